@@ -1,0 +1,335 @@
+"""The mesh: validated once at the border, read-only afterwards.
+
+libigl trusts its input (a face index out of range corrupts memory), so everything that reaches it passes here first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import TypeVar
+
+import igl
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.csgraph as csgraph
+
+from heat_igl import connectivity
+from heat_igl.errors import MeshError
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+
+__all__ = ["RANGE_LIMIT", "Mesh", "MeshReport"]
+
+# How many lengths sqrt(t) the heat survives in double precision: values run from 1e290 (the rest is left for the
+# gradient's 1 / length) down to 1e-300, 590 decades or 1358 e-foldings, less a margin for the first step away.
+RANGE_LIMIT = 1300.0
+
+# Products of four lengths (areas by Heron's formula) must stay inside the double range.
+_LARGEST_EXTENT = 1e60
+_SMALLEST_EXTENT = 1e-60
+
+
+ArrayT = TypeVar("ArrayT", bound=AnyArray)
+
+
+def _frozen(array: ArrayT) -> ArrayT:
+    array.setflags(write=False)
+    return array
+
+
+def _positions(V: ArrayLike) -> FloatArray:
+    try:
+        array = np.asarray(V)
+    except ValueError as error:
+        raise MeshError(f"V must be an array of shape (n, 3): {error}") from None
+    if array.dtype.kind not in "iuf":
+        raise MeshError(f"V must hold real numbers, not {array.dtype}: pass an (n, 3) array of positions")
+    if array.ndim != 2 or array.shape[1] != 3:
+        remedy = "; append a zero column to planar positions" if array.ndim == 2 and array.shape[1] == 2 else ""
+        raise MeshError(f"V must have shape (n, 3), but it has shape {array.shape}{remedy}")
+    if not len(array):
+        raise MeshError("V is empty: a mesh needs vertices")
+    with np.errstate(over="ignore"):
+        positions = np.array(array, dtype=np.float64, order="C", copy=True)
+    bad = ~np.isfinite(positions)
+    if bad.any():
+        row, column = (int(i) for i in np.argwhere(bad)[0])
+        raise MeshError(
+            f"V[{row}, {column}] is {positions[row, column]} ({int(bad.any(axis=1).sum())} of {len(positions)} "
+            "vertices are not finite): remove or repair these vertices"
+        )
+    return positions
+
+
+def _faces(F: ArrayLike, n: int) -> IntArray:
+    try:
+        array = np.asarray(F)
+    except ValueError as error:
+        raise MeshError(f"F must be an array of shape (m, 3) or (m, 4): {error}") from None
+    if array.size == 0:
+        raise MeshError("F is empty: a mesh needs triangles (m, 3) or tetrahedra (m, 4)")
+    if array.dtype.kind not in "iu":
+        raise MeshError(
+            f"F must hold integers, not {array.dtype}: vertex indices are 0-based; convert with F.astype(int)"
+        )
+    if array.ndim != 2 or array.shape[1] not in (3, 4):
+        raise MeshError(
+            f"F must have shape (m, 3) for triangles or (m, 4) for tetrahedra, but it has shape {array.shape}"
+        )
+    outside = (array < 0) | (array >= n)
+    if outside.any():
+        row, column = (int(i) for i in np.argwhere(outside)[0])
+        hint = "; the indices look 1-based, subtract 1" if array.min() == 1 and array.max() == n else ""
+        raise MeshError(
+            f"F[{row}, {column}] = {array[row, column]} is no vertex ({int(outside.any(axis=1).sum())} of {len(array)} "
+            f"faces are affected): V has {n} rows, so indices run from 0 to {n - 1}{hint}"
+        )
+    faces = np.array(array, dtype=np.int64, order="C", copy=True)
+    ordered = np.sort(faces, axis=1)
+    repeats = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    if repeats.any():
+        row = int(np.flatnonzero(repeats)[0])
+        raise MeshError(
+            f"F[{row}] = {faces[row].tolist()} repeats a vertex ({int(repeats.sum())} of {len(faces)} faces do): "
+            "remove these faces, they have no area"
+        )
+    return faces
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Mesh:
+    """A triangle mesh in space, or a tetrahedral mesh.
+
+    Parameters
+    ----------
+    V : (n, 3) array_like of real numbers
+        Vertex positions, in any unit of length; copied to float64.
+    F : (m, 3) or (m, 4) array_like of integers
+        Vertex indices of each triangle or tetrahedron, counted from 0; copied to int64. "Face" stands for
+        both kinds throughout the package.
+
+    Raises
+    ------
+    MeshError
+        If an array has the wrong shape or type, is empty, holds a position that is not finite, an index that is no
+        vertex, or a face that repeats a vertex. The message names the first offender and how many there are.
+
+    Notes
+    -----
+    Both arrays are read-only, so that a solver made from the mesh cannot come to disagree with it. Meshes that are
+    merely bad (not manifold, slivers, zero areas, duplicated faces, unreferenced vertices) are accepted;
+    `report` lists what is wrong with them.
+    """
+
+    V: FloatArray
+    F: IntArray
+
+    def __init__(self, V: ArrayLike, F: ArrayLike) -> None:
+        positions = _positions(V)
+        faces = _faces(F, len(positions))
+        used = positions[np.unique(faces)]
+        extent = float(np.linalg.norm((used.max(axis=0) / 2 - used.min(axis=0) / 2) * 2))
+        if extent == 0:
+            raise MeshError("all vertices in V that F uses lie in one point: there is no distance to measure")
+        if not _SMALLEST_EXTENT < extent < _LARGEST_EXTENT:
+            raise MeshError(f"V spans {extent:.3g} units, outside what areas in double precision allow: rescale V")
+        positions.setflags(write=False)
+        faces.setflags(write=False)
+        object.__setattr__(self, "V", positions)
+        object.__setattr__(self, "F", faces)
+
+    def __repr__(self) -> str:
+        kind = "tetrahedra" if self.is_tetrahedral else "triangles"
+        return f"Mesh({self.n_vertices} vertices, {self.n_faces} {kind})"
+
+    def __reduce__(self) -> tuple[type[Mesh], tuple[FloatArray, IntArray]]:
+        return Mesh, (self.V, self.F)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices n."""
+        return len(self.V)
+
+    @property
+    def n_faces(self) -> int:
+        """Number of triangles or tetrahedra m."""
+        return len(self.F)
+
+    @property
+    def is_tetrahedral(self) -> bool:
+        """Whether the faces are tetrahedra."""
+        return bool(self.F.shape[1] == 4)
+
+    @cached_property
+    def edges(self) -> IntArray:
+        """The distinct edges (k, 2), each ascending."""
+        return _frozen(connectivity.edges(self.F, self.n_vertices))
+
+    @cached_property
+    def edge_lengths(self) -> FloatArray:
+        """The length (k,) of each of `edges`, in the mesh's unit."""
+        return _frozen(np.linalg.norm(self.V[self.edges[:, 0]] - self.V[self.edges[:, 1]], axis=1))
+
+    @cached_property
+    def components(self) -> IntArray:
+        """Component label (n,) of each vertex; a vertex that no face uses is a component of its own."""
+        return _frozen(connectivity.connected_components(self.F, self.n_vertices))
+
+    @cached_property
+    def referenced(self) -> BoolArray:
+        """Which vertices (n,) belong to a face."""
+        mask = np.zeros(self.n_vertices, bool)
+        mask[self.F] = True
+        return _frozen(mask)
+
+    @cached_property
+    def boundary(self) -> BoolArray:
+        """Which vertices (n,) lie on the boundary: on an edge (a triangle, for tetrahedra) of only one face."""
+        found = connectivity.facets(self.F, self.n_vertices)
+        mask = np.zeros(self.n_vertices, bool)
+        mask[found.vertices[found.n_faces == 1]] = True
+        return _frozen(mask)
+
+    @cached_property
+    def measures(self) -> FloatArray:
+        """The area of each triangle or volume of each tetrahedron (m,), never negative."""
+        if self.is_tetrahedral:
+            return _frozen(np.abs(igl.volume(self.V, self.F)))
+        return _frozen(igl.doublearea(self.V, self.F) / 2)
+
+    @cached_property
+    def longest_distance(self) -> float:
+        """Length of a longest shortest path along edges, over all components, in the mesh's unit.
+
+        Two rounds of Dijkstra, the second from the farthest vertex of the first, which finds the diameter of a tree
+        exactly and that of a mesh to a few percent. Paths along edges are longer than geodesics.
+        """
+        i, j = self.edges.T
+        graph = sp.csr_array((self.edge_lengths, (i, j)), shape=(self.n_vertices, self.n_vertices))
+        start = np.unique(self.components, return_index=True)[1]
+        for _ in range(2):
+            distance = csgraph.dijkstra(graph, directed=False, indices=start, min_only=True)
+            ascending = np.argsort(distance, kind="stable")
+            start = np.empty_like(start)
+            start[self.components[ascending]] = ascending
+        return float(distance.max())
+
+    def report(self) -> MeshReport:
+        """Everything about the mesh that bears on a distance computed on it.
+
+        Returns
+        -------
+        MeshReport
+            Prints as a table; fields that list offenders hold their indices.
+        """
+        return _report(self)
+
+
+@dataclass(frozen=True)
+class MeshReport:
+    """What `Mesh.report` finds. Lengths are in the mesh's unit; lists of offenders are index arrays.
+
+    Attributes
+    ----------
+    n_vertices, n_faces, n_edges : int
+        Counts; faces are triangles or tetrahedra.
+    n_components : int
+        Components that hold faces.
+    n_boundary_loops : int
+        Closed curves (patches, for tetrahedra) of boundary.
+    euler_characteristic : int
+        Alternating sum of the numbers of simplices, unreferenced vertices left out.
+    nonmanifold_edges : (k, 2) int64
+        Edges of more than two triangles (for tetrahedra: triangles (k, 3) of more than two tetrahedra).
+    nonmanifold_vertices : (k,) int64
+        Vertices whose faces are not one fan (triangle meshes; empty for tetrahedra).
+    degenerate_faces : (k,) int64
+        Faces whose area or volume is zero to rounding: at most 1e-12 of the square (cube) of their longest edge.
+    duplicate_faces : (k,) int64
+        Faces with the vertices of an earlier one.
+    unreferenced_vertices : (k,) int64
+        Vertices that no face uses; every distance there is ``inf``.
+    shortest_edge, mean_edge, longest_edge : float
+        Over the distinct edges.
+    smallest_angle, largest_angle : float
+        Of all triangles, in degrees.
+    is_intrinsic_delaunay : bool or None
+        Whether no edge would be flipped by the intrinsic Delaunay triangulation; None for tetrahedra.
+    edges_across : float
+        `Mesh.longest_distance` in mean edge lengths.
+    range_limit : float
+        The number of edges across up to which the heat of the default time step t = h^2 stays inside the double
+        range; beyond it the solver raises t.
+    """
+
+    n_vertices: int
+    n_faces: int
+    n_edges: int
+    n_components: int
+    n_boundary_loops: int
+    euler_characteristic: int
+    nonmanifold_edges: IntArray
+    nonmanifold_vertices: IntArray
+    degenerate_faces: IntArray
+    duplicate_faces: IntArray
+    unreferenced_vertices: IntArray
+    shortest_edge: float
+    mean_edge: float
+    longest_edge: float
+    smallest_angle: float
+    largest_angle: float
+    is_intrinsic_delaunay: bool | None
+    edges_across: float
+    range_limit: float
+
+    def rows(self) -> list[tuple[str, str]]:
+        """The report as (name, value) pairs for printing; long lists of offenders are cut."""
+        return [(field.name.replace("_", " "), _shown(getattr(self, field.name))) for field in fields(self)]
+
+    def __str__(self) -> str:
+        rows = self.rows()
+        width = max(len(name) for name, _ in rows)
+        return "\n".join(f"{name:{width}}  {value}" for name, value in rows)
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        head = ", ".join(str(row.tolist()) for row in value[:5])
+        return f"{len(value)}" + (f": {head}" if head else "") + (", ..." if len(value) > 5 else "")
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "-" if value is None else str(value)
+
+
+def _report(mesh: Mesh) -> MeshReport:
+    n, F = mesh.n_vertices, mesh.F
+    found = connectivity.facets(F, n)
+    triangles = found.vertices if mesh.is_tetrahedral else F
+    angles = np.degrees(igl.internal_angles(mesh.V, triangles))
+    lengths = igl.edge_lengths(mesh.V, F)
+    n_unreferenced = int((~mesh.referenced).sum())
+    cells = len(found.vertices) - len(F) if mesh.is_tetrahedral else len(F)
+    mean_edge = float(mesh.edge_lengths.mean())
+    return MeshReport(
+        n_vertices=n,
+        n_faces=len(F),
+        n_edges=len(mesh.edges),
+        n_components=int(mesh.components.max()) + 1 - n_unreferenced,
+        n_boundary_loops=connectivity.boundary_loops(F, n),
+        euler_characteristic=n - n_unreferenced - len(mesh.edges) + cells,
+        nonmanifold_edges=found.vertices[found.n_faces > 2],
+        nonmanifold_vertices=np.empty(0, np.int64) if mesh.is_tetrahedral else connectivity.nonmanifold_vertices(F, n),
+        degenerate_faces=np.flatnonzero(mesh.measures <= 1e-12 * lengths.max(axis=1) ** (F.shape[1] - 1)),
+        duplicate_faces=connectivity.duplicate_faces(F, n),
+        unreferenced_vertices=np.flatnonzero(~mesh.referenced),
+        shortest_edge=float(mesh.edge_lengths.min()),
+        mean_edge=mean_edge,
+        longest_edge=float(mesh.edge_lengths.max()),
+        smallest_angle=float(angles.min()),
+        largest_angle=float(angles.max()),
+        is_intrinsic_delaunay=None if mesh.is_tetrahedral else bool(igl.is_intrinsic_delaunay(lengths, F).all()),
+        edges_across=mesh.longest_distance / mean_edge,
+        range_limit=RANGE_LIMIT,
+    )

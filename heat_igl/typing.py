@@ -1,0 +1,16 @@
+"""Array types used in annotations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["AnyArray", "ArrayLike", "BoolArray", "FloatArray", "IntArray"]
+
+ArrayLike = npt.ArrayLike
+AnyArray = npt.NDArray[Any]
+BoolArray = npt.NDArray[np.bool_]
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
