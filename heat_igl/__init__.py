@@ -8,17 +8,21 @@ from heat_igl.errors import (
     ReferenceSolverError,
     SourceError,
 )
+from heat_igl.heat_method import HeatMethodSolver, HeatSolution, heat_method_distance
 from heat_igl.mesh import Mesh, MeshReport
 
 __all__ = [
     "AccuracyWarning",
     "FactorizationError",
+    "HeatMethodSolver",
+    "HeatSolution",
     "Mesh",
     "MeshError",
     "MeshReport",
     "MissingExtraError",
     "ReferenceSolverError",
     "SourceError",
+    "heat_method_distance",
 ]
 
 __version__ = "0.1.0"

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
-from heat_igl.typing import BoolArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = [
     "Facets",
@@ -21,6 +21,7 @@ __all__ = [
     "duplicate_faces",
     "edges",
     "facets",
+    "longest_path",
     "nonmanifold_vertices",
     "unique_rows",
 ]
@@ -148,3 +149,33 @@ def nonmanifold_vertices(F: IntArray, n: int) -> IntArray:
     fan_and_vertex = np.unique(np.stack([fan, F.ravel()], axis=1), axis=0)
     bad[np.bincount(fan_and_vertex[:, 1], minlength=n) > 1] = True
     return np.flatnonzero(bad)
+
+
+def longest_path(edges: IntArray, lengths: FloatArray, components: IntArray) -> float:
+    """Length of a longest shortest path along edges, over all components.
+
+    Two rounds of Dijkstra, the second from the farthest vertices of the first; exact on a tree, and a lower bound
+    within a few percent on surfaces.
+
+    Parameters
+    ----------
+    edges : (k, 2) int64
+        End points; an edge that returns to its vertex or repeats another is allowed.
+    lengths : (k,) float64
+        Positive.
+    components : (n,) int64
+        Component labels 0, 1, ... of the vertices.
+    """
+    n = len(components)
+    ascending = np.argsort(lengths, kind="stable")
+    pairs = np.sort(edges, axis=1)[ascending]
+    first, _, _ = unique_rows(pairs, n)  # the shortest of several edges between two vertices
+    i, j = pairs[first].T
+    graph = sp.csr_array((lengths[ascending][first], (i, j)), shape=(n, n))
+    start = np.unique(components, return_index=True)[1]
+    for _ in range(2):
+        distance = csgraph.dijkstra(graph, directed=False, indices=start, min_only=True)
+        # In ascending order the last one written per component is its farthest vertex.
+        farthest_last = np.argsort(distance, kind="stable")
+        start[components[farthest_last]] = farthest_last
+    return float(distance.max())

@@ -11,8 +11,6 @@ from typing import TypeVar
 
 import igl
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 
 from heat_igl import connectivity
 from heat_igl.errors import MeshError
@@ -199,20 +197,8 @@ class Mesh:
 
     @cached_property
     def longest_distance(self) -> float:
-        """Length of a longest shortest path along edges, over all components, in the mesh's unit.
-
-        Two rounds of Dijkstra, the second from the farthest vertex of the first, which finds the diameter of a tree
-        exactly and that of a mesh to a few percent. Paths along edges are longer than geodesics.
-        """
-        i, j = self.edges.T
-        graph = sp.csr_array((self.edge_lengths, (i, j)), shape=(self.n_vertices, self.n_vertices))
-        start = np.unique(self.components, return_index=True)[1]
-        for _ in range(2):
-            distance = csgraph.dijkstra(graph, directed=False, indices=start, min_only=True)
-            ascending = np.argsort(distance, kind="stable")
-            start = np.empty_like(start)
-            start[self.components[ascending]] = ascending
-        return float(distance.max())
+        """Length of a longest shortest path along edges, over all components; see `connectivity.longest_path`."""
+        return connectivity.longest_path(self.edges, self.edge_lengths, self.components)
 
     def report(self) -> MeshReport:
         """Everything about the mesh that bears on a distance computed on it.

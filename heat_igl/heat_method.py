@@ -1,0 +1,402 @@
+"""`HeatMethodSolver`: the three steps put together, factored once, asked many times."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from heat_igl.errors import AccuracyWarning, MissingExtraError, SourceError
+from heat_igl.factorization import Backend
+from heat_igl.mesh import RANGE_LIMIT, Mesh
+from heat_igl.operators import Laplacian, Operators, operators
+from heat_igl.sources import Sources, vertex_sources
+from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, normalize
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+
+__all__ = ["Diagnostics", "HeatMethodSolver", "HeatSolution", "heat_method_distance", "smallest_time_step"]
+
+# Largest heat at a source, in units of h: leaves room for the gradient's 1 / length on slivers.
+_SOURCE_HEAT = 1e290
+# Below this the heat has lost digits to gradual underflow.
+_LOWEST_HEAT = 1e-300
+# Right-hand sides solved together; wider blocks measured no faster.
+_BLOCK = 8
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """What a solver did, and what it rests on.
+
+    Attributes
+    ----------
+    t : float
+        Time step used, a squared length.
+    t_requested : float
+        What was asked for: `t`, or ``t_coef * h**2``.
+    mean_edge_length : float
+        h, of the triangulation that was solved on.
+    edges_across : float
+        Longest shortest path along edges, in units of h.
+    n_flips : int
+        Edges flipped to make the triangulation intrinsic Delaunay.
+    lengthening : float
+        What was added to every edge length because of degenerate triangles; 0 on other meshes.
+    backend : str
+        Library that holds the factors.
+    seconds_operators, seconds_factorization : float
+        Wall-clock time of the two stages of the constructor.
+    """
+
+    t: float
+    t_requested: float
+    mean_edge_length: float
+    edges_across: float
+    n_flips: int
+    lengthening: float
+    backend: str
+    seconds_operators: float
+    seconds_factorization: float
+
+    @property
+    def t_raised(self) -> bool:
+        """Whether t was raised to keep the heat inside the double range."""
+        return self.t > self.t_requested
+
+
+@dataclass(frozen=True, eq=False)
+class HeatSolution:
+    """All three steps of one answer.
+
+    Attributes
+    ----------
+    heat : (n,) float64
+        u of step 1 for a unit of heat on each source, per area. Where it falls below 1e-308 it reads 0; the steps
+        themselves run on a multiple that does not.
+    direction : (m, d) float64
+        Unit vectors X of step 2, per face of the triangulation that was solved on, d = 3 components in space or
+        d = 2 in the face's own frame (`intrinsic_gradient`); 0 where no heat arrives.
+    distance : (n,) float64
+        As `HeatMethodSolver.distance` returns it.
+    t : float
+        Time step.
+    diagnostics : Diagnostics
+        The solver's.
+    """
+
+    heat: FloatArray
+    direction: FloatArray
+    distance: FloatArray
+    t: float
+    diagnostics: Diagnostics
+
+
+def _positive(name: str, value: float) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not (np.isfinite(number) and number > 0):
+        raise ValueError(f"{name} must be a positive number, not {value!r}")
+    return number
+
+
+def smallest_time_step(domain: Operators) -> float:
+    """The smallest time step whose heat crosses `domain` without underflow in double precision.
+
+    Along a line of edges of length h, one backward Euler step falls by acosh(1 + h^2 / (2 t)) e-foldings per edge. The
+    result makes that, times the number of edges across, `RANGE_LIMIT`.
+    """
+    h = domain.mean_edge_length
+    per_edge = RANGE_LIMIT / (domain.longest_distance / h)
+    return h**2 / (2 * (float(np.cosh(per_edge)) - 1)) if per_edge < 700 else 0.0
+
+
+class HeatMethodSolver:
+    """Geodesic distance by the heat method (Crane, Weischedel, Wardetzky 2013): factor once, ask many times.
+
+    Parameters
+    ----------
+    mesh : Mesh or (n, 3) array_like
+        A mesh, or the positions V of one whose faces are `F`.
+    F : (m, 3) or (m, 4) array_like, optional
+        Faces, when `mesh` is V.
+    t_coef : float
+        Scale-free time step, t = t_coef h^2 with h the mean edge length of the triangulation that is solved on. Larger
+        values smooth the distance across the cut locus.
+    t : float, optional
+        Time step as a squared length; overrides `t_coef`.
+    laplacian : {"intrinsic-delaunay", "cotan"}
+        Triangulation to solve on, see `operators`; "cotan" is the paper's. Tetrahedra always keep their own.
+    boundary : {"neumann", "dirichlet", "average"}
+        What the heat does at the boundary, see `HeatFlow`.
+    backend : {"auto", "scipy", "cholespy"}
+        Linear solver, see `factorize`.
+
+    Raises
+    ------
+    MeshError
+        If the mesh cannot be used; the message names the first offender.
+    FactorizationError
+        If a matrix is not positive definite.
+    ValueError
+        If an option has no meaning.
+
+    Warns
+    -----
+    AccuracyWarning
+        If an explicit `t` had to be raised for the heat to cross the mesh.
+
+    Notes
+    -----
+    A time step too small for the heat to cross the mesh in double precision is raised, and `t` and `diagnostics` say
+    so. The solver is immutable; threads may share it, and a pickled copy gives the same bits.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh | ArrayLike,
+        F: ArrayLike | None = None,
+        *,
+        t_coef: float = 1.0,
+        t: float | None = None,
+        laplacian: Laplacian = "intrinsic-delaunay",
+        boundary: Boundary = "neumann",
+        backend: Backend = "auto",
+    ) -> None:
+        start = time.perf_counter()
+        domain = operators(_as_mesh(mesh, F), laplacian)
+        self._set_up(domain, t_coef, t, boundary, backend, time.perf_counter() - start)
+
+    @classmethod
+    def from_operators(
+        cls,
+        domain: Operators,
+        *,
+        t_coef: float = 1.0,
+        t: float | None = None,
+        boundary: Boundary = "neumann",
+        backend: Backend = "auto",
+    ) -> HeatMethodSolver:
+        """A solver on any domain that has operators; parameters as for the class."""
+        solver = cls.__new__(cls)
+        solver._set_up(domain, t_coef, t, boundary, backend, 0.0)
+        return solver
+
+    def _set_up(
+        self,
+        domain: Operators,
+        t_coef: float,
+        t: float | None,
+        boundary: Boundary,
+        backend: Backend,
+        seconds_operators: float,
+    ) -> None:
+        start = time.perf_counter()
+        requested = _positive("t_coef", t_coef) * domain.mean_edge_length**2 if t is None else _positive("t", t)
+        step = max(requested, smallest_time_step(domain))
+        if t is not None and step > requested:
+            warnings.warn(
+                f"t = {requested:.4g} is too small for heat to cross the mesh in double precision; using {step:.4g}",
+                AccuracyWarning,
+                stacklevel=3,
+            )
+        self._operators = domain
+        self._heat_flow = HeatFlow(domain, step, boundary, backend)
+        self._poisson = PoissonProblem(domain, backend)
+        triangulation = domain.triangulation
+        self._diagnostics = Diagnostics(
+            t=step,
+            t_requested=requested,
+            mean_edge_length=domain.mean_edge_length,
+            edges_across=domain.longest_distance / domain.mean_edge_length,
+            n_flips=triangulation.n_flips if triangulation else 0,
+            lengthening=triangulation.lengthening if triangulation else 0.0,
+            backend=self._poisson.backend,
+            seconds_operators=seconds_operators,
+            seconds_factorization=time.perf_counter() - start,
+        )
+
+    @property
+    def operators(self) -> Operators:
+        """L, M, G and D of the triangulation that is solved on."""
+        return self._operators
+
+    @property
+    def t(self) -> float:
+        """The time step in use, a squared length."""
+        return self._diagnostics.t
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """What the solver did and rests on."""
+        return self._diagnostics
+
+    @property
+    def n_vertices(self) -> int:
+        """Length of a distance array."""
+        return self._operators.n
+
+    def distance(self, sources: Sources) -> FloatArray:
+        """Distance from the nearest source.
+
+        Parameters
+        ----------
+        sources : int, sequence of int, or (n,) mask of bool
+            Source vertices.
+
+        Returns
+        -------
+        (n,) float64
+            In the mesh's unit: 0 at the sources, ``inf`` at vertices that no source reaches, never negative or NaN.
+
+        Raises
+        ------
+        SourceError
+            If `sources` does not name vertices of the mesh.
+
+        Warns
+        -----
+        AccuracyWarning
+            If heat underflowed on the way, so that distances beyond are too short.
+        """
+        chosen = [vertex_sources(sources, self.n_vertices)]
+        _, _, distance = self._steps(chosen)
+        return np.ascontiguousarray(distance[:, 0])
+
+    def distances(
+        self, source_sets: Sequence[Sources], out: AnyArray | None = None, progress: bool = False
+    ) -> AnyArray:
+        """Distance from each of several sets of sources, solved in blocks.
+
+        Parameters
+        ----------
+        source_sets : sequence of sources
+            k entries, each as for `distance`.
+        out : (k, n) array of float, optional
+            Where to write, for instance a `numpy.memmap`; float64 or float32.
+        progress : bool
+            Show a progress bar on standard error (extra ``cli``).
+
+        Returns
+        -------
+        (k, n) float64, or `out`
+            Row i is the distance from ``source_sets[i]``; the same as one by one to rounding.
+
+        Raises
+        ------
+        SourceError
+            Before anything is solved, if an entry does not name vertices; the message says which.
+        ValueError
+            If `out` has the wrong shape or cannot hold floats.
+        """
+        chosen = []
+        for i, sources in enumerate(source_sets):
+            try:
+                chosen.append(vertex_sources(sources, self.n_vertices))
+            except SourceError as error:
+                raise SourceError(f"source_sets[{i}]: {error}") from None
+        shape = (len(chosen), self.n_vertices)
+        if out is None:
+            out = np.empty(shape)
+        elif out.shape != shape or out.dtype.kind != "f":
+            raise ValueError(f"out must be an array of floats of shape {shape}, not {out.dtype} of shape {out.shape}")
+        starts: Any = range(0, len(chosen), _BLOCK)
+        for start in _tracked(starts) if progress else starts:
+            out[start : start + _BLOCK] = self._steps(chosen[start : start + _BLOCK])[2].T
+        return out
+
+    def solve(self, sources: Sources) -> HeatSolution:
+        """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
+        chosen = [vertex_sources(sources, self.n_vertices)]
+        u, X, distance = self._steps(chosen)
+        with np.errstate(under="ignore"):
+            heat = u[:, 0] / self._source_heat(chosen[0]) / self._heat_flow.mean_mass
+        direction = np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T)
+        return HeatSolution(heat, direction, np.ascontiguousarray(distance[:, 0]), self.t, self.diagnostics)
+
+    def _source_heat(self, sources: IntArray) -> float:
+        """Initial heat of each source, for `HeatFlow.solve`: as much as cannot overflow.
+
+        Rows of L sum to zero, so the maximum principle bounds the heat by the largest initial heat over mass.
+        """
+        mass = self._operators.M.diagonal()[sources] / self._heat_flow.mean_mass
+        smallest = float(mass[mass > 0].min(initial=1.0))
+        return _SOURCE_HEAT * min(self._operators.mean_edge_length, 1e10) * smallest
+
+    def _steps(self, source_sets: list[IntArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Heat (n, k), directions (d m, k) and distances (n, k) for k sets of sources."""
+        domain = self._operators
+        initial = np.zeros((domain.n, len(source_sets)))
+        for column, sources in enumerate(source_sets):
+            initial[sources, column] = self._source_heat(sources)
+        u = self._heat_flow.solve(initial)
+        X = normalize(domain, u)
+        phi = self._poisson.solve(domain.D @ X)
+        for column, sources in enumerate(source_sets):
+            phi[:, column] = self._from_sources(phi[:, column], u[:, column], sources)
+        return u, X, phi
+
+    def _from_sources(self, phi: FloatArray, u: FloatArray, sources: IntArray) -> FloatArray:
+        """Shift phi so that distances start at 0 at the sources, in each component by itself."""
+        components = self._operators.components
+        count = np.bincount(components[sources], minlength=int(components.max()) + 1)
+        if (count > 1).any() and MODE:
+            base = phi[sources].min()
+            initial = np.zeros(len(phi))
+            initial[sources] = self._source_heat(sources) * (phi[sources] - base) / max(np.ptp(phi[sources]), 1e-300)
+            with np.errstate(all="ignore"):
+                kappa = np.where(u > 0, self._heat_flow.solve(initial) / u, 0) * np.ptp(phi[sources])
+            phi = phi - np.clip(np.nan_to_num(kappa), 0, np.ptp(phi[sources]))
+        total = np.bincount(components[sources], weights=phi[sources], minlength=len(count))
+        offset = np.where(count > 0, total / np.maximum(count, 1), -np.inf)
+        distance = np.maximum(phi - offset[components], 0.0)
+        distance[sources] = 0.0
+        return distance
+
+
+def _tracked(starts: Any) -> Any:
+    try:
+        from rich.progress import track
+    except ImportError:
+        raise MissingExtraError.of("progress=True", "rich", "cli") from None
+    return track(starts, description="distances")
+
+
+def _as_mesh(mesh: Mesh | ArrayLike, F: ArrayLike | None) -> Mesh:
+    if isinstance(mesh, Mesh):
+        if F is not None:
+            raise TypeError("pass a Mesh alone, or positions V and faces F")
+        return mesh
+    if F is None:
+        raise TypeError("faces F are missing: pass a Mesh, or positions V and faces F")
+    return Mesh(mesh, F)
+
+
+def heat_method_distance(V: ArrayLike, F: ArrayLike, sources: Sources, **options: Any) -> FloatArray:
+    """Geodesic distance from `sources` in one call; to ask more than once, keep a `HeatMethodSolver`.
+
+    Parameters
+    ----------
+    V : (n, 3) array_like
+        Vertex positions.
+    F : (m, 3) or (m, 4) array_like
+        Triangles or tetrahedra.
+    sources : int, sequence of int, or (n,) mask of bool
+        Source vertices.
+    **options
+        As for `HeatMethodSolver`.
+
+    Returns
+    -------
+    (n,) float64
+        See `HeatMethodSolver.distance`, for errors too.
+    """
+    return HeatMethodSolver(V, F, **options).distance(sources)
+
+
+MODE = 1

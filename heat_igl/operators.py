@@ -1,0 +1,180 @@
+"""The discrete Laplacian, mass, gradient and divergence, from libigl.
+
+`Operators` is all that the three steps of the heat method know of a domain. A new kind of domain is a new function that
+returns one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import igl
+import numpy as np
+import scipy.sparse as sp
+
+from heat_igl import connectivity
+from heat_igl.errors import MeshError
+from heat_igl.intrinsic import (
+    IntrinsicTriangulation,
+    intrinsic_delaunay,
+    intrinsic_gradient,
+    intrinsic_triangulation,
+)
+from heat_igl.mesh import Mesh
+from heat_igl.typing import BoolArray, FloatArray, IntArray
+
+__all__ = ["Laplacian", "Operators", "cotan_operators", "intrinsic_operators", "operators"]
+
+Laplacian = Literal["intrinsic-delaunay", "cotan"]
+
+
+@dataclass(frozen=True, eq=False)
+class Operators:
+    """The operators of a domain with n vertices and m faces (triangles, or tetrahedra).
+
+    Lengths are in the domain's own unit, d is the number of gradient components per face: 3 where faces lie in space,
+    2 where each has a plane of its own.
+
+    Attributes
+    ----------
+    L : (n, n) csc_matrix
+        Cotangent Laplacian, symmetric, negative semidefinite, integrated: rows sum to 0. Unit 1 for triangles, length
+        for tetrahedra. L = D G.
+    M : (n, n) csc_matrix
+        Lumped mass, diagonal: the area (volume) of each vertex's cell. Sums to the area of the domain.
+    G : (d m, n) csc_matrix
+        Gradient of piecewise linear functions, constant per face, stacked by coordinate: row ``k * m + f`` is
+        component k on face f. Unit 1 / length.
+    D : (n, d m) csc_matrix
+        Integrated divergence, D = -G^T W with W the face areas repeated d times.
+    weights : (m,) float64
+        Area (volume) of each face.
+    mean_edge_length : float
+        h, over the distinct edges of the triangulation that the operators belong to.
+    components : (n,) int64
+        Component label of each vertex.
+    boundary : (n,) bool
+        Vertices on the boundary.
+    referenced : (n,) bool
+        Vertices that a face uses; on the others M is 0.
+    longest_distance : float
+        Length of a longest shortest path along edges; heat has to last that far.
+    triangulation : IntrinsicTriangulation or None
+        The triangles that the operators belong to; None for tetrahedra.
+    """
+
+    L: sp.csc_matrix
+    M: sp.csc_matrix
+    G: sp.csc_matrix
+    weights: FloatArray
+    mean_edge_length: float
+    components: IntArray
+    boundary: BoolArray
+    referenced: BoolArray
+    longest_distance: float
+    triangulation: IntrinsicTriangulation | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of vertices."""
+        return int(self.L.shape[0])
+
+    @property
+    def dimension(self) -> int:
+        """Number d of gradient components per face."""
+        return int(self.G.shape[0]) // len(self.weights)
+
+    @cached_property
+    def D(self) -> sp.csc_matrix:
+        """Integrated divergence (n, d m)."""
+        divergence = self.G.T.tocsc()
+        scale = np.tile(-self.weights, self.dimension)
+        divergence.data *= np.repeat(scale, np.diff(divergence.indptr))
+        return divergence
+
+
+def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operators:
+    """The operators of `mesh`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles or tetrahedra.
+    laplacian : {"intrinsic-delaunay", "cotan"}
+        On which triangulation of a triangle mesh: its intrinsic Delaunay triangulation, whose inner edges have no
+        negative weight, or the mesh's own faces, as in the paper. Tetrahedra always keep their own.
+
+    Raises
+    ------
+    ValueError
+        If `laplacian` is neither.
+    """
+    if laplacian not in ("intrinsic-delaunay", "cotan"):
+        raise ValueError(f"laplacian must be 'intrinsic-delaunay' or 'cotan', not {laplacian!r}")
+    if mesh.is_tetrahedral:
+        return cotan_operators(mesh)
+    triangulation = intrinsic_triangulation(mesh)
+    if laplacian == "intrinsic-delaunay":
+        triangulation = intrinsic_delaunay(triangulation)
+    if triangulation.n_flips or triangulation.lengthening:
+        return intrinsic_operators(triangulation)
+    return replace(cotan_operators(mesh), triangulation=triangulation)
+
+
+def cotan_operators(mesh: Mesh) -> Operators:
+    """The operators on the mesh's own triangles or tetrahedra, gradients in space (d = 3).
+
+    Raises
+    ------
+    MeshError
+        If a tetrahedron has no volume.
+    """
+    flat = mesh.measures <= 0
+    if flat.any():
+        first = int(np.flatnonzero(flat)[0])
+        raise MeshError(
+            f"F[{first}] = {mesh.F[first].tolist()} has no {'volume' if mesh.is_tetrahedral else 'area'} "
+            f"({int(flat.sum())} of {mesh.n_faces} faces): remove these faces"
+        )
+    return Operators(
+        L=_padded(igl.cotmatrix(mesh.V, mesh.F), mesh.n_vertices),
+        M=_padded(igl.massmatrix(mesh.V, mesh.F), mesh.n_vertices),
+        G=igl.grad(mesh.V, mesh.F),
+        weights=mesh.measures,
+        mean_edge_length=float(mesh.edge_lengths.mean()),
+        components=mesh.components,
+        boundary=mesh.boundary,
+        referenced=mesh.referenced,
+        longest_distance=mesh.longest_distance,
+    )
+
+
+def intrinsic_operators(triangulation: IntrinsicTriangulation) -> Operators:
+    """The operators of triangles that are known by their edge lengths, gradients in the plane of each (d = 2)."""
+    F, lengths, n = triangulation.F, triangulation.l, triangulation.n
+    referenced = np.zeros(n, bool)
+    referenced[F] = True
+    components = connectivity.connected_components(F, n)
+    edges = triangulation.edges
+    ends = np.stack([triangulation.tail(edges), triangulation.head(edges)], axis=1)
+    return Operators(
+        L=_padded(igl.cotmatrix_intrinsic(lengths, F), n),
+        M=_padded(igl.massmatrix_intrinsic(lengths, F), n),
+        G=intrinsic_gradient(triangulation),
+        weights=triangulation.areas,
+        mean_edge_length=triangulation.mean_edge_length,
+        components=components,
+        boundary=triangulation.boundary,
+        referenced=referenced,
+        longest_distance=connectivity.longest_path(ends, lengths.ravel()[edges], components),
+        triangulation=triangulation,
+    )
+
+
+def _padded(matrix: sp.csc_matrix, n: int) -> sp.csc_matrix:
+    """Pad: libigl stops at the last vertex that a face uses; the others get empty rows and columns."""
+    if matrix.shape[0] < n:
+        matrix.resize((n, n))
+    return matrix
