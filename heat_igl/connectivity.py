@@ -91,7 +91,10 @@ def facets(F: IntArray, n: int) -> Facets:
     opposite = np.stack([np.delete(F, corner, axis=1) for corner in range(size)], axis=1)
     rows = np.sort(opposite.reshape(-1, size - 1), axis=1)
     first, inverse, counts = unique_rows(rows, n)
-    return Facets(rows[first], inverse.reshape(-1, size), counts)
+    found = Facets(rows[first], inverse.reshape(-1, size), counts)
+    for array in found:
+        array.setflags(write=False)
+    return found
 
 
 def connected_components(F: IntArray, n: int) -> IntArray:
@@ -103,9 +106,8 @@ def connected_components(F: IntArray, n: int) -> IntArray:
     return np.asarray(label, np.int64)
 
 
-def boundary_loops(F: IntArray, n: int) -> int:
+def boundary_loops(found: Facets, n: int) -> int:
     """The number of boundary loops of a triangle mesh (of boundary patches of a tetrahedral mesh)."""
-    found = facets(F, n)
     boundary = found.vertices[found.n_faces == 1]
     if not len(boundary):
         return 0
@@ -121,13 +123,12 @@ def duplicate_faces(F: IntArray, n: int) -> IntArray:
     return np.flatnonzero(repeated)
 
 
-def nonmanifold_vertices(F: IntArray, n: int) -> IntArray:
+def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
     """Vertices whose faces do not form one fan: two cones that touch in a point, or more than two faces on an edge.
 
     Corners of the mesh are the nodes of a graph and two corners at the same vertex are joined when their
     faces share a facet there; a manifold vertex has one connected piece. Defined for triangle meshes.
     """
-    found = facets(F, n)
     bad: BoolArray = np.zeros(n, bool)
     bad[found.vertices[found.n_faces > 2]] = True
     corner = np.arange(F.size).reshape(F.shape)

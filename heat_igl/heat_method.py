@@ -342,21 +342,33 @@ class HeatMethodSolver:
         return u, X, phi
 
     def _from_sources(self, phi: FloatArray, u: FloatArray, sources: IntArray) -> FloatArray:
-        """Shift phi so that distances start at 0 at the sources, in each component by itself."""
+        """Shift phi so that distance starts at 0 at every source; ``inf`` where there is no source to start from."""
         components = self._operators.components
-        count = np.bincount(components[sources], minlength=int(components.max()) + 1)
-        if (count > 1).any() and MODE:
-            base = phi[sources].min()
-            initial = np.zeros(len(phi))
-            initial[sources] = self._source_heat(sources) * (phi[sources] - base) / max(np.ptp(phi[sources]), 1e-300)
-            with np.errstate(all="ignore"):
-                kappa = np.where(u > 0, self._heat_flow.solve(initial) / u, 0) * np.ptp(phi[sources])
-            phi = phi - np.clip(np.nan_to_num(kappa), 0, np.ptp(phi[sources]))
-        total = np.bincount(components[sources], weights=phi[sources], minlength=len(count))
-        offset = np.where(count > 0, total / np.maximum(count, 1), -np.inf)
-        distance = np.maximum(phi - offset[components], 0.0)
+        n_sources = np.bincount(components[sources], minlength=int(components.max()) + 1)
+        if (n_sources > 1).any():
+            phi = phi - self._value_at_source(phi, u, sources)
+        total = np.bincount(components[sources], weights=phi[sources], minlength=len(n_sources))
+        shift = np.where(n_sources > 0, total / np.maximum(n_sources, 1), -np.inf)
+        distance = np.maximum(phi - shift[components], 0.0)
         distance[sources] = 0.0
         return distance
+
+    def _value_at_source(self, phi: FloatArray, u: FloatArray, sources: IntArray) -> FloatArray:
+        """The value that phi has at the source from which a vertex got its heat.
+
+        phi is a little different at each source: the error of a path between them. Shifting by the mean would move
+        the whole cell of each source by its difference. Here every vertex is shifted by the values of the sources
+        weighted by its heat from each, one more solve; the weights change from 0 to 1 within sqrt(t) of the border
+        between two cells.
+        """
+        low, high = float(phi[sources].min()), float(phi[sources].max())
+        if low == high:
+            return np.full_like(phi, low)
+        initial = np.zeros_like(phi)
+        initial[sources] = self._source_heat(sources) * ((phi[sources] - low) / (high - low))
+        warm = u > 0  # always, but for noise under "cotan" and a cold boundary
+        share = np.divide(self._heat_flow.solve(initial), u, out=np.zeros_like(u), where=warm)
+        return low + (high - low) * np.clip(share, 0.0, 1.0)
 
 
 def _tracked(starts: Any) -> Any:

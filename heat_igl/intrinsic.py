@@ -13,7 +13,6 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl import connectivity
 from heat_igl.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -111,7 +110,7 @@ def mollify(l: FloatArray) -> float:  # noqa: E741
 def intrinsic_triangulation(mesh: Mesh) -> IntrinsicTriangulation:
     """The triangles of `mesh` by their lengths, degenerate ones mollified."""
     F = mesh.F
-    found = connectivity.facets(F, mesh.n_vertices)
+    found = mesh.facets
     two = found.n_faces[found.of_face] == 2
     half_edge = np.argsort(found.of_face.ravel(), kind="stable")
     half_edge = half_edge[two.ravel()[half_edge]]

@@ -159,8 +159,15 @@ class Mesh:
         return bool(self.F.shape[1] == 4)
 
     @cached_property
+    def facets(self) -> connectivity.Facets:
+        """The distinct edges of triangles, or triangles of tetrahedra, and the faces that hold them."""
+        return connectivity.facets(self.F, self.n_vertices)
+
+    @cached_property
     def edges(self) -> IntArray:
         """The distinct edges (k, 2), each ascending."""
+        if not self.is_tetrahedral:
+            return self.facets.vertices
         return _frozen(connectivity.edges(self.F, self.n_vertices))
 
     @cached_property
@@ -183,9 +190,8 @@ class Mesh:
     @cached_property
     def boundary(self) -> BoolArray:
         """Which vertices (n,) lie on the boundary: on an edge (a triangle, for tetrahedra) of only one face."""
-        found = connectivity.facets(self.F, self.n_vertices)
         mask = np.zeros(self.n_vertices, bool)
-        mask[found.vertices[found.n_faces == 1]] = True
+        mask[self.facets.vertices[self.facets.n_faces == 1]] = True
         return _frozen(mask)
 
     @cached_property
@@ -291,7 +297,7 @@ def _shown(value: object) -> str:
 
 def _report(mesh: Mesh) -> MeshReport:
     n, F = mesh.n_vertices, mesh.F
-    found = connectivity.facets(F, n)
+    found = mesh.facets
     triangles = found.vertices if mesh.is_tetrahedral else F
     angles = np.degrees(igl.internal_angles(mesh.V, triangles))
     lengths = igl.edge_lengths(mesh.V, F)
@@ -303,10 +309,12 @@ def _report(mesh: Mesh) -> MeshReport:
         n_faces=len(F),
         n_edges=len(mesh.edges),
         n_components=int(mesh.components.max()) + 1 - n_unreferenced,
-        n_boundary_loops=connectivity.boundary_loops(F, n),
+        n_boundary_loops=connectivity.boundary_loops(found, n),
         euler_characteristic=n - n_unreferenced - len(mesh.edges) + cells,
         nonmanifold_edges=found.vertices[found.n_faces > 2],
-        nonmanifold_vertices=np.empty(0, np.int64) if mesh.is_tetrahedral else connectivity.nonmanifold_vertices(F, n),
+        nonmanifold_vertices=np.empty(0, np.int64)
+        if mesh.is_tetrahedral
+        else connectivity.nonmanifold_vertices(F, found, n),
         degenerate_faces=np.flatnonzero(mesh.measures <= 1e-12 * lengths.max(axis=1) ** (F.shape[1] - 1)),
         duplicate_faces=connectivity.duplicate_faces(F, n),
         unreferenced_vertices=np.flatnonzero(~mesh.referenced),

@@ -119,7 +119,8 @@ def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operat
     if laplacian == "intrinsic-delaunay":
         triangulation = intrinsic_delaunay(triangulation)
     if triangulation.n_flips or triangulation.lengthening:
-        return intrinsic_operators(triangulation)
+        # Paths along the mesh's own edges are paths on the surface too, and already known.
+        return intrinsic_operators(triangulation, mesh.longest_distance)
     return replace(cotan_operators(mesh), triangulation=triangulation)
 
 
@@ -151,14 +152,19 @@ def cotan_operators(mesh: Mesh) -> Operators:
     )
 
 
-def intrinsic_operators(triangulation: IntrinsicTriangulation) -> Operators:
-    """The operators of triangles that are known by their edge lengths, gradients in the plane of each (d = 2)."""
+def intrinsic_operators(triangulation: IntrinsicTriangulation, longest_distance: float | None = None) -> Operators:
+    """The operators of triangles that are known by their edge lengths, gradients in the plane of each (d = 2).
+
+    `longest_distance` is the field of `Operators`; found along the edges of the triangulation when not given.
+    """
     F, lengths, n = triangulation.F, triangulation.l, triangulation.n
     referenced = np.zeros(n, bool)
     referenced[F] = True
     components = connectivity.connected_components(F, n)
-    edges = triangulation.edges
-    ends = np.stack([triangulation.tail(edges), triangulation.head(edges)], axis=1)
+    if longest_distance is None:
+        edges = triangulation.edges
+        ends = np.stack([triangulation.tail(edges), triangulation.head(edges)], axis=1)
+        longest_distance = connectivity.longest_path(ends, lengths.ravel()[edges], components)
     return Operators(
         L=_padded(igl.cotmatrix_intrinsic(lengths, F), n),
         M=_padded(igl.massmatrix_intrinsic(lengths, F), n),
@@ -168,7 +174,7 @@ def intrinsic_operators(triangulation: IntrinsicTriangulation) -> Operators:
         components=components,
         boundary=triangulation.boundary,
         referenced=referenced,
-        longest_distance=connectivity.longest_path(ends, lengths.ravel()[edges], components),
+        longest_distance=longest_distance,
         triangulation=triangulation,
     )
 
