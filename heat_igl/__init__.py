@@ -1,5 +1,6 @@
 """Geodesic distance on meshes by the heat method, on libigl's operators."""
 
+from heat_igl import shapes
 from heat_igl.errors import (
     AccuracyWarning,
     FactorizationError,
@@ -23,6 +24,7 @@ __all__ = [
     "ReferenceSolverError",
     "SourceError",
     "heat_method_distance",
+    "shapes",
 ]
 
 __version__ = "0.1.0"

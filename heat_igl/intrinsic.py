@@ -13,15 +13,19 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.mesh import Mesh
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl import connectivity
+from heat_igl.errors import MeshError
+from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["IntrinsicTriangulation", "intrinsic_delaunay", "intrinsic_gradient", "intrinsic_triangulation", "mollify"]
-
-# An edge is flipped when the cotangents opposite it sum to less than this. Cocircular corners (every quad of a grid, a
-# cylinder or a torus) sum to zero up to rounding; flipping those would change nothing but the bits, and a larger
-# tolerance keeps the choice of diagonal the same when such a mesh is moved far from the origin (rounding 1e-9).
-_FLIP_BELOW = -1e-7
+__all__ = [
+    "IntrinsicTriangulation",
+    "from_edge_lengths",
+    "intrinsic_delaunay",
+    "intrinsic_gradient",
+    "intrinsic_triangulation",
+    "mollify",
+]
 
 # Triangles are kept at least this far, in mean edge lengths, from violating the triangle inequality.
 _MOLLIFICATION = 1e-8
@@ -107,21 +111,59 @@ def mollify(l: FloatArray) -> float:  # noqa: E741
     return max(0.0, _MOLLIFICATION * float(l.mean()) - float(slack.min()))
 
 
-def intrinsic_triangulation(mesh: Mesh) -> IntrinsicTriangulation:
-    """The triangles of `mesh` by their lengths, degenerate ones mollified."""
-    F = mesh.F
-    found = mesh.facets
-    two = found.n_faces[found.of_face] == 2
+def from_edge_lengths(
+    l: ArrayLike,  # noqa: E741
+    F: IntArray,
+    n: int,
+    facets: connectivity.Facets | None = None,
+) -> IntrinsicTriangulation:
+    """Triangles with given edge lengths, glued where they share two vertices, degenerate ones mollified.
+
+    Parameters
+    ----------
+    l : (m, 3) array_like
+        ``l[f, c]`` is the length of the edge opposite corner ``c`` of face ``f``.
+    F : (m, 3) int64
+        Faces, valid as those of a `Mesh` are.
+    n : int
+        Number of vertices.
+    facets : Facets, optional
+        Those of F, where they are known.
+
+    Raises
+    ------
+    MeshError
+        If `l` has the wrong shape or an entry that is not a positive number, or gives an edge two lengths.
+    """
+    found = connectivity.facets(F, n) if facets is None else facets
+    lengths = np.array(l, dtype=np.float64)
+    if lengths.shape != F.shape:
+        raise MeshError(f"l must have one length per side of F, shape {F.shape}, but it has shape {lengths.shape}")
+    bad = ~(np.isfinite(lengths) & (lengths >= 0))
+    if bad.any():
+        f, c = (int(i) for i in np.argwhere(bad)[0])
+        raise MeshError(f"l[{f}, {c}] = {lengths[f, c]} is not a length ({int(bad.sum())} entries are not)")
     half_edge = np.argsort(found.of_face.ravel(), kind="stable")
-    half_edge = half_edge[two.ravel()[half_edge]]
+    half_edge = half_edge[(found.n_faces[found.of_face] == 2).ravel()[half_edge]]
     a, b = half_edge[0::2], half_edge[1::2]
+    differs = np.abs(lengths.ravel()[a] - lengths.ravel()[b]) > 1e-9 * lengths.ravel()[a]
+    if differs.any():
+        one, other = int(a[differs][0]), int(b[differs][0])
+        raise MeshError(
+            f"l gives the edge between faces {one // 3} and {other // 3} two lengths, {lengths.flat[one]} and "
+            f"{lengths.flat[other]} ({int(differs.sum())} edges differ)"
+        )
     twin = np.where(found.n_faces[found.of_face.ravel()] == 1, -1, -2)
     twin[a], twin[b] = b, a
     aligned = np.ones(F.size, bool)
     aligned[a] = aligned[b] = _tail(F, a) == _head(F, b)
-    lengths = igl.edge_lengths(mesh.V, F)
     lengthening = mollify(lengths)
-    return IntrinsicTriangulation(F, lengths + lengthening, twin, aligned, mesh.n_vertices, lengthening=lengthening)
+    return IntrinsicTriangulation(F, lengths + lengthening, twin, aligned, n, lengthening=lengthening)
+
+
+def intrinsic_triangulation(mesh: Mesh) -> IntrinsicTriangulation:
+    """The triangles of `mesh` by their edge lengths, degenerate ones mollified."""
+    return from_edge_lengths(igl.edge_lengths(mesh.V, mesh.F), mesh.F, mesh.n_vertices, mesh.facets)
 
 
 def _tail(F: IntArray, half_edge: IntArray) -> IntArray:
@@ -205,7 +247,7 @@ class _Flips:
     def bad(self, half_edges: IntArray) -> IntArray:
         """The edges among `half_edges` that are to be flipped, each once, by its smaller half-edge."""
         half_edges = half_edges[(self.twin[half_edges] >= 0) & self.aligned[half_edges]]
-        half_edges = half_edges[self._cotangent_sum(half_edges) < _FLIP_BELOW]
+        half_edges = half_edges[self._cotangent_sum(half_edges) < DELAUNAY_TOLERANCE]
         smaller = np.minimum(half_edges, self.twin[half_edges])
         # An edge along which a face is glued to itself lies between two equal acute angles; only rounding says else.
         return np.unique(smaller[smaller // 3 != self.twin[smaller] // 3])

@@ -16,11 +16,16 @@ from heat_igl import connectivity
 from heat_igl.errors import MeshError
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["RANGE_LIMIT", "Mesh", "MeshReport"]
+__all__ = ["DELAUNAY_TOLERANCE", "RANGE_LIMIT", "Mesh", "MeshReport"]
 
 # How many lengths sqrt(t) the heat survives in double precision: values run from 1e290 (the rest is left for the
 # gradient's 1 / length) down to 1e-300, 590 decades or 1358 e-foldings, less a margin for the first step away.
 RANGE_LIMIT = 1300.0
+
+# An edge is flipped when the cotangents opposite it sum to less than this. Cocircular corners (every quad of a grid, a
+# cylinder or a torus) sum to zero up to rounding; flipping those would change nothing but the bits, and a larger
+# tolerance keeps the choice of diagonal the same when such a mesh is moved far from the origin (rounding 1e-9).
+DELAUNAY_TOLERANCE = -1e-7
 
 # Products of four lengths (areas by Heron's formula) must stay inside the double range.
 _LARGEST_EXTENT = 1e60
@@ -295,6 +300,12 @@ def _shown(value: object) -> str:
     return "-" if value is None else str(value)
 
 
+def _is_intrinsic_delaunay(mesh: Mesh) -> bool:
+    cotangents = 2 * igl.cotmatrix_entries(mesh.V, mesh.F)
+    total = np.bincount(mesh.facets.of_face.ravel(), weights=cotangents.ravel())
+    return not (total[mesh.facets.n_faces == 2] < DELAUNAY_TOLERANCE).any()
+
+
 def _report(mesh: Mesh) -> MeshReport:
     n, F = mesh.n_vertices, mesh.F
     found = mesh.facets
@@ -323,7 +334,7 @@ def _report(mesh: Mesh) -> MeshReport:
         longest_edge=float(mesh.edge_lengths.max()),
         smallest_angle=float(angles.min()),
         largest_angle=float(angles.max()),
-        is_intrinsic_delaunay=None if mesh.is_tetrahedral else bool(igl.is_intrinsic_delaunay(lengths, F).all()),
+        is_intrinsic_delaunay=None if mesh.is_tetrahedral else _is_intrinsic_delaunay(mesh),
         edges_across=mesh.longest_distance / mean_edge,
         range_limit=RANGE_LIMIT,
     )

@@ -1,0 +1,170 @@
+"""Generated domains, most with a known distance, for tests, benchmarks and notebooks.
+
+Every function returns a `Mesh`, but for `flat_torus`, which fits into no space and is given by its edge lengths.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import igl
+import numpy as np
+
+from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths
+from heat_igl.mesh import Mesh
+from heat_igl.typing import FloatArray, IntArray
+
+__all__ = ["box", "cone", "cylinder", "disk", "flat_torus", "grid", "icosphere", "strip", "torus"]
+
+
+def _at_least(name: str, value: int, least: int) -> int:
+    if value != int(value) or value < least:
+        raise ValueError(f"{name} must be an integer of at least {least}, not {value!r}")
+    return int(value)
+
+
+def _lattice_faces(rows: int, columns: int, wrap_rows: bool = False, wrap_columns: bool = False) -> IntArray:
+    """Triangles of a lattice of vertices ``row * columns + column``; the diagonal joins (0, 1) to (1, 0).
+
+    A lattice that wraps has a row (column) of cells between its last and its first row (column) of vertices.
+    """
+    i = np.arange(rows if wrap_rows else rows - 1)[:, None]
+    j = np.arange(columns if wrap_columns else columns - 1)[None, :]
+    below, right = (i + 1) % rows, (j + 1) % columns
+    a, b = i * columns + j, i * columns + right
+    c, d = below * columns + j, below * columns + right
+    lower = np.stack([a, b, c], axis=-1).reshape(-1, 3)
+    upper = np.stack([b, d, c], axis=-1).reshape(-1, 3)
+    return np.concatenate([lower, upper])
+
+
+def grid(n: int) -> Mesh:
+    """The unit square with n by n cells, step 1 / n, the mesh of the paper's section 4.2.
+
+    Vertex ``row * (n + 1) + column`` lies at (column / n, row / n, 0); diagonals run as in the paper, from (0, 1) to
+    (1, 0) of each cell. Distance is Euclidean.
+    """
+    n = _at_least("n", n, 1)
+    y, x = np.divmod(np.arange((n + 1) ** 2), n + 1)
+    V = np.stack([x / n, y / n, np.zeros(len(x))], axis=1)
+    return Mesh(V, _lattice_faces(n + 1, n + 1))
+
+
+def strip(length: int, width: int) -> Mesh:
+    """A flat strip of unit cells, `length` long and `width` wide.
+
+    Vertex ``row * (length + 1) + column`` lies at (column, row, 0). Distance is Euclidean.
+    """
+    length, width = _at_least("length", length, 1), _at_least("width", width, 1)
+    y, x = np.divmod(np.arange((width + 1) * (length + 1)), length + 1)
+    V = np.stack([x, y, np.zeros(len(x))], axis=1)
+    return Mesh(V, _lattice_faces(width + 1, length + 1))
+
+
+def disk(n: int) -> Mesh:
+    """The unit disk by n rings of triangles around vertex 0, ring k with 6 k vertices. Distance is Euclidean."""
+    n = _at_least("n", n, 1)
+    points, faces = [np.zeros((1, 2))], []
+    inner = np.zeros(1, np.int64)
+    for k in range(1, n + 1):
+        angle = 2 * np.pi * np.arange(6 * k) / (6 * k)
+        points.append(k / n * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+        outer = inner[-1] + 1 + np.arange(6 * k)
+        sector, step = np.divmod(np.arange(6 * k), k)
+        # Each of the six sectors has k outer edges, and k - 1 inner ones between which the zigzag runs.
+        below = inner[(sector * (k - 1) + step) % len(inner)]
+        faces.append(np.stack([below, outer, np.roll(outer, -1)], axis=1))
+        zigzag = step < k - 1
+        above = np.roll(outer, -1)[zigzag]
+        following = inner[(sector * (k - 1) + step + 1)[zigzag] % len(inner)]
+        faces.append(np.stack([below[zigzag], above, following], axis=1))
+        inner = outer
+    V = np.concatenate(points)
+    return Mesh(np.column_stack([V, np.zeros(len(V))]), np.concatenate(faces))
+
+
+def icosphere(subdivisions: int) -> Mesh:
+    """The unit sphere by subdividing an icosahedron, 10 * 4^subdivisions + 2 vertices.
+
+    Distance on the sphere between positions p and q is the angle arccos(p . q); distance on the polyhedron is shorter
+    by the order of h^2. Vertices 0 and 3 of the icosahedron need not be antipodes, but every vertex has its antipode.
+    """
+    V, F = igl.icosahedron()
+    for _ in range(_at_least("subdivisions", subdivisions, 0)):
+        V, F = igl.upsample(V, F)
+        V /= np.linalg.norm(V, axis=1, keepdims=True)
+    return Mesh(V / np.linalg.norm(V, axis=1, keepdims=True), F)
+
+
+def cylinder(around: int, along: int, length: float = 2 * np.pi) -> Mesh:
+    """An open cylinder of radius 1 about the z axis, `around` vertices per ring, `along` cells in its `length`.
+
+    Vertex ``ring * around + k`` lies at the angle 2 pi k / around. Rolled out, distance is Euclidean.
+    """
+    around, along = _at_least("around", around, 3), _at_least("along", along, 1)
+    ring, k = np.divmod(np.arange(around * (along + 1)), around)
+    angle = 2 * np.pi * k / around
+    V = np.stack([np.cos(angle), np.sin(angle), ring * (length / along)], axis=1)
+    return Mesh(V, _lattice_faces(along + 1, around, wrap_columns=True))
+
+
+def cone(around: int, along: int, half_angle: float = np.pi / 6) -> Mesh:
+    """A cone of slant height 1 with its apex, vertex 0, at the origin, opening upwards about the z axis.
+
+    Vertex ``1 + ring * around + k`` lies at the slant height (ring + 1) / along and the angle 2 pi k / around. Rolled
+    out, the cone is a sector of the angle 2 pi sin(half_angle), in which distance is Euclidean or goes by the apex.
+    """
+    around, along = _at_least("around", around, 3), _at_least("along", along, 1)
+    ring, k = np.divmod(np.arange(around * along), around)
+    slant, angle = (ring + 1) / along, 2 * np.pi * k / around
+    radius = slant * np.sin(half_angle)
+    V = np.stack([radius * np.cos(angle), radius * np.sin(angle), slant * np.cos(half_angle)], axis=1)
+    first = np.arange(around)
+    tip = np.stack([np.zeros(around, np.int64), 1 + first, 1 + (first + 1) % around], axis=1)
+    side = 1 + _lattice_faces(along, around, wrap_columns=True)[:, ::-1] if along > 1 else np.empty((0, 3), np.int64)
+    return Mesh(np.concatenate([np.zeros((1, 3)), V]), np.concatenate([tip, side]))
+
+
+def torus(around: int, along: int, tube: float = 0.4) -> Mesh:
+    """A torus about the z axis: circles of radius `tube` (`around` vertices) along a circle of radius 1 (`along`)."""
+    around, along = _at_least("around", around, 3), _at_least("along", along, 3)
+    i, j = np.divmod(np.arange(around * along), around)
+    theta, psi = 2 * np.pi * i / along, 2 * np.pi * j / around
+    radius = 1 + tube * np.cos(psi)
+    V = np.stack([radius * np.cos(theta), radius * np.sin(theta), tube * np.sin(psi)], axis=1)
+    return Mesh(V, _lattice_faces(along, around, wrap_rows=True, wrap_columns=True)[:, ::-1])
+
+
+def flat_torus(n: int) -> IntrinsicTriangulation:
+    """The unit square with opposite sides glued, n by n cells.
+
+    Vertex ``row * n + column`` lies at (column / n, row / n). Distance is Euclidean, modulo 1 in each coordinate.
+    """
+    n = _at_least("n", n, 3)
+    F = _lattice_faces(n, n, wrap_rows=True, wrap_columns=True)
+    lower = np.array([np.sqrt(2), 1, 1]) / n  # opposite the corners (0, 0), (0, 1), (1, 0) of a cell
+    upper = np.array([1, np.sqrt(2), 1]) / n  # opposite (0, 1), (1, 1), (1, 0)
+    lengths = np.concatenate([np.tile(lower, (n * n, 1)), np.tile(upper, (n * n, 1))])
+    return from_edge_lengths(lengths, F, n * n)
+
+
+def box(n: int, size: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Mesh:
+    """A box of n by n by n cells, each cut into six tetrahedra around its diagonal (Kuhn). Distance is Euclidean.
+
+    Vertex ``(layer * (n + 1) + row) * (n + 1) + column`` lies at (column, row, layer) * size / n.
+    """
+    n = _at_least("n", n, 1)
+    side = n + 1
+    index = np.arange(side**3)
+    corner: FloatArray = np.stack([index % side, index // side % side, index // side**2], axis=1) * (
+        np.asarray(size) / n
+    )
+    cell = np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    stride = np.array([1, side, side**2])
+    tetrahedra = []
+    for order in permutations(range(3)):
+        path = np.concatenate([[0], np.cumsum(stride[list(order)])])
+        if np.linalg.det(np.eye(3)[list(order)]) < 0:
+            path[[0, 1]] = path[[1, 0]]  # positive volume
+        tetrahedra.append((cell @ stride)[:, None] + path)
+    return Mesh(corner, np.concatenate(tetrahedra))

@@ -1,0 +1,45 @@
+"""Meshes that the tests share. Real ones come from the pymeshlab wheel, and from ../shared/meshes where that exists."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heat_igl
+
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "meshes"
+
+
+def wheel_path(name: str) -> Path:
+    """A sample mesh of the pymeshlab wheel, found without importing pymeshlab (which needs OpenGL libraries)."""
+    spec = importlib.util.find_spec("pymeshlab")
+    if spec is None or spec.origin is None:
+        pytest.skip("pymeshlab is not installed, and its sample meshes with it")
+    return Path(spec.origin).parent / "tests" / "sample_meshes" / name
+
+
+def shared_path(name: str) -> Path:
+    path = SHARED / name
+    if not path.exists():
+        pytest.skip(f"{name} is not at hand")
+    return path
+
+
+def perturbed(mesh: heat_igl.Mesh, amount: float = 0.15, seed: int = 0) -> heat_igl.Mesh:
+    """The same with vertices moved at random, by at most `amount` of the shortest edge: a mesh with no symmetry."""
+    rng = np.random.default_rng(seed)
+    offset = rng.uniform(-1, 1, mesh.V.shape) * amount * mesh.edge_lengths.min()
+    return heat_igl.Mesh(mesh.V + offset, mesh.F)
+
+
+@pytest.fixture(scope="session")
+def cow() -> heat_igl.Mesh:
+    return heat_igl.read_mesh(wheel_path("cow.obj"))
+
+
+@pytest.fixture(scope="session")
+def bunny() -> heat_igl.Mesh:
+    return heat_igl.read_mesh(wheel_path("bunny.obj"))
