@@ -75,9 +75,12 @@ class ScipyFactorization:
 
 
 class CholespyFactorization:
-    """CHOLMOD's supernodal Cholesky on a METIS nested dissection, as cholespy bundles it.
+    """CHOLMOD's simplicial Cholesky on a METIS nested dissection, as cholespy bundles it.
 
-    A symmetric positive definite. No subtraction of like signs either, see `ScipyFactorization`.
+    Parameters
+    ----------
+    A : (n, n) sparse matrix
+        Symmetric positive definite. As with `ScipyFactorization`, an M-matrix is factored without a cancellation.
 
     Raises
     ------
@@ -92,8 +95,10 @@ class CholespyFactorization:
 
         self._matrix = A
         try:
+            # Passed as the rows of the (symmetric) matrix: given columns, cholespy 2.2 sorts them in place and hands
+            # the memory of the three arrays to realloc, which numpy still owns; rows it copies first.
             self._factor: Any = cholespy.CholeskySolverD(
-                A.shape[0], A.indptr.astype(np.int32), A.indices.astype(np.int32), A.data, cholespy.MatrixType.CSC
+                A.shape[0], A.indptr.astype(np.int32), A.indices.astype(np.int32), A.data, cholespy.MatrixType.CSR
             )
         except ValueError as error:
             raise FactorizationError(f"the matrix ({A.shape[0]} rows) could not be factored: {error}") from None

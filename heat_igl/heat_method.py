@@ -331,15 +331,47 @@ class HeatMethodSolver:
     def _steps(self, source_sets: list[IntArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Heat (n, k), directions (d m, k) and distances (n, k) for k sets of sources."""
         domain = self._operators
+        rims = [self._rim(sources) for sources in source_sets]
         initial = np.zeros((domain.n, len(source_sets)))
-        for column, sources in enumerate(source_sets):
-            initial[sources, column] = self._source_heat(sources)
+        for column, rim in enumerate(rims):
+            initial[rim, column] = self._source_heat(rim)
         u = self._heat_flow.solve(initial)
         X = normalize(domain, u)
         phi = self._poisson.solve(domain.D @ X)
-        for column, sources in enumerate(source_sets):
-            phi[:, column] = self._from_sources(phi[:, column], u[:, column], sources)
+        for column, (sources, rim) in enumerate(zip(source_sets, rims, strict=True)):
+            self._warn_if_cold(u[:, column], sources)
+            phi[:, column] = self._from_sources(phi[:, column], u[:, column], rim)
+            phi[sources, column] = 0.0
         return u, X, phi
+
+    def _rim(self, sources: IntArray) -> IntArray:
+        """The sources that have a neighbour which is none.
+
+        Heat starts from these alone: inside a region of sources it would be level, and its gradient rounding noise
+        that is then normalized to length 1 and integrated.
+        """
+        L = self._operators.L
+        is_source = np.zeros(self.n_vertices, bool)
+        is_source[sources] = True
+        neighbours = L[:, sources]
+        outward = np.repeat(np.arange(len(sources)), np.diff(neighbours.indptr))[~is_source[neighbours.indices]]
+        return sources[np.unique(outward)] if len(outward) else sources
+
+    def _warn_if_cold(self, u: FloatArray, sources: IntArray) -> None:
+        """Heat that has underflowed has no gradient, and distance does not grow where X is 0: say so."""
+        domain = self._operators
+        cold = (np.abs(u) < _LOWEST_HEAT) & np.isin(domain.components, domain.components[sources])
+        cold[sources] = False
+        remedy = "raise t_coef"
+        if self._heat_flow.boundary == "dirichlet":
+            cold &= ~domain.boundary
+            remedy += ", or let heat pass the boundary with boundary='average'"
+        if cold.any():
+            warnings.warn(
+                f"no heat arrives at {int(cold.sum())} of {domain.n} vertices, where distances are too short: {remedy}",
+                AccuracyWarning,
+                stacklevel=4,
+            )
 
     def _from_sources(self, phi: FloatArray, u: FloatArray, sources: IntArray) -> FloatArray:
         """Shift phi so that distance starts at 0 at every source; ``inf`` where there is no source to start from."""

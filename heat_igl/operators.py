@@ -139,12 +139,18 @@ def cotan_operators(mesh: Mesh) -> Operators:
             f"F[{first}] = {mesh.F[first].tolist()} has no {'volume' if mesh.is_tetrahedral else 'area'} "
             f"({int(flat.sum())} of {mesh.n_faces} faces): remove these faces"
         )
+    # Libigl multiplies up to six lengths before it divides; in a unit near h that cannot leave the double range, and a
+    # power of two changes no digit.
+    h = float(mesh.edge_lengths.mean())
+    unit = 2.0 ** round(np.log2(h))
+    V = mesh.V / unit
+    simplex_dimension = mesh.F.shape[1] - 1
     return Operators(
-        L=_padded(igl.cotmatrix(mesh.V, mesh.F), mesh.n_vertices),
-        M=_padded(igl.massmatrix(mesh.V, mesh.F), mesh.n_vertices),
-        G=igl.grad(mesh.V, mesh.F),
+        L=_padded(igl.cotmatrix(V, mesh.F), mesh.n_vertices) * unit ** (simplex_dimension - 2),
+        M=_padded(igl.massmatrix(V, mesh.F), mesh.n_vertices) * unit**simplex_dimension,
+        G=igl.grad(V, mesh.F) / unit,
         weights=mesh.measures,
-        mean_edge_length=float(mesh.edge_lengths.mean()),
+        mean_edge_length=h,
         components=mesh.components,
         boundary=mesh.boundary,
         referenced=mesh.referenced,

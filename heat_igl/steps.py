@@ -170,7 +170,7 @@ def normalize(operators: Operators, u: FloatArray) -> FloatArray:
     Returns
     -------
     (d m,) or (d m, k) float64
-        Unit vectors; 0 on faces where u is constant (or the gradient below 1e-300): these have no direction.
+        Unit vectors; 0 on faces where the gradient is zero or below 1e-300, which have no direction.
     """
     gradient = operators.G @ u
     components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])

@@ -29,9 +29,10 @@ def shared_path(name: str) -> Path:
 
 
 def perturbed(mesh: heat_igl.Mesh, amount: float = 0.15, seed: int = 0) -> heat_igl.Mesh:
-    """The same with vertices moved at random, by at most `amount` of the shortest edge: a mesh with no symmetry."""
+    """The same with inner vertices moved at random, by at most `amount` of the shortest edge: no symmetry is left."""
     rng = np.random.default_rng(seed)
     offset = rng.uniform(-1, 1, mesh.V.shape) * amount * mesh.edge_lengths.min()
+    offset[mesh.boundary] = 0
     return heat_igl.Mesh(mesh.V + offset, mesh.F)
 
 

@@ -1,0 +1,62 @@
+"""Imports run one way, and optional libraries are loaded only where they are used."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import heat_igl
+
+PACKAGE = Path(heat_igl.__file__).parent
+
+# A module imports only from those before it.
+ORDER = """
+typing errors connectivity mesh intrinsic shapes io operators factorization sources steps refine heat_method
+reference metrics validation plots demo cli __main__
+""".split()
+
+EXTRAS = (
+    "cholespy gdist matplotlib meshio numba potpourri3d psutil pygeodesic pymeshlab pytest rich skimage typer"
+).split()
+
+
+def modules() -> list[str]:
+    return sorted(path.stem for path in PACKAGE.glob("*.py") if path.stem != "__init__")
+
+
+def imported_modules(name: str) -> set[str]:
+    tree = ast.parse((PACKAGE / f"{name}.py").read_text(encoding="utf8"))
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module == "heat_igl":
+            found |= {alias.name for alias in node.names} & set(modules())
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("heat_igl."):
+            found.add(node.module.split(".")[1])
+        elif isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[1] for alias in node.names if alias.name.startswith("heat_igl.")}
+    return found
+
+
+def test_every_module_has_its_place():
+    assert set(modules()) <= set(ORDER)
+
+
+@pytest.mark.parametrize("name", modules())
+def test_imports_run_one_way(name):
+    allowed = set(ORDER[: ORDER.index(name)])
+    assert imported_modules(name) <= allowed
+
+
+def test_import_loads_no_extra():
+    code = f"import sys, heat_igl; print(*[name for name in {EXTRAS!r} if name in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == ""
+
+
+def test_public_names_exist_and_are_documented():
+    for name in heat_igl.__all__:
+        assert getattr(heat_igl, name).__doc__, name

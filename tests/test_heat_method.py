@@ -1,0 +1,288 @@
+from __future__ import annotations
+
+import dataclasses
+import pickle
+import threading
+
+import numpy as np
+import pytest
+from conftest import perturbed, shared_path
+
+import heat_igl
+from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, MeshError, SourceError, shapes
+from heat_igl.operators import operators
+
+
+@pytest.fixture(scope="module")
+def sphere() -> Mesh:
+    return perturbed(shapes.icosphere(4))
+
+
+@pytest.fixture(scope="module")
+def solver(sphere) -> HeatMethodSolver:
+    return HeatMethodSolver(sphere)
+
+
+def two_spheres() -> Mesh:
+    sphere = perturbed(shapes.icosphere(3))
+    return Mesh(np.vstack([sphere.V, sphere.V + 5]), np.vstack([sphere.F, sphere.F + sphere.n_vertices]))
+
+
+def angle(mesh: Mesh, source: int) -> np.ndarray:
+    directions = mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True)
+    return np.arccos(np.clip(directions @ directions[source], -1, 1))
+
+
+def test_distance_on_the_sphere(sphere, solver):
+    distance = solver.distance(7)
+    assert distance.shape == (sphere.n_vertices,)
+    assert distance[7] == 0
+    assert (distance >= 0).all()
+    assert np.abs(distance - angle(sphere, 7)).mean() < 0.01 * np.pi
+
+
+def test_one_liner_equals_the_solver(sphere, solver):
+    assert (heat_igl.heat_method_distance(sphere.V, sphere.F, 7) == solver.distance(7)).all()
+    by_arrays = HeatMethodSolver(sphere.V.tolist(), sphere.F.tolist())
+    assert (by_arrays.distance(7) == solver.distance(7)).all()
+
+
+def test_forms_of_one_source(sphere, solver):
+    mask = np.zeros(sphere.n_vertices, bool)
+    mask[[3, 90]] = True
+    assert (solver.distance(mask) == solver.distance([90, 3, 3])).all()
+
+
+def test_several_sources_are_the_nearest_of_each(sphere, solver):
+    sources = [3, 4, 5, 6, 7, 800]
+    together = solver.distance(sources)
+    nearest = np.min([angle(sphere, source) for source in sources], axis=0)
+    assert (together[sources] == 0).all()
+    assert (together >= 0).all()
+    assert np.abs(together - nearest).mean() < 0.02 * nearest.max()
+    # The cell of each source starts at 0 by itself; a common shift would leave the error of the paths between sources.
+    h = solver.diagnostics.mean_edge_length
+    for source in sources:
+        ring = (angle(sphere, source) < 3 * h) & (angle(sphere, source) > 2 * h)
+        bias = (together - solver.distance(source))[ring].mean()
+        assert abs(bias) < 0.05 * h
+
+
+def test_a_region_as_source():
+    """Inside a region of sources distance is 0, and outside it is as from its rim."""
+    mesh = perturbed(shapes.grid(60), 0.2)
+    region = np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1) < 0.4
+    distance = HeatMethodSolver(mesh).distance(region)
+    assert (distance[region] == 0).all()
+    exact = np.linalg.norm(mesh.V[:, None, :2] - mesh.V[region][None, :, :2], axis=2).min(axis=1)
+    assert np.abs(distance - exact).mean() < 0.02 * exact.max()
+
+
+def test_every_vertex_a_source(solver):
+    assert (solver.distance(np.ones(solver.n_vertices, bool)) == 0).all()
+
+
+def test_a_curve_as_source():
+    """Distance from one side of a rectangle is the coordinate across."""
+    mesh = shapes.grid(40)
+    distance = HeatMethodSolver(mesh).distance(mesh.V[:, 0] == 0)
+    np.testing.assert_allclose(distance, mesh.V[:, 0], rtol=0, atol=0.01)
+
+
+def test_other_components_are_unreachable():
+    mesh = two_spheres()
+    solver = HeatMethodSolver(mesh)
+    n = mesh.n_vertices // 2
+    distance = solver.distance(3)
+    assert np.isfinite(distance[:n]).all()
+    assert (distance[n:] == np.inf).all()
+    both = solver.distance([3, n + 3])
+    np.testing.assert_allclose(both, np.tile(distance[:n], 2), rtol=0, atol=1e-10)
+
+
+def test_unreferenced_vertices_are_unreachable(sphere):
+    mesh = Mesh(np.vstack([[[7, 7, 7]], sphere.V, [[8, 8, 8]]]), sphere.F + 1)
+    solver = HeatMethodSolver(mesh)
+    distance = solver.distance(8)
+    assert np.flatnonzero(np.isinf(distance)).tolist() == [0, mesh.n_vertices - 1]
+    np.testing.assert_allclose(distance[1:-1], HeatMethodSolver(sphere).distance(7), rtol=0, atol=1e-10)
+    alone = solver.distance(0)
+    assert alone[0] == 0
+    assert np.isinf(alone[1:]).all()
+
+
+def test_solution_holds_the_three_steps(sphere, solver):
+    solution = solver.solve(7)
+    domain = solver.operators
+    u0 = np.zeros(sphere.n_vertices)
+    u0[7] = 1
+    residual = domain.M @ solution.heat - solution.t * (domain.L @ solution.heat) - u0
+    assert np.abs(residual).max() < 1e-13
+    assert solution.direction.shape[0] == sphere.n_faces
+    np.testing.assert_allclose(np.linalg.norm(solution.direction, axis=1), 1, rtol=1e-14)
+    assert (solution.distance == solver.distance(7)).all()
+    assert solution.t == solver.t == solution.diagnostics.t
+
+
+@pytest.mark.parametrize("k", [1, 8, 19])
+def test_batches(sphere, solver, k):
+    sets = [int(i) for i in np.random.default_rng(0).choice(sphere.n_vertices, k, replace=False)]
+    batch = solver.distances(sets)
+    assert batch.shape == (k, sphere.n_vertices)
+    for row, source in zip(batch, sets, strict=True):
+        np.testing.assert_allclose(row, solver.distance(source), rtol=0, atol=1e-11)
+
+
+def test_batch_into_a_given_array(tmp_path, solver):
+    out = np.lib.format.open_memmap(tmp_path / "out.npy", mode="w+", dtype=np.float32, shape=(2, solver.n_vertices))
+    assert solver.distances([0, [1, 2]], out=out) is out
+    np.testing.assert_allclose(np.load(tmp_path / "out.npy")[1], solver.distance([1, 2]), rtol=1e-6, atol=1e-6)
+    with pytest.raises(ValueError, match=r"out must be an array of floats of shape \(3, 2562\)"):
+        solver.distances([0, 1, 2], out=out)
+    with pytest.raises(ValueError, match="out must be an array of floats"):
+        solver.distances([0], out=np.empty((1, solver.n_vertices), int))
+
+
+def test_bad_source_set_is_named_before_anything_is_solved(solver):
+    out = np.full((2, solver.n_vertices), -1.0)
+    with pytest.raises(SourceError, match=r"source_sets\[1\]: sources\[0\] = 9999 is no vertex"):
+        solver.distances([0, 9999], out=out)
+    assert (out == -1).all()
+
+
+def test_time_step(sphere):
+    h = HeatMethodSolver(sphere).diagnostics.mean_edge_length
+    assert HeatMethodSolver(sphere).t == pytest.approx(h**2, rel=1e-14)
+    assert HeatMethodSolver(sphere, t_coef=4).t == pytest.approx(4 * h**2, rel=1e-14)
+    assert HeatMethodSolver(sphere, t_coef=4, t=0.03).t == 0.03
+    assert not HeatMethodSolver(sphere).diagnostics.t_raised
+
+
+@pytest.mark.parametrize("name", ["t", "t_coef"])
+@pytest.mark.parametrize("value", [0, -1.0, np.nan, np.inf, "small"])
+def test_bad_time_step(sphere, name, value):
+    with pytest.raises(ValueError, match=f"{name} must be a positive number, not {value!r}"):
+        HeatMethodSolver(sphere, **{name: value})
+
+
+def test_time_step_is_raised_when_heat_would_not_cross():
+    mesh = shapes.strip(3000, 1)
+    solver = HeatMethodSolver(mesh)
+    assert solver.diagnostics.t_raised
+    assert solver.t > solver.diagnostics.t_requested
+    with pytest.warns(AccuracyWarning, match=r"t = 0.5 is too small for heat to cross the mesh.* using"):
+        explicit = HeatMethodSolver(mesh, t=0.5)
+    assert explicit.t == solver.t
+    solution = solver.solve(0)
+    assert (np.linalg.norm(solution.direction, axis=1) > 0).all()
+
+
+def test_cold_vertices_are_reported():
+    """A domain whose extent is understated: heat runs out, and the user is told."""
+    domain = dataclasses.replace(operators(shapes.strip(3000, 1)), longest_distance=1.0)
+    with pytest.warns(AccuracyWarning, match=r"no heat arrives at \d+ of 6002 vertices.*raise t_coef"):
+        distance = HeatMethodSolver.from_operators(domain).distance(0)
+    assert np.isfinite(distance).all()
+
+
+def test_dirichlet_and_average_boundaries():
+    mesh = shapes.disk(20)
+    exact = np.linalg.norm(mesh.V, axis=1)
+    errors = {
+        boundary: np.abs(HeatMethodSolver(mesh, boundary=boundary).distance(0) - exact).max()
+        for boundary in ("neumann", "dirichlet", "average")
+    }
+    assert max(errors.values()) < 0.02
+    # A source on the boundary keeps its heat although the boundary is cold.
+    edge = int(np.argmax(mesh.V[:, 0]))
+    distance = HeatMethodSolver(mesh, boundary="dirichlet").distance(edge)
+    assert 1.5 < distance[np.argmin(mesh.V[:, 0])] < 2.5
+
+
+def test_tetrahedra():
+    mesh = shapes.box(8)
+    solver = HeatMethodSolver(mesh)
+    distance = solver.distance(0)
+    exact = np.linalg.norm(mesh.V, axis=1)
+    assert np.abs(distance - exact).mean() < 0.04 * exact.max()
+
+
+def test_mesh_and_faces_are_not_mixed(sphere):
+    with pytest.raises(TypeError, match="pass a Mesh alone"):
+        HeatMethodSolver(sphere, sphere.F)
+    with pytest.raises(TypeError, match="faces F are missing"):
+        HeatMethodSolver(sphere.V)
+    with pytest.raises(MeshError, match="F is empty"):
+        HeatMethodSolver(sphere.V, [])
+
+
+def test_solver_is_read_only(solver):
+    with pytest.raises(AttributeError, match="t"):
+        solver.t = 2.0
+    with pytest.raises(AttributeError, match="operators"):
+        solver.operators = None
+
+
+def test_pickled_copy_gives_the_same_bits(solver):
+    copy = pickle.loads(pickle.dumps(solver))
+    for sources in (0, [3, 900]):
+        assert (copy.distance(sources) == solver.distance(sources)).all()
+    assert copy.diagnostics == solver.diagnostics
+
+
+@pytest.mark.parametrize("backend", ["scipy", "cholespy"])
+def test_threads_share_a_solver(sphere, backend):
+    if backend == "cholespy":
+        pytest.importorskip("cholespy")
+    solver = HeatMethodSolver(sphere, backend=backend)
+    expected = [solver.distance(i) for i in range(20)]
+    found: list = [None] * 20
+
+    def work(start: int) -> None:
+        for i in range(start, 20, 2):
+            found[i] = solver.distance(i)
+
+    threads = [threading.Thread(target=work, args=(start,)) for start in (0, 1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for one, other in zip(found, expected, strict=True):
+        assert (one == other).all()
+
+
+def test_backends_agree(sphere):
+    pytest.importorskip("cholespy")
+    one = HeatMethodSolver(sphere, backend="scipy")
+    other = HeatMethodSolver(sphere, backend="cholespy")
+    assert (one.diagnostics.backend, other.diagnostics.backend) == ("scipy", "cholespy")
+    np.testing.assert_allclose(one.distance(0), other.distance(0), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["suzanne.obj", "truck.obj", "teapot.obj"])
+@pytest.mark.parametrize("laplacian", ["intrinsic-delaunay", "cotan"])
+@pytest.mark.parametrize("boundary", ["neumann", "average"])
+def test_bad_meshes_get_finite_distances(name, laplacian, boundary):
+    """Not manifold, in many pieces, some of them touching in a vertex only: exact solvers crash on these."""
+    mesh = heat_igl.read_mesh(shared_path(name))
+    solver = HeatMethodSolver(mesh, laplacian=laplacian, boundary=boundary)
+    for source in np.random.default_rng(0).choice(mesh.n_vertices, 5):
+        distance = solver.distance(source)
+        reached = mesh.components == mesh.components[source]
+        assert np.isfinite(distance[reached]).all()
+        assert (distance[reached] <= 1.5 * mesh.longest_distance).all()
+        assert (distance[~reached] == np.inf).all()
+
+
+def test_cold_boundary_that_cuts_the_mesh_is_reported():
+    """Two disks that touch in a vertex of their boundary: no heat passes it when the boundary is held at zero."""
+    disk = shapes.disk(6)
+    second = disk.V + [2, 0, 0]
+    touching = int(np.argmin(second[:, 0]))
+    label = np.arange(disk.n_vertices) + disk.n_vertices
+    label[touching] = np.argmax(disk.V[:, 0])
+    mesh = Mesh(np.vstack([disk.V, second]), np.vstack([disk.F, label[disk.F]]))
+    with pytest.warns(AccuracyWarning, match="no heat arrives at .* boundary='average'"):
+        HeatMethodSolver(mesh, boundary="dirichlet").distance(0)
+    distance = HeatMethodSolver(mesh, boundary="average").distance(0)
+    assert distance[label[0]] == pytest.approx(2, abs=0.2)

@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+import igl
+import numpy as np
+import pytest
+from conftest import perturbed, shared_path
+
+import heat_igl
+from heat_igl import Mesh, MeshError, shapes
+from heat_igl.intrinsic import from_edge_lengths, intrinsic_delaunay, intrinsic_triangulation, mollify
+
+
+def delaunay(mesh: Mesh):
+    return intrinsic_delaunay(intrinsic_triangulation(mesh))
+
+
+def assert_glued(triangulation):
+    """Twins point at each other, have one length and, on an oriented surface, run opposite ways."""
+    inner = np.flatnonzero(triangulation.twin >= 0)
+    twin = triangulation.twin[inner]
+    assert (triangulation.twin[twin] == inner).all()
+    assert (triangulation.l.ravel()[twin] == triangulation.l.ravel()[inner]).all()
+    opposite = triangulation.tail(inner) == triangulation.head(twin)
+    same_ends = opposite | (triangulation.tail(inner) == triangulation.tail(twin))
+    assert same_ends.all()
+    assert (opposite | ~triangulation.aligned[inner]).all()
+
+
+@pytest.mark.parametrize("name", ["cow.obj", "homer.obj", "camelhead.off"])
+def test_agrees_with_libigl(name):
+    """The intrinsic Delaunay triangulation is unique but for cocircular corners, and those have weight 0."""
+    mesh = heat_igl.read_mesh(shared_path(name))
+    found = delaunay(mesh)
+    assert found.n_flips > 1000
+    assert_glued(found)
+    L, _, _ = igl.intrinsic_delaunay_cotmatrix(mesh.V, mesh.F)
+    assert abs(igl.cotmatrix_intrinsic(found.l, found.F) - L).max() <= 1e-8 * abs(L).max()
+
+
+def test_lengths_of_flipped_edges_in_the_plane():
+    """Inside a convex planar domain every edge is straight, so its length is the distance of its ends."""
+    mesh = perturbed(shapes.disk(10), 0.3)
+    squashed = Mesh(mesh.V * [1.0, 0.25, 0.0], mesh.F)
+    found = delaunay(squashed)
+    assert found.n_flips > 100
+    half_edge = np.arange(len(found.twin))
+    ends = squashed.V[found.tail(half_edge)] - squashed.V[found.head(half_edge)]
+    np.testing.assert_allclose(found.l.ravel(), np.linalg.norm(ends, axis=1), rtol=1e-12)
+    assert_glued(found)
+
+
+def test_no_inner_edge_has_a_negative_weight(cow):
+    found = delaunay(cow)
+    assert found.areas.sum() == pytest.approx(cow.measures.sum(), rel=1e-13)
+    L = igl.cotmatrix_intrinsic(found.l, found.F).tocoo()
+    assert L.data[L.row != L.col].min() >= -1e-7
+    before = igl.cotmatrix(cow.V, cow.F).tocoo()
+    assert before.data[before.row != before.col].min() < -1
+
+
+def test_delaunay_triangulation_is_left_alone():
+    start = intrinsic_triangulation(shapes.icosphere(3))
+    assert intrinsic_delaunay(start) is start
+    far = Mesh(shapes.grid(20).V + np.array([1e6, 1e6, 0]), shapes.grid(20).F)
+    assert delaunay(far).n_flips == 0
+
+
+def test_faces_turned_over_give_the_same_surface(cow):
+    F = cow.F.copy()
+    F[::3] = F[::3, ::-1]
+    mixed = delaunay(Mesh(cow.V, F))
+    assert_glued(mixed)
+    assert mixed.aligned.all()
+    L = igl.cotmatrix_intrinsic(mixed.l, mixed.F)
+    plain = delaunay(cow)
+    assert abs(L - igl.cotmatrix_intrinsic(plain.l, plain.F)).max() < 1e-9 * abs(L).max()
+
+
+def test_moebius_strip_keeps_a_seam_and_its_area():
+    n = 40
+    angle = 2 * np.pi * np.arange(n) / n
+    V = []
+    for width in (-0.3, -0.1, 0.1, 0.3):
+        radius = 1 + width * np.cos(angle / 2)
+        V.append(np.stack([radius * np.cos(angle), radius * np.sin(angle), width * np.sin(angle / 2)], axis=1))
+    row = np.arange(3)[:, None]
+    k = np.arange(n)[None, :]
+    last = k == n - 1
+    index = lambda r, j: np.where(last & (j == 0), (3 - r) * n, r * n + j)  # noqa: E731
+    following = (k + 1) % n
+    a, b = row * n + k, index(row, following)
+    c, d = (row + 1) * n + k, index(row + 1, following)
+    F = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([b, d, c], -1).reshape(-1, 3)])
+    mesh = perturbed(Mesh(np.concatenate(V), F), 0.4)
+    found = delaunay(mesh)
+    assert found.n_flips > 0
+    assert not found.aligned.all()
+    assert_glued(found)
+    assert found.areas.sum() == pytest.approx(mesh.measures.sum(), rel=1e-13)
+
+
+def test_flat_torus_has_no_boundary_and_unit_area():
+    torus = shapes.flat_torus(5)
+    assert not torus.boundary.any()
+    assert torus.areas.sum() == pytest.approx(1)
+    assert_glued(torus)
+
+
+def test_mollification():
+    good = np.array([[3.0, 4.0, 5.0]])
+    assert mollify(good) == 0
+    flat = np.array([[1.0, 1.0, 2.0], [2.0, 2.0, 2.0]])
+    added = mollify(flat)
+    assert 0 < added < 1e-6
+    lengthened = flat + added
+    assert (lengthened.sum(axis=1) - 2 * lengthened.max(axis=1) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("l", "message"),
+    [
+        ([[1.0, 1.0]], r"shape \(1, 2\)"),
+        ([[1.0, np.nan, 1.0], [1.0, 1.0, 1.0]], r"l\[0, 1\] = nan"),
+        ([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0]], r"l\[1, 1\] = -1.0"),
+        ([[1.0, 1.0, 1.0], [1.5, 1.0, 1.0]], "edge between faces 0 and 1 two lengths"),
+    ],
+)
+def test_bad_lengths(l, message):  # noqa: E741
+    F = np.array([[0, 1, 2], [3, 2, 1]])
+    with pytest.raises(MeshError, match=message):
+        from_edge_lengths(l, F, 4)
+    assert from_edge_lengths(np.ones((2, 3)), F, 4).areas == pytest.approx([np.sqrt(3) / 4] * 2)

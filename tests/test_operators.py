@@ -1,0 +1,138 @@
+"""Identities that hold to rounding, on triangles, intrinsic Delaunay triangulations and tetrahedra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from conftest import perturbed
+
+from heat_igl import Mesh, MeshError, shapes
+from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_gradient, intrinsic_triangulation
+from heat_igl.operators import Operators, cotan_operators, intrinsic_operators, operators
+
+
+def bad_sphere() -> Mesh:
+    """A squashed, noisy sphere: many edges are not Delaunay."""
+    mesh = perturbed(shapes.icosphere(3), 0.3)
+    return Mesh(mesh.V * [1.0, 0.6, 0.2], mesh.F)
+
+
+DOMAINS = {
+    "own triangles": lambda: cotan_operators(bad_sphere()),
+    "intrinsic Delaunay": lambda: operators(bad_sphere()),
+    "with boundary": lambda: operators(perturbed(shapes.disk(8), 0.3)),
+    "tetrahedra": lambda: operators(perturbed(shapes.box(4), 0.2)),
+    "flat torus": lambda: intrinsic_operators(shapes.flat_torus(9)),
+    "unreferenced vertices": lambda: operators(
+        Mesh(np.vstack([[[9, 9, 9]], bad_sphere().V, [[8, 8, 8]]]), bad_sphere().F + 1)
+    ),
+}
+
+
+@pytest.fixture(params=DOMAINS, ids=str)
+def domain(request) -> Operators:
+    return DOMAINS[request.param]()
+
+
+def test_divergence_of_gradient_is_the_laplacian(domain):
+    assert abs(domain.D @ domain.G - domain.L).max() <= 1e-12 * abs(domain.L).max()
+
+
+def test_divergence_is_the_negative_adjoint_of_the_gradient(domain):
+    rng = np.random.default_rng(0)
+    u, X = rng.standard_normal(domain.n), rng.standard_normal(domain.G.shape[0])
+    W = np.tile(domain.weights, domain.dimension)
+    inner = (domain.G @ u) @ (W * X)
+    assert -(u @ (domain.D @ X)) == pytest.approx(inner, rel=1e-12, abs=1e-12 * np.abs(W * X).sum())
+
+
+def test_constants_have_no_laplacian(domain):
+    assert np.abs(domain.L @ np.ones(domain.n)).max() <= 1e-12 * abs(domain.L).max()
+
+
+def test_laplacian_is_symmetric_and_negative_semidefinite(domain):
+    assert abs(domain.L - domain.L.T).max() <= 1e-12 * abs(domain.L).max()
+    largest = np.linalg.eigvalsh(domain.L.toarray())[-1]
+    assert largest <= 1e-10 * abs(domain.L).max()
+
+
+def test_mass_is_the_area(domain):
+    assert domain.M.sum() == pytest.approx(domain.weights.sum(), rel=1e-12)
+    assert (domain.M.diagonal()[domain.referenced] > 0).all()
+    assert (domain.M.diagonal()[~domain.referenced] == 0).all()
+
+
+def test_matrices_are_csc(domain):
+    for matrix in (domain.L, domain.M, domain.G, domain.D):
+        assert sp.issparse(matrix)
+        assert matrix.format == "csc"
+        assert matrix.dtype == np.float64
+
+
+def test_gradient_of_a_linear_function_in_space_is_exact():
+    slope = np.array([1.0, -2.0, 3.0])
+    mesh = perturbed(shapes.box(3), 0.2)
+    gradient = (operators(mesh).G @ (mesh.V @ slope)).reshape(3, -1)
+    np.testing.assert_allclose(gradient, np.tile(slope[:, None], mesh.n_faces), rtol=0, atol=1e-12)
+
+    surface = bad_sphere()
+    gradient = (cotan_operators(surface).G @ (surface.V @ slope)).reshape(3, -1).T
+    corner = surface.V[surface.F]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    tangential = slope - (normal @ slope)[:, None] * normal
+    np.testing.assert_allclose(gradient, tangential, rtol=0, atol=1e-11)
+
+
+def test_intrinsic_gradient_of_a_linear_function_is_exact():
+    """On a planar mesh a linear function has the same slope in each flipped triangle, seen from its frame."""
+    mesh = perturbed(shapes.disk(8), 0.4, seed=1)
+    mesh = Mesh(mesh.V * [1.0, 0.3, 0.0], mesh.F)
+    triangulation = intrinsic_delaunay(intrinsic_triangulation(mesh))
+    assert triangulation.n_flips > 20
+    slope = np.array([2.0, -1.0])
+    gradient = (intrinsic_gradient(triangulation) @ (mesh.V[:, :2] @ slope)).reshape(2, -1)
+    corner = mesh.V[triangulation.F][:, :, :2]
+    along = corner[:, 1] - corner[:, 0]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    across *= np.sign(np.einsum("fk,fk->f", across, corner[:, 2] - corner[:, 0]))[:, None]
+    np.testing.assert_allclose(gradient, [along @ slope, across @ slope], rtol=0, atol=1e-11)
+
+
+def test_delaunay_mesh_keeps_its_own_operators():
+    mesh = shapes.icosphere(2)
+    by_default, plain = operators(mesh), operators(mesh, "cotan")
+    assert by_default.dimension == 3
+    assert (by_default.L != plain.L).nnz == 0
+
+
+def test_tetrahedra_turned_inside_out_change_nothing():
+    mesh = perturbed(shapes.box(3), 0.2)
+    F = mesh.F.copy()
+    F[::2] = F[::2][:, [1, 0, 2, 3]]
+    a, b = operators(mesh), operators(Mesh(mesh.V, F))
+    assert abs(a.L - b.L).max() < 1e-12
+    assert b.weights == pytest.approx(a.weights)
+
+
+def test_degenerate_triangles_are_mollified_and_stay_finite():
+    mesh = Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0], [1, -1, 0]], [[0, 1, 3], [1, 2, 3], [0, 2, 1], [2, 0, 4]])
+    for laplacian in ("intrinsic-delaunay", "cotan"):
+        domain = operators(mesh, laplacian)
+        assert domain.triangulation.lengthening > 0
+        assert np.isfinite(domain.L.data).all()
+        assert abs(domain.D @ domain.G - domain.L).max() <= 1e-10 * abs(domain.L).max()
+
+
+def test_flat_tetrahedron_is_refused():
+    mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1]], [[0, 1, 2, 4], [0, 1, 2, 3]])
+    with pytest.raises(MeshError, match=r"F\[1\] = \[0, 1, 2, 3\] has no volume \(1 of 2"):
+        operators(mesh)
+    assert operators(Mesh(mesh.V, mesh.F[:1])).n == 5
+
+
+def test_unknown_laplacian():
+    with pytest.raises(ValueError, match="laplacian must be"):
+        operators(shapes.grid(2), "cotangent")

@@ -1,0 +1,117 @@
+"""Each of the three steps by itself, against what is known about it in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import perturbed
+
+from heat_igl import Mesh, shapes
+from heat_igl.operators import operators
+from heat_igl.steps import HeatFlow, PoissonProblem, diffuse, integrate, normalize
+
+
+@pytest.fixture(scope="module")
+def disk():
+    return operators(perturbed(shapes.disk(12)))
+
+
+def dirac(n: int, vertex: int) -> np.ndarray:
+    u0 = np.zeros(n)
+    u0[vertex] = 1
+    return u0
+
+
+def test_backward_euler_step_is_solved(disk):
+    u0 = np.random.default_rng(0).random((disk.n, 3))
+    t = 0.02
+    u = diffuse(disk, u0, t)
+    np.testing.assert_allclose(disk.M @ u - t * (disk.L @ u), u0, rtol=0, atol=1e-12)
+
+
+def test_insulated_boundary_conserves_heat(disk):
+    u = diffuse(disk, dirac(disk.n, 40), 0.05)
+    assert disk.M.diagonal() @ u == pytest.approx(1, rel=1e-12)
+    assert (u > 0).all()
+
+
+def test_heat_falls_exponentially_along_a_strip():
+    """On a strip the step is one-dimensional: u falls by acosh(1 + h^2 / (2 t)) e-foldings per cell."""
+    domain = operators(shapes.strip(120, 1))
+    u = diffuse(domain, dirac(domain.n, 0) + dirac(domain.n, 121), t=2.0)
+    rate = np.diff(np.log(u[:121]))[5:50]
+    np.testing.assert_allclose(rate, -np.arccosh(1 + 1 / (2 * 2.0)), rtol=1e-9)
+
+
+def test_boundary_conditions(disk):
+    u0 = dirac(disk.n, 0)
+    neumann, dirichlet, average = (
+        diffuse(disk, u0, 0.05, boundary) for boundary in ("neumann", "dirichlet", "average")
+    )
+    assert (dirichlet[disk.boundary] == 0).all()
+    assert (dirichlet[~disk.boundary] > 0).all()
+    assert (dirichlet <= neumann).all()
+    np.testing.assert_allclose(average, (neumann + dirichlet) / 2, rtol=1e-13)
+    held = diffuse(disk, dirac(disk.n, disk.n - 1), 0.05, "dirichlet")
+    assert held[disk.n - 1] > 0
+    assert (held[~disk.boundary] > 0).all()
+
+
+def test_boundary_conditions_agree_where_there_is_no_boundary():
+    domain = operators(shapes.icosphere(2))
+    u0 = dirac(domain.n, 0)
+    assert (diffuse(domain, u0, 0.1, "average") == diffuse(domain, u0, 0.1)).all()
+
+
+def test_normalized_gradient_is_a_unit_field_downhill(disk):
+    u = diffuse(disk, dirac(disk.n, 0), 0.01)
+    X = normalize(disk, u)
+    components = X.reshape(disk.dimension, -1)
+    np.testing.assert_allclose(np.linalg.norm(components, axis=0), 1, rtol=1e-14)
+    gradient = (disk.G @ u).reshape(disk.dimension, -1)
+    cosine = (gradient * components).sum(axis=0) / np.linalg.norm(gradient, axis=0)
+    np.testing.assert_allclose(cosine, -1, rtol=1e-14)
+
+
+@pytest.mark.parametrize("scale", [1e-280, 1e-160, 1e160, 1e280])
+def test_direction_survives_any_magnitude(disk, scale):
+    """Squaring entries of this size would underflow to 0 or overflow to inf."""
+    u = np.random.default_rng(0).random(disk.n) + 1
+    np.testing.assert_allclose(normalize(disk, u * scale), normalize(disk, u), rtol=0, atol=1e-11)
+
+
+def test_no_gradient_no_direction(disk):
+    assert (normalize(disk, np.zeros((disk.n, 2))) == 0).all()
+    u = diffuse(disk, dirac(disk.n, 0), 0.01)
+    assert (normalize(disk, u * 1e-305) == 0).all()
+
+
+def test_integration_inverts_the_gradient():
+    """L phi = D G f has the solution f up to a constant per component."""
+    sphere = perturbed(shapes.icosphere(2))
+    domain = operators(Mesh(np.vstack([sphere.V, sphere.V + 5]), np.vstack([sphere.F, sphere.F + len(sphere.V)])))
+    f = np.random.default_rng(0).standard_normal(domain.n)
+    difference = integrate(domain, domain.G @ f) - f
+    for label in (0, 1):
+        on_component = difference[domain.components == label]
+        np.testing.assert_allclose(on_component, on_component[0], rtol=0, atol=1e-12)
+    assert abs(np.ptp(difference)) > 1e-3
+
+
+def test_columns_are_solved_as_one_by_one(disk):
+    flow, poisson = HeatFlow(disk, 0.01), PoissonProblem(disk)
+    b = np.random.default_rng(0).random((disk.n, 5))
+    np.testing.assert_allclose(flow.solve(b)[:, 3], flow.solve(b[:, 3]), rtol=1e-12)
+    rhs = disk.D @ normalize(disk, b)
+    np.testing.assert_allclose(poisson.solve(rhs)[:, 3], poisson.solve(rhs[:, 3]), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("t", [0.0, -1.0, np.inf, np.nan])
+def test_time_step_must_be_positive(disk, t):
+    with pytest.raises(ValueError, match="t must be a positive number"):
+        HeatFlow(disk, t)
+
+
+def test_unknown_boundary(disk):
+    with pytest.raises(ValueError, match="boundary must be 'neumann', 'dirichlet' or 'average'"):
+        HeatFlow(disk, 1.0, "robin")
