@@ -23,6 +23,7 @@ __all__ = [
     "facets",
     "longest_path",
     "nonmanifold_vertices",
+    "shortest_edge_graph",
     "unique_rows",
 ]
 
@@ -152,7 +153,7 @@ def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
     return np.flatnonzero(bad)
 
 
-def longest_path(edges: IntArray, lengths: FloatArray, components: IntArray) -> float:
+def longest_path(graph: sp.csr_array, components: IntArray) -> float:
     """Length of a longest shortest path along edges, over all components.
 
     Two rounds of Dijkstra, the second from the farthest vertices of the first; exact on a tree, and a lower bound
@@ -160,19 +161,11 @@ def longest_path(edges: IntArray, lengths: FloatArray, components: IntArray) -> 
 
     Parameters
     ----------
-    edges : (k, 2) int64
-        End points; an edge that returns to its vertex or repeats another is allowed.
-    lengths : (k,) float64
-        Positive.
+    graph : (n, n) csr_array
+        Edge lengths, each edge stored in one direction or both.
     components : (n,) int64
         Component labels 0, 1, ... of the vertices.
     """
-    n = len(components)
-    ascending = np.argsort(lengths, kind="stable")
-    pairs = np.sort(edges, axis=1)[ascending]
-    first, _, _ = unique_rows(pairs, n)  # the shortest of several edges between two vertices
-    i, j = pairs[first].T
-    graph = sp.csr_array((lengths[ascending][first], (i, j)), shape=(n, n))
     start = np.unique(components, return_index=True)[1]
     for _ in range(2):
         distance = csgraph.dijkstra(graph, directed=False, indices=start, min_only=True)
@@ -180,3 +173,11 @@ def longest_path(edges: IntArray, lengths: FloatArray, components: IntArray) -> 
         farthest_last = np.argsort(distance, kind="stable")
         start[components[farthest_last]] = farthest_last
     return float(distance.max())
+
+
+def shortest_edge_graph(edges: IntArray, lengths: FloatArray, n: int) -> sp.csr_array:
+    """Edge lengths as a graph (n, n); of several edges between the same two vertices the shortest."""
+    ascending = np.argsort(lengths, kind="stable")
+    pairs = np.sort(edges, axis=1)[ascending]
+    first, _, _ = unique_rows(pairs, n)
+    return sp.csr_array((lengths[ascending][first], tuple(pairs[first].T)), shape=(n, n))

@@ -11,6 +11,7 @@ from typing import TypeVar
 
 import igl
 import numpy as np
+import scipy.sparse as sp
 
 from heat_igl import connectivity
 from heat_igl.errors import MeshError
@@ -209,7 +210,9 @@ class Mesh:
     @cached_property
     def longest_distance(self) -> float:
         """Length of a longest shortest path along edges, over all components; see `connectivity.longest_path`."""
-        return connectivity.longest_path(self.edges, self.edge_lengths, self.components)
+        n = self.n_vertices
+        graph = sp.csr_array((self.edge_lengths, tuple(self.edges.T)), shape=(n, n))
+        return connectivity.longest_path(graph, self.components)
 
     def report(self) -> MeshReport:
         """Everything about the mesh that bears on a distance computed on it.

@@ -170,7 +170,8 @@ def intrinsic_operators(triangulation: IntrinsicTriangulation, longest_distance:
     if longest_distance is None:
         edges = triangulation.edges
         ends = np.stack([triangulation.tail(edges), triangulation.head(edges)], axis=1)
-        longest_distance = connectivity.longest_path(ends, lengths.ravel()[edges], components)
+        graph = connectivity.shortest_edge_graph(ends, lengths.ravel()[edges], n)
+        longest_distance = connectivity.longest_path(graph, components)
     return Operators(
         L=_padded(igl.cotmatrix_intrinsic(lengths, F), n),
         M=_padded(igl.massmatrix_intrinsic(lengths, F), n),

@@ -277,7 +277,7 @@ def test_bad_meshes_get_finite_distances(name, laplacian, boundary):
 def test_cold_boundary_that_cuts_the_mesh_is_reported():
     """Two disks that touch in a vertex of their boundary: no heat passes it when the boundary is held at zero."""
     disk = shapes.disk(6)
-    second = disk.V + [2, 0, 0]
+    second = disk.V + np.array([2, 0, 0])
     touching = int(np.argmin(second[:, 0]))
     label = np.arange(disk.n_vertices) + disk.n_vertices
     label[touching] = np.argmax(disk.V[:, 0])
