@@ -10,6 +10,7 @@ from heat_igl.errors import (
     SourceError,
 )
 from heat_igl.heat_method import HeatMethodSolver, HeatSolution, heat_method_distance
+from heat_igl.io import read_attributes, read_mesh, write_mesh
 from heat_igl.mesh import Mesh, MeshReport
 
 __all__ = [
@@ -24,7 +25,10 @@ __all__ = [
     "ReferenceSolverError",
     "SourceError",
     "heat_method_distance",
+    "read_attributes",
+    "read_mesh",
     "shapes",
+    "write_mesh",
 ]
 
 __version__ = "0.1.0"

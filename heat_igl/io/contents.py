@@ -1,0 +1,151 @@
+"""What a file holds, checked with the place of the first offender before `heat_igl.Mesh` sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.io.text import ragged
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+__all__ = ["Cells", "Contents", "assemble", "integers", "select"]
+
+
+class Contents(NamedTuple):
+    """Positions (n, 3), triangles (m, 3) or tetrahedra (m, 4), and arrays per vertex (n,) or (n, k) by name."""
+
+    V: FloatArray
+    F: IntArray
+    attributes: dict[str, AnyArray]
+
+
+class Cells(NamedTuple):
+    """Polygons or tetrahedra of any number of corners.
+
+    Attributes
+    ----------
+    corners : (sum of degree,) int64
+        Vertex indices from 0, cell after cell.
+    degree : (m,) int64
+        Number of corners of each cell.
+    tetrahedra : bool
+        Whether all cells are tetrahedra; polygons otherwise.
+    """
+
+    corners: IntArray
+    degree: IntArray
+    tetrahedra: bool = False
+
+
+def integers(values: FloatArray, where: Callable[[int], str], what: str = "index") -> IntArray:
+    """`values` as integers; `where(i)` says in an error where the i-th comes from."""
+    bad = ~(np.abs(values) < 2.0**53) | (values != np.rint(values))
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise MeshError(f"{where(i)}: {values[i]:g} is no {what}, which must be a whole number below 2**53")
+    return values.astype(np.int64)
+
+
+def assemble(
+    V: FloatArray, cells: Cells, vertex_at: Callable[[int], str], cell_at: Callable[[int], str], base: int
+) -> tuple[FloatArray, IntArray]:
+    """Check positions and indices, and split polygons into triangles.
+
+    A polygon becomes the fan of triangles around its first corner, which is right for convex polygons that are
+    roughly planar; others should be triangulated by the program that made them.
+
+    Parameters
+    ----------
+    V : (n, 3) float64
+        Positions.
+    cells : Cells
+        Indices from 0.
+    vertex_at, cell_at : callable
+        Where in the file a vertex or a cell stands, for errors.
+    base : int
+        The first index as the file format counts, for errors.
+
+    Raises
+    ------
+    MeshError
+        Naming the place of the first offender, and how many there are.
+    """
+    corners, degree = cells.corners, cells.degree
+    n = len(V)
+    bad = ~np.isfinite(V).all(axis=1)
+    if bad.any():
+        where = vertex_at(int(np.argmax(bad)))
+        raise MeshError(f"{where}: a coordinate is not finite ({int(bad.sum())} of {n} vertices): repair or remove it")
+    end = np.cumsum(degree)
+    bad = (corners < 0) | (corners >= n)
+    if bad.any():
+        first = int(np.argmax(bad))
+        where = cell_at(int(np.searchsorted(end, first, side="right")))
+        raise MeshError(
+            f"{where}: there is no vertex {corners[first] + base}, the file has {n} vertices, counted from {base} "
+            f"({int(bad.sum())} such indices): the file is damaged or written by another convention"
+        )
+    bad = _repeats(corners, degree)
+    if bad.any():
+        where = cell_at(int(np.argmax(bad)))
+        raise MeshError(
+            f"{where}: a face repeats a vertex ({int(bad.sum())} of {len(degree)} faces do): "
+            "remove these faces, they have no area"
+        )
+    if cells.tetrahedra:
+        return V, corners.reshape(-1, 4)
+    if not (degree > 3).any():
+        return V, corners.reshape(-1, 3)
+    start = np.repeat(end - degree, degree - 2)
+    second = ragged(end - degree + 1, degree - 2)
+    return V, np.stack([corners[start], corners[second], corners[second + 1]], axis=1)
+
+
+def _repeats(corners: IntArray, degree: IntArray) -> AnyArray:
+    if len(degree) and (degree == degree[0]).all():
+        rows = np.sort(corners.reshape(len(degree), -1), axis=1)
+        found: AnyArray = (rows[:, 1:] == rows[:, :-1]).any(axis=1)
+        return found
+    owner = np.repeat(np.arange(len(degree)), degree)
+    order = np.lexsort((corners, owner))
+    same = (owner[order[1:]] == owner[order[:-1]]) & (corners[order[1:]] == corners[order[:-1]])
+    found = np.zeros(len(degree), bool)
+    found[owner[order[1:][same]]] = True
+    return found
+
+
+_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4}
+
+
+def select(path: Path, blocks: list[tuple[str, IntArray]]) -> Cells:
+    """The domain among the cells of a file that may hold several kinds.
+
+    Tetrahedra where there are any, since the triangles beside them are their boundary; else triangles, quadrilaterals
+    and polygons. Points and lines are left out. A cell of another kind is an error, since a domain without
+    it would have a hole.
+
+    Parameters
+    ----------
+    path : Path
+        Named in errors.
+    blocks : list of (str, (k, d) int64)
+        Kind, in the words of meshio ("triangle", "tetra10", ...), and vertex indices from 0.
+    """
+    blocks = [(kind, rows) for kind, rows in blocks if len(rows) and not kind.startswith(("vertex", "line"))]
+    for kind, rows in blocks:
+        if kind != "polygon" and kind not in _CORNERS:
+            raise MeshError(
+                f"{path}: {len(rows)} cells are of kind {kind}; distances are computed on triangles and "
+                "four-node tetrahedra only: convert the cells (and lower their order) in the program that made them"
+            )
+    solid = [rows for kind, rows in blocks if kind == "tetra"]
+    chosen = solid or [rows for _, rows in blocks]
+    if not chosen:
+        raise MeshError(f"{path}: the file holds neither triangles nor tetrahedra, so there is no domain to work on")
+    corners = np.concatenate([rows.ravel() for rows in chosen]).astype(np.int64)
+    degree = np.concatenate([np.full(len(rows), rows.shape[1], np.int64) for rows in chosen])
+    return Cells(corners, degree, bool(solid))

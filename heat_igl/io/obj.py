@@ -1,0 +1,69 @@
+"""OBJ: its polygons and vertices; materials, normals and lines are passed over.
+
+Own code, since meshio takes no polygons of mixed degree, no negative indices and any text whatsoever.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.io.contents import Cells, Contents, assemble, integers
+from heat_igl.io.text import Text, format_rows
+from heat_igl.mesh import Mesh
+from heat_igl.typing import FloatArray
+
+__all__ = ["read", "write"]
+
+# Records that say nothing about vertices and polygons. A word outside this list is an error, because a damaged "v"
+# that is passed over would shift every index after it.
+_PASSED_OVER = (
+    b"vt vn vp vc l p g o s mg usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj ctech "
+    b"stech cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con call csh"
+).split()
+
+
+def read(path: Path, data: bytes) -> Contents:
+    """Parse an OBJ file."""
+    text = Text(path, data, comment="#", continued=True)
+    word = text.words(12)
+    is_v, is_f = word == b"v", word == b"f"
+    other = np.flatnonzero(~(is_v | is_f))
+    unknown = other[~np.isin(word[other], _PASSED_OVER)]
+    if len(unknown):
+        raise text.error(unknown[0], f"no OBJ record starts like this ({len(unknown)} lines): remove or repair it")
+    V_lines, F_lines = np.flatnonzero(is_v), np.flatnonzero(is_f)
+    for lines, name in ((V_lines, "vertices (lines that start with v)"), (F_lines, "faces (lines that start with f)")):
+        if not len(lines):
+            raise MeshError(f"{path}: the file has no {name}, so it is no mesh")
+    for lines, name in ((V_lines, "vertex needs three coordinates"), (F_lines, "face needs three corners or more")):
+        short = text.count[lines] < 4
+        if short.any():
+            raise text.error(lines[np.argmax(short)], f"a {name} ({int(short.sum())} lines have fewer)")
+    values, start = text.numbers(V_lines, skip=1)
+    V = values[start[:, None] + np.arange(3)]
+
+    values, _ = text.numbers(F_lines, skip=1, up_to_slash=True)
+    degree = text.count[F_lines] - 1
+    end = np.cumsum(degree)
+    number = integers(values, lambda i: text.where(F_lines[np.searchsorted(end, i, side="right")]))
+    if (number == 0).any():
+        line = F_lines[np.searchsorted(end, np.argmax(number == 0), side="right")]
+        raise text.error(line, f"vertex 0 ({int((number == 0).sum())} such indices): OBJ counts vertices from 1")
+    if (number < 0).any():
+        # -1 is the latest vertex above the line.
+        above = np.repeat(np.cumsum(is_v)[F_lines], degree)
+        corners = np.where(number < 0, above + number, number - 1)
+    else:
+        corners = number - 1
+    V, F = assemble(
+        V, Cells(corners, degree), lambda i: text.where(V_lines[i]), lambda i: text.where(F_lines[i]), base=1
+    )
+    return Contents(V, F, {})
+
+
+def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:  # noqa: ARG001
+    """Write triangles as OBJ."""
+    path.write_text(format_rows("v %r %r %r\n", mesh.V) + format_rows("f %d %d %d\n", mesh.F + 1))

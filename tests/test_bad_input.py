@@ -1,0 +1,598 @@
+"""Bad input is a clear error, never a crash: hundreds of cases in one subprocess, so that a dying interpreter is seen.
+
+The module is its own script: ``python tests/test_bad_input.py DIRECTORY`` runs every case and prints one line of JSON
+each. A case without a pattern is a neighbour: the nearest valid input of its family, which must pass.
+To add cases, write a generator of `Case` and add it to `GENERATORS`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+import struct
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import heat_igl
+from heat_igl import MeshError
+
+EXTENSIONS = ("off", "obj", "ply", "stl", "mesh", "msh", "vtu")
+
+
+@dataclass(frozen=True)
+class Case:
+    """An input and what must come of it: an error whose message matches every pattern, or (no pattern) no error."""
+
+    name: str
+    run: Callable[[Path], Any]
+    patterns: tuple[str, ...] = ()
+    error: str = "MeshError"
+
+
+# --- arrays -----------------------------------------------------------------------------------------------------------
+
+V4 = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+TRIANGLES = np.array([[0, 1, 2], [0, 1, 3]])
+TETRAHEDRA = np.array([[0, 1, 2, 3]])
+
+
+def changed(array: np.ndarray, at: tuple[int, int], value: Any) -> np.ndarray:
+    array = array.copy()
+    array[at] = value
+    return array
+
+
+def mesh_case(name: str, V: Any, F: Any, *patterns: str) -> Case:
+    return Case(f"Mesh: {name}", lambda _: heat_igl.Mesh(V, F), patterns)
+
+
+def array_cases() -> Iterator[Case]:
+    for kind, F in (("triangles", TRIANGLES), ("tetrahedra", TETRAHEDRA)):
+        yield mesh_case(f"{kind}, neighbour", V4, F)
+        yield mesh_case(f"{kind} as lists, neighbour", V4.tolist(), F.tolist())
+        yield mesh_case(f"{kind} unsigned, neighbour", V4.astype(np.float32), F.astype(np.uint8))
+        for column in range(F.shape[1]):
+            for bad in (-1, -(2**40), 4, 2**31, 2**62):
+                where = rf"F\[{len(F) - 1}, {column}\] = {bad} is no vertex \(1 of {len(F)}"
+                yield mesh_case(f"{kind}, {bad} in column {column}", V4, changed(F, (-1, column), bad), where, "0 to 3")
+            for other in range(column):
+                F_bad = changed(F, (0, column), F[0, other])
+                yield mesh_case(
+                    f"{kind}, {other} and {column} equal", V4, F_bad, r"F\[0\] = \[.*repeats a vertex \(1 of"
+                )
+        yield mesh_case(f"{kind} counted from 1", V4, F + 1, "is no vertex", "1-based|0 to 3")
+        for dtype in (np.float64, np.float32, np.complex128, np.bool_, object, np.str_):
+            yield mesh_case(f"{kind} as {dtype.__name__}", V4, F.astype(dtype), "F must hold integers")
+    for row, column in ((0, 0), (1, 1), (3, 2)):
+        for bad in (np.nan, np.inf, -np.inf):
+            V = changed(V4, (row, column), bad)
+            yield mesh_case(f"{bad} in row {row}", V, TRIANGLES, rf"V\[{row}, {column}\] is {bad} \(1 of 4 vertices")
+    yield mesh_case("largest finite float32, neighbour", V4.astype(np.float32) * np.float32(3e38), TRIANGLES)
+    for dtype in (np.complex128, np.bool_, object, np.str_, "datetime64[s]"):
+        yield mesh_case(f"V as {dtype}", V4.astype(np.int64).astype(dtype), TRIANGLES, "V must hold real numbers")
+    yield mesh_case("V of giant integers", [[10**400, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], "V must hold real")
+    for shape in ((4, 2), (4, 4), (12,), (), (4, 3, 1), (3, 4)):
+        V = np.ones(shape)
+        yield mesh_case(f"V of shape {shape}", V, TRIANGLES, rf"V must have shape \(n, 3\).*{re.escape(str(shape))}")
+    yield mesh_case("planar V", V4[:, :2], TRIANGLES, "append a zero column")
+    for shape in ((2, 2), (2, 5), (6,), (2, 3, 1), (1, 2, 3)):
+        F = np.zeros(shape, int)
+        yield mesh_case(f"F of shape {shape}", V4, F, rf"F must have shape.*{re.escape(str(shape))}")
+    for shape in ((0, 3), (0, 4), (0,), (3, 0)):
+        yield mesh_case(f"F empty, {shape}", V4, np.zeros(shape, int), "F is empty")
+    yield mesh_case("V empty", V4[:0], TRIANGLES, "V is empty")
+    yield mesh_case("V ragged", [[0, 0, 0], [1, 0]], TRIANGLES, "V must be an array")
+    yield mesh_case("F ragged", V4, [[0, 1, 2], [1, 3]], "F must be an array")
+    yield mesh_case("V None", None, TRIANGLES, "V must hold real numbers")
+    yield mesh_case("F None", V4, None, "F must hold integers")
+    yield mesh_case("V a string", "bunny", TRIANGLES, "V must hold real numbers")
+    yield mesh_case("all in one point", np.ones((4, 3)), TRIANGLES, "lie in one point")
+    for scale in (1e-40, 1e40):
+        yield mesh_case(f"scale {scale}, neighbour", V4 * scale, TRIANGLES)
+    for scale in (1e-70, 1e70):
+        yield mesh_case(f"scale {scale}", V4 * scale, TRIANGLES, "V spans .*rescale")
+
+
+# --- files, token by token --------------------------------------------------------------------------------------------
+
+# x: a coordinate, i: an index, n and m: the counts of vertices and faces.
+PLY_HEADER = (
+    "ply\nformat ascii 1.0\nelement vertex {n}\nproperty double x\nproperty double y\nproperty double z\n"
+    "element face {m}\nproperty list uchar int vertex_indices\nend_header\n"
+)
+FACET = "facet normal 0 0 1\n outer loop\n  vertex {} 0 0\n  vertex 1 0 0\n  vertex 0 {} 0\n endloop\nendfacet\n"
+VTU = """<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian"><UnstructuredGrid>
+<Piece NumberOfPoints="{n}" NumberOfCells="{m}">
+<Points><DataArray type="Float64" Name="Points" NumberOfComponents="3" format="ascii">
+{x} 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">{i} 1 2 0 1 3</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">3 6</DataArray>
+<DataArray type="Int64" Name="types" format="ascii">5 5</DataArray></Cells>
+</Piece></UnstructuredGrid></VTKFile>"""
+TEMPLATES = {
+    "off": "OFF\n{n} {m} 0\n{x} 0 0\n1 0 0\n0 1 0\n0 0 1\n3 {i} 1 2\n3 0 1 3\n",
+    "obj": "v {x} 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf {i} 2 3\nf 1 2 4\n",
+    "ply": PLY_HEADER + "{x} 0 0\n1 0 0\n0 1 0\n0 0 1\n3 {i} 1 2\n3 0 1 3\n",
+    "stl": "solid a\n" + FACET.format("{x}", 1) + FACET.format(0, 2) + "endsolid\n",
+    "mesh": "MeshVersionFormatted 2\nDimension 3\nVertices\n{n}\n{x} 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n"
+    "Triangles\n{m}\n{i} 2 3 0\n1 2 4 0\nEnd\n",
+    "msh": "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{n}\n1 {x} 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+    "$Elements\n{m}\n1 2 2 0 0 {i} 2 3\n2 2 2 0 0 1 2 4\n$EndElements\n",
+    "4.msh": "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 {n} 1 4\n2 1 0 4\n1\n2\n3\n4\n"
+    "{x} 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n$Elements\n1 {m} 1 2\n2 1 2 2\n1 {i} 2 3\n2 1 2 4\n$EndElements\n",
+    "vtu": VTU,
+}
+TOKENS = {
+    "x": ("nan", "-inf", "1e999", "abc", "1.2.3", "", "0 0", "--1", "é"),
+    "i": ("-9", "99", "99999999999999999999", "1.5", "nan", "x", "2", ""),
+    "n": ("5", "3", "0", "-4", "1000000000000", "99999999999999999999", "4.5", "x", ""),
+    "m": ("3", "1", "0", "-2", "1000000000000", "99999999999999999999", "2.5", "x", ""),
+}
+# meshio says what is wrong with a VTU file, and names neither line nor token.
+PLACE = r"line \d+|node 1\b|nodes \[|face [01]|vertex [01] \(counted|header announces|meshio|p[a-z]+ [01]"
+
+
+def filled(extension: str, **tokens: str) -> bytes:
+    base = "1" if extension.endswith(("obj", "mesh", "msh")) else "0"
+    return TEMPLATES[extension].format(**{"x": "0", "i": base, "n": "4", "m": "2", **tokens}).encode()
+
+
+def file_case(name: str, file: str, content: bytes, *patterns: str) -> Case:
+    """Read a file; every message must name it."""
+
+    def run(directory: Path) -> heat_igl.Mesh:
+        path = directory / file
+        path.write_bytes(content)
+        return heat_igl.read_mesh(path)
+
+    return Case(f"{file}: {name}", run, patterns and (re.escape(file), *patterns))
+
+
+def token_cases() -> Iterator[Case]:
+    for extension, template in TEMPLATES.items():
+        file = f"a.{extension}" if extension[0] != "4" else "a4.msh"
+        yield file_case("neighbour", file, filled(extension))
+        yield file_case("neighbour, x = -1.5e-3", file, filled(extension, x="-1.5e-3"))
+        yield file_case("neighbour, CRLF", file, filled(extension).replace(b"\n", b"\r\n"))
+        for field, tokens in TOKENS.items():
+            if f"{{{field}}}" not in template:
+                continue
+            for token in tokens:
+                if token == "0 0" and extension in ("off", "obj"):
+                    continue  # what follows the position is a colour there
+                # Vertex 2 is a repeated one where counting starts at 1, and so is 1 elsewhere.
+                token = "1" if (field, token) == ("i", "2") and filled(extension) == filled(extension, i="0") else token
+                yield file_case(f"{field} = {token!r}", file, filled(extension, **{field: token}), PLACE)
+
+
+# --- files as a whole -------------------------------------------------------------------------------------------------
+
+
+def binary_files() -> dict[str, bytes]:
+    """A small valid binary file of each format that has one."""
+    ply = b"ply\nformat binary_%s_endian 1.0\nelement vertex 4\nproperty double x\nproperty float y\nproperty float z\n"
+    ply += b"property uchar red\nelement face 2\nproperty list uchar int vertex_index\nend_header\n"
+    found = {}
+    for name, order in ((b"little", "<"), (b"big", ">")):
+        rows = b"".join(struct.pack(order + "dffB", *row, 200) for row in V4)
+        rows += b"".join(struct.pack(order + "B3i", 3, *face) for face in TRIANGLES)
+        found[f"{name.decode()}.ply"] = ply % name + rows
+    # A triangle and a quadrilateral, so that rows differ in length.
+    mixed = struct.pack("<B3i", 3, 0, 1, 2) + struct.pack("<B4i", 4, 0, 1, 2, 3)
+    found["mixed.ply"] = found["little.ply"][: -2 * 13] + mixed
+    facets = b"".join(struct.pack("<12fH", 0, 0, 1, *V4[face].ravel(), 0) for face in TRIANGLES)
+    found["binary.stl"] = b"solid but binary".ljust(80, b"\0") + struct.pack("<I", 2) + facets
+    nodes = b"".join(struct.pack("<i3d", i, *row) for i, row in enumerate(V4, 1))
+    elements = struct.pack("<3i", 2, 2, 2) + b"".join(struct.pack("<6i", 1, 0, 0, *(face + 1)) for face in TRIANGLES)
+    head = b"$MeshFormat\n%s 1 8\n" + struct.pack("<i", 1) + b"\n$EndMeshFormat\n"
+    body = b"$Nodes\n4\n" + nodes + b"\n$EndNodes\n$Elements\n2\n" + elements + b"\n$EndElements\n"
+    found["binary2.msh"] = head % b"2.2" + body
+    nodes = struct.pack("<4Q3iQ4Q", 1, 4, 1, 4, 2, 1, 0, 4, 1, 2, 3, 4) + V4.tobytes()
+    elements = struct.pack("<4Q3iQ", 1, 2, 1, 2, 2, 1, 2, 2)
+    elements += b"".join(struct.pack("<4Q", i, *(face + 1)) for i, face in enumerate(TRIANGLES, 1))
+    found["binary4.msh"] = (
+        head % b"4.1" + b"$Nodes\n" + nodes + b"\n$EndNodes\n$Elements\n" + elements + b"\n$EndElements\n"
+    )
+    return found
+
+
+def garbage() -> dict[str, bytes]:
+    noise = random.Random(20130613).randbytes(4000)
+    return {
+        "empty": b"",
+        "blank": b" \n\n\t\n",
+        "zeros": bytes(500),
+        "noise": noise,
+        "text": b"Dear all,\n\nplease find the mesh attached.\n\nBest wishes\n",
+        "html": b"<!DOCTYPE html>\n<html><head><title>404</title></head></html>\n",
+        "numbers": b"1 2 3\n" * 50,
+        "one number": b"7",
+        "utf-16": "OFF\n4 2 0\n".encode("utf-16"),
+        "pointer": b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n",
+        "one long line": b"v 1" * 3000,
+        "brackets": b"[" * 5000,
+    }
+
+
+def whole_file_cases() -> Iterator[Case]:
+    for kind, content in garbage().items():
+        for extension in EXTENSIONS:
+            yield file_case(
+                f"{kind}", f"a.{extension}", content, r"line \d|empty|header|starts with|meshio|bytes|no faces"
+            )
+    for extension in ("off", "obj", "mesh"):
+        wide = filled(extension).decode().encode("utf-16")
+        yield file_case("whole but in UTF-16", f"a.{extension}", wide, "line 1: a zero byte.*save it as UTF-8 text")
+    for file, content in binary_files().items():
+        yield file_case("neighbour", file, content)
+        yield file_case("one byte short", file, content.rstrip(b"\n")[:-1], "cut short|announced|counts say")
+        yield file_case("half", file, content[: len(content) // 2], "cut short|missing")
+        if not file.endswith(".msh"):  # which may go on with other sections
+            yield file_case("surplus", file, content + b"surplus", "announces|follow")
+    other = {"a.off": "obj", "a.obj": "off", "a.ply": "stl", "a.stl": "ply", "a.mesh": "msh", "a.msh": "mesh"}
+    for file, extension in other.items():
+        yield file_case(f"content is {extension}", file, filled(extension), r"line \d")
+    yield file_case("no tetrahedra", "a.mesh", filled("mesh").replace(b"Triangles", b"Edges"), "neither triangles nor")
+    tets = TEMPLATES["msh"].replace("1 2 2 0 0 {i} 2 3\n2 2 2 0 0 1 2 4\n", "1 4 2 0 0 1 2 3 4\n").encode()
+    tets = tets.replace(b"{n}", b"4").replace(b"{x}", b"0").replace(b"{m}", b"1")
+    yield file_case("tetrahedra, neighbour", "tet.msh", tets)
+    yield file_case("hexahedra", "tet.msh", tets.replace(b"1 4 2", b"1 5 2"), r"line \d+.*hexahedron has 8 nodes")
+    points = tets.replace(b"1 4 2 0 0 1 2 3 4", b"1 15 2 0 0 1")
+    yield file_case("a point only", "tet.msh", points, "neither triangles nor tetrahedra")
+    order_2 = tets.replace(b"1 4 2 0 0 1 2 3 4", b"1 9 2 0 0 1 2 3 4 1 2")
+    yield file_case("second order", "tet.msh", order_2, "triangle6")
+    yield file_case("node twice", "tet.msh", tets.replace(b"\n3 0 1 0", b"\n2 0 1 0"), r"node 2 is in \$Nodes twice")
+    yield file_case("unlisted node", "tet.msh", tets.replace(b"2 3 4\n$End", b"2 3 0\n$End"), "no vertex 0 in")
+    yield file_case("giant node number", "tet.msh", tets.replace(b"\n4 0 0 1", b"\n2000000000 0 0 1"), "no vertex 4 in")
+    yield file_case("version 4.0", "tet.msh", tets.replace(b"2.2", b"4.0"), "version 4.0 is not supported")
+    yield file_case("BINARY", "a.off", b"OFF BINARY\n\0\0\0\4", "line 1|BINARY|binary")
+    yield file_case("1e300", "a.off", filled("off", x="1e300"), "V spans .*rescale V")
+    yield file_case("4OFF", "a.off", b"4OFF\n1 1 0\n0 0 0 0\n", "line 1.*not for points in space")
+    yield file_case("edge as face", "a.off", filled("off").replace(b"3 0 1 3", b"2 0 1"), "line 8.*2 corners")
+    yield file_case("face without index", "a.off", filled("off").replace(b"3 0 1 3", b"4 0 1 3"), "line 8.*4 corners")
+    yield file_case("vertex of two numbers", "a.off", filled("off").replace(b"1 0 0", b"1 0"), "line 4.*three coord")
+    yield file_case("index 0", "a.obj", filled("obj", i="0"), "line 5 .*counts vertices from 1")
+    yield file_case("index -5", "a.obj", filled("obj", i="-5"), r"line 5 \(f -5 2 3\)")
+    yield file_case("index -4, neighbour", "a.obj", filled("obj", i="-4"))
+    yield file_case("two corners", "a.obj", filled("obj", i=""), "line 5 .*three corners")
+    yield file_case("damaged keyword", "a.obj", filled("obj").replace(b"v 0 1 0", b"w 0 1 0"), r"line 3 \(w 0 1 0\)")
+    yield file_case("no faces", "a.obj", b"v 0 0 0\nv 1 0 0\n", "no faces")
+    yield file_case("no vertices", "a.obj", b"f 1 2 3\n", "no vertices")
+    ply = filled("ply")
+    for name, old, new, pattern in (
+        ("no z", b"property double z\n", b"", "more numbers|x, y and z"),
+        ("z of unknown type", b"double z", b"quad z", "line 6"),
+        ("z twice", b"double z", b"double y", "twice"),
+        ("no format", b"format ascii 1.0\n", b"", "format"),
+        (
+            "no list",
+            b"property list uchar int vertex_indices",
+            b"property int vertex_indices",
+            "numbers|vertex_indices",
+        ),
+        ("list counted by float", b"list uchar int", b"list float int", "line 8"),
+        ("another list", b"vertex_indices", b"corners", "vertex_indices"),
+        ("no end_header", b"end_header\n", b"", "end_header"),
+        ("faces twice", b"element face 2\n", b"element face 0\nelement face 2\n", "twice"),
+        ("two corners", b"3 0 1 3", b"2 0 1", "face 1 .*2 corners"),
+        ("giant list", b"3 0 1 3", b"999999999999 0 1 3", "line 15.*too few numbers"),
+        ("negative list", b"3 0 1 3", b"-1 0 1 3", "line 15.*too few numbers"),
+    ):
+        yield file_case(name, "a.ply", ply.replace(old, new), pattern)
+    binary = binary_files()["little.ply"]
+    for count in (b"5", b"3", b"1000000000000", b"0"):
+        bad = binary.replace(b"vertex 4", b"vertex " + count)
+        yield file_case(f"{count!r} vertices", "a.ply", bad, "announces|follow|face . ")
+        bad = binary.replace(b"face 2", b"face " + count)
+        yield file_case(f"{count!r} faces", "a.ply", bad, "announces|follow")
+    stl = binary_files()["binary.stl"]
+    for count in (0, 1, 3, 2**32 - 1):
+        bad = stl[:80] + struct.pack("<I", count) + stl[84:]
+        yield file_case(f"{count} triangles", "a.stl", bad, f"announces {count} triangles.*has 184")
+    yield file_case("NaN", "a.stl", stl[:96] + struct.pack("<f", np.nan) + stl[100:], "triangle 0 .*not finite")
+    yield file_case("one point", "a.stl", stl[:84] + bytes(100), "none is left")
+    yield file_case("no triangles", "a.stl", stl[:80] + bytes(4), "holds no triangles")
+    yield file_case("quadrilateral", "a.stl", filled("stl").replace(b" endloop", b" vertex 1 1 1\n endloop"), "line 7")
+    vtu = filled("vtu")
+    piece = vtu[vtu.index(b"<Piece") : vtu.index(b"</Piece>") + 8]
+    yield file_case("two pieces", "a.vtu", vtu.replace(piece, piece + piece), "2 pieces")
+    attribute = b'<PointData><DataArray type="Float64" Name="d" format="ascii">1 2</DataArray></PointData></Piece>'
+    yield file_case("short attribute", "a.vtu", vtu.replace(b"</Piece>", attribute), r"len\(point_data")
+    yield file_case("other grid", "a.vtu", vtu.replace(b"UnstructuredGrid", b"PolyData"), "PolyData")
+
+
+# --- paths and writing ------------------------------------------------------------------------------------------------
+
+
+def path_cases() -> Iterator[Case]:
+    def read(name: Any, *patterns: str) -> Case:
+        return Case(f"path {name!r}", lambda directory: heat_igl.read_mesh(directory / name), patterns)
+
+    yield read("missing.off", "missing.off: no such file")
+    yield read("missing/a.off", "a.off: no such file")
+    for name in ("a.xyz", "a", "a.obj.gz", "a.blend", ".off"):
+        yield read(name, re.escape(name), "unknown extension", ".off, .obj")
+    yield read("nul\0.off", "cannot be a path")
+    yield read("surrogate\udc80\ud800.off", "cannot be a path")
+    yield read("x" * 300 + ".off", "cannot be read")
+    for bad in (None, 3, V4, b"a.off"):
+        patterns = ("path must be a string",)
+        yield Case(f"path {type(bad).__name__}", lambda _, bad=bad: heat_igl.read_mesh(bad), patterns)
+
+    def directory_named_off(directory: Path) -> None:
+        (directory / "folder.off").mkdir()
+        heat_igl.read_mesh(directory / "folder.off")
+
+    yield Case("directory", directory_named_off, ("folder.off is a directory",))
+
+    def below_a_file(directory: Path) -> None:
+        (directory / "file").write_text("")
+        heat_igl.read_mesh(directory / "file" / "a.off")
+
+    yield Case("below a file", below_a_file, ("a.off cannot be read: Not a directory",))
+
+    def pipe(directory: Path) -> None:
+        os.mkfifo(directory / "pipe.off")
+        heat_igl.read_mesh(directory / "pipe.off")
+
+    def as_nobody(action: Callable[[Path], Any]) -> Callable[[Path], Any]:
+        def run(directory: Path) -> Any:
+            was = os.geteuid()
+            if was == 0:  # permissions do not bind root
+                os.seteuid(65534)
+            try:
+                return action(directory)
+            finally:
+                os.seteuid(was)
+
+        return run
+
+    def write_file(directory: Path) -> Path:
+        path = directory / "locked.off"
+        path.write_bytes(filled("off"))
+        return path
+
+    def locked(directory: Path) -> None:
+        path = write_file(directory)
+        path.chmod(0)
+        as_nobody(lambda _: heat_igl.read_mesh(path))(directory)
+
+    def locked_folder(directory: Path) -> None:
+        folder = directory / "locked"
+        folder.mkdir()
+        folder.chmod(0o500)
+        as_nobody(lambda _: heat_igl.write_mesh(folder / "a.off", heat_igl.Mesh(V4, TRIANGLES)))(directory)
+
+    if hasattr(os, "mkfifo"):
+        yield Case("pipe", pipe, ("pipe.off is not a regular file",))
+        yield Case("locked file, neighbour", lambda directory: heat_igl.read_mesh(write_file(directory)))
+        yield Case("locked file", locked, ("locked.off cannot be read: Permission denied",))
+        yield Case("locked folder", locked_folder, ("a.off cannot be written: Permission denied",))
+
+
+def write_cases() -> Iterator[Case]:
+    surface, solid = heat_igl.Mesh(V4, TRIANGLES), heat_igl.Mesh(V4, TETRAHEDRA)
+
+    def write(name: str, file: str, mesh: Any, *patterns: str, **attributes: Any) -> Case:
+        return Case(
+            f"write {file}: {name}",
+            lambda directory: heat_igl.write_mesh(directory / file, mesh, **attributes),
+            patterns,
+        )
+
+    phi = np.arange(4.0)
+    for extension in ("off", "obj", "stl", "mesh", "msh"):
+        yield write("neighbour", f"w.{extension}", surface)
+        patterns = (rf"w.{extension}: .*no vertex attributes \(phi\)", ".ply and .vtu")
+        yield write("attribute", f"w.{extension}", surface, *patterns, phi=phi)
+    for extension in ("off", "obj", "stl", "ply"):
+        yield write("tetrahedra", f"w.{extension}", solid, rf"w.{extension}.*no tetrahedra", ".mesh, .msh and .vtu")
+    for extension in ("mesh", "msh", "vtu"):
+        yield write("tetrahedra, neighbour", f"w.{extension}", solid)
+    for extension in ("ply", "vtu"):
+        file = f"w.{extension}"
+        yield write(
+            "attributes, neighbour",
+            file,
+            surface,
+            phi=phi,
+            labels=np.array([1, 2, 3, 4]),
+            inf=phi / [0.5, 1, 2, np.inf],
+        )
+        for bad in (phi[:3], phi[None], phi[:, None, None], np.empty((4, 0)), 1.0, np.empty(0)):
+            shape = re.escape(str(np.shape(bad)))
+            yield write(f"shape {np.shape(bad)}", file, surface, "phi must have shape", shape, phi=bad)
+        for bad in (phi.astype(complex), phi.astype(str), np.array([None] * 4), phi.astype(np.longdouble)):
+            yield write(f"{bad.dtype}", file, surface, f"phi must hold real numbers.*{bad.dtype}", phi=bad)
+        yield write("ragged", file, surface, "phi must be an array", phi=[[1], [1, 2], [1], [1]])
+        yield write(
+            "2**53 + 1", file, surface, r"phi holds integers beyond 2\*\*53", phi=np.array([2**53 + 2, 0, 0, 0])
+        )
+        yield write("2**53, neighbour", file, surface, phi=np.array([2**53, 0, 0, -(2**53)]))
+        for name in ("x", "z", "a b", "", "1", "é", "a\nb", '"'):
+            yield write(f"name {name!r}", file, surface, "cannot name an attribute", **{name: phi})
+    yield write("colliding names", "w.ply", surface, "two properties named a_0", a=np.ones((4, 2)), a_0=phi)
+    yield write("unknown extension", "w.xyz", surface, "unknown extension '.xyz'")
+    yield write("missing folder", "missing/w.off", surface, "w.off cannot be written: No such file")
+    for bad in (None, (V4, TRIANGLES), V4):
+        yield write(f"mesh {type(bad).__name__}", "w.off", bad, "mesh must be a heat_igl.Mesh, not")
+
+    def over_directory(directory: Path) -> None:
+        (directory / "d.off").mkdir()
+        heat_igl.write_mesh(directory / "d.off", surface)
+
+    yield Case("write over a directory", over_directory, ("d.off is not a regular file",))
+    for extension in ("off", "mesh", "stl"):
+        yield Case(
+            f"attributes of .{extension}",
+            lambda _, extension=extension: heat_igl.read_attributes(f"a.{extension}"),
+            (rf"a.{extension}: .*no vertex attributes; .ply and .vtu do",),
+        )
+
+
+GENERATORS: tuple[Callable[[], Iterator[Case]], ...] = (
+    array_cases,
+    token_cases,
+    whole_file_cases,
+    path_cases,
+    write_cases,
+)
+
+
+@cache
+def cases() -> dict[str, Case]:
+    found: dict[str, Case] = {}
+    for generate in GENERATORS:
+        for case in generate():
+            # A file may be bad in the same words for two reasons; both run.
+            name = case.name if case.name not in found else f"{case.name} ({len(found)})"
+            found[name] = replace(case, name=name)
+    return found
+
+
+# --- fuzzing ----------------------------------------------------------------------------------------------------------
+
+
+def valid_files() -> dict[str, bytes]:
+    text = {f"text.{extension}" if extension[0] != "4" else "text4.msh": filled(extension) for extension in TEMPLATES}
+    return text | binary_files()
+
+
+def fuzz(directory: Path, rounds: int) -> dict[str, Any]:
+    """Every prefix and many mutations of every valid file; what is neither a mesh nor a MeshError is reported."""
+    generator = random.Random(55)
+    outcome: dict[str, Any] = {"tried": 0, "unclear": [], "accepted prefixes": []}
+
+    def attempt(file: str, content: bytes) -> bool:
+        path = directory / file
+        path.write_bytes(content)
+        outcome["tried"] += 1
+        try:
+            heat_igl.read_mesh(path)
+        except MeshError as error:
+            if file not in str(error):
+                outcome["unclear"].append([file, content.hex(), str(error)])
+            return False
+        except BaseException as error:
+            outcome["unclear"].append([file, content.hex(), repr(error)])
+            return False
+        return True
+
+    for file, content in valid_files().items():
+        whole = content.rstrip()
+        if not file.endswith(".obj"):  # which has neither counts nor an end
+            accepted = [size for size in range(len(whole)) if attempt(file, whole[:size])]
+            outcome["accepted prefixes"] += [[file, size] for size in accepted]
+        for _ in range(rounds):
+            mutated = bytearray(content)
+            for _ in range(generator.randint(1, 3)):
+                at = generator.randrange(len(mutated))
+                match generator.randrange(4):
+                    case 0:
+                        mutated[at] = generator.randrange(256)
+                    case 1:
+                        del mutated[at : at + generator.randint(1, 9)]
+                    case 2:
+                        mutated[at:at] = generator.choice(
+                            [b"9", b"-", b" ", b"\n", b"\0", b"nan ", b"1e9", b"\xff" * 4]
+                        )
+                    case 3:
+                        mutated[at:at] = mutated[at : at + generator.randint(1, 40)]
+                mutated = mutated or bytearray(b"x")
+            attempt(file, bytes(mutated))
+    return outcome
+
+
+# --- the subprocess and the tests -------------------------------------------------------------------------------------
+
+
+def run_all(directory: Path) -> None:
+    try:
+        import resource
+
+        # An array as large as a header may claim fails here, instead of filling the machine.
+        resource.setrlimit(resource.RLIMIT_AS, (6 * 2**30, 6 * 2**30))
+    except (ImportError, ValueError):
+        pass
+    for number, (name, case) in enumerate(cases().items()):
+        print(json.dumps({"start": name}), flush=True)
+        place = directory / str(number)
+        place.mkdir()
+        try:
+            case.run(place)
+            outcome = {"error": "", "message": ""}
+        except BaseException as error:
+            outcome = {"error": type(error).__name__, "message": str(error)}
+        print(json.dumps({"name": name, **outcome}), flush=True)
+    print(json.dumps({"start": "fuzz"}), flush=True)
+    print(json.dumps({"name": "fuzz", **fuzz(directory, 60)}), flush=True)
+
+
+@pytest.fixture(scope="session")
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    directory = tmp_path_factory.mktemp("bad_input")
+    root = str(Path(heat_igl.__file__).parents[1])
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
+    done = subprocess.run(
+        [sys.executable, "-W", "error", __file__, str(directory)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env=environment,
+        check=False,
+    )
+    lines = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    assert done.returncode == 0, f"the interpreter died ({done.returncode}) in {lines[-1:]}: {done.stderr[-2000:]}"
+    assert done.stdout.count("\n") == len(lines), "a reader printed something"
+    return {line["name"]: line for line in lines if "name" in line}
+
+
+def test_there_are_enough_cases() -> None:
+    bad = [case for case in cases().values() if case.patterns]
+    assert len(bad) >= 200
+    assert len(cases()) - len(bad) >= 40
+
+
+@pytest.mark.parametrize("name", cases())
+def test_case(name: str, outcomes: dict[str, dict[str, Any]]) -> None:
+    case, outcome = cases()[name], outcomes[name]
+    if not case.patterns:
+        assert outcome["error"] == "", outcome["message"]
+        return
+    assert outcome["error"] == case.error, outcome["message"]
+    for pattern in case.patterns:
+        assert re.search(pattern, outcome["message"]), outcome["message"]
+
+
+def test_mutated_files_are_meshes_or_mesh_errors(outcomes: dict[str, dict[str, Any]]) -> None:
+    assert outcomes["fuzz"]["tried"] > 3000
+    assert outcomes["fuzz"]["unclear"] == []
+
+
+def test_every_cut_is_noticed(outcomes: dict[str, dict[str, Any]]) -> None:
+    assert outcomes["fuzz"]["accepted prefixes"] == []
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(content=st.binary(max_size=400) | st.text(max_size=200).map(str.encode), extension=st.sampled_from(EXTENSIONS))
+def test_garbage_is_a_mesh_error(tmp_path: Path, content: bytes, extension: str) -> None:
+    path = tmp_path / f"garbage.{extension}"
+    path.write_bytes(content)
+    with pytest.raises(MeshError, match=r"garbage\."):
+        heat_igl.read_mesh(path)
+
+
+if __name__ == "__main__":
+    run_all(Path(sys.argv[1]))

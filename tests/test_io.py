@@ -1,0 +1,566 @@
+"""Reading and writing mesh files: what a valid file means, and that nothing is lost on the way."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import stat
+import struct
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import heat_igl
+import heat_igl.io
+from heat_igl import Mesh, MeshError, MissingExtraError, read_attributes, read_mesh, write_mesh
+
+needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="needs meshio")
+VTU = pytest.param(".vtu", marks=needs_meshio)
+SURFACE_FORMATS = [".off", ".obj", ".ply", ".mesh", ".msh", VTU]
+
+V4 = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+F4 = np.array([[0, 1, 2], [0, 1, 3]])
+
+
+def grid(n: int) -> Mesh:
+    """A bent n x n grid of triangles, with coordinates that have no short decimal form."""
+    x, y = np.meshgrid(np.arange(n) / 7, np.arange(n) / 3)
+    V = np.stack([x, y, np.sin(x + y) / np.pi], axis=-1).reshape(-1, 3)
+    corner = np.arange(n * n).reshape(n, n)
+    a, b, c, d = (corner[i:j, k:m].ravel() for i, j in ((0, -1), (1, None)) for k, m in ((0, -1), (1, None)))
+    return Mesh(V, np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)]))
+
+
+def solid() -> Mesh:
+    """Two tetrahedra that share a triangle."""
+    return Mesh(np.concatenate([V4, [[1 / 3, 2 / 3, np.e]]]), [[0, 1, 2, 3], [1, 2, 3, 4]])
+
+
+def save(path: Path, content: str | bytes) -> Path:
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+def same(mesh: Mesh, V: object, F: object) -> bool:
+    """Equal to the last bit, signs of zero included."""
+    V = np.asarray(V, np.float64)
+    return mesh.V.tobytes() == V.tobytes() and np.array_equal(mesh.F, np.asarray(F))
+
+
+# --- round trips ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("extension", SURFACE_FORMATS)
+def test_surface_comes_back_exactly(tmp_path: Path, extension: str) -> None:
+    mesh = grid(9)
+    write_mesh(tmp_path / f"a{extension}", mesh)
+    assert same(read_mesh(tmp_path / f"a{extension}"), mesh.V, mesh.F)
+
+
+@pytest.mark.parametrize("extension", [".mesh", ".msh", VTU])
+def test_tetrahedra_come_back_exactly(tmp_path: Path, extension: str) -> None:
+    write_mesh(tmp_path / f"a{extension}", solid())
+    assert same(read_mesh(tmp_path / f"a{extension}"), solid().V, solid().F)
+
+
+def test_stl_keeps_the_triangles_but_not_the_numbering(tmp_path: Path) -> None:
+    mesh = Mesh(np.concatenate([grid(5).V[::-1], [[9, 9, 9]]]), 24 - grid(5).F)
+    write_mesh(tmp_path / "a.stl", mesh)
+    back = read_mesh(tmp_path / "a.stl")
+    assert np.array_equal(back.V[back.F], mesh.V[mesh.F])
+    assert back.n_vertices == 25  # the one that no face uses is gone
+    first = np.unique(back.F, return_index=True)[1]
+    assert (np.diff(first) > 0).all()  # numbered in the order of their first use
+
+
+@pytest.mark.parametrize("extension", SURFACE_FORMATS)
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(numbers=st.lists(st.floats(-1e50, 1e50, allow_subnormal=True), min_size=6, max_size=6))
+def test_any_coordinate_comes_back_exactly(tmp_path: Path, extension: str, numbers: list[float]) -> None:
+    V = np.array([[0, 0, 0], [1, 0, 0], numbers[:3], numbers[3:]])
+    write_mesh(tmp_path / f"a{extension}", Mesh(V, F4))
+    assert same(read_mesh(tmp_path / f"a{extension}"), V, F4)
+
+
+@pytest.mark.parametrize("extension", [".ply", VTU])
+def test_attributes_come_back_bit_for_bit(tmp_path: Path, extension: str) -> None:
+    mesh = grid(4)
+    distance = np.linspace(0, np.pi, 16)
+    distance[[3, 7]] = np.inf
+    odd = np.array([-0.0, np.nan, -np.inf, 5e-324, np.finfo(float).max, np.pi, 1 / 3, -1e-300] * 2)
+    several = np.stack([distance, odd, -odd], axis=1)
+    label = mesh.components
+    write_mesh(
+        tmp_path / f"a{extension}", mesh, distance=distance, odd=odd, several=several, one=odd[:, None], label=label
+    )
+    back = read_attributes(tmp_path / f"a{extension}")
+    assert set(back) == {"distance", "odd", "several", "one", "label"}
+    for name, values in (("distance", distance), ("odd", odd), ("several", several), ("one", odd[:, None])):
+        assert back[name].shape == values.shape
+        assert back[name].dtype == np.float64
+        assert np.ascontiguousarray(back[name]).tobytes() == np.ascontiguousarray(values).tobytes()
+    assert np.array_equal(back["label"], label)
+    assert same(read_mesh(tmp_path / f"a{extension}"), mesh.V, mesh.F)
+
+
+@needs_meshio
+def test_vtu_attributes_on_tetrahedra(tmp_path: Path) -> None:
+    write_mesh(tmp_path / "a.vtu", solid(), distance=[0, 1, 2, np.inf, 4])
+    assert read_attributes(tmp_path / "a.vtu")["distance"].tolist() == [0, 1, 2, np.inf, 4]
+
+
+def test_scalars_named_like_parts_of_a_vector_stay_scalars(tmp_path: Path) -> None:
+    write_mesh(tmp_path / "a.ply", grid(2), a_0=[1, 2, 3, 4], a_1=[5, 6, 7, 8])
+    assert {name: values.shape for name, values in read_attributes(tmp_path / "a.ply").items()} == {
+        "a_0": (4,),
+        "a_1": (4,),
+    }
+
+
+def test_path_may_be_a_string_with_capitals(tmp_path: Path) -> None:
+    write_mesh(str(tmp_path / "A.OFF"), grid(2))
+    assert read_mesh(str(tmp_path / "A.OFF")).n_vertices == 4
+
+
+# --- OFF --------------------------------------------------------------------------------------------------------------
+
+VERTICES = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n"
+FACES = "3 0 1 2\n3 0 1 3\n"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "OFF\n4 2 0\n" + VERTICES + FACES,
+        "OFF 4 2 0\n" + VERTICES + FACES,
+        "OFF 4 2\n" + VERTICES + FACES,
+        "4 2 0\n" + VERTICES + FACES,
+        "off\n4 2 0\n" + VERTICES + FACES,
+        "OFF4 2 0\n" + VERTICES + FACES,
+        "\ufeffOFF\n4 2 0\n" + VERTICES + FACES,
+        "# made by hand\n\nOFF # really\n# counts\n4 2 0 # yes\n\n"
+        + VERTICES.replace("\n", " # v\n\n")
+        + "#\n"
+        + FACES,
+        "COFF\n4 2 0\n" + VERTICES.replace("\n", " 255 0 0 255\n") + FACES,
+        "NOFF\n4 2 0\n" + VERTICES.replace("\n", " 0 0 1\n") + FACES,
+        "STCNOFF\n4 2 0\n" + VERTICES.replace("\n", " 0 0 1 .5 .5 .5 1 0 0\n") + FACES,
+        "OFF\n4 2 0\n" + VERTICES + "3 0 1 2 255 0 0\n3 0 1 3 0.5 0.5 0.5 1\n",
+        "OFF\n4 2 0\n" + VERTICES + "3 0 1 2 7\n3 0 1 3\n",
+        ("OFF\n4 2 0\n" + VERTICES + FACES).replace("\n", "\r\n"),
+        ("OFF\n4 2 0\n" + VERTICES + FACES).replace("\n", "\r"),
+        ("OFF\n4 2 0\n" + VERTICES + FACES).replace(" ", "\t  ").rstrip(),
+        "OFF\n4 2 0\n" + VERTICES.replace("1", "+1.0E+00") + FACES,
+    ],
+)
+def test_off_variants(tmp_path: Path, content: str) -> None:
+    assert same(read_mesh(save(tmp_path / "a.off", content)), V4, F4)
+
+
+def test_polygons_become_fans(tmp_path: Path) -> None:
+    angle = np.arange(6) * np.pi / 3
+    points = "".join(f"{x!r} {y!r} 0\n" for x, y in zip(np.cos(angle).tolist(), np.sin(angle).tolist(), strict=True))
+    expected = [[0, 1, 2], [5, 0, 1], [5, 1, 2], [3, 4, 5], [3, 5, 1]]
+    off = save(tmp_path / "a.off", "OFF\n6 3 0\n" + points + "3 0 1 2 9 9 9\n4 5 0 1 2\n4 3 4 5 1 1 0 0\n")
+    obj = save(tmp_path / "a.obj", "v " + points.replace("\n", "\nv ")[:-2] + "f 1 2 3\nf 6 1 2 3\nf 4 5 6 2\n")
+    ply = "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+    ply += (
+        "element face 3\nproperty list uchar int vertex_indices\nend_header\n"
+        + points
+        + "3 0 1 2\n4 5 0 1 2\n4 3 4 5 1\n"
+    )
+    for path in (off, obj, save(tmp_path / "a.ply", ply)):
+        assert read_mesh(path).F.tolist() == expected
+    hexagon = read_mesh(save(tmp_path / "b.obj", "v " + points.replace("\n", "\nv ")[:-2] + "f 1 2 3 4 5 6\n"))
+    assert hexagon.F.tolist() == [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]]
+    assert hexagon.measures.sum() == pytest.approx(1.5 * 3**0.5, rel=1e-14)
+
+
+@pytest.mark.parametrize("face", ["4 0 1 2 1", "4 0 1 0 2", "5 0 1 2 3 1"])
+def test_polygon_that_repeats_a_vertex(tmp_path: Path, face: str) -> None:
+    path = save(tmp_path / "a.off", "OFF\n4 2 0\n" + VERTICES + "3 0 1 2\n" + face + "\n")
+    with pytest.raises(MeshError, match=rf"a.off, line 8 \({face}\): a face repeats a vertex \(1 of 2 faces do\)"):
+        read_mesh(path)
+
+
+# --- OBJ --------------------------------------------------------------------------------------------------------------
+
+OBJ_VERTICES = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        OBJ_VERTICES + "f 1 2 3\nf 1 2 4\n",
+        OBJ_VERTICES + "f 1/1 2/2 3/3\nf 1/1 2/2 4/4\n",
+        OBJ_VERTICES + "f 1//1 2//2 3//3\nf 1//1 2//2 4//1\n",
+        OBJ_VERTICES + "vn 0 0 1\nvt 0 0\nf 1/1/1 2/1/1 3/1/1\nf 1 2/1 4//1\n",
+        OBJ_VERTICES + "f -4 -3 -2\nf -4 2 -1\n",
+        OBJ_VERTICES + "f -4/-1/-1 -3/-1/-1 -2/-1/-1\nf -4 2 -1",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 1\nf -4 -3 -1\n",
+        "f 1 2 3\nf 1 2 4\n" + OBJ_VERTICES,
+        "v 0 0 \\\n 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 \\\r\n2 \\  \n 3\nf 1 2 4\n",
+        OBJ_VERTICES.replace("\n", " 1.0\n") + "f 1 2 3\nf 1 2 4\n",
+        OBJ_VERTICES.replace("\n", " 0.5 0.25 1\n", 2) + "f 1 2 3\nf 1 2 4\n",
+        "# f 1 2 99\nmtllib a/b.mtl\no thing\ng a b\n"
+        + OBJ_VERTICES
+        + "usemtl x/y\ns off\nf 1 2 3 # yes\nl 1 2\np 1\nf 1 2 4",
+        ("  " + OBJ_VERTICES + "\tf 1 2 3\nf 1 2 4\n").replace("\n", " \r\n"),
+    ],
+)
+def test_obj_variants(tmp_path: Path, content: str) -> None:
+    assert same(read_mesh(save(tmp_path / "a.obj", content)), V4, F4)
+
+
+def test_obj_line_numbers_count_comments_and_continuations(tmp_path: Path) -> None:
+    path = save(tmp_path / "a.obj", "# one\n\n" + OBJ_VERTICES + "f 1 \\\n 2 3\n# nine\nf 1 2 44/5\n")
+    with pytest.raises(
+        MeshError, match=r"a.obj, line 10 \(f 1 2 44/5\): there is no vertex 44, the file has 4 vertices"
+    ):
+        read_mesh(path)
+    with pytest.raises(MeshError, match=r"a.obj, line 4 \(v 1 0 zero\): 'zero' is not a number"):
+        read_mesh(save(path, path.read_text().replace("v 1 0 0", "v 1 0 zero")))
+    assert read_mesh(save(path, path.read_text().replace("zero", "0").replace("44", "4"))).n_faces == 2
+
+
+# --- PLY --------------------------------------------------------------------------------------------------------------
+
+PLY_TYPES = {
+    "char": "b",
+    "uchar": "B",
+    "short": "h",
+    "ushort": "H",
+    "int": "i",
+    "uint": "I",
+    "float": "f",
+    "double": "d",
+}
+
+
+@pytest.mark.parametrize("order", ["<", ">", ""])
+@pytest.mark.parametrize("kind", PLY_TYPES)
+@pytest.mark.parametrize("mixed", [False, True])
+def test_ply_types_orders_and_further_elements(tmp_path: Path, order: str, kind: str, mixed: bool) -> None:
+    """A camera before the vertices, a list and other types among their properties, and edges at the end."""
+    name = {"<": "binary_little_endian", ">": "binary_big_endian", "": "ascii"}[order]
+    index = kind if kind not in ("float", "double") else "int"
+    header = f"ply\r\nformat {name} 1.0\ncomment made by hand\nobj_info 1\nelement camera 1\nproperty float fov\n"
+    header += "property list ushort double matrix\nelement vertex 4\nproperty short before\nproperty double x\n"
+    header += f"property float y\nproperty char z\nproperty {kind} value\n"
+    header += "property list uchar short neighbours\nproperty uchar after\n" if mixed else "property uchar after\n"
+    header += f"element face 2\nproperty uchar flag\nproperty list {index} {index} vertex_index\nproperty double area\n"
+    header += "element edge 1\nproperty int a\nproperty int b\nend_header\n"
+
+    def pack(types: str, *values: float) -> bytes:
+        if order:
+            return struct.pack(order + types, *values)
+        return (" ".join(repr(value) for value in values) + " ").encode()
+
+    def end() -> bytes:
+        return b"" if order else b"\n"
+
+    body = pack("fH2d", 60, 2, 0.5, 0.25) + end()
+    for i, row in enumerate(V4.tolist()):
+        body += pack("hdfb" + PLY_TYPES[kind], -i, row[0], row[1], int(row[2]), 100 + i)
+        body += (pack("B" + "h" * i, i, *range(i)) if mixed else b"") + pack("B", 200 + i) + end()
+    item = PLY_TYPES[index]
+    for corners in ([0, 1, 2], [0, 1, 3, 2]) if mixed else F4.tolist():
+        body += pack("B" + item * (1 + len(corners)) + "d", 1, len(corners), *corners, 0.5) + end()
+    path = save(tmp_path / "a.ply", header.encode() + body + pack("2i", 0, 1) + end())
+    assert same(read_mesh(path), V4, [[0, 1, 2], [0, 1, 3], [0, 3, 2]] if mixed else F4)
+    attributes = read_attributes(path)
+    assert {name: values.tolist() for name, values in attributes.items()} == {
+        "before": [0, -1, -2, -3],
+        "value": [100, 101, 102, 103],
+        "after": [200, 201, 202, 203],
+    }
+    assert attributes["after"].dtype == np.uint8
+    assert attributes["value"].dtype == np.dtype(PLY_TYPES[kind])
+
+
+# --- STL --------------------------------------------------------------------------------------------------------------
+
+
+def facets(corners: np.ndarray) -> str:
+    loop = "outer loop\n" + "  vertex {!r} {!r} {!r}\n" * 3 + " endloop\n"
+    return "".join(f"facet normal 0 0 1\n {loop}endfacet\n".format(*row) for row in corners.reshape(-1, 9).tolist())
+
+
+def binary_stl(corners: np.ndarray, header: bytes = b"") -> bytes:
+    rows = b"".join(struct.pack("<12fH", 0, 0, 1, *row, 7) for row in corners.reshape(-1, 9))
+    return header.ljust(80) + struct.pack("<I", len(corners)) + rows
+
+
+CORNERS = V4[[[0, 1, 2], [0, 1, 3]]]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "solid\n" + facets(CORNERS) + "endsolid\n",
+        "solid a b c\n" + facets(CORNERS[:1]) + "endsolid a\nsolid facet\n" + facets(CORNERS[1:]) + "endsolid facet",
+        ("solid a\n" + facets(CORNERS) + "endsolid a\n").upper(),
+        ("solid a\n" + facets(CORNERS) + "endsolid a\n").replace("\n", "\r\n"),
+        binary_stl(CORNERS),
+        binary_stl(CORNERS, b"solid but binary"),
+        # A triangle that collapses when its equal corners are merged, and -0.0, which equals 0.0.
+        binary_stl(np.concatenate([CORNERS[:1], V4[[[3, 3, 1]]], np.where(CORNERS[1:] == 0, -0.0, CORNERS[1:])])),
+    ],
+)
+def test_stl_variants(tmp_path: Path, content: str | bytes) -> None:
+    mesh = read_mesh(save(tmp_path / "a.stl", content))
+    assert np.array_equal(mesh.V, V4)
+    assert np.array_equal(mesh.F, F4)
+
+
+def test_stl_drops_vertices_of_collapsed_triangles(tmp_path: Path) -> None:
+    far = np.array([[[9.0, 9, 9], [9, 9, 9], [8, 8, 8]]])
+    mesh = read_mesh(save(tmp_path / "a.stl", binary_stl(np.concatenate([far, CORNERS]))))
+    assert same(mesh, V4, F4)
+
+
+# --- MESH -------------------------------------------------------------------------------------------------------------
+
+MEDIT = "MeshVersionFormatted 1\nDimension 3\nVertices\n4\n0 0 0 1\n1 0 0 1\n0 1 0 1\n0 0 1 1\n"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        MEDIT + "Triangles\n2\n1 2 3 0\n1 2 4 0\nEnd\n",
+        MEDIT.replace("Dimension 3", " Dimension\n3").replace("Vertices\n4", "Vertices 4").replace("ted 1", "ted\n2")
+        + "Triangles 2\n1 2 3 0\n1 2 4 0\n End",
+        "# comment\n"
+        + MEDIT
+        + "Corners 1\n1\nRidges\n1\n1\nEdges\n1\n1 2 0\nTriangles\n2\n1 2 3 0 1 2 4 0\nTetrahedra\n0\nEnd",
+    ],
+)
+def test_medit_surfaces(tmp_path: Path, content: str) -> None:
+    assert same(read_mesh(save(tmp_path / "a.mesh", content)), V4, F4)
+
+
+def test_medit_tetrahedra_quadrilaterals_and_the_plane(tmp_path: Path) -> None:
+    tets = MEDIT + "Triangles\n1\n1 2 3 0\nTetrahedra\n1\n1 2 3 4 0\nQuadrilaterals\n1\n1 2 3 4 0\nEnd\n"
+    assert same(read_mesh(save(tmp_path / "a.mesh", tets)), V4, [[0, 1, 2, 3]])
+    quads = MEDIT + "Triangles\n1\n1 2 3 0\nQuadrilaterals\n1\n1 2 4 3 0\nEnd\n"
+    assert same(read_mesh(save(tmp_path / "a.mesh", quads)), V4, [[0, 1, 2], [0, 1, 3], [0, 3, 2]])
+    plane = "MeshVersionFormatted 2\nDimension 2\nVertices\n3\n0 0 1\n1 0 1\n0 1 1\nTriangles\n1\n1 2 3 1\nEnd\n"
+    assert same(read_mesh(save(tmp_path / "a.mesh", plane)), [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+
+
+def test_medit_version_1_is_read_in_double_precision(tmp_path: Path) -> None:
+    content = MEDIT.replace("\n1 0 0 1", "\n0.1234567890123456789 0 0 1") + "Triangles\n1\n1 2 3 0\nEnd\n"
+    assert read_mesh(save(tmp_path / "a.mesh", content)).V[1, 0] == 0.1234567890123456789
+
+
+def test_medit_hexahedra_are_refused_by_name(tmp_path: Path) -> None:
+    content = MEDIT + "Hexahedra\n1\n1 2 3 4 1 2 3 4 0\nTetrahedra\n1\n1 2 3 4 0\nEnd\n"
+    with pytest.raises(MeshError, match=r"a.mesh: 1 cells are of kind hexahedron; .* convert the cells"):
+        read_mesh(save(tmp_path / "a.mesh", content))
+
+
+# --- MSH --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mesh", [grid(4), solid()], ids=["surface", "solid"])
+@pytest.mark.parametrize("version", ["gmsh", "gmsh22"])
+@pytest.mark.parametrize("binary", [False, True])
+def test_msh_of_another_writer(tmp_path: Path, mesh: Mesh, version: str, binary: bool) -> None:
+    meshio = pytest.importorskip("meshio")
+    kind = "tetra" if mesh.is_tetrahedral else "triangle"
+    data = {"gmsh:physical": [np.ones(mesh.n_faces, np.int32)], "gmsh:geometrical": [np.ones(mesh.n_faces, np.int32)]}
+    other = meshio.Mesh(mesh.V, [(kind, mesh.F)], {"phi": mesh.V[:, 0].copy()}, data)
+    meshio.write(tmp_path / "a.msh", other, file_format=version, binary=binary)
+    assert same(read_mesh(tmp_path / "a.msh"), mesh.V, mesh.F)
+
+
+def test_msh_node_numbers_with_gaps_and_mixed_elements(tmp_path: Path) -> None:
+    nodes = "$Nodes\n5\n70 0 0 0\n5 1 0 0\n2000000000 0 1 0\n6 0 0 1\n1 5 5 5\n$EndNodes\n"
+    head = "$Comments\nx\n$EndComments\n$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
+    head += '$PhysicalNames\n1\n2 1 "a b"\n$EndPhysicalNames\n'
+    faces = "$Elements\n4\n1 15 2 0 1 70\n2 2 2 0 1 70 5 2000000000\n3 1 0 5 6\n"
+    faces += "4 3 3 0 1 2 70 5 6 2000000000\n$EndElements\n"
+    V = [*V4.tolist(), [5, 5, 5]]
+    assert same(read_mesh(save(tmp_path / "a.msh", head + nodes + faces)), V, [[0, 1, 2], [0, 1, 3], [0, 3, 2]])
+    tets = "$Elements\n2\n1 2 2 0 1 70 5 2000000000\n2 4 1 7 70 5 2000000000 6\n$EndElements\n"
+    assert same(read_mesh(save(tmp_path / "a.msh", head + nodes + tets)), V, [[0, 1, 2, 3]])
+
+
+def test_msh_4_blocks_parametric_nodes_and_big_endian(tmp_path: Path) -> None:
+    text = (
+        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 1 0\n$EndEntities\n$Nodes\n2 4 1 9\n0 1 0 1\n9\n0 0 0\n"
+    )
+    text += "2 1 1 3\n1\n2\n3\n1 0 0 .5 .5\n0 1 0 .5 .5\n0 0 1 .5 .5\n$EndNodes\n"
+    text += "$Elements\n3 3 1 3\n0 1 15 1\n1 9\n2 1 2 1\n2 9 1 2\n2 2 2 1\n3 9 1 3\n$EndElements\n"
+    assert same(read_mesh(save(tmp_path / "a.msh", text)), V4, F4)
+    nodes = struct.pack(">4Q3iQ4Q12d", 1, 4, 1, 4, 2, 1, 0, 4, 1, 2, 3, 4, *V4.ravel())
+    elements = struct.pack(">4Q3iQ8Q", 1, 2, 1, 2, 2, 1, 2, 2, 1, 1, 2, 3, 2, 1, 2, 4)
+    binary = b"$MeshFormat\n4.1 1 8\n" + struct.pack(">i", 1) + b"\n$EndMeshFormat\n$Nodes\n" + nodes
+    binary += b"\n$EndNodes\n$Elements\n" + elements + b"\n$EndElements\n"
+    assert same(read_mesh(save(tmp_path / "a.msh", binary)), V4, F4)
+
+
+# --- VTU and meshio ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("purpose", ["reading", "writing"])
+def test_without_meshio_the_error_names_the_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, purpose: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "meshio", None)
+    path = save(tmp_path / "a.vtu", "<VTKFile/>")
+    with pytest.raises(MissingExtraError, match=rf'{purpose} .vtu files needs meshio: pip install "heat-igl\[io\]"'):
+        read_mesh(path) if purpose == "reading" else write_mesh(path, grid(2))
+    assert path.read_text() == "<VTKFile/>"
+    write_mesh(tmp_path / "a.ply", grid(2))
+    assert read_mesh(tmp_path / "a.ply").n_vertices == 4
+
+
+@needs_meshio
+@pytest.mark.parametrize("failure", ["exit", "print", "exception"])
+def test_every_failure_of_meshio_is_a_mesh_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], failure: str
+) -> None:
+    import meshio
+
+    write_mesh(tmp_path / "a.vtu", grid(2))
+    real = meshio.vtu.read
+
+    def failing(path: str) -> object:
+        if failure == "exception":
+            raise ZeroDivisionError("inside")
+        print("something is wrong", file=sys.stderr)
+        if failure == "exit":
+            sys.exit(1)
+        return real(path)
+
+    monkeypatch.setattr(meshio.vtu, "read", failing)
+    said = "inside" if failure == "exception" else "something is wrong"
+    with pytest.raises(MeshError, match=rf"a.vtu: meshio .*{said}"):
+        read_mesh(tmp_path / "a.vtu")
+    assert capfd.readouterr() == ("", "")
+    monkeypatch.undo()
+    assert read_mesh(tmp_path / "a.vtu").n_faces == 2
+
+
+@needs_meshio
+def test_vtu_polygons_and_quadrilaterals(tmp_path: Path) -> None:
+    import meshio
+
+    meshio.vtu.write(str(tmp_path / "a.vtu"), meshio.Mesh(V4, [("quad", [[0, 1, 3, 2]]), ("line", [[0, 1]])]))
+    assert same(read_mesh(tmp_path / "a.vtu"), V4, [[0, 1, 3], [0, 3, 2]])
+
+
+# --- replacing files --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("stage", ["writer", "replace"])
+@pytest.mark.parametrize("before", [b"precious", None])
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt("stopped")])
+def test_failed_write_leaves_everything_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stage: str, before: bytes | None, error: BaseException
+) -> None:
+    path = tmp_path / "a.off"
+    if before is not None:
+        path.write_bytes(before)
+
+    def half(temporary: Path, *_: object) -> None:
+        temporary.write_bytes(b"OFF\n4")
+        raise error
+
+    def no_replace(*_: object) -> None:
+        raise error
+
+    if stage == "writer":
+        form = heat_igl.io._FORMATS[".off"]
+        monkeypatch.setitem(heat_igl.io._FORMATS, ".off", form._replace(write=half))
+    else:
+        monkeypatch.setattr(Path, "replace", no_replace)
+    if isinstance(error, OSError):
+        with pytest.raises(MeshError, match=r"a.off cannot be written: No space left on device"):
+            write_mesh(path, grid(2))
+    else:
+        with pytest.raises(KeyboardInterrupt, match="stopped"):
+            write_mesh(path, grid(2))
+    assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == ([("a.off", before)] if before else [])
+    monkeypatch.undo()
+    write_mesh(path, grid(2))
+    assert read_mesh(path).n_vertices == 4
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_refused_attribute_leaves_the_old_file(tmp_path: Path) -> None:
+    path = save(tmp_path / "a.ply", "precious")
+    with pytest.raises(MeshError, match=r"distance must have shape \(4,\)"):
+        write_mesh(path, grid(2), distance=[1, 2, 3])
+    with pytest.raises(MeshError, match="two properties named a_1"):
+        write_mesh(path, grid(2), a=np.ones((4, 2)), a_1=np.ones(4))
+    assert path.read_text() == "precious"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions and links of POSIX")
+def test_links_and_permissions_are_kept(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    target = save(tmp_path / "real" / "b.off", "old")
+    target.chmod(0o640)
+    (tmp_path / "a.off").symlink_to(target)
+    write_mesh(tmp_path / "a.off", grid(2))
+    assert (tmp_path / "a.off").is_symlink()
+    assert read_mesh(target).n_vertices == 4
+    assert stat.S_IMODE(target.stat().st_mode) == 0o640
+    ordinary = save(tmp_path / "ordinary", "")
+    write_mesh(tmp_path / "new.off", grid(2))
+    assert (tmp_path / "new.off").stat().st_mode == ordinary.stat().st_mode
+
+
+# --- real meshes ------------------------------------------------------------------------------------------------------
+
+REAL = {
+    "airplane.obj": (7017, 10796),
+    "bone.ply": (1872, 3022),
+    "bunny.obj": (28088, 56172),
+    "bunny10k_textured.obj": (5051, 9999),
+    "colored_airplane.ply": (7017, 10796),
+    "cow.obj": (2904, 5804),
+    "cube.obj": (8, 12),
+    "rangemaps/face000.ply": (85849, 166259),
+}
+
+
+def real(name: str) -> Path:
+    spec = importlib.util.find_spec("pymeshlab")
+    path = Path(spec.origin).parent / "tests" / "sample_meshes" / name if spec and spec.origin else Path("absent")
+    if not path.exists():
+        pytest.skip("needs the meshes of the pymeshlab wheel")
+    return path
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_meshes(tmp_path: Path, name: str) -> None:
+    mesh = read_mesh(real(name))
+    assert (mesh.n_vertices, mesh.n_faces) == REAL[name]
+    for extension in (".off", ".obj", ".ply"):
+        write_mesh(tmp_path / f"a{extension}", mesh)
+        assert same(read_mesh(tmp_path / f"a{extension}"), mesh.V, mesh.F)
+
+
+def test_real_attributes() -> None:
+    bone = read_attributes(real("bone.ply"))
+    assert {name: values.dtype.str for name, values in bone.items()} == {
+        "flags": "<i4", "red": "|u1", "green": "|u1", "blue": "|u1", "alpha": "|u1",
+    }  # fmt: skip
+    assert (bone["red"] == 255).all()
+    airplane = read_attributes(real("colored_airplane.ply"))["quality"]
+    assert airplane.dtype == np.float64
+    assert airplane.max() == pytest.approx(1.543193660475573, rel=1e-15)
+
+
+def test_the_same_airplane_from_two_formats() -> None:
+    obj, ply = read_mesh(real("airplane.obj")), read_mesh(real("colored_airplane.ply"))
+    assert np.array_equal(obj.F, ply.F)
+    assert np.abs(obj.V - ply.V).max() < 1e-5
