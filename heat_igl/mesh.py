@@ -132,7 +132,8 @@ class Mesh:
         positions = _positions(V)
         faces = _faces(F, len(positions))
         used = positions[np.unique(faces)]
-        extent = float(np.linalg.norm((used.max(axis=0) / 2 - used.min(axis=0) / 2) * 2))
+        with np.errstate(over="ignore"):
+            extent = float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
         if extent == 0:
             raise MeshError("all vertices in V that F uses lie in one point: there is no distance to measure")
         if not _SMALLEST_EXTENT < extent < _LARGEST_EXTENT:

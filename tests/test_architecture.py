@@ -24,21 +24,27 @@ EXTRAS = (
 ).split()
 
 
+def files(name: str) -> list[Path]:
+    """The source of a module, or of every module of a subpackage."""
+    return sorted((PACKAGE / name).glob("*.py")) or [PACKAGE / f"{name}.py"]
+
+
 def modules() -> list[str]:
-    return sorted(path.stem for path in PACKAGE.glob("*.py") if path.stem != "__init__")
+    paths = [*PACKAGE.glob("*.py"), *(path.parent for path in PACKAGE.glob("*/__init__.py"))]
+    return sorted(path.stem for path in paths if path.stem != "__init__")
 
 
 def imported_modules(name: str) -> set[str]:
-    tree = ast.parse((PACKAGE / f"{name}.py").read_text(encoding="utf8"))
     found = set()
-    for node in ast.walk(tree):
+    nodes = [node for file in files(name) for node in ast.walk(ast.parse(file.read_text(encoding="utf8")))]
+    for node in nodes:
         if isinstance(node, ast.ImportFrom) and node.module == "heat_igl":
             found |= {alias.name for alias in node.names} & set(modules())
         elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("heat_igl."):
             found.add(node.module.split(".")[1])
         elif isinstance(node, ast.Import):
             found |= {alias.name.split(".")[1] for alias in node.names if alias.name.startswith("heat_igl.")}
-    return found
+    return found - {name}
 
 
 def test_every_module_has_its_place():

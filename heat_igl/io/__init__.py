@@ -196,9 +196,7 @@ def _load(path: str | os.PathLike[str]) -> tuple[Path, Contents]:
 
 def _mesh(path: Path, contents: Contents) -> Mesh:
     try:
-        # Whether coordinates are too large is for Mesh to say; numpy's warning on the way says nothing more.
-        with np.errstate(over="ignore"):
-            return Mesh(contents.V, contents.F)
+        return Mesh(contents.V, contents.F)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
 
