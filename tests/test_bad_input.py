@@ -101,8 +101,48 @@ def array_cases() -> Iterator[Case]:
     yield mesh_case("all in one point", np.ones((4, 3)), TRIANGLES, "lie in one point")
     for scale in (1e-40, 1e40):
         yield mesh_case(f"scale {scale}, neighbour", V4 * scale, TRIANGLES)
-    for scale in (1e-70, 1e70):
+    for scale in (1e-70, 1e70, 1e300):
         yield mesh_case(f"scale {scale}", V4 * scale, TRIANGLES, "V spans .*rescale")
+
+
+def source_case(name: str, sources: Any, *patterns: str) -> Case:
+    """Through every way in which a source reaches libigl and the solvers."""
+
+    def run(_: Path) -> None:
+        mesh = heat_igl.shapes.icosphere(1)
+        solver = heat_igl.HeatMethodSolver(mesh)
+        ways = (
+            lambda: heat_igl.heat_method_distance(mesh.V, mesh.F, sources),
+            lambda: solver.distance(sources),
+            lambda: solver.solve(sources),
+            lambda: solver.distances([0, sources]),
+        )
+        errors = []
+        for way in ways:
+            try:
+                way()
+            except heat_igl.SourceError as error:
+                errors.append(error)
+        if errors:
+            raise errors[0] if len(errors) == len(ways) else AssertionError(f"only {len(errors)} ways refuse it")
+
+    return Case(f"source: {name}", run, patterns, error="SourceError")
+
+
+def source_cases() -> Iterator[Case]:
+    n = 42
+    for name, sources in (("last vertex", n - 1), ("list", [0, 41]), ("mask", np.arange(n) == 5), ("int8", np.int8(3))):
+        yield source_case(f"{name}, neighbour", sources)
+    for bad in (-1, n, 2**31, 2**62, -(2**63)):
+        yield source_case(f"{bad}", bad, rf"sources\[0\] = {bad} is no vertex \(1 of 1", "0 to 41")
+        yield source_case(f"{bad} in a list", [3, bad, 5], rf"sources\[1\] = {bad} is no vertex \(1 of 3")
+    for bad in (1.0, np.nan, [0, 1.5], 1j, "0", b"0", None, len, {0: 1}, [None], [[0, 1]], [[0], [1, 2]], [2**70]):
+        yield source_case(f"{bad!r:.30}", bad, "sources must be")
+    for empty in ([], (), np.empty(0), np.empty(0, int)):
+        yield source_case(f"empty {type(empty).__name__}", empty, "sources is empty")
+    yield source_case("mask that selects nothing", np.zeros(n, bool), "selects no vertex")
+    for length in (1, n - 1, n + 1):
+        yield source_case(f"mask of {length}", np.ones(length, bool), f"has {length} entries.*has 42 vertices")
 
 
 # --- files, token by token --------------------------------------------------------------------------------------------
@@ -444,6 +484,7 @@ def write_cases() -> Iterator[Case]:
 
 GENERATORS: tuple[Callable[[], Iterator[Case]], ...] = (
     array_cases,
+    source_cases,
     token_cases,
     whole_file_cases,
     path_cases,
