@@ -6,7 +6,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,10 +15,12 @@ from heat_igl.factorization import Backend
 from heat_igl.mesh import RANGE_LIMIT, Mesh
 from heat_igl.operators import Laplacian, Operators, operators
 from heat_igl.sources import Sources, vertex_sources
-from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, normalize
+from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["Diagnostics", "HeatMethodSolver", "HeatSolution", "heat_method_distance", "smallest_time_step"]
+
+Magnitude = Literal["auto", "unit", "damped"]
 
 # Largest heat at a source, in units of h: leaves room for the gradient's 1 / length on slivers.
 _SOURCE_HEAT = 1e290
@@ -80,6 +82,8 @@ class HeatSolution:
     direction : (m, d) float64
         Unit vectors X of step 2, per face of the triangulation that was solved on, d = 3 components in space or
         d = 2 in the face's own frame (`intrinsic_gradient`); 0 where no heat arrives.
+    magnitude : (m,) float64
+        Length that X was given for step 3: 1, or `damping` where heat arrives from several sides.
     distance : (n,) float64
         As `HeatMethodSolver.distance` returns it.
     t : float
@@ -90,6 +94,7 @@ class HeatSolution:
 
     heat: FloatArray
     direction: FloatArray
+    magnitude: FloatArray
     distance: FloatArray
     t: float
     diagnostics: Diagnostics
@@ -134,6 +139,10 @@ class HeatMethodSolver:
         Triangulation to solve on, see `operators`; "cotan" is the paper's. Tetrahedra always keep their own.
     boundary : {"neumann", "dirichlet", "average"}
         What the heat does at the boundary, see `HeatFlow`.
+    magnitude : {"auto", "unit", "damped"}
+        Length of the field X that is integrated: 1 as in the paper, or less where heat arrives from several sides, see
+        `damping`. "auto" damps on surfaces, where it was measured to pay, but not for "cotan", where heat may be
+        negative and the paper's method is wanted.
     backend : {"auto", "scipy", "cholespy"}
         Linear solver, see `factorize`.
 
@@ -166,11 +175,15 @@ class HeatMethodSolver:
         t: float | None = None,
         laplacian: Laplacian = "intrinsic-delaunay",
         boundary: Boundary = "neumann",
+        magnitude: Magnitude = "auto",
         backend: Backend = "auto",
     ) -> None:
         start = time.perf_counter()
         domain = operators(_as_mesh(mesh, F), laplacian)
-        self._set_up(domain, t_coef, t, boundary, backend, time.perf_counter() - start)
+        seconds = time.perf_counter() - start
+        if magnitude == "auto" and laplacian == "cotan":
+            magnitude = "unit"
+        self._set_up(domain, t_coef, t, boundary, magnitude, backend, seconds)
 
     @classmethod
     def from_operators(
@@ -180,11 +193,12 @@ class HeatMethodSolver:
         t_coef: float = 1.0,
         t: float | None = None,
         boundary: Boundary = "neumann",
+        magnitude: Magnitude = "auto",
         backend: Backend = "auto",
     ) -> HeatMethodSolver:
         """A solver on any domain that has operators; parameters as for the class."""
         solver = cls.__new__(cls)
-        solver._set_up(domain, t_coef, t, boundary, backend, 0.0)
+        solver._set_up(domain, t_coef, t, boundary, magnitude, backend, 0.0)
         return solver
 
     def _set_up(
@@ -193,10 +207,14 @@ class HeatMethodSolver:
         t_coef: float,
         t: float | None,
         boundary: Boundary,
+        magnitude: Magnitude,
         backend: Backend,
         seconds_operators: float,
     ) -> None:
         start = time.perf_counter()
+        if magnitude not in ("auto", "unit", "damped"):
+            raise ValueError(f"magnitude must be 'auto', 'unit' or 'damped', not {magnitude!r}")
+        self._damped = magnitude == "damped" or (magnitude == "auto" and domain.triangulation is not None)
         requested = _positive("t_coef", t_coef) * domain.mean_edge_length**2 if t is None else _positive("t", t)
         step = max(requested, smallest_time_step(domain))
         if t is not None and step > requested:
@@ -265,8 +283,7 @@ class HeatMethodSolver:
             If heat underflowed on the way, so that distances beyond are too short.
         """
         chosen = [vertex_sources(sources, self.n_vertices)]
-        _, _, distance = self._steps(chosen)
-        return np.ascontiguousarray(distance[:, 0])
+        return np.ascontiguousarray(self._steps(chosen)[-1][:, 0])
 
     def distances(
         self, source_sets: Sequence[Sources], out: AnyArray | None = None, progress: bool = False
@@ -307,17 +324,24 @@ class HeatMethodSolver:
             raise ValueError(f"out must be an array of floats of shape {shape}, not {out.dtype} of shape {out.shape}")
         starts: Any = range(0, len(chosen), _BLOCK)
         for start in _tracked(starts) if progress else starts:
-            out[start : start + _BLOCK] = self._steps(chosen[start : start + _BLOCK])[2].T
+            out[start : start + _BLOCK] = self._steps(chosen[start : start + _BLOCK])[-1].T
         return out
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
         chosen = [vertex_sources(sources, self.n_vertices)]
-        u, X, distance = self._steps(chosen)
+        u, X, magnitude, distance = self._steps(chosen)
         with np.errstate(under="ignore"):
             heat = u[:, 0] / self._source_heat(chosen[0]) / self._heat_flow.mean_mass
         direction = np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T)
-        return HeatSolution(heat, direction, np.ascontiguousarray(distance[:, 0]), self.t, self.diagnostics)
+        return HeatSolution(
+            heat=heat,
+            direction=direction,
+            magnitude=np.ascontiguousarray(magnitude[:, 0]),
+            distance=np.ascontiguousarray(distance[:, 0]),
+            t=self.t,
+            diagnostics=self.diagnostics,
+        )
 
     def _source_heat(self, sources: IntArray) -> float:
         """Initial heat of each source, for `HeatFlow.solve`: as much as cannot overflow.
@@ -328,8 +352,8 @@ class HeatMethodSolver:
         smallest = float(mass[mass > 0].min(initial=1.0))
         return _SOURCE_HEAT * min(self._operators.mean_edge_length, 1e10) * smallest
 
-    def _steps(self, source_sets: list[IntArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Heat (n, k), directions (d m, k) and distances (n, k) for k sets of sources."""
+    def _steps(self, source_sets: list[IntArray]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Heat (n, k), directions (d m, k), their magnitude (m, k) and distances (n, k) for k sets of sources."""
         domain = self._operators
         rims = [self._rim(sources) for sources in source_sets]
         initial = np.zeros((domain.n, len(source_sets)))
@@ -337,12 +361,17 @@ class HeatMethodSolver:
             initial[rim, column] = self._source_heat(rim)
         u = self._heat_flow.solve(initial)
         X = normalize(domain, u)
-        phi = self._poisson.solve(domain.D @ X)
+        if self._damped:
+            magnitude = damping(domain, u, self.t)
+            field = X * np.tile(magnitude, (domain.dimension, 1))
+        else:
+            magnitude, field = np.ones((len(domain.weights), u.shape[1])), X
+        phi = self._poisson.solve(domain.D @ field)
         for column, (sources, rim) in enumerate(zip(source_sets, rims, strict=True)):
             self._warn_if_cold(u[:, column], sources)
             phi[:, column] = self._from_sources(phi[:, column], u[:, column], rim)
             phi[sources, column] = 0.0
-        return u, X, phi
+        return u, X, magnitude, phi
 
     def _rim(self, sources: IntArray) -> IntArray:
         """The sources that have a neighbour which is none.

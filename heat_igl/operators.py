@@ -51,6 +51,8 @@ class Operators:
         Integrated divergence, D = -G^T W with W the face areas repeated d times.
     weights : (m,) float64
         Area (volume) of each face.
+    face_sizes : (m,) float64
+        Longest edge of each face.
     mean_edge_length : float
         h, over the distinct edges of the triangulation that the operators belong to.
     components : (n,) int64
@@ -69,6 +71,7 @@ class Operators:
     M: sp.csc_matrix
     G: sp.csc_matrix
     weights: FloatArray
+    face_sizes: FloatArray
     mean_edge_length: float
     components: IntArray
     boundary: BoolArray
@@ -85,6 +88,11 @@ class Operators:
     def dimension(self) -> int:
         """Number d of gradient components per face."""
         return int(self.G.shape[0]) // len(self.weights)
+
+    @cached_property
+    def boundary_faces(self) -> IntArray:
+        """Faces (k,) with a vertex on the boundary."""
+        return np.asarray(np.unique(self.G[:, self.boundary].indices % len(self.weights)))
 
     @cached_property
     def D(self) -> sp.csc_matrix:
@@ -150,6 +158,7 @@ def cotan_operators(mesh: Mesh) -> Operators:
         M=_padded(igl.massmatrix(V, mesh.F), mesh.n_vertices) * unit**simplex_dimension,
         G=igl.grad(V, mesh.F) / unit,
         weights=mesh.measures,
+        face_sizes=igl.edge_lengths(mesh.V, mesh.F).max(axis=1),
         mean_edge_length=h,
         components=mesh.components,
         boundary=mesh.boundary,
@@ -177,6 +186,7 @@ def intrinsic_operators(triangulation: IntrinsicTriangulation, longest_distance:
         M=_padded(igl.massmatrix_intrinsic(lengths, F), n),
         G=intrinsic_gradient(triangulation),
         weights=triangulation.areas,
+        face_sizes=lengths.max(axis=1),
         mean_edge_length=triangulation.mean_edge_length,
         components=components,
         boundary=triangulation.boundary,

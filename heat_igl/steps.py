@@ -18,10 +18,14 @@ from heat_igl.factorization import Backend, Factorization, factorize
 from heat_igl.operators import Operators
 from heat_igl.typing import BoolArray, FloatArray
 
-__all__ = ["Boundary", "HeatFlow", "PoissonProblem", "diffuse", "integrate", "normalize"]
+__all__ = ["Boundary", "HeatFlow", "PoissonProblem", "damping", "diffuse", "integrate", "normalize"]
 
 # Below this, gradients lose digits to gradual underflow and no longer have a direction worth keeping.
 _SMALLEST_GRADIENT = 1e-300
+
+# Share of a front's rate from which on a direction is trusted fully: fronts on a mesh scatter by some percent around 1.
+# Measured over twelve meshes, anything from 0.85 to 0.95 gives the same mean error within 2 %.
+_FULL_RATE = 0.9
 
 Boundary = Literal["neumann", "dirichlet", "average"]
 
@@ -182,6 +186,40 @@ def normalize(operators: Operators, u: FloatArray) -> FloatArray:
         components /= -np.sqrt(np.einsum("k...,k...->...", components, components))
     components[:, largest < _SMALLEST_GRADIENT] = 0
     return np.asarray(gradient)
+
+
+def damping(operators: Operators, u: FloatArray, t: float) -> FloatArray:
+    """How sure the direction of X is on each face: 1 almost everywhere, less where heat arrives from several sides.
+
+    A front of heat falls by the same factor over each length, |grad log u| = 1 / sqrt(t) for small faces, and by
+    arccosh(1 + l^2 / (2 t)) over an edge of length l on large ones. Where fronts meet, at the cut locus and between
+    two sources, it falls more slowly, and the distance has no gradient of length 1 there either. Integrating a unit
+    field all the same overestimates distance on both sides.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    u : (n,) or (n, k) float64
+        Heat.
+    t : float
+        Time step that the heat was made with.
+
+    Returns
+    -------
+    (m,) or (m, k) float64
+        Factor of X on each face, between 0 and 1; 1 on faces with a corner on the boundary, where an insulated
+        boundary turns the front into its own mirror image, or where u is not positive.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gradient = operators.G @ np.log(u)
+        components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
+        rate = np.sqrt(np.einsum("k...,k...->...", components, components))
+    size = operators.face_sizes
+    front = np.arccosh(1 + size**2 / (2 * t)) / size
+    factor = (rate.T / (_FULL_RATE * front)).T
+    factor[operators.boundary_faces] = 1
+    return np.asarray(np.where(factor < 1, factor, 1.0))
 
 
 def integrate(operators: Operators, X: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ from conftest import perturbed, shared_path
 import heat_igl
 from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, MeshError, SourceError, shapes
 from heat_igl.operators import operators
+from heat_igl.steps import integrate
 
 
 @pytest.fixture(scope="module")
@@ -121,6 +122,8 @@ def test_solution_holds_the_three_steps(sphere, solver):
     assert solution.direction.shape[0] == sphere.n_faces
     np.testing.assert_allclose(np.linalg.norm(solution.direction, axis=1), 1, rtol=1e-14)
     assert (solution.distance == solver.distance(7)).all()
+    phi = integrate(domain, (solution.direction * solution.magnitude[:, None]).T.ravel())
+    np.testing.assert_allclose(solution.distance, np.maximum(phi - phi[7], 0), rtol=0, atol=1e-11)
     assert solution.t == solver.t == solution.diagnostics.t
 
 
@@ -183,6 +186,18 @@ def test_cold_vertices_are_reported():
     with pytest.warns(AccuracyWarning, match=r"no heat arrives at \d+ of 6002 vertices.*raise t_coef"):
         distance = HeatMethodSolver.from_operators(domain).distance(0)
     assert np.isfinite(distance).all()
+
+
+def test_magnitude():
+    """By default the field is damped on surfaces; the paper's plain method is there for the asking."""
+    mesh = perturbed(shapes.disk(8))
+    assert HeatMethodSolver(mesh).solve(20).magnitude.min() < 1
+    assert (HeatMethodSolver(mesh, magnitude="unit").solve(20).magnitude == 1).all()
+    assert (HeatMethodSolver(mesh, laplacian="cotan").solve(20).magnitude == 1).all()
+    assert HeatMethodSolver(mesh, laplacian="cotan", magnitude="damped").solve(20).magnitude.min() < 1
+    assert (HeatMethodSolver(shapes.box(3)).solve(0).magnitude == 1).all()
+    with pytest.raises(ValueError, match="magnitude must be 'auto', 'unit' or 'damped', not 'log'"):
+        HeatMethodSolver(mesh, magnitude="log")
 
 
 def test_dirichlet_and_average_boundaries():

@@ -8,7 +8,7 @@ from conftest import perturbed
 
 from heat_igl import Mesh, shapes
 from heat_igl.operators import operators
-from heat_igl.steps import HeatFlow, PoissonProblem, diffuse, integrate, normalize
+from heat_igl.steps import HeatFlow, PoissonProblem, damping, diffuse, integrate, normalize
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +84,30 @@ def test_no_gradient_no_direction(disk):
     assert (normalize(disk, np.zeros((disk.n, 2))) == 0).all()
     u = diffuse(disk, dirac(disk.n, 0), 0.01)
     assert (normalize(disk, u * 1e-305) == 0).all()
+
+
+def test_a_single_front_is_not_damped_and_a_meeting_of_two_is():
+    """Heat from both ends of a strip: a cosh in between, whose rate is tanh(distance from the middle / sqrt(t))."""
+    mesh = shapes.strip(400, 3)
+    domain = operators(Mesh(mesh.V / 400, mesh.F))
+    t = (20 / 400) ** 2
+    left, right = (mesh.V[:, 0] == 0).astype(float), (mesh.V[:, 0] == 400).astype(float)
+    one, both = diffuse(domain, left, t), diffuse(domain, left + right, t)
+    middle = mesh.V[mesh.F, 0].mean(axis=1) / 400
+    inner = np.abs(middle - 0.5) < 0.3  # off the ends, which mirror the front as well
+    inner[domain.boundary_faces] = False
+    assert inner.sum() == 480
+    assert (damping(domain, both, t)[domain.boundary_faces] == 1).all()
+    np.testing.assert_allclose(damping(domain, one, t)[inner], 1, rtol=1e-12)
+    expected = np.minimum(1, np.tanh(np.abs(middle - 0.5) / np.sqrt(t)) / 0.9)
+    np.testing.assert_allclose(damping(domain, both, t)[inner], expected[inner], rtol=0, atol=0.03)
+
+
+def test_damping_where_heat_is_not_positive(disk):
+    u = diffuse(disk, dirac(disk.n, 0), 0.05, "dirichlet")
+    factor = damping(disk, u, 0.05)
+    assert ((factor > 0) & (factor <= 1)).all()
+    assert (damping(disk, np.zeros(disk.n), 0.05) == 1).all()
 
 
 def test_integration_inverts_the_gradient():
