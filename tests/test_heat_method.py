@@ -69,11 +69,12 @@ def test_several_sources_are_the_nearest_of_each(sphere, solver):
         assert abs(bias) < 0.05 * h
 
 
-def test_a_region_as_source():
+@pytest.mark.parametrize("magnitude", ["unit", "damped"])
+def test_a_region_as_source(magnitude):
     """Inside a region of sources distance is 0, and outside it is as from its rim."""
     mesh = perturbed(shapes.grid(60), 0.2)
     region = np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1) < 0.4
-    distance = HeatMethodSolver(mesh).distance(region)
+    distance = HeatMethodSolver(mesh, magnitude=magnitude).distance(region)
     assert (distance[region] == 0).all()
     exact = np.linalg.norm(mesh.V[:, None, :2] - mesh.V[region][None, :, :2], axis=2).min(axis=1)
     assert np.abs(distance - exact).mean() < 0.02 * exact.max()
