@@ -27,6 +27,13 @@ __all__ = [
     "mollify",
 ]
 
+# The cotangents of a needle are differences of much larger numbers; an edge beside one is flipped only when they say so
+# beyond their own rounding, or two flips would undo each other for ever.
+_ROUNDING = 1e-12
+
+# A last bound on the work; meshes measured so far take less than one flip per face.
+_MOST_FLIPS_PER_FACE = 100
+
 # Triangles are kept at least this far, in mean edge lengths, from violating the triangle inequality.
 _MOLLIFICATION = 1e-8
 
@@ -176,12 +183,14 @@ def _head(F: IntArray, half_edge: IntArray) -> IntArray:
     return np.asarray(F[face, (corner + 2) % 3])
 
 
-def _cotangents(l: FloatArray) -> FloatArray:  # noqa: E741
-    """Cotangent (k, 3) of the angle at each corner of triangles with edge lengths `l` (k, 3)."""
+def _cotangents(l: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: E741
+    """Cotangent (k, 3) of the angle at each corner of triangles with edge lengths `l` (k, 3), and its rounding (k,)."""
     square = l * l
+    total = square.sum(axis=1)
     four_areas = 2 * igl.doublearea(l, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray((square.sum(axis=1, keepdims=True) - 2 * square) / four_areas[:, None])
+        cotangent = (total[:, None] - 2 * square) / four_areas[:, None]
+        return np.asarray(cotangent), np.asarray(_ROUNDING * total / four_areas)
 
 
 def _oriented(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
@@ -222,7 +231,8 @@ def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriang
         return triangulation
     flips = _Flips(triangulation if triangulation.aligned.all() else _oriented(triangulation))
     bad = flips.bad(np.arange(triangulation.F.size))
-    while len(bad):
+    most = _MOST_FLIPS_PER_FACE * len(triangulation.F)
+    while len(bad) and flips.n_flips < most:
         changed = flips.flip(flips.independent(bad))
         around = (3 * changed[:, None] + np.arange(3)).ravel()
         bad = flips.bad(np.concatenate([bad, around]))
@@ -235,7 +245,7 @@ class _Flips:
     def __init__(self, start: IntrinsicTriangulation) -> None:
         self.F, self.l = start.F.copy(), start.l.copy()
         self.twin, self.aligned = start.twin.copy(), start.aligned.copy()
-        self.cotangent = _cotangents(self.l)
+        self.cotangent, self.rounding = _cotangents(self.l)
         self.n_flips = 0
         self._moved_to = np.arange(self.F.size)
         self._best_of_face = np.full(len(self.F), self.F.size)
@@ -247,7 +257,8 @@ class _Flips:
     def bad(self, half_edges: IntArray) -> IntArray:
         """The edges among `half_edges` that are to be flipped, each once, by its smaller half-edge."""
         half_edges = half_edges[(self.twin[half_edges] >= 0) & self.aligned[half_edges]]
-        half_edges = half_edges[self._cotangent_sum(half_edges) < DELAUNAY_TOLERANCE]
+        rounding = self.rounding[half_edges // 3] + self.rounding[self.twin[half_edges] // 3]
+        half_edges = half_edges[self._cotangent_sum(half_edges) < DELAUNAY_TOLERANCE - rounding]
         smaller = np.minimum(half_edges, self.twin[half_edges])
         # An edge along which a face is glued to itself lies between two equal acute angles; only rounding says else.
         return np.unique(smaller[smaller // 3 != self.twin[smaller] // 3])
@@ -294,7 +305,7 @@ class _Flips:
         self.aligned[f_new] = self.aligned[g_new] = True
 
         changed = np.concatenate([f, g])
-        self.cotangent[changed] = _cotangents(lengths[changed])
+        self.cotangent[changed], self.rounding[changed] = _cotangents(lengths[changed])
         self.n_flips += len(half_edge)
         return changed
 

@@ -65,6 +65,29 @@ def test_delaunay_triangulation_is_left_alone():
     assert delaunay(far).n_flips == 0
 
 
+@pytest.mark.parametrize("height", [1e-3, 1e-6, 1e-9, 1e-12, 0.0])
+def test_needles_and_caps_come_to_an_end(height):
+    """Rounding must not make two flips undo each other for ever; area and gluing survive."""
+    start = shapes.torus(20, 40)
+    rng = np.random.default_rng(0)
+    # A vertex close to the middle of an edge of every third face: a cap on one side of it, needles on the other.
+    chosen = np.arange(0, start.n_faces, 3)
+    corner = start.V[start.F[chosen]]
+    weight = np.stack(
+        [0.5 - height + 0 * chosen, 0.5 + rng.uniform(0, height, len(chosen)), height + 0 * chosen], axis=1
+    )
+    added = np.einsum("fc,fck->fk", weight / weight.sum(axis=1, keepdims=True), corner)
+    new = start.n_vertices + np.arange(len(chosen))
+    a, b, c = start.F[chosen].T
+    split = np.concatenate([np.stack(face, axis=1) for face in ((a, b, new), (b, c, new), (c, a, new))])
+    mesh = Mesh(np.vstack([start.V, added]), np.vstack([np.delete(start.F, chosen, axis=0), split]))
+    found = delaunay(mesh)
+    assert_glued(found)
+    assert found.n_flips < 3 * mesh.n_faces
+    # Lengthening by 1e-8 of an edge opens a flat triangle by the square root of that.
+    assert found.areas.sum() == pytest.approx(start.measures.sum(), rel=1e-4)
+
+
 def test_faces_turned_over_give_the_same_surface(cow):
     F = cow.F.copy()
     F[::3] = F[::3, ::-1]
