@@ -56,7 +56,7 @@ def varadhan(
     form : {"backward-euler", "heat-kernel"}
         "backward-euler": ``-sqrt(t) log(u / u_source)`` of one step (4), (id - t Lap) u = delta. The paper's equation
         (delta t) has a factor 1/2, which halves every distance: in one dimension the step is
-        ``u = exp(-x / sqrt(t)) / (2 sqrt(t))``. Varadhan's own statement is for the generator Lap / 2.
+        ``u = exp(-x / sqrt(t)) / (2 sqrt(t))``.
         "heat-kernel": ``sqrt(-4 t log(k / k_source))``, equation (VF), of the heat kernel itself. Dividing by
         k_source takes away the factor (4 pi t)^(-n/2) of (2), without which distances would depend on the unit.
 
@@ -294,7 +294,7 @@ def _logarithm(heat: FloatArray, reached: BoolArray) -> FloatArray:
     if lost.any():
         warnings.warn(
             f"no positive heat arrives at {int(lost.sum())} of {int(reached.sum())} vertices, where distances are too "
-            "short: raise the time step, or use laplacian='intrinsic-delaunay'",
+            "short: raise the time step, or, on triangles, use laplacian='intrinsic-delaunay'",
             AccuracyWarning,
             stacklevel=4,
         )
