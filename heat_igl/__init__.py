@@ -1,6 +1,6 @@
 """Geodesic distance on meshes by the heat method, on libigl's operators."""
 
-from heat_igl import shapes
+from heat_igl import baselines, shapes
 from heat_igl.errors import (
     AccuracyWarning,
     FactorizationError,
@@ -24,6 +24,7 @@ __all__ = [
     "MissingExtraError",
     "ReferenceSolverError",
     "SourceError",
+    "baselines",
     "heat_method_distance",
     "read_attributes",
     "read_mesh",

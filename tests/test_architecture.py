@@ -16,11 +16,11 @@ PACKAGE = Path(heat_igl.__file__).parent
 # A module imports only from those before it.
 ORDER = """
 typing errors connectivity mesh intrinsic shapes io operators factorization sources steps refine heat_method
-reference metrics validation plots demo cli __main__
+baselines reference metrics validation plots demo cli __main__
 """.split()
 
 EXTRAS = (
-    "cholespy gdist matplotlib meshio numba potpourri3d psutil pygeodesic pymeshlab pytest rich skimage typer"
+    "cholespy gdist matplotlib meshio numba potpourri3d psutil pygeodesic pymeshlab pytest rich skfmm skimage typer"
 ).split()
 
 

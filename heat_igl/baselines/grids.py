@@ -1,0 +1,43 @@
+"""What functions on regular grids accept: validated once, at the border."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heat_igl.errors import SourceError
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray
+
+__all__ = ["grid_domain", "grid_sources", "grid_spacing"]
+
+
+def grid_sources(sources: ArrayLike) -> BoolArray:
+    """The points of a grid that `sources` marks; `SourceError` where it is no such array."""
+    mask = np.asarray(sources)
+    if mask.dtype.kind != "b" or mask.ndim == 0:
+        raise SourceError(f"sources must be a boolean array with the shape of the grid, not {mask.dtype}")
+    if not mask.any():
+        raise SourceError("sources marks no point of the grid: set at least one entry")
+    return mask
+
+
+def grid_spacing(spacing: ArrayLike, dimension: int) -> FloatArray:
+    """The step along each axis, from one number or one per axis."""
+    steps = np.asarray(spacing, dtype=np.float64)
+    if steps.shape not in ((), (dimension,)) or not (np.isfinite(steps) & (steps > 0)).all():
+        raise ValueError(f"spacing must be a positive number, or one for each of {dimension} axes, not {spacing!r}")
+    return np.array(np.broadcast_to(steps, dimension))
+
+
+def grid_domain(domain: ArrayLike | None, sources: BoolArray) -> BoolArray:
+    """Where paths may run, all sources included; everywhere when not given."""
+    if domain is None:
+        return np.ones(sources.shape, bool)
+    mask = np.asarray(domain)
+    if mask.dtype.kind != "b" or mask.shape != sources.shape:
+        raise ValueError(
+            f"domain must be a boolean array of shape {sources.shape}, not {mask.dtype} of shape {mask.shape}"
+        )
+    outside = int((sources & ~mask).sum())
+    if outside:
+        raise SourceError(f"{outside} of {int(sources.sum())} sources lie outside the domain")
+    return mask

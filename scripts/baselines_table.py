@@ -1,0 +1,222 @@
+"""Mean error of the paper's other ways (`heat_igl.baselines`) beside the heat method.
+
+    python scripts/baselines_table.py                       # generated shapes, grids, cow and bunny: about a minute
+    python scripts/baselines_table.py --quick               # generated shapes and grids alone, coarse
+    python scripts/baselines_table.py --output DIRECTORY    # where baselines.json and baselines.md go
+
+Truth is a closed form on generated shapes, and pygeodesic's exact distance on the cow and the bunny of the pymeshlab
+wheel (extra ``validate``; left out where it is missing). Fast marching needs the extra ``bench``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import os
+import platform
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import heat_igl
+from heat_igl import Mesh, MissingExtraError, baselines, shapes
+from heat_igl.operators import Operators, operators
+
+PACKAGES = ("numpy", "scipy", "libigl", "cholespy", "potpourri3d", "scikit-fmm", "pygeodesic", "pymeshlab")
+Truth = Callable[[Mesh, int], np.ndarray]
+
+METHODS: dict[str, Callable[[Mesh, Operators, int], np.ndarray]] = {
+    "heat method": lambda _, domain, s: heat_igl.HeatMethodSolver.from_operators(domain).distance(s),
+    "Varadhan, backward Euler": lambda _, domain, s: baselines.varadhan(domain, s),
+    "the same with the paper's 1/2": lambda _, domain, s: baselines.varadhan(domain, s) / 2,
+    "BP": lambda _, domain, s: baselines.boundary_problem(domain, s),
+    "Varadhan, heat kernel": lambda _, domain, s: baselines.varadhan(domain, s, form="heat-kernel"),
+    "Schrodinger": lambda _, domain, s: baselines.schrodinger(domain, s),
+    "fast marching": lambda mesh, _, s: baselines.fast_marching(mesh, s),
+    "edges": lambda mesh, _, s: baselines.graph_distance(mesh, s),
+}
+GRID_METHODS: dict[str, Callable[[np.ndarray, float], np.ndarray]] = {
+    "Schrodinger, convolution": baselines.schrodinger_grid,
+    "fast marching, order 1": lambda mask, h: baselines.fast_marching_grid(mask, h, order=1),
+    "fast marching, order 2": baselines.fast_marching_grid,
+    "fast sweeping": baselines.fast_sweeping,
+}
+
+
+def environment() -> dict[str, str]:
+    """What the numbers depend on."""
+    found = {"python": platform.python_version(), "machine": platform.machine(), "cores": str(os.cpu_count())}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "-"
+    return found
+
+
+def straight_line(mesh: Mesh, source: int) -> np.ndarray:
+    return np.linalg.norm(mesh.V - mesh.V[source], axis=1)
+
+
+def great_circle(mesh: Mesh, source: int) -> np.ndarray:
+    return np.arccos(np.clip(mesh.V @ mesh.V[source], -1, 1))
+
+
+def helix(mesh: Mesh, source: int) -> np.ndarray:
+    angle = np.arctan2(mesh.V[:, 1], mesh.V[:, 0])
+    turn = np.abs((angle - angle[source] + np.pi) % (2 * np.pi) - np.pi)
+    return np.hypot(turn, mesh.V[:, 2] - mesh.V[source, 2])
+
+
+def polyhedral(mesh: Mesh, source: int) -> np.ndarray:
+    from pygeodesic import geodesic
+
+    solver = geodesic.PyGeodesicAlgorithmExact(mesh.V.copy(), mesh.F.astype(np.int32))
+    return np.asarray(solver.geodesicDistances(np.array([source]), None)[0])
+
+
+def meshes(quick: bool) -> Iterator[tuple[str, Mesh, Truth]]:
+    """Name, mesh and truth of each test case."""
+    k = 1 if quick else 2
+    yield "square", shapes.grid(24 * k), straight_line
+    yield "disk", shapes.disk(16 * k), straight_line
+    yield "sphere", shapes.icosphere(2 + k), great_circle
+    yield "cylinder", shapes.cylinder(40 * k, 40 * k), helix
+    if quick:
+        return
+    spec = importlib.util.find_spec("pymeshlab")
+    if spec is None or spec.origin is None or importlib.util.find_spec("pygeodesic") is None:
+        print('cow and bunny are left out: pip install "heat-igl[validate]"', file=sys.stderr)
+        return
+    for name in ("cow", "bunny"):
+        path = Path(spec.origin).parent / "tests" / "sample_meshes" / f"{name}.obj"
+        yield name, heat_igl.read_mesh(path), polyhedral
+
+
+def mean_error(distance: np.ndarray, truth: np.ndarray) -> float:
+    """Mean of |d - truth| / truth over the vertices off the source, as a fraction."""
+    away = np.isfinite(truth) & (truth > 0)
+    return float(np.mean(np.abs(distance[away] - truth[away]) / truth[away]))
+
+
+def mesh_rows(cases: Iterator[tuple[str, Mesh, Truth]], n_sources: int, seed: int) -> list[dict[str, Any]]:
+    rows = []
+    for name, mesh, truth in cases:
+        domain = operators(mesh)
+        sources = np.random.default_rng(seed).choice(np.flatnonzero(mesh.referenced), n_sources, replace=False)
+        exact = [truth(mesh, int(source)) for source in sources]
+        for method, distance_from in METHODS.items():
+            start = time.perf_counter()
+            try:
+                errors = [
+                    mean_error(distance_from(mesh, domain, int(s)), e) for s, e in zip(sources, exact, strict=True)
+                ]
+            except MissingExtraError as error:
+                print(error, file=sys.stderr)
+                continue
+            seconds = (time.perf_counter() - start) / n_sources
+            rows.append({"case": name, "n": mesh.n_vertices, "method": method, "error": errors, "seconds": seconds})
+    return rows
+
+
+def grid_rows(sizes: Sequence[int], n_sources: int, seed: int) -> list[dict[str, Any]]:
+    """Distance from several points of a square at once."""
+    rows = []
+    for size in sizes:
+        sources = np.random.default_rng(seed).integers(0, size + 1, (n_sources, 2))
+        mask = np.zeros((size + 1, size + 1), bool)
+        mask[tuple(sources.T)] = True
+        place = np.indices(mask.shape) / size
+        exact = np.min([np.hypot(*(place - s[:, None, None] / size)) for s in sources], axis=0)
+        for method, distance_from in GRID_METHODS.items():
+            start = time.perf_counter()
+            try:
+                error = mean_error(distance_from(mask, 1 / size), exact)
+            except MissingExtraError as missing:
+                print(missing, file=sys.stderr)
+                continue
+            seconds = time.perf_counter() - start
+            rows.append(
+                {"case": f"{size + 1}^2", "n": mask.size, "method": method, "error": [error], "seconds": seconds}
+            )
+    return rows
+
+
+def limit_rows(subdivisions: int) -> list[dict[str, Any]]:
+    """Theorem 3.1 on a sphere: how far log u / log t is from the number of edges."""
+    mesh = shapes.icosphere(subdivisions)
+    A = operators(mesh).L
+    n = baselines.graph_distance(mesh, 0, count_edges=True)
+    off = n > 0
+    rows = []
+    for decades in (3, 30, 300, 3000, 30000):
+        limit = baselines.graph_limit(A, 0, -decades * np.log(10))
+        rows.append({"t": f"1e-{decades}", "largest": float((np.abs(limit - n)[off] / n[off]).max())})
+    return rows
+
+
+def table(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Methods down, cases across: mean error in percent, and seconds per set of sources."""
+    cases = list(dict.fromkeys(row["case"] for row in rows))
+    lines = ["| method | " + " | ".join(cases) + " |", "|---|" + "---:|" * len(cases)]
+    for method in dict.fromkeys(row["method"] for row in rows):
+        found = {row["case"]: row for row in rows if row["method"] == method}
+        cells = [f"{100 * np.mean(found[case]['error']):.3g} ({found[case]['seconds']:.2g} s)" for case in cases]
+        lines.append(f"| {method} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def markdown(result: dict[str, Any]) -> str:
+    lines = [
+        f"Mean relative error in percent, and seconds per solve from scratch; {result['sources']} sources per case, "
+        f"seed {result['seed']}.",
+        "",
+        "On meshes, one source at a time:",
+        "",
+        *table(result["meshes"]),
+        "",
+        "On grids, from all sources at once:",
+        "",
+        *table(result["grids"]),
+        "",
+        "Theorem 3.1: largest relative difference of log u_t / log t from the number of edges, on a sphere.",
+        "",
+        "| t | difference |",
+        "|---|---:|",
+        *(f"| {row['t']} | {100 * row['largest']:.3g} % |" for row in result["theorem 3.1"]),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sources", type=int, default=3, help="sources per case (default 3)")
+    parser.add_argument("--seed", type=int, default=0, help="of the generator that draws them (default 0)")
+    parser.add_argument("--quick", action="store_true", help="coarse generated shapes alone")
+    parser.add_argument("--output", type=Path, help="directory for baselines.json and baselines.md")
+    arguments = parser.parse_args(argv)
+    result = {
+        "sources": arguments.sources,
+        "seed": arguments.seed,
+        "environment": environment(),
+        "meshes": mesh_rows(meshes(arguments.quick), arguments.sources, arguments.seed),
+        "grids": grid_rows((32, 64) if arguments.quick else (64, 128, 256), arguments.sources, arguments.seed),
+        "theorem 3.1": limit_rows(2 if arguments.quick else 3),
+    }
+    text = markdown(result)
+    print(text, end="")
+    if arguments.output is not None:
+        arguments.output.mkdir(parents=True, exist_ok=True)
+        (arguments.output / "baselines.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf8")
+        (arguments.output / "baselines.md").write_text(text, encoding="utf8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
