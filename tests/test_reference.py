@@ -32,6 +32,7 @@ from heat_igl import (
     reference,
     shapes,
 )
+from heat_igl.peak_memory import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
 
 
@@ -557,6 +558,19 @@ def test_hundred_repetitions_leave_no_child_and_no_memory() -> None:
     assert after[1] - before[1] < 20e6  # MeshLab leaks a third of a megabyte here with each call
     reference.close()
     assert not children()
+
+
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="needs a high-water mark")
+def test_arrays_cross_without_a_copy() -> None:
+    big = np.ones(2**24)
+    guarded.call("numpy:sum", {"a": big[:10]})
+    with PeakMemory() as peak:
+        reply = guarded.call("numpy:sum", {"a": big})
+    assert peak.bytes is not None
+    assert reply.peak_memory is not None
+    assert peak.bytes < big.nbytes / 8
+    # What the child holds of it is the file that the caller wrote, mapped.
+    assert reply.peak_memory < 1.125 * big.nbytes
 
 
 def test_a_child_that_leaks_is_replaced() -> None:
