@@ -36,9 +36,10 @@ __all__ = ["MEMORY", "TIMEOUT", "GuardedProcess", "Reply", "call", "close"]
 TIMEOUT = 600.0
 MEMORY = 8 * 2**30
 
-# Seconds that an abandoned child outlives its timeout, and the longest that the system's alarm clock takes.
+# Seconds that an abandoned child outlives its timeout; the longest that clocks take; memory that nobody has.
 _GRACE = 5.0
-_LONGEST_ALARM = 2.0**30
+_LONGEST_ALARM = 2.0**20
+_NO_BOUND = 2.0**62
 
 _START = "import sys; sys.path[:] = sys.argv[1:]; from heat_igl.guarded import _serve; _serve()"
 
@@ -125,7 +126,7 @@ class GuardedProcess:
                 "folder": folder,
                 "arrays": list(arrays),
                 "parameters": dict(parameters or {}),
-                "memory": int(memory),
+                "memory": int(min(memory, _NO_BOUND)),
                 "timeout": timeout,
             }
             try:
@@ -155,7 +156,7 @@ class GuardedProcess:
             late.set()
             process.kill()
 
-        timer = threading.Timer(timeout, stop)
+        timer = threading.Timer(min(timeout, _LONGEST_ALARM), stop)
         timer.daemon = True
         timer.start()
         try:
@@ -184,12 +185,18 @@ class GuardedProcess:
             self._stop()
         if self._process is None:
             self._messages = tempfile.TemporaryFile(prefix="heat_igl_")  # noqa: SIM115 (closed with the child)
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", _START, *sys.path],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=self._messages,
-            )
+            try:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-c", _START, *sys.path],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=self._messages,
+                )
+            except OSError as error:
+                raise ReferenceSolverError(
+                    f"no child process could be started with sys.executable = {sys.executable!r} ({error}): set it to "
+                    "a Python interpreter"
+                ) from error
         elif self._messages is not None:
             self._messages.seek(0)
             self._messages.truncate()

@@ -7,8 +7,8 @@ there. `docs/references.md` says how far each can be trusted. Closed forms are i
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from typing import Any
 
@@ -50,17 +50,20 @@ class _Solver:
     package: str = ""
     extra: str = "validate"
     is_exact: bool = False
+    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 _SOLVERS = {
     "gdist": _Solver("gdist_exact", "gdist", "tvb-gdist", is_exact=True),
     "pygeodesic": _Solver("pygeodesic_exact", "pygeodesic", "pygeodesic", is_exact=True),
     "igl": _Solver("igl_exact", "igl", is_exact=True),
-    "igl_heat": _Solver("igl_heat", "igl"),
+    "igl_heat": _Solver("igl_heat", "igl", options={"t": None, "intrinsic_delaunay": False}),
     "meshlab": _Solver("meshlab_front", "pymeshlab", "pymeshlab"),
     "meshlab_border": _Solver("meshlab_border", "pymeshlab", "pymeshlab"),
-    "meshlab_heat": _Solver("meshlab_heat", "pymeshlab", "pymeshlab"),
-    "potpourri3d_heat": _Solver("potpourri3d_heat", "potpourri3d", "potpourri3d", "bench"),
+    "meshlab_heat": _Solver("meshlab_heat", "pymeshlab", "pymeshlab", options={"m": 1.0}),
+    "potpourri3d_heat": _Solver(
+        "potpourri3d_heat", "potpourri3d", "potpourri3d", "bench", options={"t_coef": 1.0, "use_robust": True}
+    ),
 }
 
 
@@ -251,20 +254,12 @@ def measured(
         if not to_boundary:
             arrays["sources"] = part_seeds
         reply = guarded.call(
-            f"heat_igl.native:{chosen.function}", arrays, defaults | options, timeout=timeout, memory=memory
+            f"heat_igl.native:{chosen.function}", arrays, {**chosen.options, **options}, timeout=timeout, memory=memory
         )
         _check(solver, chosen, part, part_seeds, reply.values["distance"])
         return reply
 
-    defaults = _DEFAULTS.get(solver, {})
     return _over_components(mesh, seeds, run)
-
-
-_DEFAULTS: dict[str, dict[str, Any]] = {
-    "meshlab_heat": {"m": 1.0},
-    "igl_heat": {"t": None, "intrinsic_delaunay": False},
-    "potpourri3d_heat": {"t_coef": 1.0, "use_robust": True},
-}
 
 
 def _over_components(mesh: Mesh, seeds: IntArray, run: Callable[[Mesh, IntArray], guarded.Reply]) -> Measured:
