@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
 from heat_igl import metrics, reference
-from heat_igl.errors import FactorizationError, MeshError, MissingExtraError, ReferenceSolverError, SourceError
+from heat_igl.errors import (
+    AccuracyWarning,
+    FactorizationError,
+    MeshError,
+    MissingExtraError,
+    ReferenceSolverError,
+    SourceError,
+)
 from heat_igl.guarded import MEMORY, TIMEOUT
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.mesh import Mesh
@@ -56,6 +65,7 @@ class _Run:
     solve_seconds: float
     peak_memory: int | None
     parameters: Mapping[str, Any]
+    notes: tuple[str, ...] = ()
 
 
 def validate(
@@ -228,7 +238,7 @@ def _run(
     if prepare is None:
         return _run_native(mesh, sets, label, bounds, counter)
     distances, seconds = [], []
-    with PeakMemory() as peak:
+    with PeakMemory() as peak, _noted() as notes:
         start = time.perf_counter()
         solver = prepare(mesh)
         ready = time.perf_counter()
@@ -243,7 +253,21 @@ def _run(
         for key in ("t", "t_requested", "mean_edge_length", "backend")
         if hasattr(diagnostics, key)
     }
-    return _Run(np.stack(distances), ready - start, float(np.median(seconds)), peak.bytes, parameters)
+    return _Run(np.stack(distances), ready - start, float(np.median(seconds)), peak.bytes, parameters, tuple(notes))
+
+
+@contextmanager
+def _noted() -> Iterator[list[str]]:
+    """Collect what is said about accuracy, each once, for the report; other warnings go their way."""
+    notes: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", AccuracyWarning)
+        yield notes
+    for warning in caught:
+        if not issubclass(warning.category, AccuracyWarning):
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+        elif str(warning.message) not in notes:
+            notes.append(str(warning.message))
 
 
 def _run_native(mesh: Mesh, sets: list[IntArray], label: str, bounds: Mapping[str, float], counter: _Counter) -> _Run:
@@ -291,4 +315,5 @@ def _row(mesh: Mesh, sets: list[IntArray], label: str, run: _Run, truths: FloatA
         precompute_seconds=run.precompute_seconds,
         solve_seconds=run.solve_seconds,
         peak_memory=run.peak_memory,
+        notes=run.notes,
     )

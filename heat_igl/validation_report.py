@@ -42,6 +42,8 @@ class ValidationRow:
         What depends on the mesh alone; the median over the sets of sources of the rest.
     peak_memory : int or None
         Bytes by which the process that ran the method grew at most.
+    notes : tuple of str
+        Warnings about accuracy that the method gave.
     failure : str or None
         Why there are no numbers.
     """
@@ -56,6 +58,7 @@ class ValidationRow:
     precompute_seconds: float | None = None
     solve_seconds: float | None = None
     peak_memory: int | None = None
+    notes: tuple[str, ...] = ()
     failure: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
@@ -137,7 +140,7 @@ class ValidationReport:
         }
 
     def to_markdown(self) -> str:
-        """A table with one line per method, errors in percent, and the reason where a method failed."""
+        """A table with one line per method, errors in percent, and below it why a method failed or warned."""
         against = f"errors against {self.reference}" if self.reference else "no reference"
         lines = [
             f"**{self.name}**: {self.mesh.n_vertices} vertices, {self.mesh.n_faces} faces, "
@@ -147,8 +150,9 @@ class ValidationReport:
             "|---" + "|---:" * (len(_COLUMNS) - 1) + "|",
         ]
         lines += ["| " + " | ".join(_cells(row)) + " |" for row in self.rows]
-        failures = [f"- {row.method}: {row.failure}" for row in self.rows if row.failure]
-        return "\n".join([*lines, *(["", *failures] if failures else [])]) + "\n"
+        said = [(row.method, text) for row in self.rows for text in (row.failure, *row.notes) if text]
+        remarks = ["", *(f"- {method}: {text}" for method, text in said)] if said else []
+        return "\n".join([*lines, *remarks]) + "\n"
 
     def plot(self, case: int = 0) -> Figure:
         """Relative error of each method: on the surface, and against distance.
