@@ -16,6 +16,7 @@ import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from conftest import shared_path
 
 import heat_igl
 from heat_igl import (
@@ -148,6 +149,18 @@ def test_a_method_that_fails_is_a_row_that_says_why(monkeypatch: pytest.MonkeyPa
     assert f"- meshlab: {failed.failure}" in report.to_markdown()
     assert steps == [0, 1, 2, 4, 5, 6]
     assert report.plot().axes
+
+
+@pytest.mark.parametrize("name", ["suzanne.obj", "truck.obj", "teapot.obj"])
+def test_no_reference_brings_the_process_down(name: str) -> None:
+    mesh = heat_igl.read_mesh(shared_path(name))
+    report = validate(mesh, draw_sources(mesh, 3), validation.METHODS, reference=None)
+    assert [row.method for row in report.rows] == list(validation.METHODS)
+    for row in report.rows:
+        assert (row.failure is None) == (row.method in report.distances)
+    failed = {row.method: row.failure or "" for row in report.rows}
+    assert "more than two triangles" in failed["exact"] or "touch in a point" in failed["exact"]
+    assert not failed["meshlab"]
 
 
 def test_warnings_about_accuracy_are_notes_and_others_pass() -> None:
