@@ -301,6 +301,15 @@ def test_exact_tends_to_the_smooth_surface_with_the_square_of_the_edge(
     assert errors[-1] < 2e-3
 
 
+@pytest.mark.slow
+def test_exact_on_a_fine_sphere() -> None:
+    mesh = shapes.icosphere(7)
+    found = reference.measured("exact", mesh, 5)
+    # Inscribed with edges of h = 0.0094, the polyhedron is shorter by a fraction of h^2 = 9e-5.
+    assert relative(found.distance, closed_forms.sphere(mesh, 5)).mean() < 2e-5
+    assert found.peak_memory is None or 1e9 < found.peak_memory < 4e9
+
+
 def test_closed_forms_refuse_other_shapes() -> None:
     with pytest.raises(ReferenceSolverError, match="distance from the center varies"):
         closed_forms.sphere(shapes.cylinder(8, 5), 0)
