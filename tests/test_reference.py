@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -671,6 +672,24 @@ def test_a_fork_gets_a_child_of_its_own() -> None:
     assert os.waitpid(forked, 0)[1] == 0
     assert np.array_equal(reference.exact(mesh, 0), expected)
     assert guarded._shared.pid == pid
+
+
+def test_a_child_that_was_killed_between_calls_is_replaced() -> None:
+    mesh = rectangle(5, 5, 1, 1)
+    expected = reference.exact(mesh, 0)
+    child = psutil.Process(guarded._shared.pid)
+    child.kill()
+    psutil.wait_procs([child], timeout=10)
+    assert np.array_equal(reference.exact(mesh, 0), expected)
+    assert guarded._shared.pid != child.pid
+
+
+def test_threads_take_turns() -> None:
+    mesh = rectangle(12, 12, 1, 1)
+    expected = [closed_forms.plane(mesh, source) for source in range(24)]
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda source: reference.exact(mesh, source), range(24)))
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_every_native_function_has_a_name() -> None:
