@@ -236,7 +236,9 @@ def triangle_violations(distances: ArrayLike, sources: ArrayLike) -> TriangleVio
     return TriangleViolations(count, count / max(n_tried, 1), largest)
 
 
-def bound_violations(mesh: Mesh, distance: ArrayLike, sources: Sources) -> BoundViolations:
+def bound_violations(
+    mesh: Mesh, distance: ArrayLike, sources: Sources, limits: tuple[FloatArray, FloatArray] | None = None
+) -> BoundViolations:
     """Check a distance against the straight line from below and paths along edges from above.
 
     Parameters
@@ -247,13 +249,15 @@ def bound_violations(mesh: Mesh, distance: ArrayLike, sources: Sources) -> Bound
         In the mesh's unit; vertices where it is not finite are left out.
     sources : int, sequence of int, or (n,) mask of bool
         That it was measured from.
+    limits : pair of (n,) float64, optional
+        `straight_lines` and `edge_paths` from these sources, where they are known already.
 
     Returns
     -------
     BoundViolations
     """
     d = np.asarray(distance, dtype=np.float64)
-    lower, upper = straight_lines(mesh, sources), edge_paths(mesh, sources)
+    lower, upper = limits or (straight_lines(mesh, sources), edge_paths(mesh, sources))
     inside = np.isfinite(d) & np.isfinite(upper) & (upper > 0)
     d, lower, upper = d[inside], lower[inside], upper[inside]
     # Two vertices in one place: the straight line is 0 and cannot be undercut.
