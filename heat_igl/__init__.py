@@ -1,6 +1,6 @@
 """Geodesic distance on meshes by the heat method, on libigl's operators."""
 
-from heat_igl import baselines, shapes
+from heat_igl import baselines, closed_forms, metrics, reference, shapes
 from heat_igl.errors import (
     AccuracyWarning,
     FactorizationError,
@@ -12,6 +12,8 @@ from heat_igl.errors import (
 from heat_igl.heat_method import HeatMethodSolver, HeatSolution, heat_method_distance
 from heat_igl.io import read_attributes, read_mesh, write_mesh
 from heat_igl.mesh import Mesh, MeshReport
+from heat_igl.validation import validate
+from heat_igl.validation_report import ValidationReport, ValidationRow
 
 __all__ = [
     "AccuracyWarning",
@@ -24,11 +26,17 @@ __all__ = [
     "MissingExtraError",
     "ReferenceSolverError",
     "SourceError",
+    "ValidationReport",
+    "ValidationRow",
     "baselines",
+    "closed_forms",
     "heat_method_distance",
+    "metrics",
     "read_attributes",
     "read_mesh",
+    "reference",
     "shapes",
+    "validate",
     "write_mesh",
 ]
 

@@ -16,7 +16,8 @@ PACKAGE = Path(heat_igl.__file__).parent
 # A module imports only from those before it.
 ORDER = """
 typing errors connectivity mesh intrinsic shapes io operators factorization sources steps refine heat_method
-baselines reference metrics validation plots demo cli __main__
+baselines bounds closed_forms peak_memory guarded native reference metrics validation_methods
+validation_plots validation_report validation raster picture plots demo cli __main__
 """.split()
 
 EXTRAS = (

@@ -1,0 +1,226 @@
+"""Distances that are known without a solver: on the plane, sphere, cylinder, cone and flat torus, and in convex solids.
+
+Each takes the sources of the rest of the package and returns the distance (n,) to the nearest of them, in the mesh's
+unit, ``inf`` where no source can be reached. On the curved surfaces this is the distance on the smooth surface; a mesh
+inscribed in it is shorter by a fraction that shrinks with the square of the edge length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from heat_igl.errors import ReferenceSolverError
+from heat_igl.mesh import Mesh
+from heat_igl.sources import Sources, vertex_sources
+from heat_igl.typing import ArrayLike, FloatArray
+
+__all__ = ["cone", "convex_solid", "cylinder", "flat_torus", "plane", "sphere"]
+
+# Rounding of coordinates read from text files with seven digits.
+_TOLERANCE = 1e-6
+
+
+def plane(mesh: Mesh, sources: Sources) -> FloatArray:
+    """Length of the straight line, the distance in a convex planar domain.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles that fill one convex piece of a plane, in any position.
+    sources : int, sequence of int, or (n,) mask of bool
+        Source vertices.
+
+    Returns
+    -------
+    (n,) float64
+
+    Raises
+    ------
+    ReferenceSolverError
+        If the mesh is not planar or not convex.
+    SourceError
+        If the sources name no vertex of the mesh.
+    """
+    used = mesh.V[mesh.referenced]
+    centred = used - used.mean(axis=0)
+    _, _, axes = np.linalg.svd(centred, full_matrices=False)
+    extent = float(np.ptp(centred @ axes[0]))
+    if mesh.is_tetrahedral or np.abs(centred @ axes[2]).max() > _TOLERANCE * extent:
+        raise ReferenceSolverError("the mesh does not lie in a plane: use reference.exact")
+    _require_convex(centred @ axes[:2].T, float(mesh.measures.sum()))
+    return _nearest(mesh, sources, lambda source: np.linalg.norm(mesh.V - mesh.V[source], axis=1))
+
+
+def convex_solid(mesh: Mesh, sources: Sources) -> FloatArray:
+    """Length of the straight line, the distance in a convex solid of tetrahedra.
+
+    Parameters, result and errors are those of `plane`, for tetrahedra.
+    """
+    if not mesh.is_tetrahedral:
+        raise ReferenceSolverError("the mesh holds no tetrahedra: use reference.exact on a surface")
+    _require_convex(mesh.V[mesh.referenced], float(mesh.measures.sum()))
+    return _nearest(mesh, sources, lambda source: np.linalg.norm(mesh.V - mesh.V[source], axis=1))
+
+
+def sphere(mesh: Mesh, sources: Sources, *, center: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
+    """Length of the great circle arc on the sphere around `center` whose radius is that of the vertices.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Vertices on a sphere.
+    sources : int, sequence of int, or (n,) mask of bool
+        Source vertices.
+    center : (3,) array_like
+        Of the sphere.
+
+    Returns
+    -------
+    (n,) float64
+
+    Raises
+    ------
+    ReferenceSolverError
+        If the vertices do not lie on a sphere around `center`.
+    SourceError
+        If the sources name no vertex of the mesh.
+    """
+    P = mesh.V - np.asarray(center, dtype=np.float64)
+    radius = _common("distance from the center", np.linalg.norm(P[mesh.referenced], axis=1))
+
+    def arcs(source: int) -> FloatArray:
+        # The arc cosine alone loses half of the digits of small angles.
+        across = np.linalg.norm(np.cross(P, P[source]), axis=1)
+        return np.asarray(radius * np.arctan2(across, P @ P[source]))
+
+    return _nearest(mesh, sources, arcs)
+
+
+def cylinder(mesh: Mesh, sources: Sources) -> FloatArray:
+    """Length of the shortest helix on the side of a cylinder around the z axis, without caps.
+
+    The radius is that of the vertices. Parameters, result and errors are those of `sphere`.
+    """
+    radius = _common("distance from the z axis", np.linalg.norm(mesh.V[mesh.referenced, :2], axis=1))
+    angle = np.arctan2(mesh.V[:, 1], mesh.V[:, 0])
+    return _nearest(
+        mesh,
+        sources,
+        lambda source: np.hypot(radius * _turn(angle - angle[source]), mesh.V[:, 2] - mesh.V[source, 2]),
+    )
+
+
+def cone(mesh: Mesh, sources: Sources, *, apex: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
+    """Length of the straight line on the unrolled side of a circular cone around an axis parallel to z, without base.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Vertices on a cone, up to and including its apex: around a hole at the tip, paths would be longer.
+    sources : int, sequence of int, or (n,) mask of bool
+        Source vertices.
+    apex : (3,) array_like
+        Tip of the cone.
+
+    Returns
+    -------
+    (n,) float64
+
+    Raises
+    ------
+    ReferenceSolverError
+        If the vertices do not lie on such a cone.
+    SourceError
+        If the sources name no vertex of the mesh.
+    """
+    P = mesh.V - np.asarray(apex, dtype=np.float64)
+    slant = np.linalg.norm(P, axis=1)
+    away = mesh.referenced & (slant > _TOLERANCE * slant.max())
+    # Unrolled, a full turn is narrowed to a sector by the sine of the half angle at the apex.
+    narrowing = _common("angle to the axis", np.linalg.norm(P[away, :2], axis=1) / slant[away])
+    angle = np.arctan2(P[:, 1], P[:, 0])
+
+    def lines(source: int) -> FloatArray:
+        half = narrowing * _turn(angle - angle[source]) / 2
+        # The law of cosines, written so that nearby points do not cancel.
+        return np.asarray(np.sqrt((slant - slant[source]) ** 2 + 4 * slant * slant[source] * np.sin(half) ** 2))
+
+    return _nearest(mesh, sources, lines)
+
+
+def flat_torus(coordinates: ArrayLike, sources: Sources, *, periods: ArrayLike = (1.0, 1.0)) -> FloatArray:
+    """Length of the shortest straight line on a flat torus, the plane modulo two perpendicular periods.
+
+    Parameters
+    ----------
+    coordinates : (n, 2) array_like
+        Where each vertex lies in the plane: a flat torus fits into space only when folded.
+    sources : int, sequence of int, or (n,) mask of bool
+        Source vertices.
+    periods : (2,) array_like
+        Lengths after which either coordinate repeats.
+
+    Returns
+    -------
+    (n,) float64
+
+    Raises
+    ------
+    ReferenceSolverError
+        If the coordinates or periods have the wrong shape.
+    SourceError
+        If the sources name no vertex.
+    """
+    points, lengths = np.asarray(coordinates, dtype=np.float64), np.asarray(periods, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2 or lengths.shape != (2,) or not (lengths > 0).all():
+        raise ReferenceSolverError(
+            f"a flat torus needs coordinates of shape (n, 2) and two positive periods, not {points.shape} and "
+            f"{lengths.tolist()}"
+        )
+    distance = np.full(len(points), np.inf)
+    for source in vertex_sources(sources, len(points)):
+        step = points - points[source]
+        distance = np.minimum(distance, np.linalg.norm(step - lengths * np.round(step / lengths), axis=1))
+    return distance
+
+
+def _nearest(mesh: Mesh, sources: Sources, distance_from: Callable[[int], FloatArray]) -> FloatArray:
+    distance = np.full(mesh.n_vertices, np.inf)
+    for source in vertex_sources(sources, mesh.n_vertices):
+        reached = mesh.components == mesh.components[source]
+        distance[reached] = np.minimum(distance, distance_from(int(source)))[reached]
+        distance[source] = 0.0
+    return distance
+
+
+def _turn(angle: FloatArray) -> FloatArray:
+    """The smaller of the two ways around, without sign."""
+    return np.abs(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
+
+
+def _common(name: str, values: FloatArray) -> float:
+    middle = float(np.median(values))
+    spread = float(np.abs(values - middle).max())
+    if spread > _TOLERANCE * middle:
+        raise ReferenceSolverError(
+            f"the {name} varies from {values.min():.6g} to {values.max():.6g} over the vertices, so this closed form "
+            "does not hold for the mesh: use reference.exact"
+        )
+    return middle
+
+
+def _require_convex(points: FloatArray, content: float) -> None:
+    """The mesh must fill the convex hull of its vertices, or straight lines would leave it."""
+    from scipy.spatial import ConvexHull, QhullError  # takes as long to import as the rest of the package
+
+    try:
+        hull = float(ConvexHull(points).volume)
+    except QhullError:
+        hull = np.inf
+    if abs(content - hull) > _TOLERANCE * hull:
+        raise ReferenceSolverError(
+            f"the mesh fills {content / hull:.4%} of its convex hull, so straight lines are no geodesics: "
+            "use reference.exact"
+        )

@@ -1,0 +1,218 @@
+"""What a validation found: rows of numbers, as a dictionary, as Markdown, as a figure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from heat_igl.mesh import Mesh
+from heat_igl.metrics import BoundViolations, ErrorSummary
+from heat_igl.typing import FloatArray, IntArray
+from heat_igl.validation_plots import error_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["ValidationReport", "ValidationRow"]
+
+
+@dataclass(frozen=True)
+class ValidationRow:
+    """One method on one mesh.
+
+    Attributes
+    ----------
+    method : str
+        Its name.
+    parameters : dict
+        What it was run with, and what it chose itself.
+    errors : ErrorSummary or None
+        Against the reference; None without one, or where the method failed.
+    eikonal : float or None
+        Mean over faces, weighted by area, of | |grad d| - 1 |.
+    bounds : BoundViolations or None
+        Sums and maxima over the sets of sources.
+    asymmetry : float or None
+        Largest |d(a, b) - d(b, a)| over the mean of both; None unless there are two single sources or more.
+    triangle_excess : float or None
+        Largest violation of the triangle inequality, see `TriangleViolations.largest`; None likewise.
+    precompute_seconds, solve_seconds : float or None
+        What depends on the mesh alone; the median over the sets of sources of the rest.
+    peak_memory : int or None
+        Bytes by which the process that ran the method grew at most.
+    notes : tuple of str
+        Warnings about accuracy that the method gave.
+    failure : str or None
+        Why there are no numbers.
+    """
+
+    method: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    errors: ErrorSummary | None = None
+    eikonal: float | None = None
+    bounds: BoundViolations | None = None
+    asymmetry: float | None = None
+    triangle_excess: float | None = None
+    precompute_seconds: float | None = None
+    solve_seconds: float | None = None
+    peak_memory: int | None = None
+    notes: tuple[str, ...] = ()
+    failure: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The row as values that JSON can carry; an infinite error becomes the string ``"inf"``."""
+        return {name: _plain(value) for name, value in asdict(self).items()}
+
+
+_COLUMNS = (
+    "method",
+    "mean %",
+    "median %",
+    "95 % %",
+    "max %",
+    "L1 %",
+    "L2 %",
+    "L-inf %",
+    "near field %",
+    "eikonal",
+    "below line",
+    "above edges",
+    "precompute s",
+    "solve ms",
+    "memory MB",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ValidationReport:
+    """Several methods on one mesh against one reference; made by `heat_igl.validate`.
+
+    Attributes
+    ----------
+    name : str
+        Of the mesh.
+    mesh : Mesh
+        The mesh.
+    reference : str or None
+        What the errors are measured against.
+    source_sets : tuple of (k_i,) int64
+        The sets of sources, one distance each.
+    rows : tuple of ValidationRow
+        In the order asked for.
+    truths : (k, n) float64 or None
+        Distances of the reference.
+    distances : dict of str to (k, n) float64
+        Distances of each method that did not fail.
+    """
+
+    name: str
+    mesh: Mesh
+    reference: str | None
+    source_sets: tuple[IntArray, ...]
+    rows: tuple[ValidationRow, ...]
+    truths: FloatArray | None = field(repr=False)
+    distances: Mapping[str, FloatArray] = field(repr=False)
+
+    def exceeding(self, percent: float) -> tuple[ValidationRow, ...]:
+        """The rows that do not prove a mean relative error of at most `percent`.
+
+        A row that failed proves nothing and is included, as is one that calls reachable vertices unreachable or the
+        other way round. Without a reference, all rows are.
+        """
+        return tuple(
+            row
+            for row in self.rows
+            # Written so that NaN, which is no proof either, is included.
+            if row.errors is None or row.errors.n_wrong_reach or not row.errors.mean * 100 <= percent
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The report without its arrays, as values that JSON can carry."""
+        return {
+            "name": self.name,
+            "n_vertices": self.mesh.n_vertices,
+            "n_faces": self.mesh.n_faces,
+            "reference": self.reference,
+            "sources": [sources.tolist() for sources in self.source_sets],
+            "rows": [row.to_dict() for row in self.rows],
+        }
+
+    def to_markdown(self) -> str:
+        """A table with one line per method, errors in percent, and below it why a method failed or warned."""
+        against = f"errors against {self.reference}" if self.reference else "no reference"
+        lines = [
+            f"**{self.name}**: {self.mesh.n_vertices} vertices, {self.mesh.n_faces} faces, "
+            f"{len(self.source_sets)} {'set' if len(self.source_sets) == 1 else 'sets'} of sources, {against}",
+            "",
+            "| " + " | ".join(_COLUMNS) + " |",
+            "|---" + "|---:" * (len(_COLUMNS) - 1) + "|",
+        ]
+        lines += ["| " + " | ".join(_cells(row)) + " |" for row in self.rows]
+        said = [(row.method, text) for row in self.rows for text in (row.failure, *row.notes) if text]
+        remarks = ["", *(f"- {method}: {text}" for method, text in said)] if said else []
+        return "\n".join([*lines, *remarks]) + "\n"
+
+    def plot(self, case: int = 0) -> Figure:
+        """Relative error of each method: on the surface, and against distance.
+
+        Parameters
+        ----------
+        case : int
+            Which set of sources.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Save it with ``figure.savefig(path)``.
+
+        Raises
+        ------
+        MissingExtraError
+            If matplotlib is not installed (extra ``view``).
+        ValueError
+            If there is no reference, or nothing to draw.
+        """
+        if self.truths is None or not self.distances:
+            raise ValueError("there are no errors to draw: the report has no reference, or every method failed")
+        title = f"{self.name}: relative error against {self.reference}"
+        distances = {method: rows[case] for method, rows in self.distances.items()}
+        return error_figure(title, self.mesh, self.truths[case], distances)
+
+
+def _cells(row: ValidationRow) -> list[str]:
+    if row.failure is not None:
+        return [row.method, "failed"] + ["-"] * (len(_COLUMNS) - 2)
+    errors, bounds = row.errors, row.bounds
+    percent: list[float | None] = [None] * 8
+    if errors is not None:
+        fractions = (errors.mean, errors.median, errors.percentile_95, errors.maximum)
+        percent = [100 * e for e in (*fractions, errors.l1, errors.l2, errors.l_infinity, errors.near_field)]
+    return [
+        row.method,
+        *(_number(value) for value in percent),
+        _number(row.eikonal),
+        "-" if bounds is None else str(bounds.n_below),
+        "-" if bounds is None else str(bounds.n_above),
+        _number(row.precompute_seconds),
+        _number(None if row.solve_seconds is None else 1e3 * row.solve_seconds),
+        _number(None if row.peak_memory is None else row.peak_memory / 1e6),
+    ]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+def _plain(value: Any) -> Any:
+    """Numbers, text, None and their containers; JSON has no word for infinity."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(entry) for name, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(float(value))
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return value.item() if hasattr(value, "item") else str(value)

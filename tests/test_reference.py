@@ -1,0 +1,696 @@
+"""References: the exact solvers against each other, closed forms and independent bounds; the guard around them all."""
+
+from __future__ import annotations
+
+import gc
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import igl
+import numpy as np
+import psutil
+import pytest
+import scipy.sparse as sp
+import scipy.sparse.csgraph as csgraph
+from scipy.spatial import Delaunay
+
+from heat_igl import (
+    Mesh,
+    MeshError,
+    MissingExtraError,
+    ReferenceSolverError,
+    closed_forms,
+    guarded,
+    native,
+    read_mesh,
+    reference,
+    shapes,
+)
+from heat_igl.peak_memory import PeakMemory
+from heat_igl.typing import FloatArray, IntArray
+
+
+def real_meshes() -> dict[str, Path]:
+    """Real meshes on this machine: those of the pymeshlab wheel, and a folder beside the repository if there is one."""
+    folders = [Path(__file__).parents[2] / "shared" / "meshes"]
+    wheel = importlib.util.find_spec("pymeshlab")
+    if wheel is not None and wheel.origin is not None:
+        home = Path(wheel.origin).parent
+        folders = [home / "tests" / "sample_meshes", home / "sample_meshes", *folders]
+    found = [path for folder in folders for path in sorted(folder.glob("*.o*")) + sorted(folder.glob("*.ply"))]
+    return {path.stem: path for path in found}
+
+
+MESHES = real_meshes()
+
+
+def load(name: str) -> Mesh:
+    if name not in MESHES:
+        pytest.skip(f"{name} is not on this machine")
+    return read_mesh(MESHES[name])
+
+
+def source_on_largest_component(mesh: Mesh, seed: int) -> int:
+    label = np.bincount(mesh.components[mesh.F[:, 0]]).argmax()
+    return int(np.random.default_rng(seed).choice(np.flatnonzero(mesh.components == label)))
+
+
+def rectangle(n_x: int, n_y: int, width: float, height: float, jitter: float = 0.0) -> Mesh:
+    x, y = np.meshgrid(np.linspace(0, width, n_x), np.linspace(0, height, n_y))
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    inner = (points > 0).all(axis=1) & (points < [width, height]).all(axis=1)
+    step = np.array([width / (n_x - 1), height / (n_y - 1)])
+    points[inner] += jitter * step * np.random.default_rng(5).uniform(-1, 1, (int(inner.sum()), 2))
+    return Mesh(np.column_stack([points, np.zeros(len(points))]), Delaunay(points).simplices)
+
+
+def flat_torus(n: int, m: int) -> tuple[Mesh, FloatArray, FloatArray]:
+    """A prism's side covered twice, inside and outside joined at both rims: flat everywhere, and it fits into space."""
+    angle = 2 * np.pi * np.arange(n) / n
+    side = 2 * np.sin(np.pi / n)
+    corner = np.repeat(np.stack([np.cos(angle), np.sin(angle)], axis=1), 2 * m, axis=0)
+    along, up = np.meshgrid(side * np.arange(n), np.arange(2 * m) / m, indexing="ij")
+    V = np.column_stack([corner, np.abs(up.ravel() - 1)])
+    i, j = (a.ravel() for a in np.meshgrid(np.arange(n), np.arange(2 * m), indexing="ij"))
+    a, b, next_j = i * 2 * m, (i + 1) % n * 2 * m, (j + 1) % (2 * m)
+    F = np.concatenate([np.stack([a + j, b + j, b + next_j], 1), np.stack([a + j, b + next_j, a + next_j], 1)])
+    return Mesh(V, F), np.stack([along.ravel(), up.ravel()], axis=1), np.array([n * side, 2.0])
+
+
+def random_disk(n: int, n_rim: int) -> Mesh:
+    """Random points in a unit disk, Delaunay: very uneven triangles."""
+    rng = np.random.default_rng(0)
+    rim = 2 * np.pi * np.arange(n_rim) / n_rim
+    radius, turn = np.sqrt(rng.uniform(0, 0.98, n)), rng.uniform(0, 2 * np.pi, n)
+    x = np.concatenate([np.cos(rim), radius * np.cos(turn)])
+    y = np.concatenate([np.sin(rim), radius * np.sin(turn)])
+    return Mesh(np.column_stack([x, y, np.zeros_like(x)]), Delaunay(np.column_stack([x, y])).simplices)
+
+
+def zigzag(folds: int) -> Mesh:
+    """A strip folded like a map: much farther along it than across its bounding box."""
+    flat = rectangle(20 * folds + 1, 5, 4.0 * folds, 1.0)
+    x, y = flat.V[:, 0], flat.V[:, 1]
+    return Mesh(np.column_stack([np.abs(np.remainder(x + 4, 8) - 4), y, 0.01 * x]), flat.F)
+
+
+def relative(distance: FloatArray, truth: FloatArray) -> FloatArray:
+    away = np.isfinite(truth) & (truth > 0)
+    return np.asarray(np.abs(distance[away] - truth[away]) / truth[away])
+
+
+def paths_through_edge_points(mesh: Mesh, source: int, per_edge: int) -> FloatArray:
+    """Shortest paths through points on edges: an upper bound that shares nothing with the solvers under test."""
+    i, j = mesh.edges.T
+    weight = ((np.arange(per_edge) + 1) / (per_edge + 1))[:, None]
+    points = np.concatenate([mesh.V, (mesh.V[i][:, None] * (1 - weight) + mesh.V[j][:, None] * weight).reshape(-1, 3)])
+    number = {(int(a), int(b)): k for k, (a, b) in enumerate(mesh.edges)}
+    pairs = []
+    for face in np.sort(mesh.F, axis=1):
+        edge = [number[int(face[a]), int(face[b])] for a, b in ((0, 1), (1, 2), (0, 2))]
+        here = np.concatenate([face, *(mesh.n_vertices + e * per_edge + np.arange(per_edge) for e in edge)])
+        p, q = np.triu_indices(len(here), 1)
+        pairs.append(np.sort(np.stack([here[p], here[q]], axis=1), axis=1))
+    p, q = np.unique(np.concatenate(pairs), axis=0).T
+    graph = sp.csr_array((np.linalg.norm(points[p] - points[q], axis=1), (p, q)), shape=(len(points), len(points)))
+    return np.asarray(csgraph.dijkstra(graph, directed=False, indices=source)[: mesh.n_vertices])
+
+
+# --- exact -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("cow", "airplane", "bone", "bunny10k_textured", "cube"),  # of the wheel
+        *("spot", "fertility", "fandisk", "homer", "lion", "3holes", "cheburashka"),
+    ],
+)
+def test_exact_solvers_agree_on_real_meshes(name: str) -> None:
+    mesh = load(name)
+    source = source_on_largest_component(mesh, 0)
+    truth = reference.exact(mesh, source, solver="pygeodesic")
+    for solver in ("gdist", "igl"):
+        other = reference.exact(mesh, source, solver=solver)
+        assert np.array_equal(np.isinf(other), np.isinf(truth))
+        assert relative(other, truth).max() < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bunny", "camelhead", "face", "armadillo"])
+def test_exact_solvers_agree_on_large_meshes(name: str) -> None:
+    mesh = load(name)
+    source = source_on_largest_component(mesh, 0)
+    truth = reference.exact(mesh, source)
+    for solver in ("gdist", "igl"):
+        assert relative(reference.exact(mesh, source, solver=solver), truth).max() < 1e-6
+
+
+@pytest.mark.parametrize("solver", reference.EXACT_SOLVERS)
+def test_exact_from_several_sources_is_the_minimum_over_them(solver: str) -> None:
+    mesh = load("cow")
+    sources = [5, 1200, 2800]
+    alone = np.min([reference.exact(mesh, source, solver=solver) for source in sources], axis=0)
+    together = reference.exact(mesh, [*sources, 5], solver=solver)
+    assert relative(together, alone).max() < 1e-9
+    assert (together[sources] == 0).all()
+
+
+def test_exact_is_approached_from_above_by_independent_paths() -> None:
+    # A path that crosses an edge between two of its points is longer than a straight one by a second order in their
+    # spacing: twice as many points, a quarter of the excess.
+    smooth = shapes.icosphere(2)
+    V = smooth.V * [1.0, 0.6, 0.3]
+    mesh = Mesh(V + 0.03 * np.random.default_rng(3).normal(size=V.shape), smooth.F)
+    truth = reference.exact(mesh, 7)
+    excess = []
+    for per_edge in (3, 7, 15):
+        above = paths_through_edge_points(mesh, 7, per_edge)
+        assert (above >= truth * (1 - 1e-12)).all()
+        excess.append(relative(above, truth).mean())
+    assert 3 < excess[0] / excess[1] < 6
+    assert 3 < excess[1] / excess[2] < 6
+    assert excess[2] < 2e-3
+
+
+@pytest.mark.parametrize("solver", reference.EXACT_SOLVERS)
+@pytest.mark.parametrize("factor", [1e-9, 1e-3, 3.7, 1e6])
+def test_exact_does_not_depend_on_the_unit(solver: str, factor: float) -> None:
+    mesh = load("cow")
+    truth = reference.exact(mesh, 2470, solver=solver) * factor
+    assert relative(reference.exact(Mesh(mesh.V * factor, mesh.F), 2470, solver=solver), truth).max() < 1e-9
+
+
+def test_exact_solvers_alone_depend_on_the_unit() -> None:
+    # Why `native` scales: in units a thousand times larger the solver itself is wrong by 0.2 %.
+    from pygeodesic.geodesic import PyGeodesicAlgorithmExact
+
+    mesh = load("cow")
+    alone = PyGeodesicAlgorithmExact(mesh.V * 1e-3, mesh.F).geodesicDistances(np.array([2470]))[0] * 1e3
+    assert 1e-3 < relative(alone, reference.exact(mesh, 2470)).max() < 1e-2
+
+
+def test_exact_is_inf_beyond_the_component_and_at_unreferenced_vertices() -> None:
+    one = rectangle(6, 6, 1, 1)
+    n = one.n_vertices
+    mesh = Mesh(np.vstack([[[9.0, 9, 9]], one.V, one.V + np.array([3, 0, 0])]), np.vstack([one.F + 1, one.F + 1 + n]))
+    for solver in reference.EXACT_SOLVERS:
+        distance = reference.exact(mesh, 1, solver=solver)
+        assert np.isinf(distance[0])
+        assert np.isinf(distance[1 + n :]).all()
+        np.testing.assert_allclose(distance[1 : 1 + n], closed_forms.plane(one, 0), atol=1e-9)
+        everywhere = reference.exact(mesh, [0, 1, 1 + n], solver=solver)
+        assert everywhere[0] == 0
+        np.testing.assert_allclose(everywhere[1 : 1 + n], everywhere[1 + n :], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"), [("truck", "belong to more than two triangles"), ("teapot", "two surfaces touch in a point")]
+)
+def test_exact_refuses_surfaces_that_are_not_manifold(name: str, message: str) -> None:
+    mesh = load(name)
+    with pytest.raises(ReferenceSolverError, match=message):
+        reference.exact(mesh, source_on_largest_component(mesh, 0))
+
+
+def test_exact_refuses_small_examples_of_the_same() -> None:
+    fin = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]], [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    with pytest.raises(ReferenceSolverError, match=r"1 edges .* more than two triangles \(first: \[0, 1\]\)"):
+        reference.exact(fin, 0)
+    bow = Mesh([[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]])
+    with pytest.raises(ReferenceSolverError, match=r"at 1 vertices .* touch in a point \(first: 0\)"):
+        reference.exact(bow, 1)
+    assert np.isfinite(reference.exact(Mesh(fin.V, fin.F[:2]), 0)[:4]).all()
+
+
+def test_exact_accepts_a_good_component_of_a_bad_mesh() -> None:
+    mesh = load("suzanne")
+    assert len(mesh.report().nonmanifold_edges)
+    eye = mesh.components == np.bincount(mesh.components).argmin()
+    distance = reference.exact(mesh, int(np.flatnonzero(eye)[0]))
+    assert np.array_equal(np.isfinite(distance), eye)
+
+
+def test_exact_refuses_edges_without_length() -> None:
+    mesh = rectangle(5, 5, 1, 1)
+    V = mesh.V.copy()
+    V[mesh.F[0, 0]] = V[mesh.F[0, 1]]
+    with pytest.raises(ReferenceSolverError, match=r"1 edges .* have length zero"):
+        reference.exact(Mesh(V, mesh.F), 24)
+
+
+def test_exact_refuses_tetrahedra_and_unknown_solvers() -> None:
+    box = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    with pytest.raises(ReferenceSolverError, match=r"closed_forms\.convex_solid"):
+        reference.exact(box, 0)
+    with pytest.raises(ReferenceSolverError, match="'auto' or one of pygeodesic, gdist, igl"):
+        reference.exact(rectangle(3, 3, 1, 1), 0, solver="magic")
+    with pytest.raises(ReferenceSolverError, match="'magic' is unknown"):
+        reference.measured("magic", rectangle(3, 3, 1, 1), 0)
+
+
+# --- closed forms ----------------------------------------------------------------------------------------------------
+
+
+def test_plane_is_exact() -> None:
+    mesh = rectangle(12, 9, 2, 1, jitter=0.4)
+    for sources in (0, [3, 50, 77]):
+        np.testing.assert_allclose(closed_forms.plane(mesh, sources), reference.exact(mesh, sources), atol=1e-9)
+    with pytest.raises(ReferenceSolverError, match="does not lie in a plane"):
+        closed_forms.plane(shapes.icosphere(0), 0)
+    with pytest.raises(ReferenceSolverError, match=r"fills .*% of its convex hull"):
+        closed_forms.plane(Mesh(mesh.V, mesh.F[20:]), 0)
+
+
+def test_flat_torus_is_exact() -> None:
+    mesh, coordinates, periods = flat_torus(12, 9)
+    for sources in (0, [40, 111]):
+        closed = closed_forms.flat_torus(coordinates, sources, periods=periods)
+        np.testing.assert_allclose(closed, reference.exact(mesh, sources), atol=1e-9)
+    with pytest.raises(ReferenceSolverError, match=r"coordinates of shape \(n, 2\)"):
+        closed_forms.flat_torus(mesh.V, 0)
+
+
+@pytest.mark.parametrize(
+    ("build", "closed"),
+    [
+        (lambda level: shapes.cylinder(8 * 2**level, 6 * 2**level), closed_forms.cylinder),
+        (lambda level: shapes.cone(8 * 2**level, 4 * 2**level), closed_forms.cone),
+        (lambda level: shapes.icosphere(level + 1), closed_forms.sphere),
+    ],
+    ids=["cylinder", "cone", "sphere"],
+)
+def test_exact_tends_to_the_smooth_surface_with_the_square_of_the_edge(
+    build: Callable[[int], Mesh], closed: Callable[[Mesh, int], FloatArray]
+) -> None:
+    errors = []
+    for level in range(4):
+        mesh = build(level)
+        source = mesh.n_vertices - 1 - 2 * 2**level  # on the rim, a quarter of a turn from where angles jump
+        errors.append(relative(reference.exact(mesh, source), closed(mesh, source)).mean())
+    ratios = np.array(errors[:-1]) / errors[1:]
+    assert (ratios[1:] > 3.3).all()
+    assert (ratios[1:] < 4.8).all()
+    assert errors[-1] < 2e-3
+
+
+@pytest.mark.slow
+def test_exact_on_a_fine_sphere() -> None:
+    mesh = shapes.icosphere(7)
+    found = reference.measured("exact", mesh, 5)
+    # Inscribed with edges of h = 0.0094, the polyhedron is shorter by a fraction of h^2 = 9e-5.
+    assert relative(found.distance, closed_forms.sphere(mesh, 5)).mean() < 2e-5
+    assert found.peak_memory is None or 1e9 < found.peak_memory < 4e9
+
+
+def test_closed_forms_refuse_other_shapes() -> None:
+    with pytest.raises(ReferenceSolverError, match="distance from the center varies"):
+        closed_forms.sphere(shapes.cylinder(8, 5), 0)
+    with pytest.raises(ReferenceSolverError, match="distance from the z axis varies"):
+        closed_forms.cylinder(shapes.icosphere(1), 0)
+    with pytest.raises(ReferenceSolverError, match="angle to the axis varies"):
+        closed_forms.cone(shapes.cylinder(8, 5), 0, apex=(0, 0, 9))
+    with pytest.raises(ReferenceSolverError, match="holds no tetrahedra"):
+        closed_forms.convex_solid(shapes.icosphere(1), 0)
+
+
+def test_convex_solid_is_the_straight_line() -> None:
+    points = np.random.default_rng(2).uniform(size=(60, 3))
+    mesh = Mesh(points, Delaunay(points).simplices)
+    truth = np.linalg.norm(points[:, None] - points[[4, 9]], axis=2).min(axis=1)
+    np.testing.assert_allclose(closed_forms.convex_solid(mesh, [4, 9]), truth)
+    with pytest.raises(ReferenceSolverError, match=r"fills .*% of its convex hull"):
+        closed_forms.convex_solid(Mesh(points, mesh.F[:-5]), 0)
+
+
+# --- MeshLab and the other heat methods ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["cow", "bunny", "spot"])
+def test_front_of_meshlab_is_near_but_neither_exact_nor_a_bound(name: str) -> None:
+    mesh = load(name)
+    errors, below, above = [], 0, 0
+    for seed in range(3):
+        source = source_on_largest_component(mesh, seed)
+        truth, front = reference.exact(mesh, source), reference.meshlab(mesh, source)
+        errors.append(relative(front, truth).mean())
+        below += int((front < truth * (1 - 1e-4)).sum())
+        above += int((front > truth * (1 + 1e-4)).sum())
+    assert 5e-4 < np.mean(errors) < 1e-2
+    assert below > 0
+    assert above > 0
+
+
+def test_default_cutoff_of_meshlab_writes_zeros_on_a_folded_sheet() -> None:
+    mesh = zigzag(6)
+    default = as_it_comes(mesh, 0, "compute_scalar_by_geodesic_distance_from_selection_per_vertex")
+    assert (default == 0).mean() > 0.5
+    ours = reference.meshlab(mesh, 0)
+    assert (ours == 0).sum() == 1
+    assert relative(ours, reference.exact(mesh, 0)).mean() < 0.01
+
+
+def filter_as_it_comes(V: FloatArray, F: IntArray, marks: FloatArray, name: str) -> dict[str, Any]:
+    """A filter of MeshLab with its default parameters; runs in the guarded child."""
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(V, F, v_scalar_array=marks))
+    meshes.compute_selection_by_condition_per_vertex(condselect="(q > 0.5)")
+    meshes.apply_filter(name)
+    return {"distance": meshes.current_mesh().vertex_scalar_array()}
+
+
+def as_it_comes(mesh: Mesh, source: int, name: str) -> FloatArray:
+    marks = np.zeros(mesh.n_vertices)
+    marks[source] = 1
+    arrays = {"V": mesh.V, "F": mesh.F, "marks": marks}
+    reply = guarded.call("test_reference:filter_as_it_comes", arrays, {"name": name})
+    return np.asarray(reply.values["distance"])
+
+
+def test_border_filter_of_meshlab_is_much_worse() -> None:
+    mesh = random_disk(2000, 120)
+    error = relative(reference.meshlab_border(mesh), reference.exact(mesh, mesh.boundary))
+    assert 0.01 < error.mean() < 0.05
+    assert 0.1 < error.max() < 0.4
+    # It is the many sources: in a plane, a front from one of them is right.
+    assert relative(reference.meshlab(mesh, 500), closed_forms.plane(mesh, 500)).mean() < 1e-7
+    assert relative(reference.meshlab(mesh, [500, 900]), closed_forms.plane(mesh, [500, 900])).max() > 1e-3
+
+
+@pytest.mark.slow
+def test_front_of_meshlab_can_take_forever() -> None:
+    seconds = {}
+    for name in ("bunny", "camelhead"):
+        mesh = load(name)
+        solve = reference.measured("meshlab", mesh, source_on_largest_component(mesh, 0)).solve_seconds
+        seconds[name] = solve / mesh.n_vertices
+    assert seconds["camelhead"] > 100 * seconds["bunny"]
+    with pytest.raises(ReferenceSolverError, match=r"meshlab_front was stopped after 2 s: raise timeout"):
+        reference.meshlab(mesh, source_on_largest_component(mesh, 0), timeout=2)
+
+
+@pytest.mark.slow
+def test_libigl_is_slow_because_it_traces_paths() -> None:
+    mesh = load("camelhead")
+    seconds = {name: reference.measured(name, mesh, 9680).solve_seconds for name in reference.EXACT_SOLVERS}
+    assert seconds["igl"] > 2.5 * max(seconds["pygeodesic"], seconds["gdist"])
+    assert 0.5 < seconds["pygeodesic"] / seconds["gdist"] < 2
+
+
+def test_border_of_a_closed_surface_is_infinitely_far() -> None:
+    assert np.isinf(reference.meshlab_border(shapes.icosphere(1))).all()
+
+
+def test_heat_filter_of_meshlab_survives_an_offset() -> None:
+    mesh = load("spot")
+    near = reference.meshlab_heat(mesh, 5)
+    assert 0 < relative(near, reference.exact(mesh, 5)).mean() < 0.1
+    # At 1e6 the coordinates keep ten digits, of which single precision leaves none.
+    far = Mesh(mesh.V + 1e6, mesh.F)
+    assert relative(reference.meshlab_heat(far, 5), near).max() < 1e-2
+    assert np.isnan(as_it_comes(far, 5, "compute_scalar_by_heat_geodesic_distance_from_selection_per_vertex")).all()
+
+
+INEXACT: dict[str, Callable[..., FloatArray]] = {
+    "meshlab": reference.meshlab,
+    "meshlab_heat": reference.meshlab_heat,
+    "igl_heat": reference.igl_heat,
+    "potpourri3d_heat": reference.potpourri3d_heat,
+}
+
+
+@pytest.mark.parametrize("name", INEXACT)
+def test_unreachable_is_inf_in_all(name: str) -> None:
+    mesh, n = load("spot"), load("spot").n_vertices
+    pair = Mesh(np.vstack([mesh.V, mesh.V + 5, [[0, 0, 0]]]), np.vstack([mesh.F, mesh.F + n]))
+    distance = INEXACT[name](pair, [3, 900])
+    assert np.isinf(distance[n:]).all()
+    assert relative(distance[:n], reference.exact(mesh, [3, 900])).mean() < 0.1
+    both = INEXACT[name](pair, [3, n + 900])
+    assert np.isfinite(both[: 2 * n]).all()
+    assert np.isinf(both[2 * n])
+
+
+def test_igl_heat_is_what_libigl_computes() -> None:
+    mesh = load("spot")
+    for intrinsic in (False, True):
+        data = igl.HeatGeodesicsData()
+        data.use_intrinsic_delaunay = intrinsic
+        igl.heat_geodesics_precompute(mesh.V, mesh.F, 1e-3, data)
+        direct = igl.heat_geodesics_solve(data, np.array([7]))
+        np.testing.assert_allclose(
+            reference.igl_heat(mesh, 7, t=1e-3, intrinsic_delaunay=intrinsic), direct, atol=1e-12
+        )
+
+
+# --- the guard -------------------------------------------------------------------------------------------------------
+
+
+def children() -> list[psutil.Process]:
+    return psutil.Process().children(recursive=True)
+
+
+def test_a_crash_is_an_error_and_the_next_call_works() -> None:
+    mesh = rectangle(5, 5, 1, 1)
+    before = reference.exact(mesh, 0)
+    with pytest.raises(ReferenceSolverError, match=r"os:abort died with (SIGABRT|exit status).*mesh\.report\(\)"):
+        guarded.call("os:abort", {})
+    assert np.array_equal(reference.exact(mesh, 0), before)
+
+
+@pytest.mark.parametrize("name", ["suzanne", "truck"])
+@pytest.mark.parametrize("function", ["pygeodesic_exact", "gdist_exact", "igl_exact"])
+def test_real_segmentation_faults_stay_in_the_child(name: str, function: str) -> None:
+    # Past the validation, exact solvers crash on these; only the guard is left.
+    mesh = load(name)
+    arrays = {"V": mesh.V, "F": mesh.F, "sources": mesh.F[0, :1]}
+    with pytest.raises(ReferenceSolverError, match=f"native:{function} died with"):
+        guarded.call(f"heat_igl.native:{function}", arrays)
+
+
+@pytest.mark.parametrize("function", ["pygeodesic_exact", "igl_exact", "meshlab_front", "igl_heat"])
+def test_an_index_out_of_range_takes_nothing_down(function: str) -> None:
+    mesh = rectangle(4, 4, 1, 1)
+    F = mesh.F.copy()
+    F[3, 1] = 10**6
+    with pytest.raises(MeshError, match=r"F\[3, 1\] = 1000000 is no vertex"):
+        Mesh(mesh.V, F)
+    # And if it got past that, it would take the child only.
+    options = {"t": None, "intrinsic_delaunay": False} if function == "igl_heat" else {}
+    with pytest.raises(ReferenceSolverError, match=f"native:{function} (died with|failed with)"):
+        guarded.call(f"heat_igl.native:{function}", {"V": mesh.V, "F": F, "sources": np.array([0])}, options)
+    assert np.isfinite(reference.exact(mesh, 0)).all()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signal.pause")
+def test_a_hang_is_stopped() -> None:
+    start = time.perf_counter()
+    with pytest.raises(ReferenceSolverError, match=r"signal:pause was stopped after 0\.5 s: raise timeout"):
+        guarded.call("signal:pause", {}, timeout=0.5)
+    assert time.perf_counter() - start < 10
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the bound needs Linux")
+def test_memory_is_bounded() -> None:
+    with pytest.raises(ReferenceSolverError, match=r"numpy:ones needs more than 0\.25 GiB: raise memory"):
+        guarded.call("numpy:ones", {}, {"shape": 2**27}, memory=2**28)
+    assert (guarded.call("numpy:ones", {}, {"shape": 2**27}, memory=2**31).peak_memory or 2**30) > 2**29
+    reference.close()  # a child that has room left over from an earlier call would not need more
+    mesh = load("camelhead")
+    with pytest.raises(ReferenceSolverError, match=r"(died with|needs more than).* GiB"):
+        reference.exact(mesh, 0, memory=2**24)
+    assert np.isfinite(reference.exact(mesh, 0)).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda d: d[:0], r"array of shape \(0,\) for 25 vertices"),
+        (lambda d: np.full_like(d, np.nan), "25 of 25 distances that are not finite"),
+        (lambda d: d * 0.9, "[1-9][0-9]* vertices are nearer than a straight line"),
+        (lambda d: d * 1.5, "[1-9][0-9]* farther than a path along edges"),
+    ],
+    ids=["empty", "nan", "short", "long"],
+)
+def test_what_is_no_distance_is_an_error(
+    change: Callable[[FloatArray], FloatArray], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mesh, original = rectangle(5, 5, 1, 1), guarded.call
+
+    def changed(*args: Any, **options: Any) -> guarded.Reply:
+        reply = original(*args, **options)
+        reply.values["distance"] = change(reply.values["distance"])
+        return reply
+
+    assert np.isfinite(reference.exact(mesh, 0)).all()
+    monkeypatch.setattr(guarded, "call", changed)
+    with pytest.raises(ReferenceSolverError, match=message):
+        reference.exact(mesh, 0)
+
+
+def test_a_missing_package_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reference, "find_spec", lambda name: object() if name == "igl" else None)
+    mesh = rectangle(3, 3, 1, 1)
+    with pytest.raises(MissingExtraError, match=r'pymeshlab: pip install "heat-igl\[validate\]"'):
+        reference.meshlab(mesh, 0)
+    with pytest.raises(MissingExtraError, match=r'potpourri3d: pip install "heat-igl\[bench\]"'):
+        reference.potpourri3d_heat(mesh, 0)
+    np.testing.assert_allclose(reference.exact(mesh, 0), closed_forms.plane(mesh, 0))  # libigl's is always there
+
+
+def test_without_an_interpreter_there_is_no_child(monkeypatch: pytest.MonkeyPatch) -> None:
+    guard = guarded.GuardedProcess()
+    monkeypatch.setattr(sys, "executable", "")
+    with pytest.raises(ReferenceSolverError, match=r"sys\.executable = ''.*: set it to a Python interpreter"):
+        guard.call("numpy:sum", {"a": np.ones(3)})
+    monkeypatch.undo()
+    guard.call("numpy:sum", {"a": np.ones(3)}, timeout=np.inf, memory=np.inf)
+    guard.close()
+
+
+def test_a_library_that_does_not_load_is_one_line() -> None:
+    with pytest.raises(ReferenceSolverError, match="no_such_module:run cannot be loaded: No module named") as caught:
+        guarded.call("no_such_module:run", {})
+    assert "\n" not in str(caught.value)
+
+
+def test_hundred_repetitions_leave_no_child_and_no_memory() -> None:
+    reference.close()
+    assert not children()
+    mesh = rectangle(40, 40, 1, 1)
+    names = ("pygeodesic", "gdist", "igl", "meshlab", "meshlab_heat", "igl_heat", "potpourri3d_heat")
+    for name in 2 * names:
+        reference.measured(name, mesh, 0)
+    ours, child = psutil.Process(), children()
+    assert len(child) == 1
+    gc.collect()
+    before = ours.memory_info().rss, child[0].memory_info().rss
+    for repetition in range(100):
+        reference.measured(names[repetition % len(names)], mesh, repetition)
+    gc.collect()
+    after = ours.memory_info().rss, child[0].memory_info().rss
+    assert children() == child  # reused, not started again
+    # A repetition that kept one array of positions would add 38 kB, one that kept a solver megabytes.
+    assert after[0] - before[0] < 2e6
+    assert after[1] - before[1] < 20e6  # MeshLab leaks a third of a megabyte here with each call
+    reference.close()
+    assert not children()
+
+
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="needs a high-water mark")
+def test_arrays_cross_without_a_copy() -> None:
+    big = np.ones(2**24)
+    guarded.call("numpy:sum", {"a": big[:10]})
+    with PeakMemory() as peak:
+        reply = guarded.call("numpy:sum", {"a": big})
+    assert peak.bytes is not None
+    assert reply.peak_memory is not None
+    assert peak.bytes < big.nbytes / 8
+    # What the child holds of it is the file that the caller wrote, mapped.
+    assert reply.peak_memory < 1.125 * big.nbytes
+
+
+def test_a_child_that_leaks_is_replaced() -> None:
+    guard, mesh = guarded.GuardedProcess(growth=2**23), rectangle(40, 40, 1, 1)
+    arrays = {"V": mesh.V, "F": mesh.F, "sources": np.array([0])}
+    first, pids = 0, []
+    for _ in range(30):
+        guard.call("heat_igl.native:meshlab_heat", arrays, {"m": 1.0})
+        if guard.pid is None:
+            continue
+        resident = psutil.Process(guard.pid).memory_info().rss
+        first = first or resident
+        assert resident < first + 2**23 + 2**22
+        pids.append(guard.pid)
+    guard.close()
+    assert len(set(pids)) > 1
+    assert not any(psutil.pid_exists(pid) for pid in pids)
+
+
+def test_repeated_crashes_leave_no_child_no_memory_and_no_file() -> None:
+    guard = guarded.GuardedProcess()
+
+    def crash() -> None:
+        with pytest.raises(ReferenceSolverError, match="os:abort died with"):
+            guard.call("os:abort", {})
+
+    crash()
+    known, process = set(children()), psutil.Process()
+    before, n_files = process.memory_info().rss, process.num_fds() if os.name == "posix" else 0
+    for _ in range(10):
+        crash()
+    assert guard.pid is None
+    assert set(children()) <= known
+    assert process.memory_info().rss - before < 2e6
+    if os.name == "posix":
+        assert process.num_fds() <= n_files
+
+
+ABANDON = """
+import os, threading, time
+from heat_igl import guarded
+threading.Thread(target=lambda: guarded.call("signal:pause", {}, timeout=0.5), daemon=True).start()
+while guarded._shared.pid is None:
+    time.sleep(0.01)
+time.sleep(0.2)
+print(guarded._shared.pid, flush=True)
+os._exit(0)  # neither the timer nor atexit has a say
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signal.pause")
+def test_a_hanging_child_does_not_outlive_a_killed_caller_for_long() -> None:
+    found = subprocess.run([sys.executable, "-c", ABANDON], capture_output=True, text=True, check=True)
+    child = psutil.Process(int(found.stdout))
+    assert child.is_running()
+    assert psutil.wait_procs([child], timeout=20)[0]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_fork_gets_a_child_of_its_own() -> None:
+    mesh = rectangle(5, 5, 1, 1)
+    expected = reference.exact(mesh, 0)
+    pid = guarded._shared.pid
+    with guarded._shared._lock:  # as if another thread were in a call
+        forked = os.fork()
+        if forked == 0:
+            signal.alarm(30)
+            same = np.array_equal(reference.exact(mesh, 0), expected) and guarded._shared.pid != pid
+            reference.close()
+            os._exit(0 if same else 1)
+    assert os.waitpid(forked, 0)[1] == 0
+    assert np.array_equal(reference.exact(mesh, 0), expected)
+    assert guarded._shared.pid == pid
+
+
+def test_a_child_that_was_killed_between_calls_is_replaced() -> None:
+    mesh = rectangle(5, 5, 1, 1)
+    expected = reference.exact(mesh, 0)
+    child = psutil.Process(guarded._shared.pid)
+    child.kill()
+    psutil.wait_procs([child], timeout=10)
+    assert np.array_equal(reference.exact(mesh, 0), expected)
+    assert guarded._shared.pid != child.pid
+
+
+def test_threads_take_turns() -> None:
+    mesh = rectangle(12, 12, 1, 1)
+    expected = [closed_forms.plane(mesh, source) for source in range(24)]
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda source: reference.exact(mesh, source), range(24)))
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+def test_every_native_function_has_a_name() -> None:
+    assert sorted(solver.function for solver in reference._SOLVERS.values()) == sorted(native.__all__)
