@@ -31,7 +31,7 @@ from heat_igl.sources import vertex_sources
 from heat_igl.steps import Boundary
 from heat_igl.typing import FloatArray
 
-__all__ = ["app", "check_writable", "print_rows", "run"]
+__all__ = ["app", "run"]
 
 # What a user can cause; anything else is a fault of the package and shows its traceback.
 _EXPECTED = (OSError, ValueError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
@@ -95,7 +95,7 @@ def _warnings_on_one_line() -> Iterator[None]:
         yield
 
 
-def print_rows(rows: Sequence[tuple[str, str]]) -> None:
+def _print_rows(rows: Sequence[tuple[str, str]]) -> None:
     """Print names and values as two columns."""
     width = max(len(name) for name, _ in rows)
     console = Console(highlight=False, soft_wrap=True)  # a line is a line, also in a pipe
@@ -103,7 +103,7 @@ def print_rows(rows: Sequence[tuple[str, str]]) -> None:
         console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {value}"))
 
 
-def check_writable(path: Path) -> None:
+def _check_writable(path: Path) -> None:
     """Make sure that a file can be written to `path`, before any work is done for it.
 
     Raises
@@ -156,7 +156,7 @@ def _version(version: Annotated[bool, typer.Option("--version", help="Print the 
 @app.command()
 def info(mesh: MeshArgument) -> None:
     """Describe a mesh: sizes, defects, and what bears on distances."""
-    print_rows(read_mesh(mesh).report().rows())
+    _print_rows(read_mesh(mesh).report().rows())
 
 
 @app.command()
@@ -182,7 +182,7 @@ def distance(
     phi = solver.distance(sources)
     seconds = time.perf_counter() - start
     written = _write(loaded, phi, sources, output, picture)
-    print_rows([*_summary(mesh, loaded, phi, solver, seconds), *(("wrote", str(path)) for path in written)])
+    _print_rows([*_summary(mesh, loaded, phi, solver, seconds), *(("wrote", str(path)) for path in written)])
 
 
 @app.command()
@@ -192,7 +192,9 @@ def demo(
     """The whole job on a real mesh: distance, error against exact, files, picture."""
     from heat_igl.demo import demonstrate
 
-    demonstrate(out)
+    out.mkdir(parents=True, exist_ok=True)
+    _check_writable(out / "demo.png")
+    _print_rows(demonstrate(out))
 
 
 def _check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> None:
@@ -203,14 +205,14 @@ def _check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> Non
             raise MeshError(f"--output {output}: {kind} go to {' or '.join(accepted)} files")
         if output.suffix.lower() == ".vtu":
             _require("meshio", "a .vtu file", "io")
-        check_writable(output)
+        _check_writable(output)
     if picture is not None:
         from heat_igl.plots import PICTURE_SUFFIXES
 
         if picture.suffix.lower() not in PICTURE_SUFFIXES:
             raise ValueError(f"--picture {picture}: pictures go to {', '.join(PICTURE_SUFFIXES)} files")
         _require("matplotlib", "a picture", "view")
-        check_writable(picture)
+        _check_writable(picture)
 
 
 def _require(package: str, purpose: str, extra: str) -> None:

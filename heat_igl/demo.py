@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl import reference, shapes
-from heat_igl.cli import check_writable, print_rows
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.io import read_mesh, write_mesh
@@ -32,20 +31,22 @@ def sample_mesh() -> Path | None:
     return None
 
 
-def demonstrate(out: Path) -> None:
-    """Distance on the bunny (a sphere where pymeshlab is missing): compare, write PLY and PNG to `out`, print a table.
+def demonstrate(out: Path) -> list[tuple[str, str]]:
+    """Distance on the bunny (a sphere where pymeshlab is missing), compared with exact, as PLY and PNG in `out`.
 
-    Raises
-    ------
-    OSError
-        If nothing can be written to `out`.
+    Parameters
+    ----------
+    out : Path
+        An existing directory.
+
+    Returns
+    -------
+    list of (name, value)
+        What happened, to be printed.
     """
-    out.mkdir(parents=True, exist_ok=True)
     path = sample_mesh()
     name = "bunny" if path else "sphere"
     ply, png = out / f"{name}.ply", out / f"{name}.png"
-    for target in (ply, png):
-        check_writable(target)
     rows: _Rows = []
     if path is None:
         rows.append(
@@ -66,7 +67,7 @@ def demonstrate(out: Path) -> None:
     write_mesh(ply, mesh, distance=phi)
     rows.append(("wrote", f"{ply} (distance as vertex attribute)"))
     rows.append(_drawn(png, mesh, phi))
-    print_rows(rows)
+    return rows
 
 
 def _since(start: float) -> str:
