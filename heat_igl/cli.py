@@ -48,11 +48,18 @@ def run(arguments: Sequence[str]) -> int:
     """Run one command and return the exit status: 0, 1 for errors, 2 for wrong usage, 130 when interrupted."""
     command = typer.main.get_command(app)
     try:
-        with _warnings_on_one_line():
-            status = command.main(args=list(arguments) or ["--help"], prog_name="heat-igl", standalone_mode=False)
+        # Not command.main, whose own handling of errors and of Ctrl-C differs between versions of typer.
+        with (
+            _warnings_on_one_line(),
+            command.make_context("heat-igl", list(arguments) or ["--help"]) as context,
+        ):
+            command.invoke(context)
             sys.stdout.flush()
+    except typer.Exit as error:
+        return error.exit_code
     except (KeyboardInterrupt, typer.Abort):
-        status = 130
+        _say("interrupted")
+        return 130
     except BrokenPipeError:
         # Whoever read the output has left. Python flushes once more at exit, which must not complain.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -67,9 +74,7 @@ def run(arguments: Sequence[str]) -> int:
             raise
         _say(f"{message()} (see heat-igl --help)")
         return int(getattr(error, "exit_code", 2))
-    if status == 130:
-        _say("interrupted")
-    return status if isinstance(status, int) else 0
+    return 0
 
 
 def _say(message: str) -> None:
