@@ -203,7 +203,7 @@ def _laid_out(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    left, right, bottom, top = 0.05, 0.72, 0.26, 0.12
+    left, right, bottom, top = 0.05, 0.72, 0.26, 0.16
     low, high = turned[used, :2].min(axis=0), turned[used, :2].max(axis=0)
     extent = np.maximum(high - low, 1e-3 * (high - low).max())
     across = _WIDTH - left - right
