@@ -27,6 +27,7 @@ from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Laplacian
+from heat_igl.picture import PICTURE_SUFFIXES
 from heat_igl.sources import vertex_sources
 from heat_igl.steps import Boundary
 from heat_igl.typing import FloatArray
@@ -212,8 +213,6 @@ def _check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> Non
             _require("meshio", "a .vtu file", "io")
         _check_writable(output)
     if picture is not None:
-        from heat_igl.plots import PICTURE_SUFFIXES
-
         if picture.suffix.lower() not in PICTURE_SUFFIXES:
             raise ValueError(f"--picture {picture}: pictures go to {', '.join(PICTURE_SUFFIXES)} files")
         _require("matplotlib", "a picture", "view")

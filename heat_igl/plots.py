@@ -6,17 +6,14 @@ needs OpenGL system libraries that slim machines lack. Needs the extra ``view``.
 
 from __future__ import annotations
 
-import io
 import os
-import tempfile
-from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from heat_igl.errors import MissingExtraError
 from heat_igl.mesh import Mesh
+from heat_igl.picture import DPI, Picture
 from heat_igl.raster import (
     default_rotation,
     isoline_coverage,
@@ -34,11 +31,8 @@ from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["PICTURE_SUFFIXES", "Picture", "picture", "plot"]
+__all__ = ["Picture", "picture", "plot"]
 
-PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
-
-_DPI = 400  # of raster output: 8 cm become 1260 pixels
 _OVERSAMPLING = 2
 _WIDTH = 3.15  # inches, one column of a journal
 _FONT = 7.0  # points
@@ -47,60 +41,6 @@ _UNREACHABLE = (0.72, 0.72, 0.72)
 _LINE_DARKNESS = 0.42
 _UNIT = "distance, in the mesh's unit"
 _PERMUTATION = {"x": [1, 0, 2], "y": [0, 1, 2], "z": [1, 2, 0]}
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """A finished picture; notebooks show it.
-
-    Attributes
-    ----------
-    figure : matplotlib.figure.Figure
-        For changes of one's own; independent of pyplot.
-    """
-
-    figure: Figure
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write PNG, PDF or SVG, by the suffix of `path`; an existing file is replaced only by a complete one.
-
-        Raises
-        ------
-        ValueError
-            If the suffix is another.
-        OSError
-            If the file cannot be written.
-        """
-        target = Path(path)
-        suffix = target.suffix.lower()
-        if suffix not in PICTURE_SUFFIXES:
-            raise ValueError(f"{target} must end in one of {', '.join(PICTURE_SUFFIXES)} to be a picture")
-        content = self._rendered(suffix[1:])
-        descriptor, temporary = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=suffix, dir=target.parent)
-        try:
-            with os.fdopen(descriptor, "wb") as file:
-                file.write(content)
-            os.chmod(temporary, 0o666 & ~_umask())
-            os.replace(temporary, target)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
-
-    def _rendered(self, form: str, dpi: float = _DPI) -> bytes:
-        buffer = io.BytesIO()
-        # No date inside, so that the same input gives the same bytes.
-        metadata = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}[form]
-        self.figure.savefig(buffer, format=form, dpi=dpi, metadata=metadata)
-        return buffer.getvalue()
-
-    def _repr_png_(self) -> bytes:
-        return self._rendered("png", dpi=_DPI / 2)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def plot(
@@ -208,13 +148,13 @@ def _laid_out(
     extent = np.maximum(high - low, 1e-3 * (high - low).max())
     across = _WIDTH - left - right
     tall = float(np.clip(across * extent[1] / extent[0], 1.5, 2.6))
-    columns, rows = (round(length * _DPI) for length in (across, tall))
-    margin = 0.07 * _DPI  # for markers at the rim
+    columns, rows = (round(length * DPI) for length in (across, tall))
+    margin = 0.07 * DPI  # for markers at the rim
     scale = float(min((columns - 2 * margin) / extent[0], (rows - 2 * margin) / extent[1]))
     centre = np.array([columns - 1, rows - 1]) / 2 - (low + high) / 2 * scale * [1, -1]
     points = to_pixels(turned, scale, centre)
 
-    figure = Figure(figsize=(_WIDTH, bottom + tall + top), dpi=_DPI / 2, facecolor="white")
+    figure = Figure(figsize=(_WIDTH, bottom + tall + top), dpi=DPI / 2, facecolor="white")
     FigureCanvasAgg(figure)
     height = bottom + tall + top
     axes = figure.add_axes((left / _WIDTH, bottom / height, across / _WIDTH, tall / height))
@@ -242,7 +182,7 @@ def _surface(
 
     colour = _colours(colormap)(here / _top_of_scale(values))[:, :3]
     per_pixel = screen_gradient(fine, F, finite)[pixels.face]
-    line = isoline_coverage(here, per_pixel, step, _LINE * _DPI * _OVERSAMPLING)
+    line = isoline_coverage(here, per_pixel, step, _LINE * DPI * _OVERSAMPLING)
     colour *= 1 - (1 - _LINE_DARKNESS) * line[:, None]
     colour[~known] = _UNREACHABLE
     colour *= shading(fine, F, pixels)[:, None]

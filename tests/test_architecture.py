@@ -16,7 +16,7 @@ PACKAGE = Path(heat_igl.__file__).parent
 # A module imports only from those before it.
 ORDER = """
 typing errors connectivity mesh intrinsic shapes io operators factorization sources steps refine heat_method
-reference metrics validation raster plots demo cli __main__
+reference metrics validation raster picture plots demo cli __main__
 """.split()
 
 EXTRAS = (

@@ -19,7 +19,7 @@ matplotlib = pytest.importorskip("matplotlib")
 @pytest.fixture(autouse=True)
 def _small(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same picture with fewer pixels."""
-    monkeypatch.setattr(plots, "_DPI", 160)
+    monkeypatch.setattr(plots, "DPI", 160)
 
 
 def surface_image(drawn: Picture) -> np.ndarray:
@@ -94,7 +94,7 @@ def test_isolines_lie_at_the_levels_and_have_the_width_asked_for() -> None:
     middle = image.shape[0] // 2
     columns = np.flatnonzero(plain[middle, :, 3] > 0.99)
     ratio = image[middle, columns, :3].sum(axis=1) / plain[middle, columns, :3].sum(axis=1)
-    line = plots._LINE * plots._DPI
+    line = plots._LINE * plots.DPI
     expected = columns[0] - 0.5 + len(columns) * np.array([0.3, 0.6, 0.9])
     away = np.abs(columns[:, None] - expected).min(axis=1)
     np.testing.assert_allclose(ratio[away > line / 2 + 2], 1, atol=1e-12)
