@@ -14,6 +14,7 @@ Writes benchmark.json and benchmark.md. Needs the extras ``bench`` (potpourri3d)
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib.metadata
 import importlib.util
 import json
@@ -130,17 +131,21 @@ class Child:
         """Seconds and bytes of one run; the distance from the first source goes to `save`."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps({"save": str(save) if save else None}) + "\n")
-        self._process.stdin.flush()
-        line = self._process.stdout.readline()
+        line = ""
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.write(json.dumps({"save": str(save) if save else None}) + "\n")
+            self._process.stdin.flush()
+            line = self._process.stdout.readline()
         if not line:
             raise RuntimeError(f"{self.method} ended with status {self._process.wait()}")
         return dict(json.loads(line))
 
     def close(self) -> None:
         """End the process."""
-        if self._process.stdin is not None:
-            self._process.stdin.close()
+        for pipe in (self._process.stdin, self._process.stdout):
+            assert pipe is not None
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
         self._process.wait()
 
 
