@@ -23,7 +23,7 @@ from rich.text import Text
 import heat_igl
 from heat_igl.errors import AccuracyWarning, FactorizationError, MeshError, MissingExtraError, ReferenceSolverError
 from heat_igl.factorization import Backend
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat_method import HeatMethodSolver, Magnitude
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Laplacian
@@ -175,6 +175,7 @@ def distance(
     t: Annotated[float | None, typer.Option(help="Time step, a squared length.", callback=_positive)] = None,
     laplacian: Annotated[str, _choice(Laplacian, "Triangulation to solve on.")] = "intrinsic-delaunay",
     boundary: Annotated[str, _choice(Boundary, "What heat does at the boundary.")] = "neumann",
+    magnitude: Annotated[str, _choice(Magnitude, "Length of the field that is integrated.")] = "auto",
     backend: Annotated[str, _choice(Backend, "Linear solver.")] = "auto",
 ) -> None:
     """Distance from one or more source vertices."""
@@ -182,7 +183,12 @@ def distance(
     sources = vertex_sources(np.array(source), loaded.n_vertices)
     _check_outputs(loaded, output, picture)
     with Console(stderr=True).status("factoring"):
-        options: dict[str, Any] = {"laplacian": laplacian, "boundary": boundary, "backend": backend}
+        options: dict[str, Any] = {
+            "laplacian": laplacian,
+            "boundary": boundary,
+            "magnitude": magnitude,
+            "backend": backend,
+        }
         solver = HeatMethodSolver(loaded, t_coef=t_coef, t=t, **options)
     start = time.perf_counter()
     phi = solver.distance(sources)

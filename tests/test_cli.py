@@ -175,7 +175,7 @@ def test_unreachable_vertices_are_counted(two_spheres: Path, capsys: pytest.Capt
 
 def test_options_reach_the_solver(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = sphere.with_name("out.ply")
-    options = {"t_coef": 7.0, "laplacian": "cotan", "boundary": "dirichlet", "backend": "scipy"}
+    options = {"t_coef": 7.0, "laplacian": "cotan", "boundary": "dirichlet", "magnitude": "damped", "backend": "scipy"}
     arguments = [f"--{name.replace('_', '-')}={value}" for name, value in options.items()]
     assert cli.run(["distance", str(sphere), "--source", "3", "--output", str(output), *arguments]) == 0
     solver = heat_igl.HeatMethodSolver(shapes.icosphere(2), **options)
@@ -197,6 +197,7 @@ def test_a_warning_of_the_package_is_one_line(sphere: Path, capsys: pytest.Captu
         (["--t=nan"], 2, ("--t", "nan is not a positive number")),
         (["--laplacian=graph"], 2, ("graph", "intrinsic-delaunay, cotan")),
         (["--boundary=hot"], 2, ("hot", "neumann, dirichlet, average")),
+        (["--magnitude=long"], 2, ("long", "auto, unit, damped")),
         (["--backend=abacus"], 2, ("abacus", "auto, scipy, cholespy")),
         (["--output=out.obj"], 1, ("out.obj", ".ply or .vtu")),
         (["--picture=out.gif"], 1, ("out.gif", ".png, .pdf, .svg")),
