@@ -1,0 +1,268 @@
+"""The command line: the package's words, one line per error, no half-written files.
+
+Imported by `heat_igl.__main__` only; needs the extra ``cli``.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, get_args
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.text import Text
+
+import heat_igl
+from heat_igl.errors import AccuracyWarning, FactorizationError, MeshError, MissingExtraError, ReferenceSolverError
+from heat_igl.factorization import Backend
+from heat_igl.heat_method import HeatMethodSolver, Magnitude
+from heat_igl.io import read_mesh, write_mesh
+from heat_igl.mesh import Mesh
+from heat_igl.operators import Laplacian
+from heat_igl.picture import PICTURE_SUFFIXES
+from heat_igl.sources import vertex_sources
+from heat_igl.steps import Boundary
+from heat_igl.typing import FloatArray
+
+__all__ = ["app", "run"]
+
+# What a user can cause; anything else is a fault of the package and shows its traceback.
+_EXPECTED = (OSError, ValueError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
+
+app = typer.Typer(
+    help="Geodesic distance on meshes by the heat method.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command and return the exit status: 0, 1 for errors, 2 for wrong usage, 130 when interrupted."""
+    command = typer.main.get_command(app)
+    try:
+        # Not command.main, whose own handling of errors and of Ctrl-C differs between versions of typer.
+        with (
+            _warnings_on_one_line(),
+            command.make_context("heat-igl", list(arguments) or ["--help"]) as context,
+        ):
+            command.invoke(context)
+            sys.stdout.flush()
+    except typer.Exit as error:
+        return error.exit_code
+    except (KeyboardInterrupt, typer.Abort):
+        _say("interrupted")
+        return 130
+    except BrokenPipeError:
+        # Whoever read the output has left. Python flushes once more at exit, which must not complain.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except _EXPECTED as error:
+        _say(_one_line(error))
+        return 1
+    except Exception as error:
+        # typer's usage errors have no public class in common over its versions.
+        message = getattr(error, "format_message", None)
+        if message is None:
+            raise
+        _say(f"{message()} (see heat-igl --help)")
+        return int(getattr(error, "exit_code", 2))
+    return 0
+
+
+def _say(message: str) -> None:
+    print(f"heat-igl: {' '.join(message.split())}", file=sys.stderr)
+
+
+def _one_line(error: BaseException) -> str:
+    if isinstance(error, MemoryError):
+        return f"out of memory: {error}" if str(error) else "out of memory"
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error) or type(error).__name__
+
+
+@contextmanager
+def _warnings_on_one_line() -> Iterator[None]:
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        _say(f"warning: {message}")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", AccuracyWarning)
+        warnings.showwarning = show
+        yield
+
+
+def _print_rows(rows: Sequence[tuple[str, str]]) -> None:
+    """Print names and values as two columns."""
+    width = max(len(name) for name, _ in rows)
+    console = Console(highlight=False, soft_wrap=True)  # a line is a line, also in a pipe
+    for name, value in rows:
+        console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {value}"))
+
+
+def _check_writable(path: Path) -> None:
+    """Make sure that a file can be written to `path`, before any work is done for it.
+
+    Raises
+    ------
+    OSError
+        If it cannot.
+    """
+    if path.is_dir():
+        raise IsADirectoryError(f"{path} is a directory: name a file in it")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"{path} cannot be written: there is no directory {path.parent}")
+    try:
+        # Permissions alone do not tell: the file system may be read-only.
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise OSError(f"{path} cannot be written: {error.strerror}") from error
+
+
+def _one_of(choices: tuple[str, ...]) -> Callable[[str], str]:
+    def check(value: str) -> str:
+        if value not in choices:
+            raise typer.BadParameter(f"{value!r} is not one of {', '.join(choices)}")
+        return value
+
+    return check
+
+
+def _positive(value: float | None) -> float | None:
+    if value is not None and not (np.isfinite(value) and value > 0):
+        raise typer.BadParameter(f"{value:g} is not a positive number")
+    return value
+
+
+def _choice(kind: Any, text: str) -> Any:
+    choices = get_args(kind)
+    return typer.Option(help=text, metavar="|".join(choices), callback=_one_of(choices))
+
+
+MeshArgument = Annotated[Path, typer.Argument(metavar="MESH", help="OFF, OBJ, PLY, STL, MESH, MSH or VTU file.")]
+
+
+@app.callback(invoke_without_command=True)
+def _version(version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False) -> None:
+    if version:
+        print(heat_igl.__version__)
+        raise typer.Exit
+
+
+@app.command()
+def info(mesh: MeshArgument) -> None:
+    """Describe a mesh: sizes, defects, and what bears on distances."""
+    _print_rows(read_mesh(mesh).report().rows())
+
+
+@app.command()
+def distance(
+    mesh: MeshArgument,
+    source: Annotated[list[int], typer.Option(help="Source vertex, counted from 0; repeat for several.")],
+    output: Annotated[Path | None, typer.Option(help="PLY or VTU file for mesh and distance.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for a picture.")] = None,
+    t_coef: Annotated[float, typer.Option(help="Time step in squared mean edge lengths.", callback=_positive)] = 1.0,
+    t: Annotated[float | None, typer.Option(help="Time step, a squared length.", callback=_positive)] = None,
+    laplacian: Annotated[str, _choice(Laplacian, "Triangulation to solve on.")] = "intrinsic-delaunay",
+    boundary: Annotated[str, _choice(Boundary, "What heat does at the boundary.")] = "neumann",
+    magnitude: Annotated[str, _choice(Magnitude, "Length of the field that is integrated.")] = "auto",
+    backend: Annotated[str, _choice(Backend, "Linear solver.")] = "auto",
+) -> None:
+    """Distance from one or more source vertices."""
+    loaded = read_mesh(mesh)
+    sources = vertex_sources(np.array(source), loaded.n_vertices)
+    _check_outputs(loaded, output, picture)
+    with Console(stderr=True).status("factoring"):
+        options: dict[str, Any] = {
+            "laplacian": laplacian,
+            "boundary": boundary,
+            "magnitude": magnitude,
+            "backend": backend,
+        }
+        solver = HeatMethodSolver(loaded, t_coef=t_coef, t=t, **options)
+    start = time.perf_counter()
+    phi = solver.distance(sources)
+    seconds = time.perf_counter() - start
+    written = _write(loaded, phi, sources, output, picture)
+    _print_rows([*_summary(mesh, loaded, phi, solver, seconds), *(("wrote", str(path)) for path in written)])
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Directory for the results; made if missing.")] = Path("heat-igl-demo"),
+) -> None:
+    """The whole job on a real mesh: distance, error against exact, files, picture."""
+    from heat_igl.demo import demonstrate
+
+    out.mkdir(parents=True, exist_ok=True)
+    _check_writable(out / "demo.png")
+    _print_rows(demonstrate(out))
+
+
+def _check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> None:
+    if output is not None:
+        accepted = (".vtu",) if mesh.is_tetrahedral else (".ply", ".vtu")
+        if output.suffix.lower() not in accepted:
+            kind = "tetrahedra with distances" if mesh.is_tetrahedral else "distances"
+            raise MeshError(f"--output {output}: {kind} go to {' or '.join(accepted)} files")
+        if output.suffix.lower() == ".vtu":
+            _require("meshio", "a .vtu file", "io")
+        _check_writable(output)
+    if picture is not None:
+        if picture.suffix.lower() not in PICTURE_SUFFIXES:
+            raise ValueError(f"--picture {picture}: pictures go to {', '.join(PICTURE_SUFFIXES)} files")
+        _require("matplotlib", "a picture", "view")
+        _check_writable(picture)
+
+
+def _require(package: str, purpose: str, extra: str) -> None:
+    from importlib.util import find_spec
+
+    if find_spec(package) is None:
+        raise MissingExtraError.of(purpose, package, extra)
+
+
+def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, picture: Path | None) -> list[Path]:
+    drawn = None
+    if picture is not None:
+        from heat_igl.plots import plot
+
+        # Drawn before anything is written, since it is what may still fail.
+        with Console(stderr=True).status("drawing"):
+            drawn = plot(mesh, phi, sources=sources)
+    if output is not None:
+        write_mesh(output, mesh, distance=phi)
+    if drawn is not None and picture is not None:
+        drawn.save(picture)
+    return [path for path in (output, picture) if path is not None]
+
+
+def _summary(
+    path: Path, mesh: Mesh, phi: FloatArray, solver: HeatMethodSolver, seconds: float
+) -> list[tuple[str, str]]:
+    found = solver.diagnostics
+    finite = np.isfinite(phi)
+    farthest = int(np.argmax(np.where(finite, phi, -1.0)))
+    kind = "tetrahedra" if mesh.is_tetrahedral else "triangles"
+    raised = " (raised, so that heat crosses the mesh in double precision)" if found.t_raised else ""
+    rows = [
+        ("mesh", f"{path}: {mesh.n_vertices} vertices, {mesh.n_faces} {kind}"),
+        ("farthest", f"{phi[farthest]:.6g} at vertex {farthest}"),
+        ("mean", f"{phi[finite].mean():.6g}"),
+        ("time step", f"{found.t:.6g}{raised}"),
+        ("flipped edges", str(found.n_flips)),
+        ("seconds", f"{found.seconds_operators + found.seconds_factorization:.3f} once, {seconds:.3f} per distance"),
+    ]
+    if not finite.all():
+        rows.insert(2, ("unreachable", f"{int((~finite).sum())} vertices"))
+    return rows

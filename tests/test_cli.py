@@ -1,0 +1,287 @@
+"""The command line: what it prints, what it leaves behind, and how it fails."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heat_igl
+from heat_igl import cli, demo, io, plots, reference, shapes
+
+ENVIRONMENT = {
+    **os.environ,
+    # The package under test, wherever the command runs.
+    "PYTHONPATH": os.pathsep.join([str(Path(heat_igl.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]),
+}
+
+
+def command(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "heat_igl", *map(str, arguments)],
+        cwd=cwd, env=ENVIRONMENT, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
+def files(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def assert_one_line(stderr: str, *words: str) -> None:
+    assert stderr.startswith("heat-igl: "), stderr
+    assert stderr.count("\n") == 1, stderr
+    for word in words:
+        assert word in stderr
+
+
+@pytest.fixture
+def sphere(tmp_path: Path) -> Path:
+    io.write_mesh(tmp_path / "sphere.off", shapes.icosphere(2))
+    return tmp_path / "sphere.off"
+
+
+@pytest.fixture
+def two_spheres(tmp_path: Path) -> Path:
+    one = shapes.icosphere(1)
+    path = tmp_path / "two.off"
+    io.write_mesh(
+        path, heat_igl.Mesh(np.concatenate([one.V, one.V + 5]), np.concatenate([one.F, one.F + one.n_vertices]))
+    )
+    return path
+
+
+def test_distance_writes_what_the_library_returns_and_a_picture(sphere: Path) -> None:
+    done = command(
+        "distance", sphere, "--source", 12, "--source", 40, "--output", "out.ply", "--picture", "out.png",
+        cwd=sphere.parent,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    written = io.read_attributes(sphere.parent / "out.ply")["distance"]
+    np.testing.assert_array_equal(written, heat_igl.HeatMethodSolver(shapes.icosphere(2)).distance([12, 40]))
+    assert written[[12, 40]].tolist() == [0, 0]
+    assert (sphere.parent / "out.png").read_bytes().startswith(b"\x89PNG")
+    assert f"{written.max():.6g} at vertex {written.argmax()}" in done.stdout
+    assert files(sphere.parent) == {"sphere.off", "out.ply", "out.png"}
+
+
+def test_a_file_that_is_no_mesh(tmp_path: Path) -> None:
+    (tmp_path / "notes.off").write_text("buy milk\n")
+    done = command("distance", "notes.off", "--source", 0, "--output", "out.ply", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert_one_line(done.stderr, "notes.off")
+    assert files(tmp_path) == {"notes.off"}
+
+
+def test_a_source_that_is_no_vertex(sphere: Path) -> None:
+    done = command("distance", sphere, "--source", 162, "--output", "out.ply", cwd=sphere.parent)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert_one_line(done.stderr, "162", "indices run from 0 to 161")
+    assert files(sphere.parent) == {"sphere.off"}
+
+
+def test_an_output_directory_that_does_not_exist(sphere: Path) -> None:
+    done = command("distance", sphere, "--source", 0, "--output", "nowhere/out.ply", cwd=sphere.parent)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert_one_line(done.stderr, "nowhere")
+    assert files(sphere.parent) == {"sphere.off"}
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a directory in which even root cannot write")
+@pytest.mark.parametrize("option", ["--output=/proc/out.ply", "--picture=/proc/out.png"])
+def test_an_output_that_cannot_be_written(sphere: Path, option: str) -> None:
+    done = command("distance", sphere, "--source", 0, option, cwd=sphere.parent)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert_one_line(done.stderr, "/proc/out", "cannot be written")
+
+
+def test_wrong_usage_is_one_line_with_status_2(sphere: Path) -> None:
+    done = command("distance", sphere, "--source", "north", cwd=sphere.parent)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert_one_line(done.stderr, "--source", "integer")
+
+
+def test_without_typer_one_line_names_the_extra(tmp_path: Path) -> None:
+    code = "import sys; sys.modules['typer'] = None; from heat_igl.__main__ import main; sys.exit(main())"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert_one_line(done.stderr, 'pip install "heat-igl[cli]"')
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends a signal")
+def test_interrupt(tmp_path: Path) -> None:
+    code = (
+        "import sys, time; from heat_igl import cli\n"
+        "def read_mesh(path):\n    print('ready', flush=True)\n    time.sleep(60)\n"
+        "cli.read_mesh = read_mesh; sys.exit(cli.run(['info', 'a.off']))"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, env=ENVIRONMENT, stdout=-1, stderr=-1, text=True
+    ) as running:
+        assert running.stdout is not None
+        assert running.stdout.readline() == "ready\n"
+        running.send_signal(signal.SIGINT)
+        _, stderr = running.communicate(timeout=30)
+    assert running.returncode == 130
+    assert stderr == "heat-igl: interrupted\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell with pipes")
+def test_a_closed_pipe_is_no_traceback(sphere: Path) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-m", "heat_igl", "info", str(sphere)], env=ENVIRONMENT, stdout=-1, stderr=-1, text=True
+    ) as running:
+        assert running.stdout is not None
+        running.stdout.close()
+        assert running.stderr is not None
+        assert "Traceback" not in running.stderr.read()
+    assert running.returncode == 1
+
+
+def test_demo_does_the_whole_job(tmp_path: Path) -> None:
+    done = command("demo", "--out", "made/results", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    name = "bunny" if demo.sample_mesh() else "sphere"
+    assert files(tmp_path / "made/results") == {f"{name}.ply", f"{name}.png"}
+    mesh = io.read_mesh(tmp_path / "made/results" / f"{name}.ply")
+    distance = io.read_attributes(tmp_path / "made/results" / f"{name}.ply")["distance"]
+    np.testing.assert_array_equal(distance, heat_igl.HeatMethodSolver(mesh).distance(1234))
+    assert f"{mesh.n_vertices} vertices" in done.stdout
+    error = next(line for line in done.stdout.splitlines() if line.startswith("error of heat"))
+    assert 0.1 < float(error.split()[3]) < 1.5
+
+
+def test_info_prints_the_report(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["info", str(sphere)]) == 0
+    out = capsys.readouterr().out
+    for name, value in shapes.icosphere(2).report().rows():
+        assert [line[len(name) :].strip() for line in out.splitlines() if line.startswith(name + " ")] == [value]
+
+
+def test_unreachable_vertices_are_counted(two_spheres: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["distance", str(two_spheres), "--source", "0"]) == 0
+    assert "42 vertices" in next(
+        line for line in capsys.readouterr().out.splitlines() if line.startswith("unreachable")
+    )
+
+
+def test_options_reach_the_solver(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = sphere.with_name("out.ply")
+    options = {"t_coef": 7.0, "laplacian": "cotan", "boundary": "dirichlet", "magnitude": "damped", "backend": "scipy"}
+    arguments = [f"--{name.replace('_', '-')}={value}" for name, value in options.items()]
+    assert cli.run(["distance", str(sphere), "--source", "3", "--output", str(output), *arguments]) == 0
+    solver = heat_igl.HeatMethodSolver(shapes.icosphere(2), **options)
+    np.testing.assert_array_equal(io.read_attributes(output)["distance"], solver.distance(3))
+    assert f"{solver.t:.6g}" in capsys.readouterr().out
+
+
+def test_a_warning_of_the_package_is_one_line(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["distance", str(sphere), "--source", "3", "--t", "1e-300"]) == 0
+    first, *others = capsys.readouterr().err.splitlines()
+    assert first.startswith("heat-igl: warning: t = 1e-300 is too small")
+    assert all(line.startswith("heat-igl: warning: ") for line in others)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["--t-coef=-1"], 2, ("--t-coef", "-1 is not a positive number")),
+        (["--t=nan"], 2, ("--t", "nan is not a positive number")),
+        (["--laplacian=graph"], 2, ("graph", "intrinsic-delaunay, cotan")),
+        (["--boundary=hot"], 2, ("hot", "neumann, dirichlet, average")),
+        (["--magnitude=long"], 2, ("long", "auto, unit, damped")),
+        (["--backend=abacus"], 2, ("abacus", "auto, scipy, cholespy")),
+        (["--output=out.obj"], 1, ("out.obj", ".ply or .vtu")),
+        (["--picture=out.gif"], 1, ("out.gif", ".png, .pdf, .svg")),
+        (["--output=.ply/out.ply"], 1, (".ply",)),
+        (["--picture=folder.png"], 1, ("folder.png is a directory",)),
+    ],
+)
+def test_a_bad_option_stops_before_anything_is_solved(
+    sphere: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    status: int,
+    words: tuple[str, ...],
+) -> None:
+    monkeypatch.chdir(sphere.parent)
+    Path("folder.png").mkdir()
+    monkeypatch.setattr(cli, "HeatMethodSolver", lambda *_, **__: pytest.fail("solved before it checked"))
+    assert cli.run(["distance", str(sphere), "--source", "0", *arguments]) == status
+    assert_one_line(capsys.readouterr().err, *words)
+    assert files(sphere.parent) == {"sphere.off", "folder.png"}
+
+
+def test_tetrahedra_go_to_vtu_only(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    box = tmp_path / "box.mesh"
+    io.write_mesh(box, shapes.box(2))
+    assert cli.run(["distance", str(box), "--source", "0", "--output", str(tmp_path / "out.ply")]) == 1
+    assert_one_line(capsys.readouterr().err, "tetrahedra with distances go to .vtu files")
+    assert cli.run(["distance", str(box), "--source", "0", "--output", str(tmp_path / "out.vtu")]) == 0
+    distance = io.read_attributes(tmp_path / "out.vtu")["distance"]
+    np.testing.assert_array_equal(distance, heat_igl.HeatMethodSolver(shapes.box(2)).distance(0))
+
+
+def test_a_failure_while_drawing_leaves_old_files_alone(
+    sphere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device", "out.png")
+
+    monkeypatch.setattr(plots, "plot", full)
+    output = sphere.with_name("out.ply")
+    output.write_text("old")
+    picture = sphere.with_name("out.png")
+    assert cli.run(["distance", str(sphere), "--source", "0", f"--output={output}", f"--picture={picture}"]) == 1
+    assert_one_line(capsys.readouterr().err, "out.png: No space left on device")
+    assert output.read_text() == "old"
+    assert files(sphere.parent) == {"sphere.off", "out.ply"}
+
+
+def test_no_arguments_print_the_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run([]) == 0
+    out = capsys.readouterr().out
+    assert all(name in out for name in ("info", "distance", "demo"))
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["--version"]) == 0
+    assert capsys.readouterr().out == f"{heat_igl.__version__}\n"
+
+
+def test_demo_goes_on_without_pymeshlab_and_without_references(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(*_: object) -> None:
+        raise heat_igl.ReferenceSolverError("meshlab_front cannot be loaded: libOpenGL.so.0")
+
+    monkeypatch.setattr(demo, "sample_mesh", lambda: None)
+    monkeypatch.setattr(reference, "exact", lambda mesh, _: np.arccos(np.clip(mesh.V @ mesh.V[1234], -1, 1)))
+    monkeypatch.setattr(reference, "meshlab", missing)
+    assert cli.run(["demo", "--out", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert "no bunny, since pymeshlab is missing" in out
+    assert out.count("libOpenGL") == 1
+    assert "error of heat" in out
+    assert files(tmp_path) == {"sphere.ply", "sphere.png"}
+    monkeypatch.setattr(reference, "exact", missing)
+    assert cli.run(["demo", "--out", str(tmp_path)]) == 0
+    assert "error of heat" not in capsys.readouterr().out
+
+
+def test_a_fault_of_the_package_is_not_hidden(sphere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(_: object) -> None:
+        raise TypeError("a bug")
+
+    monkeypatch.setattr(cli, "read_mesh", broken)
+    with pytest.raises(TypeError, match="a bug"):
+        cli.run(["info", str(sphere)])

@@ -1,0 +1,274 @@
+"""Pictures: every pixel shows the nearest triangle and the right distance, lines lie where they should."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heat_igl
+from heat_igl import plots, raster, shapes
+from heat_igl.plots import Picture, picture, plot
+
+matplotlib = pytest.importorskip("matplotlib")
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same picture with fewer pixels."""
+    monkeypatch.setattr(plots, "DPI", 160)
+
+
+def surface_image(drawn: Picture) -> np.ndarray:
+    return np.asarray(drawn.figure.axes[0].get_images()[0].get_array())
+
+
+def legend_texts(drawn: Picture) -> list[str]:
+    return [text.get_text() for text in drawn.figure.legends[0].get_texts()]
+
+
+def flat_grid(n: int = 20) -> tuple[heat_igl.Mesh, np.ndarray]:
+    """The unit square and the distance from its left side."""
+    mesh = shapes.grid(n)
+    V = (mesh.V - mesh.V.min(axis=0)) / np.ptp(mesh.V[:, 0])
+    return heat_igl.Mesh(V, mesh.F), V[:, 0]
+
+
+def test_each_pixel_shows_the_nearest_triangle_and_interpolates_exactly() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform(0, 40, (60, 3))
+    F = np.arange(60).reshape(20, 3)
+    pixels = raster.rasterize(points, F, 40, 40)
+    # A slow second opinion: every triangle against every pixel.
+    depth = np.full((40, 40), -np.inf)
+    face = np.full((40, 40), -1)
+    for f, corners in enumerate(points[F]):
+        system = np.concatenate([corners[:, :2].T, np.ones((1, 3))])
+        for row in range(40):
+            for column in range(40):
+                weights = np.linalg.solve(system, [column, row, 1])
+                if (weights >= 0).all() and weights @ corners[:, 2] > depth[row, column]:
+                    depth[row, column], face[row, column] = weights @ corners[:, 2], f
+    np.testing.assert_array_equal(pixels.place, np.flatnonzero(face.ravel() >= 0))
+    np.testing.assert_array_equal(pixels.face, face.ravel()[pixels.place])
+    np.testing.assert_allclose(pixels.depth, depth, atol=1e-9)
+    where = np.einsum("pk,pkd->pd", pixels.weights, points[F[pixels.face]])
+    np.testing.assert_allclose(where[:, 0] + 40 * where[:, 1], pixels.place, atol=1e-6)
+
+
+def test_many_pixels_are_drawn_in_chunks_without_a_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = np.random.default_rng(1).uniform(0, 60, (90, 3))
+    F = np.arange(90).reshape(30, 3)
+    whole = raster.rasterize(points, F, 60, 60)
+    monkeypatch.setattr(raster, "_CHUNK", 500)
+    for a, b in zip(whole, raster.rasterize(points, F, 60, 60), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_neighbouring_triangles_leave_no_gap() -> None:
+    mesh, _ = flat_grid(8)
+    points = mesh.V @ raster.rotation(30, 40).T * [80, 80, 1] + [40, 40, 0]
+    pixels = raster.rasterize(points, mesh.F, 150, 150)
+    covered = np.isfinite(pixels.depth)
+    for row in covered[covered.any(axis=1)]:
+        inside = np.flatnonzero(row)
+        assert len(inside) == inside[-1] - inside[0] + 1
+
+
+@pytest.mark.parametrize(("azimuth", "elevation"), [(0, 0), (90, 0), (33, -70), (0, 90)])
+def test_rotations_keep_shapes_and_handedness(azimuth: float, elevation: float) -> None:
+    turn = raster.rotation(azimuth, elevation)
+    np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(turn) == pytest.approx(1)
+    viewer = np.radians([azimuth, elevation])
+    assert turn[2, 1] == pytest.approx(np.sin(viewer[1]))
+
+
+def test_isolines_lie_at_the_levels_and_have_the_width_asked_for() -> None:
+    """Distance x, on a square seen face on: dark columns at multiples of the spacing and nowhere else."""
+    mesh, x = flat_grid()
+    image, plain = (surface_image(plot(mesh, x, spacing=spacing)) for spacing in (0.3, 100.0))
+    middle = image.shape[0] // 2
+    columns = np.flatnonzero(plain[middle, :, 3] > 0.99)
+    ratio = image[middle, columns, :3].sum(axis=1) / plain[middle, columns, :3].sum(axis=1)
+    line = plots._LINE * plots.DPI
+    expected = columns[0] - 0.5 + len(columns) * np.array([0.3, 0.6, 0.9])
+    away = np.abs(columns[:, None] - expected).min(axis=1)
+    np.testing.assert_allclose(ratio[away > line / 2 + 2], 1, atol=1e-12)
+    ink = (1 - ratio).sum() / (1 - plots._LINE_DARKNESS)
+    assert ink == pytest.approx(3 * line, rel=0.3)
+
+
+def test_colours_follow_the_colour_bar() -> None:
+    mesh, x = flat_grid()
+    drawn = plot(mesh, x, spacing=10.0 / 3)  # no line on the way
+    image = surface_image(drawn)
+    row = image[image.shape[0] // 2]
+    row = row[row[:, 3] > 0.99, :3]
+    bar = drawn.figure.axes[1].get_images()[0]
+    expected = bar.cmap(np.linspace(0, 1, len(row)))[:, :3]
+    assert np.abs(row - expected).max() < 0.02
+    # Perceptually uniform: brightness falls steadily from the source.
+    luminance = row @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(luminance) < 0.01).all()
+    assert luminance[0] - luminance[-1] > 0.5
+
+
+def test_unreachable_is_grey_and_the_legend_says_so() -> None:
+    mesh, x = flat_grid()
+    both = heat_igl.Mesh(
+        np.concatenate([mesh.V, mesh.V + np.array([1.5, 0, 0])]), np.concatenate([mesh.F, mesh.F + mesh.n_vertices])
+    )
+    drawn = plot(both, np.concatenate([x, np.full_like(x, np.inf)]), sources=[0])
+    image = surface_image(drawn)
+    right = image[image.shape[0] // 2, image.shape[1] * 3 // 4]
+    left = image[image.shape[0] // 2, image.shape[1] // 8]
+    assert np.ptp(right[:3]) < 1e-6
+    assert np.ptp(left[:3]) > 0.2
+    assert "unreachable" in legend_texts(drawn)
+    assert "unreachable" not in legend_texts(plot(mesh, x))
+
+
+def test_sources_in_front_are_dots_and_those_behind_are_rings() -> None:
+    sphere = shapes.icosphere(3)
+    front, back = int(np.argmax(sphere.V[:, 2])), int(np.argmin(sphere.V[:, 2]))
+    distance = np.minimum(*(np.arccos(np.clip(sphere.V @ sphere.V[s], -1, 1)) for s in (front, back)))
+    drawn = plot(sphere, distance, sources=[front, back], view=(0, 0))
+    assert legend_texts(drawn)[:2] == ["source", "source behind"]
+    seen, hidden = drawn.figure.axes[0].collections
+    rows, columns = surface_image(drawn).shape[:2]
+    for marks in (seen, hidden):
+        np.testing.assert_allclose(marks.get_offsets(), [[columns / 2, rows / 2]], atol=0.05 * columns)
+    assert len(hidden.get_facecolors()) == 0
+
+
+def test_the_default_view_shows_the_source() -> None:
+    sphere = shapes.icosphere(3)
+    for axis in (0, 2):
+        for source in (int(np.argmax(sphere.V[:, axis])), int(np.argmin(sphere.V[:, axis]))):
+            distance = np.arccos(np.clip(sphere.V @ sphere.V[source], -1, 1))
+            assert legend_texts(plot(sphere, distance, sources=source))[0] == "source"
+
+
+@pytest.mark.parametrize("axes", [[0, 1, 2], [2, 0, 1], [1, 2, 0]])
+def test_a_flat_mesh_is_seen_face_on(axes: list[int]) -> None:
+    mesh, x = flat_grid()
+    image = surface_image(plot(heat_igl.Mesh(mesh.V[:, axes], mesh.F), x))
+    rows, columns = np.nonzero(image[..., 3] > 0.5)
+    assert np.ptp(rows) == pytest.approx(np.ptp(columns), abs=4)
+
+
+@pytest.mark.parametrize(("scale", "offset"), [(1e-8, 0.0), (1e8, 0.0), (1.0, 1e6)])
+def test_scale_and_place_do_not_change_the_picture(scale: float, offset: float) -> None:
+    mesh = shapes.icosphere(2)
+    distance = np.arccos(np.clip(mesh.V @ mesh.V[0], -1, 1))
+    moved = heat_igl.Mesh(mesh.V * scale + offset, mesh.F)
+    spacing = 0.25
+    a = surface_image(plot(mesh, distance, spacing=spacing))
+    b = surface_image(plot(moved, distance * scale, spacing=spacing * scale))
+    assert np.abs(a - b).mean() < 1e-4
+
+
+def test_tetrahedra_are_drawn_by_their_surface() -> None:
+    box = shapes.box(3)
+    distance = np.linalg.norm(box.V - box.V[0], axis=1)
+    image = surface_image(plot(box, distance, sources=0))
+    assert 0.3 < (image[..., 3] > 0.5).mean() < 0.95
+
+
+def test_nothing_overlaps_and_nothing_is_cut_off() -> None:
+    mesh, x = flat_grid()
+    for values in (x * 1e-9, x * 12345.0):
+        drawn = plot(mesh, values, sources=[0, 441 - 1])
+        figure = drawn.figure
+        renderer = figure.canvas.get_renderer()
+        figure.draw(renderer)
+        surface, bar = figure.axes
+        boxes = [
+            surface.get_window_extent(renderer),
+            bar.get_tightbbox(renderer),
+            figure.legends[0].get_window_extent(),
+        ]
+        for i, box in enumerate(boxes):
+            assert box.x0 >= 0
+            assert box.y0 >= -1
+            assert box.x1 <= figure.bbox.x1
+            assert box.y1 <= figure.bbox.y1
+            assert not any(box.shrunk(0.99, 0.97).overlaps(other) for other in boxes[i + 1 :])
+
+
+def test_save_writes_the_format_that_the_suffix_names_and_the_same_bytes(tmp_path: Path) -> None:
+    mesh, x = flat_grid(4)
+    for suffix, start in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
+        path = tmp_path / f"a{suffix}"
+        picture(path, mesh, x)
+        assert path.read_bytes().startswith(start)
+    drawn = plot(mesh, x)
+    drawn.save(tmp_path / "b.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert drawn._repr_png_().startswith(b"\x89PNG")
+
+
+def test_save_rejects_other_suffixes(tmp_path: Path) -> None:
+    mesh, x = flat_grid(4)
+    with pytest.raises(ValueError, match=r"a\.gif must end in one of \.png, \.pdf, \.svg"):
+        picture(tmp_path / "a.gif", mesh, x)
+
+
+def test_a_failed_save_leaves_the_old_file_and_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, x = flat_grid(4)
+    drawn = plot(mesh, x)
+    path = tmp_path / "a.png"
+    path.write_text("old")
+
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", fail)
+        with pytest.raises(OSError, match="No space left"):
+            drawn.save(path)
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("a.png", "old")]
+    drawn.save(path)
+    assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_cannot_be_drawn_is_rejected_by_name() -> None:
+    mesh, x = flat_grid(4)
+    plot(mesh, x)
+    with pytest.raises(ValueError, match=r"distance must have shape \(25,\)"):
+        plot(mesh, x[1:])
+    with pytest.raises(ValueError, match=r"distance\[3\] is NaN"):
+        plot(mesh, np.where(np.arange(25) == 3, np.nan, x))
+    with pytest.raises(ValueError, match="infinite everywhere"):
+        plot(mesh, np.full(25, np.inf))
+    with pytest.raises(ValueError, match="spacing must be a positive number"):
+        plot(mesh, x, spacing=-1.0)
+    with pytest.raises(ValueError, match="spacing must be a positive number"):
+        plot(mesh, x, spacing=1e-9)
+    with pytest.raises(ValueError, match="up must be"):
+        plot(mesh, x, up="w")
+    with pytest.raises(ValueError, match="colormap must be"):
+        plot(mesh, x, colormap="mud")
+    with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 25"):
+        plot(mesh, x, sources=25)
+
+
+def test_zero_everywhere_can_be_drawn() -> None:
+    mesh, x = flat_grid(4)
+    assert plot(mesh, 0 * x, sources=np.ones(25, bool)).figure is not None
+
+
+def test_without_matplotlib_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, x = flat_grid(4)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(heat_igl.MissingExtraError, match=r'pip install "heat-igl\[view\]"'):
+        plot(mesh, x)
+
+
+@pytest.mark.parametrize(("largest", "spacing"), [(1.0, 0.05), (0.85, 0.05), (635.0, 50.0), (3e-8, 2e-9), (0.0, 1.0)])
+def test_spacing_is_a_round_number(largest: float, spacing: float) -> None:
+    assert raster.isoline_spacing(largest) == pytest.approx(spacing)
