@@ -5,6 +5,7 @@ Imported by `heat_igl.__main__` only; needs the extra ``cli``.
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import tempfile
@@ -18,24 +19,29 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 from rich.console import Console
+from rich.progress import Progress
 from rich.text import Text
 
 import heat_igl
 from heat_igl.errors import AccuracyWarning, FactorizationError, MeshError, MissingExtraError, ReferenceSolverError
 from heat_igl.factorization import Backend
+from heat_igl.guarded import TIMEOUT
 from heat_igl.heat_method import HeatMethodSolver, Magnitude
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Laplacian
-from heat_igl.picture import PICTURE_SUFFIXES
+from heat_igl.picture import PICTURE_SUFFIXES, Picture
 from heat_igl.sources import vertex_sources
 from heat_igl.steps import Boundary
 from heat_igl.typing import FloatArray
+from heat_igl.validation import METHODS, draw_sources
 
 __all__ = ["app", "run"]
 
 # What a user can cause; anything else is a fault of the package and shows its traceback.
 _EXPECTED = (OSError, ValueError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
+
+_DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
 
 app = typer.Typer(
     help="Geodesic distance on meshes by the heat method.",
@@ -129,6 +135,17 @@ def _check_writable(path: Path) -> None:
         raise OSError(f"{path} cannot be written: {error.strerror}") from error
 
 
+def _write_text(path: Path, text: str) -> None:
+    """Write a file that replaces an existing one only when it is complete."""
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        temporary.write_text(text, encoding="utf8")
+        os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
 def _one_of(choices: tuple[str, ...]) -> Callable[[str], str]:
     def check(value: str) -> str:
         if value not in choices:
@@ -195,6 +212,47 @@ def distance(
     seconds = time.perf_counter() - start
     written = _write(loaded, phi, sources, output, picture)
     _print_rows([*_summary(mesh, loaded, phi, solver, seconds), *(("wrote", str(path)) for path in written)])
+
+
+@app.command()
+def validate(
+    mesh: MeshArgument,
+    sources: Annotated[int, typer.Option(min=1, help="Single source vertices, one distance from each.")] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="For drawing them.")] = 0,
+    methods: Annotated[str, typer.Option(help=f"Separated by commas: {', '.join(METHODS)}.")] = _DEFAULT_METHODS,
+    reference: Annotated[str, typer.Option(help="Method to measure errors against.")] = "exact",
+    timeout: Annotated[float, typer.Option(help="Seconds for one native solve.", callback=_positive)] = TIMEOUT,
+    json_file: Annotated[Path | None, typer.Option("--json", help="JSON file for the report.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for errors on the surface.")] = None,
+    fail_above: Annotated[
+        float | None, typer.Option(metavar="PERCENT", help="Exit with 1 if a mean error is larger.")
+    ] = None,
+) -> None:
+    """How far each method is from a reference, and what it costs."""
+    loaded = read_mesh(mesh)
+    drawn_sources = draw_sources(loaded, sources, seed)
+    _check_outputs(loaded, None, picture)
+    if json_file is not None:
+        _check_writable(json_file)
+    console = Console(stderr=True)
+    # Where nobody watches, not even the empty line that a finished bar leaves.
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=None)
+        report = heat_igl.validate(
+            loaded, drawn_sources, [name.strip() for name in methods.split(",")], reference, name=mesh.stem,
+            timeout=timeout,
+            progress=lambda label, done, total: bar.update(task, description=label, completed=done, total=total),
+        )  # fmt: skip
+    if picture is not None:
+        Picture(report.plot()).save(picture)
+    if json_file is not None:
+        _write_text(json_file, json.dumps(report.to_dict(), indent=1, allow_nan=False) + "\n")
+    print(report.to_markdown(), end="")
+    exceeding = report.exceeding(fail_above) if fail_above is not None else ()
+    if exceeding:
+        names = ", ".join(row.method for row in exceeding)
+        _say(f"no mean error of at most {fail_above:g} % for {names}")
+        raise typer.Exit(1)
 
 
 @app.command()

@@ -5,6 +5,9 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import json
+import os
+import subprocess
+import sys
 import time
 import warnings
 from collections.abc import Callable
@@ -374,3 +377,62 @@ def test_script_refuses_what_it_does_not_know(script: ModuleType, folder: Path, 
         script.main([str(folder / "empty")])
     assert "no mesh files there" in capsys.readouterr().err
     assert not (folder / "out").exists()
+
+
+# --- heat-igl validate -----------------------------------------------------------------------------------------------
+
+
+def command(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    root = str(Path(heat_igl.__file__).parents[1])
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
+    return subprocess.run(
+        [sys.executable, "-m", "heat_igl", "validate", *options],
+        cwd=folder / "meshes", env=environment, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
+def test_command_prints_and_writes_the_report(folder: Path) -> None:
+    written = {"report.json", "errors.png"}
+    before = {path.name for path in (folder / "meshes").iterdir()}
+    done = command(
+        folder, "disk.off", "--sources", "2", "--seed", "7", "--methods", "heat,meshlab",
+        "--json", "report.json", "--picture", "errors.png", "--fail-above", "20",
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    mesh = heat_igl.read_mesh(folder / "meshes" / "disk.off")
+    report = validate(mesh, draw_sources(mesh, 2, 7), ["heat", "meshlab"], name="disk")
+    found = json.loads((folder / "meshes" / "report.json").read_text())
+    assert found["sources"] == report.to_dict()["sources"]
+    assert [row["errors"] for row in found["rows"]] == [row["errors"] for row in report.to_dict()["rows"]]
+    # Up to the times and memory at the end, and the eikonal residual, that is all of the line.
+    assert done.stdout.splitlines()[4].split("|")[:12] == report.to_markdown().splitlines()[4].split("|")[:12]
+    assert (folder / "meshes" / "errors.png").read_bytes().startswith(b"\x89PNG")
+    assert {path.name for path in (folder / "meshes").iterdir()} == before | written
+
+
+def test_command_exits_with_one_above_the_threshold(folder: Path) -> None:
+    done = command(folder, "disk.off", "--methods", "heat,exact", "--fail-above", "0.1")
+    assert done.returncode == 1
+    assert done.stdout.startswith("**disk**")
+    assert done.stderr == "heat-igl: no mean error of at most 0.1 % for heat\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["fin.off"], "more than two triangles"),
+        (["noise.off"], "noise.off"),
+        (["disk.off", "--methods", "heat,magic"], "'magic' is unknown"),
+        (["disk.off", "--sources", "1000"], "1000 sources cannot be drawn"),
+        (["disk.off", "--picture", "errors.gif"], "errors.gif"),
+        (["disk.off", "--json", "nowhere/report.json"], "nowhere"),
+    ],
+)
+def test_command_fails_in_one_line_and_leaves_nothing(folder: Path, options: list[str], message: str) -> None:
+    before = {path.name for path in (folder / "meshes").iterdir()}
+    done = command(folder, *options)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("heat-igl: ")
+    assert done.stderr.count("\n") == 1
+    assert message in done.stderr
+    assert {path.name for path in (folder / "meshes").iterdir()} == before
