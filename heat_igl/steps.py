@@ -23,10 +23,6 @@ __all__ = ["Boundary", "HeatFlow", "PoissonProblem", "damping", "diffuse", "inte
 # Below this, gradients lose digits to gradual underflow and no longer have a direction worth keeping.
 _SMALLEST_GRADIENT = 1e-300
 
-# Share of a front's rate from which on a direction is trusted fully: fronts on a mesh scatter by some percent around 1.
-# Measured over twelve meshes, anything from 0.85 to 0.95 gives the same mean error within 2 %.
-_FULL_RATE = 0.9
-
 Boundary = Literal["neumann", "dirichlet", "average"]
 
 
@@ -188,7 +184,7 @@ def normalize(operators: Operators, u: FloatArray) -> FloatArray:
     return np.asarray(gradient)
 
 
-def damping(operators: Operators, u: FloatArray, t: float) -> FloatArray:
+def damping(operators: Operators, u: FloatArray, t: float, full_rate: float = 0.9) -> FloatArray:
     """How sure the direction of X is on each face: 1 almost everywhere, less where heat arrives from several sides.
 
     A front of heat falls by the same factor over each length, |grad log u| = 1 / sqrt(t) for small faces, and by
@@ -204,6 +200,9 @@ def damping(operators: Operators, u: FloatArray, t: float) -> FloatArray:
         Heat.
     t : float
         Time step that the heat was made with.
+    full_rate : float
+        Share of a front's rate from which on a direction is trusted fully: on a mesh, fronts scatter by some percent
+        around 1. docs/heat_path.md compares values.
 
     Returns
     -------
@@ -217,7 +216,7 @@ def damping(operators: Operators, u: FloatArray, t: float) -> FloatArray:
         rate = np.sqrt(np.einsum("k...,k...->...", components, components))
     size = operators.face_sizes
     front = np.arccosh(1 + size**2 / (2 * t)) / size
-    factor = (rate.T / (_FULL_RATE * front)).T
+    factor = (rate.T / (full_rate * front)).T
     factor[operators.boundary_faces] = 1
     return np.asarray(np.where(factor < 1, factor, 1.0))
 

@@ -19,7 +19,7 @@ import numpy as np
 from environment import environment
 
 from heat_igl import HeatMethodSolver, Mesh, read_mesh, reference
-from heat_igl.steps import damping, integrate
+from heat_igl.steps import PoissonProblem, damping, normalize
 from heat_igl.typing import FloatArray
 from heat_igl.validation import draw_sources
 
@@ -30,22 +30,25 @@ def options(**kept: object) -> Callable[[Mesh], Distance]:
     return lambda mesh: HeatMethodSolver(mesh, **kept).distance
 
 
-def log_gradient(damped: bool) -> Callable[[Mesh], Distance]:
-    """X along the gradient of log u, which is nearly linear, in place of that of u."""
+def field(of_log_u: bool = False, full_rate: float | None = None) -> Callable[[Mesh], Distance]:
+    """X put together from the steps: along the gradient of u or of log u, damped with a given constant or not."""
 
     def prepare(mesh: Mesh) -> Distance:
         solver = HeatMethodSolver(mesh)
         domain = solver.operators
+        poisson = PoissonProblem(domain)
 
         def distance(source: int) -> FloatArray:
             u = solver.solve(source).heat
-            with np.errstate(divide="ignore", invalid="ignore"):
-                gradient = (domain.G @ np.log(u)).reshape(domain.dimension, -1)
-                X = -gradient / np.linalg.norm(gradient, axis=0)
-            X[:, ~np.isfinite(X).all(axis=0)] = 0
-            if damped:
-                X *= damping(domain, u, solver.t)
-            phi = integrate(domain, X.ravel())
+            X = normalize(domain, u).reshape(domain.dimension, -1)
+            if of_log_u:
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    gradient = (domain.G @ np.log(u)).reshape(domain.dimension, -1)
+                    along_log = -gradient / np.linalg.norm(gradient, axis=0)
+                X = np.where(np.isfinite(along_log).all(axis=0), along_log, X)
+            if full_rate is not None:
+                X = X * damping(domain, u, solver.t, full_rate)
+            phi = poisson.solve(domain.D @ X.ravel())
             return np.maximum(phi - phi[source], 0)
 
         return distance
@@ -70,8 +73,12 @@ VARIANTS: dict[str, Callable[[Mesh], Distance]] = {
     "unit, t_coef 2": options(magnitude="unit", t_coef=2),
     "cotan, the paper's": options(laplacian="cotan"),
     "cotan, damped": options(laplacian="cotan", magnitude="damped"),
-    "gradient of log u": log_gradient(damped=False),
-    "gradient of log u, damped": log_gradient(damped=True),
+    "damped from 0.8": field(full_rate=0.8),
+    "damped from 0.85": field(full_rate=0.85),
+    "damped from 0.95": field(full_rate=0.95),
+    "damped from 1": field(full_rate=1.0),
+    "gradient of log u": field(of_log_u=True),
+    "gradient of log u, damped": field(of_log_u=True, full_rate=0.9),
 }
 
 
