@@ -13,22 +13,20 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import json
-import os
-import platform
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import heat_igl
-from heat_igl import Mesh, MissingExtraError, baselines, shapes
+from heat_igl import Mesh, MissingExtraError, baselines, reference, shapes
 from heat_igl.operators import Operators, operators
 
-PACKAGES = ("numpy", "scipy", "libigl", "cholespy", "potpourri3d", "scikit-fmm", "pygeodesic", "pymeshlab")
+from environment import environment
+
 Truth = Callable[[Mesh, int], np.ndarray]
 
 METHODS: dict[str, Callable[[Mesh, Operators, int], np.ndarray]] = {
@@ -49,17 +47,6 @@ GRID_METHODS: dict[str, Callable[[np.ndarray, float], np.ndarray]] = {
 }
 
 
-def environment() -> dict[str, str]:
-    """What the numbers depend on."""
-    found = {"python": platform.python_version(), "machine": platform.machine(), "cores": str(os.cpu_count())}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "-"
-    return found
-
-
 def straight_line(mesh: Mesh, source: int) -> np.ndarray:
     return np.linalg.norm(mesh.V - mesh.V[source], axis=1)
 
@@ -75,10 +62,7 @@ def helix(mesh: Mesh, source: int) -> np.ndarray:
 
 
 def polyhedral(mesh: Mesh, source: int) -> np.ndarray:
-    from pygeodesic import geodesic
-
-    solver = geodesic.PyGeodesicAlgorithmExact(mesh.V.copy(), mesh.F.astype(np.int32))
-    return np.asarray(solver.geodesicDistances(np.array([source]), None)[0])
+    return reference.exact(mesh, source)
 
 
 def meshes(quick: bool) -> Iterator[tuple[str, Mesh, Truth]]:

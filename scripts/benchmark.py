@@ -15,11 +15,9 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import importlib.metadata
 import importlib.util
 import json
 import os
-import platform
 import statistics
 import subprocess
 import sys
@@ -36,6 +34,8 @@ from heat_igl import HeatMethodSolver, Mesh, MissingExtraError, ReferenceSolverE
 from heat_igl.demo import sample_mesh
 from heat_igl.io import read_mesh
 from heat_igl.peak_memory import PeakMemory
+
+from environment import environment
 
 METHODS = ("heat_igl", "heat_igl (scipy)", "potpourri3d", "libigl heat")
 SIZES = (10_000, 30_000, 100_000, 300_000)
@@ -281,23 +281,6 @@ def accuracy(methods: Sequence[str], large: bool) -> list[dict[str, Any]]:
 # The report.
 
 
-def environment(seed: int) -> dict[str, Any]:
-    """What the figures depend on."""
-    versions = {}
-    for package in ("heat-igl", "numpy", "scipy", "libigl", "cholespy", "potpourri3d", "pygeodesic"):
-        try:
-            versions[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            versions[package] = "missing"
-    return {
-        "python": platform.python_version(),
-        "system": f"{platform.system()} {platform.machine()}",
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
-        "seed": seed,
-        **versions,
-    }
-
-
 def _row(cells: Sequence[tuple[Any, str]]) -> str:
     return f"| {' | '.join('-' if value is None else format(value, digits) for value, digits in cells)} |"
 
@@ -361,7 +344,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     sizes = arguments.size or (SIZES[:2] if arguments.quick else SIZES)
     runs = min(arguments.runs, 3) if arguments.quick else arguments.runs
     methods = [m for m in METHODS if importlib.util.find_spec(NEEDS.get(m, "heat_igl")) is not None]
-    result: dict[str, Any] = {"environment": environment(arguments.seed), "timings": []}
+    result: dict[str, Any] = {"environment": environment() | {"seed": str(arguments.seed)}, "timings": []}
     for name, mesh in timed_meshes(sizes, rng):
         print(name, file=sys.stderr)
         sources = rng.choice(mesh.n_vertices, 1 + BATCH, replace=False)

@@ -16,12 +16,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from environment import environment
 
 from heat_igl import HeatMethodSolver, Mesh, read_mesh, reference
 from heat_igl.steps import PoissonProblem, damping, normalize
 from heat_igl.typing import FloatArray
 from heat_igl.validation import draw_sources
+
+from environment import environment
 
 Distance = Callable[[int], FloatArray]
 

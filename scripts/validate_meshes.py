@@ -11,11 +11,8 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
-import platform
 import sys
 from collections.abc import Iterable, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -23,20 +20,9 @@ import heat_igl
 from heat_igl import MeshError, MissingExtraError, ReferenceSolverError, SourceError
 from heat_igl.validation import METHODS, draw_sources
 
+from environment import environment
+
 SUFFIXES = {".off", ".obj", ".ply", ".stl", ".mesh", ".msh"}
-PACKAGES = ("numpy", "scipy", "libigl", "pymeshlab", "pygeodesic", "tvb-gdist", "potpourri3d", "cholespy", "numba")
-
-
-def environment() -> dict[str, str]:
-    """What the numbers depend on."""
-    found = {"python": platform.python_version(), "system": platform.system(), "machine": platform.machine()}
-    found["cores"] = str(os.cpu_count())
-    for package in ("heat-igl", *PACKAGES):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = heat_igl.__version__ if package == "heat-igl" else "-"
-    return found
 
 
 def mesh_files(places: Iterable[Path]) -> list[Path]:
