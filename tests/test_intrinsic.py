@@ -212,3 +212,16 @@ def test_flips_come_to_an_end_on_flat_faces(cow, monkeypatch, mollification):
     found = delaunay(with_flat_faces(cow, 0.0, True))
     assert found.n_flips > 1000
     assert found.areas.sum() == pytest.approx(cow.measures.sum(), rel=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.0, 1e-10, 1e-6])
+def test_flat_faces_far_larger_and_far_smaller_than_the_mean(share):
+    """A coarse sphere with needles beside a tiny fine one: faces from 1e-10 to 60 mean edge lengths."""
+    coarse = perturbed(shapes.icosphere(1), 0.2)
+    fine = shapes.icosphere(4)
+    flat = with_flat_faces(coarse, share, cap=True)
+    mesh = Mesh(np.concatenate([flat.V, 1e-4 * fine.V]), np.concatenate([flat.F, fine.F + flat.n_vertices]))
+    assert mesh.edge_lengths.max() > 50 * mesh.edge_lengths.mean()
+    clean = heat_igl.HeatMethodSolver(coarse, t=0.1).distance(0)
+    distance = heat_igl.HeatMethodSolver(mesh, t=0.1).distance(0)[: len(clean)]
+    np.testing.assert_allclose(distance, clean, atol=1e-4)
