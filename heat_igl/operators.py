@@ -23,9 +23,10 @@ from heat_igl.intrinsic import (
     intrinsic_triangulation,
 )
 from heat_igl.mesh import Mesh
+from heat_igl.tufted import has_nonmanifold_edges, tufted_cover
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Laplacian", "Operators", "cotan_operators", "intrinsic_operators", "operators"]
+__all__ = ["Laplacian", "Operators", "cotan_operators", "intrinsic_operators", "operators", "tufted_operators"]
 
 Laplacian = Literal["intrinsic-delaunay", "cotan"]
 
@@ -65,6 +66,9 @@ class Operators:
         Length of a longest shortest path along edges; heat has to last that far.
     triangulation : IntrinsicTriangulation or None
         The triangles that the operators belong to; None for tetrahedra.
+    surface : IntrinsicTriangulation or None
+        Triangles of the surface itself, each once, where `triangulation` is its tufted cover and goes over it twice.
+        Paths are to be unfolded in these: on the cover a path over an edge of five faces goes on in one of them only.
     """
 
     L: sp.csc_matrix
@@ -78,6 +82,7 @@ class Operators:
     referenced: BoolArray
     longest_distance: float
     triangulation: IntrinsicTriangulation | None = None
+    surface: IntrinsicTriangulation | None = None
 
     @property
     def n(self) -> int:
@@ -112,7 +117,9 @@ def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operat
         Triangles or tetrahedra.
     laplacian : {"intrinsic-delaunay", "cotan"}
         On which triangulation of a triangle mesh: its intrinsic Delaunay triangulation, whose inner edges have no
-        negative weight, or the mesh's own faces, as in the paper. Tetrahedra always keep their own.
+        negative weight, or the mesh's own faces, as in the paper. Where more than two faces meet at an edge, the
+        former takes faces that are there twice once, and goes by the tufted cover if such edges remain. Tetrahedra
+        always keep their own.
 
     Raises
     ------
@@ -123,6 +130,11 @@ def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operat
         raise ValueError(f"laplacian must be 'intrinsic-delaunay' or 'cotan', not {laplacian!r}")
     if mesh.is_tetrahedral:
         return cotan_operators(mesh)
+    if laplacian == "intrinsic-delaunay" and has_nonmanifold_edges(mesh):
+        # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being manifold.
+        mesh = _without_duplicates(mesh)
+        if has_nonmanifold_edges(mesh):
+            return tufted_operators(mesh)
     triangulation = intrinsic_triangulation(mesh)
     if laplacian == "intrinsic-delaunay":
         triangulation = intrinsic_delaunay(triangulation)
@@ -194,6 +206,29 @@ def intrinsic_operators(triangulation: IntrinsicTriangulation, longest_distance:
         longest_distance=longest_distance,
         triangulation=triangulation,
     )
+
+
+def tufted_operators(mesh: Mesh) -> Operators:
+    """The operators of any triangle mesh by way of its tufted cover, made intrinsic Delaunay (d = 2).
+
+    The cover goes over the surface twice, so L, M and the weights are one half of its own: a face of the mesh counts
+    once, and L = D G holds. No weight is negative, not even on the boundary, which the cover does not have; `boundary`
+    is that of the mesh.
+    """
+    cover = intrinsic_operators(intrinsic_delaunay(tufted_cover(mesh)), mesh.longest_distance)
+    return replace(
+        cover,
+        L=cover.L / 2,
+        M=cover.M / 2,
+        weights=cover.weights / 2,
+        boundary=mesh.boundary,
+        surface=intrinsic_delaunay(intrinsic_triangulation(mesh)),
+    )
+
+
+def _without_duplicates(mesh: Mesh) -> Mesh:
+    repeated = connectivity.duplicate_faces(mesh.F, mesh.n_vertices)
+    return Mesh(mesh.V, np.delete(mesh.F, repeated, axis=0)) if len(repeated) else mesh
 
 
 def _padded(matrix: sp.csc_matrix, n: int) -> sp.csc_matrix:

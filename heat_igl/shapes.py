@@ -14,7 +14,7 @@ from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["box", "cone", "cylinder", "disk", "flat_torus", "grid", "icosphere", "strip", "torus"]
+__all__ = ["book", "box", "cone", "cylinder", "disk", "flat_torus", "grid", "icosphere", "strip", "torus"]
 
 
 def _at_least(name: str, value: int, least: int) -> int:
@@ -106,6 +106,24 @@ def cylinder(around: int, along: int, length: float = 2 * np.pi) -> Mesh:
     angle = 2 * np.pi * k / around
     V = np.stack([np.cos(angle), np.sin(angle), ring * (length / along)], axis=1)
     return Mesh(V, _lattice_faces(along + 1, around, wrap_columns=True))
+
+
+def book(pages: int, n: int) -> Mesh:
+    """Unit squares of n by n cells, one per page, that share an edge: the spine, on the z axis from 0 to 1.
+
+    Vertex ``column * (n + 1) + row`` of page 0 lies at the height row / n and the distance column / n from the spine;
+    the other pages follow with their columns from 1 to n. More than two faces meet at the spine of three pages or
+    more. Any two pages unfold to a rectangle: with r the distance from the spine and z the height, distance is
+    ``hypot(r - r', z - z')`` on one page and ``hypot(r + r', z - z')`` between two.
+    """
+    pages, n = _at_least("pages", pages, 1), _at_least("n", n, 1)
+    column, row = np.divmod(np.arange((n + 1) ** 2), n + 1)
+    turned = 2 * np.pi * np.arange(pages)[:, None] / pages
+    x, y = np.cos(turned) * column / n, np.sin(turned) * column / n
+    V = np.stack([x, y, np.broadcast_to(row / n, x.shape)], axis=2)
+    lattice, later = _lattice_faces(n + 1, n + 1), np.arange(pages)[:, None, None] * n * (n + 1)
+    F = np.where(lattice <= n, lattice, lattice + later)
+    return Mesh(np.concatenate([V[0], V[1:, n + 1 :].reshape(-1, 3)]), F.reshape(-1, 3))
 
 
 def cone(around: int, along: int, half_angle: float = np.pi / 6) -> Mesh:

@@ -215,7 +215,8 @@ def damping(operators: Operators, u: FloatArray, t: float, full_rate: float = 0.
         components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
         rate = np.sqrt(np.einsum("k...,k...->...", components, components))
     size = operators.face_sizes
-    front = np.arccosh(1 + size**2 / (2 * t)) / size
+    # The same as arccosh(1 + size^2 / (2 t)) / size, which is 0 where size^2 is lost beside 1: faces of no size at all.
+    front = 2 * np.arcsinh(size / (2 * np.sqrt(t))) / size
     factor = (rate.T / (full_rate * front)).T
     factor[operators.boundary_faces] = 1
     return np.asarray(np.where(factor < 1, factor, 1.0))

@@ -153,3 +153,75 @@ def test_bad_lengths(l, message):  # noqa: E741
     with pytest.raises(MeshError, match=message):
         from_edge_lengths(l, F, 4)
     assert from_edge_lengths(np.ones((2, 3)), F, 4).areas == pytest.approx([np.sqrt(3) / 4] * 2)
+
+
+def with_flat_faces(mesh: Mesh, share: float, cap: bool) -> Mesh:
+    """The same surface with a new vertex at `share` of many edges; with `cap`, one side keeps its face.
+
+    The gap between that face and the two halves on the other side is filled by a face of no area. At share 0 the new
+    vertex lies on the end of its edge, and edges have no length.
+    """
+    rank = np.random.default_rng(0).permutation(len(mesh.edges))
+    least = rank[mesh.facets.of_face].min(axis=1)
+    wins = np.bincount(mesh.facets.of_face.ravel(), (rank[mesh.facets.of_face] == least[:, None]).ravel())
+    chosen = np.flatnonzero((wins == 2) & (mesh.facets.n_faces == 2))
+    V = np.concatenate([mesh.V, (1 - share) * mesh.V[mesh.edges[chosen, 0]] + share * mesh.V[mesh.edges[chosen, 1]]])
+    new = np.full(len(mesh.edges), -1)
+    new[chosen] = mesh.n_vertices + np.arange(len(chosen))
+    at = new[mesh.facets.of_face]
+    f, c = np.nonzero(at >= 0)
+    middle, apex, tail, head = at[f, c], mesh.F[f, c], mesh.F[f, (c + 1) % 3], mesh.F[f, (c + 2) % 3]
+    second = np.ones(len(f), bool)
+    second[np.unique(middle, return_index=True)[1]] = False
+    whole = second & cap
+    halves = [np.stack([apex, tail, middle], axis=1)[~whole], np.stack([apex, middle, head], axis=1)[~whole]]
+    caps = np.stack([tail, middle, head], axis=1)[whole]
+    kept = np.ones(mesh.n_faces, bool)
+    kept[f[~whole]] = False
+    return Mesh(V, np.concatenate([mesh.F[kept], *halves, caps]))
+
+
+@pytest.mark.parametrize("cap", [False, True])
+@pytest.mark.parametrize("share", [0.0, 1e-12, 1e-8, 1e-4, 0.5])
+def test_flat_faces_leave_distances_as_they_are(share, cap):
+    """Needles, caps and edges of no length on the same surface: not only finite, but as good as without them."""
+    sphere = perturbed(shapes.icosphere(3), 0.2)
+    flat = with_flat_faces(sphere, share, cap)
+    assert flat.n_vertices > 1.2 * sphere.n_vertices
+    t = sphere.edge_lengths.mean() ** 2
+    clean = heat_igl.HeatMethodSolver(sphere, t=t).distance(7)
+    distance = heat_igl.HeatMethodSolver(flat, t=t).distance(7)[: len(clean)]
+    away = clean > 0
+    assert np.mean(np.abs(distance[away] / clean[away] - 1)) < (0.02 if share == 0.5 else 0.01)
+
+
+@pytest.mark.parametrize("mollification", [1e-8, 1e-11, 1e-12])
+def test_flips_come_to_an_end_on_flat_faces(cow, monkeypatch, mollification):
+    """Rounding makes some flips of flat triangles undo each other; with hardly any mollification, for ever."""
+    monkeypatch.setattr(heat_igl.intrinsic, "_MOLLIFICATION", mollification)
+    rounds = []
+    flip = heat_igl.intrinsic._Flips.flip
+
+    def counted(self, half_edge):
+        rounds.append(len(half_edge))
+        if len(rounds) > 1000:
+            pytest.fail("flips do not end")
+        return flip(self, half_edge)
+
+    monkeypatch.setattr(heat_igl.intrinsic._Flips, "flip", counted)
+    found = delaunay(with_flat_faces(cow, 0.0, True))
+    assert found.n_flips > 1000
+    assert found.areas.sum() == pytest.approx(cow.measures.sum(), rel=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.0, 1e-10, 1e-6])
+def test_flat_faces_far_larger_and_far_smaller_than_the_mean(share):
+    """A coarse sphere with needles beside a tiny fine one: faces from 1e-10 to 60 mean edge lengths."""
+    coarse = perturbed(shapes.icosphere(1), 0.2)
+    fine = shapes.icosphere(4)
+    flat = with_flat_faces(coarse, share, cap=True)
+    mesh = Mesh(np.concatenate([flat.V, 1e-4 * fine.V]), np.concatenate([flat.F, fine.F + flat.n_vertices]))
+    assert mesh.edge_lengths.max() > 50 * mesh.edge_lengths.mean()
+    clean = heat_igl.HeatMethodSolver(coarse, t=0.1).distance(0)
+    distance = heat_igl.HeatMethodSolver(mesh, t=0.1).distance(0)[: len(clean)]
+    np.testing.assert_allclose(distance, clean, atol=1e-4)
