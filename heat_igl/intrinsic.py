@@ -25,6 +25,7 @@ __all__ = [
     "intrinsic_gradient",
     "intrinsic_triangulation",
     "mollify",
+    "oriented",
 ]
 
 # The cotangents of a needle are differences of much larger numbers; an edge beside one is flipped only when they say so
@@ -193,7 +194,7 @@ def _cotangents(l: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: E741
         return np.asarray(cotangent), np.asarray(_ROUNDING * total / four_areas)
 
 
-def _oriented(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
+def oriented(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
     """The same with faces turned over until neighbours agree, which the flips need; a Moebius strip keeps a seam."""
     F = triangulation.F
     turned = (igl.bfs_orient(F)[0] != F).any(axis=1)
@@ -229,7 +230,7 @@ def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriang
     flips = _Flips(triangulation)
     if not len(flips.bad(np.arange(triangulation.F.size))):
         return triangulation
-    flips = _Flips(triangulation if triangulation.aligned.all() else _oriented(triangulation))
+    flips = _Flips(triangulation if triangulation.aligned.all() else oriented(triangulation))
     bad = flips.bad(np.arange(triangulation.F.size))
     most = _MOST_FLIPS_PER_FACE * len(triangulation.F)
     while len(bad) and flips.n_flips < most:

@@ -1,0 +1,229 @@
+"""Half-edge tables for walks over a triangulation: what lies across an edge, and where edges leave a vertex.
+
+The faces are oriented alike. Half-edge ``3 f + c`` is the side of face ``f`` opposite its corner ``c``, and a *corner*
+carries the same number. A *fan* is a set of corners around a vertex that are glued to one another; directions at a
+vertex are angles in its fan, counted counter-clockwise from the first spoke.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar, cast
+
+import numba
+import numpy as np
+
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+__all__ = ["Tables", "inline", "jit", "tables"]
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def jit(function: Function) -> Function:
+    """Compile on the first call, to run without the interpreter's lock."""
+    # error_model="numpy": a division need not look for a zero first.
+    return cast(Function, numba.njit(nogil=True, cache=True, error_model="numpy")(function))
+
+
+def inline(function: Function) -> Function:
+    """Compile into the caller: what runs once per step or visit, where a call would cost as much as the work."""
+    return cast(Function, numba.njit(nogil=True, inline="always", error_model="numpy")(function))
+
+
+# Columns of `Tables.spoke`, and of its view as integers.
+LENGTH, ANGLE_HERE, ANGLE_THERE, APEX_X, APEX_Y, BASE = 0, 1, 2, 3, 4, 5
+NEIGHBOUR, FAN_THERE, CORNER, NEXT_SPOKE, FAN_HERE = 12, 13, 14, 15, 16
+# Columns of `Tables.step`, and of its view as integers.
+FAR_X, FAR_Y, FAR_ANGLE = 0, 1, 2
+FAR, TO_RIGHT, TO_LEFT, FAR_FAN = 6, 7, 8, 9
+
+
+class Tables(NamedTuple):
+    """What a walk reads, one row for each visit of a spoke and one for each step, so that it reads little memory.
+
+    Attributes
+    ----------
+    first : (n + 1,) int64
+        Spokes of vertex v are ``first[v]`` to ``first[v + 1]``, counter-clockwise, fan after fan.
+    spoke : (s, 9) float64
+        Length; direction of the spoke at v; direction of the same edge at the neighbour (angles in their fans). Of the
+        triangle to the left of the spoke: v's place over the opposite side, along it and to its left in units of that
+        side, and the length of the side.
+    spoke_id : (s, 18) int32
+        The same memory. The neighbour; the neighbour's fan; the half-edge opposite v in the triangle to the left (-1
+        past the end of an open fan); the next spoke, on the other side of that triangle; v's fan.
+    step : (3 m, 5) float64
+        For a half-edge that is crossed, where the far vertex lies, in units of the half-edge on the other side; the
+        direction of the edge from the far vertex to the right end (seen in the walk: to b) in the far vertex's fan.
+    step_id : (3 m, 10) int32
+        The same memory. The far vertex (-1 on the boundary); the half-edge to leave by when passing right of it, and
+        when passing left of it; its fan.
+    total : (k,) float64
+        Sum of the angles of each fan, negative for a fan that is open.
+    """
+
+    first: IntArray
+    spoke: FloatArray
+    spoke_id: AnyArray
+    step: FloatArray
+    step_id: AnyArray
+    total: FloatArray
+
+
+@inline
+def _next(h: int) -> int:
+    """The half-edge after `h` in its face."""
+    return h + 1 if h % 3 < 2 else h - 2
+
+
+@inline
+def _previous(h: int) -> int:
+    return h - 1 if h % 3 else h + 2
+
+
+@jit
+def _shapes(l: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: E741
+    """Apex over each half-edge in units of the half-edge, and the angle at each corner."""
+    m = len(l)
+    apex = np.empty((3 * m, 2))
+    corner_angle = np.empty(3 * m)
+    for f in range(m):
+        for c in range(3):
+            base, right, left = l[f, c], l[f, (c + 2) % 3], l[f, (c + 1) % 3]
+            x = 0.5 * ((right - left) * (right + left) / (base * base) + 1.0)
+            # Heron's formula as a product of differences: a height from right^2 - x^2 loses the digits of slivers.
+            half = 0.5 * (base + right + left)
+            product = max(half * (half - base) * (half - right) * (half - left), 0.0)
+            apex[3 * f + c, 0] = x
+            apex[3 * f + c, 1] = 2.0 * math.sqrt(product) / (base * base)
+            corner_angle[3 * f + c] = 2.0 * math.atan2(
+                math.sqrt(max((half - right) * (half - left), 0.0)), math.sqrt(max(half * (half - base), 0.0))
+            )
+    return apex, corner_angle
+
+
+@jit
+def _fans(twin: IntArray, corner_angle: FloatArray) -> tuple[FloatArray, AnyArray, FloatArray, IntArray]:
+    """Direction of the first spoke of each corner, fan of each corner, total angles, and the corners in fan order."""
+    count = len(twin)
+    angle = np.empty(count)
+    fan = np.full(count, -1, np.int32)
+    total = np.empty(count)
+    in_order = np.empty(count, np.int64)
+    n_fans = n_seen = 0
+    for h in range(count):
+        if fan[h] >= 0:
+            continue
+        start, is_open = h, False
+        while True:  # clockwise, to the boundary or once around
+            t = twin[_previous(start)]
+            if t < 0:
+                is_open = True
+                break
+            start = _previous(t)
+            if start == h:
+                break
+        k, sum_of_angles = start, 0.0
+        while True:  # counter-clockwise
+            fan[k], angle[k], in_order[n_seen] = n_fans, sum_of_angles, k
+            n_seen += 1
+            sum_of_angles += corner_angle[k]
+            t = twin[_next(k)]
+            if t < 0:
+                break
+            k = _next(t)
+            if k == start:
+                break
+        total[n_fans] = -sum_of_angles if is_open else sum_of_angles
+        n_fans += 1
+    return angle, fan, total[:n_fans].copy(), in_order
+
+
+@jit
+def _count_spokes(F: IntArray, twin: IntArray, n: int) -> IntArray:
+    """First spoke of each vertex: one per corner, and one more at the end of an open fan."""
+    vertex = F.ravel()
+    first = np.zeros(n + 1, np.int64)
+    for h in range(len(twin)):
+        first[vertex[h] + 1] += 2 if twin[_next(h)] < 0 else 1
+    for v in range(n):
+        first[v + 1] += first[v]
+    return first
+
+
+@jit
+def _fill_spokes(
+    F: IntArray,
+    twin: IntArray,
+    length: FloatArray,
+    apex: FloatArray,
+    corner_angle: FloatArray,
+    angle: FloatArray,
+    fan: AnyArray,
+    in_order: IntArray,
+    first: IntArray,
+    spoke: FloatArray,
+    spoke_id: AnyArray,
+) -> None:
+    """The spokes of each vertex, from its corners in fan order."""
+    vertex = F.ravel()
+    fill = first.copy()
+    fan_start = 0
+    for i in range(len(in_order)):
+        h = in_order[i]
+        right, left = _next(h), _previous(h)  # as corners: at the neighbours right and left of the corner h
+        v = vertex[h]
+        k = fill[v]
+        if i == 0 or fan[h] != fan[in_order[i - 1]]:
+            fan_start = k
+        row, ids = spoke[k], spoke_id[k]
+        row[LENGTH], row[ANGLE_HERE], row[ANGLE_THERE] = length[left], angle[h], angle[right] + corner_angle[right]
+        row[APEX_X], row[APEX_Y], row[BASE] = apex[h, 0], apex[h, 1], length[h]
+        ids[NEIGHBOUR], ids[FAN_THERE], ids[CORNER] = vertex[right], fan[right], h
+        ids[NEXT_SPOKE], ids[FAN_HERE] = k + 1, fan[h]
+        fill[v] += 1
+        if twin[_next(h)] < 0:
+            k += 1
+            row, ids = spoke[k], spoke_id[k]
+            row[LENGTH], row[ANGLE_HERE], row[ANGLE_THERE] = length[right], angle[h] + corner_angle[h], angle[left]
+            ids[NEIGHBOUR], ids[FAN_THERE], ids[CORNER] = vertex[left], fan[left], -1
+            ids[NEXT_SPOKE], ids[FAN_HERE] = k, fan[h]
+            fill[v] += 1
+        elif i + 1 == len(in_order) or fan[in_order[i + 1]] != fan[h]:
+            ids[NEXT_SPOKE] = fan_start
+
+
+@jit
+def _fill_steps(
+    F: IntArray,
+    twin: IntArray,
+    apex: FloatArray,
+    angle: FloatArray,
+    fan: AnyArray,
+    step: FloatArray,
+    step_id: AnyArray,
+) -> None:
+    vertex = F.ravel()
+    for h in range(len(twin)):
+        t = twin[h]
+        row, ids = step[h], step_id[h]
+        if t < 0:
+            ids[FAR] = -1
+            continue
+        row[FAR_X], row[FAR_Y], row[FAR_ANGLE] = apex[t, 0], apex[t, 1], angle[t]
+        ids[FAR], ids[TO_RIGHT], ids[TO_LEFT], ids[FAR_FAN] = vertex[t], _next(t), _previous(t), fan[t]
+
+
+def tables(F: IntArray, l: FloatArray, twin: IntArray, n: int) -> Tables:  # noqa: E741
+    """The tables of m triangles on n vertices, oriented alike; `twin` < 0 on the boundary."""
+    length = l.ravel()
+    apex, corner_angle = _shapes(l)
+    angle, fan, total, in_order = _fans(twin, corner_angle)
+    first = _count_spokes(F, twin, n)
+    spoke, step = np.zeros((first[-1], 9)), np.zeros((F.size, 5))
+    spoke_id, step_id = spoke.view(np.int32), step.view(np.int32)
+    _fill_spokes(F, twin, length, apex, corner_angle, angle, fan, in_order, first, spoke, spoke_id)
+    _fill_steps(F, twin, apex, angle, fan, step, step_id)
+    return Tables(first, spoke, spoke_id, step, step_id, total)
