@@ -12,6 +12,7 @@ from heat_igl.errors import (
 from heat_igl.heat_method import HeatMethodSolver, HeatSolution, heat_method_distance
 from heat_igl.io import read_attributes, read_mesh, write_mesh
 from heat_igl.mesh import Mesh, MeshReport
+from heat_igl.refine import Refinement, unfolded_distance
 from heat_igl.subdivision import split_long_edges
 from heat_igl.validation import validate
 from heat_igl.validation_report import ValidationReport, ValidationRow
@@ -26,6 +27,7 @@ __all__ = [
     "MeshReport",
     "MissingExtraError",
     "ReferenceSolverError",
+    "Refinement",
     "SourceError",
     "ValidationReport",
     "ValidationRow",
@@ -38,6 +40,7 @@ __all__ = [
     "reference",
     "shapes",
     "split_long_edges",
+    "unfolded_distance",
     "validate",
     "write_mesh",
 ]

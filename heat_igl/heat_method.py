@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -14,6 +16,7 @@ from heat_igl.errors import AccuracyWarning, MissingExtraError, SourceError
 from heat_igl.factorization import Backend
 from heat_igl.mesh import RANGE_LIMIT, Mesh
 from heat_igl.operators import Laplacian, Operators, operators
+from heat_igl.refine import Refine, Refinement
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -143,6 +146,10 @@ class HeatMethodSolver:
         Length of the field X that is integrated: 1 as in the paper, or less where heat arrives from several sides, see
         `damping`. "auto" damps on surfaces, where it was measured to pay, but not for "cotan", where heat may be
         negative and the paper's method is wanted.
+    refine : {"sweep", "unfold"}, optional
+        Integrate nothing, and find the distance in the order of the heat by unfolding triangles, one at a time or in
+        strips: 0.2 to 0.7 % and 0.001 to 0.01 % mean error on common meshes, see `Refinement`. Needs triangles, and
+        numba (extra ``fast``); no Poisson problem is factored.
     backend : {"auto", "scipy", "cholespy"}
         Linear solver, see `factorize`.
 
@@ -152,6 +159,8 @@ class HeatMethodSolver:
         If the mesh cannot be used; the message names the first offender.
     FactorizationError
         If a matrix is not positive definite.
+    MissingExtraError
+        If a library asked for is not installed.
     ValueError
         If an option has no meaning.
 
@@ -176,6 +185,7 @@ class HeatMethodSolver:
         laplacian: Laplacian = "intrinsic-delaunay",
         boundary: Boundary = "neumann",
         magnitude: Magnitude = "auto",
+        refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> None:
         start = time.perf_counter()
@@ -183,7 +193,7 @@ class HeatMethodSolver:
         seconds = time.perf_counter() - start
         if magnitude == "auto" and laplacian == "cotan":
             magnitude = "unit"
-        self._set_up(domain, t_coef, t, boundary, magnitude, backend, seconds)
+        self._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, seconds)
 
     @classmethod
     def from_operators(
@@ -194,11 +204,12 @@ class HeatMethodSolver:
         t: float | None = None,
         boundary: Boundary = "neumann",
         magnitude: Magnitude = "auto",
+        refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> HeatMethodSolver:
         """A solver on any domain that has operators; parameters as for the class."""
         solver = cls.__new__(cls)
-        solver._set_up(domain, t_coef, t, boundary, magnitude, backend, 0.0)
+        solver._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, 0.0)
         return solver
 
     def _set_up(
@@ -208,12 +219,17 @@ class HeatMethodSolver:
         t: float | None,
         boundary: Boundary,
         magnitude: Magnitude,
+        refine: Refine | None,
         backend: Backend,
         seconds_operators: float,
     ) -> None:
         start = time.perf_counter()
         if magnitude not in ("auto", "unit", "damped"):
             raise ValueError(f"magnitude must be 'auto', 'unit' or 'damped', not {magnitude!r}")
+        if refine not in (None, "sweep", "unfold"):
+            raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {refine!r}")
+        if refine is not None and domain.triangulation is None:
+            raise ValueError(f"refine={refine!r} unfolds triangles, and this domain has none")
         self._damped = magnitude == "damped" or (magnitude == "auto" and domain.triangulation is not None)
         requested = _positive("t_coef", t_coef) * domain.mean_edge_length**2 if t is None else _positive("t", t)
         step = max(requested, smallest_time_step(domain))
@@ -225,8 +241,15 @@ class HeatMethodSolver:
             )
         self._operators = domain
         self._heat_flow = HeatFlow(domain, step, boundary, backend)
-        self._poisson = PoissonProblem(domain, backend)
+        self._poisson: PoissonProblem | None = None
+        self._unfolded: Callable[[FloatArray, IntArray], FloatArray] | None = None
         triangulation = domain.triangulation
+        if refine is not None and triangulation is not None:
+            # Not the tufted cover: on it, a path over an edge of five faces can go on in one of them only.
+            refinement = Refinement(domain.surface or triangulation)
+            self._unfolded = refinement.sweep if refine == "sweep" else refinement.unfold
+        else:
+            self._poisson = PoissonProblem(domain, backend)
         self._diagnostics = Diagnostics(
             t=step,
             t_requested=requested,
@@ -234,7 +257,7 @@ class HeatMethodSolver:
             edges_across=domain.longest_distance / domain.mean_edge_length,
             n_flips=triangulation.n_flips if triangulation else 0,
             lengthening=triangulation.lengthening if triangulation else 0.0,
-            backend=self._poisson.backend,
+            backend=self._heat_flow.backend,
             seconds_operators=seconds_operators,
             seconds_factorization=time.perf_counter() - start,
         )
@@ -283,7 +306,7 @@ class HeatMethodSolver:
             If heat underflowed on the way, so that distances beyond are too short.
         """
         chosen = [vertex_sources(sources, self.n_vertices)]
-        return np.ascontiguousarray(self._steps(chosen)[-1][:, 0])
+        return np.asarray(self._distances(chosen)[0])
 
     def distances(
         self, source_sets: Sequence[Sources], out: AnyArray | None = None, progress: bool = False
@@ -324,13 +347,18 @@ class HeatMethodSolver:
             raise ValueError(f"out must be an array of floats of shape {shape}, not {out.dtype} of shape {out.shape}")
         starts: Any = range(0, len(chosen), _BLOCK)
         for start in _tracked(starts) if progress else starts:
-            out[start : start + _BLOCK] = self._steps(chosen[start : start + _BLOCK])[-1].T
+            out[start : start + _BLOCK] = self._distances(chosen[start : start + _BLOCK])
         return out
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
         chosen = [vertex_sources(sources, self.n_vertices)]
-        u, X, magnitude, distance = self._steps(chosen)
+        u = self._diffuse(chosen)
+        X, magnitude = self._field(u)
+        if self._unfolded is not None:
+            distance = _in_heat_order(self._unfolded, u, chosen)
+        else:
+            distance = self._integrated(chosen, u, X, magnitude)
         with np.errstate(under="ignore"):
             heat = u[:, 0] / self._source_heat(chosen[0]) / self._heat_flow.mean_mass
         direction = np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T)
@@ -338,7 +366,7 @@ class HeatMethodSolver:
             heat=heat,
             direction=direction,
             magnitude=np.ascontiguousarray(magnitude[:, 0]),
-            distance=np.ascontiguousarray(distance[:, 0]),
+            distance=distance[0],
             t=self.t,
             diagnostics=self.diagnostics,
         )
@@ -352,26 +380,40 @@ class HeatMethodSolver:
         smallest = float(mass[mass > 0].min(initial=1.0))
         return _SOURCE_HEAT * min(self._operators.mean_edge_length, 1e10) * smallest
 
-    def _steps(self, source_sets: list[IntArray]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Heat (n, k), directions (d m, k), their magnitude (m, k) and distances (n, k) for k sets of sources."""
-        domain = self._operators
-        rims = [self._rim(sources) for sources in source_sets]
-        initial = np.zeros((domain.n, len(source_sets)))
-        for column, rim in enumerate(rims):
+    def _distances(self, source_sets: list[IntArray]) -> FloatArray:
+        """Distances (k, n) from k sets of sources."""
+        u = self._diffuse(source_sets)
+        if self._unfolded is not None:
+            return _in_heat_order(self._unfolded, u, source_sets)
+        return self._integrated(source_sets, u, *self._field(u))
+
+    def _diffuse(self, source_sets: list[IntArray]) -> FloatArray:
+        """Heat (n, k), from the rims of k sets of sources."""
+        initial = np.zeros((self.n_vertices, len(source_sets)))
+        for column, sources in enumerate(source_sets):
+            rim = self._rim(sources)
             initial[rim, column] = self._source_heat(rim)
-        u = self._heat_flow.solve(initial)
+        return self._heat_flow.solve(initial)
+
+    def _field(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Directions (d m, k) and their magnitude (m, k)."""
+        domain = self._operators
         X = normalize(domain, u)
-        if self._damped:
-            magnitude = damping(domain, u, self.t)
-            field = X * np.tile(magnitude, (domain.dimension, 1))
-        else:
-            magnitude, field = np.ones((len(domain.weights), u.shape[1])), X
-        phi = self._poisson.solve(domain.D @ field)
-        for column, (sources, rim) in enumerate(zip(source_sets, rims, strict=True)):
+        return X, damping(domain, u, self.t) if self._damped else np.ones((len(domain.weights), u.shape[1]))
+
+    def _integrated(
+        self, source_sets: list[IntArray], u: FloatArray, X: FloatArray, magnitude: FloatArray
+    ) -> FloatArray:
+        """Distances (k, n) by step 3."""
+        if self._poisson is None:
+            raise RuntimeError("this solver unfolds and has no Poisson problem")
+        domain = self._operators
+        phi = self._poisson.solve(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1)) if self._damped else X))
+        for column, sources in enumerate(source_sets):
             self._warn_if_cold(u[:, column], sources)
-            phi[:, column] = self._from_sources(phi[:, column], u[:, column], rim)
+            phi[:, column] = self._from_sources(phi[:, column], u[:, column], self._rim(sources))
             phi[sources, column] = 0.0
-        return u, X, magnitude, phi
+        return np.ascontiguousarray(phi.T)
 
     def _rim(self, sources: IntArray) -> IntArray:
         """The sources that have a neighbour which is none.
@@ -430,6 +472,23 @@ class HeatMethodSolver:
         warm = u > 0  # always, but for noise under "cotan" and a cold boundary
         share = np.divide(self._heat_flow.solve(initial), u, out=np.zeros_like(u), where=warm)
         return low + (high - low) * np.clip(share, 0.0, 1.0)
+
+
+def _in_heat_order(
+    unfolded: Callable[[FloatArray, IntArray], FloatArray], u: FloatArray, source_sets: list[IntArray]
+) -> FloatArray:
+    """Distances (k, n) by unfolding, on all processors: the kernels run without the interpreter's lock.
+
+    Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
+    """
+    if len(source_sets) == 1:
+        return unfolded(-u[:, 0], source_sets[0])[None]
+    with ThreadPoolExecutor(_n_processors()) as pool:
+        return np.stack(list(pool.map(unfolded, -u.T, source_sets)))
+
+
+def _n_processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _tracked(starts: Any) -> Any:

@@ -75,6 +75,11 @@ class HeatFlow:
             self._boundary_diagonal = matrix.diagonal()[operators.boundary]
             self._on_boundary = operators.boundary
 
+    @property
+    def backend(self) -> str:
+        """Library that holds the factors."""
+        return next(part.backend for part in (self._neumann, self._dirichlet) if part is not None)
+
     def solve(self, b: FloatArray) -> FloatArray:
         """Heat u (n,) or (n, k) after the time step, for initial heat `b` in units of `mean_mass`."""
         solutions = []
