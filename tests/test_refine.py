@@ -1,0 +1,360 @@
+"""Sweep and strip unfolding: exact where they must be, bounded elsewhere, and no more than their claims."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+from conftest import perturbed, wheel_path
+
+import heat_igl
+from heat_igl import HeatMethodSolver, Mesh, Refinement, shapes, unfolded_distance
+from heat_igl.errors import MeshError, SourceError
+from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
+
+pytest.importorskip("numba")
+
+METHODS = ("sweep", "unfold")
+
+
+def random_disk(n: int, seed: int) -> Mesh:
+    """A Delaunay triangulation of random points in the unit disk, boundary points on the circle."""
+    spatial = pytest.importorskip("scipy.spatial")
+    rng = np.random.default_rng(seed)
+    radius, angle = 0.97 * np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
+    rim = 2 * np.pi * np.arange(int(4 * np.sqrt(n))) / int(4 * np.sqrt(n))
+    points = np.concatenate(
+        [np.stack([radius * np.cos(angle), radius * np.sin(angle)], 1), np.stack([np.cos(rim), np.sin(rim)], 1)]
+    )
+    faces = spatial.Delaunay(points).simplices
+    return Mesh(np.column_stack([points, np.zeros(len(points))]), faces)
+
+
+def exact(mesh: Mesh, source: int) -> np.ndarray:
+    geodesic = pytest.importorskip("pygeodesic.geodesic")
+    used, F = np.unique(mesh.F, return_inverse=True)  # it takes no unused vertices
+    algorithm = geodesic.PyGeodesicAlgorithmExact(mesh.V[used], F.reshape(-1, 3))
+    d = np.full(mesh.n_vertices, np.inf)
+    d[used] = algorithm.geodesicDistances(np.searchsorted(used, [source]))[0]
+    return d
+
+
+def relative_error(d: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    there = (truth > 0) & np.isfinite(truth)
+    return np.abs(d[there] - truth[there]) / truth[there]
+
+
+def moebius_strip(around: int, across: int) -> Mesh:
+    t = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    s = np.linspace(-0.4, 0.4, across + 1)
+    T, S = np.meshgrid(t, s, indexing="ij")
+    V = np.stack([(1 + S * np.cos(T / 2)) * np.cos(T), (1 + S * np.cos(T / 2)) * np.sin(T), S * np.sin(T / 2)], axis=-1)
+    faces = []
+    for i in range(around):
+        for j in range(across):
+            a, b = i * (across + 1) + j, i * (across + 1) + j + 1
+            c, d = (a + across + 1, b + across + 1) if i < around - 1 else (across - j, across - j - 1)
+            faces += [[a, c, b], [b, c, d]]
+    return Mesh(V.reshape(-1, 3), faces)
+
+
+def with_slivers(mesh: Mesh, seed: int) -> Mesh:
+    """The same surface with up to a tenth of the edges split at 1e-4 of their length; vertices keep their numbers."""
+    rng = np.random.default_rng(seed)
+    faces_of: list[list[tuple[int, int]]] = [[] for _ in mesh.edges]
+    for f, row in enumerate(mesh.facets.of_face):
+        for c, e in enumerate(row):
+            faces_of[e].append((f, c))
+    alive = np.ones(mesh.n_faces, bool)
+    points, added = [], []
+    for e in rng.permutation(len(mesh.edges))[: len(mesh.edges) // 10]:
+        if not all(alive[f] for f, _ in faces_of[e]):
+            continue
+        i, j = rng.permutation(mesh.edges[e])
+        points.append(mesh.V[i] + 1e-4 * (mesh.V[j] - mesh.V[i]))
+        new = mesh.n_vertices + len(points) - 1
+        for f, c in faces_of[e]:
+            alive[f] = False
+            w, a, b = mesh.F[f, c], mesh.F[f, (c + 1) % 3], mesh.F[f, (c + 2) % 3]
+            added += [[w, a, new], [w, new, b]]
+    return Mesh(np.concatenate([mesh.V, points]), np.concatenate([mesh.F[alive], added]))
+
+
+FLAT = {
+    "grid": lambda: shapes.grid(25),
+    "disk": lambda: shapes.disk(12),
+    "strip": lambda: shapes.strip(80, 3),
+    "perturbed grid": lambda: perturbed_in_plane(shapes.grid(20)),
+    "random disk": lambda: random_disk(700, 0),
+    "another random disk": lambda: random_disk(700, 1),
+}
+
+
+def perturbed_in_plane(mesh: Mesh) -> Mesh:
+    V = perturbed(mesh, 0.3, 3).V.copy()
+    V[:, 2] = 0
+    return Mesh(V, mesh.F)
+
+
+@pytest.mark.parametrize("name", FLAT)
+@pytest.mark.parametrize("method", METHODS)
+def test_flat_convex_domains_are_exact(name, method):
+    mesh = FLAT[name]()
+    solver = HeatMethodSolver(mesh, refine=method)
+    for source in (0, mesh.n_vertices // 2, mesh.n_vertices - 1):
+        truth = np.linalg.norm(mesh.V - mesh.V[source], axis=1)
+        assert relative_error(solver.distance(source), truth).max() < 1e-9
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_rolled_out_cylinder(method):
+    """A prism is as flat as a strip; its shortest paths go around either side."""
+    mesh = shapes.cylinder(24, 20)
+    side = 2 * np.sin(np.pi / 24)
+    ring, k = np.divmod(np.arange(mesh.n_vertices), 24)
+    dk = np.minimum(k, 24 - k) * side
+    truth = np.hypot(dk, ring * (2 * np.pi / 20))
+    d = HeatMethodSolver(mesh, refine=method).distance(0)
+    # From the corner of a quad that is flat in itself, distance is exact; rounding splits no ties at the seam.
+    assert relative_error(d, truth).max() < 1e-9
+
+
+@pytest.fixture(scope="module")
+def bumpy() -> Mesh:
+    """A sphere with bumps: vertices of both signs of curvature, and no symmetry."""
+    mesh = shapes.icosphere(4)
+    V = mesh.V * (1 + 0.25 * np.sin(5 * mesh.V[:, :1]) * np.cos(4 * mesh.V[:, 1:2]))
+    return perturbed(Mesh(V, mesh.F), 0.2, 1)
+
+
+@pytest.mark.parametrize("source", [0, 100, 1000])
+def test_against_exact_distance_on_a_generated_surface(bumpy, source):
+    truth = exact(bumpy, source)
+    unfolded = relative_error(HeatMethodSolver(bumpy, refine="unfold").distance(source), truth)
+    swept = relative_error(HeatMethodSolver(bumpy, refine="sweep").distance(source), truth)
+    assert unfolded.mean() < 1e-4
+    assert np.percentile(unfolded, 99) < 1e-3
+    assert swept.mean() < 8e-3
+
+
+@pytest.mark.parametrize("name", ["bone.ply", "cow.obj"])
+def test_against_exact_distance_on_a_sample_mesh(name):
+    mesh = heat_igl.read_mesh(wheel_path(name))
+    source = int(mesh.F[0, 0])
+    truth = exact(mesh, source)
+    error = relative_error(HeatMethodSolver(mesh, refine="unfold").distance(source), truth)
+    assert error.mean() < 3e-4
+    assert np.percentile(error, 99) < 2e-3
+
+
+def test_unfolding_is_never_shorter_than_the_exact_distance(bumpy):
+    """Every value is the length of a path. The sweep makes no such claim, and would fail this."""
+    truth = exact(bumpy, 7)
+    d = HeatMethodSolver(bumpy, refine="unfold").distance(7)
+    assert (d - truth).min() > -1e-8 * truth.max()
+    assert (HeatMethodSolver(bumpy, refine="sweep").distance(7) - truth).min() < -1e-5 * truth.max()
+
+
+def test_unfolding_is_never_longer_than_along_edges(bumpy):
+    from scipy.sparse import csgraph, csr_array
+
+    graph = csr_array((bumpy.edge_lengths, tuple(bumpy.edges.T)), shape=(bumpy.n_vertices,) * 2)
+    along_edges = csgraph.dijkstra(graph, directed=False, indices=7)
+    d = HeatMethodSolver(bumpy, refine="unfold", laplacian="cotan").distance(7)
+    assert (d <= along_edges * (1 + 1e-12)).all()
+
+
+def test_smaller_tolerance_is_more_accurate(bumpy):
+    truth = exact(bumpy, 3)
+    error = [relative_error(unfolded_distance(bumpy.V, bumpy.F, 3, tolerance=t), truth).mean() for t in (1e-3, 1e-5, 0)]
+    assert error[0] > 2 * error[1] > 2 * error[2]
+    # Followed to their ends, most paths are the shortest ones.
+    d = unfolded_distance(bumpy.V, bumpy.F, 3, tolerance=0)
+    assert (relative_error(d, truth) < 1e-9).mean() > 0.9
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_several_sources_give_the_nearest(bumpy, method):
+    solver = HeatMethodSolver(bumpy, refine=method)
+    sources = [0, 500, 1700]
+    each = solver.distances([[s] for s in sources]).min(axis=0)
+    together = solver.distance(sources)
+    assert (together[sources] == 0).all()
+    assert (np.abs(together - each) < (2e-2 if method == "sweep" else 2e-3) * each.max()).all()
+    assert np.abs(together - each).mean() < (2e-3 if method == "sweep" else 1e-4) * each.max()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_unreached_components_and_unused_vertices_are_infinite(method):
+    grid = shapes.grid(6)
+    n = grid.n_vertices
+    mesh = Mesh(
+        np.concatenate([grid.V, grid.V + np.array([5, 0, 0]), [[9, 9, 9]]]), np.concatenate([grid.F, grid.F + n])
+    )
+    d = HeatMethodSolver(mesh, refine=method).distance(3)
+    assert np.isinf(d[n:]).all()
+    np.testing.assert_allclose(d[:n], np.linalg.norm(grid.V - grid.V[3], axis=1), rtol=1e-12)
+    both = HeatMethodSolver(mesh, refine=method).distance([3, n + 3])
+    np.testing.assert_allclose(both[n : 2 * n], both[:n], rtol=1e-12)
+    assert np.isinf(both[-1])
+
+
+def test_path_bends_at_the_corner_of_a_boundary():
+    """In a plane with a slot, the shortest path from one side to the other touches the end of the slot."""
+    grid = shapes.grid(20)
+    centre = grid.V[grid.F].mean(axis=1)
+    mesh = Mesh(grid.V, grid.F[~((np.abs(centre[:, 0] - 0.5) < 0.05) & (centre[:, 1] < 0.5))])
+    source = int(np.argmin(np.linalg.norm(mesh.V[:, :2], axis=1)))
+    ends = np.array([[0.45, 0.5], [0.55, 0.5]])
+    d = HeatMethodSolver(mesh, refine="unfold").distance(source)
+    target = int(np.argmin(np.linalg.norm(mesh.V[:, :2] - [1, 0], axis=1)))
+    truth = np.linalg.norm(ends[0]) + 0.1 + np.linalg.norm(ends[1] - [1, 0])
+    assert d[target] == pytest.approx(truth, rel=1e-9)
+
+
+@pytest.mark.parametrize("source", [0, 3, 200])
+def test_surface_that_cannot_be_oriented(source):
+    """The seam must not be felt: without the double cover, paths would run along it."""
+    mesh = moebius_strip(60, 6)
+    truth = exact(mesh, source)
+    assert relative_error(unfolded_distance(mesh.V, mesh.F, source), truth).max() < 1e-3
+    assert relative_error(HeatMethodSolver(mesh, refine="sweep").distance(source), truth).mean() < 2e-2
+
+
+def test_faces_turned_over_change_nothing(bumpy):
+    rng = np.random.default_rng(0)
+    F = bumpy.F.copy()
+    turned = rng.random(len(F)) < 0.5
+    F[turned] = F[turned][:, ::-1]
+    np.testing.assert_allclose(
+        unfolded_distance(bumpy.V, F, 11), unfolded_distance(bumpy.V, bumpy.F, 11), rtol=0, atol=2e-3
+    )
+
+
+def test_more_than_two_faces_at_an_edge():
+    """Five half planes on one line: paths between two of them turn on the line."""
+    k = 8
+    y, x = np.divmod(np.arange((k + 1) ** 2), k + 1)
+    V, F = [np.stack([np.zeros(k + 1), np.zeros(k + 1), np.arange(k + 1) / k], axis=1)], []
+    n = k + 1
+    for i in range(5):
+        direction = np.array([np.cos(2 * np.pi * i / 5), np.sin(2 * np.pi * i / 5)])
+        inner = x > 0
+        number = np.where(inner, n + np.cumsum(inner) - 1, y)
+        V.append(np.column_stack([np.outer(x[inner] / k, direction), y[inner] / k]))
+        F.append(number[shapes.grid(k).F])
+        n += int(inner.sum())
+    mesh = Mesh(np.concatenate(V), np.concatenate(F))
+    source = n - 1
+    leaf = np.arange(mesh.n_vertices) < k + 1
+    d = unfolded_distance(mesh.V, mesh.F, source)
+    assert np.isfinite(d).all()
+    # On the source's own leaf, and on the line, distance is that of the plane.
+    truth = np.linalg.norm(mesh.V - mesh.V[source], axis=1)
+    np.testing.assert_allclose(d[leaf], truth[leaf], rtol=1e-9)
+    assert (d >= truth * (1 - 1e-9)).all()
+
+
+def test_slivers_do_little_harm(bumpy):
+    truth = exact(bumpy, 5)
+    bad = with_slivers(bumpy, 0)
+    assert bad.n_vertices > bumpy.n_vertices + 200
+    error = {}
+    for name, mesh in (("clean", bumpy), ("slivers", bad)):
+        for method in METHODS:
+            d = HeatMethodSolver(mesh, refine=method).distance(5)[: bumpy.n_vertices]
+            error[name, method] = relative_error(d, truth).mean()
+    assert error["slivers", "sweep"] < 1.5 * error["clean", "sweep"]
+    assert error["slivers", "unfold"] < 3e-4
+
+
+def test_any_order_will_do(bumpy):
+    """The order costs time, not accuracy: even a random one is repaired."""
+    truth = exact(bumpy, 9)
+    refinement = Refinement(intrinsic_delaunay(intrinsic_triangulation(bumpy)))
+    key = np.random.default_rng(0).random(bumpy.n_vertices)
+    assert relative_error(refinement.unfold(key, np.array([9])), truth).mean() < 2e-3
+    assert relative_error(refinement.sweep(key, np.array([9])), truth).mean() < 1e-2
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_same_bits_alone_in_threads_and_pickled(bumpy, method):
+    solver = HeatMethodSolver(bumpy, refine=method, backend="scipy")
+    sources = list(range(0, 1600, 100))
+    block = solver.distances(sources)
+    again = pickle.loads(pickle.dumps(solver)).distances(sources)
+    np.testing.assert_array_equal(block, again)
+    # The order comes from the heat, whose bits may depend on how many right-hand sides are solved together.
+    refinement = Refinement(intrinsic_delaunay(intrinsic_triangulation(bumpy)))
+    key = block[0]
+    first = getattr(refinement, method)(key, np.array([0]))
+    for _ in range(3):
+        np.testing.assert_array_equal(getattr(refinement, method)(key, np.array([0])), first)
+
+
+def test_no_poisson_problem_is_factored(bumpy, monkeypatch):
+    def forbidden(*_: object) -> None:
+        raise AssertionError("a Poisson problem was set up")
+
+    monkeypatch.setattr("heat_igl.heat_method.PoissonProblem", forbidden)
+    assert HeatMethodSolver(bumpy, refine="unfold").distance(0).max() > 1
+    with pytest.raises(AssertionError, match="Poisson"):
+        HeatMethodSolver(bumpy)
+
+
+def test_solve_returns_the_refined_distance(bumpy):
+    solver = HeatMethodSolver(bumpy, refine="unfold")
+    solution = solver.solve(4)
+    np.testing.assert_array_equal(solution.distance, solver.distance(4))
+    assert solution.direction.shape[0] == len(solver.operators.weights)
+
+
+def test_underflowed_heat_still_gives_an_order():
+    """Beyond the range of heat the order is arbitrary, and the distance all the same exact."""
+    mesh = shapes.strip(300, 2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        solver = HeatMethodSolver(mesh, refine="unfold", t_coef=1e-4)
+    truth = np.linalg.norm(mesh.V - mesh.V[0], axis=1)
+    assert relative_error(solver.distance(0), truth).max() < 1e-9
+
+
+def test_without_factorization_as_with(bumpy):
+    np.testing.assert_allclose(
+        unfolded_distance(bumpy.V, bumpy.F, [2, 900]),
+        HeatMethodSolver(bumpy, refine="unfold").distance([2, 900]),
+        atol=5e-3,
+    )
+
+
+def test_bad_arguments():
+    grid = shapes.grid(3)
+    assert HeatMethodSolver(grid, refine="sweep").distance(0)[-1] == pytest.approx(np.sqrt(2))
+    with pytest.raises(ValueError, match="refine must be None, 'sweep' or 'unfold', not 'exact'"):
+        HeatMethodSolver(grid, refine="exact")
+    with pytest.raises(ValueError, match="this domain has none"):
+        HeatMethodSolver(shapes.box(1), refine="sweep")
+    box = shapes.box(1)
+    with pytest.raises(MeshError, match="needs triangles"):
+        unfolded_distance(box.V, box.F, 0)
+    with pytest.raises(SourceError, match="99 is no vertex"):
+        unfolded_distance(grid.V, grid.F, 99)
+    with pytest.raises(ValueError, match="tolerance must lie between 0 and 1, not -1"):
+        unfolded_distance(grid.V, grid.F, 0, tolerance=-1)
+
+
+def test_missing_numba_names_the_extra():
+    code = (
+        "import sys; sys.modules['numba'] = None\n"
+        "import heat_igl\n"
+        "grid = heat_igl.shapes.grid(2)\n"
+        "heat_igl.HeatMethodSolver(grid).distance(0)\n"
+        "try:\n    heat_igl.HeatMethodSolver(grid, refine='unfold')\n"
+        "except heat_igl.MissingExtraError as error:\n    print(error)"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == 'refinement needs numba: pip install "heat-igl[fast]"'
