@@ -31,6 +31,7 @@ from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Laplacian
 from heat_igl.picture import PICTURE_SUFFIXES, Picture
+from heat_igl.refine import Refine
 from heat_igl.sources import vertex_sources
 from heat_igl.steps import Boundary
 from heat_igl.typing import FloatArray
@@ -193,6 +194,7 @@ def distance(
     laplacian: Annotated[str, _choice(Laplacian, "Triangulation to solve on.")] = "intrinsic-delaunay",
     boundary: Annotated[str, _choice(Boundary, "What heat does at the boundary.")] = "neumann",
     magnitude: Annotated[str, _choice(Magnitude, "Length of the field that is integrated.")] = "auto",
+    refine: Annotated[str | None, _choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
     backend: Annotated[str, _choice(Backend, "Linear solver.")] = "auto",
 ) -> None:
     """Distance from one or more source vertices."""
@@ -204,6 +206,7 @@ def distance(
             "laplacian": laplacian,
             "boundary": boundary,
             "magnitude": magnitude,
+            "refine": refine,
             "backend": backend,
         }
         solver = HeatMethodSolver(loaded, t_coef=t_coef, t=t, **options)

@@ -250,6 +250,7 @@ class HeatMethodSolver:
             self._unfolded = refinement.sweep if refine == "sweep" else refinement.unfold
         else:
             self._poisson = PoissonProblem(domain, backend)
+            _ = domain.D  # made on first use otherwise, in the middle of the first query
         self._diagnostics = Diagnostics(
             t=step,
             t_requested=requested,

@@ -70,6 +70,19 @@ def test_distance_writes_what_the_library_returns_and_a_picture(sphere: Path) ->
     assert files(sphere.parent) == {"sphere.off", "out.ply", "out.png"}
 
 
+def test_refined_distance_is_that_of_the_library(sphere: Path) -> None:
+    pytest.importorskip("numba")
+    done = command("distance", sphere, "--source", 12, "--refine", "unfold", "--output", "out.ply", cwd=sphere.parent)
+    assert done.returncode == 0, done.stderr
+    written = io.read_attributes(sphere.parent / "out.ply")["distance"]
+    expected = heat_igl.HeatMethodSolver(shapes.icosphere(2), refine="unfold").distance(12)
+    np.testing.assert_array_equal(written, expected)
+    assert np.abs(expected - heat_igl.HeatMethodSolver(shapes.icosphere(2)).distance(12)).max() > 0.01
+    refused = command("distance", sphere, "--source", 12, "--refine", "best", cwd=sphere.parent)
+    assert refused.returncode == 2
+    assert_one_line(refused.stderr, "--refine", "'best' is not one of sweep, unfold")
+
+
 def test_a_file_that_is_no_mesh(tmp_path: Path) -> None:
     (tmp_path / "notes.off").write_text("buy milk\n")
     done = command("distance", "notes.off", "--source", 0, "--output", "out.ply", cwd=tmp_path)
