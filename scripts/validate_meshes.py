@@ -22,6 +22,8 @@ from heat_igl.validation import METHODS, draw_sources
 
 from environment import environment
 
+# Percent; smaller errors are rounding.
+_LEAST_SHOWN = 1e-4
 SUFFIXES = {".off", ".obj", ".ply", ".stl", ".mesh", ".msh"}
 
 
@@ -123,14 +125,16 @@ def _geometric_mean(values: Sequence[float]) -> float:
 
 
 def draw(found: Sequence[dict[str, Any]], methods: Sequence[str], path: Path) -> None:
-    """Mean error of each method on each mesh as a dot."""
+    """Mean error of each method on each mesh as a dot, the methods one below the other; exact ones at the left edge."""
     from matplotlib.figure import Figure
 
     shown = [record for record in found if "report" in record]
-    figure = Figure(figsize=(7, 0.3 * len(shown) + 1.5), layout="constrained")
+    figure = Figure(figsize=(7, 0.45 * len(shown) + 1.5), layout="constrained")
     axes = figure.subplots()
-    for method in methods:
-        points = [(100 * mean, i) for i, r in enumerate(shown) if (mean := mean_error(r, method)) and mean < math.inf]
+    for k, method in enumerate(methods):
+        below = 0.7 * ((k + 0.5) / len(methods) - 0.5)
+        means = [(i, mean_error(record, method)) for i, record in enumerate(shown)]
+        points = [(max(100 * m, _LEAST_SHOWN), i + below) for i, m in means if m is not None and m < math.inf]
         if points:
             axes.plot(*zip(*points, strict=True), "o", label=method, markersize=5)
     axes.set_yticks(range(len(shown)), [Path(record["file"]).stem for record in shown])
@@ -138,7 +142,7 @@ def draw(found: Sequence[dict[str, Any]], methods: Sequence[str], path: Path) ->
     axes.set(xscale="log", xlabel="mean relative error, %")
     axes.grid(visible=True, axis="x", alpha=0.3)
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=8)
+        axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5))
     figure.savefig(path, dpi=150)
 
 
