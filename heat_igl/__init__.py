@@ -9,16 +9,18 @@ from heat_igl.errors import (
     ReferenceSolverError,
     SourceError,
 )
-from heat_igl.heat_method import HeatMethodSolver, HeatSolution, heat_method_distance
+from heat_igl.heat_method import HeatMethodSolver, heat_method_distance
 from heat_igl.io import read_attributes, read_mesh, write_mesh
 from heat_igl.mesh import Mesh, MeshReport
 from heat_igl.refine import Refinement, unfolded_distance
+from heat_igl.solution import Diagnostics, HeatSolution
 from heat_igl.subdivision import split_long_edges
 from heat_igl.validation import validate
 from heat_igl.validation_report import ValidationReport, ValidationRow
 
 __all__ = [
     "AccuracyWarning",
+    "Diagnostics",
     "FactorizationError",
     "HeatMethodSolver",
     "HeatSolution",

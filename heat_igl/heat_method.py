@@ -7,7 +7,6 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -17,11 +16,12 @@ from heat_igl.factorization import Backend
 from heat_igl.mesh import RANGE_LIMIT, Mesh
 from heat_igl.operators import Laplacian, Operators, operators
 from heat_igl.refine import Refine, Refinement
+from heat_igl.solution import Diagnostics, HeatSolution
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
-__all__ = ["Diagnostics", "HeatMethodSolver", "HeatSolution", "heat_method_distance", "smallest_time_step"]
+__all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_time_step"]
 
 Magnitude = Literal["auto", "unit", "damped"]
 
@@ -31,76 +31,6 @@ _SOURCE_HEAT = 1e290
 _LOWEST_HEAT = 1e-300
 # Right-hand sides solved together; wider blocks measured no faster.
 _BLOCK = 8
-
-
-@dataclass(frozen=True)
-class Diagnostics:
-    """What a solver did, and what it rests on.
-
-    Attributes
-    ----------
-    t : float
-        Time step used, a squared length.
-    t_requested : float
-        What was asked for: `t`, or ``t_coef * h**2``.
-    mean_edge_length : float
-        h, of the triangulation that was solved on.
-    edges_across : float
-        Longest shortest path along edges, in units of h.
-    n_flips : int
-        Edges flipped to make the triangulation intrinsic Delaunay.
-    lengthening : float
-        What was added to every edge length because of degenerate triangles; 0 on other meshes.
-    backend : str
-        Library that holds the factors.
-    seconds_operators, seconds_factorization : float
-        Wall-clock time of the two stages of the constructor.
-    """
-
-    t: float
-    t_requested: float
-    mean_edge_length: float
-    edges_across: float
-    n_flips: int
-    lengthening: float
-    backend: str
-    seconds_operators: float
-    seconds_factorization: float
-
-    @property
-    def t_raised(self) -> bool:
-        """Whether t was raised to keep the heat inside the double range."""
-        return self.t > self.t_requested
-
-
-@dataclass(frozen=True, eq=False)
-class HeatSolution:
-    """All three steps of one answer.
-
-    Attributes
-    ----------
-    heat : (n,) float64
-        u of step 1 for a unit of heat on each source, per area. Where it falls below 1e-308 it reads 0; the steps
-        themselves run on a multiple that does not.
-    direction : (m, d) float64
-        Unit vectors X of step 2, per face of the triangulation that was solved on, d = 3 components in space or
-        d = 2 in the face's own frame (`intrinsic_gradient`); 0 where no heat arrives.
-    magnitude : (m,) float64
-        Length that X was given for step 3: 1, or `damping` where heat arrives from several sides.
-    distance : (n,) float64
-        As `HeatMethodSolver.distance` returns it.
-    t : float
-        Time step.
-    diagnostics : Diagnostics
-        The solver's.
-    """
-
-    heat: FloatArray
-    direction: FloatArray
-    magnitude: FloatArray
-    distance: FloatArray
-    t: float
-    diagnostics: Diagnostics
 
 
 def _positive(name: str, value: float) -> float:
@@ -361,7 +291,7 @@ class HeatMethodSolver:
         else:
             distance = self._integrated(chosen, u, X, magnitude)
         with np.errstate(under="ignore"):
-            heat = u[:, 0] / self._source_heat(chosen[0]) / self._heat_flow.mean_mass
+            heat = u[:, 0] / self._source_heat(self._rim(chosen[0])) / self._heat_flow.mean_mass
         direction = np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T)
         return HeatSolution(
             heat=heat,

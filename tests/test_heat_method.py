@@ -128,6 +128,18 @@ def test_solution_holds_the_three_steps(sphere, solver):
     assert solution.t == solver.t == solution.diagnostics.t
 
 
+def test_heat_of_a_region_starts_at_its_rim():
+    mesh = shapes.grid(12)
+    region = (np.abs(mesh.V - [0.5, 0.5, 0]) < 0.3).all(axis=1)
+    rim = np.zeros(mesh.n_vertices, bool)
+    crossing = mesh.edges[region[mesh.edges[:, 0]] != region[mesh.edges[:, 1]]]
+    rim[crossing.ravel()] = True
+    solver = HeatMethodSolver(mesh)
+    heat = solver.solve(region).heat
+    residual = solver.operators.M @ heat - solver.t * (solver.operators.L @ heat)
+    np.testing.assert_allclose(residual, rim & region, rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("k", [1, 8, 19])
 def test_batches(sphere, solver, k):
     sets = [int(i) for i in np.random.default_rng(0).choice(sphere.n_vertices, k, replace=False)]
