@@ -265,6 +265,8 @@ class HeatMethodSolver:
         ValueError
             If `out` has the wrong shape or cannot hold floats.
         """
+        if not hasattr(source_sets, "__len__"):
+            raise SourceError(f"source_sets must be a sequence of sets of sources, not {source_sets!r}: try distance")
         chosen = []
         for i, sources in enumerate(source_sets):
             try:
