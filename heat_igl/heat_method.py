@@ -387,7 +387,7 @@ class HeatMethodSolver:
         shift = np.where(n_sources > 0, total / np.maximum(n_sources, 1), -np.inf)
         distance = np.maximum(phi - shift[components], 0.0)
         distance[sources] = 0.0
-        return distance
+        return np.asarray(distance)
 
     def _value_at_source(self, phi: FloatArray, u: FloatArray, sources: IntArray) -> FloatArray:
         """The value that phi has at the source from which a vertex got its heat.

@@ -262,7 +262,7 @@ class _Flips:
         half_edges = half_edges[self._cotangent_sum(half_edges) < DELAUNAY_TOLERANCE - rounding]
         smaller = np.minimum(half_edges, self.twin[half_edges])
         # An edge along which a face is glued to itself lies between two equal acute angles; only rounding says else.
-        return np.unique(smaller[smaller // 3 != self.twin[smaller] // 3])
+        return np.asarray(np.unique(smaller[smaller // 3 != self.twin[smaller] // 3]))
 
     def independent(self, bad: IntArray) -> IntArray:
         """Those edges that are worse than every other bad edge of their two faces: no face is in two flips."""
@@ -308,7 +308,7 @@ class _Flips:
         changed = np.concatenate([f, g])
         self.cotangent[changed], self.rounding[changed] = _cotangents(lengths[changed])
         self.n_flips += len(half_edge)
-        return changed
+        return np.asarray(changed)
 
 
 def _diagonal(ab: FloatArray, pa: FloatArray, bp: FloatArray, aq: FloatArray, qb: FloatArray) -> FloatArray:

@@ -81,7 +81,7 @@ def default_rotation(V: FloatArray, F: IntArray, used: IntArray, marked: IntArra
     sample = F[:: 1 + len(F) // 50_000]
     best, best_score = rotation(45.0, 20.0), -1.0
     for azimuth in np.arange(-45.0, 315.0, 45.0):
-        turn = rotation(azimuth, 20.0)
+        turn = rotation(float(azimuth), 20.0)
         points = to_pixels(V @ turn.T, 96 / 2 / np.sqrt(3), np.array([47.5, 47.5]))
         depth = rasterize(points, sample, 96, 96).depth
         seen = 1.0 if marked is None else float(visible(points, depth, marked, 2.0).mean())
@@ -206,7 +206,7 @@ def isoline_coverage(values: FloatArray, per_pixel: FloatArray, step: float, wid
         width_here = np.minimum(width, 0.25 * step / per_pixel)
     coverage = np.clip(width_here / 2 + 0.5 - apart, 0.0, 1.0) * np.minimum(1.0, width_here)
     coverage[(level < 1) | ~np.isfinite(per_pixel) | (per_pixel == 0)] = 0.0
-    return coverage
+    return np.asarray(coverage)
 
 
 def shading(points: FloatArray, F: IntArray, pixels: Pixels) -> FloatArray:

@@ -64,7 +64,8 @@ def strip(length: int, width: int) -> Mesh:
 def disk(n: int) -> Mesh:
     """The unit disk by n rings of triangles around vertex 0, ring k with 6 k vertices. Distance is Euclidean."""
     n = _at_least("n", n, 1)
-    points, faces = [np.zeros((1, 2))], []
+    points: list[FloatArray] = [np.zeros((1, 2))]
+    faces: list[IntArray] = []
     inner = np.zeros(1, np.int64)
     for k in range(1, n + 1):
         angle = 2 * np.pi * np.arange(6 * k) / (6 * k)

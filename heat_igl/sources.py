@@ -61,7 +61,7 @@ def vertex_sources(sources: Sources, n: int) -> IntArray:
             f"sources[{first}] = {array[first]} is no vertex ({int(outside.sum())} of {len(array)} are not): the mesh "
             f"has {n} vertices, so indices run from 0 to {n - 1}"
         )
-    return np.unique(array).astype(np.int64)
+    return np.asarray(np.unique(array), dtype=np.int64)
 
 
 def _first_of_wrong_type(array: AnyArray) -> str:

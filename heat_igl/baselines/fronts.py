@@ -6,7 +6,7 @@ All solve the eikonal equation ``|grad d| = 1``, equation (3) of the paper, from
 from __future__ import annotations
 
 from itertools import product
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -112,11 +112,11 @@ def fast_marching_grid(
         import skfmm
     except ImportError:
         raise MissingExtraError.of("fast marching on grids", "scikit-fmm", "bench") from None
-    level = np.ma.MaskedArray(np.where(mask, 0.0, 1.0), ~inside)
+    level: Any = np.ma.masked_array(np.where(mask, 0.0, 1.0), ~inside)  # type: ignore[no-untyped-call,unused-ignore]
     aligned = [np.moveaxis(mask, axis, 0) for axis in range(mask.ndim)]
     touching = any((lines[1:] & lines[:-1]).any() for lines in aligned)
     found = skfmm.distance(level, dx=steps, order=1 if touching else order)
-    return np.asarray(np.ma.filled(found, np.inf), np.float64)
+    return np.asarray(found.filled(np.inf) if isinstance(found, np.ma.MaskedArray) else found, np.float64)
 
 
 def fast_sweeping(sources: ArrayLike, spacing: ArrayLike = 1.0, *, domain: ArrayLike | None = None) -> FloatArray:

@@ -112,7 +112,7 @@ def read(path: Path, data: bytes) -> Contents:
     if dimension not in (2, 3):
         raise text.error(sections[names.index("dimension")][1].line, "the dimension must be 2 or 3")
     vertices = sections[names.index("vertices")][1]
-    V = np.zeros((len(rows := vertices.rows(dimension + 1)), 3))
+    V: FloatArray = np.zeros((len(rows := vertices.rows(dimension + 1)), 3))
     V[:, :dimension] = rows[:, :dimension]
     blocks: list[tuple[str, IntArray]] = []
     where: list[str] = []

@@ -167,7 +167,8 @@ def _elements_2(section: _Section) -> Blocks:
 
 def _nodes_4(section: _Section) -> tuple[IntArray, FloatArray]:
     n_blocks, n, _, _ = section.counts(4, "size")
-    tags, positions = [np.empty(0)], [np.empty((0, 3))]
+    tags: list[FloatArray] = [np.empty(0)]
+    positions: list[FloatArray] = [np.empty((0, 3))]
     for _ in range(n_blocks):
         dimension, _, parametric = integers(section.take(3, "int"), lambda _: section.where, "entity").tolist()
         (k,) = section.counts(1, "size")

@@ -203,7 +203,7 @@ def _ascii(text: Text, header: _Header) -> Iterator[tuple[_Element, dict[str, _C
         end = at + text.count[lines]
         columns = {}
         for prop in element.properties:
-            length = np.ones(element.n, np.int64)
+            length: IntArray = np.ones(element.n, np.int64)
             if prop.count_dtype:
                 _check(text, lines, at >= end, "too few numbers for the properties in the header")
                 length = integers(values[at], lambda i, lines=lines: text.where(lines[i]), "length of a list")  # type: ignore[misc]

@@ -57,7 +57,7 @@ def read(path: Path, data: bytes) -> Contents:
     with _strict(path, "read"):
         # Not meshio.read, which prints what is wrong and ends the program.
         found = meshio.vtu.read(str(path))
-        V = np.asarray(found.points, np.float64).reshape(-1, 3)
+        V: FloatArray = np.asarray(found.points, np.float64).reshape(-1, 3)
         blocks = [(str(block.type), np.asarray(block.data, np.int64)) for block in found.cells]
         attributes = {str(name): np.asarray(values) for name, values in found.point_data.items()}
     announced = re.search(rb"<Piece\b[^>]*\bNumberOfPoints\s*=\s*[\"']([^\"']*)", data)
