@@ -116,7 +116,10 @@ def fast_marching_grid(
     aligned = [np.moveaxis(mask, axis, 0) for axis in range(mask.ndim)]
     touching = any((lines[1:] & lines[:-1]).any() for lines in aligned)
     found = skfmm.distance(level, dx=steps, order=1 if touching else order)
-    return np.asarray(found.filled(np.inf) if isinstance(found, np.ma.MaskedArray) else found, np.float64)
+    filled: Any = getattr(
+        found, "filled", None
+    )  # a masked array where something is out of reach, a plain one elsewhere
+    return np.asarray(found if filled is None else filled(np.inf), np.float64)
 
 
 def fast_sweeping(sources: ArrayLike, spacing: ArrayLike = 1.0, *, domain: ArrayLike | None = None) -> FloatArray:
