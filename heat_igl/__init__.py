@@ -15,6 +15,7 @@ from heat_igl.mesh import Mesh, MeshReport
 from heat_igl.refine import Refinement, unfolded_distance
 from heat_igl.solution import Diagnostics, HeatSolution
 from heat_igl.subdivision import split_long_edges
+from heat_igl.surface_points import SurfaceCurve, SurfacePoints
 from heat_igl.validation import validate
 from heat_igl.validation_report import ValidationReport, ValidationRow
 
@@ -31,6 +32,8 @@ __all__ = [
     "ReferenceSolverError",
     "Refinement",
     "SourceError",
+    "SurfaceCurve",
+    "SurfacePoints",
     "ValidationReport",
     "ValidationRow",
     "baselines",
