@@ -15,14 +15,62 @@ PACKAGE = Path(heat_igl.__file__).parent
 
 # A module imports only from those before it.
 ORDER = """
-typing errors connectivity mesh surface_points intrinsic tufted subdivision shapes io operators factorization sources fans sweeping
-unfolding refine steps solution heat_method baselines bounds closed_forms peak_memory guarded native reference metrics
-validation_methods validation_plots validation_report validation raster picture plots demo cli __main__
+typing
+errors
+connectivity
+mesh
+surface_points
+intrinsic
+tufted
+subdivision
+shapes
+io
+operators
+factorization
+sources
+fans
+sweeping
+unfolding
+refine
+steps
+solution
+heat_method
+baselines
+bounds
+closed_forms
+peak_memory
+guarded
+native
+reference
+metrics
+validation_methods
+validation_plots
+validation_report
+validation
+raster
+picture
+plots
+demo
+cli
+__main__
 """.split()
 
-EXTRAS = (
-    "cholespy gdist matplotlib meshio numba potpourri3d psutil pygeodesic pymeshlab pytest rich skfmm skimage typer"
-).split()
+EXTRAS = """
+cholespy
+gdist
+matplotlib
+meshio
+numba
+potpourri3d
+psutil
+pygeodesic
+pymeshlab
+pytest
+rich
+skfmm
+skimage
+typer
+""".split()
 
 
 def files(name: str) -> list[Path]:
