@@ -35,6 +35,7 @@ refine
 steps
 solution
 heat_method
+sampling
 baselines
 bounds
 closed_forms
