@@ -10,8 +10,9 @@ from heat_igl.errors import (
     SourceError,
 )
 from heat_igl.heat_method import HeatMethodSolver, heat_method_distance
-from heat_igl.io import read_attributes, read_mesh, write_mesh
+from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_mesh
 from heat_igl.mesh import Mesh, MeshReport
+from heat_igl.polygons import PolygonMesh, polygon_operators
 from heat_igl.refine import Refinement, unfolded_distance
 from heat_igl.sampling import (
     VoronoiCells,
@@ -39,6 +40,7 @@ __all__ = [
     "MeshError",
     "MeshReport",
     "MissingExtraError",
+    "PolygonMesh",
     "ReferenceSolverError",
     "Refinement",
     "SourceError",
@@ -57,8 +59,10 @@ __all__ = [
     "geodesic_centre",
     "heat_method_distance",
     "metrics",
+    "polygon_operators",
     "read_attributes",
     "read_mesh",
+    "read_polygon_mesh",
     "reference",
     "sampling",
     "shapes",

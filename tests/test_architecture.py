@@ -24,8 +24,9 @@ intrinsic
 tufted
 subdivision
 shapes
-io
 operators
+polygons
+io
 factorization
 sources
 fans
