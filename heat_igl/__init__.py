@@ -10,6 +10,7 @@ from heat_igl.errors import (
     SourceError,
 )
 from heat_igl.heat_method import HeatMethodSolver, heat_method_distance
+from heat_igl.images import ImageDomain, image_domain
 from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_mesh
 from heat_igl.mesh import Mesh, MeshReport
 from heat_igl.polygons import PolygonMesh, polygon_operators
@@ -25,6 +26,7 @@ from heat_igl.sampling import (
     voronoi_cells,
 )
 from heat_igl.solution import Diagnostics, HeatSolution
+from heat_igl.speed import speed_operators
 from heat_igl.subdivision import split_long_edges
 from heat_igl.surface_points import SurfaceCurve, SurfacePoints
 from heat_igl.validation import validate
@@ -36,6 +38,7 @@ __all__ = [
     "FactorizationError",
     "HeatMethodSolver",
     "HeatSolution",
+    "ImageDomain",
     "Mesh",
     "MeshError",
     "MeshReport",
@@ -58,6 +61,7 @@ __all__ = [
     "farthest_points",
     "geodesic_centre",
     "heat_method_distance",
+    "image_domain",
     "metrics",
     "polygon_operators",
     "read_attributes",
@@ -66,6 +70,7 @@ __all__ = [
     "reference",
     "sampling",
     "shapes",
+    "speed_operators",
     "split_long_edges",
     "unfolded_distance",
     "validate",

@@ -23,8 +23,10 @@ surface_points
 intrinsic
 tufted
 subdivision
+images
 shapes
 operators
+speed
 polygons
 io
 factorization
