@@ -159,8 +159,8 @@ class HeatMethodSolver:
         if refine not in (None, "sweep", "unfold"):
             raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {refine!r}")
         if refine is not None and domain.triangulation is None:
-            raise ValueError(f"refine={refine!r} unfolds triangles, and this domain has none")
-        self._damped = magnitude == "damped" or (magnitude == "auto" and domain.triangulation is not None)
+            raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
+        self._damped = magnitude == "damped" or (magnitude == "auto" and domain.is_surface)
         requested = _positive("t_coef", t_coef) * domain.mean_edge_length**2 if t is None else _positive("t", t)
         step = max(requested, smallest_time_step(domain))
         if t is not None and step > requested:

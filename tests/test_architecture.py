@@ -23,9 +23,12 @@ surface_points
 intrinsic
 tufted
 subdivision
+images
 shapes
-io
 operators
+speed
+polygons
+io
 factorization
 sources
 fans
@@ -35,6 +38,7 @@ refine
 steps
 solution
 heat_method
+sampling
 baselines
 bounds
 closed_forms
