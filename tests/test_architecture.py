@@ -34,6 +34,7 @@ unfolding
 refine
 steps
 solution
+processors
 heat_method
 sampling
 baselines
@@ -52,12 +53,15 @@ raster
 picture
 plots
 demo
+cluster
 cli
 __main__
 """.split()
 
 EXTRAS = """
 cholespy
+dask
+distributed
 gdist
 matplotlib
 meshio
@@ -71,6 +75,7 @@ rich
 skfmm
 skimage
 typer
+zarr
 """.split()
 
 

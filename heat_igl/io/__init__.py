@@ -24,7 +24,7 @@ from heat_igl.io.contents import Contents
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = ["read_attributes", "read_mesh", "write_mesh"]
+__all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "write_mesh"]
 
 
 class _Format(NamedTuple):
@@ -43,6 +43,8 @@ _FORMATS = {
     ".msh": _Format(msh.read, msh.write, tetrahedra=True, attributes=False),
     ".vtu": _Format(vtu.read, vtu.write, tetrahedra=True, attributes=True),
 }
+
+MESH_SUFFIXES = tuple(_FORMATS)
 
 _ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
 
