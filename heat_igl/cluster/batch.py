@@ -282,6 +282,7 @@ def connected(scheduler: str | None = None, n_workers: int | None = None, dashbo
             threads_per_worker=1,
             dashboard_address=":0" if dashboard else None,
             silence_logs=logging.CRITICAL,
+            env={"HEAT_IGL_NUM_THREADS": "1"},
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
