@@ -157,7 +157,7 @@ def markdown(result: dict[str, Any]) -> str:
         *(f"| {name} | {statistics.median(seconds):.1f} |" for name, seconds in rate["seconds"].items()),
         "",
         f"Two workers are {rate['rate_of_two']:.2f} times as fast as one. One worker takes "
-        f"{100 * rate['overhead']:+.1f} % more time than the loop. Same bits as the loop: {'yes' if rate['same_bits'] else 'NO'}.",
+        f"{100 * rate['overhead']:+.1f} % more time than the loop. Same bits: {'yes' if rate['same_bits'] else 'NO'}.",
         "",
         "| vertices | refine | peak memory, MiB | stated, MiB | ratio |",
         "|--:|---|--:|--:|--:|",
