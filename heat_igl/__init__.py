@@ -1,8 +1,9 @@
 """Geodesic distance on meshes by the heat method, on libigl's operators."""
 
-from heat_igl import baselines, closed_forms, metrics, reference, sampling, shapes
+from heat_igl import baselines, closed_forms, cluster, metrics, reference, sampling, shapes
 from heat_igl.errors import (
     AccuracyWarning,
+    BatchError,
     FactorizationError,
     MeshError,
     MissingExtraError,
@@ -34,6 +35,7 @@ from heat_igl.validation_report import ValidationReport, ValidationRow
 
 __all__ = [
     "AccuracyWarning",
+    "BatchError",
     "Diagnostics",
     "FactorizationError",
     "HeatMethodSolver",
@@ -54,6 +56,7 @@ __all__ = [
     "VoronoiCells",
     "baselines",
     "closed_forms",
+    "cluster",
     "diameter",
     "distance_matrix",
     "dual_triangulation",

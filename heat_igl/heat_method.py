@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 import warnings
 from collections.abc import Callable, Sequence
@@ -15,6 +14,7 @@ from heat_igl.errors import AccuracyWarning, MissingExtraError, SourceError
 from heat_igl.factorization import Backend
 from heat_igl.mesh import RANGE_LIMIT, Mesh
 from heat_igl.operators import Laplacian, Operators, operators
+from heat_igl.processors import n_threads
 from heat_igl.refine import Refine, Refinement
 from heat_igl.solution import Diagnostics, HeatSolution
 from heat_igl.sources import Sources, vertex_sources
@@ -416,12 +416,8 @@ def _in_heat_order(
     """
     if len(source_sets) == 1:
         return unfolded(-u[:, 0], source_sets[0])[None]
-    with ThreadPoolExecutor(_n_processors()) as pool:
+    with ThreadPoolExecutor(n_threads()) as pool:
         return np.stack(list(pool.map(unfolded, -u.T, source_sets)))
-
-
-def _n_processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _tracked(starts: Any) -> Any:

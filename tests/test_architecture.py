@@ -37,6 +37,7 @@ unfolding
 refine
 steps
 solution
+processors
 heat_method
 sampling
 baselines
@@ -55,12 +56,15 @@ raster
 picture
 plots
 demo
+cluster
 cli
 __main__
 """.split()
 
 EXTRAS = """
 cholespy
+dask
+distributed
 gdist
 matplotlib
 meshio
@@ -74,6 +78,7 @@ rich
 skfmm
 skimage
 typer
+zarr
 """.split()
 
 
