@@ -48,7 +48,9 @@ validation_plots
 validation_report
 validation
 raster
+scene
 picture
+html_view
 plots
 demo
 cli
@@ -57,6 +59,7 @@ __main__
 
 EXTRAS = """
 cholespy
+colorspacious
 gdist
 matplotlib
 meshio
@@ -67,6 +70,7 @@ pygeodesic
 pymeshlab
 pytest
 rich
+selenium
 skfmm
 skimage
 typer
