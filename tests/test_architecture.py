@@ -53,7 +53,9 @@ validation_plots
 validation_report
 validation
 raster
+scene
 picture
+html_view
 plots
 demo
 cluster
@@ -65,6 +67,7 @@ EXTRAS = """
 cholespy
 dask
 distributed
+colorspacious
 gdist
 matplotlib
 meshio
@@ -75,6 +78,7 @@ pygeodesic
 pymeshlab
 pytest
 rich
+selenium
 skfmm
 skimage
 typer
