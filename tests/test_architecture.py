@@ -20,6 +20,7 @@ errors
 connectivity
 mesh
 surface_points
+flip_history
 intrinsic
 tufted
 subdivision
