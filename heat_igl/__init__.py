@@ -14,6 +14,7 @@ from heat_igl.io import read_attributes, read_mesh, write_mesh
 from heat_igl.mesh import Mesh, MeshReport
 from heat_igl.refine import Refinement, unfolded_distance
 from heat_igl.solution import Diagnostics, HeatSolution
+from heat_igl.sources import OffsetSources
 from heat_igl.subdivision import split_long_edges
 from heat_igl.surface_points import SurfaceCurve, SurfacePoints
 from heat_igl.validation import validate
@@ -29,6 +30,7 @@ __all__ = [
     "MeshError",
     "MeshReport",
     "MissingExtraError",
+    "OffsetSources",
     "ReferenceSolverError",
     "Refinement",
     "SourceError",

@@ -313,12 +313,12 @@ class _Flips:
 
 def _diagonal(ab: FloatArray, pa: FloatArray, bp: FloatArray, aq: FloatArray, qb: FloatArray) -> FloatArray:
     """The distance between p and q, laid out in the plane on either side of the edge ab."""
-    x_p, y_p = _apex(ab, pa, bp)
-    x_q, y_q = _apex(ab, aq, qb)
+    x_p, y_p = triangle_apex(ab, pa, bp)
+    x_q, y_q = triangle_apex(ab, aq, qb)
     return np.asarray(np.hypot(x_p - x_q, y_p + y_q))
 
 
-def _apex(base: FloatArray, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+def triangle_apex(base: FloatArray, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Corner opposite the base of triangles whose base starts at the origin and runs along the first axis."""
     x = (base + (left - right) * ((left + right) / base)) / 2
     height = igl.doublearea(np.stack([base, left, right], axis=1), 0.0) / base
@@ -342,7 +342,7 @@ def intrinsic_gradient(triangulation: IntrinsicTriangulation) -> sp.csc_matrix:
     F, lengths = triangulation.F, triangulation.l
     m = len(F)
     base = lengths[:, 2]
-    x, y = _apex(base, lengths[:, 1], lengths[:, 0])
+    x, y = triangle_apex(base, lengths[:, 1], lengths[:, 0])
     # Corners at (0, 0), (base, 0), (x, y): the gradient of the hat function of each corner.
     along = np.stack([-1 / base, 1 / base, np.zeros(m)], axis=1)
     across = np.stack([(x - base) / (base * y), -x / (base * y), 1 / y], axis=1)

@@ -28,11 +28,13 @@ io
 operators
 factorization
 sources
+near_field
 fans
 sweeping
 unfolding
 refine
 steps
+emission
 solution
 heat_method
 baselines
