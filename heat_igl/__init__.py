@@ -12,6 +12,7 @@ from heat_igl.errors import (
 from heat_igl.heat_method import HeatMethodSolver, heat_method_distance
 from heat_igl.io import read_attributes, read_mesh, write_mesh
 from heat_igl.mesh import Mesh, MeshReport
+from heat_igl.projection import ClosestPoints, closest_points, curve_on, edge_curve
 from heat_igl.refine import Refinement, unfolded_distance
 from heat_igl.solution import Diagnostics, HeatSolution
 from heat_igl.sources import OffsetSources
@@ -22,6 +23,7 @@ from heat_igl.validation_report import ValidationReport, ValidationRow
 
 __all__ = [
     "AccuracyWarning",
+    "ClosestPoints",
     "Diagnostics",
     "FactorizationError",
     "HeatMethodSolver",
@@ -40,6 +42,9 @@ __all__ = [
     "ValidationRow",
     "baselines",
     "closed_forms",
+    "closest_points",
+    "curve_on",
+    "edge_curve",
     "heat_method_distance",
     "metrics",
     "read_attributes",

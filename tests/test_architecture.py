@@ -20,6 +20,7 @@ errors
 connectivity
 mesh
 surface_points
+projection
 intrinsic
 tufted
 subdivision
