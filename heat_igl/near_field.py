@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.intrinsic import IntrinsicTriangulation, triangle_apex
+from heat_igl.flip_history import apex
+from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.sources import SourcePoints, SourceSegments
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -276,7 +277,7 @@ class NearField:
     def _layout(self, f: IntArray) -> FloatArray:
         """Corners (k, 3, 2) of faces, each in a plane of its own."""
         l0, l1, l2 = self.triangulation.l[f].T
-        x, y = triangle_apex(l2, l1, l0)
+        x, y = apex(l2, l1, l0)
         corners = np.zeros((len(f), 3, 2))
         corners[:, 1, 0], corners[:, 2, 0], corners[:, 2, 1] = l2, x, y
         return corners
@@ -333,7 +334,7 @@ class NearField:
         g, k = t // 3, t % 3
         base = tri.l[g, k]
         rows = np.arange(len(t))
-        ax, ay = triangle_apex(base, tri.l[g, (k + 2) % 3], tri.l[g, (k + 1) % 3])
+        ax, ay = apex(base, tri.l[g, (k + 2) % 3], tri.l[g, (k + 1) % 3])
         corners = np.zeros((len(t), 3, 2))
         corners[rows, k, 0], corners[rows, k, 1] = ax, ay
         corners[rows, (k + 2) % 3, 0] = base

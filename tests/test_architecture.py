@@ -21,6 +21,7 @@ connectivity
 mesh
 surface_points
 projection
+flip_history
 intrinsic
 tufted
 subdivision
