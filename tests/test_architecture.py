@@ -20,6 +20,7 @@ errors
 connectivity
 mesh
 surface_points
+projection
 flip_history
 intrinsic
 tufted
@@ -32,11 +33,13 @@ polygons
 io
 factorization
 sources
+near_field
 fans
 sweeping
 unfolding
 refine
 steps
+emission
 solution
 processors
 heat_method
