@@ -40,6 +40,7 @@ solution
 heat_method
 sampling
 baselines
+applications
 bounds
 closed_forms
 peak_memory
