@@ -49,7 +49,7 @@ def test_search_expands_few_and_finds_the_same_lengths(bunny, pairs, by_dijkstra
 
 
 def test_dijkstra_against_scipy(bunny, pairs, by_dijkstra):
-    for (a, b), found in list(zip(pairs, by_dijkstra, strict=True))[:5]:
+    for (a, b), found in list(zip(pairs, by_dijkstra, strict=True))[:3]:
         assert found.length == pytest.approx(graph_distance(bunny, a)[b], rel=1e-12)
         assert found.vertices[[0, -1]].tolist() == [a, b]
         steps = np.sort(np.stack([found.vertices[:-1], found.vertices[1:]], axis=1), axis=1)
