@@ -20,6 +20,8 @@ errors
 connectivity
 mesh
 surface_points
+projection
+flip_history
 intrinsic
 tufted
 subdivision
@@ -31,12 +33,15 @@ polygons
 io
 factorization
 sources
+near_field
 fans
 sweeping
 unfolding
 refine
 steps
+emission
 solution
+processors
 heat_method
 sampling
 baselines
@@ -53,15 +58,21 @@ validation_plots
 validation_report
 validation
 raster
+scene
 picture
+html_view
 plots
 demo
+cluster
 cli
 __main__
 """.split()
 
 EXTRAS = """
 cholespy
+dask
+distributed
+colorspacious
 gdist
 matplotlib
 meshio
@@ -72,9 +83,11 @@ pygeodesic
 pymeshlab
 pytest
 rich
+selenium
 skfmm
 skimage
 typer
+zarr
 """.split()
 
 

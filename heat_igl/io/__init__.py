@@ -25,7 +25,7 @@ from heat_igl.mesh import Mesh
 from heat_igl.polygons import PolygonMesh
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = ["read_attributes", "read_mesh", "read_polygon_mesh", "write_mesh"]
+__all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "read_polygon_mesh", "write_mesh"]
 
 
 class _Format(NamedTuple):
@@ -44,6 +44,8 @@ _FORMATS = {
     ".msh": _Format(msh.read, msh.write, tetrahedra=True, attributes=False),
     ".vtu": _Format(vtu.read, vtu.write, tetrahedra=True, attributes=True),
 }
+
+MESH_SUFFIXES = tuple(_FORMATS)
 
 _ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
 
