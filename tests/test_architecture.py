@@ -46,6 +46,7 @@ processors
 heat_method
 sampling
 baselines
+applications
 bounds
 closed_forms
 peak_memory
