@@ -278,12 +278,11 @@ def suspect_error(square: Square, options: dict[str, Any]) -> float:
     return mean_error(square, **options)
 
 
-def jump(sizes: Sequence[int], progress: Callable[[str], None] = lambda name: None) -> Rows:
+def jump(sizes: Sequence[int]) -> Rows:
     """Section 4.2.2: which suspect makes the error of figure 5 rise, and where."""
     squares = [Square(i) for i in sizes]
     rows: Rows = []
     for name, options in SUSPECTS.items():
-        progress(name)
         errors = np.array([suspect_error(square, options) for square in squares])
         growth = errors[1:] / errors[:-1]
         rises = growth > 1
@@ -318,10 +317,6 @@ def _cell(value: Any) -> str:
 
 def claims(quick: bool) -> dict[str, Rows]:
     """All tables, by title."""
-
-    def tell(name: str) -> None:
-        print(f"  {name}", file=sys.stderr)
-
     i = 20 if quick else 70
     todo: dict[str, Callable[[], Rows]] = {
         "Mean edge length and time step": lambda: edge_length((10, 70, 300)),
@@ -333,7 +328,7 @@ def claims(quick: bool) -> dict[str, Rows]:
         "Growth": lambda: growth((10, 20, 30, 40) if quick else (50, 100, 150, 200, 250, 300), 1 if quick else 3),
         "Memory": lambda: memory(shapes.torus(25, 20) if quick else shapes.torus(250, 200)),
         "Expected accuracy": lambda: expected_accuracy((5, 10, 20) if quick else (10, 30, 56, 100, 200)),
-        "The jump at i = 56": lambda: jump(range(52, 60) if quick else range(10, 81), tell),
+        "The jump at i = 56": lambda: jump(range(52, 60) if quick else range(10, 81)),
     }
     found = {}
     for title, rows in todo.items():

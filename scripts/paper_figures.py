@@ -332,14 +332,13 @@ def _jump(out: Path, quick: bool) -> None:
     ]
     write_csv(out / "figure_5_jump.csv", rows)
     figure, (panel,) = canvas(2.1)
-    for name, colour, style, text in (
-        ("single", ORANGE, "-", "single precision"),
-        ("single_safe_norm", GREEN, "--", "single, norm that cannot underflow"),
-        ("double", BLUE, "-", "double precision"),
+    for name, colour, style, width, text in (
+        ("single", ORANGE, "-", 1.0, "single precision"),
+        ("double", BLUE, "-", 2.2, "double precision"),
+        ("single_safe_norm", GREEN, "--", 0.9, "single, norm that cannot underflow"),
     ):
-        panel.plot(
-            [row["i"] for row in rows], [row[name] for row in rows], style, color=colour, linewidth=1, label=text
-        )
+        errors = [row[name] for row in rows]
+        panel.plot([row["i"] for row in rows], errors, style, color=colour, linewidth=width, label=text)
     panel.axvline(56, color=GREY, linewidth=0.6, linestyle=":")
     panel.text(56.3, 0.001, "$i = 56$", fontsize=FONT - 0.5, color=GREY)
     panel.set_ylim(0, 0.02)

@@ -43,7 +43,7 @@ def printed_triangulation(i: int, per_row: int) -> tuple[np.ndarray, np.ndarray]
     k = np.arange(per_row**2)
     F = np.concatenate([np.c_[k, k + 1, k + per_row], np.c_[k, k + per_row, k + per_row - 1]])
     V = np.c_[k % per_row, k // per_row, np.zeros(len(k))] / i
-    return V, F[(F < len(k)).all(axis=1)]
+    return V, F[F.max(axis=1) < len(k)]
 
 
 def distance(
