@@ -26,9 +26,11 @@ subdivision
 shapes
 io
 operators
+fans
+relaxation
+iterative
 factorization
 sources
-fans
 sweeping
 unfolding
 refine
@@ -63,6 +65,7 @@ meshio
 numba
 potpourri3d
 psutil
+pyamg
 pygeodesic
 pymeshlab
 pytest
