@@ -1,4 +1,4 @@
-"""Linear systems that are too large to factor: relaxation for heat, multigrid for Poisson. Knows matrices, never meshes.
+"""Linear systems too large to factor: relaxation for heat, multigrid for Poisson. Knows matrices, never meshes.
 
 Heat falls by hundreds of decades over a mesh, and only its *relative* accuracy gives far directions: an iteration that
 stops at a residual would lose them. The heat matrix on a Delaunay triangulation is an M-matrix, so Gauss-Seidel from 0

@@ -23,8 +23,8 @@ def relax(
     """Solve for `x` (n,), zero at first, by Gauss-Seidel in breadth-first order from where b > 0.
 
     A sweep goes over a band of levels, outward. Its outer end moves on by one level per sweep; its inner end follows,
-    one level behind the first unknown that changed by more than `tolerance` of itself. The result is accepted by a sweep
-    over all unknowns that changes none. Returns the number of sweeps, -1 if `most_sweeps` did not suffice.
+    one level behind the first unknown that changed by more than `tolerance` of itself. The result is accepted by a
+    sweep over all unknowns that changes none. Returns the number of sweeps, -1 if `most_sweeps` did not suffice.
     """
     n = len(b)
     order = np.empty(n, np.int32)

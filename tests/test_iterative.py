@@ -78,7 +78,7 @@ def test_distance_agrees_on_scans(name):
 def test_negative_weights_are_refused(cow):
     """The cow's own triangles are far from Delaunay, and heat turns negative on them."""
     solver = HeatMethodSolver(cow, laplacian="cotan", backend="iterative")
-    with pytest.raises(FactorizationError, match='negative heat.*use laplacian="intrinsic-delaunay"'):
+    with pytest.raises(FactorizationError, match=r'negative heat.*use laplacian="intrinsic-delaunay"'):
         solver.distance(0)
     with pytest.raises(FactorizationError, match="singular or not positive definite"):
         iterative.iterative(sp.diags([1.0, -1.0]).tocsc())
