@@ -19,9 +19,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import FactorizationError, MissingExtraError
+from heat_igl.processors import n_threads
 from heat_igl.typing import FloatArray
 
-__all__ = ["Multigrid", "Relaxation", "available_memory", "factors_fit", "has_iterative", "iterative", "n_processors"]
+__all__ = ["Multigrid", "Relaxation", "available_memory", "factors_fit", "has_iterative", "iterative"]
 
 # Relative change per sweep below which an unknown is left alone. What it still lacks adds up along the way from the
 # source, to at most some 1e-8 on slivers; distances see the differences of neighbours only.
@@ -68,7 +69,7 @@ class Relaxation:
             If the solution for a right-hand side that is nowhere negative is negative somewhere.
         """
         columns = b[:, None] if b.ndim == 1 else b
-        with ThreadPoolExecutor(min(n_processors(), columns.shape[1])) as pool:
+        with ThreadPoolExecutor(min(n_threads(), columns.shape[1])) as pool:
             solved = list(pool.map(self._column, np.ascontiguousarray(columns.T)))
         return solved[0] if b.ndim == 1 else np.stack(solved, axis=1)
 
@@ -197,11 +198,6 @@ def available_memory() -> float:
         return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
         return float("inf")
-
-
-def n_processors() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _kernel() -> ModuleType:

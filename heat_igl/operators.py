@@ -69,6 +69,8 @@ class Operators:
     surface : IntrinsicTriangulation or None
         Triangles of the surface itself, each once, where `triangulation` is its tufted cover and goes over it twice.
         Paths are to be unfolded in these: on the cover a path over an edge of five faces goes on in one of them only.
+    is_surface : bool
+        Whether the domain has two dimensions; tetrahedra have three.
     """
 
     L: sp.csc_matrix
@@ -83,6 +85,7 @@ class Operators:
     longest_distance: float
     triangulation: IntrinsicTriangulation | None = None
     surface: IntrinsicTriangulation | None = None
+    is_surface: bool = True
 
     @property
     def n(self) -> int:
@@ -176,6 +179,7 @@ def cotan_operators(mesh: Mesh) -> Operators:
         boundary=mesh.boundary,
         referenced=mesh.referenced,
         longest_distance=mesh.longest_distance,
+        is_surface=not mesh.is_tetrahedral,
     )
     if not mesh.is_tetrahedral:
         return domain

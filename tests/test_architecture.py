@@ -17,15 +17,20 @@ PACKAGE = Path(heat_igl.__file__).parent
 ORDER = """
 typing
 errors
+processors
 connectivity
 mesh
 surface_points
+flip_history
 intrinsic
 tufted
 subdivision
+images
 shapes
-io
 operators
+speed
+polygons
+io
 fans
 relaxation
 iterative
@@ -36,7 +41,9 @@ unfolding
 refine
 steps
 solution
+blocks
 heat_method
+sampling
 baselines
 bounds
 closed_forms
@@ -50,15 +57,21 @@ validation_plots
 validation_report
 validation
 raster
+scene
 picture
+html_view
 plots
 demo
+cluster
 cli
 __main__
 """.split()
 
 EXTRAS = """
 cholespy
+dask
+distributed
+colorspacious
 gdist
 matplotlib
 meshio
@@ -70,9 +83,11 @@ pygeodesic
 pymeshlab
 pytest
 rich
+selenium
 skfmm
 skimage
 typer
+zarr
 """.split()
 
 
