@@ -79,9 +79,8 @@ class Relaxation:
         return self._rising(b)
 
     def _rising(self, b: FloatArray) -> FloatArray:
-        x = np.zeros(len(b))
         A = self._matrix  # symmetric: its columns are its rows
-        sweeps = self._kernel.relax(A.indptr, A.indices, A.data, b, x, _TOLERANCE, _MOST_SWEEPS)
+        x, sweeps = self._kernel.relax(A.indptr, A.indices, A.data, b, _TOLERANCE, _MOST_SWEEPS)
         if sweeps < 0 or (x < 0).any():
             raise FactorizationError(
                 f"relaxation failed ({'no end' if sweeps < 0 else 'negative heat'}): edges with negative weights let "
