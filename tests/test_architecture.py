@@ -17,6 +17,7 @@ PACKAGE = Path(heat_igl.__file__).parent
 ORDER = """
 typing
 errors
+processors
 connectivity
 mesh
 surface_points
@@ -31,10 +32,12 @@ operators
 speed
 polygons
 io
+fans
+relaxation
+iterative
 factorization
 sources
 near_field
-fans
 ordering
 sweeping
 unfolding
@@ -42,7 +45,7 @@ refine
 steps
 emission
 solution
-processors
+blocks
 heat_method
 sampling
 baselines
@@ -80,6 +83,7 @@ meshio
 numba
 potpourri3d
 psutil
+pyamg
 pygeodesic
 pymeshlab
 pytest
