@@ -35,6 +35,7 @@ factorization
 sources
 near_field
 fans
+ordering
 sweeping
 unfolding
 refine
