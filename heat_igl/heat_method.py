@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-import os
 import time
 import warnings
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
-from heat_igl.errors import AccuracyWarning, MissingExtraError, SourceError
+from heat_igl.blocks import block_size, float_type, in_blocks, in_order, progress_bar, row_writer
+from heat_igl.emission import Emission, Emitter
+from heat_igl.errors import AccuracyWarning, SourceError
 from heat_igl.factorization import Backend
 from heat_igl.mesh import RANGE_LIMIT, Mesh
 from heat_igl.operators import Laplacian, Operators, operators
+from heat_igl.processors import n_threads
 from heat_igl.refine import Refine, Refinement
 from heat_igl.solution import Diagnostics, HeatSolution
-from heat_igl.sources import Sources, vertex_sources
+from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
@@ -25,12 +27,8 @@ __all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_ti
 
 Magnitude = Literal["auto", "unit", "damped"]
 
-# Largest heat at a source, in units of h: leaves room for the gradient's 1 / length on slivers.
-_SOURCE_HEAT = 1e290
 # Below this the heat has lost digits to gradual underflow.
 _LOWEST_HEAT = 1e-300
-# Right-hand sides solved together; wider blocks measured no faster.
-_BLOCK = 8
 
 
 def _positive(name: str, value: float) -> float:
@@ -105,6 +103,9 @@ class HeatMethodSolver:
     so. The solver is immutable; threads may share it, and a pickled copy gives the same bits.
     """
 
+    _mesh: Mesh | None
+    _options: dict[str, Any]
+
     def __init__(
         self,
         mesh: Mesh | ArrayLike,
@@ -119,7 +120,17 @@ class HeatMethodSolver:
         backend: Backend = "auto",
     ) -> None:
         start = time.perf_counter()
-        domain = operators(_as_mesh(mesh, F), laplacian)
+        self._mesh = made_from = _as_mesh(mesh, F)
+        self._options = {
+            "t_coef": t_coef,
+            "t": t,
+            "laplacian": laplacian,
+            "boundary": boundary,
+            "magnitude": magnitude,
+            "refine": refine,
+            "backend": backend,
+        }
+        domain = operators(made_from, laplacian)
         seconds = time.perf_counter() - start
         if magnitude == "auto" and laplacian == "cotan":
             magnitude = "unit"
@@ -139,8 +150,37 @@ class HeatMethodSolver:
     ) -> HeatMethodSolver:
         """A solver on any domain that has operators; parameters as for the class."""
         solver = cls.__new__(cls)
+        solver._mesh = None
         solver._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, 0.0)
         return solver
+
+    def with_vertices(self, V: ArrayLike) -> HeatMethodSolver:
+        """A new solver after the vertices have moved; this one stays as it is.
+
+        Parameters
+        ----------
+        V : (n, 3) array_like
+            New positions of all vertices.
+
+        Returns
+        -------
+        HeatMethodSolver
+            With the same faces and options, and the same results as one made anew. The time step follows `t_coef`,
+            unless `t` was given. What the faces alone say is shared: they are not validated, and edges, boundary and
+            components not found again.
+
+        Raises
+        ------
+        MeshError
+            If `V` cannot be used; the message names the first offender.
+        ValueError
+            If the solver was made from operators.
+        """
+        if self._mesh is None:
+            raise ValueError(
+                "this solver was made from operators and has no vertices to move: use from_operators again"
+            )
+        return HeatMethodSolver(self._mesh.with_vertices(V), **self._options)
 
     def _set_up(
         self,
@@ -159,8 +199,8 @@ class HeatMethodSolver:
         if refine not in (None, "sweep", "unfold"):
             raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {refine!r}")
         if refine is not None and domain.triangulation is None:
-            raise ValueError(f"refine={refine!r} unfolds triangles, and this domain has none")
-        self._damped = magnitude == "damped" or (magnitude == "auto" and domain.triangulation is not None)
+            raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
+        self._damped = magnitude == "damped" or (magnitude == "auto" and domain.is_surface)
         requested = _positive("t_coef", t_coef) * domain.mean_edge_length**2 if t is None else _positive("t", t)
         step = max(requested, smallest_time_step(domain))
         if t is not None and step > requested:
@@ -171,6 +211,7 @@ class HeatMethodSolver:
             )
         self._operators = domain
         self._heat_flow = HeatFlow(domain, step, boundary, backend)
+        self._emitter = Emitter(domain, self._heat_flow)
         self._poisson: PoissonProblem | None = None
         self._unfolded: Callable[[FloatArray, IntArray], FloatArray] | None = None
         triangulation = domain.triangulation
@@ -236,64 +277,125 @@ class HeatMethodSolver:
         AccuracyWarning
             If heat underflowed on the way, so that distances beyond are too short.
         """
-        chosen = [vertex_sources(sources, self.n_vertices)]
+        chosen = [self._set(sources)]
         return np.asarray(self._distances(chosen)[0])
 
     def distances(
-        self, source_sets: Sequence[Sources], out: AnyArray | None = None, progress: bool = False
+        self,
+        source_sets: Sequence[Sources],
+        out: AnyArray | None = None,
+        progress: bool = False,
+        dtype: npt.DTypeLike | None = None,
     ) -> AnyArray:
-        """Distance from each of several sets of sources, solved in blocks.
+        """Distance from each of several sets of sources, solved in blocks, on all processors.
 
         Parameters
         ----------
         source_sets : sequence of sources
             k entries, each as for `distance`.
         out : (k, n) array of float, optional
-            Where to write, for instance a `numpy.memmap`; float64 or float32.
+            Where to write: an array, a `numpy.memmap`, a zarr array, or whatever has a shape and a dtype and takes
+            ``out[start:stop] = rows``. A chunked array is written a whole row of chunks at a time.
         progress : bool
             Show a progress bar on standard error (extra ``cli``).
+        dtype : float64 or float32, optional
+            Of the result; float64, or that of `out`.
 
         Returns
         -------
-        (k, n) float64, or `out`
-            Row i is the distance from ``source_sets[i]``; the same as one by one to rounding.
+        (k, n) array of `dtype`, or `out`
+            Row i is the distance from ``source_sets[i]``; the same as one by one to rounding, whatever the number of
+            threads.
 
         Raises
         ------
         SourceError
-            Before anything is solved, if an entry does not name vertices; the message says which.
+            Before anything is solved, if an entry does not name sources; the message says which.
         ValueError
-            If `out` has the wrong shape or cannot hold floats.
+            If `out` has the wrong shape, cannot hold floats or cannot be written, or if `dtype` is none for distances.
+
+        Notes
+        -----
+        Beside the result and one row of chunks of `out`, it holds at most 1 GiB, or what one query takes where that is
+        more: 130 bytes per face. The number of threads is that of the processors, or ``HEAT_IGL_NUM_THREADS``.
         """
         if not hasattr(source_sets, "__len__"):
             raise SourceError(f"source_sets must be a sequence of sets of sources, not {source_sets!r}: try distance")
-        chosen = []
-        for i, sources in enumerate(source_sets):
-            try:
-                chosen.append(vertex_sources(sources, self.n_vertices))
-            except SourceError as error:
-                raise SourceError(f"source_sets[{i}]: {error}") from None
+        chosen = list(self._named(source_sets))
         shape = (len(chosen), self.n_vertices)
         if out is None:
-            out = np.empty(shape)
-        elif out.shape != shape or out.dtype.kind != "f":
+            out = np.empty(shape, float_type(dtype))
+        elif tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f":
             raise ValueError(f"out must be an array of floats of shape {shape}, not {out.dtype} of shape {out.shape}")
-        starts: Any = range(0, len(chosen), _BLOCK)
-        for start in _tracked(starts) if progress else starts:
-            out[start : start + _BLOCK] = self._distances(chosen[start : start + _BLOCK])
+        elif dtype is not None and float_type(dtype) != out.dtype:
+            raise ValueError(f"dtype is {np.dtype(dtype)}, but out holds {out.dtype}: leave one of them away")
+        elif isinstance(out, np.ndarray) and not out.flags.writeable:
+            raise ValueError("out is read-only: open a memmap with mode='r+'")
+        write = row_writer(out)
+        with progress_bar("distances", len(chosen), progress) as advance:
+            for rows in self._blocks(chosen, len(chosen)):
+                write(rows.astype(out.dtype, copy=False))
+                advance(len(rows))
         return out
+
+    def iter_distances(self, source_sets: Iterable[Sources], dtype: npt.DTypeLike | None = None) -> Iterator[AnyArray]:
+        """Distance from each of several sets of sources, a row as soon as its block is solved.
+
+        Parameters
+        ----------
+        source_sets : iterable of sources
+            Each as for `distance`; drawn from as the rows are taken, so it may be a generator without an end.
+        dtype : float64 or float32, optional
+            Of the rows.
+
+        Yields
+        ------
+        (n,) array of `dtype`
+            In the order of `source_sets`; no view of anything else.
+
+        Raises
+        ------
+        SourceError
+            When the row of an entry that does not name sources would be next; the message says which.
+        ValueError
+            At once, if `dtype` is none for distances.
+
+        Notes
+        -----
+        Memory is bounded as for `distances`, whatever the number of sets; blocks are solved ahead on all processors
+        while rows are being used.
+        """
+        row_type = float_type(dtype)
+        if not isinstance(source_sets, Iterable):
+            raise SourceError(f"source_sets must be an iterable of sets of sources, not {source_sets!r}: try distance")
+        n_sets = len(source_sets) if isinstance(source_sets, Sized) else None
+        blocks = self._blocks(self._named(source_sets), n_sets)
+        return (row.astype(row_type) for rows in blocks for row in rows)
+
+    def _named(self, source_sets: Iterable[Sources]) -> Iterator[SourceSet]:
+        """The sources of each set; errors say which set they are in."""
+        for i, sources in enumerate(source_sets):
+            try:
+                yield self._set(sources)
+            except SourceError as error:
+                raise SourceError(f"source_sets[{i}]: {error}") from None
+
+    def _blocks(self, source_sets: Iterable[SourceSet], n_sets: int | None) -> Iterator[FloatArray]:
+        """Distances of a block of sets after the other."""
+        size, threads = block_size(len(self._operators.weights), n_sets, n_threads())
+        return in_order(self._distances, in_blocks(source_sets, size), threads)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
-        chosen = [vertex_sources(sources, self.n_vertices)]
-        u = self._diffuse(chosen)
-        X, magnitude = self._field(u)
+        chosen = [self._set(sources)]
+        emissions, u = self._diffuse(chosen)
+        X, magnitude = self._field(emissions, u)
         if self._unfolded is not None:
             distance = _in_heat_order(self._unfolded, u, chosen)
         else:
-            distance = self._integrated(chosen, u, X, magnitude)
+            distance = self._integrated(emissions, u, X, magnitude)
         with np.errstate(under="ignore"):
-            heat = u[:, 0] / self._source_heat(self._rim(chosen[0])) / self._heat_flow.mean_mass
+            heat = u[:, 0] / self._emitter.unit(emissions[0]) / self._heat_flow.mean_mass
         direction = np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T)
         return HeatSolution(
             heat=heat,
@@ -304,68 +406,49 @@ class HeatMethodSolver:
             diagnostics=self.diagnostics,
         )
 
-    def _source_heat(self, sources: IntArray) -> float:
-        """Initial heat of each source, for `HeatFlow.solve`: as much as cannot overflow.
+    def _set(self, sources: Sources) -> SourceSet:
+        faces = self._operators.faces
+        return source_set(sources, self.n_vertices, None if faces is None else faces.F)
 
-        Rows of L sum to zero, so the maximum principle bounds the heat by the largest initial heat over mass.
-        """
-        mass = self._operators.M.diagonal()[sources] / self._heat_flow.mean_mass
-        smallest = float(mass[mass > 0].min(initial=1.0))
-        return _SOURCE_HEAT * min(self._operators.mean_edge_length, 1e10) * smallest
-
-    def _distances(self, source_sets: list[IntArray]) -> FloatArray:
+    def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
         """Distances (k, n) from k sets of sources."""
-        u = self._diffuse(source_sets)
+        emissions, u = self._diffuse(source_sets)
         if self._unfolded is not None:
             return _in_heat_order(self._unfolded, u, source_sets)
-        return self._integrated(source_sets, u, *self._field(u))
+        return self._integrated(emissions, u, *self._field(emissions, u))
 
-    def _diffuse(self, source_sets: list[IntArray]) -> FloatArray:
-        """Heat (n, k), from the rims of k sets of sources."""
-        initial = np.zeros((self.n_vertices, len(source_sets)))
-        for column, sources in enumerate(source_sets):
-            rim = self._rim(sources)
-            initial[rim, column] = self._source_heat(rim)
-        return self._heat_flow.solve(initial)
+    def _diffuse(self, source_sets: list[SourceSet]) -> tuple[list[Emission], FloatArray]:
+        """Heat (n, k) from k sets of sources."""
+        emissions = [self._emitter.emission(sources) for sources in source_sets]
+        return emissions, self._heat_flow.solve(np.stack([self._emitter.heat(one) for one in emissions], axis=1))
 
-    def _field(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _field(self, emissions: list[Emission], u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Directions (d m, k) and their magnitude (m, k)."""
         domain = self._operators
         X = normalize(domain, u)
-        return X, damping(domain, u, self.t) if self._damped else np.ones((len(domain.weights), u.shape[1]))
+        magnitude = damping(domain, u, self.t) if self._damped else np.ones((len(domain.weights), u.shape[1]))
+        for column, emission in enumerate(emissions):
+            self._emitter.guide(emission, X[:, column], magnitude[:, column])
+        return X, magnitude
 
-    def _integrated(
-        self, source_sets: list[IntArray], u: FloatArray, X: FloatArray, magnitude: FloatArray
-    ) -> FloatArray:
+    def _integrated(self, emissions: list[Emission], u: FloatArray, X: FloatArray, magnitude: FloatArray) -> FloatArray:
         """Distances (k, n) by step 3."""
         if self._poisson is None:
             raise RuntimeError("this solver unfolds and has no Poisson problem")
         domain = self._operators
-        phi = self._poisson.solve(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1)) if self._damped else X))
-        for column, sources in enumerate(source_sets):
-            self._warn_if_cold(u[:, column], sources)
-            phi[:, column] = self._from_sources(phi[:, column], u[:, column], self._rim(sources))
-            phi[sources, column] = 0.0
-        return np.ascontiguousarray(phi.T)
+        phi = self._poisson.solve(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1))))
+        distances = np.empty(phi.T.shape)
+        for column, emission in enumerate(emissions):
+            self._warn_if_cold(u[:, column], emission)
+            distances[column] = self._emitter.settle(emission, phi[:, column], u[:, column])
+        return distances
 
-    def _rim(self, sources: IntArray) -> IntArray:
-        """The sources that have a neighbour which is none.
-
-        Heat starts from these alone: inside a region of sources it would be level, and its gradient rounding noise
-        that is then normalized to length 1 and integrated.
-        """
-        L = self._operators.L
-        is_source = np.zeros(self.n_vertices, bool)
-        is_source[sources] = True
-        neighbours = L[:, sources]
-        outward = np.repeat(np.arange(len(sources)), np.diff(neighbours.indptr))[~is_source[neighbours.indices]]
-        return sources[np.unique(outward)] if len(outward) else sources
-
-    def _warn_if_cold(self, u: FloatArray, sources: IntArray) -> None:
+    def _warn_if_cold(self, u: FloatArray, emission: Emission) -> None:
         """Heat that has underflowed has no gradient, and distance does not grow where X is 0: say so."""
         domain = self._operators
-        cold = (np.abs(u) < _LOWEST_HEAT) & np.isin(domain.components, domain.components[sources])
-        cold[sources] = False
+        components = domain.components
+        cold = (np.abs(u) < _LOWEST_HEAT) & np.isin(components, components[emission.near.vertex])
+        cold[emission.near.vertex] = False
         remedy = "raise t_coef"
         if self._heat_flow.boundary == "dirichlet":
             cold &= ~domain.boundary
@@ -377,59 +460,15 @@ class HeatMethodSolver:
                 stacklevel=4,
             )
 
-    def _from_sources(self, phi: FloatArray, u: FloatArray, sources: IntArray) -> FloatArray:
-        """Shift phi so that distance starts at 0 at every source; ``inf`` where there is no source to start from."""
-        components = self._operators.components
-        n_sources = np.bincount(components[sources], minlength=int(components.max()) + 1)
-        if (n_sources > 1).any():
-            phi = phi - self._value_at_source(phi, u, sources)
-        total = np.bincount(components[sources], weights=phi[sources], minlength=len(n_sources))
-        shift = np.where(n_sources > 0, total / np.maximum(n_sources, 1), -np.inf)
-        distance = np.maximum(phi - shift[components], 0.0)
-        distance[sources] = 0.0
-        return np.asarray(distance)
-
-    def _value_at_source(self, phi: FloatArray, u: FloatArray, sources: IntArray) -> FloatArray:
-        """The value that phi has at the source from which a vertex got its heat.
-
-        phi is a little different at each source: the error of a path between them. Shifting by the mean would move
-        the whole cell of each source by its difference. Here every vertex is shifted by the values of the sources
-        weighted by its heat from each, one more solve; the weights change from 0 to 1 within sqrt(t) of the border
-        between two cells.
-        """
-        low, high = float(phi[sources].min()), float(phi[sources].max())
-        if low == high:
-            return np.full_like(phi, low)
-        initial = np.zeros_like(phi)
-        initial[sources] = self._source_heat(sources) * ((phi[sources] - low) / (high - low))
-        warm = u > 0  # always, but for noise under "cotan" and a cold boundary
-        share = np.divide(self._heat_flow.solve(initial), u, out=np.zeros_like(u), where=warm)
-        return low + (high - low) * np.clip(share, 0.0, 1.0)
-
 
 def _in_heat_order(
-    unfolded: Callable[[FloatArray, IntArray], FloatArray], u: FloatArray, source_sets: list[IntArray]
+    unfolded: Callable[[FloatArray, IntArray], FloatArray], u: FloatArray, source_sets: list[SourceSet]
 ) -> FloatArray:
-    """Distances (k, n) by unfolding, on all processors: the kernels run without the interpreter's lock.
+    """Distances (k, n) by unfolding.
 
     Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
     """
-    if len(source_sets) == 1:
-        return unfolded(-u[:, 0], source_sets[0])[None]
-    with ThreadPoolExecutor(_n_processors()) as pool:
-        return np.stack(list(pool.map(unfolded, -u.T, source_sets)))
-
-
-def _n_processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _tracked(starts: Any) -> Any:
-    try:
-        from rich.progress import track
-    except ImportError:
-        raise MissingExtraError.of("progress=True", "rich", "cli") from None
-    return track(starts, description="distances")
+    return np.stack([unfolded(-column, one.vertices) for column, one in zip(u.T, source_sets, strict=True)])
 
 
 def _as_mesh(mesh: Mesh | ArrayLike, F: ArrayLike | None) -> Mesh:
