@@ -52,18 +52,21 @@ scene
 picture
 html_view
 plots
+viewer
 demo
 cli
 __main__
 """.split()
 
 EXTRAS = """
+Xlib
 cholespy
 colorspacious
 gdist
 matplotlib
 meshio
 numba
+polyscope
 potpourri3d
 psutil
 pygeodesic
