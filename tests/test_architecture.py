@@ -20,21 +20,30 @@ errors
 connectivity
 mesh
 surface_points
+projection
+flip_history
 intrinsic
 tufted
 subdivision
+images
 shapes
-io
 operators
+speed
+polygons
+io
 factorization
 sources
+near_field
 fans
 sweeping
 unfolding
 refine
 steps
+emission
 solution
+processors
 heat_method
+sampling
 baselines
 bounds
 closed_forms
@@ -54,6 +63,7 @@ html_view
 plots
 viewer
 demo
+cluster
 cli
 __main__
 """.split()
@@ -61,6 +71,8 @@ __main__
 EXTRAS = """
 Xlib
 cholespy
+dask
+distributed
 colorspacious
 gdist
 matplotlib
@@ -77,6 +89,7 @@ selenium
 skfmm
 skimage
 typer
+zarr
 """.split()
 
 
