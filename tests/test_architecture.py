@@ -17,6 +17,7 @@ PACKAGE = Path(heat_igl.__file__).parent
 ORDER = """
 typing
 errors
+processors
 connectivity
 mesh
 surface_points
@@ -31,20 +32,24 @@ operators
 speed
 polygons
 io
+fans
+relaxation
+iterative
 factorization
 sources
 near_field
-fans
+ordering
 sweeping
 unfolding
 refine
 steps
 emission
 solution
-processors
+blocks
 heat_method
 sampling
 baselines
+applications
 bounds
 closed_forms
 peak_memory
@@ -81,6 +86,7 @@ numba
 polyscope
 potpourri3d
 psutil
+pyamg
 pygeodesic
 pymeshlab
 pytest
