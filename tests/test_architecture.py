@@ -66,6 +66,7 @@ scene
 picture
 html_view
 plots
+viewer
 demo
 cluster
 cli
@@ -73,6 +74,7 @@ __main__
 """.split()
 
 EXTRAS = """
+Xlib
 cholespy
 dask
 distributed
@@ -81,6 +83,7 @@ gdist
 matplotlib
 meshio
 numba
+polyscope
 potpourri3d
 psutil
 pyamg
