@@ -35,6 +35,10 @@ refine
 steps
 solution
 heat_method
+isolines
+tracing
+paths
+curve_files
 baselines
 bounds
 closed_forms
@@ -57,6 +61,7 @@ __main__
 
 EXTRAS = """
 cholespy
+ezdxf
 gdist
 matplotlib
 meshio
