@@ -6,6 +6,7 @@ Imported by `heat_igl.__main__` only; needs the extra ``cli``.
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 import tempfile
@@ -14,7 +15,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, cast, get_args
 
 import numpy as np
 import typer
@@ -23,7 +24,15 @@ from rich.progress import Progress
 from rich.text import Text
 
 import heat_igl
-from heat_igl.errors import AccuracyWarning, FactorizationError, MeshError, MissingExtraError, ReferenceSolverError
+from heat_igl.curve_files import CURVE_SUFFIXES
+from heat_igl.errors import (
+    AccuracyWarning,
+    BatchError,
+    FactorizationError,
+    MeshError,
+    MissingExtraError,
+    ReferenceSolverError,
+)
 from heat_igl.factorization import Backend
 from heat_igl.guarded import TIMEOUT
 from heat_igl.heat_method import HeatMethodSolver, Magnitude
@@ -40,7 +49,10 @@ from heat_igl.validation import METHODS, draw_sources
 __all__ = ["app", "run"]
 
 # What a user can cause; anything else is a fault of the package and shows its traceback.
-_EXPECTED = (OSError, ValueError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
+_EXPECTED = (OSError, ValueError, BatchError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
+
+# More isolines than this are a mistaken spacing.
+_MOST_LINES = 10000
 
 _DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
 
@@ -218,6 +230,49 @@ def distance(
 
 
 @app.command()
+def isolines(
+    mesh: MeshArgument,
+    source: Annotated[list[int], typer.Option(help="Source vertex, counted from 0; repeat for several.")],
+    spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=_positive)],
+    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the lines.")],
+    refine: Annotated[str | None, _choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+) -> None:
+    """Curves of equal distance from one or more source vertices."""
+    loaded = read_mesh(mesh)
+    sources = vertex_sources(np.array(source), loaded.n_vertices)
+    _check_curves(output)
+    phi = HeatMethodSolver(loaded, refine=cast(Refine | None, refine)).distance(sources)
+    farthest = float(phi[np.isfinite(phi)].max())
+    if farthest > _MOST_LINES * spacing:
+        raise ValueError(
+            f"--spacing {spacing:g} makes over {_MOST_LINES} lines up to {farthest:.3g}: choose a larger one"
+        )
+    levels = spacing * np.arange(1, int(farthest / spacing) + 1)
+    curves = heat_igl.isolines(loaded, phi, levels)
+    heat_igl.write_curves(output, loaded, {f"{level:g}": each for level, each in zip(levels, curves, strict=True)})
+    rows = [("farthest", f"{farthest:.6g}"), ("lines", f"{sum(map(len, curves))} at {len(levels)} distances")]
+    _print_rows([*rows, ("wrote", str(output))])
+
+
+@app.command()
+def path(
+    mesh: MeshArgument,
+    start: Annotated[int, typer.Option("--from", help="Vertex where the path begins, counted from 0.")],
+    end: Annotated[int, typer.Option("--to", help="Vertex where it ends.")],
+    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the path.")],
+) -> None:
+    """A locally shortest path between two vertices."""
+    loaded = read_mesh(mesh)
+    for vertex in (start, end):
+        vertex_sources(vertex, loaded.n_vertices)
+    _check_curves(output)
+    found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), start, end)
+    heat_igl.write_curves(output, loaded, found)
+    length = float(found[0].lengths(loaded).sum())
+    _print_rows([("length", f"{length:.6g}"), ("segments", str(len(found[0]))), ("wrote", str(output))])
+
+
+@app.command()
 def validate(
     mesh: MeshArgument,
     sources: Annotated[int, typer.Option(min=1, help="Single source vertices, one distance from each.")] = 3,
@@ -270,6 +325,54 @@ def demo(
     _print_rows(demonstrate(out))
 
 
+@app.command()
+def batch(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of meshes, searched with all below it.")],
+    store: Annotated[Path, typer.Option(help="Zarr directory for the distances; continued if it is there.")],
+    sources: Annotated[
+        str, typer.Option(metavar="all|farthest:K|FILE", help="Source sets; in a file, vertex indices, one set a line.")
+    ] = "all",
+    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler; else this machine.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; one a processor.")] = None,
+    refine: Annotated[str | None, _choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+    dtype: Annotated[str, typer.Option(help="Of the distances.", callback=_one_of(("float32", "float64")))] = "float32",
+    log: Annotated[Path | None, typer.Option(help="File for a log of meshes and blocks.")] = None,
+    dashboard: Annotated[bool, typer.Option(help="Serve Dask's dashboard (needs bokeh).")] = False,
+) -> None:
+    """Distances on every mesh of a folder, into a store, on all processors or a cluster; resumes where it stopped."""
+    from heat_igl import cluster
+
+    meshes = cluster.folder(folder)
+    plan = sources if sources == "all" or sources.startswith("farthest:") else cluster.read_source_sets(sources)
+    options: dict[str, Any] = {"refine": refine, "dtype": dtype, "progress": Console(stderr=True).is_terminal}
+    with _logged(log), cluster.connected(scheduler, workers, dashboard) as client:
+        if dashboard:
+            _say(f"dashboard: {client.dashboard_link}")
+        report = cluster.distances(meshes, plan, store, client=client, **options)
+    print(report.to_markdown(), end="")
+    if report.failed:
+        raise typer.Exit(1)
+
+
+@contextmanager
+def _logged(path: Path | None) -> Iterator[None]:
+    """Write what the batch logs to a file; what Dask logs about lost connections is told in one line at the end."""
+    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
+    if path is None:
+        yield
+        return
+    handler = logging.FileHandler(path, encoding="utf8")
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    logger = logging.getLogger("heat_igl.cluster")
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        handler.close()
+
+
 def _check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> None:
     if output is not None:
         accepted = (".vtu",) if mesh.is_tetrahedral else (".ply", ".vtu")
@@ -284,6 +387,14 @@ def _check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> Non
             raise ValueError(f"--picture {picture}: pictures go to {', '.join(PICTURE_SUFFIXES)} files")
         _require("matplotlib", "a picture", "view")
         _check_writable(picture)
+
+
+def _check_curves(output: Path) -> None:
+    if output.suffix.lower() not in CURVE_SUFFIXES:
+        raise ValueError(f"--output {output}: curves go to {', '.join(CURVE_SUFFIXES)} files")
+    if output.suffix.lower() == ".dxf":
+        _require("ezdxf", "a .dxf file", "io")
+    _check_writable(output)
 
 
 def _require(package: str, purpose: str, extra: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,16 +13,14 @@ from heat_igl.errors import MeshError, MissingExtraError, SourceError
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.mesh import Mesh
-from heat_igl.sources import Sources, vertex_sources
+from heat_igl.sources import Sources, source_set, vertex_sources
 from heat_igl.surface_points import SurfaceCurve, SurfacePoints
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from heat_igl.tracing import Surface
 
 __all__ = ["shortest_paths"]
-
-Places = Sources | SurfacePoints | SurfaceCurve
 
 # Barycentric coordinates below this put a point on the side of its face.
 _ON_SIDE = 1e-12
@@ -31,8 +29,8 @@ _ON_SIDE = 1e-12
 def shortest_paths(
     mesh: Mesh,
     distance: ArrayLike | HeatMethodSolver,
-    targets: Sources | SurfacePoints,
-    sources: Places | None = None,
+    targets: Sources,
+    sources: Sources | None = None,
 ) -> list[SurfaceCurve]:
     """Locally shortest paths from targets to the sources of a distance.
 
@@ -44,11 +42,12 @@ def shortest_paths(
         Distance from the sources, or a solver to compute it. It decides which way around the surface a path takes, so
         the better it is (``refine="unfold"``), the more often that is the shortest one; its values are not used
         otherwise.
-    targets : int, sequence of int, or SurfacePoints
+    targets : int, sequence of int, (n,) mask of bool, or SurfacePoints
         Where the paths begin: vertices, as often and in the order given, or points on faces.
-    sources : int, sequence of int, (n,) mask of bool, SurfacePoints, or SurfaceCurve, optional
-        Where paths may end; by default the vertices where the distance is 0. Needed with a solver, and where sources
-        lie inside faces. On a curve, a path ends at the nearest point of the segment in the face where it arrives.
+    sources : optional
+        Where paths may end: whatever ``solver.distance`` takes; by default the vertices where the distance is 0. Needed
+        with a solver, and where sources lie inside faces. On a curve, a path ends at the nearest point of the segment
+        in the face where it arrives.
 
     Returns
     -------
@@ -107,12 +106,11 @@ def _kernel() -> ModuleType:
     return tracing
 
 
-def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver, sources: Places | None) -> FloatArray:
+def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver, sources: Sources | None) -> FloatArray:
     if isinstance(distance, HeatMethodSolver):
         if sources is None:
             raise SourceError("a solver needs sources: name them, or pass a distance in its place")
-        chosen: Any = sources
-        distance = distance.distance(chosen)
+        distance = distance.distance(sources)
     array: AnyArray = np.asarray(distance)
     if array.dtype.kind not in "iuf" or array.shape != (mesh.n_vertices,):
         raise ValueError(
@@ -128,7 +126,7 @@ def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver, sources: Places 
     return values
 
 
-def _points(name: str, mesh: Mesh, points: Sources | SurfacePoints) -> tuple[IntArray, FloatArray]:
+def _points(name: str, mesh: Mesh, points: Sources) -> tuple[IntArray, FloatArray]:
     """Faces and barycentric coordinates of points, or of vertices in the order given."""
     if isinstance(points, SurfacePoints):
         points.positions(mesh)  # which checks the faces
@@ -151,40 +149,44 @@ def _snapped(barycentric: FloatArray) -> FloatArray:
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
-def _goals(mesh: Mesh, values: FloatArray, sources: Places | None) -> tuple[AnyArray, IntArray, FloatArray, IntArray]:
+def _goals(
+    mesh: Mesh, values: FloatArray, sources: Sources | None
+) -> tuple[BoolArray, IntArray, FloatArray, FloatArray, IntArray]:
     """Where paths may end; the fields of the kernel's `Goals`."""
-    is_source = np.zeros(mesh.n_vertices, bool)
-    face, inside = np.zeros(0, np.int64), np.zeros((0, 2, 3))
     if sources is None:
-        is_source = values == 0
-        if not is_source.any():
+        if values.min() > 0:
             raise SourceError("distance is 0 at no vertex: name the sources, where paths may end")
-    elif isinstance(sources, SurfaceCurve):
-        sources.positions(mesh)  # which checks the faces
-        face, inside = sources.faces, np.stack([_snapped(sources.start), _snapped(sources.end)], axis=1)
-    elif isinstance(sources, SurfacePoints):
-        face, points = _points("sources", mesh, sources)
-        inside = np.stack([points, points], axis=1)
-    else:
-        is_source[vertex_sources(sources, mesh.n_vertices)] = True
+        sources = values == 0
+    found = source_set(sources, mesh.n_vertices, mesh.F)
+    points, segments = found.points, found.segments
+    face = np.concatenate([points.faces, segments.faces])
+    start, end = (_snapped(np.concatenate([points.barycentric, there])) for there in (segments.start, segments.end))
+    inside, offset = np.stack([start, end], axis=1), np.concatenate([points.offset, segments.offset])
+
+    # A vertex that is nearer to another source than its own offset is passed.
+    is_source = np.zeros(mesh.n_vertices, bool)
     row, _, corner = np.nonzero(inside == 1)
-    is_source[mesh.F[face[row], corner]] = True
-    face, inside = _on_all_sides(mesh, face, inside)
+    vertex, begins = np.append(found.vertices, mesh.F[face[row], corner]), np.append(found.vertex_offset, offset[row])
+    is_source[vertex[values[vertex] >= begins * (1 - 1e-9)]] = True
+
+    face, inside, offset = _on_all_sides(mesh, face, inside, offset)
     first_inside = np.concatenate([[0], np.cumsum(np.bincount(face, minlength=mesh.n_faces))])
     escape = _ways_out(mesh, values, _roots(mesh, is_source, first_inside))
-    return is_source, first_inside, inside, escape
+    return is_source, first_inside, inside, offset, escape
 
 
-def _roots(mesh: Mesh, is_source: AnyArray, first_inside: IntArray) -> AnyArray:
+def _roots(mesh: Mesh, is_source: BoolArray, first_inside: IntArray) -> BoolArray:
     """The vertices that are sources, or corners of faces with sources inside."""
     roots = is_source.copy()
     roots[mesh.F[np.diff(first_inside) > 0]] = True
     return roots
 
 
-def _on_all_sides(mesh: Mesh, face: IntArray, inside: FloatArray) -> tuple[IntArray, FloatArray]:
+def _on_all_sides(
+    mesh: Mesh, face: IntArray, inside: FloatArray, offset: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
     """Segments in faces, sorted by face; one that lies on a side, or at a corner, once in each face that has it."""
-    faces, segments = [face], [inside]
+    faces, segments, copies = [face], [inside], [np.arange(len(face))]
     weight = inside.max(axis=1)  # (p, 3): 0 for corners that play no part
     for row in np.flatnonzero((weight == 0).any(axis=1)):
         f, played = int(face[row]), weight[row] > 0
@@ -196,12 +198,13 @@ def _on_all_sides(mesh: Mesh, face: IntArray, inside: FloatArray) -> tuple[IntAr
             moved[at[:, 0], :, at[:, 1]] = inside[row, :, c]
         faces.append(others)
         segments.append(moved)
+        copies.append(np.full(len(others), row))
     all_faces = np.concatenate(faces)
     order = np.argsort(all_faces, kind="stable")
-    return all_faces[order], np.concatenate(segments)[order]
+    return all_faces[order], np.concatenate(segments)[order], offset[np.concatenate(copies)[order]]
 
 
-def _ways_out(mesh: Mesh, values: FloatArray, roots: AnyArray) -> IntArray:
+def _ways_out(mesh: Mesh, values: FloatArray, roots: BoolArray) -> IntArray:
     """For each vertex the next on the way along edges to a root that rises least; -1 at roots, and if there is none.
 
     The ways are those in a minimum spanning tree whose edges weigh as much as their higher end, and among equals as

@@ -72,6 +72,8 @@ class Goals(NamedTuple):
         Sources inside face f are rows ``first_inside[f]`` to ``first_inside[f + 1]`` of `inside`.
     inside : (p, 2, 3) float64
         Barycentric coordinates of both ends of a segment, equal ones for a point.
+    offset : (p,) float64
+        The distance at which each begins.
     escape : (n,) int64
         The next vertex on a way along edges to a source, -1 where there is none: where descent ends too early.
     """
@@ -79,6 +81,7 @@ class Goals(NamedTuple):
     is_source: BoolArray
     first_inside: IntArray
     inside: FloatArray
+    offset: FloatArray
     escape: IntArray
 
 
@@ -203,13 +206,13 @@ def _nearest(s: Surface, f: int, segment: FloatArray, x: FloatArray, out: FloatA
 
 @jit
 def _source_in(s: Surface, d: FloatArray, goals: Goals, f: int, x: FloatArray, at_any_cost: bool) -> tuple[int, float]:
-    """The nearest source inside face f from its point x, and how far it is; -1 if d at x belongs to a nearer one."""
+    """The nearest source inside face f from its point x, and the distance by it; -1 if d at x is less."""
     best, length = -1, math.inf
     if goals.first_inside[f] == goals.first_inside[f + 1]:
         return best, length
     point = np.empty(3)
     for i in range(goals.first_inside[f], goals.first_inside[f + 1]):
-        apart = _nearest(s, f, goals.inside[i], x, point)
+        apart = _nearest(s, f, goals.inside[i], x, point) + goals.offset[i]
         if apart < length:
             best, length = i, apart
     value = x[0] * d[s.F[f, 0]] + x[1] * d[s.F[f, 1]] + x[2] * d[s.F[f, 2]]
@@ -703,8 +706,6 @@ def _path(
             v = s.F[f, c]
             continue
         _descent(s, d, f, rate)
-        if on >= 0:
-            x[(on + 1) % 3] = 1.0 - x[(on + 2) % 3]
         _exit(x, rate)
         c = _only_corner(x)
         if c >= 0:

@@ -20,25 +20,34 @@ errors
 connectivity
 mesh
 surface_points
+projection
+flip_history
 intrinsic
 tufted
 subdivision
+images
 shapes
-io
 operators
+speed
+polygons
+io
 factorization
 sources
+near_field
 fans
 sweeping
 unfolding
 refine
 steps
+emission
 solution
+processors
 heat_method
 isolines
 tracing
 paths
 curve_files
+sampling
 baselines
 bounds
 closed_forms
@@ -52,15 +61,21 @@ validation_plots
 validation_report
 validation
 raster
+scene
 picture
+html_view
 plots
 demo
+cluster
 cli
 __main__
 """.split()
 
 EXTRAS = """
 cholespy
+colorspacious
+dask
+distributed
 ezdxf
 gdist
 matplotlib
@@ -72,9 +87,11 @@ pygeodesic
 pymeshlab
 pytest
 rich
+selenium
 skfmm
 skimage
 typer
+zarr
 """.split()
 
 
