@@ -74,7 +74,8 @@ def shortest_paths(
     found by a funnel, and where it bends at a vertex that it could pass on the other side with an angle below pi, the
     strip is led there, until no such vertex is left (Xin and Wang 2007). Where the descent ends at a vertex that is no
     source, it goes on along the edges that rise least. Where three faces or more meet at an edge, a path goes straight
-    over it as it would over any other, but is not moved past a vertex of it.
+    over it as it would over any other, but is not moved past a vertex of it. Nor is it moved past two vertices in one
+    place.
     """
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")
