@@ -13,11 +13,12 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from heat_igl.errors import FactorizationError, MissingExtraError
+from heat_igl.iterative import factors_fit, has_iterative, iterative
 from heat_igl.typing import FloatArray
 
 __all__ = ["Backend", "CholespyFactorization", "Factorization", "ScipyFactorization", "factorize"]
 
-Backend = Literal["auto", "scipy", "cholespy"]
+Backend = Literal["auto", "scipy", "cholespy", "iterative"]
 
 
 class Factorization(Protocol):
@@ -142,8 +143,9 @@ def factorize(A: sp.csc_matrix, backend: Backend = "auto") -> Factorization:
     ----------
     A : (n, n) csc_matrix
         Both triangles stored.
-    backend : {"auto", "scipy", "cholespy"}
-        "auto" takes cholespy where it is installed and scipy elsewhere.
+    backend : {"auto", "scipy", "cholespy", "iterative"}
+        "auto" takes cholespy where it is installed and scipy elsewhere; where factors would not fit into memory, by an
+        estimate made before, it takes "iterative": nothing is factored, see `iterative`.
 
     Raises
     ------
@@ -154,12 +156,14 @@ def factorize(A: sp.csc_matrix, backend: Backend = "auto") -> Factorization:
     ValueError
         If there is no such backend.
     """
-    if backend != "auto" and backend not in _BACKENDS:
-        raise ValueError(f"backend must be 'auto' or one of {sorted(_BACKENDS)}, not {backend!r}")
+    if backend not in ("auto", "iterative", *_BACKENDS):
+        raise ValueError(f"backend must be 'auto' or one of {sorted([*_BACKENDS, 'iterative'])}, not {backend!r}")
     if not np.isfinite(A.data).all():
         raise FactorizationError(
             f"{int((~np.isfinite(A.data)).sum())} entries of the matrix are not finite: the mesh has degenerate faces"
         )
+    if backend == "iterative" or (backend == "auto" and has_iterative() and not factors_fit(A)):
+        return iterative(A)
     installed = importlib.util.find_spec("cholespy") is not None
     if backend == "cholespy" and not installed:
         raise MissingExtraError.of('backend="cholespy"', "cholespy", "fast")

@@ -3,8 +3,8 @@
     python scripts/paths_table.py bunny.obj cow.obj         # 200 targets on each, from one source
     python scripts/paths_table.py MESH --targets 1000 --output DIRECTORY    # where paths.json and paths.md go
 
-Truth is pygeodesic's exact polyhedral distance (extra ``validate``). Paths are traced down the refined distance, and down
-that of the heat alone. Needs the extra ``fast``.
+Truth is pygeodesic's exact polyhedral distance (extra ``validate``). Paths are traced down the refined distance, and
+down that of the heat alone. Needs the extra ``fast``.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def measured(mesh: Mesh, name: str, n_targets: int, seed: int) -> list[dict[str,
 
 def markdown(result: dict[str, Any]) -> str:
     lines = [
-        f"Length of a path over exact distance, less 1, in percent; from one source, seed {result['seed']}. Seconds are "
+        f"Length of a path over exact distance, less 1, in percent; to one source, seed {result['seed']}. Seconds are "
         "for all paths, tables of the mesh included and the distance not.",
         "",
         "| mesh | vertices | down | paths | median | mean | 99th percentile | largest | smallest | seconds |",

@@ -17,6 +17,7 @@ PACKAGE = Path(heat_igl.__file__).parent
 ORDER = """
 typing
 errors
+processors
 connectivity
 mesh
 surface_points
@@ -31,17 +32,20 @@ operators
 speed
 polygons
 io
+fans
+relaxation
+iterative
 factorization
 sources
 near_field
-fans
+ordering
 sweeping
 unfolding
 refine
 steps
 emission
 solution
-processors
+blocks
 heat_method
 isolines
 tracing
@@ -49,6 +53,7 @@ paths
 curve_files
 sampling
 baselines
+applications
 bounds
 closed_forms
 peak_memory
@@ -83,6 +88,7 @@ meshio
 numba
 potpourri3d
 psutil
+pyamg
 pygeodesic
 pymeshlab
 pytest
