@@ -47,6 +47,10 @@ emission
 solution
 blocks
 heat_method
+isolines
+tracing
+paths
+curve_files
 sampling
 baselines
 applications
@@ -76,9 +80,10 @@ __main__
 EXTRAS = """
 Xlib
 cholespy
+colorspacious
 dask
 distributed
-colorspacious
+ezdxf
 gdist
 matplotlib
 meshio
