@@ -15,6 +15,7 @@ from heat_igl.images import ImageDomain, image_domain
 from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_mesh
 from heat_igl.mesh import Mesh, MeshReport
 from heat_igl.polygons import PolygonMesh, polygon_operators
+from heat_igl.projection import ClosestPoints, closest_points, curve_on, edge_curve
 from heat_igl.refine import Refinement, unfolded_distance
 from heat_igl.sampling import (
     VoronoiCells,
@@ -27,6 +28,7 @@ from heat_igl.sampling import (
     voronoi_cells,
 )
 from heat_igl.solution import Diagnostics, HeatSolution
+from heat_igl.sources import OffsetSources
 from heat_igl.speed import speed_operators
 from heat_igl.subdivision import split_long_edges
 from heat_igl.surface_points import SurfaceCurve, SurfacePoints
@@ -36,6 +38,7 @@ from heat_igl.validation_report import ValidationReport, ValidationRow
 __all__ = [
     "AccuracyWarning",
     "BatchError",
+    "ClosestPoints",
     "Diagnostics",
     "FactorizationError",
     "HeatMethodSolver",
@@ -46,6 +49,7 @@ __all__ = [
     "MeshReport",
     "MissingExtraError",
     "PolygonMesh",
+    "OffsetSources",
     "ReferenceSolverError",
     "Refinement",
     "SourceError",
@@ -63,6 +67,9 @@ __all__ = [
     "farthest_cells",
     "farthest_points",
     "geodesic_centre",
+    "closest_points",
+    "curve_on",
+    "edge_curve",
     "heat_method_distance",
     "image_domain",
     "metrics",

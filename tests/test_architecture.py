@@ -21,6 +21,7 @@ processors
 connectivity
 mesh
 surface_points
+projection
 flip_history
 intrinsic
 tufted
@@ -36,10 +37,12 @@ relaxation
 iterative
 factorization
 sources
+near_field
 sweeping
 unfolding
 refine
 steps
+emission
 solution
 blocks
 heat_method
