@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 import warnings
 from collections.abc import Callable, Sequence
@@ -11,13 +10,15 @@ from typing import Any, Literal
 
 import numpy as np
 
+from heat_igl.emission import Emission, Emitter
 from heat_igl.errors import AccuracyWarning, MissingExtraError, SourceError
 from heat_igl.factorization import Backend
 from heat_igl.mesh import RANGE_LIMIT, Mesh
 from heat_igl.operators import Laplacian, Operators, operators
+from heat_igl.processors import n_threads
 from heat_igl.refine import Refine, Refinement
 from heat_igl.solution import Diagnostics, HeatSolution
-from heat_igl.sources import Sources, vertex_sources
+from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
@@ -25,8 +26,6 @@ __all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_ti
 
 Magnitude = Literal["auto", "unit", "damped"]
 
-# Largest heat at a source, in units of h: leaves room for the gradient's 1 / length on slivers.
-_SOURCE_HEAT = 1e290
 # Below this the heat has lost digits to gradual underflow.
 _LOWEST_HEAT = 1e-300
 # Right-hand sides solved together; wider blocks measured no faster.
@@ -159,8 +158,8 @@ class HeatMethodSolver:
         if refine not in (None, "sweep", "unfold"):
             raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {refine!r}")
         if refine is not None and domain.triangulation is None:
-            raise ValueError(f"refine={refine!r} unfolds triangles, and this domain has none")
-        self._damped = magnitude == "damped" or (magnitude == "auto" and domain.triangulation is not None)
+            raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
+        self._damped = magnitude == "damped" or (magnitude == "auto" and domain.is_surface)
         requested = _positive("t_coef", t_coef) * domain.mean_edge_length**2 if t is None else _positive("t", t)
         step = max(requested, smallest_time_step(domain))
         if t is not None and step > requested:
@@ -171,6 +170,7 @@ class HeatMethodSolver:
             )
         self._operators = domain
         self._heat_flow = HeatFlow(domain, step, boundary, backend)
+        self._emitter = Emitter(domain, self._heat_flow)
         self._poisson: PoissonProblem | None = None
         self._unfolded: Callable[[FloatArray, IntArray], FloatArray] | None = None
         triangulation = domain.triangulation
@@ -236,7 +236,7 @@ class HeatMethodSolver:
         AccuracyWarning
             If heat underflowed on the way, so that distances beyond are too short.
         """
-        chosen = [vertex_sources(sources, self.n_vertices)]
+        chosen = [self._set(sources)]
         return np.asarray(self._distances(chosen)[0])
 
     def distances(
@@ -270,7 +270,7 @@ class HeatMethodSolver:
         chosen = []
         for i, sources in enumerate(source_sets):
             try:
-                chosen.append(vertex_sources(sources, self.n_vertices))
+                chosen.append(self._set(sources))
             except SourceError as error:
                 raise SourceError(f"source_sets[{i}]: {error}") from None
         shape = (len(chosen), self.n_vertices)
@@ -285,15 +285,15 @@ class HeatMethodSolver:
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
-        chosen = [vertex_sources(sources, self.n_vertices)]
-        u = self._diffuse(chosen)
-        X, magnitude = self._field(u)
+        chosen = [self._set(sources)]
+        emissions, u = self._diffuse(chosen)
+        X, magnitude = self._field(emissions, u)
         if self._unfolded is not None:
             distance = _in_heat_order(self._unfolded, u, chosen)
         else:
-            distance = self._integrated(chosen, u, X, magnitude)
+            distance = self._integrated(emissions, u, X, magnitude)
         with np.errstate(under="ignore"):
-            heat = u[:, 0] / self._source_heat(self._rim(chosen[0])) / self._heat_flow.mean_mass
+            heat = u[:, 0] / self._emitter.unit(emissions[0]) / self._heat_flow.mean_mass
         direction = np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T)
         return HeatSolution(
             heat=heat,
@@ -304,68 +304,49 @@ class HeatMethodSolver:
             diagnostics=self.diagnostics,
         )
 
-    def _source_heat(self, sources: IntArray) -> float:
-        """Initial heat of each source, for `HeatFlow.solve`: as much as cannot overflow.
+    def _set(self, sources: Sources) -> SourceSet:
+        faces = self._operators.faces
+        return source_set(sources, self.n_vertices, None if faces is None else faces.F)
 
-        Rows of L sum to zero, so the maximum principle bounds the heat by the largest initial heat over mass.
-        """
-        mass = self._operators.M.diagonal()[sources] / self._heat_flow.mean_mass
-        smallest = float(mass[mass > 0].min(initial=1.0))
-        return _SOURCE_HEAT * min(self._operators.mean_edge_length, 1e10) * smallest
-
-    def _distances(self, source_sets: list[IntArray]) -> FloatArray:
+    def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
         """Distances (k, n) from k sets of sources."""
-        u = self._diffuse(source_sets)
+        emissions, u = self._diffuse(source_sets)
         if self._unfolded is not None:
             return _in_heat_order(self._unfolded, u, source_sets)
-        return self._integrated(source_sets, u, *self._field(u))
+        return self._integrated(emissions, u, *self._field(emissions, u))
 
-    def _diffuse(self, source_sets: list[IntArray]) -> FloatArray:
-        """Heat (n, k), from the rims of k sets of sources."""
-        initial = np.zeros((self.n_vertices, len(source_sets)))
-        for column, sources in enumerate(source_sets):
-            rim = self._rim(sources)
-            initial[rim, column] = self._source_heat(rim)
-        return self._heat_flow.solve(initial)
+    def _diffuse(self, source_sets: list[SourceSet]) -> tuple[list[Emission], FloatArray]:
+        """Heat (n, k) from k sets of sources."""
+        emissions = [self._emitter.emission(sources) for sources in source_sets]
+        return emissions, self._heat_flow.solve(np.stack([self._emitter.heat(one) for one in emissions], axis=1))
 
-    def _field(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _field(self, emissions: list[Emission], u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Directions (d m, k) and their magnitude (m, k)."""
         domain = self._operators
         X = normalize(domain, u)
-        return X, damping(domain, u, self.t) if self._damped else np.ones((len(domain.weights), u.shape[1]))
+        magnitude = damping(domain, u, self.t) if self._damped else np.ones((len(domain.weights), u.shape[1]))
+        for column, emission in enumerate(emissions):
+            self._emitter.guide(emission, X[:, column], magnitude[:, column])
+        return X, magnitude
 
-    def _integrated(
-        self, source_sets: list[IntArray], u: FloatArray, X: FloatArray, magnitude: FloatArray
-    ) -> FloatArray:
+    def _integrated(self, emissions: list[Emission], u: FloatArray, X: FloatArray, magnitude: FloatArray) -> FloatArray:
         """Distances (k, n) by step 3."""
         if self._poisson is None:
             raise RuntimeError("this solver unfolds and has no Poisson problem")
         domain = self._operators
-        phi = self._poisson.solve(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1)) if self._damped else X))
-        for column, sources in enumerate(source_sets):
-            self._warn_if_cold(u[:, column], sources)
-            phi[:, column] = self._from_sources(phi[:, column], u[:, column], self._rim(sources))
-            phi[sources, column] = 0.0
-        return np.ascontiguousarray(phi.T)
+        phi = self._poisson.solve(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1))))
+        distances = np.empty(phi.T.shape)
+        for column, emission in enumerate(emissions):
+            self._warn_if_cold(u[:, column], emission)
+            distances[column] = self._emitter.settle(emission, phi[:, column], u[:, column])
+        return distances
 
-    def _rim(self, sources: IntArray) -> IntArray:
-        """The sources that have a neighbour which is none.
-
-        Heat starts from these alone: inside a region of sources it would be level, and its gradient rounding noise
-        that is then normalized to length 1 and integrated.
-        """
-        L = self._operators.L
-        is_source = np.zeros(self.n_vertices, bool)
-        is_source[sources] = True
-        neighbours = L[:, sources]
-        outward = np.repeat(np.arange(len(sources)), np.diff(neighbours.indptr))[~is_source[neighbours.indices]]
-        return sources[np.unique(outward)] if len(outward) else sources
-
-    def _warn_if_cold(self, u: FloatArray, sources: IntArray) -> None:
+    def _warn_if_cold(self, u: FloatArray, emission: Emission) -> None:
         """Heat that has underflowed has no gradient, and distance does not grow where X is 0: say so."""
         domain = self._operators
-        cold = (np.abs(u) < _LOWEST_HEAT) & np.isin(domain.components, domain.components[sources])
-        cold[sources] = False
+        components = domain.components
+        cold = (np.abs(u) < _LOWEST_HEAT) & np.isin(components, components[emission.near.vertex])
+        cold[emission.near.vertex] = False
         remedy = "raise t_coef"
         if self._heat_flow.boundary == "dirichlet":
             cold &= ~domain.boundary
@@ -377,51 +358,18 @@ class HeatMethodSolver:
                 stacklevel=4,
             )
 
-    def _from_sources(self, phi: FloatArray, u: FloatArray, sources: IntArray) -> FloatArray:
-        """Shift phi so that distance starts at 0 at every source; ``inf`` where there is no source to start from."""
-        components = self._operators.components
-        n_sources = np.bincount(components[sources], minlength=int(components.max()) + 1)
-        if (n_sources > 1).any():
-            phi = phi - self._value_at_source(phi, u, sources)
-        total = np.bincount(components[sources], weights=phi[sources], minlength=len(n_sources))
-        shift = np.where(n_sources > 0, total / np.maximum(n_sources, 1), -np.inf)
-        distance = np.maximum(phi - shift[components], 0.0)
-        distance[sources] = 0.0
-        return np.asarray(distance)
-
-    def _value_at_source(self, phi: FloatArray, u: FloatArray, sources: IntArray) -> FloatArray:
-        """The value that phi has at the source from which a vertex got its heat.
-
-        phi is a little different at each source: the error of a path between them. Shifting by the mean would move
-        the whole cell of each source by its difference. Here every vertex is shifted by the values of the sources
-        weighted by its heat from each, one more solve; the weights change from 0 to 1 within sqrt(t) of the border
-        between two cells.
-        """
-        low, high = float(phi[sources].min()), float(phi[sources].max())
-        if low == high:
-            return np.full_like(phi, low)
-        initial = np.zeros_like(phi)
-        initial[sources] = self._source_heat(sources) * ((phi[sources] - low) / (high - low))
-        warm = u > 0  # always, but for noise under "cotan" and a cold boundary
-        share = np.divide(self._heat_flow.solve(initial), u, out=np.zeros_like(u), where=warm)
-        return low + (high - low) * np.clip(share, 0.0, 1.0)
-
 
 def _in_heat_order(
-    unfolded: Callable[[FloatArray, IntArray], FloatArray], u: FloatArray, source_sets: list[IntArray]
+    unfolded: Callable[[FloatArray, IntArray], FloatArray], u: FloatArray, source_sets: list[SourceSet]
 ) -> FloatArray:
     """Distances (k, n) by unfolding, on all processors: the kernels run without the interpreter's lock.
 
     Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
     """
     if len(source_sets) == 1:
-        return unfolded(-u[:, 0], source_sets[0])[None]
-    with ThreadPoolExecutor(_n_processors()) as pool:
-        return np.stack(list(pool.map(unfolded, -u.T, source_sets)))
-
-
-def _n_processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return unfolded(-u[:, 0], source_sets[0].vertices)[None]
+    with ThreadPoolExecutor(n_threads()) as pool:
+        return np.stack(list(pool.map(unfolded, -u.T, [one.vertices for one in source_sets])))
 
 
 def _tracked(starts: Any) -> Any:

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from heat_igl import connectivity
 from heat_igl.errors import MeshError
+from heat_igl.flip_history import Flipped, Turned, apex
 from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -59,6 +60,8 @@ class IntrinsicTriangulation:
         How many edges were flipped to arrive here.
     lengthening : float
         What `mollify` added to every edge; 0 unless a triangle was degenerate.
+    history : tuple of Turned or Flipped
+        How these faces came from those of the mesh.
     """
 
     F: IntArray
@@ -68,6 +71,7 @@ class IntrinsicTriangulation:
     n: int
     n_flips: int = 0
     lengthening: float = 0.0
+    history: tuple[Turned | Flipped, ...] = ()
 
     @property
     def boundary(self) -> BoolArray:
@@ -99,6 +103,27 @@ class IntrinsicTriangulation:
     def areas(self) -> FloatArray:
         """Area (m,) of each triangle, by Heron's formula in Kahan's order."""
         return np.asarray(igl.doublearea(self.l, 0.0) / 2)
+
+    def locate(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Where points of the mesh lie in these triangles.
+
+        Parameters
+        ----------
+        faces : (k,) int64
+            Faces that the triangulation was made from.
+        barycentric : (k, 3) float64
+            Coordinates in them.
+
+        Returns
+        -------
+        faces : (k,) int64
+            Triangle of each point.
+        barycentric : (k, 3) float64
+            Coordinates in it.
+        """
+        for move in self.history:
+            faces, barycentric = move.carry(faces, barycentric)
+        return faces, barycentric
 
 
 def mollify(l: FloatArray) -> float:  # noqa: E741
@@ -207,7 +232,8 @@ def oriented(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
     aligned = np.ones(F.size, bool)
     inner = np.flatnonzero(twin >= 0)
     aligned[inner] = _tail(F, inner) == _head(F, twin[inner])
-    return replace(triangulation, F=F, l=lengths, twin=twin, aligned=aligned)
+    history = (*triangulation.history, Turned(turned))
+    return replace(triangulation, F=F, l=lengths, twin=twin, aligned=aligned, history=history)
 
 
 def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
@@ -237,7 +263,15 @@ def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriang
         changed = flips.flip(flips.independent(bad))
         around = (3 * changed[:, None] + np.arange(3)).ravel()
         bad = flips.bad(np.concatenate([bad, around]))
-    return replace(triangulation, F=flips.F, l=flips.l, twin=flips.twin, aligned=flips.aligned, n_flips=flips.n_flips)
+    return replace(
+        triangulation,
+        F=flips.F,
+        l=flips.l,
+        twin=flips.twin,
+        aligned=flips.aligned,
+        n_flips=flips.n_flips,
+        history=tuple(flips.history),
+    )
 
 
 class _Flips:
@@ -248,6 +282,7 @@ class _Flips:
         self.twin, self.aligned = start.twin.copy(), start.aligned.copy()
         self.cotangent, self.rounding = _cotangents(self.l)
         self.n_flips = 0
+        self.history = list(start.history)
         self._moved_to = np.arange(self.F.size)
         self._best_of_face = np.full(len(self.F), self.F.size)
 
@@ -288,6 +323,7 @@ class _Flips:
         F, lengths = self.F, self.l
         bp, pa, aq, qb = lengths[f, c1], lengths[f, c2], lengths[g, e1], lengths[g, e2]
         pq = _diagonal(lengths[f, c], pa, bp, aq, qb)
+        self.history.append(Flipped(half_edge, 3 * g + e, np.stack([lengths[f, c], pa, bp, aq, qb])))
         p, q = F[f, c], F[g, e]
         F[f, c2], F[g, e2] = q, p
         lengths[f, c], lengths[f, c1], lengths[g, e], lengths[g, e1] = aq, pq, bp, pq
@@ -313,16 +349,9 @@ class _Flips:
 
 def _diagonal(ab: FloatArray, pa: FloatArray, bp: FloatArray, aq: FloatArray, qb: FloatArray) -> FloatArray:
     """The distance between p and q, laid out in the plane on either side of the edge ab."""
-    x_p, y_p = _apex(ab, pa, bp)
-    x_q, y_q = _apex(ab, aq, qb)
+    x_p, y_p = apex(ab, pa, bp)
+    x_q, y_q = apex(ab, aq, qb)
     return np.asarray(np.hypot(x_p - x_q, y_p + y_q))
-
-
-def _apex(base: FloatArray, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Corner opposite the base of triangles whose base starts at the origin and runs along the first axis."""
-    x = (base + (left - right) * ((left + right) / base)) / 2
-    height = igl.doublearea(np.stack([base, left, right], axis=1), 0.0) / base
-    return x, np.asarray(height)
 
 
 def intrinsic_gradient(triangulation: IntrinsicTriangulation) -> sp.csc_matrix:
@@ -342,7 +371,7 @@ def intrinsic_gradient(triangulation: IntrinsicTriangulation) -> sp.csc_matrix:
     F, lengths = triangulation.F, triangulation.l
     m = len(F)
     base = lengths[:, 2]
-    x, y = _apex(base, lengths[:, 1], lengths[:, 0])
+    x, y = apex(base, lengths[:, 1], lengths[:, 0])
     # Corners at (0, 0), (base, 0), (x, y): the gradient of the hat function of each corner.
     along = np.stack([-1 / base, 1 / base, np.zeros(m)], axis=1)
     across = np.stack([(x - base) / (base * y), -x / (base * y), 1 / y], axis=1)

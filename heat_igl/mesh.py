@@ -17,7 +17,7 @@ from heat_igl import connectivity
 from heat_igl.errors import MeshError
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["DELAUNAY_TOLERANCE", "RANGE_LIMIT", "Mesh", "MeshReport"]
+__all__ = ["DELAUNAY_TOLERANCE", "RANGE_LIMIT", "Mesh", "MeshReport", "checked_positions"]
 
 # How many lengths sqrt(t) the heat survives in double precision: values run from 1e290 (the rest is left for the
 # gradient's 1 / length) down to 1e-300, 590 decades or 1358 e-foldings, less a margin for the first step away.
@@ -41,7 +41,8 @@ def _frozen(array: ArrayT) -> ArrayT:
     return array
 
 
-def _positions(V: ArrayLike) -> FloatArray:
+def checked_positions(V: ArrayLike) -> FloatArray:
+    """`V` as a new (n, 3) float64 array, or a `MeshError` that names the first position that is none."""
     try:
         array = np.asarray(V)
     except ValueError as error:
@@ -129,7 +130,7 @@ class Mesh:
     F: IntArray
 
     def __init__(self, V: ArrayLike, F: ArrayLike) -> None:
-        positions = _positions(V)
+        positions = checked_positions(V)
         faces = _faces(F, len(positions))
         used = positions[np.unique(faces)]
         with np.errstate(over="ignore"):

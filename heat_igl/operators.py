@@ -69,6 +69,10 @@ class Operators:
     surface : IntrinsicTriangulation or None
         Triangles of the surface itself, each once, where `triangulation` is its tufted cover and goes over it twice.
         Paths are to be unfolded in these: on the cover a path over an edge of five faces goes on in one of them only.
+    is_surface : bool
+        Whether the domain has two dimensions; tetrahedra have three.
+    faces : IntrinsicTriangulation or None
+        The triangles as they were given, before any flip: those that points and curves on faces refer to.
     """
 
     L: sp.csc_matrix
@@ -83,6 +87,8 @@ class Operators:
     longest_distance: float
     triangulation: IntrinsicTriangulation | None = None
     surface: IntrinsicTriangulation | None = None
+    is_surface: bool = True
+    faces: IntrinsicTriangulation | None = None
 
     @property
     def n(self) -> int:
@@ -130,18 +136,20 @@ def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operat
         raise ValueError(f"laplacian must be 'intrinsic-delaunay' or 'cotan', not {laplacian!r}")
     if mesh.is_tetrahedral:
         return cotan_operators(mesh)
-    if laplacian == "intrinsic-delaunay" and has_nonmanifold_edges(mesh):
-        # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being manifold.
-        mesh = _without_duplicates(mesh)
-        if has_nonmanifold_edges(mesh):
-            return tufted_operators(mesh)
-    triangulation = intrinsic_triangulation(mesh)
+    faces = triangulation = intrinsic_triangulation(mesh)
     if laplacian == "intrinsic-delaunay":
+        if has_nonmanifold_edges(mesh):
+            # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being
+            # manifold.
+            mesh = _without_duplicates(mesh)
+            if has_nonmanifold_edges(mesh):
+                return replace(tufted_operators(mesh), faces=faces)
+            triangulation = intrinsic_triangulation(mesh)
         triangulation = intrinsic_delaunay(triangulation)
     if triangulation.n_flips or triangulation.lengthening:
         # Paths along the mesh's own edges are paths on the surface too, and already known.
-        return intrinsic_operators(triangulation, mesh.longest_distance)
-    return replace(cotan_operators(mesh), triangulation=triangulation)
+        return replace(intrinsic_operators(triangulation, mesh.longest_distance), faces=faces)
+    return replace(cotan_operators(mesh), triangulation=triangulation, faces=faces)
 
 
 def cotan_operators(mesh: Mesh) -> Operators:
@@ -176,6 +184,7 @@ def cotan_operators(mesh: Mesh) -> Operators:
         boundary=mesh.boundary,
         referenced=mesh.referenced,
         longest_distance=mesh.longest_distance,
+        is_surface=not mesh.is_tetrahedral,
     )
     if not mesh.is_tetrahedral:
         return domain
@@ -212,6 +221,7 @@ def intrinsic_operators(triangulation: IntrinsicTriangulation, longest_distance:
         referenced=referenced,
         longest_distance=longest_distance,
         triangulation=triangulation,
+        faces=triangulation,
     )
 
 

@@ -8,7 +8,7 @@ needed for is the order alone; no Poisson problem is solved. docs/refinement.md 
 from __future__ import annotations
 
 from types import ModuleType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,10 +18,12 @@ from heat_igl.errors import MeshError, MissingExtraError
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, oriented
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, vertex_sources
+from heat_igl.surface_points import SurfacePoints
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from heat_igl.fans import Tables
+    from heat_igl.unfolding import Points
 
 __all__ = ["Refine", "Refinement", "unfolded_distance"]
 
@@ -37,6 +39,8 @@ _SHORTFALL = 25.0
 _MAX_PASSES = 50
 # Steps that the search from one vertex may take; a walk takes 20 to 50.
 _MAX_SEARCH = 500
+# A point whose barycentric coordinate is below this lies on the side of its face.
+_ON_SIDE = 1e-8
 
 
 class Refinement:
@@ -69,10 +73,20 @@ class Refinement:
         if not triangulation.aligned.all():
             self._n_sheets = 2
             F, lengths, twin = _double_cover(triangulation)
-        self._number, F, lengths, twin = _renumbered(F, lengths, twin, self._n_sheets * self.n)
+        self._triangulation = triangulation
+        self._number, self._face, F, lengths, twin = _renumbered(F, lengths, twin, self._n_sheets * self.n)
+        self._F = F
         self._tables: Tables = fans.tables(F, lengths, twin, len(self._number))
 
-    def sweep(self, key: FloatArray, sources: IntArray) -> FloatArray:
+    def sweep(
+        self,
+        key: FloatArray,
+        sources: IntArray,
+        offsets: FloatArray | None = None,
+        points: SurfacePoints | None = None,
+        point_offsets: FloatArray | None = None,
+        labels: IntArray | None = None,
+    ) -> FloatArray:
         """Distance by unfolding one triangle at a time, until no triangle gives less.
 
         Parameters
@@ -81,7 +95,18 @@ class Refinement:
             Vertices are visited in ascending order of this: ``-heat``, or a rough distance. A wrong order costs
             time, not accuracy.
         sources : (k,) int64
-            Vertices at distance 0.
+            Vertices that distance starts from.
+        offsets : (k,) float64, optional
+            The distance at which each of them starts, not negative; 0 if not given. One that another source undercuts
+            gets the distance from that one.
+        points : SurfacePoints, optional
+            p sources inside the faces (or on their rims) that the triangulation was made from: the mesh's, before they
+            were flipped.
+        point_offsets : (p,) float64, optional
+            The distance at which each of them starts; 0 if not given.
+        labels : (n,) int64, optional
+            Filled with the source that each distance is measured from (geodesic Voronoi cells): 0 to k - 1 for
+            vertices, k to k + p - 1 for points, -1 where none is reached.
 
         Returns
         -------
@@ -90,13 +115,27 @@ class Refinement:
             convex one exact to rounding.
         """
         _, sweeping, _ = _kernels()
-        order, lifted = self._lifted(key, sources)
-        distance = np.full(len(order), np.inf)
-        distance[lifted] = 0.0
-        sweeping.sweep(order, self._tables, distance, _MAX_PASSES)
-        return self._on_base(distance)
+        starts = self._starts(sources, offsets, points, point_offsets)
+        n = len(self._number)
+        distance = np.full(n + starts.n_points, np.inf)
+        distance[starts.row] = starts.state[:, 0]
+        label = None
+        if labels is not None or offsets is not None or point_offsets is not None:
+            label = np.full(len(distance), -1)
+            label[starts.row] = starts.label
+        sweeping.sweep(self._order(key), self._tables, distance[:n], _MAX_PASSES, label, starts.offset)
+        return self._on_base(distance, label, labels)
 
-    def unfold(self, key: FloatArray, sources: IntArray, tolerance: float = _TOLERANCE) -> FloatArray:
+    def unfold(
+        self,
+        key: FloatArray,
+        sources: IntArray,
+        tolerance: float = _TOLERANCE,
+        offsets: FloatArray | None = None,
+        points: SurfacePoints | None = None,
+        point_offsets: FloatArray | None = None,
+        labels: IntArray | None = None,
+    ) -> FloatArray:
         """Distance by following straight lines through strips of triangles.
 
         Parameters
@@ -107,6 +146,8 @@ class Refinement:
             A path is taken as it is once straightening it further would shorten it by less than this fraction of its
             length, and by less than seven times this fraction of the way to the next bend. 0 follows every path to its
             last bend or its source.
+        offsets, points, point_offsets, labels
+            As for `sweep`.
 
         Returns
         -------
@@ -124,24 +165,122 @@ class Refinement:
         _, _, unfolding = _kernels()
         # Below 1e-5, forecasts are wrong by as much because of the curvature on the way.
         shortfall = max(_SHORTFALL * tolerance, 1e-5)
-        order, lifted = self._lifted(key, sources)
-        return self._on_base(
-            unfolding.unfold(order, self._tables, lifted, tolerance, shortfall, _MAX_SEARCH, _MAX_PASSES)
+        starts = self._starts(sources, offsets, points, point_offsets)
+        state = np.zeros((len(self._number) + starts.n_points, 6))
+        state[:, 0], state[:, 4] = np.inf, unfolding.NO_FAN
+        state[starts.row] = starts.state
+        label = inside = None
+        if labels is not None or points is not None:
+            label = np.full(len(state), -1)
+            label[starts.row] = starts.label
+            inside = starts.points
+        order = self._order(key)
+        unfolding.unfold(order, self._tables, state, label, inside, tolerance, shortfall, _MAX_SEARCH, _MAX_PASSES)
+        return self._on_base(state[:, 0], label, labels)
+
+    def _order(self, key: FloatArray) -> IntArray:
+        """Vertices of all sheets in ascending order, by the numbers of the tables."""
+        return np.asarray(self._number[np.argsort(np.tile(key, self._n_sheets))])
+
+    def _starts(
+        self,
+        sources: IntArray,
+        offsets: FloatArray | None,
+        points: SurfacePoints | None,
+        point_offsets: FloatArray | None,
+    ) -> _Starts:
+        """What the kernels start from, on all sheets and by the numbers of the tables."""
+        n, k, sheets = len(self._number), len(sources), range(self._n_sheets)
+        row = self._number[np.concatenate([sources + self.n * sheet for sheet in sheets])]
+        state = np.zeros((len(row), 6))
+        state[:, 4] = -1
+        label = np.tile(np.arange(k), self._n_sheets)
+        begin = np.zeros(k) if offsets is None else np.asarray(offsets, np.float64)
+        if points is None:
+            state[:, 0] = state[:, 1] = begin[label]
+            return _ascending(row, state, label, begin)
+        _, _, unfolding = _kernels()
+        faces, barycentric, point = self._faces_of(points)
+        vertex, seen = unfolding.views(faces, barycentric, self._F, self._tables)
+        place = np.zeros((len(points), 6))
+        place[:, 4] = -1
+        row = np.concatenate([row, vertex, n + np.arange(len(points))])
+        state = np.concatenate([state, seen, place])
+        label = np.concatenate([label, k + np.repeat(point, 3), k + np.arange(len(points))])
+        begin = np.concatenate([begin, np.zeros(len(points)) if point_offsets is None else point_offsets])
+        state[:, 0] += begin[label]
+        state[:, 1] = begin[label]
+        by_face = np.argsort(faces, kind="stable")
+        first = np.full(len(self._F), -1)
+        first[faces[by_face][::-1]] = by_face[::-1]
+        following = np.full(len(faces), -1)
+        same = faces[by_face][1:] == faces[by_face][:-1]
+        following[by_face[:-1][same]] = by_face[1:][same]
+        inside = unfolding.Points(first, following, np.ascontiguousarray(barycentric), n + point)
+        return _ascending(row, state, label, begin, len(points), inside)
+
+    def _faces_of(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray]:
+        """Triangles of the tables that hold points, coordinates in them, and which point each is."""
+        fans, _, _ = _kernels()
+        faces, barycentric = self._triangulation.locate(points.faces, points.barycentric)
+        point = np.arange(len(faces))
+        if self._n_sheets == 2:
+            # On the other sheet faces are turned over: their corners 1 and 2 change places.
+            faces = np.concatenate([faces, faces + len(self._triangulation.F)])
+            barycentric = np.concatenate([barycentric, barycentric[:, [0, 2, 1]]])
+            point = np.tile(point, 2)
+        faces = self._face[faces]
+        # A point on a side also lies in the face beyond it.
+        i, c = np.nonzero(barycentric < _ON_SIDE)
+        beyond = self._tables.step_id[3 * faces[i] + c]
+        there = np.flatnonzero(beyond[:, fans.FAR] >= 0)
+        i, c, following = i[there], c[there], beyond[there, fans.TO_RIGHT].astype(np.int64)
+        other = np.zeros((len(i), 3))
+        # Its corner after the far one is at the end, as seen from here, of the side that starts after corner c.
+        other[np.arange(len(i)), following % 3] = barycentric[i, (c + 2) % 3]
+        other[np.arange(len(i)), (following + 1) % 3] = barycentric[i, (c + 1) % 3]
+        return (
+            np.concatenate([faces, following // 3]),
+            np.concatenate([barycentric, other]),
+            np.concatenate([point, point[i]]),
         )
 
-    def _lifted(self, key: FloatArray, sources: IntArray) -> tuple[IntArray, IntArray]:
-        """Visiting order and sources, on all sheets and by the numbers of the tables."""
-        order = self._number[np.argsort(np.tile(key, self._n_sheets))]
-        return order, self._number[np.concatenate([sources + self.n * sheet for sheet in range(self._n_sheets)])]
+    def _on_base(self, distance: FloatArray, label: IntArray | None, labels: IntArray | None) -> FloatArray:
+        on_sheets = distance[self._number].reshape(self._n_sheets, -1)
+        if labels is not None and label is not None:
+            nearest = on_sheets.argmin(axis=0)[None]
+            labels[:] = np.take_along_axis(label[self._number].reshape(self._n_sheets, -1), nearest, axis=0)[0]
+        return np.asarray(on_sheets.min(axis=0))
 
-    def _on_base(self, distance: FloatArray) -> FloatArray:
-        return np.asarray(distance[self._number].reshape(self._n_sheets, -1).min(axis=0))
+
+class _Starts(NamedTuple):
+    """Rows of the state that are known, the nearest last: (k,), (k, 6), (k,); then by label where it begins."""
+
+    row: IntArray
+    state: FloatArray
+    label: IntArray
+    offset: FloatArray
+    n_points: int = 0
+    points: Points | None = None
+
+
+def _ascending(
+    row: IntArray,
+    state: FloatArray,
+    label: IntArray,
+    offset: FloatArray,
+    n_points: int = 0,
+    points: Points | None = None,
+) -> _Starts:
+    """Far ones first, so that of several for one vertex the nearest is written last."""
+    order = np.argsort(-state[:, 0], kind="stable")
+    return _Starts(row[order], state[order], label[order], offset, n_points, points)
 
 
 def _renumbered(
     F: IntArray, lengths: FloatArray, twin: IntArray, n: int
-) -> tuple[IntArray, IntArray, FloatArray, IntArray]:
-    """The new number of each vertex, and the triangles with vertices and faces renumbered breadth first.
+) -> tuple[IntArray, IntArray, IntArray, FloatArray, IntArray]:
+    """New numbers of vertices and of faces, and the triangles with both renumbered breadth first.
 
     Neighbours on the surface become neighbours in memory: nothing on most meshes, a fifth of the time where vertices
     come in an arbitrary order.
@@ -157,7 +296,7 @@ def _renumbered(
     twin = twin.reshape(-1, 3)[face].ravel()
     glued = twin >= 0
     twin[glued] = 3 * new_face[twin[glued] // 3] + twin[glued] % 3
-    return number, number[F[face]], lengths[face], twin
+    return number, new_face, number[F[face]], lengths[face], twin
 
 
 def _kernels() -> tuple[ModuleType, ModuleType, ModuleType]:

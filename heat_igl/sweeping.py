@@ -25,12 +25,13 @@ def _is_flat(v: int, t: Tables) -> bool:
 
 
 @jit
-def _mark_dependents(v: int, t: Tables, d: FloatArray, rank: IntArray, is_stale: AnyArray) -> bool:
+def _mark_dependents(v: int, t: Tables, d: FloatArray, begin: float, rank: IntArray, is_stale: AnyArray) -> bool:
     """Mark the neighbours that a smaller d[v] can improve: the farther ones, and a nearer one whose path can cross an
     edge that ends in v.
 
-    That takes an angle there whose cosine is below L / (2 d), L the length of the spoke: around 90 degrees, less near
-    the source. On the first turn everybody who is still to come is stale anyway.
+    That takes an angle there whose cosine is below L / (2 d), L the length of the spoke and d counted from `begin`,
+    where the source begins: around 90 degrees, less near the source. On the first turn everybody who is still to come
+    is stale anyway.
     """
     found = False
     for k in range(t.first[v], t.first[v + 1]):
@@ -40,8 +41,11 @@ def _mark_dependents(v: int, t: Tables, d: FloatArray, rank: IntArray, is_stale:
             k_left = t.spoke_id[k, NEXT_SPOKE]
             b = t.spoke_id[k_left, NEIGHBOUR]
             along = t.spoke[k, APEX_X] * t.spoke[k, BASE]
-            depends = depends or 2.0 * d[a] * along < t.spoke[k, LENGTH] ** 2
-            if 2.0 * d[b] * (t.spoke[k, BASE] - along) < t.spoke[k_left, LENGTH] ** 2 and not is_stale[rank[b]]:
+            depends = depends or 2.0 * (d[a] - begin) * along < t.spoke[k, LENGTH] ** 2
+            if (
+                2.0 * (d[b] - begin) * (t.spoke[k, BASE] - along) < t.spoke[k_left, LENGTH] ** 2
+                and not is_stale[rank[b]]
+            ):
                 is_stale[rank[b]] = found = True
         if depends and not is_stale[rank[a]]:
             is_stale[rank[a]] = found = True
@@ -49,11 +53,14 @@ def _mark_dependents(v: int, t: Tables, d: FloatArray, rank: IntArray, is_stale:
 
 
 @jit
-def sweep(order: IntArray, t: Tables, d: FloatArray, max_passes: int) -> int:
+def sweep(
+    order: IntArray, t: Tables, d: FloatArray, max_passes: int, label: IntArray | None, offset: FloatArray
+) -> int:
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, in the given order.
 
     One pass over all vertices, then passes over those that come before a neighbour which turned out to be nearer, until
-    there are none (or `max_passes` are made). Returns the number of passes.
+    there are none (or `max_passes` are made). Returns the number of passes. Where given, `label` (n,) is handed on with
+    the distance, and ``offset[label]`` is the distance at which the source of that label begins.
     """
     n = len(d)
     rank = np.empty(n, np.int64)
@@ -69,15 +76,27 @@ def sweep(order: IntArray, t: Tables, d: FloatArray, max_passes: int) -> int:
             is_stale[i] = False
             v = order[i]
             old = best = d[v]
+            giver = v
             for k in range(t.first[v], t.first[v + 1]):
-                da = d[t.spoke_id[k, NEIGHBOUR]]
-                best = min(best, da + t.spoke[k, LENGTH])
+                a = t.spoke_id[k, NEIGHBOUR]
+                da = d[a]
+                if da + t.spoke[k, LENGTH] < best:
+                    best = da + t.spoke[k, LENGTH]
+                    giver = a
                 h = t.spoke_id[k, CORNER]
                 if h < 0:
                     continue
-                db = d[t.spoke_id[t.spoke_id[k, NEXT_SPOKE], NEIGHBOUR]]
+                b = t.spoke_id[t.spoke_id[k, NEXT_SPOKE], NEIGHBOUR]
+                db = d[b]
                 if (da >= best and db >= best) or da == np.inf or db == np.inf:
                     continue
+                begin = 0.0
+                if label is not None:
+                    begin = offset[label[a]]
+                    if begin != offset[label[b]]:
+                        continue
+                    da -= begin
+                    db -= begin
                 # The source in units of the edge ab: x along it, y behind it.
                 base = t.spoke[k, BASE]
                 scale = 1.0 / (base * base)
@@ -90,12 +109,17 @@ def sweep(order: IntArray, t: Tables, d: FloatArray, max_passes: int) -> int:
                 crossing = x * py + px * y  # times y + py
                 if 0 <= crossing <= y + py:
                     squared = (px - x) ** 2 + (py + y) ** 2
-                    if squared < best * best * scale:
-                        best = base * math.sqrt(squared)
+                    if squared < (best - begin) * (best - begin) * scale:
+                        best = begin + base * math.sqrt(squared)
+                        giver = a if da < db else b
             if best < old:
                 d[v] = best
+                begin = 0.0
+                if label is not None:
+                    label[v] = label[giver]
+                    begin = offset[label[v]]
                 if best < old * (1 - (_ROUNDING if _is_flat(v, t) else _NEGLIGIBLE)):
-                    found_stale = _mark_dependents(v, t, d, rank, is_stale) or found_stale
+                    found_stale = _mark_dependents(v, t, d, begin, rank, is_stale) or found_stale
         if not found_stale:
             return turn + 1
     return max_passes

@@ -38,7 +38,7 @@ from heat_igl.fans import (
 )
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["unfold"]
+__all__ = ["NO_FAN", "Points", "unfold", "views"]
 
 # Columns of the state of a vertex: its distance; the distance of the last bend (or source) of its path; how far that
 # is away in a straight line; the direction in which it lies, as an angle in the fan of the vertex.
@@ -136,7 +136,8 @@ def _may_agree(
         return False
     one = _promise(right_length, state[right, OFFSET], state[right, REACH], right_saving)
     other = _promise(left_length, state[left, OFFSET], state[left, REACH], left_saving)
-    return bool(abs(one - other) <= 1e-6 * one)
+    # Beyond 1, beside the source, the promise is not as good as that.
+    return bool(abs(one - other) <= 1e-6 * one or max(right_saving, left_saving) > 1.0)
 
 
 @jit
@@ -213,11 +214,95 @@ def _look_around(
     return float(smallest)
 
 
+class Points(NamedTuple):
+    """Sources inside faces, for walks to end at. One on an edge is listed in the faces on both sides.
+
+    Attributes
+    ----------
+    first : (m,) int64
+        First entry of each face, -1 if it has none.
+    following : (e,) int64
+        The next entry of the same face, -1 after the last.
+    barycentric : (e, 3) float64
+        Where the point lies in that face.
+    row : (e,) int64
+        Row of the state that stands for the point.
+    """
+
+    first: IntArray
+    following: IntArray
+    barycentric: FloatArray
+    row: IntArray
+
+
+@jit
+def _arrive(
+    points: Points | None, t: Tables, state: FloatArray, found: FloatArray, h: int, k: int, first_x: float,
+    first_y: float, wx: float, wy: float, ax: float, ay: float, bx: float, by: float, rx: float, ry: float,
+    lx: float, ly: float,
+) -> bool:  # fmt: skip
+    """Note the straight paths to the sources inside the face behind half-edge `h`; whether one is the shortest so far.
+
+    That face is a, w, b; only what lies in the cone is seen in a straight line.
+    """
+    arrived = False
+    if points is None:
+        return arrived
+    face, right_of_w = t.step_id[h, TO_RIGHT] // 3, t.step_id[h, TO_RIGHT] % 3
+    entry = points.first[face]
+    while entry >= 0:
+        # From w, its face runs first to b and then to a.
+        at_w, at_b = points.barycentric[entry, right_of_w - 1], points.barycentric[entry, right_of_w]
+        at_a = points.barycentric[entry, right_of_w - 2]
+        x, y = at_w * wx + at_a * ax + at_b * bx, at_w * wy + at_a * ay + at_b * by
+        slack = 1e-12 * (x * x + y * y)
+        row = points.row[entry]
+        distance = state[row, DISTANCE] + math.sqrt(x * x + y * y)
+        if rx * y - ry * x >= -slack and x * ly - y * lx >= -slack and distance < found[0]:
+            _take(found, distance, row, x, y, _REAL_BEND, k, first_x, first_y)
+            arrived = True
+        entry = points.following[entry]
+    return arrived
+
+
+@jit
+def _hand_on(label: IntArray | None, v: int, z: int) -> None:
+    """Give v the label of z, if there are labels."""
+    if label is not None:
+        label[v] = label[z]
+
+
+@jit
+def views(faces: IntArray, barycentric: FloatArray, F: IntArray, t: Tables) -> tuple[IntArray, FloatArray]:
+    """How the corners (3 k,) of faces see points in them: the state (3 k, 6) of each, for a source at distance 0."""
+    vertex = np.empty(3 * len(faces), np.int64)
+    state = np.zeros((3 * len(faces), 6))
+    for i in range(len(faces)):
+        for c in range(3):
+            h = 3 * faces[i] + c
+            v = vertex[3 * i + c] = F[faces[i], c]
+            k = t.first[v]
+            while t.spoke_id[k, CORNER] != h:
+                k += 1
+            base = t.spoke[k, BASE]
+            ax, ay = -t.spoke[k, APEX_X] * base, -t.spoke[k, APEX_Y] * base
+            at_a, at_b = barycentric[i, (c + 1) % 3], barycentric[i, (c + 2) % 3]
+            x, y = at_a * ax + at_b * (ax + base), (at_a + at_b) * ay
+            row = state[3 * i + c]
+            row[DISTANCE] = row[REACH] = math.sqrt(x * x + y * y)
+            # A source at v itself leaves v without a direction.
+            row[FAN] = t.spoke_id[k, FAN_HERE] if row[REACH] > 1e-12 * base else NO_FAN
+            row[ANGLE] = t.spoke[k, ANGLE_HERE] + math.atan2(ax * y - ay * x, ax * x + ay * y)
+            row[TOTAL] = t.total[t.spoke_id[k, FAN_HERE]]
+    return vertex, state
+
+
 @inline
 def _walk(
     v: int,
     k: int,
     t: Tables,
+    points: Points | None,
     state: FloatArray,
     side: AnyArray,
     saving: FloatArray,
@@ -255,6 +340,8 @@ def _walk(
         x, y = t.step[h, FAR_X], t.step[h, FAR_Y]
         wx = bx + x * ux - y * uy
         wy = by + x * uy + y * ux
+        if _arrive(points, t, state, found, h, k, first_x, first_y, wx, wy, ax, ay, bx, by, rx, ry, lx, ly):
+            break
         # Outside the cone there is nothing to decide.
         if rx * wy - ry * wx <= 0.0:
             ax, ay = wx, wy
@@ -341,6 +428,7 @@ def _push(
 def _search(
     v: int,
     t: Tables,
+    points: Points | None,
     state: FloatArray,
     found: FloatArray,
     cones: FloatArray,
@@ -389,6 +477,8 @@ def _search(
             wx = bx + x * ux - y * uy
             wy = by + x * uy + y * ux
             to_right, to_left = t.step_id[h, TO_RIGHT], t.step_id[h, TO_LEFT]
+            first_x, first_y = -t.spoke[spoke, APEX_X], -t.spoke[spoke, APEX_Y]
+            _arrive(points, t, state, found, h, spoke, first_x, first_y, wx, wy, ax, ay, bx, by, rx, ry, lx, ly)
             if rx * wy - ry * wx <= 0.0:
                 a, ax, ay, h = w, wx, wy, to_left
                 continue
@@ -403,10 +493,9 @@ def _search(
                 bend = left if left >= right else -right
                 if max(right, left) < -_STRAIGHT:
                     bend = _REAL_BEND
-                first_x, first_y = -t.spoke[spoke, APEX_X], -t.spoke[spoke, APEX_Y]
                 length = math.sqrt(wx * wx + wy * wy)
                 _take(found, length + state[w, DISTANCE], w, wx, wy, bend, spoke, first_x, first_y)
-                if state[w, DISTANCE] == 0.0:
+                if state[w, FAN] == NO_FAN:
                     break
             right_forecast = _cone_forecast(ax, ay, wx, wy, state[a, DISTANCE], state[w, DISTANCE], rx, ry, wx, wy)
             left_forecast = _cone_forecast(wx, wy, bx, by, state[w, DISTANCE], state[b, DISTANCE], wx, wy, lx, ly)
@@ -437,7 +526,9 @@ def _visit(
     v: int,
     may_wait: bool,
     t: Tables,
+    points: Points | None,
     state: FloatArray,
+    label: IntArray | None,
     work: _Workspace,
     tolerance: float,
     shortfall: float,
@@ -465,15 +556,16 @@ def _visit(
                     best, best_promise = k, forecast
         if best < 0:
             break
-        wait_for = _walk(v, best, t, state, side, work.saving, found, tolerance)
+        wait_for = _walk(v, best, t, points, state, side, work.saving, found, tolerance)
         if wait_for >= 0 and may_wait:
             return wait_for
         promise[best - t.first[v]] = np.inf
         promise[t.spoke_id[best, NEXT_SPOKE] - t.first[v]] = np.inf
     if found[0] > smallest * (1 + shortfall):
-        _search(v, t, state, found, work.cones, work.ids, max_steps)
+        _search(v, t, points, state, found, work.cones, work.ids, max_steps)
     if found[0] < old:
         _settle(v, t, state, found)
+        _hand_on(label, v, int(found[1]))
     return -1
 
 
@@ -481,13 +573,15 @@ def _visit(
 def unfold(
     order: IntArray,
     t: Tables,
-    sources: IntArray,
+    state: FloatArray,
+    label: IntArray | None,
+    points: Points | None,
     tolerance: float,
     shortfall: float,
     max_steps: int,
     max_passes: int,
-) -> FloatArray:
-    """Distance (n,) by straight paths through strips of triangles; ``inf`` where no source is reached.
+) -> None:
+    """Distance by straight paths through strips of triangles, to be read from `state`.
 
     Parameters
     ----------
@@ -495,8 +589,13 @@ def unfold(
         Vertices, near ones first. One that comes too early is visited again.
     t : Tables
         The triangulation.
-    sources : (s,) int64
-        Vertices at distance 0.
+    state : (n + p, 6) float64
+        What is known of each vertex and of each of p sources inside faces; changed in place. Distance is ``inf`` where
+        nothing is known, and where no source is reached.
+    label : (n + p,) int64 or None
+        Handed on from the end of a path to its beginning.
+    points : Points or None
+        The sources inside faces.
     tolerance : float
         Relative gain below which a path is not straightened further.
     shortfall : float
@@ -507,13 +606,10 @@ def unfold(
         Passes over vertices that a later one may have improved.
     """
     n = len(t.first) - 1
-    state = np.zeros((n, 6))
-    state[:, DISTANCE] = np.inf
-    state[:, FAN] = NO_FAN
     is_stale = np.ones(n, np.bool_)
-    for v in sources:
-        state[v, DISTANCE] = 0.0
-        is_stale[v] = False
+    for v in range(n):
+        # A source that begins later may be overtaken; a corner that sees a source in its face hardly is.
+        is_stale[v] = state[v, DISTANCE] == np.inf or (state[v, DISTANCE] > 0.0 and state[v, FAN] == NO_FAN)
     degree = 0
     for v in range(n):
         degree = max(degree, t.first[v + 1] - t.first[v])
@@ -533,11 +629,12 @@ def unfold(
                 continue
             waiting[0] = start
             depth = 1
-            may_wait = True
+            # A source that begins later has a path already.
+            may_wait = state[start, FAN] != NO_FAN or state[start, DISTANCE] == np.inf
             while depth > 0:
                 v = waiting[depth - 1]
                 old = state[v, DISTANCE]
-                wait_for = _visit(v, may_wait, t, state, work, tolerance, shortfall, max_steps)
+                wait_for = _visit(v, may_wait, t, points, state, label, work, tolerance, shortfall, max_steps)
                 if wait_for >= 0:
                     may_wait = depth < _MAX_WAITING
                     for i in range(depth):
@@ -558,4 +655,3 @@ def unfold(
                             is_stale[w] = found_stale = True
         if not found_stale:
             break
-    return state[:, DISTANCE].copy()

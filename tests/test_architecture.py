@@ -20,21 +20,30 @@ errors
 connectivity
 mesh
 surface_points
+projection
+flip_history
 intrinsic
 tufted
 subdivision
+images
 shapes
-io
 operators
+speed
+polygons
+io
 factorization
 sources
+near_field
 fans
 sweeping
 unfolding
 refine
 steps
+emission
 solution
+processors
 heat_method
+sampling
 baselines
 bounds
 closed_forms
@@ -48,15 +57,21 @@ validation_plots
 validation_report
 validation
 raster
+scene
 picture
+html_view
 plots
 demo
+cluster
 cli
 __main__
 """.split()
 
 EXTRAS = """
 cholespy
+dask
+distributed
+colorspacious
 gdist
 matplotlib
 meshio
@@ -67,9 +82,11 @@ pygeodesic
 pymeshlab
 pytest
 rich
+selenium
 skfmm
 skimage
 typer
+zarr
 """.split()
 
 

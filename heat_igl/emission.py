@@ -1,0 +1,290 @@
+"""What a set of sources gives to each step: heat to start from, exact values around it, the level to begin at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from heat_igl.near_field import NearField, Seeds
+from heat_igl.operators import Operators
+from heat_igl.sources import SourceSet
+from heat_igl.steps import HeatFlow
+from heat_igl.typing import BoolArray, FloatArray, IntArray
+
+__all__ = ["Emission", "Emitter"]
+
+# Largest heat at a source, in units of h: leaves room for the gradient's 1 / length on slivers.
+_SOURCE_HEAT = 1e290
+# How far around points and curves distance is taken from straight lines, in mean edge lengths.
+_RADIUS = 2.0
+# Point and curve are equally warm some edges away if the heat of a point is spread over so many edges of the curve.
+_EDGES_PER_POINT = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Emission:
+    """One set of sources, ready for the steps.
+
+    Attributes
+    ----------
+    sources : SourceSet
+        As the user gave it.
+    vertex, share, delay, label : (e,) int64, float64, float64, int64
+        Initial heat: a share of the unit at a vertex, less exp(-delay), and the source that it belongs to.
+    anchors : Seeds
+        Where the integrated phi is compared with known values.
+    near : Seeds
+        Vertices whose distance is known and set.
+    guides : (g,) bool
+        Which of `near` were found by straight lines from points and curves: on faces with such corners alone, the
+        field is the gradient of these values.
+    """
+
+    sources: SourceSet
+    vertex: IntArray
+    share: FloatArray
+    delay: FloatArray
+    label: IntArray
+    anchors: Seeds
+    near: Seeds
+    guides: BoolArray
+
+
+class Emitter:
+    """Sources on one domain.
+
+    Parameters
+    ----------
+    domain : Operators
+        The domain.
+    heat_flow : HeatFlow
+        Step 1 on it.
+    """
+
+    def __init__(self, domain: Operators, heat_flow: HeatFlow) -> None:
+        self._domain = domain
+        self._heat_flow = heat_flow
+        self._on_solved = None if domain.triangulation is None else NearField(domain.triangulation)
+        self._on_faces = self._on_solved
+        if domain.faces is not None and domain.faces is not domain.triangulation:
+            self._on_faces = NearField(domain.faces)
+
+    def emission(self, sources: SourceSet) -> Emission:
+        """`sources` ready for the steps; those with offsets only as far as no other's front comes first."""
+        rim = self._rim(sources)
+        near_vertices = self._near_vertices(sources, rim)
+        lines = self._straight_lines(sources)
+        near = Seeds.nearest(_joined(near_vertices, lines))
+        guides = np.isin(near.vertex, lines.vertex) & ~np.isin(near.vertex, near_vertices.vertex)
+        own = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
+        anchors = _joined(own, near.at(guides))
+        vertex, share, label, offset = self._heat(sources, rim)
+        found = Emission(sources, vertex, share, self._delay(vertex, offset), label, anchors, near, guides)
+        if np.ptp(sources.offsets) == 0:
+            return found
+        return self._without_late(found)
+
+    def heat(self, emission: Emission) -> FloatArray:
+        """Right-hand side (n,) of `HeatFlow.solve`: as much heat as cannot overflow."""
+        return self._heat_of(emission, emission.share)
+
+    def unit(self, emission: Emission) -> float:
+        """The heat that a share of 1 stands for.
+
+        Rows of L sum to zero, so the maximum principle bounds the heat by the largest initial heat over mass.
+        """
+        domain = self._domain
+        largest = np.bincount(emission.vertex, emission.share, minlength=domain.n)[emission.vertex]
+        bound = domain.M.diagonal()[emission.vertex] / self._heat_flow.mean_mass
+        held = (bound > 0) & (largest > 0)
+        smallest = float((bound[held] / largest[held]).min(initial=1.0))
+        return _SOURCE_HEAT * min(domain.mean_edge_length, 1e10) * smallest
+
+    def guide(self, emission: Emission, X: FloatArray, magnitude: FloatArray) -> None:
+        """Near points and curves, replace the field X (d m,) of length `magnitude` (m,) by the exact gradient."""
+        triangulation = self._domain.triangulation
+        if triangulation is None or not emission.guides.any():
+            return
+        near, m = emission.near, len(magnitude)
+        columns = self._domain.G[:, near.vertex]
+        known = np.zeros(self._domain.n, np.int8)
+        known[near.vertex] = 1
+        known[near.vertex[emission.guides]] = 2
+        around = np.unique(columns.indices % m)
+        corners = known[triangulation.F[around]]
+        faces = around[(corners > 0).all(axis=1) & (corners == 2).any(axis=1)]
+        gradient = (columns @ near.value).reshape(-1, m)[:, faces]
+        length = np.linalg.norm(gradient, axis=0)
+        X.reshape(-1, m)[:, faces] = gradient / np.where(length > 0, length, 1)
+        magnitude[faces] = length
+
+    def settle(self, emission: Emission, phi: FloatArray, u: FloatArray) -> FloatArray:
+        """Distance (n,) from the integrated phi: begun at the right level, exact where it is known."""
+        components = self._domain.components
+        anchors = emission.anchors
+        misfit = phi[anchors.vertex] - anchors.value
+        n_anchors = np.bincount(components[anchors.vertex], minlength=int(components.max()) + 1)
+        if (n_anchors > 1).any():
+            level = self._level(emission, misfit, u)
+            phi = phi - level
+            misfit = misfit - level[anchors.vertex]
+        total = np.bincount(components[anchors.vertex], weights=misfit, minlength=len(n_anchors))
+        shift = np.where(n_anchors > 0, total / np.maximum(n_anchors, 1), -np.inf)
+        lowest = np.full(len(n_anchors), np.inf)
+        np.minimum.at(lowest, components[emission.near.vertex], emission.near.value)
+        distance = np.maximum(phi - shift[components], lowest[components])
+        return self._continued(emission.near, distance)
+
+    def labels(self, emission: Emission, u: FloatArray) -> IntArray:
+        """The source (n,) from which each vertex gets most of its heat `u`, -1 where it gets none."""
+        labels = self._warmest(emission, u)
+        labels[emission.near.vertex] = emission.near.label
+        return labels
+
+    def _warmest(self, emission: Emission, u: FloatArray) -> IntArray:
+        """By one solve for each binary digit of the labels: the share of heat from sources with that digit."""
+        present, index = np.unique(emission.label, return_inverse=True)
+        digits = np.arange(max(1, int(len(present) - 1).bit_length()))
+        of_source = (index[:, None] >> digits) & 1
+        parts = self._heat_flow.solve(
+            np.stack([self._heat_of(emission, emission.share * digit) for digit in of_source.T], axis=1)
+        )
+        share = np.divide(parts, u[:, None], out=np.zeros_like(parts), where=u[:, None] > 0)
+        found = (share > 0.5) @ (1 << digits)
+        # Where three sources or more are equally warm, the digits may come from different ones.
+        unsure = np.flatnonzero((np.abs(share - 0.5) < 0.25).any(axis=1) & (u > 0))
+        neighbours = self._domain.L[:, unsure]
+        which = np.repeat(np.arange(len(unsure)), np.diff(neighbours.indptr))
+        others = neighbours.indices != unsure[which]
+        which, offered = which[others], found[neighbours.indices[others]]
+        alone = np.bincount(which, offered == found[unsure[which]], minlength=len(unsure)) == 0
+        which, offered = which[alone[which]], offered[alone[which]]
+        chance = np.where((offered[:, None] >> digits) & 1, share[unsure[which]], 1 - share[unsure[which]]).prod(axis=1)
+        order = np.argsort(chance, kind="stable")
+        found[unsure[which[order]]] = offered[order]
+        return np.where(u > 0, present[np.minimum(found, len(present) - 1)], -1)
+
+    def _rim(self, sources: SourceSet) -> BoolArray:
+        """The source vertices that have a neighbour which is none.
+
+        Heat starts from these alone: inside a region of sources it would be level, and its gradient rounding noise
+        that is then normalized to length 1 and integrated.
+        """
+        vertices = sources.vertices
+        everyone = np.ones(len(vertices), bool)
+        if len(vertices) < 2 or np.ptp(sources.vertex_offset) > 0:
+            return everyone
+        is_source = np.zeros(self._domain.n, bool)
+        is_source[vertices] = True
+        neighbours = self._domain.L[:, vertices]
+        outward = np.repeat(np.arange(len(vertices)), np.diff(neighbours.indptr))[~is_source[neighbours.indices]]
+        if not len(outward):
+            return everyone
+        rim = np.zeros(len(vertices), bool)
+        rim[outward] = True
+        return rim
+
+    def _near_vertices(self, sources: SourceSet, rim: BoolArray) -> Seeds:
+        """Source vertices, and those at the rim with their neighbours at the lengths of edges."""
+        itself = Seeds(sources.vertices, sources.vertex_offset, sources.vertex_label)
+        if self._on_solved is None:
+            return itself
+        which, ends, lengths = self._on_solved.spokes(sources.vertices[rim])
+        return _joined(
+            itself, Seeds(ends, sources.vertex_offset[rim][which] + lengths, sources.vertex_label[rim][which])
+        )
+
+    def _straight_lines(self, sources: SourceSet) -> Seeds:
+        """Exact distance of all vertices that see a point or a curve in a straight line, some edges around it."""
+        if self._on_faces is None or sources.on_vertices_alone:
+            return Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
+        return self._on_faces.seeds(
+            sources.points.joined(sources.segments.ends()), sources.segments, _RADIUS * self._domain.mean_edge_length
+        )
+
+    def _heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
+        """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""
+        parts = [(sources.vertices[rim], np.ones(rim.sum()), sources.vertex_label[rim], sources.vertex_offset[rim])]
+        if self._on_faces is not None and not sources.on_vertices_alone:
+            F = self._on_faces.triangulation.F
+            points, segments = sources.points, sources.segments
+            # The integral of a linear function along a segment: its length times the mean of both ends.
+            lengths = self._on_faces.lengths(segments)
+            per_length = 1 / (_EDGES_PER_POINT * self._domain.mean_edge_length)
+            along = (segments.start + segments.end) / 2 * (lengths * per_length)[:, None]
+            for part, share in ((points, points.barycentric), (segments, along)):
+                parts.append(
+                    (F[part.faces].ravel(), share.ravel(), np.repeat(part.label, 3), np.repeat(part.offset, 3))
+                )
+        vertex, share, label, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
+        used = share > 0
+        return vertex[used], share[used], label[used], offset[used]
+
+    def _delay(self, vertex: IntArray, offset: FloatArray) -> FloatArray:
+        """Heat falls by exp(-d / sqrt(t)) over a distance d, so that is what a later source has less of."""
+        components = self._domain.components
+        earliest = np.full(int(components.max()) + 1, np.inf)
+        np.minimum.at(earliest, components[vertex], offset)
+        return np.asarray((offset - earliest[components[vertex]]) / np.sqrt(self._heat_flow.t))
+
+    def _heat_of(self, emission: Emission, share: FloatArray) -> FloatArray:
+        # Together, since exp(-delay) alone would underflow.
+        with np.errstate(under="ignore"):
+            weights = share * np.exp(np.log(self.unit(emission)) - emission.delay)
+        return np.asarray(np.bincount(emission.vertex, weights, minlength=self._domain.n), np.float64)
+
+    def _level(self, emission: Emission, misfit: FloatArray, u: FloatArray) -> FloatArray:
+        """The value that phi has at the source from which a vertex got its heat, less that source's offset.
+
+        It is a little different at each source: the error of a path between them. Shifting by the mean would move
+        the whole cell of each source by its difference. Here every vertex is shifted by the values of the sources
+        weighted by its heat from each, one more solve; the weights change from 0 to 1 within sqrt(t) of the border
+        between two cells.
+        """
+        n_labels = emission.sources.n_labels
+        count = np.bincount(emission.anchors.label, minlength=n_labels)
+        level = np.bincount(emission.anchors.label, misfit, minlength=n_labels) / np.maximum(count, 1)
+        low, high = float(level[count > 0].min()), float(level[count > 0].max())
+        if low == high:
+            return np.full_like(u, low)
+        relative = np.where(count > 0, (level - low) / (high - low), 0.0)
+        part = self._heat_flow.solve(self._heat_of(emission, emission.share * relative[emission.label]))
+        warm = u > 0  # always, but for noise under "cotan" and a cold boundary
+        return low + (high - low) * np.clip(np.divide(part, u, out=np.zeros_like(u), where=warm), 0.0, 1.0)
+
+    def _continued(self, near: Seeds, distance: FloatArray) -> FloatArray:
+        """Set known values; across an edge from one, distance changes by no more than the edge's length."""
+        if self._on_solved is not None:
+            which, ends, lengths = self._on_solved.spokes(near.vertex)
+            upper = np.full_like(distance, np.inf)
+            np.minimum.at(upper, ends, near.value[which] + lengths)
+            np.maximum.at(distance, ends, near.value[which] - lengths)
+            np.minimum(distance, upper, out=distance)
+        distance[near.vertex] = near.value
+        return distance
+
+    def _without_late(self, found: Emission) -> Emission:
+        """Less the sources at which the front of another arrives before they begin, and values it arrives before at."""
+        label = self._warmest(found, self._heat_flow.solve(self.heat(found)))
+        anchors = found.anchors.at(label[found.anchors.vertex] == found.anchors.label)
+        on_time = np.isin(found.label, anchors.label)
+        kept = label[found.near.vertex] == found.near.label
+        return replace(
+            found,
+            vertex=found.vertex[on_time],
+            share=found.share[on_time],
+            delay=found.delay[on_time],
+            label=found.label[on_time],
+            anchors=anchors,
+            near=found.near.at(kept),
+            guides=found.guides[kept],
+        )
+
+
+def _joined(one: Seeds, other: Seeds) -> Seeds:
+    return Seeds(
+        np.concatenate([one.vertex, other.vertex]),
+        np.concatenate([one.value, other.value]),
+        np.concatenate([one.label, other.label]),
+    )
