@@ -19,7 +19,7 @@ from heat_igl.processors import n_threads
 from heat_igl.refine import Refine, Refinement
 from heat_igl.solution import Diagnostics, HeatSolution
 from heat_igl.sources import Sources, SourceSet, source_set
-from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, damping, normalize
+from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, analysis, damping, descent, normalize
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_time_step"]
@@ -79,7 +79,7 @@ class HeatMethodSolver:
         Integrate nothing, and find the distance in the order of the heat by unfolding triangles, one at a time or in
         strips: 0.2 to 0.7 % and 0.001 to 0.01 % mean error on common meshes, see `Refinement`. Needs triangles, and
         numba (extra ``fast``); no Poisson problem is factored.
-    backend : {"auto", "scipy", "cholespy"}
+    backend : {"auto", "scipy", "multifrontal"}
         Linear solver, see `factorize`.
 
     Raises
@@ -169,9 +169,15 @@ class HeatMethodSolver:
                 stacklevel=3,
             )
         self._operators = domain
-        self._heat_flow = HeatFlow(domain, step, boundary, backend)
+        self._analysis = analysis(domain, backend)
+        analysed = time.perf_counter()
+        # Both matrices at once: the backends run without the interpreter's lock.
+        with ThreadPoolExecutor(2) as pool:
+            poisson = pool.submit(PoissonProblem, domain, backend, self._analysis) if refine is None else None
+            self._heat_flow = HeatFlow(domain, step, boundary, backend, self._analysis)
+            self._poisson = None if poisson is None else poisson.result()
+        factored = time.perf_counter()
         self._emitter = Emitter(domain, self._heat_flow)
-        self._poisson: PoissonProblem | None = None
         self._unfolded: Callable[[FloatArray, IntArray], FloatArray] | None = None
         triangulation = domain.triangulation
         if refine is not None and triangulation is not None:
@@ -179,8 +185,8 @@ class HeatMethodSolver:
             refinement = Refinement(domain.surface or triangulation)
             self._unfolded = refinement.sweep if refine == "sweep" else refinement.unfold
         else:
-            self._poisson = PoissonProblem(domain, backend)
-            _ = domain.D  # made on first use otherwise, in the middle of the first query
+            _ = domain.gradient_rows  # made on first use otherwise, in the middle of the first query
+        factors = self._heat_flow.factors + ([] if self._poisson is None else [self._poisson.factor])
         self._diagnostics = Diagnostics(
             t=step,
             t_requested=requested,
@@ -190,7 +196,10 @@ class HeatMethodSolver:
             lengthening=triangulation.lengthening if triangulation else 0.0,
             backend=self._heat_flow.backend,
             seconds_operators=seconds_operators,
-            seconds_factorization=time.perf_counter() - start,
+            factor_nonzeros=sum(factor.nonzeros for factor in factors),
+            factor_bytes=sum(factor.n_bytes for factor in factors),
+            seconds_analysis=analysed - start,
+            seconds_factorization=factored - analysed,
         )
 
     @property
@@ -291,7 +300,7 @@ class HeatMethodSolver:
         if self._unfolded is not None:
             distance = _in_heat_order(self._unfolded, u, chosen)
         else:
-            distance = self._integrated(emissions, u, X, magnitude)
+            distance = self._integrated(emissions, u)
         with np.errstate(under="ignore"):
             heat = u[:, 0] / self._emitter.unit(emissions[0]) / self._heat_flow.mean_mass
         direction = np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T)
@@ -313,7 +322,7 @@ class HeatMethodSolver:
         emissions, u = self._diffuse(source_sets)
         if self._unfolded is not None:
             return _in_heat_order(self._unfolded, u, source_sets)
-        return self._integrated(emissions, u, *self._field(emissions, u))
+        return self._integrated(emissions, u)
 
     def _diffuse(self, source_sets: list[SourceSet]) -> tuple[list[Emission], FloatArray]:
         """Heat (n, k) from k sets of sources."""
@@ -329,12 +338,19 @@ class HeatMethodSolver:
             self._emitter.guide(emission, X[:, column], magnitude[:, column])
         return X, magnitude
 
-    def _integrated(self, emissions: list[Emission], u: FloatArray, X: FloatArray, magnitude: FloatArray) -> FloatArray:
+    def _divergence(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
+        """Right-hand sides (n, k) of step 3."""
+        domain = self._operators
+        if not any(emission.guides.any() for emission in emissions):
+            return descent(domain, u, self.t if self._damped else None)
+        X, magnitude = self._field(emissions, u)
+        return np.asarray(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1))))
+
+    def _integrated(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
         """Distances (k, n) by step 3."""
         if self._poisson is None:
             raise RuntimeError("this solver unfolds and has no Poisson problem")
-        domain = self._operators
-        phi = self._poisson.solve(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1))))
+        phi = self._poisson.solve(self._divergence(emissions, u))
         distances = np.empty(phi.T.shape)
         for column, emission in enumerate(emissions):
             self._warn_if_cold(u[:, column], emission)

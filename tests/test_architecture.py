@@ -31,13 +31,16 @@ operators
 speed
 polygons
 io
+fans
+dissection
+multifrontal
 factorization
 sources
 near_field
-fans
 sweeping
 unfolding
 refine
+descending
 steps
 emission
 solution
