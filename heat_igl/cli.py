@@ -39,7 +39,7 @@ from heat_igl.heat_method import HeatMethodSolver, Magnitude
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Laplacian
-from heat_igl.picture import PICTURE_SUFFIXES, Picture
+from heat_igl.picture import PAGE_SUFFIXES, PICTURE_SUFFIXES, Picture, replace_file
 from heat_igl.refine import Refine
 from heat_igl.sources import vertex_sources
 from heat_igl.steps import Boundary
@@ -146,17 +146,6 @@ def _check_writable(path: Path) -> None:
             pass
     except OSError as error:
         raise OSError(f"{path} cannot be written: {error.strerror}") from error
-
-
-def _write_text(path: Path, text: str) -> None:
-    """Write a file that replaces an existing one only when it is complete."""
-    target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{target.name}.{os.getpid()}")
-    try:
-        temporary.write_text(text, encoding="utf8")
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _one_of(choices: tuple[str, ...]) -> Callable[[str | None], str | None]:
@@ -304,13 +293,62 @@ def validate(
     if picture is not None:
         Picture(report.plot()).save(picture)
     if json_file is not None:
-        _write_text(json_file, json.dumps(report.to_dict(), indent=1, allow_nan=False) + "\n")
+        replace_file(json_file, (json.dumps(report.to_dict(), indent=1, allow_nan=False) + "\n").encode("utf8"))
     print(report.to_markdown(), end="")
     exceeding = report.exceeding(fail_above) if fail_above is not None else ()
     if exceeding:
         names = ", ".join(row.method for row in exceeding)
         _say(f"no mean error of at most {fail_above:g} % for {names}")
         raise typer.Exit(1)
+
+
+@app.command()
+def view(
+    mesh: MeshArgument,
+    source: Annotated[list[int] | None, typer.Option(help="Source vertex to start with; repeat for several.")] = None,
+    t_coef: Annotated[float, typer.Option(help="Time step in squared mean edge lengths.", callback=_positive)] = 1.0,
+    boundary: Annotated[str, _choice(Boundary, "What heat does at the boundary.")] = "neumann",
+    refine: Annotated[str | None, _choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
+) -> None:
+    """A window in which a click moves the source and the distance follows; where there is no display, a page."""
+    from heat_igl.viewer import Exploration, Options, Window, display_problem
+
+    loaded = read_mesh(mesh)
+    sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
+    chosen: dict[str, Any] = {"boundary": boundary, "refine": refine}
+    target = html or Path(f"{mesh.stem}-view.html")
+    problem = None if html else display_problem()
+    if html or problem:
+        _check_page(target)
+    with Console(stderr=True).status("factoring"):
+        shown = Exploration(loaded, sources, Options(t_coef=t_coef, **chosen))
+    if html is None and problem is None:
+        try:
+            window = Window(shown, title=f"heat-igl: {mesh.name}")
+        except RuntimeError as error:
+            problem = str(error)
+            _check_page(target)
+        else:
+            window.run()
+            return
+    from heat_igl.plots import write_html
+
+    kind = f"unfolded in heat order (refine = {refine})" if refine else "the heat method"
+    write_html(
+        target, loaded, shown.distance, sources=sources, title=mesh.name,
+        method=f"Distance by {kind}, t = {t_coef:g} h^2, boundary {boundary}.",
+    )  # fmt: skip
+    if problem:
+        _say(f"no window: {problem}")
+    _print_rows([("mesh", f"{mesh}: {loaded.n_vertices} vertices"), ("wrote", f"{target} (open it in a browser)")])
+
+
+def _check_page(path: Path) -> None:
+    if path.suffix.lower() not in PAGE_SUFFIXES:
+        raise ValueError(f"--html {path}: pages go to {' or '.join(PAGE_SUFFIXES)} files")
+    _require("matplotlib", "a page", "view")
+    _check_writable(path)
 
 
 @app.command()

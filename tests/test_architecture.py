@@ -70,6 +70,7 @@ scene
 picture
 html_view
 plots
+viewer
 demo
 cluster
 cli
@@ -77,6 +78,7 @@ __main__
 """.split()
 
 EXTRAS = """
+Xlib
 cholespy
 colorspacious
 dask
@@ -86,6 +88,7 @@ gdist
 matplotlib
 meshio
 numba
+polyscope
 potpourri3d
 psutil
 pyamg
