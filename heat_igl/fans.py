@@ -16,7 +16,7 @@ import numpy as np
 
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["Tables", "inline", "jit", "tables"]
+__all__ = ["Tables", "breadth_first", "inline", "jit", "tables"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -227,6 +227,38 @@ def _fill_steps(
             continue
         row[FAR_X], row[FAR_Y], row[FAR_ANGLE] = apex[t, 0], apex[t, 1], angle[t]
         ids[FAR], ids[TO_RIGHT], ids[TO_LEFT], ids[FAR_FAN] = vertex[t], _next(t), _previous(t), fan[t]
+
+
+@jit
+def breadth_first(F: IntArray, twin: IntArray, n: int) -> tuple[IntArray, IntArray]:
+    """Number (n,) of each vertex, and the faces (m,), in the order in which a front over glued faces meets them."""
+    m = len(F)
+    number = np.full(n, -1, np.int64)
+    faces = np.empty(m, np.int64)
+    is_met = np.zeros(m, np.bool_)
+    n_met = n_numbered = n_done = 0
+    for start in range(m):
+        if not is_met[start]:
+            is_met[start] = True
+            faces[n_met] = start
+            n_met += 1
+        while n_done < n_met:
+            f = faces[n_done]
+            n_done += 1
+            for c in range(3):
+                if number[F[f, c]] < 0:
+                    number[F[f, c]] = n_numbered
+                    n_numbered += 1
+                t = twin[3 * f + c]
+                if t >= 0 and not is_met[t // 3]:
+                    is_met[t // 3] = True
+                    faces[n_met] = t // 3
+                    n_met += 1
+    for v in range(n):
+        if number[v] < 0:
+            number[v] = n_numbered
+            n_numbered += 1
+    return number, faces
 
 
 def tables(F: IntArray, l: FloatArray, twin: IntArray, n: int) -> Tables:  # noqa: E741

@@ -16,6 +16,8 @@ from heat_igl import HeatMethodSolver, Mesh, Refinement, shapes, unfolded_distan
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 
+from refinement_table import book, with_slivers
+
 pytest.importorskip("numba")
 
 METHODS = ("sweep", "unfold")
@@ -60,28 +62,6 @@ def moebius_strip(around: int, across: int) -> Mesh:
             c, d = (a + across + 1, b + across + 1) if i < around - 1 else (across - j, across - j - 1)
             faces += [[a, c, b], [b, c, d]]
     return Mesh(V.reshape(-1, 3), faces)
-
-
-def with_slivers(mesh: Mesh, seed: int) -> Mesh:
-    """The same surface with up to a tenth of the edges split at 1e-4 of their length; vertices keep their numbers."""
-    rng = np.random.default_rng(seed)
-    faces_of: list[list[tuple[int, int]]] = [[] for _ in mesh.edges]
-    for f, row in enumerate(mesh.facets.of_face):
-        for c, e in enumerate(row):
-            faces_of[e].append((f, c))
-    alive = np.ones(mesh.n_faces, bool)
-    points, added = [], []
-    for e in rng.permutation(len(mesh.edges))[: len(mesh.edges) // 10]:
-        if not all(alive[f] for f, _ in faces_of[e]):
-            continue
-        i, j = rng.permutation(mesh.edges[e])
-        points.append(mesh.V[i] + 1e-4 * (mesh.V[j] - mesh.V[i]))
-        new = mesh.n_vertices + len(points) - 1
-        for f, c in faces_of[e]:
-            alive[f] = False
-            w, a, b = mesh.F[f, c], mesh.F[f, (c + 1) % 3], mesh.F[f, (c + 2) % 3]
-            added += [[w, a, new], [w, new, b]]
-    return Mesh(np.concatenate([mesh.V, points]), np.concatenate([mesh.F[alive], added]))
 
 
 FLAT = {
@@ -238,18 +218,8 @@ def test_faces_turned_over_change_nothing(bumpy):
 def test_more_than_two_faces_at_an_edge():
     """Five half planes on one line: paths between two of them turn on the line."""
     k = 8
-    y, x = np.divmod(np.arange((k + 1) ** 2), k + 1)
-    V, F = [np.stack([np.zeros(k + 1), np.zeros(k + 1), np.arange(k + 1) / k], axis=1)], []
-    n = k + 1
-    for i in range(5):
-        direction = np.array([np.cos(2 * np.pi * i / 5), np.sin(2 * np.pi * i / 5)])
-        inner = x > 0
-        number = np.where(inner, n + np.cumsum(inner) - 1, y)
-        V.append(np.column_stack([np.outer(x[inner] / k, direction), y[inner] / k]))
-        F.append(number[shapes.grid(k).F])
-        n += int(inner.sum())
-    mesh = Mesh(np.concatenate(V), np.concatenate(F))
-    source = n - 1
+    mesh = book(5, k)
+    source = mesh.n_vertices - 1
     leaf = np.arange(mesh.n_vertices) < k + 1
     d = unfolded_distance(mesh.V, mesh.F, source)
     assert np.isfinite(d).all()
