@@ -229,6 +229,23 @@ def test_more_than_two_faces_at_an_edge():
     assert (d >= truth * (1 - 1e-9)).all()
 
 
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("k", [1, 2, 5])
+def test_straight_over_an_edge_of_more_than_two_faces(method, k):
+    """Any two of five pages are a plane folded on the line: the path between them is straight when rolled out."""
+    mesh = book(5, k)
+    surface = Refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)))
+    source = mesh.n_vertices - 1
+    page = (np.arange(mesh.n_vertices) - (k + 1)) // (k * (k + 1))
+    from_line, height = np.hypot(mesh.V[:, 0], mesh.V[:, 1]), mesh.V[:, 2] - mesh.V[source, 2]
+    same = (page == 4) | (from_line < 1e-9)
+    truth = np.hypot(np.where(same, from_line - 1, from_line + 1), height)
+    d = getattr(surface, method)(truth, np.array([source]))
+    # Beyond the first row of a page, straight paths are found where both ends of an edge on the line see the source.
+    first_row = same | (from_line < 1.5 / k)
+    np.testing.assert_allclose(d[first_row], truth[first_row], rtol=1e-9)
+
+
 def test_slivers_do_little_harm(bumpy):
     truth = exact(bumpy, 5)
     bad = with_slivers(bumpy, 0)
