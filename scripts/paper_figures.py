@@ -120,7 +120,7 @@ def accuracy(i: int) -> dict[str, float]:
     """Mean error of distances from the corner of the square of step 1 / i, |d - truth| over all vertices.
 
     ``edges`` is the curve that the paper's section 4.2.2 expects, paths along edges; ``bound`` the one it is bounded
-    by. ``heat`` is the paper's three steps at its time step, ``log_gradient`` takes the direction from log u instead of u,
+    by. ``heat`` is the paper's three steps at its t, ``log_gradient`` takes the direction from log u instead of u;
     ``default`` and ``sweep`` are `HeatMethodSolver` without and with ``refine="sweep"``.
     """
     square = shapes.grid(i)
