@@ -35,6 +35,8 @@ io
 fans
 relaxation
 iterative
+dissection
+multifrontal
 factorization
 sources
 near_field
@@ -42,11 +44,16 @@ ordering
 sweeping
 unfolding
 refine
+descending
 steps
 emission
 solution
 blocks
 heat_method
+isolines
+tracing
+paths
+curve_files
 sampling
 baselines
 applications
@@ -66,6 +73,7 @@ scene
 picture
 html_view
 plots
+viewer
 demo
 cluster
 cli
@@ -73,14 +81,17 @@ __main__
 """.split()
 
 EXTRAS = """
+Xlib
 cholespy
+colorspacious
 dask
 distributed
-colorspacious
+ezdxf
 gdist
 matplotlib
 meshio
 numba
+polyscope
 potpourri3d
 psutil
 pyamg
