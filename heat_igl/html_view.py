@@ -83,8 +83,9 @@ def page(
 
     Dragging turns it, the wheel or two fingers zoom, Shift moves. The page reads out vertex, position and distance
     under the pointer. A click makes the vertex the source, and the distance follows: computed in the page by unfolding
-    triangle after triangle over the intrinsic Delaunay triangulation, to 1e-4 what ``refine="sweep"`` gives. Of
-    tetrahedra the outside is shown, and a click reads only: the way leads through the inside.
+    triangle after triangle over the intrinsic Delaunay triangulation, to 1e-3 (on average 1e-5) what
+    ``refine="sweep"`` gives. Of tetrahedra the outside is shown, and a click reads only: the way leads through the
+    inside.
 
     Parameters
     ----------
