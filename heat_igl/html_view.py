@@ -99,7 +99,7 @@ def page(
     Returns
     -------
     Page
-        Shown by notebooks; `Page.save` writes it. It takes 25 kB and about 55 bytes per vertex, and needs
+        Shown by notebooks; `Page.save` writes it. It takes 35 kB and 50 to 55 bytes per vertex, and needs
         a browser with WebGL 2 and DecompressionStream (2023 or later).
 
     Raises
