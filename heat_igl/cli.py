@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, cast, get_args
 
 import numpy as np
 import typer
@@ -24,6 +24,7 @@ from rich.progress import Progress
 from rich.text import Text
 
 import heat_igl
+from heat_igl.curve_files import CURVE_SUFFIXES
 from heat_igl.errors import (
     AccuracyWarning,
     BatchError,
@@ -49,6 +50,9 @@ __all__ = ["app", "run"]
 
 # What a user can cause; anything else is a fault of the package and shows its traceback.
 _EXPECTED = (OSError, ValueError, BatchError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
+
+# More isolines than this are a mistaken spacing.
+_MOST_LINES = 10000
 
 _DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
 
@@ -215,6 +219,49 @@ def distance(
 
 
 @app.command()
+def isolines(
+    mesh: MeshArgument,
+    source: Annotated[list[int], typer.Option(help="Source vertex, counted from 0; repeat for several.")],
+    spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=_positive)],
+    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the lines.")],
+    refine: Annotated[str | None, _choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+) -> None:
+    """Curves of equal distance from one or more source vertices."""
+    loaded = read_mesh(mesh)
+    sources = vertex_sources(np.array(source), loaded.n_vertices)
+    _check_curves(output)
+    phi = HeatMethodSolver(loaded, refine=cast(Refine | None, refine)).distance(sources)
+    farthest = float(phi[np.isfinite(phi)].max())
+    if farthest > _MOST_LINES * spacing:
+        raise ValueError(
+            f"--spacing {spacing:g} makes over {_MOST_LINES} lines up to {farthest:.3g}: choose a larger one"
+        )
+    levels = spacing * np.arange(1, int(farthest / spacing) + 1)
+    curves = heat_igl.isolines(loaded, phi, levels)
+    heat_igl.write_curves(output, loaded, {f"{level:g}": each for level, each in zip(levels, curves, strict=True)})
+    rows = [("farthest", f"{farthest:.6g}"), ("lines", f"{sum(map(len, curves))} at {len(levels)} distances")]
+    _print_rows([*rows, ("wrote", str(output))])
+
+
+@app.command()
+def path(
+    mesh: MeshArgument,
+    start: Annotated[int, typer.Option("--from", help="Vertex where the path begins, counted from 0.")],
+    end: Annotated[int, typer.Option("--to", help="Vertex where it ends.")],
+    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the path.")],
+) -> None:
+    """A locally shortest path between two vertices."""
+    loaded = read_mesh(mesh)
+    for vertex in (start, end):
+        vertex_sources(vertex, loaded.n_vertices)
+    _check_curves(output)
+    found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), start, end)
+    heat_igl.write_curves(output, loaded, found)
+    length = float(found[0].lengths(loaded).sum())
+    _print_rows([("length", f"{length:.6g}"), ("segments", str(len(found[0]))), ("wrote", str(output))])
+
+
+@app.command()
 def validate(
     mesh: MeshArgument,
     sources: Annotated[int, typer.Option(min=1, help="Single source vertices, one distance from each.")] = 3,
@@ -378,6 +425,14 @@ def _check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> Non
             raise ValueError(f"--picture {picture}: pictures go to {', '.join(PICTURE_SUFFIXES)} files")
         _require("matplotlib", "a picture", "view")
         _check_writable(picture)
+
+
+def _check_curves(output: Path) -> None:
+    if output.suffix.lower() not in CURVE_SUFFIXES:
+        raise ValueError(f"--output {output}: curves go to {', '.join(CURVE_SUFFIXES)} files")
+    if output.suffix.lower() == ".dxf":
+        _require("ezdxf", "a .dxf file", "io")
+    _check_writable(output)
 
 
 def _require(package: str, purpose: str, extra: str) -> None:

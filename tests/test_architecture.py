@@ -35,6 +35,8 @@ io
 fans
 relaxation
 iterative
+dissection
+multifrontal
 factorization
 sources
 near_field
@@ -42,11 +44,16 @@ ordering
 sweeping
 unfolding
 refine
+descending
 steps
 emission
 solution
 blocks
 heat_method
+isolines
+tracing
+paths
+curve_files
 sampling
 baselines
 applications
@@ -76,9 +83,10 @@ __main__
 EXTRAS = """
 Xlib
 cholespy
+colorspacious
 dask
 distributed
-colorspacious
+ezdxf
 gdist
 matplotlib
 meshio

@@ -198,6 +198,13 @@ def test_flat_polygons_are_refused():
         polygon_operators(PolygonMesh(V, [[0, 1, 2, 3], [0, 4, 1, 5]]))
 
 
+def test_spikes_are_refused():
+    """Out along the diagonal and back: the virtual vertex lies on it, too."""
+    V = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 2, 0], [1, 1, 0], [0, 1, 0]]
+    with pytest.raises(heat_igl.MeshError, match="or a side that its middle does not see"):
+        polygon_operators(PolygonMesh(V, [[0, 1, 2, 3, 4, 5]]))
+
+
 def test_a_corner_on_a_straight_side_is_fine():
     """Where two small neighbours meet a large polygon."""
     mesh = PolygonMesh([*SQUARE, [0.5, 0, 0], [0.5, -0.5, 0], [0, -0.5, 0], [1, -0.5, 0]],
