@@ -38,6 +38,7 @@ iterative
 factorization
 sources
 near_field
+ordering
 sweeping
 unfolding
 refine
@@ -46,8 +47,13 @@ emission
 solution
 blocks
 heat_method
+isolines
+tracing
+paths
+curve_files
 sampling
 baselines
+applications
 bounds
 closed_forms
 peak_memory
@@ -64,6 +70,7 @@ scene
 picture
 html_view
 plots
+viewer
 demo
 cluster
 cli
@@ -71,14 +78,17 @@ __main__
 """.split()
 
 EXTRAS = """
+Xlib
 cholespy
+colorspacious
 dask
 distributed
-colorspacious
+ezdxf
 gdist
 matplotlib
 meshio
 numba
+polyscope
 potpourri3d
 psutil
 pyamg
