@@ -42,12 +42,12 @@ def block_size(n_faces: int, n_sets: int | None, n_threads: int) -> tuple[int, i
     Returns
     -------
     (int, int)
-        Both at least 1. Together they keep to `WORKING_MEMORY`; few right-hand sides are spread over the threads.
+        Both at least 1. Together they keep to `WORKING_MEMORY`. Where there is room, the size of a block does not
+        depend on the threads, and so the bits of the results do not.
     """
     fit = int(WORKING_MEMORY // (_BYTES_PER_FACE * n_faces))
     threads = max(1, min(n_threads, fit, n_threads if n_sets is None else n_sets))
-    share = _MOST if n_sets is None else -(-n_sets // threads)
-    return max(1, min(_MOST, fit // threads, share)), threads
+    return max(1, min(_MOST, fit // threads)), threads
 
 
 def in_blocks(items: Iterable[Item], size: int) -> Iterator[list[Item]]:

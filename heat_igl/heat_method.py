@@ -13,14 +13,14 @@ import numpy.typing as npt
 from heat_igl.blocks import block_size, float_type, in_blocks, in_order, progress_bar, row_writer
 from heat_igl.emission import Emission, Emitter
 from heat_igl.errors import AccuracyWarning, SourceError
-from heat_igl.factorization import Backend
+from heat_igl.factorization import Analysis, Backend
 from heat_igl.mesh import RANGE_LIMIT, Mesh
 from heat_igl.operators import Laplacian, Operators, operators
 from heat_igl.processors import n_threads
 from heat_igl.refine import Refine, Refinement
 from heat_igl.solution import Diagnostics, HeatSolution
 from heat_igl.sources import Sources, SourceSet, source_set
-from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, damping, normalize
+from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, analysis, damping, descent, normalize
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_time_step"]
@@ -78,7 +78,7 @@ class HeatMethodSolver:
         Integrate nothing, and find the distance in the order of the heat by unfolding triangles, one at a time or in
         strips: 0.2 to 0.7 % and 0.001 to 0.01 % mean error on common meshes, see `Refinement`. Needs triangles, and
         numba (extra ``fast``); no Poisson problem is factored.
-    backend : {"auto", "scipy", "cholespy"}
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
         Linear solver, see `factorize`.
 
     Raises
@@ -119,9 +119,7 @@ class HeatMethodSolver:
         refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> None:
-        start = time.perf_counter()
-        self._mesh = made_from = _as_mesh(mesh, F)
-        self._options = {
+        options = {
             "t_coef": t_coef,
             "t": t,
             "laplacian": laplacian,
@@ -130,11 +128,18 @@ class HeatMethodSolver:
             "refine": refine,
             "backend": backend,
         }
-        domain = operators(made_from, laplacian)
-        seconds = time.perf_counter() - start
-        if magnitude == "auto" and laplacian == "cotan":
-            magnitude = "unit"
-        self._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, seconds)
+        self._set_up_mesh(_as_mesh(mesh, F), options)
+
+    def _set_up_mesh(self, mesh: Mesh, options: dict[str, Any], known: Analysis | None = None) -> None:
+        start = time.perf_counter()
+        self._mesh = mesh
+        self._options = options
+        rest = dict(options)
+        laplacian = rest.pop("laplacian")
+        domain = operators(mesh, laplacian)
+        if rest["magnitude"] == "auto" and laplacian == "cotan":
+            rest["magnitude"] = "unit"
+        self._set_up(domain, **rest, seconds_operators=time.perf_counter() - start, known=known)
 
     @classmethod
     def from_operators(
@@ -167,7 +172,7 @@ class HeatMethodSolver:
         HeatMethodSolver
             With the same faces and options, and the same results as one made anew. The time step follows `t_coef`,
             unless `t` was given. What the faces alone say is shared: they are not validated, and edges, boundary and
-            components not found again.
+            components not found again; nor is the order of elimination, unless other edges are flipped.
 
         Raises
         ------
@@ -180,7 +185,9 @@ class HeatMethodSolver:
             raise ValueError(
                 "this solver was made from operators and has no vertices to move: use from_operators again"
             )
-        return HeatMethodSolver(self._mesh.with_vertices(V), **self._options)
+        solver = HeatMethodSolver.__new__(HeatMethodSolver)
+        solver._set_up_mesh(self._mesh.with_vertices(V), self._options, self._analysis)
+        return solver
 
     def _set_up(
         self,
@@ -192,6 +199,7 @@ class HeatMethodSolver:
         refine: Refine | None,
         backend: Backend,
         seconds_operators: float,
+        known: Analysis | None = None,
     ) -> None:
         start = time.perf_counter()
         if magnitude not in ("auto", "unit", "damped"):
@@ -210,9 +218,16 @@ class HeatMethodSolver:
                 stacklevel=3,
             )
         self._operators = domain
-        self._heat_flow = HeatFlow(domain, step, boundary, backend)
+        self._analysis = analysis(domain, backend, known)
+        analysed = time.perf_counter()
+        makers: list[Callable[[], Any]] = [lambda: HeatFlow(domain, step, boundary, backend, self._analysis)]
+        if refine is None:
+            makers.append(lambda: PoissonProblem(domain, backend, self._analysis))
+        # Both matrices at once: the backends run without the interpreter's lock.
+        self._heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
+        self._poisson: PoissonProblem | None = poisson[0] if poisson else None
+        factored = time.perf_counter()
         self._emitter = Emitter(domain, self._heat_flow)
-        self._poisson: PoissonProblem | None = None
         self._unfolded: Callable[[FloatArray, IntArray], FloatArray] | None = None
         triangulation = domain.triangulation
         if refine is not None and triangulation is not None:
@@ -220,8 +235,8 @@ class HeatMethodSolver:
             refinement = Refinement(domain.surface or triangulation)
             self._unfolded = refinement.sweep if refine == "sweep" else refinement.unfold
         else:
-            self._poisson = PoissonProblem(domain, backend)
-            _ = domain.D  # made on first use otherwise, in the middle of the first query
+            _ = domain.gradient_rows  # made on first use otherwise, in the middle of the first query
+        factors = self._heat_flow.factors + ([] if self._poisson is None else [self._poisson.factor])
         self._diagnostics = Diagnostics(
             t=step,
             t_requested=requested,
@@ -231,7 +246,10 @@ class HeatMethodSolver:
             lengthening=triangulation.lengthening if triangulation else 0.0,
             backend=self._heat_flow.backend,
             seconds_operators=seconds_operators,
-            seconds_factorization=time.perf_counter() - start,
+            factor_nonzeros=sum(factor.nonzeros for factor in factors),
+            factor_bytes=sum(factor.n_bytes for factor in factors),
+            seconds_analysis=analysed - start,
+            seconds_factorization=factored - analysed,
         )
 
     @property
@@ -393,7 +411,7 @@ class HeatMethodSolver:
         if self._unfolded is not None:
             distance = _in_heat_order(self._unfolded, u, chosen)
         else:
-            distance = self._integrated(emissions, u, X, magnitude)
+            distance = self._integrated(emissions, u)
         with np.errstate(under="ignore"):
             heat = u[:, 0] / self._emitter.unit(emissions[0]) / self._heat_flow.mean_mass
         direction = np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T)
@@ -415,7 +433,7 @@ class HeatMethodSolver:
         emissions, u = self._diffuse(source_sets)
         if self._unfolded is not None:
             return _in_heat_order(self._unfolded, u, source_sets)
-        return self._integrated(emissions, u, *self._field(emissions, u))
+        return self._integrated(emissions, u)
 
     def _diffuse(self, source_sets: list[SourceSet]) -> tuple[list[Emission], FloatArray]:
         """Heat (n, k) from k sets of sources."""
@@ -431,12 +449,19 @@ class HeatMethodSolver:
             self._emitter.guide(emission, X[:, column], magnitude[:, column])
         return X, magnitude
 
-    def _integrated(self, emissions: list[Emission], u: FloatArray, X: FloatArray, magnitude: FloatArray) -> FloatArray:
+    def _divergence(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
+        """Right-hand sides (n, k) of step 3."""
+        domain = self._operators
+        if not any(emission.guides.any() for emission in emissions):
+            return descent(domain, u, self.t if self._damped else None)
+        X, magnitude = self._field(emissions, u)
+        return np.asarray(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1))))
+
+    def _integrated(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
         """Distances (k, n) by step 3."""
         if self._poisson is None:
             raise RuntimeError("this solver unfolds and has no Poisson problem")
-        domain = self._operators
-        phi = self._poisson.solve(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1))))
+        phi = self._poisson.solve(self._divergence(emissions, u))
         distances = np.empty(phi.T.shape)
         for column, emission in enumerate(emissions):
             self._warn_if_cold(u[:, column], emission)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from types import ModuleType
 from typing import Any
@@ -20,9 +21,17 @@ import scipy.sparse as sp
 
 from heat_igl.errors import FactorizationError, MissingExtraError
 from heat_igl.processors import n_threads
-from heat_igl.typing import FloatArray
+from heat_igl.typing import BoolArray, FloatArray
 
-__all__ = ["Multigrid", "Relaxation", "available_memory", "factors_fit", "has_iterative", "iterative"]
+__all__ = [
+    "IterativeAnalysis",
+    "Multigrid",
+    "Relaxation",
+    "available_memory",
+    "factors_fit",
+    "has_iterative",
+    "iterative",
+]
 
 # Relative change per sweep below which an unknown is left alone. What it still lacks adds up along the way from the
 # source, to at most some 1e-8 on slivers; distances see the differences of neighbours only.
@@ -39,6 +48,20 @@ _BYTES_SURFACE = 65.0
 _BYTES_VOLUME = 200.0
 
 
+class IterativeAnalysis:
+    """In place of an ordering: there is nothing to analyse, and every matrix fits."""
+
+    backend = "iterative"
+
+    def fits(self, A: sp.csc_matrix) -> bool:  # noqa: ARG002 - any will do
+        """Whether the analysis may be used for A: always."""
+        return True
+
+    def factorize(self, A: sp.csc_matrix, free: BoolArray | None = None) -> Relaxation | Multigrid:
+        """See `iterative`."""
+        return iterative(A, free)
+
+
 class Relaxation:
     """Gauss-Seidel in breadth-first order from the right-hand side, to relative accuracy.
 
@@ -47,6 +70,8 @@ class Relaxation:
     A : (n, n) sparse matrix
         Symmetric positive definite, with an inverse that has no negative entry: an M-matrix, or one with a few small
         positive entries off the diagonal such as obtuse angles at a boundary bring.
+    free : (n,) bool, optional
+        Rows and columns to keep; the solution is 0 on the others.
 
     Raises
     ------
@@ -54,10 +79,13 @@ class Relaxation:
         If numba is not installed.
     """
 
-    backend = "relaxation"
+    backend = "iterative"
+    nonzeros = 0
 
-    def __init__(self, A: sp.csc_matrix) -> None:
-        self._matrix = A.tocsc()
+    def __init__(self, A: sp.csc_matrix, free: BoolArray | None = None) -> None:
+        self._arguments = A, free
+        self._part = _Part(A, free)
+        self.n_bytes = self._part.n_bytes
         self._kernel = _kernel()
 
     def solve(self, b: FloatArray) -> FloatArray:
@@ -68,10 +96,7 @@ class Relaxation:
         FactorizationError
             If the solution for a right-hand side that is nowhere negative is negative somewhere.
         """
-        columns = b[:, None] if b.ndim == 1 else b
-        with ThreadPoolExecutor(min(n_threads(), columns.shape[1])) as pool:
-            solved = list(pool.map(self._column, np.ascontiguousarray(columns.T)))
-        return solved[0] if b.ndim == 1 else np.stack(solved, axis=1)
+        return self._part.solve(b, self._column, n_threads())
 
     def _column(self, b: FloatArray) -> FloatArray:
         if (b < 0).any():
@@ -79,17 +104,17 @@ class Relaxation:
         return self._rising(b)
 
     def _rising(self, b: FloatArray) -> FloatArray:
-        A = self._matrix  # symmetric: its columns are its rows
+        A = self._part.matrix  # symmetric: its columns are its rows
         x, sweeps = self._kernel.relax(A.indptr, A.indices, A.data, b, _TOLERANCE, _MOST_SWEEPS)
         if sweeps < 0 or (x < 0).any():
             raise FactorizationError(
                 f"relaxation failed ({'no end' if sweeps < 0 else 'negative heat'}): edges with negative weights let "
                 'heat turn negative; use laplacian="intrinsic-delaunay", or a direct backend'
             )
-        return x
+        return np.asarray(x)
 
-    def __reduce__(self) -> tuple[type[Relaxation], tuple[sp.csc_matrix]]:
-        return Relaxation, (self._matrix,)
+    def __reduce__(self) -> tuple[type[Relaxation], tuple[sp.csc_matrix, BoolArray | None]]:
+        return Relaxation, self._arguments
 
 
 class Multigrid:
@@ -98,7 +123,9 @@ class Multigrid:
     Parameters
     ----------
     A : (n, n) sparse matrix
-        Symmetric positive definite.
+        Symmetric positive definite on the vertices that are free.
+    free : (n,) bool, optional
+        Rows and columns to keep; the solution is 0 on the others.
 
     Raises
     ------
@@ -111,17 +138,20 @@ class Multigrid:
     Laplacians of triangulations; and it uses no random numbers.
     """
 
-    backend = "pyamg"
+    backend = "iterative"
+    nonzeros = 0
 
-    def __init__(self, A: sp.csc_matrix) -> None:
+    def __init__(self, A: sp.csc_matrix, free: BoolArray | None = None) -> None:
         try:
             import pyamg
         except ImportError:
             raise MissingExtraError.of('backend="iterative"', "pyamg", "fast") from None
-        self._matrix = A.tocsc()
-        # Symmetric: the columns are the rows.
-        rows = sp.csr_matrix((self._matrix.data, self._matrix.indices, self._matrix.indptr), shape=A.shape)
+        self._arguments = A, free
+        self._part = _Part(A, free)
+        part = self._part.matrix  # symmetric: its columns are its rows
+        rows = sp.csr_matrix((part.data, part.indices, part.indptr), shape=part.shape)
         self._levels: Any = pyamg.ruge_stuben_solver(rows, max_coarse=500)
+        self.n_bytes = int(self._part.n_bytes * self._levels.operator_complexity())
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Solve A x = b for one right-hand side (n,) or several (n, k).
@@ -131,8 +161,9 @@ class Multigrid:
         FactorizationError
             If the iteration does not converge.
         """
-        if b.ndim == 2:
-            return np.stack([self.solve(column) for column in np.ascontiguousarray(b.T)], axis=1)
+        return self._part.solve(b, self._column, 1)
+
+    def _column(self, b: FloatArray) -> FloatArray:
         x, status = self._levels.solve(b, tol=_RESIDUAL, maxiter=_MOST_ITERATIONS, accel="cg", return_info=True)
         if status != 0:
             raise FactorizationError(
@@ -141,13 +172,42 @@ class Multigrid:
             )
         return np.asarray(x)
 
-    def __reduce__(self) -> tuple[type[Multigrid], tuple[sp.csc_matrix]]:
-        return Multigrid, (self._matrix,)
+    def __reduce__(self) -> tuple[type[Multigrid], tuple[sp.csc_matrix, BoolArray | None]]:
+        return Multigrid, self._arguments
 
 
-def iterative(A: sp.csc_matrix) -> Relaxation | Multigrid:
+class _Part:
+    """The principal submatrix of A on the free rows, and solutions that are 0 on the others."""
+
+    def __init__(self, A: sp.csc_matrix, free: BoolArray | None) -> None:
+        self._free = None if free is None or free.all() else np.flatnonzero(free)
+        self.matrix = (A if self._free is None else A[self._free][:, self._free]).tocsc()
+        self.n_bytes = self.matrix.data.nbytes + self.matrix.indices.nbytes + self.matrix.indptr.nbytes
+
+    def solve(self, b: FloatArray, column_solve: Callable[[FloatArray], FloatArray], n_threads: int) -> FloatArray:
+        kept = b if self._free is None else b[self._free]
+        columns = kept.reshape(len(kept), -1)
+        if columns.shape[1] == 1 or n_threads == 1:
+            solved = [column_solve(np.ascontiguousarray(column)) for column in columns.T]
+        else:
+            with ThreadPoolExecutor(min(n_threads, columns.shape[1])) as pool:
+                solved = list(pool.map(column_solve, np.ascontiguousarray(columns.T)))
+        x = np.zeros(b.shape)
+        into = x.reshape(len(x), -1)
+        into[slice(None) if self._free is None else self._free] = np.stack(solved, axis=1)
+        return x
+
+
+def iterative(A: sp.csc_matrix, free: BoolArray | None = None) -> Relaxation | Multigrid:
     """What solves with `A` without factors: `Relaxation` where each diagonal entry exceeds the rest of its row, as in
     a step of heat flow, and `Multigrid` where rows sum to zero, as in a Poisson problem.
+
+    Parameters
+    ----------
+    A : (n, n) csc_matrix
+        Symmetric, both triangles stored.
+    free : (n,) bool, optional
+        Rows and columns to keep; solutions are 0 on the others.
 
     Raises
     ------
@@ -156,11 +216,12 @@ def iterative(A: sp.csc_matrix) -> Relaxation | Multigrid:
     MissingExtraError
         If a library is missing.
     """
-    diagonal = A.diagonal()
+    kept = np.ones(A.shape[0], bool) if free is None else free
+    diagonal = A.diagonal()[kept]
     if not (diagonal > 0).all():
         raise FactorizationError(f"the matrix ({A.shape[0]} rows) is singular or not positive definite")
-    excess = A @ np.ones(A.shape[0])
-    return Relaxation(A) if (excess > _EXCESS * diagonal).all() else Multigrid(A)
+    excess = (A @ np.ones(A.shape[0]))[kept]
+    return Relaxation(A, free) if (excess > _EXCESS * diagonal).all() else Multigrid(A, free)
 
 
 def has_iterative() -> bool:

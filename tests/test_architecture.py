@@ -35,6 +35,8 @@ io
 fans
 relaxation
 iterative
+dissection
+multifrontal
 factorization
 sources
 near_field
@@ -42,6 +44,7 @@ ordering
 sweeping
 unfolding
 refine
+descending
 steps
 emission
 solution
