@@ -396,7 +396,7 @@ def break_even(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 # The largest meshes: one method, one query.
 
 
-def huge(n: int, mesh_path: Path | None) -> dict[str, Any]:
+def huge(n: int, mesh_path: Path | None, backend: Any = "auto") -> dict[str, Any]:
     """One query on an icosphere of about `n` vertices, or on a mesh subdivided to at least `n`, and two more."""
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -416,7 +416,7 @@ def huge(n: int, mesh_path: Path | None) -> dict[str, Any]:
         mesh, exact_mesh = timed("making the mesh", lambda: huge_mesh(n, mesh_path))
         V, n_first = mesh.V, exact_mesh.n_vertices if exact_mesh is not None else mesh.n_vertices
         result |= {"mesh": mesh_path.stem if mesh_path else "icosphere", "n": mesh.n_vertices}
-        solver = timed("precomputation", lambda: HeatMethodSolver(mesh))
+        solver = timed("precomputation", lambda: HeatMethodSolver(mesh, backend=backend))
         result["backend"] = solver.diagnostics.backend
         distance = timed("first query", lambda: solver.distance(0))
         timed("later query", lambda: solver.distance(n_first // 2))
@@ -590,6 +590,7 @@ def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--large", action="store_true", help="add the icosphere with 655 362 vertices")
     parser.add_argument("--huge", type=int, help="one query on an icosphere of about so many vertices, or on --mesh")
+    parser.add_argument("--backend", default="auto", help="of --huge")
     parser.add_argument("--docs", type=Path, help="page whose tables are to be written")
     parser.add_argument("--out", type=Path, default=Path("benchmark-results"), help="directory of the results")
     parser.add_argument("--child", nargs=2, help=argparse.SUPPRESS)
@@ -628,7 +629,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     name = "benchmark"
     if arguments.huge:
         name = "huge"
-        result["huge"] = huge(arguments.huge, arguments.mesh[0] if arguments.mesh else None)
+        result["huge"] = huge(arguments.huge, arguments.mesh[0] if arguments.mesh else None, arguments.backend)
         reference.close()
     else:
         result |= _measured(arguments)

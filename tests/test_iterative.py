@@ -70,7 +70,7 @@ def test_distance_agrees_with_direct_factors(name, request):
         "two spheres": lambda: Mesh(np.vstack([sphere.V, sphere.V + 5]), np.vstack([sphere.F, sphere.F + 642])),
         "disk": lambda: perturbed(shapes.disk(30), 0.3),
     }[name]()
-    direct, by_iteration = HeatMethodSolver(mesh), HeatMethodSolver(mesh, backend="iterative")
+    direct, by_iteration = (HeatMethodSolver(mesh, backend=backend) for backend in ("scipy", "iterative"))
     for sources in (5, [5, 700]):
         expected, found = direct.distance(sources), by_iteration.distance(sources)
         assert (np.isinf(found) == np.isinf(expected)).all()
