@@ -67,7 +67,8 @@ def _heat_igl(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch | None, dict[s
     solver = HeatMethodSolver(V, F)
     found = solver.diagnostics
     factor_bytes = getattr(found, "factor_bytes", None)
-    return solver.distance, solver.distances, {"factor_bytes": factor_bytes, "backend": found.backend}
+    facts = {"factor_bytes": factor_bytes, "backend": found.backend, "again": lambda: solver.with_vertices(V * 1.01)}
+    return solver.distance, solver.distances, facts
 
 
 def _potpourri3d(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch | None, dict[str, Any]]:
@@ -133,6 +134,7 @@ def _child(method: str, path: str) -> None:
             ready = time.perf_counter()
             distance = solve(int(sources[0]))
             solved = time.perf_counter()
+        again = facts.pop("again", None)
         reply = {"precomputation": ready - start, "query": solved - ready, "peak_memory": peak.bytes, **facts}
         later = []
         for source in sources[1 : 1 + LATER] if batch is not None else []:
@@ -144,9 +146,13 @@ def _child(method: str, path: str) -> None:
             start = time.perf_counter()
             batch(sources[1:])
             reply["batch"] = (time.perf_counter() - start) / (len(sources) - 1)
+        if again is not None:
+            start = time.perf_counter()
+            again()
+            reply["moved"] = time.perf_counter() - start
         if request["save"]:
             np.save(request["save"], distance)
-        del solve, batch, distance
+        del solve, batch, distance, again
         print(json.dumps(reply), file=replies, flush=True)
 
 
@@ -291,7 +297,7 @@ def medians(found: dict[str, list[dict[str, Any]]], method: str) -> dict[str, An
     runs = found[method]
     row: dict[str, Any] = {
         key: statistics.median(run[key] for run in runs)
-        for key in ("precomputation", "query", "later", "batch")
+        for key in ("precomputation", "query", "later", "batch", "moved")
         if runs[0].get(key) is not None
     }
     row |= {key: runs[0].get(key) for key in ("peak_memory", "factor_bytes", "backend")}
@@ -504,6 +510,11 @@ def tables(result: dict[str, Any]) -> dict[str, str]:
         found["floor"] = [f"Copying runs at {result['bandwidth'] / 1e9:.1f} GB/s, read and written.", ""]
         if cells:
             found["floor"] += _table("mesh | factors MB | floor ms | later query ms | over floor", cells)
+    moved = [
+        [(row["mesh"], ""), (row["precomputation"], ".3f"), (row["moved"], ".3f")] for row in rows if row.get("moved")
+    ]
+    if moved:
+        found["moved"] = _table("mesh | a new solver | with_vertices", moved)
     paid = [
         [(row["mesh"], ""), (row["method"], ""), (row["query"], ".3f"), (row["queries"], "")]
         for row in break_even(rows)
