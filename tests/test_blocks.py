@@ -33,6 +33,8 @@ def test_blocks_keep_to_the_memory_and_use_the_threads():
     assert 1 < size < 8
     assert blocks.block_size(20_000_000, 64, 2) == (1, 2)
     assert blocks.block_size(60_000_000, 64, 2) == (1, 1)
+    # The bits of the results do not depend on the threads.
+    assert blocks.block_size(10_000, 6, 64)[0] == blocks.block_size(10_000, 6, 1)[0]
 
 
 def test_in_order_works_on_several_threads_and_draws_no_more_than_it_has_room_for():
