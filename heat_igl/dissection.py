@@ -14,7 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from heat_igl.fans import jit
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray as FloatArray  # of 32 bits too
+from heat_igl.typing import AnyArray as IntArray
+from heat_igl.typing import BoolArray
 
 __all__ = ["Dissection", "dissect"]
 

@@ -100,7 +100,9 @@ class _ScipyFactorization:
                 restricted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
             )
         except RuntimeError as error:
-            raise FactorizationError(f"the matrix ({restricted.shape[0]} rows) could not be factored: {error}") from None
+            raise FactorizationError(
+                f"the matrix ({restricted.shape[0]} rows) could not be factored: {error}"
+            ) from None
         self.nonzeros = int(self._factor.nnz)
         self.n_bytes = 12 * self.nonzeros
         _check_probe(self, A, free, indefinite=True)
