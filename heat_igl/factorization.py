@@ -9,18 +9,20 @@ from __future__ import annotations
 
 import importlib.util
 from concurrent.futures import ThreadPoolExecutor
-from typing import Literal, Protocol
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from heat_igl.errors import FactorizationError, MissingExtraError
+from heat_igl.iterative import IterativeAnalysis, factors_fit, has_iterative
+from heat_igl.processors import n_threads
 from heat_igl.typing import BoolArray, FloatArray
 
 __all__ = ["Analysis", "Backend", "Factorization", "analyse", "factorize"]
 
-Backend = Literal["auto", "scipy", "multifrontal"]
+Backend = Literal["auto", "scipy", "multifrontal", "iterative"]
 
 # Smaller matrices go to scipy: printed by scripts/tune_backends.py.
 _SMALLEST_MULTIFRONTAL = 1000
@@ -127,7 +129,7 @@ class _MultifrontalAnalysis:
         from heat_igl import dissection, multifrontal
 
         self._ends, self._neighbours = pattern.indptr, pattern.indices
-        with ThreadPoolExecutor() as workers:
+        with ThreadPoolExecutor(n_threads()) as workers:
             tree = dissection.dissect(self._ends, self._neighbours, workers)
         self.fronts = multifrontal.fronts(self._ends, self._neighbours, tree)
 
@@ -223,9 +225,10 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
     ----------
     pattern : (n, n) csc_matrix
         Both triangles stored, indices sorted or not; the values do not matter.
-    backend : {"auto", "scipy", "multifrontal"}
-        SuperLU, or the package's own factorization, which needs numba. "auto" takes the latter where numba is installed
-        and the matrix is not small.
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
+        SuperLU; the package's own factorization, which needs numba; or no factors at all, see `iterative`, which needs
+        pyamg too. "auto" takes the second where numba is installed and the matrix is not small, and the third where
+        factors would not fit into memory, by an estimate made before.
 
     Raises
     ------
@@ -234,8 +237,10 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
     ValueError
         If there is no such backend.
     """
-    if backend not in ("auto", "scipy", "multifrontal"):
-        raise ValueError(f"backend must be 'auto' or one of ['multifrontal', 'scipy'], not {backend!r}")
+    if backend not in get_args(Backend):
+        raise ValueError(f"backend must be one of {', '.join(map(repr, get_args(Backend)))}, not {backend!r}")
+    if backend == "iterative" or (backend == "auto" and has_iterative() and not factors_fit(pattern)):
+        return IterativeAnalysis()
     installed = importlib.util.find_spec("numba") is not None
     if backend == "multifrontal" and not installed:
         raise MissingExtraError.of('backend="multifrontal"', "numba", "fast")
@@ -251,7 +256,7 @@ def factorize(A: sp.csc_matrix, backend: Backend = "auto", free: BoolArray | Non
     ----------
     A : (n, n) csc_matrix
         Both triangles stored.
-    backend : {"auto", "scipy", "multifrontal"}
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
         See `analyse`.
     free : (n,) bool, optional
         Rows and columns to keep, all by default.

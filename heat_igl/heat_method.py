@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
+from heat_igl.blocks import block_size, float_type, in_blocks, in_order, progress_bar, row_writer
 from heat_igl.emission import Emission, Emitter
-from heat_igl.errors import AccuracyWarning, MissingExtraError, SourceError
-from heat_igl.factorization import Backend
+from heat_igl.errors import AccuracyWarning, SourceError
+from heat_igl.factorization import Analysis, Backend
 from heat_igl.mesh import RANGE_LIMIT, Mesh
 from heat_igl.operators import Laplacian, Operators, operators
 from heat_igl.processors import n_threads
@@ -28,8 +29,6 @@ Magnitude = Literal["auto", "unit", "damped"]
 
 # Below this the heat has lost digits to gradual underflow.
 _LOWEST_HEAT = 1e-300
-# Right-hand sides solved together; wider blocks measured no faster.
-_BLOCK = 8
 
 
 def _positive(name: str, value: float) -> float:
@@ -79,7 +78,7 @@ class HeatMethodSolver:
         Integrate nothing, and find the distance in the order of the heat by unfolding triangles, one at a time or in
         strips: 0.2 to 0.7 % and 0.001 to 0.01 % mean error on common meshes, see `Refinement`. Needs triangles, and
         numba (extra ``fast``); no Poisson problem is factored.
-    backend : {"auto", "scipy", "multifrontal"}
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
         Linear solver, see `factorize`.
 
     Raises
@@ -104,6 +103,9 @@ class HeatMethodSolver:
     so. The solver is immutable; threads may share it, and a pickled copy gives the same bits.
     """
 
+    _mesh: Mesh | None
+    _options: dict[str, Any]
+
     def __init__(
         self,
         mesh: Mesh | ArrayLike,
@@ -117,12 +119,27 @@ class HeatMethodSolver:
         refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> None:
+        options = {
+            "t_coef": t_coef,
+            "t": t,
+            "laplacian": laplacian,
+            "boundary": boundary,
+            "magnitude": magnitude,
+            "refine": refine,
+            "backend": backend,
+        }
+        self._set_up_mesh(_as_mesh(mesh, F), options)
+
+    def _set_up_mesh(self, mesh: Mesh, options: dict[str, Any], known: Analysis | None = None) -> None:
         start = time.perf_counter()
-        domain = operators(_as_mesh(mesh, F), laplacian)
-        seconds = time.perf_counter() - start
-        if magnitude == "auto" and laplacian == "cotan":
-            magnitude = "unit"
-        self._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, seconds)
+        self._mesh = mesh
+        self._options = options
+        rest = dict(options)
+        laplacian = rest.pop("laplacian")
+        domain = operators(mesh, laplacian)
+        if rest["magnitude"] == "auto" and laplacian == "cotan":
+            rest["magnitude"] = "unit"
+        self._set_up(domain, **rest, seconds_operators=time.perf_counter() - start, known=known)
 
     @classmethod
     def from_operators(
@@ -138,7 +155,38 @@ class HeatMethodSolver:
     ) -> HeatMethodSolver:
         """A solver on any domain that has operators; parameters as for the class."""
         solver = cls.__new__(cls)
+        solver._mesh = None
         solver._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, 0.0)
+        return solver
+
+    def with_vertices(self, V: ArrayLike) -> HeatMethodSolver:
+        """A new solver after the vertices have moved; this one stays as it is.
+
+        Parameters
+        ----------
+        V : (n, 3) array_like
+            New positions of all vertices.
+
+        Returns
+        -------
+        HeatMethodSolver
+            With the same faces and options, and the same results as one made anew. The time step follows `t_coef`,
+            unless `t` was given. What the faces alone say is shared: they are not validated, and edges, boundary and
+            components not found again; nor is the order of elimination, unless other edges are flipped.
+
+        Raises
+        ------
+        MeshError
+            If `V` cannot be used; the message names the first offender.
+        ValueError
+            If the solver was made from operators.
+        """
+        if self._mesh is None:
+            raise ValueError(
+                "this solver was made from operators and has no vertices to move: use from_operators again"
+            )
+        solver = HeatMethodSolver.__new__(HeatMethodSolver)
+        solver._set_up_mesh(self._mesh.with_vertices(V), self._options, self._analysis)
         return solver
 
     def _set_up(
@@ -151,6 +199,7 @@ class HeatMethodSolver:
         refine: Refine | None,
         backend: Backend,
         seconds_operators: float,
+        known: Analysis | None = None,
     ) -> None:
         start = time.perf_counter()
         if magnitude not in ("auto", "unit", "damped"):
@@ -169,13 +218,14 @@ class HeatMethodSolver:
                 stacklevel=3,
             )
         self._operators = domain
-        self._analysis = analysis(domain, backend)
+        self._analysis = analysis(domain, backend, known)
         analysed = time.perf_counter()
+        makers: list[Callable[[], Any]] = [lambda: HeatFlow(domain, step, boundary, backend, self._analysis)]
+        if refine is None:
+            makers.append(lambda: PoissonProblem(domain, backend, self._analysis))
         # Both matrices at once: the backends run without the interpreter's lock.
-        with ThreadPoolExecutor(2) as pool:
-            poisson = pool.submit(PoissonProblem, domain, backend, self._analysis) if refine is None else None
-            self._heat_flow = HeatFlow(domain, step, boundary, backend, self._analysis)
-            self._poisson = None if poisson is None else poisson.result()
+        self._heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
+        self._poisson: PoissonProblem | None = poisson[0] if poisson else None
         factored = time.perf_counter()
         self._emitter = Emitter(domain, self._heat_flow)
         self._unfolded: Callable[[FloatArray, IntArray], FloatArray] | None = None
@@ -249,48 +299,109 @@ class HeatMethodSolver:
         return np.asarray(self._distances(chosen)[0])
 
     def distances(
-        self, source_sets: Sequence[Sources], out: AnyArray | None = None, progress: bool = False
+        self,
+        source_sets: Sequence[Sources],
+        out: AnyArray | None = None,
+        progress: bool = False,
+        dtype: npt.DTypeLike | None = None,
     ) -> AnyArray:
-        """Distance from each of several sets of sources, solved in blocks.
+        """Distance from each of several sets of sources, solved in blocks, on all processors.
 
         Parameters
         ----------
         source_sets : sequence of sources
             k entries, each as for `distance`.
         out : (k, n) array of float, optional
-            Where to write, for instance a `numpy.memmap`; float64 or float32.
+            Where to write: an array, a `numpy.memmap`, a zarr array, or whatever has a shape and a dtype and takes
+            ``out[start:stop] = rows``. A chunked array is written a whole row of chunks at a time.
         progress : bool
             Show a progress bar on standard error (extra ``cli``).
+        dtype : float64 or float32, optional
+            Of the result; float64, or that of `out`.
 
         Returns
         -------
-        (k, n) float64, or `out`
-            Row i is the distance from ``source_sets[i]``; the same as one by one to rounding.
+        (k, n) array of `dtype`, or `out`
+            Row i is the distance from ``source_sets[i]``; the same as one by one to rounding, whatever the number of
+            threads.
 
         Raises
         ------
         SourceError
-            Before anything is solved, if an entry does not name vertices; the message says which.
+            Before anything is solved, if an entry does not name sources; the message says which.
         ValueError
-            If `out` has the wrong shape or cannot hold floats.
+            If `out` has the wrong shape, cannot hold floats or cannot be written, or if `dtype` is none for distances.
+
+        Notes
+        -----
+        Beside the result and one row of chunks of `out`, it holds at most 1 GiB, or what one query takes where that is
+        more: 130 bytes per face. The number of threads is that of the processors, or ``HEAT_IGL_NUM_THREADS``.
         """
         if not hasattr(source_sets, "__len__"):
             raise SourceError(f"source_sets must be a sequence of sets of sources, not {source_sets!r}: try distance")
-        chosen = []
-        for i, sources in enumerate(source_sets):
-            try:
-                chosen.append(self._set(sources))
-            except SourceError as error:
-                raise SourceError(f"source_sets[{i}]: {error}") from None
+        chosen = list(self._named(source_sets))
         shape = (len(chosen), self.n_vertices)
         if out is None:
-            out = np.empty(shape)
-        elif out.shape != shape or out.dtype.kind != "f":
+            out = np.empty(shape, float_type(dtype))
+        elif tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f":
             raise ValueError(f"out must be an array of floats of shape {shape}, not {out.dtype} of shape {out.shape}")
-        starts: Any = range(0, len(chosen), _BLOCK)
-        for start in _tracked(starts) if progress else starts:
-            out[start : start + _BLOCK] = self._distances(chosen[start : start + _BLOCK])
+        elif dtype is not None and float_type(dtype) != out.dtype:
+            raise ValueError(f"dtype is {np.dtype(dtype)}, but out holds {out.dtype}: leave one of them away")
+        elif isinstance(out, np.ndarray) and not out.flags.writeable:
+            raise ValueError("out is read-only: open a memmap with mode='r+'")
+        write = row_writer(out)
+        with progress_bar("distances", len(chosen), progress) as advance:
+            for rows in self._blocks(chosen, len(chosen)):
+                write(rows.astype(out.dtype, copy=False))
+                advance(len(rows))
         return out
+
+    def iter_distances(self, source_sets: Iterable[Sources], dtype: npt.DTypeLike | None = None) -> Iterator[AnyArray]:
+        """Distance from each of several sets of sources, a row as soon as its block is solved.
+
+        Parameters
+        ----------
+        source_sets : iterable of sources
+            Each as for `distance`; drawn from as the rows are taken, so it may be a generator without an end.
+        dtype : float64 or float32, optional
+            Of the rows.
+
+        Yields
+        ------
+        (n,) array of `dtype`
+            In the order of `source_sets`; no view of anything else.
+
+        Raises
+        ------
+        SourceError
+            When the row of an entry that does not name sources would be next; the message says which.
+        ValueError
+            At once, if `dtype` is none for distances.
+
+        Notes
+        -----
+        Memory is bounded as for `distances`, whatever the number of sets; blocks are solved ahead on all processors
+        while rows are being used.
+        """
+        row_type = float_type(dtype)
+        if not isinstance(source_sets, Iterable):
+            raise SourceError(f"source_sets must be an iterable of sets of sources, not {source_sets!r}: try distance")
+        n_sets = len(source_sets) if isinstance(source_sets, Sized) else None
+        blocks = self._blocks(self._named(source_sets), n_sets)
+        return (row.astype(row_type) for rows in blocks for row in rows)
+
+    def _named(self, source_sets: Iterable[Sources]) -> Iterator[SourceSet]:
+        """The sources of each set; errors say which set they are in."""
+        for i, sources in enumerate(source_sets):
+            try:
+                yield self._set(sources)
+            except SourceError as error:
+                raise SourceError(f"source_sets[{i}]: {error}") from None
+
+    def _blocks(self, source_sets: Iterable[SourceSet], n_sets: int | None) -> Iterator[FloatArray]:
+        """Distances of a block of sets after the other."""
+        size, threads = block_size(len(self._operators.weights), n_sets, n_threads())
+        return in_order(self._distances, in_blocks(source_sets, size), threads)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
@@ -378,22 +489,11 @@ class HeatMethodSolver:
 def _in_heat_order(
     unfolded: Callable[[FloatArray, IntArray], FloatArray], u: FloatArray, source_sets: list[SourceSet]
 ) -> FloatArray:
-    """Distances (k, n) by unfolding, on all processors: the kernels run without the interpreter's lock.
+    """Distances (k, n) by unfolding.
 
     Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
     """
-    if len(source_sets) == 1:
-        return unfolded(-u[:, 0], source_sets[0].vertices)[None]
-    with ThreadPoolExecutor(n_threads()) as pool:
-        return np.stack(list(pool.map(unfolded, -u.T, [one.vertices for one in source_sets])))
-
-
-def _tracked(starts: Any) -> Any:
-    try:
-        from rich.progress import track
-    except ImportError:
-        raise MissingExtraError.of("progress=True", "rich", "cli") from None
-    return track(starts, description="distances")
+    return np.stack([unfolded(-column, one.vertices) for column, one in zip(u.T, source_sets, strict=True)])
 
 
 def _as_mesh(mesh: Mesh | ArrayLike, F: ArrayLike | None) -> Mesh:

@@ -21,7 +21,7 @@ import numpy as np
 
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.mesh import Mesh
-from heat_igl.picture import replace_file
+from heat_igl.picture import PAGE_SUFFIXES, replace_file
 from heat_igl.scene import DISTANCE_LABEL, LINE_INK, STRIPE_INK, Style, check_style, colours, scene
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike
@@ -57,8 +57,8 @@ class Page:
             If the file cannot be written.
         """
         target = Path(path)
-        if target.suffix.lower() not in (".html", ".htm"):
-            raise ValueError(f"{target} must end in .html to be a page")
+        if target.suffix.lower() not in PAGE_SUFFIXES:
+            raise ValueError(f"{target} must end in {' or '.join(PAGE_SUFFIXES)} to be a page")
         replace_file(target, self.html.encode("utf8"))
 
     def _repr_html_(self) -> str:

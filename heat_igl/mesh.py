@@ -33,6 +33,9 @@ _LARGEST_EXTENT = 1e60
 _SMALLEST_EXTENT = 1e-60
 
 
+# Cached properties of a mesh that do not depend on its positions.
+_OF_THE_FACES = {"facets", "edges", "components", "referenced", "boundary"}
+
 ArrayT = TypeVar("ArrayT", bound=AnyArray)
 
 
@@ -132,7 +135,13 @@ class Mesh:
     def __init__(self, V: ArrayLike, F: ArrayLike) -> None:
         positions = checked_positions(V)
         faces = _faces(F, len(positions))
-        used = positions[np.unique(faces)]
+        faces.setflags(write=False)
+        self._hold(positions, faces)
+
+    def _hold(self, positions: FloatArray, faces: IntArray) -> None:
+        is_used = np.zeros(len(positions), bool)
+        is_used[faces] = True
+        used = positions[is_used]
         with np.errstate(over="ignore"):
             extent = float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
         if extent == 0:
@@ -140,9 +149,30 @@ class Mesh:
         if not _SMALLEST_EXTENT < extent < _LARGEST_EXTENT:
             raise MeshError(f"V spans {extent:.3g} units, outside what areas in double precision allow: rescale V")
         positions.setflags(write=False)
-        faces.setflags(write=False)
         object.__setattr__(self, "V", positions)
         object.__setattr__(self, "F", faces)
+
+    def with_vertices(self, V: ArrayLike) -> Mesh:
+        """The same faces on other positions; whatever the faces alone say is shared and not found again.
+
+        Parameters
+        ----------
+        V : (n, 3) array_like
+            New positions of all vertices; copied to float64.
+
+        Raises
+        ------
+        MeshError
+            If V cannot be positions, or are not as many as the mesh has vertices.
+        """
+        positions = checked_positions(V)
+        if len(positions) != self.n_vertices:
+            raise MeshError(f"V has {len(positions)} rows, but the mesh has {self.n_vertices} vertices")
+        moved = object.__new__(Mesh)
+        moved._hold(positions, self.F)
+        for name in _OF_THE_FACES & self.__dict__.keys():
+            moved.__dict__[name] = self.__dict__[name]
+        return moved
 
     def __repr__(self) -> str:
         kind = "tetrahedra" if self.is_tetrahedral else "triangles"

@@ -123,7 +123,7 @@ class Refinement:
         if labels is not None or offsets is not None or point_offsets is not None:
             label = np.full(len(distance), -1)
             label[starts.row] = starts.label
-        sweeping.sweep(self._order(key), self._tables, distance[:n], _MAX_PASSES, label, starts.offset)
+        sweeping.sweep(self._order(key), self._tables, distance[:n], label, starts.offset)
         return self._on_base(distance, label, labels)
 
     def unfold(
@@ -180,7 +180,10 @@ class Refinement:
 
     def _order(self, key: FloatArray) -> IntArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
-        return np.asarray(self._number[np.argsort(np.tile(key, self._n_sheets))])
+        from heat_igl.ordering import ascending
+
+        on_sheets = np.tile(key, self._n_sheets) if self._n_sheets > 1 else np.ascontiguousarray(key)
+        return np.asarray(self._number[ascending(on_sheets)])
 
     def _starts(
         self,

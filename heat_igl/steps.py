@@ -54,7 +54,7 @@ class HeatFlow:
     boundary : {"neumann", "dirichlet", "average"}
         Insulated boundary, boundary held at zero, or the mean of both solutions. Under "dirichlet" heat that is put on
         a boundary vertex stays there as its fixed value.
-    backend : {"auto", "scipy", "multifrontal"}
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
         See `factorize`.
     analysis : Analysis, optional
         As `analysis` makes it for a domain with the same pattern of L, to be shared; made anew where it does not fit.
@@ -140,9 +140,13 @@ class PoissonProblem:
         return self.factor.solve(-b)
 
 
-def analysis(operators: Operators, backend: Backend = "auto") -> Analysis:
-    """Order and analyse the pattern that the matrices of the heat flow and of the Poisson problem have in common."""
-    return analyse(_shifted(operators.L, 1.0, np.zeros(operators.n)), backend)
+def analysis(operators: Operators, backend: Backend = "auto", known: Analysis | None = None) -> Analysis:
+    """Order and analyse the pattern that the matrices of the heat flow and of the Poisson problem have in common.
+
+    An analysis that is `known` is returned as it is if it fits.
+    """
+    pattern = _shifted(operators.L, 1.0, np.zeros(operators.n))
+    return known if known is not None and known.fits(pattern) else analyse(pattern, backend)
 
 
 def _shifted(L: sp.csc_matrix, factor: float, diagonal: FloatArray) -> sp.csc_matrix:

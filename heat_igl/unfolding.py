@@ -14,10 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.fans import (
+    ALONG,
     ANGLE_HERE,
     ANGLE_THERE,
-    APEX_X,
-    APEX_Y,
     BASE,
     CORNER,
     FAN_HERE,
@@ -27,6 +26,7 @@ from heat_igl.fans import (
     FAR_FAN,
     FAR_X,
     FAR_Y,
+    HEIGHT,
     LENGTH,
     NEIGHBOUR,
     NEXT_SPOKE,
@@ -120,9 +120,9 @@ def _settle(v: int, t: Tables, state: FloatArray, found: FloatArray) -> None:
         zx, zy = zx + further * (zx * cosine - zy * sine), zy + further * (zx * sine + zy * cosine)
         reach = math.sqrt(zx * zx + zy * zy)
         offset = state[z, OFFSET]
-    fan = t.spoke_id[k, FAN_HERE]
+    fan = t.turn_id[k, FAN_HERE]
     state[v, DISTANCE], state[v, OFFSET], state[v, REACH] = found[0], offset, reach
-    state[v, ANGLE] = t.spoke[k, ANGLE_HERE] + math.atan2(ax * zy - ay * zx, ax * zx + ay * zy)
+    state[v, ANGLE] = t.turn[k, ANGLE_HERE] + math.atan2(ax * zy - ay * zx, ax * zx + ay * zy)
     state[v, FAN], state[v, TOTAL] = fan, t.total[fan]
 
 
@@ -201,8 +201,8 @@ def _look_around(
         length = t.spoke[k, LENGTH]
         side[i] = 0
         most = -1.0
-        if state[w, FAN] == t.spoke_id[k, FAN_THERE]:
-            right, left = _savings(t.spoke[k, ANGLE_THERE], state[w, ANGLE], state[w, TOTAL])
+        if state[w, FAN] == t.turn_id[k, FAN_THERE]:
+            right, left = _savings(t.turn[k, ANGLE_THERE], state[w, ANGLE], state[w, TOTAL])
             most = max(right, left)
             if most > _STRAIGHT:
                 side[i] = 1 if left >= right else -1
@@ -282,18 +282,18 @@ def views(faces: IntArray, barycentric: FloatArray, F: IntArray, t: Tables) -> t
             h = 3 * faces[i] + c
             v = vertex[3 * i + c] = F[faces[i], c]
             k = t.first[v]
-            while t.spoke_id[k, CORNER] != h:
+            while t.turn_id[k, CORNER] != h:
                 k += 1
             base = t.spoke[k, BASE]
-            ax, ay = -t.spoke[k, APEX_X] * base, -t.spoke[k, APEX_Y] * base
+            ax, ay = -t.spoke[k, ALONG], -t.spoke[k, HEIGHT]
             at_a, at_b = barycentric[i, (c + 1) % 3], barycentric[i, (c + 2) % 3]
             x, y = at_a * ax + at_b * (ax + base), (at_a + at_b) * ay
             row = state[3 * i + c]
             row[DISTANCE] = row[REACH] = math.sqrt(x * x + y * y)
             # A source at v itself leaves v without a direction.
-            row[FAN] = t.spoke_id[k, FAN_HERE] if row[REACH] > 1e-12 * base else NO_FAN
-            row[ANGLE] = t.spoke[k, ANGLE_HERE] + math.atan2(ax * y - ay * x, ax * x + ay * y)
-            row[TOTAL] = t.total[t.spoke_id[k, FAN_HERE]]
+            row[FAN] = t.turn_id[k, FAN_HERE] if row[REACH] > 1e-12 * base else NO_FAN
+            row[ANGLE] = t.turn[k, ANGLE_HERE] + math.atan2(ax * y - ay * x, ax * x + ay * y)
+            row[TOTAL] = t.total[t.turn_id[k, FAN_HERE]]
     return vertex, state
 
 
@@ -317,7 +317,7 @@ def _walk(
     i, i_left = k - t.first[v], k_left - t.first[v]
     base = t.spoke[k, BASE]
     right, left = t.spoke_id[k, NEIGHBOUR], t.spoke_id[k_left, NEIGHBOUR]
-    ax, ay = -t.spoke[k, APEX_X] * base, -t.spoke[k, APEX_Y] * base
+    ax, ay = -t.spoke[k, ALONG], -t.spoke[k, HEIGHT]
     bx, by = ax + base, ay
     first_x, first_y = ax, ay
     rx, ry, lx, ly = ax, ay, bx, by
@@ -330,7 +330,7 @@ def _walk(
             _take(found, distance, right, rx, ry, right_saving, k, first_x, first_y)
             return -1
     far = 4.0 * found[0] * found[0]
-    h = t.spoke_id[k, CORNER]
+    h = t.turn_id[k, CORNER]
     wait_for = -1
     while True:
         w = t.step_id[h, FAR]
@@ -442,12 +442,12 @@ def _search(
     """
     top = 0
     for k in range(t.first[v], t.first[v + 1]):
-        corner = t.spoke_id[k, CORNER]
+        corner = t.turn_id[k, CORNER]
         if corner < 0:
             continue
         a, b = t.spoke_id[k, NEIGHBOUR], t.spoke_id[t.spoke_id[k, NEXT_SPOKE], NEIGHBOUR]
         base = t.spoke[k, BASE]
-        ax, ay = -t.spoke[k, APEX_X] * base, -t.spoke[k, APEX_Y] * base
+        ax, ay = -t.spoke[k, ALONG], -t.spoke[k, HEIGHT]
         bx, by = ax + base, ay
         forecast = _cone_forecast(ax, ay, bx, by, state[a, DISTANCE], state[b, DISTANCE], ax, ay, bx, by)
         if forecast < found[0]:
@@ -477,7 +477,7 @@ def _search(
             wx = bx + x * ux - y * uy
             wy = by + x * uy + y * ux
             to_right, to_left = t.step_id[h, TO_RIGHT], t.step_id[h, TO_LEFT]
-            first_x, first_y = -t.spoke[spoke, APEX_X], -t.spoke[spoke, APEX_Y]
+            first_x, first_y = -t.spoke[spoke, ALONG], -t.spoke[spoke, HEIGHT]
             _arrive(points, t, state, found, h, spoke, first_x, first_y, wx, wy, ax, ay, bx, by, rx, ry, lx, ly)
             if rx * wy - ry * wx <= 0.0:
                 a, ax, ay, h = w, wx, wy, to_left
@@ -542,7 +542,7 @@ def _visit(
     for _ in range(2):
         best, best_promise = -1, found[0] * (1 - 1e-12)
         for k in range(t.first[v], t.first[v + 1]):
-            if t.spoke_id[k, CORNER] < 0:
+            if t.turn_id[k, CORNER] < 0:
                 continue
             i, i_left = k - t.first[v], t.spoke_id[k, NEXT_SPOKE] - t.first[v]
             # A way in lies where one neighbour says left and the next one right (or is not known yet).

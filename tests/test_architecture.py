@@ -17,6 +17,7 @@ PACKAGE = Path(heat_igl.__file__).parent
 ORDER = """
 typing
 errors
+processors
 connectivity
 mesh
 surface_points
@@ -32,11 +33,14 @@ speed
 polygons
 io
 fans
+relaxation
+iterative
 dissection
 multifrontal
 factorization
 sources
 near_field
+ordering
 sweeping
 unfolding
 refine
@@ -44,10 +48,15 @@ descending
 steps
 emission
 solution
-processors
+blocks
 heat_method
+isolines
+tracing
+paths
+curve_files
 sampling
 baselines
+applications
 bounds
 closed_forms
 peak_memory
@@ -64,6 +73,7 @@ scene
 picture
 html_view
 plots
+viewer
 demo
 cluster
 cli
@@ -71,16 +81,20 @@ __main__
 """.split()
 
 EXTRAS = """
+Xlib
 cholespy
+colorspacious
 dask
 distributed
-colorspacious
+ezdxf
 gdist
 matplotlib
 meshio
 numba
+polyscope
 potpourri3d
 psutil
+pyamg
 pygeodesic
 pymeshlab
 pytest

@@ -67,7 +67,7 @@ def test_bad_matrix(backend, kind):
 
 
 def test_unknown_backend(heat_matrix):
-    with pytest.raises(ValueError, match="backend must be 'auto' or one of"):
+    with pytest.raises(ValueError, match="backend must be one of 'auto', 'scipy'"):
         factorize(heat_matrix, "mumps")
 
 

@@ -82,7 +82,7 @@ def test_what_cannot_be_shown_is_rejected_by_name(tmp_path: Path) -> None:
         page(mesh, x, style="dots")  # type: ignore[arg-type]
     with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 25"):
         page(mesh, x, sources=25)
-    with pytest.raises(ValueError, match=r"a\.png must end in \.html to be a page"):
+    with pytest.raises(ValueError, match=r"a\.png must end in \.html or \.htm to be a page"):
         write_html(tmp_path / "a.png", mesh, x)
 
 
