@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from heat_igl.dissection import Dissection
-from heat_igl.fans import Function, inline
+from heat_igl.fans import Function
 from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 from heat_igl.typing import BoolArray, FloatArray
 
@@ -116,7 +116,7 @@ def fronts(ends: IntArray, neighbours: IntArray, dissection: Dissection) -> Fron
     return Fronts(order, place, start, parent, first_row, rows, first_entry)
 
 
-@inline
+@jit
 def _at(column: int, row: int, size: int) -> int:
     """Where an entry on or below the diagonal is in the columns of a front with `size` rows."""
     return column * size - column * (column + 1) // 2 + row

@@ -139,14 +139,13 @@ def test_any_graph(name):
     np.testing.assert_allclose(factorize(A, "multifrontal").solve(A @ x), x, rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize(("mesh", "most"), [(shapes.grid(60), 1.15), (shapes.torus(80, 40), 1.15)])
-def test_dissection_keeps_fill_low(mesh, most):
-    """About as many entries as after minimum degree, on small meshes where that is good."""
+def test_dissection_keeps_fill_low():
+    """On a grid of 10 thousand vertices minimum degree is still as good."""
     pytest.importorskip("numba")
-    domain = operators(mesh)
+    domain = operators(shapes.grid(100))
     A = (domain.M - domain.L).tocsc()
     minimum_degree = spl.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    assert factorize(A, "multifrontal").nonzeros < most * minimum_degree.L.nnz
+    assert factorize(A, "multifrontal").nonzeros < 1.15 * minimum_degree.L.nnz
 
 
 def test_the_order_does_not_depend_on_threads():
