@@ -16,7 +16,7 @@ import numpy as np
 
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["Tables", "inline", "jit", "tables"]
+__all__ = ["Tables", "breadth_first", "inline", "jit", "tables"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -37,7 +37,7 @@ LENGTH, ALONG, HEIGHT, BASE, PER_BASE = 0, 1, 2, 3, 4
 NEIGHBOUR, NEXT_SPOKE = 10, 11
 # Columns of `Tables.turn`, and of its view as integers.
 ANGLE_HERE, ANGLE_THERE = 0, 1
-FAN_HERE, FAN_THERE, CORNER = 4, 5, 6
+FAN_HERE, FAN_THERE, CORNER, MANY = 4, 5, 6, 7
 # Columns of `Tables.step`, and of its view as integers.
 FAR_X, FAR_Y, FAR_ANGLE = 0, 1, 2
 FAR, TO_RIGHT, TO_LEFT, FAR_FAN = 6, 7, 8, 9
@@ -59,7 +59,8 @@ class Tables(NamedTuple):
     turn : (s, 4) float64
         Direction of the spoke at v; direction of the same edge at the neighbour (angles in their fans).
     turn_id : (s, 8) int32
-        The same memory. v's fan; the neighbour's; the half-edge opposite v in the triangle to the left, -1 if none.
+        The same memory. v's fan; the neighbour's; the half-edge opposite v in the triangle to the left, -1 if none;
+        whether more than two faces meet at that half-edge.
     step : (3 m, 5) float64
         For a half-edge that is crossed, where the far vertex lies, in units of the half-edge on the other side; the
         direction of the edge from the far vertex to the right end (seen in the walk: to b) in the far vertex's fan.
@@ -196,6 +197,7 @@ def _fill_spokes(
         spoke_id[k, NEIGHBOUR], spoke_id[k, NEXT_SPOKE] = vertex[right], k + 1
         turn[k, ANGLE_HERE], turn[k, ANGLE_THERE] = angle[h], angle[right] + corner_angle[right]
         turn_id[k, FAN_HERE], turn_id[k, FAN_THERE], turn_id[k, CORNER] = fan[h], fan[right], h
+        turn_id[k, MANY] = twin[h] < -1
         fill[v] += 1
         if twin[_next(h)] < 0:
             k += 1
@@ -229,8 +231,40 @@ def _fill_steps(
         ids[FAR], ids[TO_RIGHT], ids[TO_LEFT], ids[FAR_FAN] = vertex[t], _next(t), _previous(t), fan[t]
 
 
+@jit
+def breadth_first(F: IntArray, twin: IntArray, n: int) -> tuple[IntArray, IntArray]:
+    """Number (n,) of each vertex, and the faces (m,), in the order in which a front over glued faces meets them."""
+    m = len(F)
+    number = np.full(n, -1, np.int64)
+    faces = np.empty(m, np.int64)
+    is_met = np.zeros(m, np.bool_)
+    n_met = n_numbered = n_done = 0
+    for start in range(m):
+        if not is_met[start]:
+            is_met[start] = True
+            faces[n_met] = start
+            n_met += 1
+        while n_done < n_met:
+            f = faces[n_done]
+            n_done += 1
+            for c in range(3):
+                if number[F[f, c]] < 0:
+                    number[F[f, c]] = n_numbered
+                    n_numbered += 1
+                t = twin[3 * f + c]
+                if t >= 0 and not is_met[t // 3]:
+                    is_met[t // 3] = True
+                    faces[n_met] = t // 3
+                    n_met += 1
+    for v in range(n):
+        if number[v] < 0:
+            number[v] = n_numbered
+            n_numbered += 1
+    return number, faces
+
+
 def tables(F: IntArray, l: FloatArray, twin: IntArray, n: int) -> Tables:  # noqa: E741
-    """The tables of m triangles on n vertices, oriented alike; `twin` < 0 on the boundary."""
+    """The tables of m triangles on n vertices, oriented alike; `twin` is -1 on the boundary, -2 between more than two."""
     length = l.ravel()
     apex, corner_angle = _shapes(l)
     angle, fan, total, in_order = _fans(twin, corner_angle)

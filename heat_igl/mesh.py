@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import combinations
 from typing import TypeVar
 
 import igl
@@ -93,8 +94,9 @@ def _faces(F: ArrayLike, n: int) -> IntArray:
             f"faces are affected): V has {n} rows, so indices run from 0 to {n - 1}{hint}"
         )
     faces = np.array(array, dtype=np.int64, order="C", copy=True)
-    ordered = np.sort(faces, axis=1)
-    repeats = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    repeats = np.zeros(len(faces), bool)
+    for one, other in combinations(faces.T, 2):
+        repeats |= one == other
     if repeats.any():
         row = int(np.flatnonzero(repeats)[0])
         raise MeshError(

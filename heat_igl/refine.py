@@ -288,12 +288,8 @@ def _renumbered(
     Neighbours on the surface become neighbours in memory: nothing on most meshes, a fifth of the time where vertices
     come in an arbitrary order.
     """
-    graph = sp.csr_array((np.ones(F.size, np.int8), (F.ravel(), np.roll(F, -1, axis=1).ravel())), shape=(n, n))
-    found = csgraph.breadth_first_order(graph, int(F[0, 0]), directed=False, return_predecessors=False)
-    number = np.full(n, -1)
-    number[found] = np.arange(len(found))
-    number[number < 0] = np.arange(len(found), n)
-    face = np.argsort(number[F].min(axis=1), kind="stable")
+    fans, _, _ = _kernels()
+    number, face = fans.breadth_first(F, twin, n)
     new_face = np.empty(len(F), np.int64)
     new_face[face] = np.arange(len(F))
     twin = twin.reshape(-1, 3)[face].ravel()

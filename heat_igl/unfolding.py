@@ -28,6 +28,7 @@ from heat_igl.fans import (
     FAR_Y,
     HEIGHT,
     LENGTH,
+    MANY,
     NEIGHBOUR,
     NEXT_SPOKE,
     TO_LEFT,
@@ -173,6 +174,43 @@ def _common_source(
     if off_x * off_x + off_y * off_y > (1e-9 * scale) ** 2 or rx * qy - ry * qx < 0.0 or qx * ly - qy * lx < 0.0:
         return np.inf
     return float(offset + math.sqrt(qx * qx + qy * qy))
+
+
+@jit
+def _over_many(k: int, t: Tables, state: FloatArray, found: FloatArray) -> None:
+    """Note the straight path over an edge of more than two faces, left of a spoke k of the vertex to be visited.
+
+    Which face it comes from, the ends of the edge know: if both see one point in a straight line, at the distances and
+    at an angle that belong together in a plane, the leaf in which they see it is flat as far as that point.
+    """
+    a, b = t.spoke_id[k, NEIGHBOUR], t.spoke_id[t.spoke_id[k, NEXT_SPOKE], NEIGHBOUR]
+    ra, rb, begin = state[a, REACH], state[b, REACH], state[a, OFFSET]
+    if not (0.0 < ra < np.inf and 0.0 < rb < np.inf):
+        return
+    rounding = 1e-11 * (begin + ra)
+    if (
+        abs(begin - state[b, OFFSET]) > rounding
+        or abs(state[a, DISTANCE] - begin - ra) > rounding
+        or abs(state[b, DISTANCE] - begin - rb) > rounding
+    ):
+        return
+    along, height, base = t.spoke[k, ALONG], t.spoke[k, HEIGHT], t.spoke[k, BASE]
+    x = 0.5 * ((ra - rb) * (ra + rb) / base + base)
+    y = math.sqrt(max(ra * ra - x * x, 0.0))
+    crossing = x * height + along * y
+    distance = begin + math.sqrt((along - x) ** 2 + (height + y) ** 2)
+    if not 0.0 <= crossing <= (y + height) * base or distance >= found[0]:
+        return
+    for i in range(t.first[a], t.first[a + 1]):
+        if t.spoke_id[i, NEIGHBOUR] == b and t.turn_id[i, FAN_HERE] == state[a, FAN]:
+            turn = abs(state[a, ANGLE] - t.turn[i, ANGLE_HERE])
+            if state[a, TOTAL] > 0.0:
+                turn = min(turn, state[a, TOTAL] - turn)
+            if abs(turn - math.atan2(y, x)) < 1e-8:
+                # Seen from v, a lies at (-along, -height), and the point x further along and y below it.
+                saving = math.atan2(along * y + height * x, height * y - along * x)
+                _take(found, distance, a, -along, -height, saving, k, -along, -height)
+                return
 
 
 @inline
@@ -544,6 +582,8 @@ def _visit(
         for k in range(t.first[v], t.first[v + 1]):
             if t.turn_id[k, CORNER] < 0:
                 continue
+            if t.turn_id[k, MANY] > 0:
+                _over_many(k, t, state, found)
             i, i_left = k - t.first[v], t.spoke_id[k, NEXT_SPOKE] - t.first[v]
             # A way in lies where one neighbour says left and the next one right (or is not known yet).
             if side[i] > 0 and (side[i_left] == -1 or side[i_left] == 2):

@@ -120,7 +120,7 @@ def accuracy(i: int) -> dict[str, float]:
     """Mean error of distances from the corner of the square of step 1 / i, |d - truth| over all vertices.
 
     ``edges`` is the curve that the paper's section 4.2.2 expects, paths along edges; ``bound`` the one it is bounded
-    by. ``heat`` is the paper's method at its time step, ``log_gradient`` takes the direction from log u instead of u,
+    by. ``heat`` is the paper's three steps at its t, ``log_gradient`` takes the direction from log u instead of u;
     ``default`` and ``sweep`` are `HeatMethodSolver` without and with ``refine="sweep"``.
     """
     square = shapes.grid(i)
@@ -129,7 +129,7 @@ def accuracy(i: int) -> dict[str, float]:
     t = 1.3 / i**2
     delta = np.zeros(square.n_vertices)
     delta[0] = 1e290
-    log_u = np.log(diffuse(domain, delta, t))
+    u = diffuse(domain, delta, t)
 
     def error(distance: np.ndarray) -> float:
         return float(np.abs(distance - truth).mean())
@@ -138,8 +138,8 @@ def accuracy(i: int) -> dict[str, float]:
         "i": i,
         "bound": float((square.V.sum(axis=1) / 2).mean()),
         "edges": error(baselines.graph_distance(square, 0, count_edges=True) / i),
-        "heat": error(HeatMethodSolver.from_operators(domain, t=t, magnitude="unit").distance(0)),
-        "log_gradient": error(integrate(domain, normalize(domain, log_u))),
+        "heat": error(integrate(domain, normalize(domain, u))),
+        "log_gradient": error(integrate(domain, normalize(domain, np.log(u)))),
         "default": error(HeatMethodSolver(square).distance(0)),
         "sweep": error(HeatMethodSolver(square, refine="sweep").distance(0)),
     }
@@ -185,6 +185,16 @@ def plain_ticks(axis: Any, ticks: Sequence[float]) -> None:
     axis.set_major_locator(FixedLocator(ticks))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def round_between(low: float, high: float) -> list[float]:
+    """Three or more round numbers from `low` to `high`, for a logarithmic axis."""
+    found: list[float] = []
+    for digits in ((1,), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7), tuple(np.arange(10, 100) / 10)):
+        found = [float(d * 10.0**e) for e in range(-6, 7) for d in digits if low <= d * 10.0**e <= high]
+        if len(found) >= 3:
+            break
+    return found
 
 
 def save(out: Path, name: str, picture: Picture) -> None:
@@ -268,15 +278,11 @@ def figure_3(out: Path, options: argparse.Namespace) -> None:
         )
         panel.set_title(name, fontsize=FONT, loc="left", pad=3)
         plain_ticks(panel.xaxis, degree)
-        low, high = panel.get_ylim()
-        plain_ticks(panel.yaxis, [tick for tick in _ROUND if low <= tick <= high])
+        plain_ticks(panel.yaxis, round_between(*panel.get_ylim()))
         label(panel, None, "RMS error, % of mean")
     panels[1].set_xlabel("degree of the polynomial in $i$", fontsize=FONT)
     write_csv(out / "figure_3.csv", table)
     save(out, "figure_3", Picture(figure))
-
-
-_ROUND = [m * 10.0**e for e in range(-4, 6) for m in (1, 2, 5)]
 
 
 def _errors(law: dict[str, float]) -> dict[str, float]:
