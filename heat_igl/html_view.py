@@ -83,8 +83,9 @@ def page(
 
     Dragging turns it, the wheel or two fingers zoom, Shift moves. The page reads out vertex, position and distance
     under the pointer. A click makes the vertex the source, and the distance follows: computed in the page by unfolding
-    triangle after triangle over the intrinsic Delaunay triangulation, to 1e-4 what ``refine="sweep"`` gives. Of
-    tetrahedra the outside is shown, and a click reads only: the way leads through the inside.
+    triangle after triangle over the intrinsic Delaunay triangulation, to 1e-3 (on average 1e-5) what
+    ``refine="sweep"`` gives. Of tetrahedra the outside is shown, and a click reads only: the way leads through the
+    inside.
 
     Parameters
     ----------
@@ -98,7 +99,7 @@ def page(
     Returns
     -------
     Page
-        Shown by notebooks; `Page.save` writes it. It takes 25 kB and about 55 bytes per vertex, and needs
+        Shown by notebooks; `Page.save` writes it. It takes 35 kB and 50 to 55 bytes per vertex, and needs
         a browser with WebGL 2 and DecompressionStream (2023 or later).
 
     Raises
@@ -122,7 +123,8 @@ def page(
         "turn": seen.turn.tolist(),
         "middle": ((low + high) / 2).tolist(),
         "extent": np.maximum(high - low, 1e-3).tolist(),
-        "sources": [] if seen.marked is None else seen.marked.tolist(),
+        "sources": seen.vertices.tolist(),
+        "dots": np.concatenate([seen.dots, seen.lines.reshape(-1, 3)]).round(7).ravel().tolist(),
         "spacing": spacing,
         "style": str(get_args(Style).index(style)),
         "colours": np.rint(255 * table[:, :3]).astype(int).tolist(),

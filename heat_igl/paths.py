@@ -5,13 +5,13 @@ from __future__ import annotations
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+import igl
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
 from heat_igl.errors import MeshError, MissingExtraError, SourceError
 from heat_igl.heat_method import HeatMethodSolver
-from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, source_set, vertex_sources
 from heat_igl.surface_points import SurfaceCurve, SurfacePoints
@@ -24,6 +24,8 @@ __all__ = ["shortest_paths"]
 
 # Barycentric coordinates below this put a point on the side of its face.
 _ON_SIDE = 1e-12
+# An edge of no length has this one, in mean edge lengths: the kernel divides by it.
+_SHORTEST = 1e-12
 
 
 def shortest_paths(
@@ -223,8 +225,9 @@ def _ways_out(mesh: Mesh, values: FloatArray, roots: BoolArray) -> IntArray:
 
 
 def _surface(mesh: Mesh) -> Surface:
-    """The tables of the kernel. Lengths are mollified, so that degenerate triangles have an area."""
-    lengths = intrinsic_triangulation(mesh).l
+    """The tables of the kernel."""
+    # Not mollified: the height that this gives a flat triangle would bend the paths across.
+    lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
     edge = mesh.facets.of_face.ravel()
     corner = mesh.F.ravel()
     tables: Surface = _kernel().Surface(

@@ -40,7 +40,7 @@ class Surface(NamedTuple):
     F : (m, 3) int64
         Vertices.
     l : (m, 3) float64
-        Edge lengths, opposite each corner; triangles with an area.
+        Edge lengths, opposite each corner; none of them 0.
     angle : (m, 3) float64
         Angle at each corner.
     edge : (3 m,) int64

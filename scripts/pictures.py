@@ -3,8 +3,8 @@
     python scripts/pictures.py                      # into docs/images: about three minutes
     python scripts/pictures.py --out DIRECTORY --picture bunny
 
-``bunny`` heads the README and ``paper`` makes those of docs/paper.md, both on meshes of the pymeshlab wheel. Needs the extras
-``view`` and ``fast``.
+``bunny`` heads the README, ``paper`` makes those of docs/paper.md. Needs the extras ``view`` and ``fast``, and the
+meshes of the pymeshlab wheel.
 """
 
 from __future__ import annotations

@@ -26,11 +26,12 @@ def solver(sphere) -> HeatMethodSolver:
 def test_blocks_keep_to_the_memory_and_use_the_threads():
     assert blocks.block_size(10_000, 1000, 2) == (8, 2)
     assert blocks.block_size(10_000, None, 2) == (8, 2)
-    assert blocks.block_size(10_000, 6, 2) == (3, 2)
-    assert blocks.block_size(10_000, 1, 4) == (1, 1)
+    assert blocks.block_size(10_000, 6, 2) == (8, 2)
+    assert blocks.block_size(10_000, 1, 4) == (8, 1)
     size, threads = blocks.block_size(1_600_000, 64, 2)
     assert threads == 2
     assert 1 < size < 8
+    assert blocks.block_size(10_000, 6, 64)[0] == blocks.block_size(10_000, 6, 1)[0]  # bits do not depend on threads
     assert blocks.block_size(6_400_000, 64, 2) == (1, 1)
     assert blocks.block_size(20_000_000, 64, 2) == (1, 1)
 

@@ -185,6 +185,16 @@ def browser(chromium: Browser) -> Iterator[Browser]:
     assert chromium.driver.get_log("browser") == []
 
 
+def assert_agree(found: np.ndarray, expected: np.ndarray) -> None:
+    """The same fixed point, though Python's sweep does not pass on changes below 3e-4 and the page's all above 1e-7."""
+    np.testing.assert_array_equal(np.isfinite(found), np.isfinite(expected))
+    away = np.isfinite(expected) & (expected > 0)
+    np.testing.assert_array_equal(found[expected == 0], 0)
+    relative = np.abs(found[away] / expected[away] - 1)
+    assert relative.max() < 1e-3
+    assert relative.mean() < 3e-5
+
+
 def colour_at(image: np.ndarray, at: np.ndarray) -> np.ndarray:
     return image[int(at[1]), int(at[0])]
 
@@ -240,6 +250,18 @@ def test_what_is_not_reached_is_grey(browser: Browser) -> None:
     np.testing.assert_allclose(colour_at(browser.image(), browser.on_canvas(middle)), UNREACHABLE, atol=0.02)
 
 
+def test_a_source_inside_a_face_is_marked_there_until_a_click(browser: Browser) -> None:
+    mesh = heat_igl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    inside = heat_igl.SurfacePoints([0], [[0.5, 0.25, 0.25]])
+    browser.open(page(mesh, [0.35, 0.8, 0.8], sources=inside))
+    at = 0.5 * browser.on_canvas(0) + 0.25 * browser.on_canvas(1) + 0.25 * browser.on_canvas(2)
+    red = [0.91, 0.0, 0.043]
+    np.testing.assert_allclose(colour_at(browser.image(), at), red, atol=0.02)
+    browser.click(0.1 * browser.on_canvas(0) + 0.8 * browser.on_canvas(1) + 0.1 * browser.on_canvas(2))
+    assert browser.sources() == [1]
+    assert np.abs(colour_at(browser.image(), at) - red).max() > 0.2
+
+
 def test_a_drag_turns_the_surface_with_the_hand(browser: Browser) -> None:
     mesh, front, _, distance = sphere()
     browser.open(page(mesh, distance, sources=front, view=(0, 0)))
@@ -285,13 +307,13 @@ def test_a_click_moves_the_source_and_the_distance_follows(browser: Browser, bun
     assert "sweep" in browser.text("method")
     assert (np.abs(browser.image() - image).max(axis=2) > 0.1).mean() > 0.1
     sweep = heat_igl.HeatMethodSolver(bunny, refine="sweep")
-    np.testing.assert_allclose(browser.distance(), sweep.distance(source), rtol=1e-4)
+    assert_agree(browser.distance(), sweep.distance(source))
 
     browser.click(np.array([0.4 * width, 0.5 * height]), modifiers=8)
     both = browser.sources()
     assert both[0] == source
     assert len(both) == 2
-    np.testing.assert_allclose(browser.distance(), sweep.distance(both), rtol=1e-4)
+    assert_agree(browser.distance(), sweep.distance(both))
     browser.mouse("mouseMoved", browser.on_canvas(source) + np.array([0, -40, 0]), buttons=0)
     browser.wait(lambda: f"vertex {both[1]} " not in browser.text("readout"))
     vertex, value = re.fullmatch(r"vertex (\d+) at \(.*\): (\S+)", browser.text("readout")).groups()  # type: ignore[union-attr]
@@ -317,10 +339,7 @@ def test_bad_meshes_agree_with_python_too(browser: Browser, name: str) -> None:
     mesh = heat_igl.read_mesh(shared_path(name))
     browser.open(page(mesh, np.zeros(mesh.n_vertices)))
     browser.run("window.heatIgl.setSources([7])")
-    expected = heat_igl.HeatMethodSolver(mesh, refine="sweep").distance(7)
-    np.testing.assert_allclose(
-        browser.distance(), expected, rtol=2e-4, atol=1e-6 * expected[np.isfinite(expected)].max()
-    )
+    assert_agree(browser.distance(), heat_igl.HeatMethodSolver(mesh, refine="sweep").distance(7))
 
 
 def test_what_is_behind_is_not_picked(browser: Browser) -> None:

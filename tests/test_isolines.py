@@ -161,6 +161,7 @@ def test_faces_with_an_infinite_value_end_a_curve():
     (curve,) = isolines(mesh, values, 0.3)[0]
     assert not curve.is_closed
     assert curve.positions(mesh)[:, 0].max() == pytest.approx(0.75, rel=1e-12)
+    np.testing.assert_allclose(curve.positions(mesh)[:, 1], 0.3, rtol=1e-12)
 
 
 def test_curves_end_where_three_faces_meet():

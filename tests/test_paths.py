@@ -18,6 +18,7 @@ from heat_igl import (
     HeatMethodSolver,
     Mesh,
     MeshError,
+    OffsetSources,
     SourceError,
     SurfaceCurve,
     SurfacePoints,
@@ -129,6 +130,19 @@ def test_of_two_points_in_faces_the_nearer_is_reached():
     np.testing.assert_allclose(found[away], apart.min(axis=1)[away], rtol=1e-12)
     last = ends(mesh, paths)[1]
     assert (np.linalg.norm(last[:, None] - sources.positions(mesh), axis=2).min(axis=1) < 1e-12).all()
+
+
+@pytest.mark.parametrize(("offset", "n_reached"), [(0.1, 2), (0.4, 1)])
+def test_an_offset_decides_which_source_is_reached(offset, n_reached):
+    mesh = flat_perturbed(shapes.grid(10))
+    points = SurfacePoints([90, 93], [[0.3, 0.3, 0.4], [0.3, 0.3, 0.4]])
+    begins = np.array([0.0, offset])  # 0.3 apart: with 0.4, the second is nowhere the nearest
+    distance = np.linalg.norm(mesh.V[:, None] - points.positions(mesh), axis=2) + begins
+    targets = np.flatnonzero(np.abs(distance[:, 0] - distance[:, 1]) > 0.05)
+    paths = shortest_paths(mesh, distance.min(axis=1), targets, OffsetSources(points, begins))
+    reached = points.positions(mesh)[distance[targets].argmin(axis=1)]
+    assert len(np.unique(reached[:, 0])) == n_reached
+    np.testing.assert_allclose(ends(mesh, paths)[1], reached, atol=1e-12)
 
 
 def test_a_path_to_a_curve_ends_on_it():
