@@ -82,7 +82,6 @@ __main__
 
 EXTRAS = """
 Xlib
-cholespy
 colorspacious
 dask
 distributed
