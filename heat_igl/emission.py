@@ -20,6 +20,8 @@ _SOURCE_HEAT = 1e290
 _RADIUS = 2.0
 # Point and curve are equally warm some edges away if the heat of a point is spread over so many edges of the curve.
 _EDGES_PER_POINT = 4.0
+# Points that a curve is integrated by are at most so many edges apart.
+_SPACING = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,17 +208,21 @@ class Emitter:
     def _heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""
         parts = [(sources.vertices[rim], np.ones(rim.sum()), sources.vertex_label[rim], sources.vertex_offset[rim])]
-        if self._on_faces is not None and not sources.on_vertices_alone:
-            F = self._on_faces.triangulation.F
-            points, segments = sources.points, sources.segments
-            # The integral of a linear function along a segment: its length times the mean of both ends.
-            lengths = self._on_faces.lengths(segments)
-            per_length = 1 / (_EDGES_PER_POINT * self._domain.mean_edge_length)
-            along = (segments.start + segments.end) / 2 * (lengths * per_length)[:, None]
-            for part, share in ((points, points.barycentric), (segments, along)):
-                parts.append(
-                    (F[part.faces].ravel(), share.ravel(), np.repeat(part.label, 3), np.repeat(part.offset, 3))
+        triangulation = self._domain.triangulation
+        if self._on_faces is not None and triangulation is not None and not sources.on_vertices_alone:
+            h = self._domain.mean_edge_length
+            samples, lengths = self._on_faces.samples(sources.segments, h * _SPACING)
+            amount = np.concatenate([np.ones(len(sources.points.faces)), lengths / (h * _EDGES_PER_POINT)])
+            points = sources.points.joined(samples)
+            faces, barycentric = triangulation.locate(points.faces, points.barycentric)
+            parts.append(
+                (
+                    triangulation.F[faces].ravel(),
+                    (amount[:, None] * barycentric).ravel(),
+                    np.repeat(points.label, 3),
+                    np.repeat(points.offset, 3),
                 )
+            )
         vertex, share, label, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
         used = share > 0
         return vertex[used], share[used], label[used], offset[used]

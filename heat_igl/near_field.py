@@ -158,10 +158,19 @@ class NearField:
             windows = self._cross(windows, found)
         return found.seeds()
 
-    def lengths(self, segments: SourceSegments) -> FloatArray:
-        """Length (s,) of each segment."""
+    def samples(self, segments: SourceSegments, spacing: float) -> tuple[SourcePoints, FloatArray]:
+        """Points along segments, at most `spacing` apart, and the length that each stands for.
+
+        Each lies in the middle of its piece, where a linear function takes its mean.
+        """
         along = np.einsum("kc,kcx->kx", segments.end - segments.start, self._layout(segments.faces))
-        return np.asarray(np.linalg.norm(along, axis=1))
+        lengths = np.linalg.norm(along, axis=1)
+        counts = np.ceil(lengths / spacing).astype(np.int64)
+        which = np.repeat(np.arange(len(counts)), counts)
+        share = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[which]
+        barycentric = (1 - share)[:, None] * segments.start[which] + share[:, None] * segments.end[which]
+        points = SourcePoints(segments.faces[which], barycentric, segments.label[which], segments.offset[which])
+        return points, lengths[which] / counts[which]
 
     def _of_points(self, points: SourcePoints, found: _Found) -> list[_Windows]:
         """Windows on the sides of each point's face, and its corners."""

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from heat_igl import connectivity
 from heat_igl.errors import MeshError
+from heat_igl.flip_history import Merged
 from heat_igl.intrinsic import (
     IntrinsicTriangulation,
     intrinsic_delaunay,
@@ -138,10 +139,10 @@ def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operat
         if has_nonmanifold_edges(mesh):
             # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being
             # manifold.
-            mesh = _without_duplicates(mesh)
+            mesh, history = _without_duplicates(mesh)
             if has_nonmanifold_edges(mesh):
-                return replace(tufted_operators(mesh), faces=faces)
-            triangulation = intrinsic_triangulation(mesh)
+                return replace(tufted_operators(mesh, history), faces=faces)
+            triangulation = replace(intrinsic_triangulation(mesh), history=history)
         triangulation = intrinsic_delaunay(triangulation)
     if triangulation.n_flips or triangulation.lengthening:
         # Paths along the mesh's own edges are paths on the surface too, and already known.
@@ -217,31 +218,43 @@ def intrinsic_operators(triangulation: IntrinsicTriangulation, longest_distance:
         referenced=referenced,
         longest_distance=longest_distance,
         triangulation=triangulation,
-        faces=triangulation,
+        faces=None if triangulation.history else triangulation,
     )
 
 
-def tufted_operators(mesh: Mesh) -> Operators:
+def tufted_operators(mesh: Mesh, history: tuple[Merged, ...] = ()) -> Operators:
     """The operators of any triangle mesh by way of its tufted cover, made intrinsic Delaunay (d = 2).
 
     The cover goes over the surface twice, so L, M and the weights are one half of its own: a face of the mesh counts
     once, and L = D G holds. No weight is negative, not even on the boundary, which the cover does not have; `boundary`
-    is that of the mesh.
+    is that of the mesh. `history` says how its faces came from those that points refer to.
     """
-    cover = intrinsic_operators(intrinsic_delaunay(tufted_cover(mesh)), mesh.longest_distance)
+    cover = replace(tufted_cover(mesh), history=history)
+    surface = replace(intrinsic_triangulation(mesh), history=history)
+    domain = intrinsic_operators(intrinsic_delaunay(cover), mesh.longest_distance)
     return replace(
-        cover,
-        L=cover.L / 2,
-        M=cover.M / 2,
-        weights=cover.weights / 2,
+        domain,
+        L=domain.L / 2,
+        M=domain.M / 2,
+        weights=domain.weights / 2,
         boundary=mesh.boundary,
-        surface=intrinsic_delaunay(intrinsic_triangulation(mesh)),
+        surface=intrinsic_delaunay(surface),
+        faces=surface,
     )
 
 
-def _without_duplicates(mesh: Mesh) -> Mesh:
+def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Merged, ...]]:
+    """The mesh with each face once, and which faces became which."""
     repeated = connectivity.duplicate_faces(mesh.F, mesh.n_vertices)
-    return Mesh(mesh.V, np.delete(mesh.F, repeated, axis=0)) if len(repeated) else mesh
+    if not len(repeated):
+        return mesh, ()
+    kept = np.delete(np.arange(mesh.n_faces), repeated)
+    ascending = np.argsort(mesh.F, axis=1)
+    first, inverse, _ = connectivity.unique_rows(np.take_along_axis(mesh.F, ascending, axis=1), mesh.n_vertices)
+    copied = first[inverse]
+    corner = np.empty_like(mesh.F)
+    np.put_along_axis(corner, ascending, ascending[copied], axis=1)
+    return Mesh(mesh.V, mesh.F[kept]), (Merged(np.searchsorted(kept, copied), corner),)
 
 
 def _padded(matrix: sp.csc_matrix, n: int) -> sp.csc_matrix:
