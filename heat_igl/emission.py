@@ -73,7 +73,7 @@ class Emitter:
             self._on_faces = NearField(domain.faces)
 
     def emission(self, sources: SourceSet) -> Emission:
-        """`sources` ready for the steps; those with offsets only as far as no other's front comes first."""
+        """`sources` ready for step 1."""
         rim = self._rim(sources)
         near_vertices = self._near_vertices(sources, rim)
         lines = self._straight_lines(sources)
@@ -82,10 +82,26 @@ class Emitter:
         own = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         anchors = _joined(own, near.at(guides))
         vertex, share, label, offset = self._heat(sources, rim)
-        found = Emission(sources, vertex, share, self._delay(vertex, offset), label, anchors, near, guides)
-        if np.ptp(sources.offsets) == 0:
+        return Emission(sources, vertex, share, self._delay(vertex, offset), label, anchors, near, guides)
+
+    def on_time(self, found: Emission) -> Emission:
+        """Less the sources at which the front of another arrives before they begin, and values it arrives before at."""
+        if np.ptp(found.sources.offsets) == 0:
             return found
-        return self._without_late(found)
+        label = self._warmest(found, self._heat_flow.solve(self.heat(found)))
+        anchors = found.anchors.at(label[found.anchors.vertex] == found.anchors.label)
+        on_time = np.isin(found.label, anchors.label)
+        kept = label[found.near.vertex] == found.near.label
+        return replace(
+            found,
+            vertex=found.vertex[on_time],
+            share=found.share[on_time],
+            delay=found.delay[on_time],
+            label=found.label[on_time],
+            anchors=anchors,
+            near=found.near.at(kept),
+            guides=found.guides[kept],
+        )
 
     def heat(self, emission: Emission) -> FloatArray:
         """Right-hand side (n,) of `HeatFlow.solve`: as much heat as cannot overflow."""
@@ -269,23 +285,6 @@ class Emitter:
             np.minimum(distance, upper, out=distance)
         distance[near.vertex] = near.value
         return distance
-
-    def _without_late(self, found: Emission) -> Emission:
-        """Less the sources at which the front of another arrives before they begin, and values it arrives before at."""
-        label = self._warmest(found, self._heat_flow.solve(self.heat(found)))
-        anchors = found.anchors.at(label[found.anchors.vertex] == found.anchors.label)
-        on_time = np.isin(found.label, anchors.label)
-        kept = label[found.near.vertex] == found.near.label
-        return replace(
-            found,
-            vertex=found.vertex[on_time],
-            share=found.share[on_time],
-            delay=found.delay[on_time],
-            label=found.label[on_time],
-            anchors=anchors,
-            near=found.near.at(kept),
-            guides=found.guides[kept],
-        )
 
 
 def _joined(one: Seeds, other: Seeds) -> Seeds:

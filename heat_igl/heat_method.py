@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import time
 import warnings
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -15,12 +13,13 @@ from heat_igl.emission import Emission, Emitter
 from heat_igl.errors import AccuracyWarning, MissingExtraError, SourceError
 from heat_igl.factorization import Backend
 from heat_igl.mesh import RANGE_LIMIT, Mesh
-from heat_igl.operators import Laplacian, Operators, operators
-from heat_igl.refine import Refine, Refinement
-from heat_igl.solution import Diagnostics, HeatSolution
+from heat_igl.operators import Laplacian, Operators, edge_length_operators, operators
+from heat_igl.heat_order import HeatOrder
+from heat_igl.refine import Refine
+from heat_igl.solution import Diagnostics, HeatSolution, VoronoiCells
 from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, damping, normalize
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_time_step"]
 
@@ -141,6 +140,50 @@ class HeatMethodSolver:
         solver._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, 0.0)
         return solver
 
+    @classmethod
+    def from_edge_lengths(
+        cls,
+        F: ArrayLike,
+        lengths: ArrayLike,
+        *,
+        n: int | None = None,
+        t_coef: float = 1.0,
+        t: float | None = None,
+        laplacian: Laplacian = "intrinsic-delaunay",
+        boundary: Boundary = "neumann",
+        magnitude: Magnitude = "auto",
+        refine: Refine | None = None,
+        backend: Backend = "auto",
+    ) -> HeatMethodSolver:
+        """A solver on triangles that are known by their edge lengths alone; positions are not needed.
+
+        Parameters
+        ----------
+        F : (m, 3) array_like of int
+            Vertices of each triangle.
+        lengths : (m, 3) array_like
+            ``lengths[f, c]`` is that of the side of triangle f opposite its corner c, as `igl.edge_lengths` gives it;
+            both triangles at an edge give it the same length.
+        n : int, optional
+            Number of vertices; one more than the largest in `F` if not given.
+        **options
+            As for the class. Where more than two triangles meet at an edge no tufted cover is made, which takes
+            positions: such edges are not flipped.
+
+        Raises
+        ------
+        MeshError
+            If `F` or `lengths` cannot be used; the message names the first offender.
+        """
+        start = time.perf_counter()
+        domain = edge_length_operators(F, lengths, n, laplacian)
+        seconds = time.perf_counter() - start
+        if magnitude == "auto" and laplacian == "cotan":
+            magnitude = "unit"
+        solver = cls.__new__(cls)
+        solver._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, seconds)
+        return solver
+
     def _set_up(
         self,
         domain: Operators,
@@ -157,8 +200,6 @@ class HeatMethodSolver:
             raise ValueError(f"magnitude must be 'auto', 'unit' or 'damped', not {magnitude!r}")
         if refine not in (None, "sweep", "unfold"):
             raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {refine!r}")
-        if refine is not None and domain.triangulation is None:
-            raise ValueError(f"refine={refine!r} unfolds triangles, and this domain has none")
         self._damped = magnitude == "damped" or (magnitude == "auto" and domain.triangulation is not None)
         requested = _positive("t_coef", t_coef) * domain.mean_edge_length**2 if t is None else _positive("t", t)
         step = max(requested, smallest_time_step(domain))
@@ -172,15 +213,13 @@ class HeatMethodSolver:
         self._heat_flow = HeatFlow(domain, step, boundary, backend)
         self._emitter = Emitter(domain, self._heat_flow)
         self._poisson: PoissonProblem | None = None
-        self._unfolded: Callable[[FloatArray, IntArray], FloatArray] | None = None
-        triangulation = domain.triangulation
-        if refine is not None and triangulation is not None:
-            # Not the tufted cover: on it, a path over an edge of five faces can go on in one of them only.
-            refinement = Refinement(domain.surface or triangulation)
-            self._unfolded = refinement.sweep if refine == "sweep" else refinement.unfold
-        else:
+        self._heat_order: HeatOrder | None = None
+        if refine is None:
             self._poisson = PoissonProblem(domain, backend)
             _ = domain.D  # made on first use otherwise, in the middle of the first query
+        else:
+            self._heat_order = HeatOrder(domain, refine)
+        triangulation = domain.triangulation
         self._diagnostics = Diagnostics(
             t=step,
             t_requested=requested,
@@ -213,34 +252,70 @@ class HeatMethodSolver:
         """Length of a distance array."""
         return self._operators.n
 
-    def distance(self, sources: Sources) -> FloatArray:
+    def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
         """Distance from the nearest source.
 
         Parameters
         ----------
-        sources : int, sequence of int, or (n,) mask of bool
-            Source vertices.
+        sources : sources
+            A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources`
+            where distance begins at other values than 0, or a list of such.
+        cutoff : float, optional
+            Distances beyond this are ``inf``.
 
         Returns
         -------
         (n,) float64
-            In the mesh's unit: 0 at the sources, ``inf`` at vertices that no source reaches, never negative or NaN.
+            In the mesh's unit: 0 at the sources (their offset where they have one, unless another source is nearer),
+            ``inf`` at vertices that no source reaches, never negative or NaN.
 
         Raises
         ------
         SourceError
-            If `sources` does not name vertices of the mesh.
+            If `sources` does not describe places on the mesh.
+        ValueError
+            If `cutoff` is not positive.
 
         Warns
         -----
         AccuracyWarning
             If heat underflowed on the way, so that distances beyond are too short.
         """
-        chosen = [self._set(sources)]
-        return np.asarray(self._distances(chosen)[0])
+        return np.asarray(self._distances([self._set(sources)], _cutoff(cutoff))[0])
+
+    def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> VoronoiCells:
+        """Distance, and which source is nearest: a geodesic Voronoi diagram.
+
+        Parameters
+        ----------
+        sources, cutoff
+            As for `distance`, with its errors. Sources are counted as they are given: each vertex of a sequence, each
+            set entry of a mask, each point, a curve as one; over the entries of a list one after another.
+
+        Returns
+        -------
+        VoronoiCells
+            Without `refine`, labels say from which source most of the heat comes, which at the border of two cells is
+            right to about an edge.
+        """
+        beyond = _cutoff(cutoff)
+        emissions, u = self._diffuse([self._set(sources)])
+        if self._heat_order is not None:
+            distance, labels = self._heat_order.labelled(emissions[0], u[:, 0])
+        else:
+            distance = self._integrated(emissions, u, *self._field(emissions, u))[0]
+            labels = self._emitter.labels(emissions[0], u[:, 0])
+        distance = _within(beyond, distance)
+        labels[np.isinf(distance)] = -1
+        return VoronoiCells(distance, labels)
 
     def distances(
-        self, source_sets: Sequence[Sources], out: AnyArray | None = None, progress: bool = False
+        self,
+        source_sets: Sequence[Sources],
+        out: AnyArray | None = None,
+        progress: bool = False,
+        *,
+        cutoff: float | None = None,
     ) -> AnyArray:
         """Distance from each of several sets of sources, solved in blocks.
 
@@ -252,6 +327,8 @@ class HeatMethodSolver:
             Where to write, for instance a `numpy.memmap`; float64 or float32.
         progress : bool
             Show a progress bar on standard error (extra ``cli``).
+        cutoff : float, optional
+            Distances beyond this are ``inf``.
 
         Returns
         -------
@@ -261,12 +338,13 @@ class HeatMethodSolver:
         Raises
         ------
         SourceError
-            Before anything is solved, if an entry does not name vertices; the message says which.
+            Before anything is solved, if an entry does not describe places on the mesh; the message says which.
         ValueError
-            If `out` has the wrong shape or cannot hold floats.
+            If `out` has the wrong shape or cannot hold floats, or `cutoff` is not positive.
         """
         if not hasattr(source_sets, "__len__"):
             raise SourceError(f"source_sets must be a sequence of sets of sources, not {source_sets!r}: try distance")
+        beyond = _cutoff(cutoff)
         chosen = []
         for i, sources in enumerate(source_sets):
             try:
@@ -280,7 +358,7 @@ class HeatMethodSolver:
             raise ValueError(f"out must be an array of floats of shape {shape}, not {out.dtype} of shape {out.shape}")
         starts: Any = range(0, len(chosen), _BLOCK)
         for start in _tracked(starts) if progress else starts:
-            out[start : start + _BLOCK] = self._distances(chosen[start : start + _BLOCK])
+            out[start : start + _BLOCK] = self._distances(chosen[start : start + _BLOCK], beyond)
         return out
 
     def solve(self, sources: Sources) -> HeatSolution:
@@ -288,8 +366,8 @@ class HeatMethodSolver:
         chosen = [self._set(sources)]
         emissions, u = self._diffuse(chosen)
         X, magnitude = self._field(emissions, u)
-        if self._unfolded is not None:
-            distance = _in_heat_order(self._unfolded, u, chosen)
+        if self._heat_order is not None:
+            distance = self._heat_order.distances(emissions, u)
         else:
             distance = self._integrated(emissions, u, X, magnitude)
         with np.errstate(under="ignore"):
@@ -308,16 +386,20 @@ class HeatMethodSolver:
         faces = self._operators.faces
         return source_set(sources, self.n_vertices, None if faces is None else faces.F)
 
-    def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
+    def _distances(self, source_sets: list[SourceSet], cutoff: float | None) -> FloatArray:
         """Distances (k, n) from k sets of sources."""
         emissions, u = self._diffuse(source_sets)
-        if self._unfolded is not None:
-            return _in_heat_order(self._unfolded, u, source_sets)
-        return self._integrated(emissions, u, *self._field(emissions, u))
+        if self._heat_order is not None:
+            distances = self._heat_order.distances(emissions, u)
+        else:
+            distances = self._integrated(emissions, u, *self._field(emissions, u))
+        return _within(cutoff, distances)
 
     def _diffuse(self, source_sets: list[SourceSet]) -> tuple[list[Emission], FloatArray]:
         """Heat (n, k) from k sets of sources."""
         emissions = [self._emitter.emission(sources) for sources in source_sets]
+        if self._heat_order is None:
+            emissions = [self._emitter.on_time(emission) for emission in emissions]
         return emissions, self._heat_flow.solve(np.stack([self._emitter.heat(one) for one in emissions], axis=1))
 
     def _field(self, emissions: list[Emission], u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -359,21 +441,14 @@ class HeatMethodSolver:
             )
 
 
-def _in_heat_order(
-    unfolded: Callable[[FloatArray, IntArray], FloatArray], u: FloatArray, source_sets: list[SourceSet]
-) -> FloatArray:
-    """Distances (k, n) by unfolding, on all processors: the kernels run without the interpreter's lock.
-
-    Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
-    """
-    if len(source_sets) == 1:
-        return unfolded(-u[:, 0], source_sets[0].vertices)[None]
-    with ThreadPoolExecutor(_n_processors()) as pool:
-        return np.stack(list(pool.map(unfolded, -u.T, [one.vertices for one in source_sets])))
+def _cutoff(value: float | None) -> float | None:
+    return None if value is None else _positive("cutoff", value)
 
 
-def _n_processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def _within(cutoff: float | None, distances: FloatArray) -> FloatArray:
+    if cutoff is not None:
+        distances[distances > cutoff] = np.inf
+    return distances
 
 
 def _tracked(starts: Any) -> Any:
@@ -403,8 +478,8 @@ def heat_method_distance(V: ArrayLike, F: ArrayLike, sources: Sources, **options
         Vertex positions.
     F : (m, 3) or (m, 4) array_like
         Triangles or tetrahedra.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
+    sources : sources
+        As for `HeatMethodSolver.distance`.
     **options
         As for `HeatMethodSolver`.
 

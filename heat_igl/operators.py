@@ -222,6 +222,44 @@ def intrinsic_operators(triangulation: IntrinsicTriangulation, longest_distance:
     )
 
 
+def edge_length_operators(
+    F: ArrayLike, lengths: ArrayLike, n: int | None = None, laplacian: Laplacian = "intrinsic-delaunay"
+) -> Operators:
+    """The operators of triangles that are known by their edge lengths alone.
+
+    Parameters
+    ----------
+    F : (m, 3) array_like of int
+        Vertices of each triangle.
+    lengths : (m, 3) array_like
+        ``lengths[f, c]`` is that of the side of triangle f opposite its corner c.
+    n : int, optional
+        Number of vertices; one more than the largest in `F` if not given.
+    laplacian : {"intrinsic-delaunay", "cotan"}
+        As for `operators`.
+
+    Raises
+    ------
+    MeshError
+        If `F` or `lengths` cannot be used.
+    ValueError
+        If `laplacian` is neither.
+    """
+    if laplacian not in ("intrinsic-delaunay", "cotan"):
+        raise ValueError(f"laplacian must be 'intrinsic-delaunay' or 'cotan', not {laplacian!r}")
+    triangles = checked_faces(F, n)
+    if triangles.shape[1] != 3:
+        raise MeshError(f"F must have shape (m, 3), triangles, but it has shape {triangles.shape}")
+    faces = from_edge_lengths(lengths, triangles, int(triangles.max()) + 1 if n is None else n)
+    given = intrinsic_operators(faces)
+    if laplacian == "cotan":
+        return given
+    triangulation = intrinsic_delaunay(faces)
+    if triangulation is faces:
+        return given
+    return replace(intrinsic_operators(triangulation, given.longest_distance), faces=faces)
+
+
 def tufted_operators(mesh: Mesh, history: tuple[Merged, ...] = ()) -> Operators:
     """The operators of any triangle mesh by way of its tufted cover, made intrinsic Delaunay (d = 2).
 

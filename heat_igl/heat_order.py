@@ -1,0 +1,98 @@
+"""Distance by unfolding triangles in the order of the heat, from all kinds of sources."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from heat_igl.emission import Emission
+from heat_igl.near_field import NearField
+from heat_igl.operators import Operators
+from heat_igl.refine import Refine, Refinement
+from heat_igl.sources import SourcePoints
+from heat_igl.surface_points import SurfacePoints
+from heat_igl.typing import FloatArray, IntArray
+
+__all__ = ["HeatOrder"]
+
+# Curves are unfolded from as points, at most so many mean edge lengths apart.
+_SPACING = 0.125
+# Mean error of a sweep: what it falls short of a straight line by less than this is no shorter path.
+_SWEEP_ERROR = 0.01
+
+
+class HeatOrder:
+    """`Refinement` of a domain, asked by sets of sources and their heat.
+
+    Parameters
+    ----------
+    domain : Operators
+        Triangles.
+    refine : {"sweep", "unfold"}
+        Which update.
+
+    Raises
+    ------
+    ValueError
+        If the domain has no triangles.
+    MissingExtraError
+        If numba is not installed.
+    """
+
+    def __init__(self, domain: Operators, refine: Refine) -> None:
+        # Not the tufted cover: on it, a path over an edge of five faces can go on in one of them only.
+        triangulation = domain.surface or domain.triangulation
+        if triangulation is None:
+            raise ValueError(f"refine={refine!r} unfolds triangles, and this domain has none")
+        refinement = Refinement(triangulation)
+        self._unfolded = refinement.sweep if refine == "sweep" else refinement.unfold
+        self._error = _SWEEP_ERROR if refine == "sweep" else 0.0
+        self._faces = None if domain.faces is None else NearField(domain.faces)
+        self._spacing = _SPACING * domain.mean_edge_length
+
+    def distances(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
+        """Distances (k, n) for heat (n, k), on all processors: the kernels run without the interpreter's lock.
+
+        Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
+        """
+        if len(emissions) == 1:
+            return self._distance(emissions[0], u[:, 0])[None]
+        with ThreadPoolExecutor(_n_processors()) as pool:
+            return np.stack(list(pool.map(self._distance, emissions, u.T)))
+
+    def labelled(self, emission: Emission, u: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 where none is reached."""
+        labels = np.empty(len(u), np.int64)
+        return self._distance(emission, u, labels), labels
+
+    def _distance(self, emission: Emission, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
+        sources, points = emission.sources, self._points(emission)
+        has_offsets = bool(sources.offsets.any())
+        distance = self._unfolded(
+            -u,
+            sources.vertices,
+            offsets=sources.vertex_offset if has_offsets else None,
+            points=SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
+            point_offsets=points.offset if has_offsets and len(points.faces) else None,
+            labels=labels,
+        )
+        if labels is not None:
+            labels[:] = np.concatenate([sources.vertex_label, points.label, [-1]])[labels]
+        near = emission.near.at(emission.guides)
+        closest = near.value < distance[near.vertex] * (1 + self._error)
+        distance[near.vertex[closest]] = near.value[closest]
+        if labels is not None:
+            labels[near.vertex[closest]] = near.label[closest]
+        return distance
+
+    def _points(self, emission: Emission) -> SourcePoints:
+        points, segments = emission.sources.points, emission.sources.segments
+        if self._faces is None or not len(segments.faces):
+            return points
+        return points.joined(self._faces.samples(segments, self._spacing)[0]).joined(segments.ends())
+
+
+def _n_processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
