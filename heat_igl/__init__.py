@@ -1,8 +1,9 @@
 """Geodesic distance on meshes by the heat method, on libigl's operators."""
 
-from heat_igl import baselines, closed_forms, metrics, reference, shapes
+from heat_igl import baselines, closed_forms, cluster, metrics, reference, sampling, shapes
 from heat_igl.errors import (
     AccuracyWarning,
+    BatchError,
     FactorizationError,
     MeshError,
     MissingExtraError,
@@ -10,12 +11,25 @@ from heat_igl.errors import (
     SourceError,
 )
 from heat_igl.heat_method import HeatMethodSolver, heat_method_distance
-from heat_igl.io import read_attributes, read_mesh, write_mesh
+from heat_igl.images import ImageDomain, image_domain
+from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_mesh
 from heat_igl.mesh import Mesh, MeshReport
+from heat_igl.polygons import PolygonMesh, polygon_operators
 from heat_igl.projection import ClosestPoints, closest_points, curve_on, edge_curve
 from heat_igl.refine import Refinement, unfolded_distance
+from heat_igl.sampling import (
+    VoronoiCells,
+    diameter,
+    distance_matrix,
+    dual_triangulation,
+    farthest_cells,
+    farthest_points,
+    geodesic_centre,
+    voronoi_cells,
+)
 from heat_igl.solution import Diagnostics, HeatSolution
 from heat_igl.sources import OffsetSources
+from heat_igl.speed import speed_operators
 from heat_igl.subdivision import split_long_edges
 from heat_igl.surface_points import SurfaceCurve, SurfacePoints
 from heat_igl.validation import validate
@@ -24,15 +38,18 @@ from heat_igl.validation_report import ValidationReport, ValidationRow
 __all__ = [
     "AccuracyWarning",
     "ClosestPoints",
+    "BatchError",
     "Diagnostics",
     "FactorizationError",
     "HeatMethodSolver",
     "HeatSolution",
+    "ImageDomain",
     "Mesh",
     "MeshError",
     "MeshReport",
     "MissingExtraError",
     "OffsetSources",
+    "PolygonMesh",
     "ReferenceSolverError",
     "Refinement",
     "SourceError",
@@ -40,20 +57,34 @@ __all__ = [
     "SurfacePoints",
     "ValidationReport",
     "ValidationRow",
+    "VoronoiCells",
     "baselines",
     "closed_forms",
     "closest_points",
     "curve_on",
     "edge_curve",
+    "cluster",
+    "diameter",
+    "distance_matrix",
+    "dual_triangulation",
+    "farthest_cells",
+    "farthest_points",
+    "geodesic_centre",
     "heat_method_distance",
+    "image_domain",
     "metrics",
+    "polygon_operators",
     "read_attributes",
     "read_mesh",
+    "read_polygon_mesh",
     "reference",
+    "sampling",
     "shapes",
+    "speed_operators",
     "split_long_edges",
     "unfolded_distance",
     "validate",
+    "voronoi_cells",
     "write_mesh",
 ]
 

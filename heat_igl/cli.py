@@ -6,6 +6,7 @@ Imported by `heat_igl.__main__` only; needs the extra ``cli``.
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 import tempfile
@@ -23,7 +24,14 @@ from rich.progress import Progress
 from rich.text import Text
 
 import heat_igl
-from heat_igl.errors import AccuracyWarning, FactorizationError, MeshError, MissingExtraError, ReferenceSolverError
+from heat_igl.errors import (
+    AccuracyWarning,
+    BatchError,
+    FactorizationError,
+    MeshError,
+    MissingExtraError,
+    ReferenceSolverError,
+)
 from heat_igl.factorization import Backend
 from heat_igl.guarded import TIMEOUT
 from heat_igl.heat_method import HeatMethodSolver, Magnitude
@@ -40,7 +48,7 @@ from heat_igl.validation import METHODS, draw_sources
 __all__ = ["app", "run"]
 
 # What a user can cause; anything else is a fault of the package and shows its traceback.
-_EXPECTED = (OSError, ValueError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
+_EXPECTED = (OSError, ValueError, BatchError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
 
 _DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
 
@@ -268,6 +276,54 @@ def demo(
     out.mkdir(parents=True, exist_ok=True)
     _check_writable(out / "demo.png")
     _print_rows(demonstrate(out))
+
+
+@app.command()
+def batch(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of meshes, searched with all below it.")],
+    store: Annotated[Path, typer.Option(help="Zarr directory for the distances; continued if it is there.")],
+    sources: Annotated[
+        str, typer.Option(metavar="all|farthest:K|FILE", help="Source sets; in a file, vertex indices, one set a line.")
+    ] = "all",
+    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler; else this machine.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; one a processor.")] = None,
+    refine: Annotated[str | None, _choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+    dtype: Annotated[str, typer.Option(help="Of the distances.", callback=_one_of(("float32", "float64")))] = "float32",
+    log: Annotated[Path | None, typer.Option(help="File for a log of meshes and blocks.")] = None,
+    dashboard: Annotated[bool, typer.Option(help="Serve Dask's dashboard (needs bokeh).")] = False,
+) -> None:
+    """Distances on every mesh of a folder, into a store, on all processors or a cluster; resumes where it stopped."""
+    from heat_igl import cluster
+
+    meshes = cluster.folder(folder)
+    plan = sources if sources == "all" or sources.startswith("farthest:") else cluster.read_source_sets(sources)
+    options: dict[str, Any] = {"refine": refine, "dtype": dtype, "progress": Console(stderr=True).is_terminal}
+    with _logged(log), cluster.connected(scheduler, workers, dashboard) as client:
+        if dashboard:
+            _say(f"dashboard: {client.dashboard_link}")
+        report = cluster.distances(meshes, plan, store, client=client, **options)
+    print(report.to_markdown(), end="")
+    if report.failed:
+        raise typer.Exit(1)
+
+
+@contextmanager
+def _logged(path: Path | None) -> Iterator[None]:
+    """Write what the batch logs to a file; what Dask logs about lost connections is told in one line at the end."""
+    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
+    if path is None:
+        yield
+        return
+    handler = logging.FileHandler(path, encoding="utf8")
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    logger = logging.getLogger("heat_igl.cluster")
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        handler.close()
 
 
 def _check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> None:

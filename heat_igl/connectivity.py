@@ -147,9 +147,10 @@ def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
             joined.append(np.stack([a[same], b[same]], axis=1))
     pairs = np.concatenate(joined)
     graph = sp.coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(F.size, F.size))
-    _, fan = csgraph.connected_components(graph, directed=False)
-    fan_and_vertex = np.unique(np.stack([fan, F.ravel()], axis=1), axis=0)
-    bad[np.bincount(fan_and_vertex[:, 1], minlength=n) > 1] = True
+    n_fans, fan = csgraph.connected_components(graph, directed=False)
+    centre = np.empty(n_fans, np.int64)
+    centre[fan] = F.ravel()
+    bad[np.bincount(centre, minlength=n) > 1] = True
     return np.flatnonzero(bad)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 __all__ = [
     "AccuracyWarning",
+    "BatchError",
     "FactorizationError",
     "MeshError",
     "MissingExtraError",
@@ -26,6 +27,10 @@ class FactorizationError(RuntimeError):
 
 class ReferenceSolverError(RuntimeError):
     """A reference solver crashed, hung, or returned something that is not a distance."""
+
+
+class BatchError(RuntimeError):
+    """A batch had to stop before it was done; what is finished stays, and the same call goes on from there."""
 
 
 class MissingExtraError(ImportError):

@@ -12,11 +12,11 @@ import numpy as np
 from heat_igl.emission import Emission, Emitter
 from heat_igl.errors import AccuracyWarning, MissingExtraError, SourceError
 from heat_igl.factorization import Backend
+from heat_igl.heat_order import HeatOrder
 from heat_igl.mesh import RANGE_LIMIT, Mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators, operators
-from heat_igl.heat_order import HeatOrder
 from heat_igl.refine import Refine
-from heat_igl.solution import Diagnostics, HeatSolution, VoronoiCells
+from heat_igl.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
@@ -200,7 +200,7 @@ class HeatMethodSolver:
             raise ValueError(f"magnitude must be 'auto', 'unit' or 'damped', not {magnitude!r}")
         if refine not in (None, "sweep", "unfold"):
             raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {refine!r}")
-        self._damped = magnitude == "damped" or (magnitude == "auto" and domain.triangulation is not None)
+        self._damped = magnitude == "damped" or (magnitude == "auto" and domain.is_surface)
         requested = _positive("t_coef", t_coef) * domain.mean_edge_length**2 if t is None else _positive("t", t)
         step = max(requested, smallest_time_step(domain))
         if t is not None and step > requested:
@@ -283,7 +283,7 @@ class HeatMethodSolver:
         """
         return np.asarray(self._distances([self._set(sources)], _cutoff(cutoff))[0])
 
-    def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> VoronoiCells:
+    def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
         """Distance, and which source is nearest: a geodesic Voronoi diagram.
 
         Parameters
@@ -294,7 +294,7 @@ class HeatMethodSolver:
 
         Returns
         -------
-        VoronoiCells
+        LabelledDistance
             Without `refine`, labels say from which source most of the heat comes, which at the border of two cells is
             right to about an edge.
         """
@@ -307,7 +307,7 @@ class HeatMethodSolver:
             labels = self._emitter.labels(emissions[0], u[:, 0])
         distance = _within(beyond, distance)
         labels[np.isinf(distance)] = -1
-        return VoronoiCells(distance, labels)
+        return LabelledDistance(distance, labels)
 
     def distances(
         self,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from heat_igl.emission import Emission
 from heat_igl.near_field import NearField
 from heat_igl.operators import Operators
+from heat_igl.processors import n_threads
 from heat_igl.refine import Refine, Refinement
 from heat_igl.sources import SourcePoints
 from heat_igl.surface_points import SurfacePoints
@@ -45,7 +45,7 @@ class HeatOrder:
         # Not the tufted cover: on it, a path over an edge of five faces can go on in one of them only.
         triangulation = domain.surface or domain.triangulation
         if triangulation is None:
-            raise ValueError(f"refine={refine!r} unfolds triangles, and this domain has none")
+            raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
         refinement = Refinement(triangulation)
         self._unfolded = refinement.sweep if refine == "sweep" else refinement.unfold
         self._error = _SWEEP_ERROR if refine == "sweep" else 0.0
@@ -59,7 +59,7 @@ class HeatOrder:
         """
         if len(emissions) == 1:
             return self._distance(emissions[0], u[:, 0])[None]
-        with ThreadPoolExecutor(_n_processors()) as pool:
+        with ThreadPoolExecutor(n_threads()) as pool:
             return np.stack(list(pool.map(self._distance, emissions, u.T)))
 
     def labelled(self, emission: Emission, u: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -92,7 +92,3 @@ class HeatOrder:
         if self._faces is None or not len(segments.faces):
             return points
         return points.joined(self._faces.samples(segments, self._spacing)[0]).joined(segments.ends())
-
-
-def _n_processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

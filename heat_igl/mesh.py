@@ -17,7 +17,7 @@ from heat_igl import connectivity
 from heat_igl.errors import MeshError
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["DELAUNAY_TOLERANCE", "RANGE_LIMIT", "Mesh", "MeshReport"]
+__all__ = ["DELAUNAY_TOLERANCE", "RANGE_LIMIT", "Mesh", "MeshReport", "checked_positions"]
 
 # How many lengths sqrt(t) the heat survives in double precision: values run from 1e290 (the rest is left for the
 # gradient's 1 / length) down to 1e-300, 590 decades or 1358 e-foldings, less a margin for the first step away.
@@ -41,7 +41,8 @@ def _frozen(array: ArrayT) -> ArrayT:
     return array
 
 
-def _positions(V: ArrayLike) -> FloatArray:
+def checked_positions(V: ArrayLike) -> FloatArray:
+    """`V` as a new (n, 3) float64 array, or a `MeshError` that names the first position that is none."""
     try:
         array = np.asarray(V)
     except ValueError as error:
@@ -65,7 +66,14 @@ def _positions(V: ArrayLike) -> FloatArray:
     return positions
 
 
-def _faces(F: ArrayLike, n: int) -> IntArray:
+def checked_faces(F: ArrayLike, n: int | None) -> IntArray:
+    """`F` as an array of its own: indices of `n` vertices, of as many as it names if that is None.
+
+    Raises
+    ------
+    MeshError
+        As for `Mesh`.
+    """
     try:
         array = np.asarray(F)
     except ValueError as error:
@@ -80,13 +88,14 @@ def _faces(F: ArrayLike, n: int) -> IntArray:
         raise MeshError(
             f"F must have shape (m, 3) for triangles or (m, 4) for tetrahedra, but it has shape {array.shape}"
         )
+    n = int(array.max()) + 1 if n is None else n
     outside = (array < 0) | (array >= n)
     if outside.any():
         row, column = (int(i) for i in np.argwhere(outside)[0])
         hint = "; the indices look 1-based, subtract 1" if array.min() == 1 and array.max() == n else ""
         raise MeshError(
             f"F[{row}, {column}] = {array[row, column]} is no vertex ({int(outside.any(axis=1).sum())} of {len(array)} "
-            f"faces are affected): V has {n} rows, so indices run from 0 to {n - 1}{hint}"
+            f"faces are affected): there are {n} vertices, so indices run from 0 to {n - 1}{hint}"
         )
     faces = np.array(array, dtype=np.int64, order="C", copy=True)
     ordered = np.sort(faces, axis=1)
@@ -129,8 +138,8 @@ class Mesh:
     F: IntArray
 
     def __init__(self, V: ArrayLike, F: ArrayLike) -> None:
-        positions = _positions(V)
-        faces = _faces(F, len(positions))
+        positions = checked_positions(V)
+        faces = checked_faces(F, len(positions))
         used = positions[np.unique(faces)]
         with np.errstate(over="ignore"):
             extent = float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))

@@ -19,13 +19,14 @@ from heat_igl.errors import MeshError
 from heat_igl.flip_history import Merged
 from heat_igl.intrinsic import (
     IntrinsicTriangulation,
+    from_edge_lengths,
     intrinsic_delaunay,
     intrinsic_gradient,
     intrinsic_triangulation,
 )
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, checked_faces
 from heat_igl.tufted import has_nonmanifold_edges, tufted_cover
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["Laplacian", "Operators", "cotan_operators", "intrinsic_operators", "operators", "tufted_operators"]
 
@@ -71,7 +72,10 @@ class Operators:
         Triangles of the surface itself, each once, where `triangulation` is its tufted cover and goes over it twice.
         Paths are to be unfolded in these: on the cover a path over an edge of five faces goes on in one of them only.
     faces : IntrinsicTriangulation or None
-        The triangles as they were given, before any flip: those that points and curves on faces refer to.
+        The triangles as they were given, before any flip: those that points and curves on faces refer to. None where
+        `triangulation` is.
+    is_surface : bool
+        Whether the domain has two dimensions; tetrahedra have three.
     """
 
     L: sp.csc_matrix
@@ -87,6 +91,7 @@ class Operators:
     triangulation: IntrinsicTriangulation | None = None
     surface: IntrinsicTriangulation | None = None
     faces: IntrinsicTriangulation | None = None
+    is_surface: bool = True
 
     @property
     def n(self) -> int:
@@ -182,6 +187,7 @@ def cotan_operators(mesh: Mesh) -> Operators:
         boundary=mesh.boundary,
         referenced=mesh.referenced,
         longest_distance=mesh.longest_distance,
+        is_surface=not mesh.is_tetrahedral,
     )
     if not mesh.is_tetrahedral:
         return domain

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["DPI", "PICTURE_SUFFIXES", "Picture"]
+__all__ = ["DPI", "PICTURE_SUFFIXES", "Picture", "replace_file"]
 
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 DPI = 400  # of raster output: 8 cm become 1260 pixels
@@ -44,16 +44,7 @@ class Picture:
         suffix = target.suffix.lower()
         if suffix not in PICTURE_SUFFIXES:
             raise ValueError(f"{target} must end in one of {', '.join(PICTURE_SUFFIXES)} to be a picture")
-        content = self._rendered(suffix[1:])
-        descriptor, temporary = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=suffix, dir=target.parent)
-        try:
-            with os.fdopen(descriptor, "wb") as file:
-                file.write(content)
-            os.chmod(temporary, 0o666 & ~_umask())
-            os.replace(temporary, target)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+        replace_file(target, self._rendered(suffix[1:]))
 
     def _rendered(self, form: str, dpi: float = DPI) -> bytes:
         buffer = io.BytesIO()
@@ -64,6 +55,25 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         return self._rendered("png", dpi=DPI / 2)
+
+
+def replace_file(target: Path, content: bytes) -> None:
+    """Write a file that replaces an existing one only when it is complete.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; then the old one is as it was.
+    """
+    descriptor, temporary = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, target)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
 
 
 def _umask() -> int:

@@ -1,4 +1,4 @@
-"""Static pictures of a distance on a mesh, without a display or OpenGL.
+"""Pictures of a distance, or of another field, on a mesh: static ones without a display or OpenGL, and pages to turn.
 
 matplotlib lays out the figure; `heat_igl.raster` draws the surface, since matplotlib cannot hide what is behind and VTK
 needs OpenGL system libraries that slim machines lack. Needs the extra ``view``.
@@ -7,40 +7,50 @@ needs OpenGL system libraries that slim machines lack. Needs the extra ``view``.
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from heat_igl.errors import MissingExtraError
+from heat_igl.html_view import Page, page
 from heat_igl.mesh import Mesh
 from heat_igl.picture import DPI, Picture
 from heat_igl.raster import (
-    default_rotation,
     isoline_coverage,
-    isoline_spacing,
     rasterize,
-    rotation,
     screen_gradient,
     shading,
+    stripe_coverage,
     to_pixels,
     visible,
+    visible_runs,
 )
-from heat_igl.sources import Sources, vertex_sources
-from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.scene import (
+    DISTANCE_LABEL,
+    LINE_INK,
+    STRIPE_INK,
+    UNREACHABLE,
+    Scene,
+    Style,
+    check_style,
+    colours,
+    scene,
+)
+from heat_igl.sources import Sources
+from heat_igl.surface_points import SurfaceCurve
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Picture", "picture", "plot"]
+__all__ = ["Page", "Picture", "page", "picture", "plot", "plot_field", "write_html"]
 
 _OVERSAMPLING = 2
 _WIDTH = 3.15  # inches, one column of a journal
 _FONT = 7.0  # points
 _LINE = 0.0055  # width of an isoline in inches
-_UNREACHABLE = (0.72, 0.72, 0.72)
-_LINE_DARKNESS = 0.42
-_UNIT = "distance, in the mesh's unit"
-_PERMUTATION = {"x": [1, 0, 2], "y": [0, 1, 2], "z": [1, 2, 0]}
+_SOURCE = "#e8000b"
+_CURVE = "#ff4fd8"
 
 
 def plot(
@@ -49,10 +59,12 @@ def plot(
     *,
     sources: Sources | None = None,
     spacing: float | None = None,
+    style: Style = "lines",
+    curves: Sequence[SurfaceCurve] = (),
     view: tuple[float, float] | None = None,
     up: str = "y",
     colormap: str = "viridis_r",
-    label: str = _UNIT,
+    label: str = DISTANCE_LABEL,
 ) -> Picture:
     """Draw a distance on a mesh: colours, isolines, and where it starts.
 
@@ -66,13 +78,18 @@ def plot(
         Vertices to mark.
     spacing : float, optional
         Distance between isolines; a round number near a sixteenth of the largest distance by default.
+    style : {"lines", "stripes", "plain"}
+        Isolines; light and full stripes in turn, each `spacing` wide, which show kinks and ripples best; or colours
+        alone.
+    curves : sequence of SurfaceCurve
+        Drawn on the surface; thin and dotted where they are behind it.
     view : (azimuth, elevation), optional
         Where the viewer is, in degrees; see `heat_igl.raster.rotation`. By default a flat mesh is seen face on, and
         another from the one of eight directions that shows the most of it and of its sources.
     up : {"x", "y", "z"}
         The coordinate that points upwards.
     colormap : str
-        A perceptually uniform colour map of matplotlib.
+        A colour map of matplotlib; the default is perceptually uniform.
     label : str
         Title of the colour bar.
 
@@ -85,25 +102,67 @@ def plot(
     ------
     ValueError
         If `distance` is not one number per vertex, holds NaN or nothing finite, or an option has no meaning.
+    SourceError
+        If `sources` does not name vertices, or a curve does not lie on the mesh.
     MissingExtraError
         If matplotlib is not installed.
     """
-    values = _checked(mesh, distance)
-    marked = None if sources is None else vertex_sources(sources, mesh.n_vertices)
-    if up not in _PERMUTATION:
-        raise ValueError(f"up must be 'x', 'y' or 'z', not {up!r}")
-    largest = float(values[np.isfinite(values)].max())
-    step = isoline_spacing(largest) if spacing is None else float(spacing)
-    if not (np.isfinite(step) and step > 0) or largest / step > 1000:
-        raise ValueError(f"spacing must be a positive number, and no less than {largest / 1000:.2g}, not {spacing!r}")
-    _require_matplotlib()
+    check_style(style)
+    seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
+    return _laid_out(seen, _lines_in_space(mesh, curves, seen), style, colours(colormap), label, "unreachable")
 
-    F = mesh.facets.vertices[mesh.facets.n_faces == 1] if mesh.is_tetrahedral else mesh.F
-    used = np.unique(F)
-    V = mesh.V - (mesh.V[used].min(axis=0) + mesh.V[used].max(axis=0)) / 2
-    V = (V / np.abs(V[used]).max())[:, _PERMUTATION[up]]
-    turn = default_rotation(V, F, used, marked) if view is None else rotation(*view)
-    return _laid_out(V @ turn.T, F, used, values, marked, step, colormap, label)
+
+def plot_field(
+    mesh: Mesh,
+    values: ArrayLike,
+    *,
+    label: str,
+    limits: tuple[float, float] | None = None,
+    spacing: float | None = None,
+    sources: Sources | None = None,
+    curves: Sequence[SurfaceCurve] = (),
+    view: tuple[float, float] | None = None,
+    up: str = "y",
+    colormap: str | None = None,
+) -> Picture:
+    """Draw any number per vertex, such as heat or an error, by colours, with isolines if asked for.
+
+    Parameters
+    ----------
+    values : (n,) array_like
+        ``inf`` is drawn grey.
+    label : str
+        Title of the colour bar.
+    limits : (low, high), optional
+        Values at the ends of the colour bar; what lies beyond takes the colour of the end. By default from the smallest
+        value, or 0 if that is less, to the largest; where there are values of both signs, as far on either side of 0.
+    spacing : float, optional
+        Distance between isolines; none by default.
+    colormap : str, optional
+        A colour map of matplotlib; by default "RdBu_r", whose middle is white, for limits on both sides of 0, and the
+        perceptually uniform "magma_r" for others.
+    mesh, sources, curves, view, up
+        As for `plot`.
+
+    Returns
+    -------
+    Picture
+        Shown by notebooks; `Picture.save` writes it.
+
+    Raises
+    ------
+    ValueError, SourceError, MissingExtraError
+        As for `plot`.
+    """
+    if limits is None:
+        limits = _limits(values)
+    has_signs = limits is not None and limits[0] < 0 < limits[1]
+    table = colours(colormap or ("RdBu_r" if has_signs else "magma_r"), is_trimmed=not has_signs)
+    seen = scene(
+        mesh, values, name="values", sources=sources, spacing=spacing, limits=limits, view=view, up=up
+    )  # fmt: skip
+    style: Style = "plain" if spacing is None else "lines"
+    return _laid_out(seen, _lines_in_space(mesh, curves, seen), style, table, label, "no value")
 
 
 def picture(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **options: Any) -> None:
@@ -111,40 +170,36 @@ def picture(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **opt
     plot(mesh, distance, **options).save(path)
 
 
-def _checked(mesh: Mesh, distance: ArrayLike) -> FloatArray:
-    values = np.asarray(distance, dtype=np.float64)
-    if values.shape != (mesh.n_vertices,):
-        raise ValueError(f"distance must have shape ({mesh.n_vertices},), one per vertex, but it has {values.shape}")
-    if np.isnan(values).any():
-        raise ValueError(f"distance[{int(np.flatnonzero(np.isnan(values))[0])}] is NaN: there is nothing to draw")
-    if not np.isfinite(values).any():
-        raise ValueError("distance is infinite everywhere: there is nothing to draw")
-    return values
+def write_html(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **options: Any) -> None:
+    """Write an interactive page to `path`; options of `page`, errors of `Page.save` too."""
+    page(mesh, distance, **options).save(path)
 
 
-def _require_matplotlib() -> None:
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise MissingExtraError.of("a picture", "matplotlib", "view") from None
+def _limits(values: ArrayLike) -> tuple[float, float] | None:
+    """Symmetric limits for values of both signs; None leaves it to `scene`, which also says what is wrong."""
+    finite = np.asarray(values, dtype=np.float64)
+    finite = finite[np.isfinite(finite)]
+    if not len(finite) or not finite.min() < 0 < finite.max():
+        return None
+    reach = float(np.abs(finite).max())
+    return -reach, reach
+
+
+def _lines_in_space(mesh: Mesh, curves: Sequence[SurfaceCurve], seen: Scene) -> list[FloatArray]:
+    """The corners of each curve, in the viewer's coordinates."""
+    return [(curve.positions(mesh) - seen.centre) / seen.unit @ seen.turn.T for curve in curves]
 
 
 def _laid_out(
-    turned: FloatArray,
-    F: IntArray,
-    used: IntArray,
-    values: FloatArray,
-    marked: IntArray | None,
-    step: float,
-    colormap: str,
-    label: str,
+    seen: Scene, lines: list[FloatArray], style: Style, table: Any, label: str, without_value: str
 ) -> Picture:
     """The figure: surface on the left, colour bar on the right, legend below. Lengths are inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     left, right, bottom, top = 0.05, 0.72, 0.26, 0.16
-    low, high = turned[used, :2].min(axis=0), turned[used, :2].max(axis=0)
+    turned = seen.turned
+    low, high = turned[seen.used, :2].min(axis=0), turned[seen.used, :2].max(axis=0)
     extent = np.maximum(high - low, 1e-3 * (high - low).max())
     across = _WIDTH - left - right
     tall = float(np.clip(across * extent[1] / extent[0], 1.5, 2.6))
@@ -159,19 +214,22 @@ def _laid_out(
     height = bottom + tall + top
     axes = figure.add_axes((left / _WIDTH, bottom / height, across / _WIDTH, tall / height))
     axes.set_axis_off()
-    image, depth = _surface(points, F, values, columns, rows, step, colormap)
+    image, depth = _surface(points, seen, columns, rows, style, table)
     axes.imshow(image, interpolation="antialiased", aspect="auto")
-    hidden = _mark(axes, points, depth, marked)
+    _draw_curves(axes, [to_pixels(line, scale, centre) for line in lines], depth)
+    hidden = _mark(axes, points, depth, seen)
     bar = figure.add_axes(((left + across + 0.08) / _WIDTH, bottom / height, 0.09 / _WIDTH, tall / height))
-    _colour_bar(bar, values, step, colormap, label)
-    _legend(figure, marked, hidden, step, bool(np.isinf(values[used]).any()), left / _WIDTH)
+    _colour_bar(bar, seen, style, table, label)
+    lacking = without_value if bool(np.isinf(seen.values[seen.used]).any()) else None
+    _legend(figure, seen, hidden, style, len(lines), lacking, left / _WIDTH)
     return Picture(figure)
 
 
 def _surface(
-    points: FloatArray, F: IntArray, values: FloatArray, columns: int, rows: int, step: float, colormap: str
+    points: FloatArray, seen: Scene, columns: int, rows: int, style: Style, table: Any
 ) -> tuple[FloatArray, FloatArray]:
     """The image (rows, columns, 4) of the surface, and its depth on the finer grid that it was drawn on."""
+    F, values = seen.F, seen.values
     fine = points * _OVERSAMPLING
     fine[:, :2] += (_OVERSAMPLING - 1) / 2  # centres of pixels, not corners, are at whole numbers
     pixels = rasterize(fine, F, columns * _OVERSAMPLING, rows * _OVERSAMPLING)
@@ -180,11 +238,15 @@ def _surface(
     here = np.einsum("pk,pk->p", pixels.weights, finite[F[pixels.face]])
     known: BoolArray = reached[pixels.face]
 
-    colour = _colours(colormap)(here / _top_of_scale(values))[:, :3]
+    low, high = seen.limits
+    colour = table((here - low) / (high - low))[:, :3]
     per_pixel = screen_gradient(fine, F, finite)[pixels.face]
-    line = isoline_coverage(here, per_pixel, step, _LINE * DPI * _OVERSAMPLING)
-    colour *= 1 - (1 - _LINE_DARKNESS) * line[:, None]
-    colour[~known] = _UNREACHABLE
+    if style == "lines":
+        line = isoline_coverage(here, per_pixel, seen.step, _LINE * DPI * _OVERSAMPLING)
+        colour *= 1 - LINE_INK * line[:, None]
+    elif style == "stripes":
+        colour += STRIPE_INK * stripe_coverage(here, per_pixel, seen.step)[:, None] * (1 - colour)
+    colour[~known] = UNREACHABLE
     colour *= shading(fine, F, pixels)[:, None]
 
     image = np.zeros((rows * columns * _OVERSAMPLING**2, 4))
@@ -195,45 +257,56 @@ def _surface(
     return np.concatenate([np.clip(mixed, 0, 1), covered[..., None]], axis=2), pixels.depth
 
 
-def _colours(colormap: str) -> Any:
-    """The map without its darkest end, on which no line would be seen."""
-    import matplotlib
-    from matplotlib.colors import ListedColormap
+def _draw_curves(axes: Any, lines: list[FloatArray], depth: FloatArray) -> None:
+    """Lines through points given in pixels: full where they are seen, dotted where they are behind the surface."""
+    from matplotlib.collections import LineCollection
 
-    try:
-        whole = matplotlib.colormaps[colormap]
-    except KeyError:
-        raise ValueError(f"colormap must be one of matplotlib's, such as 'viridis_r', not {colormap!r}") from None
-    table = whole(np.linspace(0, 1, 512))
-    return ListedColormap(table[table[:, :3] @ [0.2126, 0.7152, 0.0722] > 0.2])
+    runs: dict[bool, list[FloatArray]] = {False: [], True: []}
+    for points in lines:
+        fine = points * _OVERSAMPLING
+        fine[:, :2] += (_OVERSAMPLING - 1) / 2
+        for is_seen, run in visible_runs(fine, depth, 0.01 * max(depth.shape)):
+            runs[is_seen].append((run[:, :2] - (_OVERSAMPLING - 1) / 2) / _OVERSAMPLING)
+    for is_seen, colour, width in ((False, _CURVE, 0.6), (True, "white", 1.9), (True, _CURVE, 1.1)):
+        style = "solid" if is_seen else (0, (0.8, 1.6))
+        axes.add_collection(
+            LineCollection(
+                runs[is_seen], colors=colour, linewidths=width, linestyles=style, capstyle="round", zorder=2.5
+            ),
+            autolim=False,
+        )
 
 
-def _mark(axes: Any, points: FloatArray, depth: FloatArray, marked: IntArray | None) -> BoolArray:
+def _mark(axes: Any, points: FloatArray, depth: FloatArray, seen: Scene) -> BoolArray:
     """Dots at the sources, rings at those behind the surface; returns which are."""
+    marked = seen.marked
     if marked is None:
         return np.zeros(0, bool)
     fine = points * _OVERSAMPLING
-    seen = visible(fine, depth, marked, 0.01 * max(depth.shape))
+    is_seen = visible(fine, depth, marked, 0.01 * max(depth.shape))
     size = 16.0 if len(marked) <= 20 else 4.0
-    for chosen, fill in ((seen, "#e8000b"), (~seen, "none")):
+    for chosen, fill in ((is_seen, _SOURCE), (~is_seen, "none")):
         x, y = points[marked[chosen], :2].T
-        axes.scatter(
-            x, y, s=size, c=fill, edgecolors="white" if fill != "none" else "#e8000b", linewidths=0.6, zorder=3
-        )
-    return ~seen
+        axes.scatter(x, y, s=size, c=fill, edgecolors="white" if fill != "none" else _SOURCE, linewidths=0.6, zorder=3)
+    return ~is_seen
 
 
-def _colour_bar(axes: Any, values: FloatArray, step: float, colormap: str, label: str) -> None:
-    top = _top_of_scale(values)
-    axes.imshow(np.linspace(0, 1, 512)[:, None], cmap=_colours(colormap), origin="lower", extent=(0, 1, 0, top))
+def _colour_bar(axes: Any, seen: Scene, style: Style, table: Any, label: str) -> None:
+    (low, high), step = seen.limits, seen.step
+    axes.imshow(np.linspace(0, 1, 512)[:, None], cmap=table, origin="lower", extent=(0, 1, low, high), vmin=0, vmax=1)
     axes.set_aspect("auto")
-    levels = step * np.arange(1, int(np.ceil(top / step)))
-    axes.hlines(levels, 0, 1, colors=(0, 0, 0, 1 - _LINE_DARKNESS), linewidth=_LINE * 72)
+    axes.set_ylim(low, high)
+    levels = step * np.arange(np.floor(low / step) + 1, np.ceil(high / step))
+    if style == "lines":
+        axes.hlines(levels[levels != 0], 0, 1, colors=(0, 0, 0, LINE_INK), linewidth=_LINE * 72)
+    elif style == "stripes":
+        for level in levels[np.rint(levels / step) % 2 == 1]:
+            axes.axhspan(level, min(level + step, high), color=(1, 1, 1, STRIPE_INK), linewidth=0)
     axes.set_xticks([])
     axes.yaxis.tick_right()
     axes.yaxis.set_label_position("right")
-    every = next((k for k in (1, 2, 4, 5, 10, 20, 50, 100, 200) if top / (k * step) <= 6), 500)
-    axes.set_yticks(step * every * np.arange(int(top / (step * every) * (1 + 1e-12)) + 1))
+    every = step * next((k for k in (1, 2, 4, 5, 10, 20, 50, 100, 200) if (high - low) / (k * step) <= 6), 500)
+    axes.set_yticks(every * np.arange(np.ceil(low / every * (1 - 1e-12)), np.floor(high / every * (1 + 1e-12)) + 1))
     axes.tick_params(labelsize=_FONT, length=2, width=0.4, pad=1.5)
     axes.yaxis.get_offset_text().set(fontsize=_FONT, horizontalalignment="left", x=1.0)
     axes.set_ylabel(label, fontsize=_FONT, labelpad=3)
@@ -242,45 +315,33 @@ def _colour_bar(axes: Any, values: FloatArray, step: float, colormap: str, label
 
 
 def _legend(
-    figure: Figure, marked: IntArray | None, hidden: BoolArray, step: float, unreachable: bool, left: float
+    figure: Figure, seen: Scene, hidden: BoolArray, style: Style, n_curves: int, lacking: str | None, left: float
 ) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     def dot(fill: str, edge: str, text: str) -> Line2D:
         return Line2D(
-            [],
-            [],
-            linestyle="",
-            marker="o",
-            markersize=4,
-            markerfacecolor=fill,
-            markeredgecolor=edge,
-            markeredgewidth=0.6,
-            label=text,
-        )
+            [], [], linestyle="", marker="o", markersize=4, markerfacecolor=fill, markeredgecolor=edge,
+            markeredgewidth=0.6, label=text,
+        )  # fmt: skip
 
     handles: list[Any] = []
-    if marked is not None and not hidden.all():
-        handles.append(dot("#e8000b", "white", "source" if (~hidden).sum() == 1 else "sources"))
+    if seen.marked is not None and not hidden.all():
+        handles.append(dot(_SOURCE, "white", "source" if (~hidden).sum() == 1 else "sources"))
     if hidden.any():
-        handles.append(dot("none", "#e8000b", "source behind" if hidden.sum() == 1 else "sources behind"))
-    handles.append(Line2D([], [], color="0.35", linewidth=0.7, label=f"every {step:g}"))
-    if unreachable:
-        handles.append(Patch(facecolor=_UNREACHABLE, label="unreachable"))
+        handles.append(dot("none", _SOURCE, "source behind" if hidden.sum() == 1 else "sources behind"))
+    if n_curves:
+        handles.append(Line2D([], [], color=_CURVE, linewidth=1.1, label="curve" if n_curves == 1 else "curves"))
+    if style == "lines":
+        handles.append(Line2D([], [], color="0.35", linewidth=0.7, label=f"every {seen.step:g}"))
+    elif style == "stripes":
+        handles.append(Patch(facecolor="0.75", label=f"stripes of {seen.step:g}"))
+    if lacking is not None:
+        handles.append(Patch(facecolor=UNREACHABLE, label=lacking))
+    if not handles:
+        return
     figure.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(left, 0.0),
-        ncols=len(handles),
-        fontsize=_FONT,
-        frameon=False,
-        handlelength=1.2,
-        handletextpad=0.4,
-        columnspacing=1.0,
-        borderaxespad=0.2,
-    )
-
-
-def _top_of_scale(values: FloatArray) -> float:
-    return float(values[np.isfinite(values)].max()) or 1.0
+        handles=handles, loc="lower left", bbox_to_anchor=(left, 0.0), ncols=len(handles), fontsize=_FONT,
+        frameon=False, handlelength=1.2, handletextpad=0.4, columnspacing=1.0, borderaxespad=0.2,
+    )  # fmt: skip

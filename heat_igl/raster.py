@@ -25,6 +25,8 @@ __all__ = [
     "rotation",
     "screen_gradient",
     "shading",
+    "stripe_coverage",
+    "visible_runs",
 ]
 
 # Candidate pixels handled at once: some 200 MB of temporary arrays.
@@ -207,6 +209,60 @@ def isoline_coverage(values: FloatArray, per_pixel: FloatArray, step: float, wid
     coverage = np.clip(width_here / 2 + 0.5 - apart, 0.0, 1.0) * np.minimum(1.0, width_here)
     coverage[(level < 1) | ~np.isfinite(per_pixel) | (per_pixel == 0)] = 0.0
     return np.asarray(coverage)
+
+
+def stripe_coverage(values: FloatArray, per_pixel: FloatArray, step: float) -> FloatArray:
+    """How much of each pixel (p,) lies in every second stripe of width `step`, from 0 to 1; the first one is not.
+
+    The mean over the values inside the pixel, so that stripes too narrow to be seen become an even tone.
+
+    Parameters
+    ----------
+    values, per_pixel : (p,) float64
+        As for `isoline_coverage`.
+    step : float
+        Width of a stripe.
+    """
+    known = np.isfinite(per_pixel)
+    level = values / step
+    span = np.maximum(np.where(known, per_pixel / step, 0.0), 1e-6)
+
+    def covered_up_to(x: FloatArray) -> FloatArray:
+        return np.asarray(np.floor(x / 2) + np.maximum(x % 2 - 1, 0.0))
+
+    share = (covered_up_to(level + span / 2) - covered_up_to(level - span / 2)) / span
+    return np.where(known, share, 0.5)
+
+
+def visible_runs(points: FloatArray, depth: FloatArray, tolerance: float) -> list[tuple[bool, FloatArray]]:
+    """A polyline cut into what is seen and what is behind something by more than `tolerance` pixels.
+
+    Parameters
+    ----------
+    points : (k, 3) float64
+        Column, row and depth of its corners.
+    depth : (height, width) float64
+        Of `rasterize`.
+    tolerance : float
+        In pixels.
+
+    Returns
+    -------
+    list of (bool, (j, 3) float64)
+        Whether it is seen, and the corners of a piece; pieces are told apart to about two pixels.
+    """
+    if len(points) < 2:
+        return []
+    length = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
+    pieces = np.maximum(np.ceil(length / 2.0), 1).astype(np.int64)
+    place = np.concatenate([np.repeat(np.arange(len(pieces)), pieces), [len(pieces) - 1]])
+    along = np.concatenate([np.arange(count) / count for count in pieces] + [np.ones(1)])[:, None]
+    fine = (1 - along) * points[place] + along * points[place + 1]
+    middle = (fine[:-1] + fine[1:]) / 2
+    is_seen = visible(middle, depth, np.arange(len(middle)), tolerance)
+    cuts = np.flatnonzero(np.diff(is_seen)) + 1
+    starts, stops = np.concatenate([[0], cuts]), np.concatenate([cuts, [len(middle)]])
+    return [(bool(is_seen[start]), fine[start : stop + 1]) for start, stop in zip(starts, stops, strict=True)]
 
 
 def shading(points: FloatArray, F: IntArray, pixels: Pixels) -> FloatArray:

@@ -50,7 +50,7 @@ class Diagnostics:
         return self.t > self.t_requested
 
 
-class VoronoiCells(NamedTuple):
+class LabelledDistance(NamedTuple):
     """Distance and the source that it is measured from.
 
     Attributes

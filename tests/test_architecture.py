@@ -25,9 +25,12 @@ flip_history
 intrinsic
 tufted
 subdivision
+images
 shapes
-io
 operators
+speed
+polygons
+io
 factorization
 sources
 near_field
@@ -37,8 +40,11 @@ unfolding
 refine
 steps
 emission
+processors
+heat_order
 solution
 heat_method
+sampling
 baselines
 bounds
 closed_forms
@@ -52,15 +58,21 @@ validation_plots
 validation_report
 validation
 raster
+scene
 picture
+html_view
 plots
 demo
+cluster
 cli
 __main__
 """.split()
 
 EXTRAS = """
 cholespy
+dask
+distributed
+colorspacious
 gdist
 matplotlib
 meshio
@@ -71,9 +83,11 @@ pygeodesic
 pymeshlab
 pytest
 rich
+selenium
 skfmm
 skimage
 typer
+zarr
 """.split()
 
 

@@ -11,7 +11,8 @@ import pytest
 
 import heat_igl
 from heat_igl import plots, raster, shapes
-from heat_igl.plots import Picture, picture, plot
+from heat_igl.plots import Picture, picture, plot, plot_field
+from heat_igl.scene import LINE_INK, STRIPE_INK, colours
 
 matplotlib = pytest.importorskip("matplotlib")
 
@@ -98,7 +99,7 @@ def test_isolines_lie_at_the_levels_and_have_the_width_asked_for() -> None:
     expected = columns[0] - 0.5 + len(columns) * np.array([0.3, 0.6, 0.9])
     away = np.abs(columns[:, None] - expected).min(axis=1)
     np.testing.assert_allclose(ratio[away > line / 2 + 2], 1, atol=1e-12)
-    ink = (1 - ratio).sum() / (1 - plots._LINE_DARKNESS)
+    ink = (1 - ratio).sum() / LINE_INK
     assert ink == pytest.approx(3 * line, rel=0.3)
 
 
@@ -115,6 +116,98 @@ def test_colours_follow_the_colour_bar() -> None:
     luminance = row @ [0.2126, 0.7152, 0.0722]
     assert (np.diff(luminance) < 0.01).all()
     assert luminance[0] - luminance[-1] > 0.5
+
+
+def test_stripes_are_light_in_every_second_interval() -> None:
+    mesh, x = flat_grid()
+    image, plain = (surface_image(plot(mesh, x, spacing=0.25, style=style)) for style in ("stripes", "plain"))  # type: ignore[arg-type]
+    middle = image.shape[0] // 2
+    columns = np.flatnonzero(plain[middle, :, 3] > 0.99)
+    level = (np.arange(len(columns)) + 0.5) / len(columns) / 0.25
+    inside = np.abs(level - np.rint(level)) * 0.25 * len(columns) > 2
+    lighter = (image - plain)[middle, columns, :3] / (1 - plain[middle, columns, :3])
+    odd = np.floor(level) % 2 == 1
+    np.testing.assert_allclose(lighter[inside & ~odd], 0, atol=1e-12)
+    np.testing.assert_allclose(lighter[inside & odd], STRIPE_INK, atol=1e-9)
+    assert "stripes of 0.25" in legend_texts(plot(mesh, x, spacing=0.25, style="stripes"))
+
+
+def test_stripes_too_narrow_to_be_seen_become_an_even_tone() -> None:
+    values = np.random.default_rng(0).uniform(0, 1, 500)
+    share = raster.stripe_coverage(values, np.full(500, 10.0), 0.01)
+    np.testing.assert_allclose(share, 0.5, atol=1e-3)
+    # A pixel's mean over the values in it, by a slow second opinion.
+    fine = values[:, None] + 0.15 * (np.arange(2000) + 0.5 - 1000) / 2000
+    slow = (np.floor(fine / 0.2) % 2 == 1).mean(axis=1)
+    np.testing.assert_allclose(raster.stripe_coverage(values, np.full(500, 0.15), 0.2), slow, atol=2e-3)
+
+
+@pytest.mark.parametrize("name", ["viridis_r", "magma_r"])
+def test_default_colours_are_perceptually_uniform(name: str) -> None:
+    """Equal steps look equally large (CAM02-UCS), also after the darkest end was cut off; those of jet do not."""
+    colorspacious = pytest.importorskip("colorspacious")
+
+    def steps(of: str) -> np.ndarray:
+        seen = colorspacious.cspace_convert(colours(of)(np.linspace(0, 1, 33))[:, :3], "sRGB1", "CAM02-UCS")
+        return np.linalg.norm(np.diff(seen, axis=0), axis=1)
+
+    assert steps(name).max() < 1.5 * steps(name).min()
+    assert steps("jet").max() > 3 * steps("jet").min()
+
+
+def test_curves_are_drawn_where_they_are_seen_and_dotted_where_they_are_not() -> None:
+    """Two parallel squares, a straight line across each: the far one is hidden as far as the near one reaches."""
+    V = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 1], [2, 0, 1], [0, 2, 1]], float)
+    mesh = heat_igl.Mesh(V, [[0, 1, 2], [3, 4, 5]])
+    # Along y = 0.5: in the far triangle from x = 0 to 3.5, in the near one from x = 0 to 1.5.
+    far = heat_igl.SurfaceCurve([0], [[0.875, 0, 0.125]], [[0, 0.875, 0.125]])
+    near = heat_igl.SurfaceCurve([1], [[0.75, 0, 0.25]], [[0, 0.75, 0.25]])
+    drawn = plot(mesh, V[:, 0], curves=[far, near], view=(0, 0))
+    axes = drawn.figure.axes[0]
+    columns = surface_image(drawn).shape[1]
+    spans: dict[str, list[np.ndarray]] = {"dotted": [], "solid": []}
+    for lines in axes.collections:
+        kind = "solid" if lines.get_linestyle()[0][1] is None else "dotted"
+        spans[kind] += [segment[:, 0] for segment in lines.get_segments()]
+    # Pixels per unit, from the whole picture: 4 units wide.
+    far_ends = np.array([min(x.min() for x in spans["dotted"]), max(x.max() for x in spans["solid"])])
+    per_unit = (far_ends[1] - far_ends[0]) / 3.5
+    assert per_unit == pytest.approx(columns / 4, rel=0.2)
+    assert max(x.max() for x in spans["dotted"]) - far_ends[0] == pytest.approx(1.5 * per_unit, abs=3)
+    seen = sorted({round(float(np.ptp(x) / per_unit), 1) for x in spans["solid"]})
+    assert seen == [1.5, 2.0]
+    assert "curves" in legend_texts(drawn)
+
+
+def test_errors_of_both_signs_are_white_in_the_middle() -> None:
+    mesh, x = flat_grid()
+    drawn = plot_field(mesh, x - 0.25, label="error, %")
+    assert drawn.figure.axes[1].get_ylim() == (-0.75, 0.75)
+    assert drawn.figure.axes[1].get_ylabel() == "error, %"
+    image = surface_image(drawn)
+    row = image[image.shape[0] // 2]
+    row = row[row[:, 3] > 0.99, :3]
+    zero = row[len(row) // 4]
+    assert zero.min() > 0.93
+    assert row[0, 2] > row[0, 0] + 0.1  # blue where it is too small
+    assert row[-1, 0] > row[-1, 2] + 0.2  # red where it is too large
+    bar = drawn.figure.axes[1].get_images()[0]
+    np.testing.assert_allclose(row[-1], bar.cmap(1.0)[:3], atol=0.02)
+
+
+def test_fields_of_one_sign_start_at_zero_and_end_where_they_are_told() -> None:
+    mesh, x = flat_grid()
+    assert plot_field(mesh, x, label="heat").figure.axes[1].get_ylim() == (0, 1)
+    drawn = plot_field(mesh, x, label="heat", limits=(0, 0.5))
+    image = surface_image(drawn)
+    row = image[image.shape[0] // 2]
+    row = row[row[:, 3] > 0.99, :3]
+    np.testing.assert_allclose(row[-1], row[len(row) * 3 // 5], atol=1e-12)
+    assert not drawn.figure.legends
+    with pytest.raises(ValueError, match="limits must be two numbers, the lower one first"):
+        plot_field(mesh, x, label="heat", limits=(1, 0))
+    with pytest.raises(ValueError, match=r"values\[2\] is NaN"):
+        plot_field(mesh, np.where(np.arange(441) == 2, np.nan, x), label="heat")
 
 
 def test_unreachable_is_grey_and_the_legend_says_so() -> None:
@@ -251,6 +344,8 @@ def test_what_cannot_be_drawn_is_rejected_by_name() -> None:
         plot(mesh, x, spacing=1e-9)
     with pytest.raises(ValueError, match="up must be"):
         plot(mesh, x, up="w")
+    with pytest.raises(ValueError, match="style must be one of 'lines', 'stripes', 'plain', not 'dots'"):
+        plot(mesh, x, style="dots")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="colormap must be"):
         plot(mesh, x, colormap="mud")
     with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 25"):

@@ -22,9 +22,10 @@ from heat_igl.errors import MeshError
 from heat_igl.io import medit, msh, obj, off, ply, stl, vtu
 from heat_igl.io.contents import Contents
 from heat_igl.mesh import Mesh
+from heat_igl.polygons import PolygonMesh
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = ["read_attributes", "read_mesh", "write_mesh"]
+__all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "read_polygon_mesh", "write_mesh"]
 
 
 class _Format(NamedTuple):
@@ -43,6 +44,8 @@ _FORMATS = {
     ".msh": _Format(msh.read, msh.write, tetrahedra=True, attributes=False),
     ".vtu": _Format(vtu.read, vtu.write, tetrahedra=True, attributes=True),
 }
+
+MESH_SUFFIXES = tuple(_FORMATS)
 
 _ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
 
@@ -71,7 +74,8 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
 
     Notes
     -----
-    Polygons are split into the fan of triangles around their first corner, which suits convex, roughly planar ones.
+    Polygons are split into the fan of triangles around their first corner, which suits convex, roughly planar ones;
+    `read_polygon_mesh` keeps them.
     STL has no shared vertices: equal positions are merged, and triangles that collapse by it are dropped. Materials,
     normals, texture coordinates, colours and line elements are left out. Formats that neither count their lines
     nor mark their end (OBJ) cannot show that they were cut between two lines.
@@ -82,6 +86,36 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     """
     path, contents = _load(path)
     return _mesh(path, contents)
+
+
+def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
+    """Read a mesh from a file with its polygons as they are.
+
+    Parameters
+    ----------
+    path : path-like
+        As for `read_mesh`.
+
+    Returns
+    -------
+    PolygonMesh
+        With the vertices that `read_mesh` gives.
+
+    Raises
+    ------
+    MeshError
+        As `read_mesh`; also if the file holds tetrahedra.
+    MissingExtraError
+        For .vtu without meshio.
+    """
+    path, contents = _load(path)
+    cells = contents.cells
+    if cells.tetrahedra:
+        raise MeshError(f"{path}: the file holds tetrahedra, not polygons: read it with read_mesh")
+    try:
+        return PolygonMesh(contents.V, np.split(cells.corners, np.cumsum(cells.degree)[:-1]))
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
 
 
 def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:

@@ -9,18 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io.text import ragged
+from heat_igl.polygons import triangle_fans, which_repeat_a_vertex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Cells", "Contents", "assemble", "integers", "select"]
-
-
-class Contents(NamedTuple):
-    """Positions (n, 3), triangles (m, 3) or tetrahedra (m, 4), and arrays per vertex (n,) or (n, k) by name."""
-
-    V: FloatArray
-    F: IntArray
-    attributes: dict[str, AnyArray]
+__all__ = ["Cells", "Contents", "check", "integers", "select"]
 
 
 class Cells(NamedTuple):
@@ -41,6 +33,25 @@ class Cells(NamedTuple):
     tetrahedra: bool = False
 
 
+class Contents(NamedTuple):
+    """Positions (n, 3), polygons or tetrahedra, and arrays per vertex (n,) or (n, k) by name."""
+
+    V: FloatArray
+    cells: Cells
+    attributes: dict[str, AnyArray]
+
+    @property
+    def F(self) -> IntArray:
+        """Triangles (m, 3) or tetrahedra (m, 4); a polygon becomes the fan of triangles around its first corner.
+
+        That is right for convex polygons that are roughly planar; others should be triangulated by the program that
+        made them.
+        """
+        if self.cells.tetrahedra:
+            return self.cells.corners.reshape(-1, 4)
+        return triangle_fans(self.cells.corners, self.cells.degree)
+
+
 def integers(values: FloatArray, where: Callable[[int], str], what: str = "index") -> IntArray:
     """`values` as integers; `where(i)` says in an error where the i-th comes from."""
     bad = ~(np.abs(values) < 2.0**53) | (values != np.rint(values))
@@ -50,13 +61,10 @@ def integers(values: FloatArray, where: Callable[[int], str], what: str = "index
     return values.astype(np.int64)
 
 
-def assemble(
+def check(
     V: FloatArray, cells: Cells, vertex_at: Callable[[int], str], cell_at: Callable[[int], str], base: int
-) -> tuple[FloatArray, IntArray]:
-    """Check positions and indices, and split polygons into triangles.
-
-    A polygon becomes the fan of triangles around its first corner, which is right for convex polygons that are
-    roughly planar; others should be triangulated by the program that made them.
+) -> None:
+    """Check positions and indices.
 
     Parameters
     ----------
@@ -89,33 +97,13 @@ def assemble(
             f"{where}: there is no vertex {corners[first] + base}, the file has {n} vertices, counted from {base} "
             f"({int(bad.sum())} such indices): the file is damaged or written by another convention"
         )
-    bad = _repeats(corners, degree)
+    bad = which_repeat_a_vertex(corners, degree)
     if bad.any():
         where = cell_at(int(np.argmax(bad)))
         raise MeshError(
             f"{where}: a face repeats a vertex ({int(bad.sum())} of {len(degree)} faces do): "
             "remove these faces, they have no area"
         )
-    if cells.tetrahedra:
-        return V, corners.reshape(-1, 4)
-    if not (degree > 3).any():
-        return V, corners.reshape(-1, 3)
-    start = np.repeat(end - degree, degree - 2)
-    second = ragged(end - degree + 1, degree - 2)
-    return V, np.stack([corners[start], corners[second], corners[second + 1]], axis=1)
-
-
-def _repeats(corners: IntArray, degree: IntArray) -> AnyArray:
-    if len(degree) and (degree == degree[0]).all():
-        rows = np.sort(corners.reshape(len(degree), -1), axis=1)
-        found: AnyArray = (rows[:, 1:] == rows[:, :-1]).any(axis=1)
-        return found
-    owner = np.repeat(np.arange(len(degree)), degree)
-    order = np.lexsort((corners, owner))
-    same = (owner[order[1:]] == owner[order[:-1]]) & (corners[order[1:]] == corners[order[:-1]])
-    found = np.zeros(len(degree), bool)
-    found[owner[order[1:][same]]] = True
-    return found
 
 
 _CORNERS = {"triangle": 3, "quad": 4, "tetra": 4}

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io.contents import Contents, assemble, integers, select
+from heat_igl.io.contents import Contents, check, integers, select
 from heat_igl.io.text import Text, format_rows
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
@@ -125,14 +125,14 @@ def read(path: Path, data: bytes) -> Contents:
             blocks.append((kind, index))
             where.append(place)
     cells = select(path, blocks)
-    V, F = assemble(
+    check(
         V,
         cells,
         lambda i: f"{text.where(vertices.line)}, vertex {i + 1} (counted from 1)",
         lambda i: f"{path}, {'tetrahedron' if cells.tetrahedra else 'face'} {i + 1} (counted from 1)",
         base=1,
     )
-    return Contents(V, F, {})
+    return Contents(V, cells, {})
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:  # noqa: ARG001

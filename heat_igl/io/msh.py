@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heat_igl.errors import MeshError
-from heat_igl.io.contents import Contents, assemble, integers, select
+from heat_igl.io.contents import Contents, check, integers, select
 from heat_igl.io.text import Text, format_rows
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -248,8 +248,8 @@ def read(path: Path, data: bytes) -> Contents:
         begin = int(cells.degree[:i].sum())
         return f"{path}, element with nodes {tag[cells.corners[begin : begin + cells.degree[i]]].tolist()}"
 
-    V, F = assemble(V, cells, lambda i: f"{path}, node {tag[i]}", cell_at, base=0)
-    return Contents(V, F, {})
+    check(V, cells, lambda i: f"{path}, node {tag[i]}", cell_at, base=0)
+    return Contents(V, cells, {})
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:  # noqa: ARG001

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io.contents import Cells, Contents, assemble, integers
+from heat_igl.io.contents import Cells, Contents, check, integers
 from heat_igl.io.text import Text, format_rows
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
@@ -58,10 +58,9 @@ def read(path: Path, data: bytes) -> Contents:
         corners = np.where(number < 0, above + number, number - 1)
     else:
         corners = number - 1
-    V, F = assemble(
-        V, Cells(corners, degree), lambda i: text.where(V_lines[i]), lambda i: text.where(F_lines[i]), base=1
-    )
-    return Contents(V, F, {})
+    cells = Cells(corners, degree)
+    check(V, cells, lambda i: text.where(V_lines[i]), lambda i: text.where(F_lines[i]), base=1)
+    return Contents(V, cells, {})
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:  # noqa: ARG001

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io.contents import Cells, Contents, assemble, integers
+from heat_igl.io.contents import Cells, Contents, check, integers
 from heat_igl.io.text import Text, format_rows, ragged
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
@@ -64,8 +64,8 @@ def read(path: Path, data: bytes) -> Contents:
     begin += n
     cells = _polygons(text, np.arange(begin, begin + m))
     first = begin - n
-    V, F = assemble(V, cells, lambda i: text.where(first + i), lambda i: text.where(begin + i), base=0)
-    return Contents(V, F, {})
+    check(V, cells, lambda i: text.where(first + i), lambda i: text.where(begin + i), base=0)
+    return Contents(V, cells, {})
 
 
 def _polygons(text: Text, lines: IntArray) -> Cells:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io.contents import Cells, Contents, assemble, integers
+from heat_igl.io.contents import Cells, Contents, check, integers
 from heat_igl.io.text import Text, ragged
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -255,11 +255,12 @@ def read(path: Path, data: bytes) -> Contents:
     corners = integers(
         faces[name].values.astype(np.float64), lambda i: face_at(int(np.searchsorted(end, i, side="right")))
     )
-    V, F = assemble(V, Cells(corners, degree), lambda i: f"{path}, vertex {i} (counted from 0)", face_at, base=0)
+    cells = Cells(corners, degree)
+    check(V, cells, lambda i: f"{path}, vertex {i} (counted from 0)", face_at, base=0)
     others = {
         prop.name: columns[prop.name].values.astype(prop.dtype) for prop in scalars if prop.name not in ("x", "y", "z")
     }
-    return Contents(V, F, _gathered(others, header.vectors))
+    return Contents(V, cells, _gathered(others, header.vectors))
 
 
 def _gathered(columns: dict[str, AnyArray], vectors: dict[str, int]) -> dict[str, AnyArray]:

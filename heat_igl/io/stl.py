@@ -12,7 +12,7 @@ import numpy as np
 
 from heat_igl.connectivity import unique_rows
 from heat_igl.errors import MeshError
-from heat_igl.io.contents import Contents
+from heat_igl.io.contents import Cells, Contents
 from heat_igl.io.text import Text, format_rows
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
@@ -50,7 +50,7 @@ def read(path: Path, data: bytes) -> Contents:
     V, F = _merged(corners.reshape(-1, 3))
     if not len(F):
         raise MeshError(f"{path}: all {len(corners)} triangles have two corners in one point, so none is left")
-    return Contents(V, F, {})
+    return Contents(V, Cells(F.ravel(), np.full(len(F), 3)), {})
 
 
 def _corners(path: Path, data: bytes) -> FloatArray:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import MeshError, MissingExtraError
-from heat_igl.io.contents import Contents, assemble, select
+from heat_igl.io.contents import Contents, check, select
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
 
@@ -66,14 +66,14 @@ def read(path: Path, data: bytes) -> Contents:
             f"{path}: the header announces {announced[1].decode('latin-1')[:20]} points, but the file holds {len(V)}"
         )
     cells = select(path, blocks)
-    V, F = assemble(
+    check(
         V,
         cells,
         lambda i: f"{path}, point {i} (counted from 0)",
         lambda i: f"{path}, {'tetrahedron' if cells.tetrahedra else 'polygon'} {i} (counted from 0)",
         base=0,
     )
-    return Contents(V, F, attributes)
+    return Contents(V, cells, attributes)
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:

@@ -1,0 +1,137 @@
+"""The meshes and the sources of a batch, and the names that they have in the store."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from heat_igl.errors import SourceError
+from heat_igl.io import MESH_SUFFIXES
+from heat_igl.mesh import Mesh
+from heat_igl.sources import Sources, vertex_sources
+
+__all__ = ["Item", "MeshLike", "SourcePlan", "folder", "items", "read_source_sets"]
+
+MeshLike = str | os.PathLike[str] | Mesh | tuple[Any, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Item:
+    """A mesh of a batch: its name in the store, what it is called in messages, and the mesh or where to read it."""
+
+    name: str
+    label: str
+    mesh: Path | Mesh | tuple[Any, Any]
+
+
+def folder(path: str | os.PathLike[str]) -> dict[str, Path]:
+    """Everything below a folder whose name ends like a mesh file's, by its path from there.
+
+    Raises
+    ------
+    ValueError
+        If `path` is no folder, or there is no such file in it.
+    """
+    root = Path(path)
+    if not root.is_dir():
+        raise ValueError(f"{root} is not a folder of meshes")
+    found = {
+        file.relative_to(root).as_posix(): file
+        for file in sorted(root.rglob("*"))
+        if file.suffix.lower() in MESH_SUFFIXES
+    }
+    if not found:
+        raise ValueError(f"{root} holds no mesh: files must end in {', '.join(MESH_SUFFIXES)}")
+    return found
+
+
+def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike]) -> Iterator[Item]:
+    """The meshes with their names: keys of a mapping; file names, or positions, in a sequence.
+
+    Raises
+    ------
+    ValueError
+        If two files of a sequence have one name.
+    """
+    if isinstance(meshes, Mapping):
+        pairs = list(meshes.items())
+    else:
+        pairs = [
+            (Path(mesh).name if isinstance(mesh, str | os.PathLike) else f"{i:06d}", mesh)
+            for i, mesh in enumerate(meshes)
+        ]
+    seen: set[str] = set()
+    for name, mesh in pairs:
+        if name in seen:
+            raise ValueError(f"two meshes are called {name!r}: pass a dictionary from names to meshes")
+        seen.add(name)
+        label = os.fspath(mesh) if isinstance(mesh, str | os.PathLike) else name
+        # A name may hold what separates zarr's groups.
+        yield Item(quote(name, safe=" ()[]"), label, Path(mesh) if isinstance(mesh, str | os.PathLike) else mesh)
+
+
+@dataclass(frozen=True)
+class SourcePlan:
+    """Which sources each mesh gets: every vertex, a number of farthest points, or the same list of source sets."""
+
+    farthest: int | None = None
+    source_sets: tuple[tuple[int, ...], ...] | None = None
+
+    @classmethod
+    def of(cls, sources: str | Sequence[Sources]) -> SourcePlan:
+        """The plan that `sources` of `distances` describes.
+
+        Raises
+        ------
+        SourceError
+            If it describes none.
+        """
+        if isinstance(sources, str):
+            kind, _, count = sources.partition(":")
+            if sources == "all":
+                return cls()
+            if kind != "farthest" or not count.isdecimal() or int(count) < 1:
+                raise SourceError(f"sources must be 'all', 'farthest:K' with K at least 1, or a list, not {sources!r}")
+            return cls(farthest=int(count))
+        if not hasattr(sources, "__len__") or not len(sources):
+            raise SourceError(f"sources must be 'all', 'farthest:K' or a list of source sets, not {sources!r}")
+        sets = []
+        for i, one in enumerate(sources):
+            try:
+                # Which vertices a mesh has is not known yet.
+                sets.append(tuple(int(v) for v in vertex_sources(one, np.iinfo(np.int64).max)))
+            except SourceError as error:
+                raise SourceError(f"sources[{i}]: {error}") from None
+        return cls(source_sets=tuple(sets))
+
+    def __str__(self) -> str:
+        if self.source_sets is not None:
+            return " ".join(",".join(map(str, vertices)) for vertices in self.source_sets)
+        return "all" if self.farthest is None else f"farthest:{self.farthest}"
+
+
+def read_source_sets(path: str | os.PathLike[str]) -> list[list[int]]:
+    """Source sets from a text file: one on each line, vertex indices separated by spaces or commas.
+
+    Raises
+    ------
+    SourceError
+        If a line holds anything else, or there is none.
+    """
+    sets = []
+    for number, line in enumerate(Path(path).read_text(encoding="utf8").splitlines(), start=1):
+        words = line.split("#")[0].replace(",", " ").split()
+        wrong = next((word for word in words if not word.isdecimal()), None)
+        if wrong is not None:
+            raise SourceError(f"{path}, line {number}: {wrong!r} is no vertex index")
+        if words:
+            sets.append([int(word) for word in words])
+    if not sets:
+        raise SourceError(f"{path} holds no sources: write vertex indices, one set a line")
+    return sets

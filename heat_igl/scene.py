@@ -1,0 +1,170 @@
+"""What a picture and a page have in common: which triangles are seen from where, which values, and in which colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from heat_igl.errors import MissingExtraError
+from heat_igl.mesh import Mesh
+from heat_igl.raster import default_rotation, isoline_spacing, rotation
+from heat_igl.sources import Sources, vertex_sources
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
+
+__all__ = [
+    "DISTANCE_LABEL",
+    "LINE_INK",
+    "STRIPE_INK",
+    "UNREACHABLE",
+    "Scene",
+    "Style",
+    "check_style",
+    "colours",
+    "scene",
+]
+
+Style = Literal["lines", "stripes", "plain"]
+
+DISTANCE_LABEL = "distance, in the mesh's unit"
+UNREACHABLE = (0.72, 0.72, 0.72)
+#: How much of the brightness an isoline takes away.
+LINE_INK = 0.58
+#: How far every second stripe is mixed with white.
+STRIPE_INK = 0.5
+
+_PERMUTATION = {"x": [1, 0, 2], "y": [0, 1, 2], "z": [1, 2, 0]}
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A surface with values, centred and scaled, and the direction in which it is seen.
+
+    Attributes
+    ----------
+    V : (n, 3) float64
+        Positions in units of `unit` around `centre`: those that `F` uses lie between -1 and 1.
+    F : (m, 3) int64
+        Triangles; of tetrahedra, those on the outside.
+    used : (k,) int64
+        The vertices of `F`.
+    centre : (3,) float64
+        In the mesh's unit.
+    unit : float
+        In the mesh's unit.
+    turn : (3, 3) float64
+        Rows point right, up and towards the viewer.
+    values : (n,) float64
+        In the caller's unit; ``inf`` is no value.
+    limits : (float, float)
+        Values at the ends of the colour bar.
+    step : float
+        Between isolines or stripes.
+    marked : (s,) int64 or None
+        Sources.
+    """
+
+    V: FloatArray
+    F: IntArray
+    used: IntArray
+    centre: FloatArray
+    unit: float
+    turn: FloatArray
+    values: FloatArray
+    limits: tuple[float, float]
+    step: float
+    marked: IntArray | None
+
+    @property
+    def turned(self) -> FloatArray:
+        """Positions (n, 3) as the viewer has them: right, up, near."""
+        return np.asarray(self.V @ self.turn.T)
+
+
+def scene(
+    mesh: Mesh,
+    values: ArrayLike,
+    *,
+    name: str = "distance",
+    sources: Sources | None = None,
+    spacing: float | None = None,
+    limits: tuple[float, float] | None = None,
+    view: tuple[float, float] | None = None,
+    up: str = "y",
+) -> Scene:
+    """Check what is to be drawn; parameters as for `heat_igl.plots.plot` and `heat_igl.plots.plot_field`.
+
+    Raises
+    ------
+    ValueError
+        If `values` (`name` in the message) is not one number per vertex, holds NaN or nothing finite, or an option has
+        no meaning.
+    SourceError
+        If `sources` does not name vertices of the mesh.
+    """
+    checked = _checked(name, values, mesh.n_vertices)
+    marked = None if sources is None else vertex_sources(sources, mesh.n_vertices)
+    if up not in _PERMUTATION:
+        raise ValueError(f"up must be 'x', 'y' or 'z', not {up!r}")
+    finite = checked[np.isfinite(checked)]
+    low, high = (min(0.0, float(finite.min())), float(finite.max())) if limits is None else map(float, limits)
+    if limits is not None and not (np.isfinite([low, high]).all() and low < high):
+        raise ValueError(f"limits must be two numbers, the lower one first, not {limits!r}")
+    across = max(high - low, 0.0)
+    step = isoline_spacing(across) if spacing is None else float(spacing)
+    if not (np.isfinite(step) and step > 0) or across / step > 1000:
+        raise ValueError(f"spacing must be a positive number, and no less than {across / 1000:.2g}, not {spacing!r}")
+
+    F = mesh.facets.vertices[mesh.facets.n_faces == 1] if mesh.is_tetrahedral else mesh.F
+    used = np.unique(F)
+    centre = (mesh.V[used].min(axis=0) + mesh.V[used].max(axis=0)) / 2
+    V = mesh.V - centre
+    unit = float(np.abs(V[used]).max())
+    V = V / unit
+    upright = np.eye(3)[_PERMUTATION[up]]
+    turn = default_rotation(V @ upright.T, F, used, marked) if view is None else rotation(*view)
+    return Scene(
+        V=V, F=F, used=used, centre=centre, unit=unit, turn=turn @ upright, values=checked,
+        limits=(low, high if high > low else low + 1.0), step=step, marked=marked,
+    )  # fmt: skip
+
+
+def colours(colormap: str, is_trimmed: bool = True) -> Any:
+    """A colour map of matplotlib; trimmed, without its darkest end, on which no line would be seen.
+
+    Raises
+    ------
+    ValueError
+        If matplotlib has no such map.
+    MissingExtraError
+        If matplotlib is not installed.
+    """
+    try:
+        import matplotlib
+        from matplotlib.colors import ListedColormap
+    except ImportError:
+        raise MissingExtraError.of("a picture", "matplotlib", "view") from None
+    try:
+        whole = matplotlib.colormaps[colormap]
+    except KeyError:
+        raise ValueError(f"colormap must be one of matplotlib's, such as 'viridis_r', not {colormap!r}") from None
+    table = whole(np.linspace(0, 1, 512))
+    return ListedColormap(table[table[:, :3] @ [0.2126, 0.7152, 0.0722] > 0.2] if is_trimmed else table)
+
+
+def check_style(style: str) -> None:
+    """Refuse what is not a `Style`."""
+    if style not in get_args(Style):
+        raise ValueError(f"style must be one of {', '.join(map(repr, get_args(Style)))}, not {style!r}")
+
+
+def _checked(name: str, values: ArrayLike, n: int) -> FloatArray:
+    checked = np.asarray(values, dtype=np.float64)
+    if checked.shape != (n,):
+        raise ValueError(f"{name} must have shape ({n},), one per vertex, but it has {checked.shape}")
+    if np.isnan(checked).any():
+        raise ValueError(f"{name}[{int(np.flatnonzero(np.isnan(checked))[0])}] is NaN: there is nothing to draw")
+    if not np.isfinite(checked).any():
+        raise ValueError(f"{name} is infinite everywhere: there is nothing to draw")
+    return checked

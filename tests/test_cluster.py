@@ -1,0 +1,401 @@
+"""Batches: the same bits as a solver's, bad meshes apart, and nothing lost or done twice when processes die."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heat_igl
+from heat_igl import BatchError, Mesh, SourceError, cluster
+from heat_igl.cluster.store import Store, rows_per_block
+
+pytest.importorskip("distributed")
+zarr = pytest.importorskip("zarr")
+
+FAN = Mesh(
+    [[0, 0, 0], [0, 0, 1], [1, 0, 0.5], [-1, 0.3, 0.5], [0, 1, 0.5], [0.4, -1, 0.5], [-0.7, -0.7, 0.5]],
+    [[0, 1, k] for k in range(2, 7)],
+)
+
+
+@pytest.fixture(scope="module")
+def client():
+    """Two workers, as threads of this process: real ones are started where processes have to die."""
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as local,
+        distributed.Client(local) as connected,
+    ):
+        yield connected
+
+
+def expected(mesh: Mesh, source_sets, dtype="float32", **options):
+    return heat_igl.HeatMethodSolver(mesh, **options).distances(source_sets).astype(dtype)
+
+
+@pytest.mark.parametrize("options", [{}, {"refine": "sweep"}, {"dtype": "float64", "t_coef": 2.0}])
+def test_the_bits_are_those_of_a_solver(client, tmp_path, options):
+    meshes = {"ball": heat_igl.shapes.icosphere(3), "fan": FAN, "tile": heat_igl.shapes.grid(12)}
+    report = cluster.distances(meshes, "all", tmp_path / "store", client=client, **options)
+    assert [row.status for row in report.rows] == ["done"] * 3
+    for name, mesh in meshes.items():
+        group = zarr.open_group(tmp_path / "store" / name, mode="r")
+        n = mesh.n_vertices
+        np.testing.assert_array_equal(group["source_vertex"][:], np.arange(n))
+        np.testing.assert_array_equal(group["distance"][:], expected(mesh, range(n), **options))
+        assert group.attrs["t"] == pytest.approx(
+            heat_igl.HeatMethodSolver(mesh, t_coef=options.get("t_coef", 1)).t, rel=1e-15
+        )
+
+
+def test_source_sets_and_farthest_points(client, tmp_path):
+    mesh = heat_igl.shapes.icosphere(3)
+    sets = [[3, 5, 9], 7, [1, 2]]
+    cluster.distances([mesh], sets, tmp_path / "sets", client=client)
+    group = zarr.open_group(tmp_path / "sets" / "000000", mode="r")
+    np.testing.assert_array_equal(group["source_vertex"][:], [3, 5, 9, 7, 1, 2])
+    np.testing.assert_array_equal(group["source_row"][:], [0, 0, 0, 1, 2, 2])
+    np.testing.assert_array_equal(group["distance"][:], expected(mesh, sets))
+    cluster.distances([mesh], "farthest:5", tmp_path / "far", client=client)
+    group = zarr.open_group(tmp_path / "far" / "000000", mode="r")
+    points = heat_igl.farthest_points(heat_igl.HeatMethodSolver(mesh), 5)
+    np.testing.assert_array_equal(group["source_vertex"][:], points)
+    np.testing.assert_array_equal(group["distance"][:], expected(mesh, points))
+
+
+def test_xarray_reads_a_mesh(client, tmp_path):
+    xarray = pytest.importorskip("xarray")
+    cluster.distances({"a mesh": FAN}, [0, 4], tmp_path / "store", client=client)
+    data = xarray.open_zarr(tmp_path / "store", group="a mesh", consolidated=False)
+    assert dict(data.distance.sizes) == {"source": 2, "vertex": 7}
+    np.testing.assert_array_equal(data.distance.values, expected(FAN, [0, 4]))
+    assert data.attrs["report"]["n_faces"] == 5
+
+
+def bad_files(folder: Path) -> set[str]:
+    """Files that are no meshes, each in its own way; returns their names."""
+    good = folder / "good.off"
+    heat_igl.write_mesh(good, heat_igl.shapes.icosphere(1))
+    text = good.read_text()
+    (folder / "truncated.off").write_text(text[: len(text) // 2])
+    (folder / "garbage.obj").write_bytes(os.urandom(500))
+    (folder / "nonfinite.off").write_text("OFF\n3 1 0\n0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n")
+    (folder / "empty.ply").write_bytes(b"")
+    (folder / "faceless.obj").write_text("v 0 0 0\n")
+    (folder / "outside.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n")
+    (folder / "huge_header.off").write_text("OFF\n999999999 1 0\n0 0 0\n")
+    (folder / "directory.stl").mkdir()
+    (folder / "dangling.obj").symlink_to(folder / "nowhere.obj")
+    names = {path.name for path in folder.iterdir()} - {"good.off"}
+    if os.geteuid():  # root reads everything
+        (folder / "forbidden.off").write_text(text)
+        (folder / "forbidden.off").chmod(0)
+        names.add("forbidden.off")
+    return names
+
+
+def test_bad_files_are_rows_and_the_others_go_on(client, tmp_path):
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    bad = bad_files(folder)
+    heat_igl.write_mesh(folder / "fan.off", FAN)
+    (folder / "below").mkdir()
+    heat_igl.write_mesh(folder / "below" / "tile.obj", heat_igl.shapes.grid(4))
+    report = cluster.distances(cluster.folder(folder), [0], tmp_path / "store", client=client)
+    assert {Path(row.mesh).name for row in report.failed} == bad
+    assert all(row.reason for row in report.failed)
+    reasons = {Path(row.mesh).name: row.reason for row in report.failed}
+    assert "not finite" in reasons["nonfinite.off"] or "nan" in reasons["nonfinite.off"]
+    assert "7" in reasons["outside.off"]
+    assert {row.name for row in report.rows if row.status == "done"} == {"good.off", "fan.off", "below%2Ftile.obj"}
+    assert cluster.report(tmp_path / "store") == report
+    assert f"3 of {len(bad) + 3} meshes done, {len(bad)} failed" in report.to_markdown()
+
+
+def test_a_source_that_a_mesh_does_not_have_is_a_row(client, tmp_path):
+    report = cluster.distances({"fan": FAN, "ball": heat_igl.shapes.icosphere(2)}, [9], tmp_path / "s", client=client)
+    (row,) = report.failed
+    assert row.name == "fan"
+    assert "9" in row.reason
+    assert "7 vertices" in row.reason
+
+
+def chunk_times(store: Path) -> dict[str, int]:
+    """When each chunk of distances was written."""
+    return {str(path): path.stat().st_mtime_ns for path in store.glob("*/distance/c/*/*") if path.suffix != ".partial"}
+
+
+def test_only_what_is_missing_is_computed_again(client, tmp_path):
+    mesh = heat_igl.shapes.icosphere(3)  # 642 vertices: 11 blocks
+    store = tmp_path / "store"
+    before = cluster.distances({"ball": mesh}, "all", store, client=client)
+    first = zarr.open_group(store / "ball", mode="r")["distance"][:]
+    group = zarr.open_group(store / "ball", mode="r+")
+    group["block_checksum"][3] = -1  # not finished
+    (store / "ball" / "distance" / "c" / "5" / "0").write_bytes(b"half of it")  # damaged
+    (store / "ball" / "distance" / "c" / "7" / "0").unlink()  # lost
+    group.update_attributes({"status": "running"})
+    times = chunk_times(store)
+    after = cluster.distances({"ball": mesh}, "all", store, client=client)
+    changed = {path for path, written in chunk_times(store).items() if times.get(path) != written}
+    assert {Path(path).parent.name for path in changed} == {"3", "5", "7"}
+    np.testing.assert_array_equal(zarr.open_group(store / "ball", mode="r")["distance"][:], first)
+    assert after == before
+
+
+def test_a_mesh_that_changed_is_computed_again(client, tmp_path):
+    path = tmp_path / "mesh.off"
+    heat_igl.write_mesh(path, heat_igl.shapes.grid(6))
+    cluster.distances([path], [0], tmp_path / "store", client=client)
+    times = chunk_times(tmp_path / "store")
+    cluster.distances([path], [0], tmp_path / "store", client=client)
+    assert chunk_times(tmp_path / "store") == times
+    heat_igl.write_mesh(path, heat_igl.shapes.grid(7))
+    (row,) = cluster.distances([path], [0], tmp_path / "store", client=client).rows
+    assert row.n_vertices == heat_igl.shapes.grid(7).n_vertices
+    mesh = heat_igl.read_mesh(path)
+    got = zarr.open_group(tmp_path / "store" / "mesh.off", mode="r")["distance"][:]
+    np.testing.assert_array_equal(got, expected(mesh, [0]))
+
+
+def test_a_store_keeps_its_options(client, tmp_path):
+    cluster.distances({"fan": FAN}, [0], tmp_path / "store", client=client)
+    with pytest.raises(ValueError, match=r"was begun with sources='0', not '0 1'"):
+        cluster.distances({"fan": FAN}, [0, 1], tmp_path / "store", client=client)
+    with pytest.raises(ValueError, match="was begun with dtype='float32', not 'float64'"):
+        cluster.distances({"fan": FAN}, [0], tmp_path / "store", client=client, dtype="float64")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "precious.txt").write_text("")
+    with pytest.raises(ValueError, match="is not a zarr group of distances"):
+        cluster.distances({"fan": FAN}, [0], tmp_path / "other", client=client)
+    assert (tmp_path / "other" / "precious.txt").exists()
+    zarr.open_group(tmp_path / "foreign", mode="w").create_group("data")
+    with pytest.raises(ValueError, match="holds other data"):
+        cluster.distances({"fan": FAN}, [0], tmp_path / "foreign", client=client)
+
+
+@pytest.mark.parametrize(
+    ("sources", "message"),
+    [
+        ("every", "must be 'all', 'farthest:K'"),
+        ("farthest:0", "K at least 1"),
+        ([], "must be 'all'"),
+        ([[0], [-1]], r"sources\[1\]: .* = -1 is no vertex"),
+        ([0.5], r"sources\[0\]: .* convert with int"),
+    ],
+)
+def test_sources_without_a_meaning_are_refused(client, tmp_path, sources, message):
+    with pytest.raises(SourceError, match=message):
+        cluster.distances({"fan": FAN}, sources, tmp_path / "store", client=client)
+    assert not (tmp_path / "store").exists()
+
+
+def test_names_must_differ(client, tmp_path):
+    with pytest.raises(ValueError, match=r"two meshes are called 'a\.off'"):
+        cluster.distances([tmp_path / "a.off", tmp_path / "b" / "a.off"], [0], tmp_path / "store", client=client)
+
+
+def test_a_folder_without_meshes_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="holds no mesh"):
+        cluster.folder(tmp_path)
+    with pytest.raises(ValueError, match="is not a folder"):
+        cluster.folder(tmp_path / "nowhere")
+
+
+def test_sources_from_a_file(tmp_path):
+    path = tmp_path / "sources.txt"
+    path.write_text("3, 5 # two at once\n\n8\n")
+    assert cluster.read_source_sets(path) == [[3, 5], [8]]
+    path.write_text("3\nx\n")
+    with pytest.raises(SourceError, match="line 2: 'x' is no vertex index"):
+        cluster.read_source_sets(path)
+    path.write_text("# none\n")
+    with pytest.raises(SourceError, match="holds no sources"):
+        cluster.read_source_sets(path)
+
+
+def test_a_mesh_too_large_for_its_worker_is_a_row(client, tmp_path, monkeypatch):
+    # The workers are threads of this process.
+    monkeypatch.setattr("heat_igl.cluster.worker._memory_for_solvers", lambda: 2**20)
+    meshes = {"ball": heat_igl.shapes.icosphere(4), "fan": FAN}
+    report = cluster.distances(meshes, [0], tmp_path / "store", client=client)
+    (row,) = report.failed
+    assert row.name == "ball"
+    assert "use fewer workers, or workers with more memory" in row.reason
+    monkeypatch.undo()
+    assert not cluster.distances(meshes, [0], tmp_path / "store", client=client).failed
+
+
+def test_blocks_are_whole_blocks_of_right_hand_sides():
+    for n in (3, 1000, 30_000, 200_000, 10_000_000):
+        rows = rows_per_block(n)
+        assert rows % 8 == 0
+        assert 8 <= rows <= 64
+        assert rows * n <= max(2**22, 8 * n)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of one megabyte."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", disk], capture_output=True, text=True)
+    if mounted.returncode:
+        pytest.skip(f"no file system can be mounted: {mounted.stderr.strip()}")
+    yield disk
+    subprocess.run(["umount", "-l", disk], check=True)
+
+
+def test_a_full_disk_ends_with_one_error_and_can_be_resumed(client, tmp_path, small_disk):
+    meshes = {f"ball {i}": Mesh(ball.V * (1 + i), ball.F) for i, ball in enumerate([heat_igl.shapes.icosphere(3)] * 4)}
+    with pytest.raises(BatchError, match=r"disk.*cannot be written: No space left on device.*free some space"):
+        cluster.distances(meshes, "all", small_disk / "store", client=client)
+    begun = chunk_times(small_disk / "store")
+    assert 0 < len(begun) < 44
+    subprocess.run(["mount", "-o", "remount,size=20m", small_disk], check=True)
+    whole = {row.name for row in cluster.report(small_disk / "store").rows}
+    intact = {
+        path
+        for name in whole
+        if (attributes := Store(small_disk / "store").attributes(name)).get("status") in ("running", "done")
+        for block in range(11)
+        if block not in Store(small_disk / "store").group(name).missing()
+        for path in begun
+        if f"/{name}/distance/c/{block}/" in path and attributes
+    }
+    report = cluster.distances(meshes, "all", small_disk / "store", client=client)
+    assert [row.status for row in report.rows] == ["done"] * 4
+    after = chunk_times(small_disk / "store")
+    assert all(after[path] == begun[path] for path in intact)
+    undisturbed = cluster.distances(meshes, "all", tmp_path / "undisturbed", client=client)
+    assert [row.checksum for row in report.rows] == [row.checksum for row in undisturbed.rows]
+
+
+class Processes:
+    """A scheduler and workers as processes of their own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.scheduler_file = folder / "scheduler.json"
+        self.log = (folder / "processes.log").open("a")
+        self.children: list[subprocess.Popen[bytes]] = []
+
+    def start(self, *arguments: str) -> subprocess.Popen[bytes]:
+        child = subprocess.Popen(
+            [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]],
+            stdout=self.log, stderr=self.log, start_new_session=True,
+        )  # fmt: skip
+        self.children.append(child)
+        return child
+
+    def scheduler(self) -> subprocess.Popen[bytes]:
+        self.scheduler_file.unlink(missing_ok=True)
+        child = self.start(
+            "dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
+            "--scheduler-file", str(self.scheduler_file),
+        )  # fmt: skip
+        wait_until(self.scheduler_file.exists)
+        return child
+
+    def worker(self) -> subprocess.Popen[bytes]:
+        return self.start(
+            "dask_worker", "--scheduler-file", str(self.scheduler_file), "--nthreads", "1", "--no-nanny",
+            "--no-dashboard", "--death-timeout", "20",
+        )  # fmt: skip
+
+    @property
+    def address(self) -> str:
+        return str(json.loads(self.scheduler_file.read_text())["address"])
+
+    def close(self) -> None:
+        for child in self.children:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(child.pid, signal.SIGKILL)
+            child.wait()
+        self.log.close()
+
+
+def wait_until(condition, seconds=60):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.02)
+
+
+def finished_chunks(store: Path) -> dict[str, int]:
+    """Chunks whose checksum stands beside them, and when they were written."""
+    found = {}
+    for path, written in chunk_times(store).items():
+        mesh, block = Path(path).parents[3], Path(path).parent.name
+        if (mesh / "block_checksum" / "c" / block).exists():
+            found[path] = written
+    return found
+
+
+@pytest.fixture
+def processes(tmp_path):
+    running = Processes(tmp_path)
+    yield running
+    running.close()
+
+
+def test_killed_processes_lose_nothing_and_repeat_nothing(processes, tmp_path):
+    """Kill a worker, then the scheduler, then the client; what was finished is not touched again, and the bits are
+    those of a solver that nobody disturbed."""
+    folder, store = tmp_path / "meshes", tmp_path / "store"
+    folder.mkdir()
+    ball = heat_igl.shapes.icosphere(5)
+    meshes = {f"ball{i}.ply": Mesh(ball.V * [1, 1, 1 + i / 4], ball.F) for i in range(4)}
+    for name, mesh in meshes.items():
+        heat_igl.write_mesh(folder / name, mesh)
+    source_file = tmp_path / "sources.txt"
+    source_file.write_text("\n".join(map(str, range(256))))
+    command = [
+        sys.executable, "-m", "heat_igl", "batch", str(folder), "--store", str(store), "--sources", str(source_file),
+    ]  # fmt: skip
+
+    def client(*arguments: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        )
+
+    scheduler = processes.scheduler()
+    victim, _ = processes.worker(), processes.worker()
+    batch = client("--scheduler", processes.address)
+    wait_until(lambda: len(finished_chunks(store)) >= 2)
+    victim.kill()
+    at_worker = finished_chunks(store)
+    wait_until(lambda: len(finished_chunks(store)) >= len(at_worker) + 2)
+    scheduler.kill()
+    _, errors = batch.communicate(timeout=120)
+    assert batch.returncode == 1
+    assert "the cluster is lost; what is finished stays" in errors
+    assert "Traceback" not in errors
+    at_scheduler = finished_chunks(store)
+
+    batch = client("--workers", "2")
+    wait_until(lambda: len(finished_chunks(store)) >= len(at_scheduler) + 2)
+    os.killpg(batch.pid, signal.SIGKILL)
+    batch.communicate()
+    at_client = finished_chunks(store)
+    assert 6 <= len(at_client) < 16, "nothing was left to do: the test is too small for this machine"
+
+    batch = client("--workers", "2")
+    output, errors = batch.communicate(timeout=120)
+    assert batch.returncode == 0, errors
+    assert "4 of 4 meshes done" in output
+    at_end = chunk_times(store)
+    assert len(at_end) == 16
+    for before in (at_worker, at_scheduler, at_client):
+        assert all(at_end[path] == written for path, written in before.items())
+    for name, mesh in meshes.items():
+        got = zarr.open_group(store / name, mode="r")["distance"][:]
+        np.testing.assert_array_equal(got, expected(mesh, range(256)))

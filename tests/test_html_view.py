@@ -1,0 +1,379 @@
+"""Pages: complete in themselves, drawn as the colour bar says, turned and asked in a real browser."""
+
+from __future__ import annotations
+
+import html
+import io
+import re
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import shared_path
+
+import heat_igl
+from heat_igl import shapes
+from heat_igl.plots import Page, page, write_html
+from heat_igl.scene import LINE_INK, UNREACHABLE, colours
+
+read_image = pytest.importorskip("matplotlib.image").imread
+
+
+def square(n: int = 20) -> tuple[heat_igl.Mesh, np.ndarray]:
+    """The unit square and the distance from its left side."""
+    mesh = shapes.grid(n)
+    V = (mesh.V - mesh.V.min(axis=0)) / np.ptp(mesh.V[:, 0])
+    return heat_igl.Mesh(V, mesh.F), V[:, 0]
+
+
+def sphere() -> tuple[heat_igl.Mesh, int, int, np.ndarray]:
+    """The unit sphere, its vertices nearest and farthest to the viewer, and the distance from the nearest."""
+    mesh = shapes.icosphere(4)
+    front, back = int(np.argmax(mesh.V[:, 2])), int(np.argmin(mesh.V[:, 2]))
+    return mesh, front, back, np.arccos(np.clip(mesh.V @ mesh.V[front], -1, 1))
+
+
+# ---- the file
+
+
+def test_the_file_is_complete_and_loads_nothing() -> None:
+    mesh, x = square()
+    text = page(mesh, x).html
+    assert not re.findall(r"https?:|//cdn|@import|\bimport\s*\(|\bfetch\s*\(|XMLHttpRequest", text)
+    assert set(re.findall(r"\b(?:src|href)=\"([^\"]*)\"", text)) == {"data:,"}
+    assert "default-src 'none'" in text
+
+
+def test_the_same_input_gives_the_same_bytes(tmp_path: Path) -> None:
+    mesh, x = square()
+    for name in ("a.html", "b.htm"):
+        write_html(tmp_path / name, mesh, x, sources=[0])
+    assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.htm").read_bytes()
+
+
+def test_titles_and_labels_cannot_become_markup() -> None:
+    mesh, x = square(3)
+    text = page(mesh, x, title="</title><i>&", label="</script><!--<script>", method="<b>").html
+    assert "<title>&lt;/title&gt;&lt;i&gt;&amp;</title>" in text
+    assert text.count("<script") == text.count("</script>") == 3
+    assert "<b>" not in text
+
+
+def test_a_notebook_gets_the_page_in_a_frame() -> None:
+    mesh, x = square(3)
+    shown = page(mesh, x, title='"quoted"')
+    frame = re.fullmatch(
+        r'<iframe srcdoc="([^"]*)" sandbox="allow-scripts" style="[^"]*"></iframe>', shown._repr_html_()
+    )
+    assert frame
+    assert html.unescape(frame[1]) == shown.html
+
+
+def test_what_cannot_be_shown_is_rejected_by_name(tmp_path: Path) -> None:
+    mesh, x = square(4)
+    page(mesh, x)
+    with pytest.raises(ValueError, match=r"distance must have shape \(25,\)"):
+        page(mesh, x[1:])
+    with pytest.raises(ValueError, match="style must be one of 'lines', 'stripes', 'plain', not 'dots'"):
+        page(mesh, x, style="dots")  # type: ignore[arg-type]
+    with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 25"):
+        page(mesh, x, sources=25)
+    with pytest.raises(ValueError, match=r"a\.png must end in \.html to be a page"):
+        write_html(tmp_path / "a.png", mesh, x)
+
+
+# ---- the browser
+
+
+class Browser:
+    """A page in headless Chromium, in the browser's own pixels."""
+
+    def __init__(self, driver: Any, folder: Path) -> None:
+        self.driver, self._folder = driver, folder
+
+    def open(self, shown: Page) -> None:
+        shown.save(self._folder / "page.html")
+        self.driver.get((self._folder / "page.html").as_uri())
+        self.wait(lambda: self.run("return !!window.heatIgl"))
+        box = self.run("const b = document.getElementById('surface').getBoundingClientRect(); return [b.x, b.y]")
+        self.corner = np.array(box)
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        return self.driver.execute_script(script, *arguments)
+
+    def wait(self, happened: Callable[[], bool]) -> None:
+        end = time.monotonic() + 10
+        while not happened():
+            assert time.monotonic() < end, "the page does not answer"
+            time.sleep(0.02)
+
+    def text(self, identity: str) -> str:
+        return str(self.run("return document.getElementById(arguments[0]).textContent", identity))
+
+    def image(self) -> np.ndarray:
+        """The canvas as it is on the screen, (rows, columns, 3), after the next frame."""
+        self.driver.execute_async_script("const done = arguments[0]; requestAnimationFrame(() => setTimeout(done, 60))")
+        canvas = self.driver.find_element("id", "surface")
+        return np.asarray(read_image(io.BytesIO(canvas.screenshot_as_png)))[..., :3]
+
+    def on_canvas(self, vertex: int) -> np.ndarray:
+        return np.array(self.run("return window.heatIgl.onCanvas(arguments[0])", vertex))
+
+    def distance(self) -> np.ndarray:
+        # JSON has no infinity.
+        values = self.run("return window.heatIgl.distance()")
+        return np.array([np.inf if value is None else value for value in values])
+
+    def sources(self) -> list[int]:
+        return list(self.run("return window.heatIgl.sources()"))
+
+    def mouse(self, kind: str, at: np.ndarray, buttons: int = 1, modifiers: int = 0) -> None:
+        x, y = (self.corner + at[:2]).tolist()
+        options = {"type": kind, "x": x, "y": y, "modifiers": modifiers, "buttons": buttons, "clickCount": 1}
+        button = "left" if buttons or kind == "mouseReleased" else "none"
+        self.driver.execute_cdp_cmd("Input.dispatchMouseEvent", {**options, "button": button})
+
+    def click(self, at: np.ndarray, modifiers: int = 0) -> None:
+        self.mouse("mousePressed", at, modifiers=modifiers)
+        self.mouse("mouseReleased", at, buttons=0, modifiers=modifiers)
+
+    def drag(self, start: np.ndarray, end: np.ndarray, modifiers: int = 0) -> None:
+        self.mouse("mousePressed", start, modifiers=modifiers)
+        for share in np.linspace(0.1, 1, 10):
+            self.mouse("mouseMoved", start + share * (end - start), modifiers=modifiers)
+        self.mouse("mouseReleased", end, buttons=0, modifiers=modifiers)
+
+    def touch(self, kind: str, *fingers: np.ndarray) -> None:
+        points = [
+            {"x": float(x), "y": float(y), "id": i} for i, (x, y) in enumerate(self.corner + f[:2] for f in fingers)
+        ]
+        self.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+    binary, driver = shutil.which("chromium") or shutil.which("google-chrome"), shutil.which("chromedriver")
+    if binary is None or driver is None:
+        pytest.skip("no chromium with chromedriver on this machine")
+    options = webdriver.ChromeOptions()
+    options.binary_location = binary
+    # WebGL in software, so that no graphics card is needed; no sandbox, which root may not have.
+    for (
+        argument
+    ) in "headless=new no-sandbox use-angle=swiftshader enable-unsafe-swiftshader window-size=560,560".split():
+        options.add_argument(f"--{argument}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    try:
+        started = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    except Exception as error:
+        pytest.skip(f"chromium does not start: {str(error).splitlines()[0]}")
+    try:
+        yield Browser(started, tmp_path_factory.mktemp("pages"))
+    finally:
+        started.quit()
+
+
+@pytest.fixture
+def browser(chromium: Browser) -> Iterator[Browser]:
+    """The browser; what a page wrote to the console fails the test."""
+    yield chromium
+    assert chromium.driver.get_log("browser") == []
+
+
+def colour_at(image: np.ndarray, at: np.ndarray) -> np.ndarray:
+    return image[int(at[1]), int(at[0])]
+
+
+def test_colours_are_those_of_the_colour_bar(browser: Browser) -> None:
+    mesh, x = square()
+    browser.open(page(mesh, x, style="plain"))
+    image = browser.image()
+    for vertex in (5 * 21 + 3, 10 * 21 + 10, 15 * 21 + 18):
+        expected = colours("viridis_r")(x[vertex])[:3]
+        np.testing.assert_allclose(colour_at(image, browser.on_canvas(vertex)), expected, atol=0.02)
+    assert colour_at(image, np.array([3, 3])).tolist() == [1, 1, 1]
+    ticks = browser.run("return [...document.querySelectorAll('#ticks span')].map((s) => [s.textContent, s.style.top])")
+    assert all(float(top.rstrip("%")) == pytest.approx(100 * (1 - float(text)), abs=1e-3) for text, top in ticks)
+    assert len(ticks) >= 4
+    assert browser.text("label") == "distance, in the mesh's unit"
+
+
+def test_isolines_and_stripes_lie_at_the_levels(browser: Browser) -> None:
+    """Distance x on a square seen face on: dark columns at multiples of the spacing and nowhere else."""
+    mesh, x = square()
+    rows = {}
+    for style in ("plain", "lines", "stripes"):
+        browser.open(page(mesh, x, style=style, spacing=0.25))  # type: ignore[arg-type]
+        image = browser.image()
+        rows[style] = image[image.shape[0] // 2]
+    left, right = browser.on_canvas(0)[0], browser.on_canvas(20)[0]
+    columns = np.arange(int(left) + 3, int(right) - 3)
+    level = (columns + 0.5 - left) / (right - left) / 0.25
+    away = np.abs(level - np.rint(level)) * 0.25 * (right - left)
+    line = rows["lines"][columns].sum(axis=1) / rows["plain"][columns].sum(axis=1)
+    np.testing.assert_allclose(line[away > 2.5], 1, atol=0.02)
+    assert ((1 - line).sum() / LINE_INK) == pytest.approx(3 * 1.3, rel=0.3)
+    stripe = rows["stripes"][columns] - rows["plain"][columns]
+    odd = np.floor(level) % 2 == 1
+    assert np.abs(stripe[~odd & (away > 2)]).max() < 0.02
+    expected = 0.5 * (1 - rows["plain"][columns])
+    np.testing.assert_allclose(stripe[odd & (away > 2)], expected[odd & (away > 2)], atol=0.02)
+
+
+def test_what_is_not_reached_is_grey(browser: Browser) -> None:
+    mesh, x = square()
+    both = heat_igl.Mesh(
+        np.concatenate([mesh.V, mesh.V + np.array([1.5, 0, 0])]), np.concatenate([mesh.F, mesh.F + mesh.n_vertices])
+    )
+    browser.open(page(both, np.concatenate([x, np.full_like(x, np.inf)])))
+    middle = 10 * 21 + 10
+    other = middle + mesh.n_vertices
+    np.testing.assert_allclose(colour_at(browser.image(), browser.on_canvas(other)), UNREACHABLE, atol=0.02)
+    browser.click(browser.on_canvas(other))
+    assert browser.sources() == [other]
+    assert np.isinf(browser.distance()[: mesh.n_vertices]).all()
+    np.testing.assert_allclose(colour_at(browser.image(), browser.on_canvas(middle)), UNREACHABLE, atol=0.02)
+
+
+def test_a_drag_turns_the_surface_with_the_hand(browser: Browser) -> None:
+    mesh, front, _, distance = sphere()
+    browser.open(page(mesh, distance, sources=front, view=(0, 0)))
+    before, image = browser.on_canvas(front), browser.image()
+    browser.drag(before, before + np.array([100, 0, 0]))
+    after = browser.on_canvas(front)
+    radius = (browser.on_canvas(int(np.argmax(mesh.V[:, 1])))[1] - before[1]) / -1
+    assert after[0] - before[0] == pytest.approx(radius * np.sin(0.008 * 100), rel=0.05)
+    assert after[1] == pytest.approx(before[1], abs=1)
+    assert after[2] == pytest.approx(np.cos(0.008 * 100), abs=0.05)
+    assert (np.abs(browser.image() - image).max(axis=2) > 0.1).mean() > 0.05
+    assert browser.sources() == [front]  # a drag is no click
+
+
+def test_the_wheel_zooms_about_the_pointer_and_shift_moves(browser: Browser) -> None:
+    mesh, x = square()
+    browser.open(page(mesh, x))
+    fixed, other = 5 * 21 + 5, 15 * 21 + 15
+    at, before = browser.on_canvas(fixed), browser.on_canvas(other)
+    position = (browser.corner + at[:2]).tolist()
+    wheel = {"type": "mouseWheel", "x": position[0], "y": position[1], "deltaX": 0, "deltaY": -200}
+    browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", wheel)
+    browser.wait(lambda: bool(np.abs(browser.on_canvas(other) - before).max() > 1))
+    # The browser takes whole pixels of the pointer.
+    np.testing.assert_allclose(browser.on_canvas(fixed)[:2], at[:2], atol=1.5)
+    np.testing.assert_allclose((browser.on_canvas(other) - at)[:2], np.exp(0.3) * (before - at)[:2], rtol=0.02)
+    start = browser.on_canvas(other)
+    browser.drag(at, at + np.array([30, 20, 0]), modifiers=8)
+    np.testing.assert_allclose(browser.on_canvas(other)[:2] - start[:2], [30, 20], atol=5)
+
+
+def test_a_click_moves_the_source_and_the_distance_follows(browser: Browser, bunny: heat_igl.Mesh) -> None:
+    pytest.importorskip("numba")
+    browser.open(page(bunny, np.zeros(bunny.n_vertices), method="nothing yet"))
+    assert browser.text("method") == "nothing yet"
+    image = browser.image()
+    height, width = image.shape[:2]
+    browser.click(np.array([0.5 * width, 0.6 * height]))
+    (source,) = browser.sources()
+    np.testing.assert_allclose(browser.on_canvas(source)[:2], [0.5 * width, 0.6 * height], atol=6)
+    assert browser.text("readout").startswith(f"vertex {source} at (")
+    assert browser.text("readout").endswith("): 0")
+    assert "sweep" in browser.text("method")
+    assert (np.abs(browser.image() - image).max(axis=2) > 0.1).mean() > 0.1
+    sweep = heat_igl.HeatMethodSolver(bunny, refine="sweep")
+    np.testing.assert_allclose(browser.distance(), sweep.distance(source), rtol=1e-4)
+
+    browser.click(np.array([0.4 * width, 0.5 * height]), modifiers=8)
+    both = browser.sources()
+    assert both[0] == source
+    assert len(both) == 2
+    np.testing.assert_allclose(browser.distance(), sweep.distance(both), rtol=1e-4)
+    browser.mouse("mouseMoved", browser.on_canvas(source) + np.array([0, -40, 0]), buttons=0)
+    browser.wait(lambda: f"vertex {both[1]} " not in browser.text("readout"))
+    vertex, value = re.fullmatch(r"vertex (\d+) at \(.*\): (\S+)", browser.text("readout")).groups()  # type: ignore[union-attr]
+    assert float(value) == pytest.approx(browser.distance()[int(vertex)], rel=1e-5)
+
+    browser.driver.find_element("id", "reset").click()
+    assert browser.sources() == []
+    assert browser.distance().max() == 0
+
+
+def test_the_distance_in_the_page_is_exact_where_it_is_flat(browser: Browser) -> None:
+    mesh = shapes.grid(20)
+    browser.open(page(mesh, np.zeros(mesh.n_vertices)))
+    browser.run("window.heatIgl.setSources([45])")
+    straight = np.linalg.norm(mesh.V - mesh.V[45], axis=1)
+    np.testing.assert_allclose(browser.distance(), straight, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["teapot.obj", "truck.obj", "camelhead.off"])
+def test_bad_meshes_agree_with_python_too(browser: Browser, name: str) -> None:
+    """More than two faces at an edge, slivers, pieces."""
+    pytest.importorskip("numba")
+    mesh = heat_igl.read_mesh(shared_path(name))
+    browser.open(page(mesh, np.zeros(mesh.n_vertices)))
+    browser.run("window.heatIgl.setSources([7])")
+    expected = heat_igl.HeatMethodSolver(mesh, refine="sweep").distance(7)
+    np.testing.assert_allclose(
+        browser.distance(), expected, rtol=2e-4, atol=1e-6 * expected[np.isfinite(expected)].max()
+    )
+
+
+def test_what_is_behind_is_not_picked(browser: Browser) -> None:
+    mesh, front, back, distance = sphere()
+    browser.open(page(mesh, distance, view=(0, 0)))
+    np.testing.assert_allclose(browser.on_canvas(front)[:2], browser.on_canvas(back)[:2], atol=1e-3)
+    browser.click(browser.on_canvas(back))
+    assert browser.sources() == [front]
+    browser.click(np.array([3.0, 3.0]))  # beside the surface
+    assert browser.sources() == [front]
+
+
+def test_fingers_pick_and_zoom(browser: Browser) -> None:
+    mesh, front, _, distance = sphere()
+    browser.open(page(mesh, distance, view=(0, 0)))
+    at = browser.on_canvas(front)
+    browser.touch("touchStart", at)
+    browser.touch("touchEnd")
+    browser.wait(lambda: browser.sources() == [front])
+    top = int(np.argmax(mesh.V[:, 1]))
+    before = browser.on_canvas(top)[1] - at[1]
+    apart = np.array([40.0, 0, 0])
+    browser.touch("touchStart", at - apart, at + apart)
+    for step in np.linspace(1.1, 2.0, 10):
+        browser.touch("touchMove", at - step * apart, at + step * apart)
+    browser.touch("touchEnd")
+    assert browser.on_canvas(top)[1] - browser.on_canvas(front)[1] == pytest.approx(2 * before, rel=0.1)
+
+
+def test_a_click_on_tetrahedra_reads_only(browser: Browser) -> None:
+    box = shapes.box(3)
+    distance = np.linalg.norm(box.V - box.V[0], axis=1)
+    browser.open(page(box, distance, sources=0))
+    corner = int(
+        np.argmax(
+            browser.run("return [...Array(arguments[0]).keys()].map((v) => window.heatIgl.onCanvas(v)[2])", len(box.V))
+        )
+    )
+    browser.click(browser.on_canvas(corner))
+    assert browser.sources() == [0]
+    readout = browser.text("readout")
+    assert readout.startswith(f"vertex {corner} ")
+    assert float(readout.split()[-1]) == pytest.approx(distance[corner], rel=1e-5)
+    assert not browser.driver.find_element("id", "pick-label").is_displayed()
+
+
+def test_a_page_that_fails_says_so_in_the_console(browser: Browser) -> None:
+    """The fixture's check for errors finds them."""
+    mesh, x = square(3)
+    broken = page(mesh, x).html.replace(
+        "const SURFACE_VERTEX = `#version 300 es", "const SURFACE_VERTEX = `#version 99 es"
+    )
+    Page(broken).save(browser._folder / "broken.html")
+    browser.driver.get((browser._folder / "broken.html").as_uri())
+    found: list[Any] = []
+    browser.wait(lambda: bool(found.extend(browser.driver.get_log("browser")) or found))

@@ -1,0 +1,234 @@
+"""Polygon meshes: the identities of their operators, libigl's matrices, and how far off the distances are."""
+
+from __future__ import annotations
+
+import pickle
+
+import igl
+import numpy as np
+import pytest
+from conftest import shared_path
+
+import heat_igl
+from heat_igl import shapes
+from heat_igl.metrics import relative_error
+from heat_igl.polygons import PolygonMesh, polygon_operators, triangle_fans
+
+
+def quads(n: int) -> PolygonMesh:
+    """The unit square with n by n cells, inner vertices moved: no symmetry is left, and no quad planar."""
+    rng = np.random.default_rng(5)
+    y, x = np.divmod(np.arange((n + 1) ** 2), n + 1)
+    V = np.stack([x / n, y / n, np.zeros(len(x))], axis=1)
+    inner = (x % n != 0) & (y % n != 0)
+    V[inner, :2] += rng.uniform(-0.2, 0.2, (inner.sum(), 2)) / n
+    row, column = np.divmod(np.arange(n * n), n)
+    first = row * (n + 1) + column
+    return PolygonMesh(V, np.stack([first, first + 1, first + n + 2, first + n + 1], axis=1))
+
+
+def dual_of_sphere(subdivisions: int) -> PolygonMesh:
+    """Hexagons and twelve pentagons, their vertices on the unit sphere."""
+    sphere = shapes.icosphere(subdivisions)
+    V = sphere.V[sphere.F].mean(axis=1)
+    following = {}
+    for f, (a, b, c) in enumerate(sphere.F.tolist()):
+        following |= {(a, b): (f, c), (b, c): (f, a), (c, a): (f, b)}
+    neighbour = dict(following.keys())
+    polygons = []
+    for v in range(sphere.n_vertices):
+        polygon, there = [], neighbour[v]
+        while not polygon or there != neighbour[v]:
+            face, there = following[v, there]
+            polygon.append(face)
+        polygons.append(polygon)
+    return PolygonMesh(V / np.linalg.norm(V, axis=1, keepdims=True), polygons)
+
+
+SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+MIXED = PolygonMesh(
+    [[0, 0, 0], [1, 0, 0.1], [2, 0, 0], [2, 1, 0.2], [1, 1, 0], [0, 1, 0], [1, 2, 0.3], [0, 2, 0], [3, 3, 3]],
+    [[0, 1, 4, 5], [1, 2, 3, 4], [4, 3, 6], [5, 4, 6, 7]],
+)
+
+
+@pytest.mark.parametrize("mesh", [MIXED, quads(6), dual_of_sphere(2)], ids=["mixed", "quads", "hexagons"])
+def test_identities(mesh):
+    domain = polygon_operators(mesh)
+    assert abs(domain.D @ domain.G - domain.L).max() < 1e-12 * abs(domain.L).max()
+    assert abs(domain.L - domain.L.T).max() < 1e-12 * abs(domain.L).max()
+    assert np.abs(domain.L @ np.ones(domain.n)).max() < 1e-12 * abs(domain.L).max()
+    assert domain.M.diagonal().sum() == pytest.approx(domain.weights.sum(), rel=1e-12)
+    assert np.linalg.eigvalsh(domain.L.toarray()).max() < 1e-10
+    # Positions are linear functions: their gradients are the tangential parts of the axes.
+    gradient = (domain.G @ mesh.V).reshape(3, -1, 3)
+    assert np.trace(gradient.transpose(1, 0, 2), axis1=1, axis2=2) == pytest.approx(2)
+    np.testing.assert_allclose(gradient, gradient.transpose(2, 1, 0), atol=1e-10)
+
+
+def test_area_and_boundary():
+    domain = polygon_operators(quads(8))
+    assert domain.M.diagonal().sum() == pytest.approx(1, rel=1e-12)
+    assert domain.boundary.sum() == 32
+    mixed = polygon_operators(MIXED)
+    assert np.flatnonzero(~mixed.boundary).tolist() == [4, 8]
+    assert np.flatnonzero(~mixed.referenced).tolist() == [8]
+    assert mixed.components[8] != mixed.components[0]
+
+
+def test_linear_precision_on_a_flat_domain():
+    """L of a linear function vanishes inside, so its Dirichlet energy is area times slope squared."""
+    mesh = quads(8)
+    domain = polygon_operators(mesh)
+    linear = mesh.V @ [2.0, -3.0, 0.0]
+    assert np.abs((domain.L @ linear)[~domain.boundary]).max() < 1e-12
+    assert -linear @ domain.L @ linear == pytest.approx(13, rel=1e-12)
+
+
+def test_triangles_are_polygons_too(cow):
+    """On triangles the virtual vertex changes nothing: L is the cotangent Laplacian."""
+    domain = polygon_operators(PolygonMesh(cow.V, cow.F))
+    L = igl.cotmatrix(cow.V, cow.F)
+    assert abs(domain.L - L).max() < 1e-9 * abs(L).max()
+    assert domain.mean_edge_length == pytest.approx(cow.edge_lengths.mean(), rel=1e-12)
+
+
+@pytest.mark.parametrize("unit", [1e-20, 1e20])
+def test_the_unit_of_length_plays_no_part(unit):
+    mesh = quads(6)
+    distance = heat_igl.HeatMethodSolver.from_operators(polygon_operators(mesh)).distance(3)
+    scaled = polygon_operators(PolygonMesh(mesh.V * unit, mesh.polygons))
+    np.testing.assert_allclose(heat_igl.HeatMethodSolver.from_operators(scaled).distance(3) / unit, distance, rtol=1e-9)
+
+
+def test_distance_in_the_plane_converges():
+    errors = []
+    for n in (16, 32, 64):
+        mesh = quads(n)
+        source = (n // 2) * (n + 2)
+        solver = heat_igl.HeatMethodSolver.from_operators(polygon_operators(mesh))
+        exact = np.linalg.norm(mesh.V - mesh.V[source], axis=1)
+        errors.append(np.abs(solver.distance(source) - exact).mean())
+    assert errors[2] < 0.003
+    assert errors[1] < 0.65 * errors[0]
+    assert errors[2] < 0.65 * errors[1]
+
+
+def test_distance_on_hexagons_of_a_sphere():
+    """Regular meshes keep an error of direction, as triangles do: it falls to one percent, and there it stays."""
+    errors = []
+    for subdivisions in (2, 3, 4):
+        mesh = dual_of_sphere(subdivisions)
+        solver = heat_igl.HeatMethodSolver.from_operators(polygon_operators(mesh))
+        exact = np.arccos(np.clip(mesh.V @ mesh.V[0], -1, 1))
+        errors.append(np.abs(solver.distance(0) - exact).mean())
+    assert errors[2] < errors[1] < 0.6 * errors[0]
+    assert errors[2] < 0.012 * np.pi / 2
+
+
+def test_time_step_goes_by_what_a_polygon_couples():
+    """Two unit squares: seven sides of length 1 and four diagonals."""
+    V = [*SQUARE, [2, 0, 0], [2, 1, 0]]
+    domain = polygon_operators(PolygonMesh(V, [[0, 1, 2, 3], [1, 4, 5, 2]]))
+    assert domain.mean_edge_length == pytest.approx((7 + 4 * np.sqrt(2)) / 11, rel=1e-12)
+
+
+def test_quads_against_their_triangulation():
+    """The target on a real mesh: at most 1.2 times the error of the mesh cut into triangles, exact as reference."""
+    path = shared_path("horse_quads.obj")
+    pytest.importorskip("pygeodesic")
+    mesh = heat_igl.read_polygon_mesh(path)
+    triangles = heat_igl.read_mesh(path)
+    assert np.array_equal(mesh.triangles.F, triangles.F)
+    by_polygons = heat_igl.HeatMethodSolver.from_operators(polygon_operators(mesh))
+    by_triangles = heat_igl.HeatMethodSolver(triangles)
+    solvers = (by_polygons, by_triangles)
+    ratios = []
+    for source in (0, 800, 1600):
+        exact = heat_igl.reference.exact(triangles, source)
+        ours, theirs = (np.nanmean(relative_error(solver.distance(source), exact)) for solver in solvers)
+        ratios.append(ours / theirs)
+    assert np.mean(ratios) < 1.2
+
+
+def test_refinement_is_refused():
+    with pytest.raises(
+        ValueError, match="refine='sweep' unfolds triangles by their edge lengths, and this domain has none"
+    ):
+        heat_igl.HeatMethodSolver.from_operators(polygon_operators(MIXED), refine="sweep")
+
+
+def test_fans_and_pickles():
+    assert triangle_fans(MIXED.corners, MIXED.degree).tolist() == [
+        [0, 1, 4], [0, 4, 5], [1, 2, 3], [1, 3, 4], [4, 3, 6], [5, 4, 6], [5, 6, 7],
+    ]  # fmt: skip
+    again = pickle.loads(pickle.dumps(MIXED))
+    assert [p.tolist() for p in again.polygons] == [p.tolist() for p in MIXED.polygons]
+    assert np.array_equal(again.V, MIXED.V)
+    assert repr(again) == "PolygonMesh(9 vertices, 4 polygons)"
+
+
+@pytest.mark.parametrize(
+    ("polygons", "message"),
+    [
+        ([], "polygons is empty"),
+        ([[0, 1, 2, 3], [0, 1]], r"polygons\[1\] = \[0, 1\] needs three corners or more \(1 of 2"),
+        ([[0, 1, 2, 4]], r"polygons\[0\] = \[0, 1, 2, 4\] holds 4, which is no vertex"),
+        ([[1, 2, 3, 4]], "the indices look 1-based"),
+        ([[0, 1, 2], [0, 1, 2, 1]], r"polygons\[1\] = \[0, 1, 2, 1\] repeats a vertex"),
+        ([[0, 1, 2.5]], r"polygons\[0\] must be a sequence of vertex indices"),
+        ([[0, 1, 2], 7], r"polygons\[1\] must be a sequence of vertex indices"),
+        (7, "polygons is empty"),
+    ],
+)
+def test_wrong_polygons_are_refused(polygons, message):
+    with pytest.raises(heat_igl.MeshError, match=message):
+        PolygonMesh(SQUARE, polygons)
+    assert PolygonMesh(SQUARE, [[0, 1, 2, 3]]).n_faces == 1
+
+
+def test_wrong_positions_are_refused():
+    with pytest.raises(heat_igl.MeshError, match=r"V\[1, 2\] is nan"):
+        PolygonMesh([[0, 0, 0], [1, 0, np.nan], [1, 1, 0]], [[0, 1, 2]])
+
+
+def test_flat_polygons_are_refused():
+    V = [*SQUARE, [0.5, 0, 0], [2, 0, 0]]
+    with pytest.raises(heat_igl.MeshError, match=r"polygons\[1\] = \[0, 4, 1, 5\] has no area"):
+        polygon_operators(PolygonMesh(V, [[0, 1, 2, 3], [0, 4, 1, 5]]))
+
+
+def test_a_corner_on_a_straight_side_is_fine():
+    """Where two small neighbours meet a large polygon."""
+    mesh = PolygonMesh([*SQUARE, [0.5, 0, 0], [0.5, -0.5, 0], [0, -0.5, 0], [1, -0.5, 0]],
+                       [[0, 4, 1, 2, 3], [0, 6, 5, 4], [4, 5, 7, 1]])  # fmt: skip
+    domain = polygon_operators(mesh)
+    assert domain.weights.sum() == pytest.approx(1.5, rel=1e-12)
+    assert np.flatnonzero(~domain.boundary).tolist() == [4]
+
+
+def test_polygons_are_read_from_files(tmp_path):
+    off, obj, ply = tmp_path / "a.off", tmp_path / "a.obj", tmp_path / "a.ply"
+    rows = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in MIXED.V.tolist())
+    counted = "".join(f"{len(p)} {' '.join(map(str, p.tolist()))}\n" for p in MIXED.polygons)
+    off.write_text(f"OFF\n9 4 0\n{rows}{counted}")
+    obj.write_text(
+        "".join(f"v {row}\n" for row in rows.splitlines())
+        + "".join(f"f {' '.join(str(v + 1) for v in p)}\n" for p in MIXED.polygons)
+    )
+    ply.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 9\nproperty double x\nproperty double y\nproperty double z\n"
+        f"element face 4\nproperty list uchar int vertex_indices\nend_header\n{rows}{counted}"
+    )
+    for path in (off, obj, ply):
+        found = heat_igl.read_polygon_mesh(path)
+        assert np.array_equal(found.V, MIXED.V)
+        assert [p.tolist() for p in found.polygons] == [p.tolist() for p in MIXED.polygons]
+        assert np.array_equal(heat_igl.read_mesh(path).F, found.triangles.F)
+
+
+def test_tetrahedra_are_no_polygons(tmp_path):
+    path = tmp_path / "box.mesh"
+    heat_igl.write_mesh(path, shapes.box(1))
+    with pytest.raises(heat_igl.MeshError, match="the file holds tetrahedra, not polygons"):
+        heat_igl.read_polygon_mesh(path)

@@ -1,0 +1,268 @@
+"""Farthest points, Voronoi cells and their dual, centres, diameters, matrices: against closed forms and definitions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+
+import heat_igl
+from heat_igl import shapes
+from heat_igl.mesh import Mesh
+
+
+@pytest.fixture(scope="module")
+def square() -> tuple[Mesh, heat_igl.HeatMethodSolver]:
+    """A flat square, where the sweep is exact."""
+    mesh = shapes.grid(20)
+    return mesh, heat_igl.HeatMethodSolver(mesh, refine="sweep")
+
+
+def two_spheres() -> Mesh:
+    """Two spheres and a vertex that no face uses."""
+    sphere = shapes.icosphere(2)
+    n = sphere.n_vertices
+    return Mesh(np.concatenate([sphere.V, sphere.V + 5, np.ones((1, 3))]), np.concatenate([sphere.F, sphere.F + n]))
+
+
+def test_farthest_points_of_a_square_are_its_corners_then_its_centre(square):
+    mesh, solver = square
+    points = heat_igl.farthest_points(solver, 5)
+    assert mesh.V[points[1], :2].tolist() == [1, 1]
+    assert {tuple(p) for p in mesh.V[points[:4], :2]} == {(0, 0), (1, 1), (1, 0), (0, 1)}
+    assert mesh.V[points[4], :2].tolist() == [0.5, 0.5]
+
+
+def test_every_point_is_the_farthest_from_those_before(square):
+    mesh, solver = square
+    points = heat_igl.farthest_points(solver, 40, start=37)
+    assert points[0] == 37
+    for j in range(1, 40):
+        to_earlier = np.linalg.norm(mesh.V[:, None] - mesh.V[points[:j]], axis=2).min(axis=1)
+        assert to_earlier[points[j]] == pytest.approx(to_earlier.max(), rel=1e-9)
+
+
+def test_farthest_points_by_heat_are_spread_and_repeatable(bunny):
+    solver = heat_igl.HeatMethodSolver(bunny)
+    points = heat_igl.farthest_points(solver, 60)
+    assert np.array_equal(points, heat_igl.farthest_points(solver, 60))
+    assert np.array_equal(points[:20], heat_igl.farthest_points(solver, 20))
+    matrix = heat_igl.distance_matrix(solver, points)
+    # The last point's distance from the others is no less than anybody's from all points.
+    covered = solver.distances([[int(p)] for p in points]).min(axis=0).max()
+    np.fill_diagonal(matrix, np.inf)
+    assert matrix.min() > 0.95 * covered
+    assert matrix.min() > bunny.edge_lengths.mean() / 2
+
+
+def test_all_vertices_can_be_sampled():
+    mesh = shapes.icosphere(1)
+    points = heat_igl.farthest_points(heat_igl.HeatMethodSolver(mesh), mesh.n_vertices)
+    assert np.array_equal(np.sort(points), np.arange(mesh.n_vertices))
+
+
+def test_every_component_gets_a_point_first_and_loose_vertices_none():
+    mesh = two_spheres()
+    solver = heat_igl.HeatMethodSolver(mesh)
+    points = heat_igl.farthest_points(solver, mesh.n_vertices - 1)
+    assert mesh.components[points[0]] != mesh.components[points[1]]
+    assert mesh.n_vertices - 1 not in points
+    with pytest.raises(ValueError, match="k must be an integer from 1"):
+        heat_igl.farthest_points(solver, mesh.n_vertices)
+
+
+def test_several_starting_points_come_first(square):
+    _, solver = square
+    points = heat_igl.farthest_points(solver, 4, start=[20, 0])
+    assert points[:2].tolist() == [0, 20]
+    with pytest.raises(ValueError, match="k must be an integer from 2"):
+        heat_igl.farthest_points(solver, 1, start=[20, 0])
+
+
+@pytest.mark.parametrize("k", [0, -1, 2.0, True, 442])
+def test_a_wrong_number_of_points_is_refused(square, k):
+    with pytest.raises(ValueError, match="k must be an integer from 1, the vertices to start from, to 441"):
+        heat_igl.farthest_points(square[1], k)
+
+
+def test_cells_are_those_of_the_nearest_site(square):
+    mesh, solver = square
+    sites = np.array([400, 3, 225, 77])
+    cells = heat_igl.voronoi_cells(solver, sites)
+    euclidean = np.linalg.norm(mesh.V[:, None] - mesh.V[sites], axis=2)
+    ordered = np.sort(euclidean, axis=1)
+    clear = ordered[:, 1] - ordered[:, 0] > 1e-9
+    assert np.array_equal(cells.labels[clear], euclidean.argmin(axis=1)[clear])
+    np.testing.assert_allclose(cells.distance, ordered[:, 0], atol=1e-9)
+
+
+def test_cells_come_with_the_sampling():
+    mesh = two_spheres()
+    solver = heat_igl.HeatMethodSolver(mesh)
+    cells = heat_igl.farthest_cells(solver, 30)
+    again = heat_igl.voronoi_cells(solver, cells.sites)
+    assert np.array_equal(cells.sites, heat_igl.farthest_points(solver, 30))
+    assert (cells.labels == again.labels).mean() > 0.99  # blocks of right-hand sides round differently
+    np.testing.assert_allclose(cells.distance, again.distance, rtol=1e-9)
+    assert cells.labels[-1] == -1
+    assert cells.distance[-1] == np.inf
+    assert np.array_equal(cells.labels[cells.sites], np.arange(30))
+
+
+@pytest.mark.parametrize("sites", [[], [1, 1], [500], [0.5]])
+def test_wrong_sites_are_refused(square, sites):
+    with pytest.raises(heat_igl.SourceError, match="sites"):
+        heat_igl.voronoi_cells(square[1], sites)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "k"), [(shapes.icosphere(4), 60), (shapes.torus(40, 100), 150), (shapes.cylinder(60, 60), 120)]
+)
+def test_dual_has_the_topology_of_the_mesh(mesh, k):
+    cells = heat_igl.farthest_cells(heat_igl.HeatMethodSolver(mesh), k)
+    dual = heat_igl.dual_triangulation(mesh, cells)
+    report, original = dual.report(), mesh.report()
+    assert dual.n_vertices == k
+    assert report.euler_characteristic == original.euler_characteristic
+    assert report.n_boundary_loops == original.n_boundary_loops
+    assert not len(report.nonmanifold_edges)
+    assert not len(report.nonmanifold_vertices)
+
+
+def test_dual_is_oriented_like_the_mesh():
+    mesh = shapes.icosphere(4)
+    cells = heat_igl.farthest_cells(heat_igl.HeatMethodSolver(mesh), 60)
+    a, b, c = np.moveaxis(heat_igl.dual_triangulation(mesh, cells).V[heat_igl.dual_triangulation(mesh, cells).F], 1, 0)
+    assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a + b + c) > 0).all()
+
+
+def test_dual_in_the_plane_is_the_delaunay_triangulation():
+    """Cells known exactly; but for slivers along the hull, whose circumcentre, where cells would meet, lies outside."""
+    mesh = shapes.grid(150)
+    sites = np.random.default_rng(11).choice(mesh.n_vertices, 12, replace=False)
+    euclidean = np.linalg.norm(mesh.V[:, None] - mesh.V[sites], axis=2)
+    cells = heat_igl.VoronoiCells(sites, euclidean.argmin(axis=1), euclidean.min(axis=1))
+    faces = np.sort(Delaunay(mesh.V[sites, :2]).simplices, axis=1)
+    corner = mesh.V[sites][faces][..., :2]
+    squares = (corner**2).sum(axis=2)
+    centre = np.linalg.solve(2 * (corner[:, 1:] - corner[:, :1]), (squares[:, 1:] - squares[:, :1])[..., None])
+    centre = centre[..., 0]
+    # Two triangles whose cells meet closer than the mesh resolves could be cut along the other diagonal.
+    apart = np.linalg.norm(centre[:, None] - centre, axis=2) + np.eye(len(faces))
+    assert apart.min() > 3 / 150
+    inside = ((centre > 0) & (centre < 1)).all(axis=1)
+    found = heat_igl.dual_triangulation(mesh, cells).F
+    assert {tuple(sorted(face)) for face in found.tolist()} == {tuple(face) for face in faces[inside].tolist()}
+
+
+def test_islands_and_zigzag_borders_leave_the_dual_alone():
+    mesh = shapes.icosphere(4)
+    cells = heat_igl.farthest_cells(heat_igl.HeatMethodSolver(mesh), 40)
+    dual = heat_igl.dual_triangulation(mesh, cells)
+    labels = cells.labels.copy()
+    alone = np.setdiff1d(np.arange(mesh.n_vertices), cells.sites)[5::400]
+    labels[alone] = (labels[alone] + 17) % 40
+    noisy = heat_igl.dual_triangulation(mesh, heat_igl.VoronoiCells(cells.sites, labels, cells.distance))
+    assert {tuple(face) for face in noisy.F.tolist()} == {tuple(face) for face in dual.F.tolist()}
+
+
+def test_too_few_sites_have_no_dual(square):
+    mesh = shapes.torus(20, 60)
+    solver = heat_igl.HeatMethodSolver(mesh)
+    with pytest.raises(heat_igl.MeshError, match="sample more densely"):
+        heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(solver, 6))
+    with pytest.raises(heat_igl.MeshError, match="no three cells meet"):
+        heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(solver, 2))
+    with pytest.raises(heat_igl.MeshError, match="the cells have 1200 vertices and the mesh 441"):
+        heat_igl.dual_triangulation(square[0], heat_igl.farthest_cells(solver, 2))
+
+
+def test_centre_in_the_plane_is_the_weighted_mean(square):
+    mesh, solver = square
+    points, weights = [3, 417, 200, 200, 62], [1.0, 2.0, 0.5, 0.25, 1.5]
+    centre = heat_igl.geodesic_centre(mesh, solver, points, weights)
+    expected = np.average(mesh.V[points], axis=0, weights=weights)
+    np.testing.assert_allclose(centre.positions(mesh)[0], expected, atol=1e-9)
+
+
+def test_centre_on_an_edge_and_in_a_corner(square):
+    mesh, solver = square
+    on_edge = heat_igl.geodesic_centre(mesh, solver, [0, 1]).positions(mesh)[0]
+    np.testing.assert_allclose(on_edge, mesh.V[[0, 1]].mean(axis=0), atol=1e-9)
+    in_corner = heat_igl.geodesic_centre(mesh, solver, [5]).positions(mesh)[0]
+    np.testing.assert_allclose(in_corner, mesh.V[5], atol=1e-9)
+
+
+def test_centre_of_an_arc_of_a_sphere():
+    """Three points at equal distance about an axis, the axis no vertex."""
+    mesh = shapes.icosphere(5)
+    axis = np.array([1.0, 2.0, 3.0]) / np.sqrt(14)
+    e = np.cross(axis, [1, 0, 0]) / np.linalg.norm(np.cross(axis, [1, 0, 0]))
+    angle = 2 * np.pi * np.arange(3)[:, None] / 3
+    ring = np.cos(0.6) * axis + np.sin(0.6) * (np.cos(angle) * e + np.sin(angle) * np.cross(axis, e))
+    points = [int(np.argmax(mesh.V @ p)) for p in ring]
+    # The vertices miss the ring by up to half an edge; weighted tangents at the true Karcher mean sum to 0.
+    mean = axis.copy()
+    for _ in range(50):
+        cosine = mesh.V[points] @ mean
+        tangent = (np.arccos(cosine) / np.sqrt(1 - cosine**2))[:, None] * (mesh.V[points] - cosine[:, None] * mean)
+        mean += tangent.mean(axis=0)
+        mean /= np.linalg.norm(mean)
+    solver = heat_igl.HeatMethodSolver(mesh, refine="unfold")
+    found = heat_igl.geodesic_centre(mesh, solver, points).positions(mesh)[0]
+    h = mesh.edge_lengths.mean()
+    assert np.linalg.norm(found / np.linalg.norm(found) - mean) < 0.1 * h
+    assert np.linalg.norm(mesh.V - mean, axis=1).min() > 0.2 * h  # no vertex would do
+
+
+def test_centre_refuses_what_has_none(square):
+    mesh = two_spheres()
+    solver = heat_igl.HeatMethodSolver(mesh)
+    with pytest.raises(heat_igl.SourceError, match="no place is reached from all"):
+        heat_igl.geodesic_centre(mesh, solver, [0, 200])
+    with pytest.raises(ValueError, match="weights must be 2 positive numbers"):
+        heat_igl.geodesic_centre(mesh, solver, [0, 1], [1.0, 0.0])
+    with pytest.raises(heat_igl.SourceError, match=r"points: sources\[0\] = 900 is no vertex"):
+        heat_igl.geodesic_centre(mesh, solver, [900])
+    with pytest.raises(heat_igl.MeshError, match="pass its own"):
+        heat_igl.geodesic_centre(square[0], solver, [0])
+
+
+def test_diameter_of_a_square_and_a_sphere(square):
+    distance, first, second = heat_igl.diameter(square[1], start=130)
+    assert distance == pytest.approx(np.sqrt(2))
+    assert np.linalg.norm(square[0].V[first] - square[0].V[second]) == pytest.approx(np.sqrt(2))
+    sphere = shapes.icosphere(4)
+    distance, first, second = heat_igl.diameter(heat_igl.HeatMethodSolver(sphere, refine="unfold"))
+    assert distance == pytest.approx(np.pi, rel=5e-3)
+    with pytest.raises(ValueError, match="rounds must be a positive integer"):
+        heat_igl.diameter(square[1], rounds=0)
+
+
+def test_diameter_stays_in_the_component_of_the_start():
+    mesh = two_spheres()
+    solver = heat_igl.HeatMethodSolver(mesh)
+    for start in (0, 200):
+        _, first, second = heat_igl.diameter(solver, start=start)
+        assert mesh.components[first] == mesh.components[second] == mesh.components[start]
+    assert heat_igl.diameter(solver, start=mesh.n_vertices - 1)[0] == 0.0
+
+
+def test_distance_matrix_in_the_plane(square):
+    mesh, solver = square
+    chosen = np.random.default_rng(0).permutation(mesh.n_vertices)[:50]
+    matrix = heat_igl.distance_matrix(solver, chosen)
+    np.testing.assert_allclose(matrix, np.linalg.norm(mesh.V[chosen, None] - mesh.V[chosen], axis=2), atol=1e-9)
+
+
+def test_distance_matrix_is_symmetric_and_the_mean_of_both_ways():
+    mesh = two_spheres()
+    solver = heat_igl.HeatMethodSolver(mesh)
+    matrix = heat_igl.distance_matrix(solver)
+    assert matrix.shape == (mesh.n_vertices, mesh.n_vertices)
+    assert np.array_equal(matrix, matrix.T)
+    assert not np.diag(matrix).any()
+    assert np.isinf(matrix[0, 200])
+    assert matrix[3, 90] == pytest.approx((solver.distance(3)[90] + solver.distance(90)[3]) / 2, rel=1e-9)
+    with pytest.raises(heat_igl.SourceError, match="indices must be distinct, but vertex 4 is there twice"):
+        heat_igl.distance_matrix(solver, [4, 2, 4])

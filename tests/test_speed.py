@@ -1,0 +1,157 @@
+"""Travel time with a speed on each face: identities, and closed forms in optics and conformal geometry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import perturbed
+
+import heat_igl
+from heat_igl import shapes, speed_operators
+from heat_igl.mesh import Mesh
+from heat_igl.metrics import relative_error
+from heat_igl.operators import operators
+from heat_igl.typing import FloatArray
+
+
+def flat(mesh: Mesh, seed: int = 0) -> Mesh:
+    """Perturbed within the plane."""
+    V = perturbed(mesh, 0.25, seed).V.copy()
+    V[:, 2] = 0
+    return Mesh(V, mesh.F)
+
+
+def solver(mesh: Mesh, speed: FloatArray, **options: float) -> heat_igl.HeatMethodSolver:
+    return heat_igl.HeatMethodSolver.from_operators(speed_operators(mesh, speed), **options)
+
+
+@pytest.mark.parametrize("mesh", [perturbed(shapes.torus(12, 30)), perturbed(shapes.box(4))], ids=["torus", "box"])
+def test_identities(mesh):
+    speed = np.random.default_rng(0).uniform(0.5, 3, mesh.n_faces)
+    domain = speed_operators(mesh, speed)
+    assert abs(domain.D @ domain.G - domain.L).max() < 1e-12 * abs(domain.L).max()
+    assert abs(domain.L - domain.L.T).max() < 1e-12 * abs(domain.L).max()
+    p = mesh.F.shape[1] - 1
+    assert domain.weights == pytest.approx(mesh.measures / speed**p)
+    assert domain.M.diagonal().sum() == pytest.approx(domain.weights.sum(), rel=1e-12)
+    assert np.array_equal(domain.boundary, mesh.boundary)
+    # |grad x|^2 sums to the dimension over the coordinates, times the square of the speed.
+    gradient = (domain.G @ mesh.V).reshape(domain.dimension, mesh.n_faces, 3)
+    np.testing.assert_allclose((gradient**2).sum(axis=(0, 2)), p * speed**2, rtol=1e-9)
+
+
+@pytest.mark.parametrize("mesh", [shapes.icosphere(3), shapes.box(6)], ids=["sphere", "box"])
+def test_one_speed_divides_all_distances(mesh):
+    expected = heat_igl.HeatMethodSolver(mesh).distance(5) / 2.5
+    found = solver(mesh, np.full(mesh.n_faces, 2.5)).distance(5)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_one_speed_flips_the_same_edges(cow):
+    expected = operators(cow)
+    found = speed_operators(cow, np.ones(cow.n_faces))
+    assert expected.triangulation is not None
+    assert expected.triangulation.n_flips > 100
+    assert abs(found.L - expected.L).max() < 1e-9 * abs(expected.L).max()
+    np.testing.assert_allclose(found.M.diagonal(), expected.M.diagonal(), rtol=1e-9)
+
+
+def test_edges_stay_where_the_speed_changes():
+    """A kite with an edge that Delaunay would flip."""
+    mesh = Mesh([[0, 0, 0], [4, 0, 0], [2, 0.5, 0], [2, -0.5, 0]], [[0, 1, 2], [1, 0, 3]])
+    assert speed_operators(mesh, [1.0, 1.0]).L[0, 1] == 0
+    domain = speed_operators(mesh, [1.0, 2.0])
+    assert domain.L[0, 1] != 0
+    assert domain.weights.tolist() == pytest.approx([1.0, 0.25])
+    # Shortest sides in time: of the fast face 2 and hypot(2, .5) / 2 twice, of the slow one hypot(2, .5) twice.
+    assert domain.mean_edge_length == pytest.approx((2 + 3 * np.hypot(2, 0.5)) / 5)
+
+
+def test_stereographic_projection_of_a_hemisphere():
+    """Speed (1 + r^2) / 2 on the unit disk makes it one: the time is an angle."""
+    errors = []
+    for n in (16, 32, 64):
+        mesh = flat(shapes.disk(n))
+        r2 = (mesh.V**2).sum(axis=1, keepdims=True)
+        on_sphere = np.concatenate([2 * mesh.V, 1 - r2], axis=1) / (1 + r2)
+        source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0, 0], axis=1)))
+        exact = np.arccos(np.clip(on_sphere @ on_sphere[source], -1, 1))
+        speed = (1 + (mesh.V[mesh.F].mean(axis=1) ** 2).sum(axis=1)) / 2
+        time = solver(mesh, speed, t_coef=4.0).distance(source)
+        errors.append(np.abs(time - exact).mean() / exact.mean())
+    assert errors[1] < 0.6 * errors[0]
+    assert errors[2] < 0.6 * errors[1]
+    assert errors[2] < 0.005
+
+
+def test_hyperbolic_space_on_tetrahedra():
+    """Speed (1 - r^2) / 2: Poincare's ball, in which a cube about the centre is convex."""
+    errors = []
+    for n in (6, 12, 24):
+        mesh = perturbed(shapes.box(n))
+        mesh = Mesh(mesh.V - 0.5, mesh.F)
+        r2 = (mesh.V**2).sum(axis=1)
+        source = int(np.argmin(np.linalg.norm(mesh.V - [0.3, 0, 0], axis=1)))
+        apart = ((mesh.V - mesh.V[source]) ** 2).sum(axis=1)
+        exact = np.arccosh(1 + 2 * apart / ((1 - r2) * (1 - r2[source])))
+        speed = (1 - (mesh.V[mesh.F].mean(axis=1) ** 2).sum(axis=1)) / 2
+        errors.append(np.abs(solver(mesh, speed).distance(source) - exact).mean() / exact.mean())
+    assert errors[1] < 0.7 * errors[0]
+    assert errors[2] < 0.7 * errors[1]
+    # No worse than Euclidean distance by much on the same tetrahedra, all of them seen at the same speed.
+    apart = np.sqrt(apart)
+    euclidean = np.abs(heat_igl.HeatMethodSolver(mesh).distance(source) - apart).mean() / apart.mean()
+    assert errors[2] < 1.5 * euclidean
+
+
+def by_fermat(source: FloatArray, points: FloatArray, above: float, below: float) -> FloatArray:
+    """Time from a source above y = 0: straight, refracted where the way crosses, or along the faster side."""
+    crossing = np.linspace(-0.5, 1.5, 4001)
+    to_crossing = np.hypot(source[0] - crossing, source[1]) / above
+    refracted = np.array([(to_crossing + np.hypot(x - crossing, y) / below).min() for x, y in points])
+    straight = np.linalg.norm(points - source, axis=1) / above
+    if below > above:
+        critical = np.arcsin(above / below)  # Snell: along the border the refracted ray is at 90 degrees
+        depth, along = source[1] + points[:, 1], np.abs(points[:, 0] - source[0])
+        head = np.where(along >= depth * np.tan(critical), depth * np.cos(critical) / above + along / below, np.inf)
+        straight = np.minimum(straight, head)
+    return np.where(points[:, 1] < 0, refracted, straight)
+
+
+@pytest.mark.parametrize("speeds", [(1.0, 2.0), (2.0, 1.0), (1.0, 4.0)])
+def test_refraction_at_a_straight_border(speeds):
+    errors = []
+    for n in (16, 32, 64):
+        square = shapes.grid(n)
+        moved = flat(square).V - [0, 0.5, 0]
+        border = square.V[:, 1] == 0.5
+        moved[border] = square.V[border] - [0, 0.5, 0]
+        mesh = Mesh(moved, square.F)
+        source = int(np.argmin(np.linalg.norm(mesh.V - [0.25, 0.3, 0], axis=1)))
+        speed = np.where(mesh.V[mesh.F][:, :, 1].mean(axis=1) > 0, *speeds)
+        exact = by_fermat(mesh.V[source, :2], mesh.V[:, :2], *speeds)
+        errors.append(float(np.nanmean(relative_error(solver(mesh, speed).distance(source), exact))))
+    assert errors[1] < 0.8 * errors[0]
+    assert errors[2] < 0.8 * errors[1]
+    assert errors[2] < 0.03
+
+
+def test_refinement_is_refused():
+    mesh = shapes.grid(3)
+    with pytest.raises(ValueError, match="unfolds triangles by their edge lengths, and this domain has none"):
+        heat_igl.HeatMethodSolver.from_operators(speed_operators(mesh, np.ones(18)), refine="unfold")
+
+
+@pytest.mark.parametrize(
+    ("speed", "message"),
+    [
+        (np.ones(17), r"speed must have shape \(18,\), one per face, not \(17,\)"),
+        (1.0, r"speed must have shape \(18,\), one per face, not \(\)"),
+        ([1.0] * 17 + [0.0], r"speed\[17\] = 0.0 must be positive and finite \(1 of 18 are not\): remove faces"),
+        ([np.inf] + [1.0] * 17, r"speed\[0\] = inf must be positive and finite"),
+        (["fast"] * 18, "speed must be real numbers"),
+    ],
+)
+def test_wrong_speeds_are_refused(speed, message):
+    with pytest.raises(ValueError, match=message):
+        speed_operators(shapes.grid(3), speed)
