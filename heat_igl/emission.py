@@ -22,6 +22,9 @@ _RADIUS = 2.0
 _EDGES_PER_POINT = 4.0
 # Points that a curve is integrated by are at most so many edges apart.
 _SPACING = 0.25
+# A binary digit of a label is taken as it is where its share of the heat is so far from one half.
+_DOUBT = 0.3
+_NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +91,7 @@ class Emitter:
         """Less the sources at which the front of another arrives before they begin, and values it arrives before at."""
         if np.ptp(found.sources.offsets) == 0:
             return found
-        label = self._warmest(found, self._heat_flow.solve(self.heat(found)))
+        label = self._warmest(found, self._heat_flow.solve(self.heat(found)), _NONE)
         anchors = found.anchors.at(label[found.anchors.vertex] == found.anchors.label)
         on_time = np.isin(found.label, anchors.label)
         kept = label[found.near.vertex] == found.near.label
@@ -156,32 +159,40 @@ class Emitter:
 
     def labels(self, emission: Emission, u: FloatArray) -> IntArray:
         """The source (n,) from which each vertex gets most of its heat `u`, -1 where it gets none."""
-        labels = self._warmest(emission, u)
-        labels[emission.near.vertex] = emission.near.label
-        return labels
+        return self._warmest(emission, u, emission.near)
 
-    def _warmest(self, emission: Emission, u: FloatArray) -> IntArray:
-        """By one solve for each binary digit of the labels: the share of heat from sources with that digit."""
-        present, index = np.unique(emission.label, return_inverse=True)
+    def _warmest(self, emission: Emission, u: FloatArray, known: Seeds) -> IntArray:
+        """By one solve for each binary digit of the labels: the share of heat from sources with that digit.
+
+        Where the digits leave no doubt they spell the label. Between cells the label is one of a neighbour that has
+        one, the likeliest; the digits alone could be spelled by different sources together.
+        """
+        present, index = np.unique(np.concatenate([emission.label, known.label]), return_inverse=True)
         digits = np.arange(max(1, int(len(present) - 1).bit_length()))
-        of_source = (index[:, None] >> digits) & 1
+        of_source = (index[: len(emission.label), None] >> digits) & 1
         parts = self._heat_flow.solve(
             np.stack([self._heat_of(emission, emission.share * digit) for digit in of_source.T], axis=1)
         )
-        share = np.divide(parts, u[:, None], out=np.zeros_like(parts), where=u[:, None] > 0)
-        found = (share > 0.5) @ (1 << digits)
-        # Where three sources or more are equally warm, the digits may come from different ones.
-        unsure = np.flatnonzero((np.abs(share - 0.5) < 0.25).any(axis=1) & (u > 0))
-        neighbours = self._domain.L[:, unsure]
-        which = np.repeat(np.arange(len(unsure)), np.diff(neighbours.indptr))
-        others = neighbours.indices != unsure[which]
-        which, offered = which[others], found[neighbours.indices[others]]
-        alone = np.bincount(which, offered == found[unsure[which]], minlength=len(unsure)) == 0
-        which, offered = which[alone[which]], offered[alone[which]]
-        chance = np.where((offered[:, None] >> digits) & 1, share[unsure[which]], 1 - share[unsure[which]]).prod(axis=1)
-        order = np.argsort(chance, kind="stable")
-        found[unsure[which[order]]] = offered[order]
-        return np.where(u > 0, present[np.minimum(found, len(present) - 1)], -1)
+        warm = u > 0
+        share = np.divide(parts, u[:, None], out=np.full_like(parts, 0.5), where=warm[:, None])
+        found = np.minimum((share > 0.5) @ (1 << digits), len(present) - 1)
+        settled = (np.abs(share - 0.5) > _DOUBT).all(axis=1) & warm
+        found[known.vertex], settled[known.vertex] = index[len(emission.label) :], True
+        while True:
+            v, offered = self._offers(np.flatnonzero(~settled & warm), found, settled)
+            if not len(v):
+                return np.where(warm | settled, present[found], -1)
+            is_one = (offered[:, None] >> digits) & 1
+            likely = np.where(is_one, share[v], 1 - share[v]).prod(axis=1)
+            order = np.argsort(likely, kind="stable")  # of several for one vertex, what is written last stays
+            found[v[order]], settled[v] = offered[order], True
+
+    def _offers(self, vertices: IntArray, found: IntArray, settled: BoolArray) -> tuple[IntArray, IntArray]:
+        """Each of `vertices` with the label of each neighbour that has one."""
+        neighbours = self._domain.L[:, vertices]
+        v, w = np.repeat(vertices, np.diff(neighbours.indptr)), neighbours.indices
+        held = settled[w]
+        return v[held], found[w[held]]
 
     def _rim(self, sources: SourceSet) -> BoolArray:
         """The source vertices that have a neighbour which is none.
@@ -216,7 +227,7 @@ class Emitter:
     def _straight_lines(self, sources: SourceSet) -> Seeds:
         """Exact distance of all vertices that see a point or a curve in a straight line, some edges around it."""
         if self._on_faces is None or sources.on_vertices_alone:
-            return Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
+            return _NONE
         return self._on_faces.seeds(
             sources.points.joined(sources.segments.ends()), sources.segments, _RADIUS * self._domain.mean_edge_length
         )
