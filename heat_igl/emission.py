@@ -16,8 +16,8 @@ __all__ = ["Emission", "Emitter"]
 
 # Largest heat at a source, in units of h: leaves room for the gradient's 1 / length on slivers.
 _SOURCE_HEAT = 1e290
-# How far around points and curves distance is taken from straight lines, in mean edge lengths.
-_RADIUS = 2.0
+# How far around points and curves distance is taken from straight lines, in mean edge lengths. docs/sources.md compares.
+_RADIUS = 6.0
 # Point and curve are equally warm some edges away if the heat of a point is spread over so many edges of the curve.
 _EDGES_PER_POINT = 4.0
 # Points that a curve is integrated by are at most so many edges apart.

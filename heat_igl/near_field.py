@@ -156,7 +156,14 @@ class NearField:
             if not len(windows):
                 break
             windows = self._cross(windows, found)
-        return found.seeds()
+        return self._shortest(found)
+
+    def _shortest(self, found: _Found) -> Seeds:
+        """Less the vertices that a way along an edge from another serves better: there, straight is not shortest."""
+        seeds = found.seeds()
+        which, ends, lengths = self.spokes(seeds.vertex)
+        beaten = found.at(ends) > (seeds.value[which] + lengths) * (1 + _ROUNDING)
+        return seeds.at(~np.isin(seeds.vertex, ends[beaten]))
 
     def samples(self, segments: SourceSegments, spacing: float) -> tuple[SourcePoints, FloatArray]:
         """Points along segments, at most `spacing` apart, and the length that each stands for.
