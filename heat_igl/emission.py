@@ -12,16 +12,18 @@ from heat_igl.sources import SourceSet
 from heat_igl.steps import HeatFlow
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Emission", "Emitter"]
+__all__ = ["Emission", "Emitter", "take_shorter"]
 
 # Largest heat at a source, in units of h: leaves room for the gradient's 1 / length on slivers.
 _SOURCE_HEAT = 1e290
-# How far around points and curves distance is taken from straight lines, in mean edge lengths. docs/sources.md compares.
+# How far around points and curves distance is taken from straight lines, in mean edge lengths.
 _RADIUS = 6.0
 # Point and curve are equally warm some edges away if the heat of a point is spread over so many edges of the curve.
 _EDGES_PER_POINT = 4.0
 # Points that a curve is integrated by are at most so many edges apart.
 _SPACING = 0.25
+# A straight line longer than the integrated distance by more than this does not lead to the nearest source.
+_HEAT_ERROR = 0.2
 # A binary digit of a label is taken as it is where its share of the heat is so far from one half.
 _DOUBT = 0.3
 _NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
@@ -44,6 +46,8 @@ class Emission:
     guides : (g,) bool
         Which of `near` were found by straight lines from points and curves: on faces with such corners alone, the
         field is the gradient of these values.
+    far : Seeds
+        Corners of sources' faces that are too far away to be among `near`, by straight lines.
     """
 
     sources: SourceSet
@@ -54,6 +58,7 @@ class Emission:
     anchors: Seeds
     near: Seeds
     guides: BoolArray
+    far: Seeds
 
 
 class Emitter:
@@ -79,13 +84,13 @@ class Emitter:
         """`sources` ready for step 1."""
         rim = self._rim(sources)
         near_vertices = self._near_vertices(sources, rim)
-        lines = self._straight_lines(sources)
+        lines, far = self._straight_lines(sources)
         near = Seeds.nearest(_joined(near_vertices, lines))
         guides = np.isin(near.vertex, lines.vertex) & ~np.isin(near.vertex, near_vertices.vertex)
         own = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         anchors = _joined(own, near.at(guides))
         vertex, share, label, offset = self._heat(sources, rim)
-        return Emission(sources, vertex, share, self._delay(vertex, offset), label, anchors, near, guides)
+        return Emission(sources, vertex, share, self._delay(vertex, offset), label, anchors, near, guides, far)
 
     def on_time(self, found: Emission) -> Emission:
         """Less the sources at which the front of another arrives before they begin, and values it arrives before at."""
@@ -155,6 +160,7 @@ class Emitter:
         lowest = np.full(len(n_anchors), np.inf)
         np.minimum.at(lowest, components[emission.near.vertex], emission.near.value)
         distance = np.maximum(phi - shift[components], lowest[components])
+        take_shorter(distance, emission.far, _HEAT_ERROR)
         return self._continued(emission.near, distance)
 
     def labels(self, emission: Emission, u: FloatArray) -> IntArray:
@@ -224,10 +230,10 @@ class Emitter:
             itself, Seeds(ends, sources.vertex_offset[rim][which] + lengths, sources.vertex_label[rim][which])
         )
 
-    def _straight_lines(self, sources: SourceSet) -> Seeds:
-        """Exact distance of all vertices that see a point or a curve in a straight line, some edges around it."""
+    def _straight_lines(self, sources: SourceSet) -> tuple[Seeds, Seeds]:
+        """Distance of the vertices that see a point or a curve in a straight line, as `NearField.seeds` has it."""
         if self._on_faces is None or sources.on_vertices_alone:
-            return _NONE
+            return _NONE, _NONE
         return self._on_faces.seeds(
             sources.points.joined(sources.segments.ends()), sources.segments, _RADIUS * self._domain.mean_edge_length
         )
@@ -296,6 +302,13 @@ class Emitter:
             np.minimum(distance, upper, out=distance)
         distance[near.vertex] = near.value
         return distance
+
+
+def take_shorter(distance: FloatArray, seeds: Seeds, error: float) -> BoolArray:
+    """Set known values where they are shorter, or longer by less than the relative error of `distance`; which were."""
+    taken = seeds.value < distance[seeds.vertex] * (1 + error)
+    distance[seeds.vertex[taken]] = seeds.value[taken]
+    return np.asarray(taken)
 
 
 def _joined(one: Seeds, other: Seeds) -> Seeds:

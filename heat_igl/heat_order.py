@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from heat_igl.emission import Emission
+from heat_igl.emission import Emission, take_shorter
 from heat_igl.near_field import NearField
 from heat_igl.operators import Operators
 from heat_igl.processors import n_threads
@@ -80,11 +80,10 @@ class HeatOrder:
         )
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, points.label, [-1]])[labels]
-        near = emission.near.at(emission.guides)
-        closest = near.value < distance[near.vertex] * (1 + self._error)
-        distance[near.vertex[closest]] = near.value[closest]
-        if labels is not None:
-            labels[near.vertex[closest]] = near.label[closest]
+        for seeds in (emission.near.at(emission.guides), emission.far):
+            taken = take_shorter(distance, seeds, self._error)
+            if labels is not None:
+                labels[seeds.vertex[taken]] = seeds.label[taken]
         return distance
 
     def _points(self, emission: Emission) -> SourcePoints:

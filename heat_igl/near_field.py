@@ -74,16 +74,16 @@ class _Windows:
         return _Windows(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     def nearest(self) -> FloatArray:
-        """Distance of the nearest point of each window, offset included."""
+        """Distance of the nearest point of each window."""
         beside = np.where(self.x < self.low, self.low - self.x, np.where(self.x > self.high, self.x - self.high, 0.0))
         to_point = np.hypot(beside, self.y)
         to_line = np.minimum(-self.x * self.low, -self.x * self.high) - self.level
-        return np.asarray(self.offset + np.where(self.w > 0, to_point, to_line))
+        return np.asarray(np.where(self.w > 0, to_point, to_line))
 
     def distance(self, px: FloatArray, py: FloatArray) -> FloatArray:
-        """Distance of a place in the frame of each window, offset included."""
+        """Distance of a place in the frame of each window."""
         to_point = np.hypot(px - self.x, py - self.y)
-        return np.asarray(self.offset + np.where(self.w > 0, to_point, -self.x * px - self.y * py - self.level))
+        return np.asarray(np.where(self.w > 0, to_point, -self.x * px - self.y * py - self.level))
 
 
 def _joined(parts: list[_Windows]) -> _Windows:
@@ -129,7 +129,7 @@ class NearField:
         lengths = np.concatenate([tri.l[f, (c + 2) % 3], tri.l[f, (c + 1) % 3]])
         return np.concatenate([which, which]), ends, lengths
 
-    def seeds(self, points: SourcePoints, segments: SourceSegments, radius: float) -> Seeds:
+    def seeds(self, points: SourcePoints, segments: SourceSegments, radius: float) -> tuple[Seeds, Seeds]:
         """Distance at the vertices that see a source in a straight line.
 
         Parameters
@@ -137,30 +137,35 @@ class NearField:
         points, segments
             The sources. The ends of segments are no sources by themselves.
         radius : float
-            How far to look. The corners of a source's own faces are always found.
+            How far to look.
 
         Returns
         -------
-        Seeds
-            One for each label and vertex, labels ascending.
+        near : Seeds
+            Vertices within `radius`, ascending. The length of a straight line, and as good as always the shortest way:
+            not where a way around curvature is shorter, which only a detour by an edge reveals.
+        far : Seeds
+            Corners of the sources' own faces beyond `radius`, where another source may be nearer.
         """
         found = _Found(self.triangulation.n)
         windows = _joined([*self._of_points(points, found), *self._of_segments(segments, found)])
+        own = found.seeds()
         base = self.triangulation.l.ravel()
-        limit = radius
         for _ in range(_MOST_LEVELS):
             nearest = windows.nearest()
             ends = self.triangulation.tail(windows.half_edge), self.triangulation.head(windows.half_edge)
             by_corner = np.minimum(*(found.at(vertex) for vertex in ends))
-            windows = windows.at((nearest - windows.offset < limit) & (nearest < by_corner + base[windows.half_edge]))
+            useful = windows.offset + nearest < by_corner + base[windows.half_edge]
+            windows = windows.at((nearest < radius) & useful)
             if not len(windows):
                 break
             windows = self._cross(windows, found)
-        return self._shortest(found)
+        near = self._shortest(found, radius)
+        return near, own.at(~np.isin(own.vertex, near.vertex))
 
-    def _shortest(self, found: _Found) -> Seeds:
+    def _shortest(self, found: _Found, radius: float) -> Seeds:
         """Less the vertices that a way along an edge from another serves better: there, straight is not shortest."""
-        seeds = found.seeds()
+        seeds = found.seeds(radius)
         which, ends, lengths = self.spokes(seeds.vertex)
         beaten = found.at(ends) > (seeds.value[which] + lengths) * (1 + _ROUNDING)
         return seeds.at(~np.isin(seeds.vertex, ends[beaten]))
@@ -187,7 +192,7 @@ class NearField:
         p = np.einsum("kc,kcx->kx", points.barycentric, corners)
         distance = np.linalg.norm(corners - p[:, None], axis=2)
         for c in range(3):
-            found.add(self.triangulation.F[f, c], points.offset + distance[:, c], points.label)
+            found.add(self.triangulation.F[f, c], distance[:, c], points.offset, points.label)
         windows = []
         one = np.ones(len(f))
         for c in range(3):
@@ -259,7 +264,8 @@ class NearField:
             beside = (u[:, c] >= -room) & (u[:, c] <= length + room) & (length > 0)
             found.add(
                 self.triangulation.F[f[beside], c],
-                segments.offset[beside] + np.abs(v[beside, c]),
+                np.abs(v[beside, c]),
+                segments.offset[beside],
                 segments.label[beside],
             )
         for side in (1.0, -1.0):
@@ -358,7 +364,7 @@ class NearField:
         x = ax - ay * (windows.x - windows.w * ax) / (windows.y - windows.w * ay)
         room = _ROUNDING * base
         seen = (x >= windows.low - room) & (x <= windows.high + room)
-        found.add(tri.F[g[seen], k[seen]], windows.distance(ax, ay)[seen], windows.label[seen])
+        found.add(tri.F[g[seen], k[seen]], windows.distance(ax, ay)[seen], windows.offset[seen], windows.label[seen])
 
         S = np.stack([windows.x, windows.y], axis=1)
         new = []
@@ -397,20 +403,23 @@ class NearField:
 
 
 class _Found:
-    """The smallest value at each vertex so far, and whose it is."""
+    """The smallest value at each vertex so far, whose it is, and how much of it is the source's offset."""
 
     def __init__(self, n: int) -> None:
         self._value = np.full(n, np.inf)
         self._label = np.full(n, -1)
+        self._offset = np.zeros(n)
 
-    def add(self, vertex: IntArray, value: FloatArray, label: IntArray) -> None:
+    def add(self, vertex: IntArray, distance: FloatArray, offset: FloatArray, label: IntArray) -> None:
+        value = offset + distance
         order = np.argsort(-value, kind="stable")  # where a vertex comes twice, what is written last stays
         better = order[value[order] < self._value[vertex[order]]]
-        self._value[vertex[better]], self._label[vertex[better]] = value[better], label[better]
+        at = vertex[better]
+        self._value[at], self._label[at], self._offset[at] = value[better], label[better], offset[better]
 
     def at(self, vertex: IntArray) -> FloatArray:
         return np.asarray(self._value[vertex])
 
-    def seeds(self) -> Seeds:
-        vertex = np.flatnonzero(self._label >= 0)
+    def seeds(self, radius: float = np.inf) -> Seeds:
+        vertex = np.flatnonzero((self._label >= 0) & (self._value - self._offset <= radius))
         return Seeds(vertex, self._value[vertex], self._label[vertex])
