@@ -76,9 +76,11 @@ class Emitter:
         self._domain = domain
         self._heat_flow = heat_flow
         self._on_solved = None if domain.triangulation is None else NearField(domain.triangulation)
-        self._on_faces = self._on_solved
-        if domain.faces is not None and domain.faces is not domain.triangulation:
-            self._on_faces = NearField(domain.faces)
+        self._on_faces = None if domain.faces is None else NearField(domain.faces)
+        # Triangulations on which the edges are straight lines: one, if none was flipped.
+        self._fields = [field for field in (self._on_solved, self._on_faces) if field is not None]
+        if domain.faces is domain.triangulation:
+            self._fields = self._fields[:1]
 
     def emission(self, sources: SourceSet) -> Emission:
         """`sources` ready for step 1."""
@@ -159,8 +161,9 @@ class Emitter:
         shift = np.where(n_anchors > 0, total / np.maximum(n_anchors, 1), -np.inf)
         lowest = np.full(len(n_anchors), np.inf)
         np.minimum.at(lowest, components[emission.near.vertex], emission.near.value)
-        distance = np.maximum(phi - shift[components], lowest[components])
-        take_shorter(distance, emission.far, _HEAT_ERROR)
+        start = lowest[components]
+        distance = np.maximum(phi - shift[components], start)
+        take_shorter(distance, emission.far, _HEAT_ERROR, start)
         return self._continued(emission.near, distance)
 
     def labels(self, emission: Emission, u: FloatArray) -> IntArray:
@@ -223,12 +226,12 @@ class Emitter:
     def _near_vertices(self, sources: SourceSet, rim: BoolArray) -> Seeds:
         """Source vertices, and those at the rim with their neighbours at the lengths of edges."""
         itself = Seeds(sources.vertices, sources.vertex_offset, sources.vertex_label)
-        if self._on_solved is None:
-            return itself
-        which, ends, lengths = self._on_solved.spokes(sources.vertices[rim])
-        return _joined(
-            itself, Seeds(ends, sources.vertex_offset[rim][which] + lengths, sources.vertex_label[rim][which])
-        )
+        vertices, offset, label = sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim]
+        found = [itself]
+        for field in self._fields:
+            which, ends, lengths = field.spokes(vertices)
+            found.append(Seeds(ends, offset[which] + lengths, label[which]))
+        return _joined(*found)
 
     def _straight_lines(self, sources: SourceSet) -> tuple[Seeds, Seeds]:
         """Distance of the vertices that see a point or a curve in a straight line, as `NearField.seeds` has it."""
@@ -304,16 +307,20 @@ class Emitter:
         return distance
 
 
-def take_shorter(distance: FloatArray, seeds: Seeds, error: float) -> BoolArray:
-    """Set known values where they are shorter, or longer by less than the relative error of `distance`; which were."""
-    taken = seeds.value < distance[seeds.vertex] * (1 + error)
+def take_shorter(distance: FloatArray, seeds: Seeds, error: float, start: FloatArray) -> BoolArray:
+    """Set known values where they are shorter, or longer by less than the error of `distance`; which were.
+
+    The error is relative to the distance from where it begins, `start` (n,).
+    """
+    begin = start[seeds.vertex]
+    taken = seeds.value - begin < (distance[seeds.vertex] - begin) * (1 + error)
     distance[seeds.vertex[taken]] = seeds.value[taken]
     return np.asarray(taken)
 
 
-def _joined(one: Seeds, other: Seeds) -> Seeds:
+def _joined(*parts: Seeds) -> Seeds:
     return Seeds(
-        np.concatenate([one.vertex, other.vertex]),
-        np.concatenate([one.value, other.value]),
-        np.concatenate([one.label, other.label]),
+        np.concatenate([part.vertex for part in parts]),
+        np.concatenate([part.value for part in parts]),
+        np.concatenate([part.label for part in parts]),
     )

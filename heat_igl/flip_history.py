@@ -43,6 +43,10 @@ class Merged(NamedTuple):
         np.put_along_axis(moved, self.corner[faces], barycentric, axis=1)
         return self.face[faces], moved
 
+    def before(self, F: IntArray) -> IntArray:
+        """The vertices (m, 3) of all faces, from those of the faces that are left."""
+        return np.asarray(np.take_along_axis(F[self.face], self.corner, axis=1))
+
 
 class Turned(NamedTuple):
     """Faces whose row was reversed, so that corner c became corner 2 - c.

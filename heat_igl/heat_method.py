@@ -212,6 +212,7 @@ class HeatMethodSolver:
         self._operators = domain
         self._heat_flow = HeatFlow(domain, step, boundary, backend)
         self._emitter = Emitter(domain, self._heat_flow)
+        self._given_faces = domain.given_faces
         self._poisson: PoissonProblem | None = None
         self._heat_order: HeatOrder | None = None
         if refine is None:
@@ -383,8 +384,7 @@ class HeatMethodSolver:
         )
 
     def _set(self, sources: Sources) -> SourceSet:
-        faces = self._operators.faces
-        return source_set(sources, self.n_vertices, None if faces is None else faces.F)
+        return source_set(sources, self.n_vertices, self._given_faces)
 
     def _distances(self, source_sets: list[SourceSet], cutoff: float | None) -> FloatArray:
         """Distances (k, n) from k sets of sources."""

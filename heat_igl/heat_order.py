@@ -50,6 +50,8 @@ class HeatOrder:
         self._unfolded = refinement.sweep if refine == "sweep" else refinement.unfold
         self._error = _SWEEP_ERROR if refine == "sweep" else 0.0
         self._faces = None if domain.faces is None else NearField(domain.faces)
+        self._components = domain.components
+        self._given_faces = np.empty((0, 3), np.int64) if domain.given_faces is None else domain.given_faces
         self._spacing = _SPACING * domain.mean_edge_length
 
     def distances(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
@@ -69,19 +71,29 @@ class HeatOrder:
 
     def _distance(self, emission: Emission, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
         sources, points = emission.sources, self._points(emission)
-        has_offsets = bool(sources.offsets.any())
+        places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
+        # Tolerances are relative to the distance: what all have in common is added afterwards.
+        earliest = np.full(int(self._components.max()) + 1, np.inf)
+        component_of_point = self._components[self._given_faces[points.faces, 0]] if places else np.empty(0, np.int64)
+        component = np.concatenate([self._components[sources.vertices], component_of_point])
+        offset = np.concatenate([sources.vertex_offset, points.offset])
+        np.minimum.at(earliest, component, offset)
+        late = offset - earliest[component]
+        k = len(sources.vertices)
         distance = self._unfolded(
             -u,
             sources.vertices,
-            offsets=sources.vertex_offset if has_offsets else None,
-            points=SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
-            point_offsets=points.offset if has_offsets and len(points.faces) else None,
+            offsets=late[:k] if late.any() else None,
+            points=places,
+            point_offsets=late[k:] if late.any() and places else None,
             labels=labels,
         )
+        start = earliest[self._components]
+        distance += start
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, points.label, [-1]])[labels]
         for seeds in (emission.near.at(emission.guides), emission.far):
-            taken = take_shorter(distance, seeds, self._error)
+            taken = take_shorter(distance, seeds, self._error, start)
             if labels is not None:
                 labels[seeds.vertex[taken]] = seeds.label[taken]
         return distance

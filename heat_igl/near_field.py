@@ -7,7 +7,7 @@ parallel, as from a point at infinity; both are one homogeneous point here. docs
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -147,6 +147,7 @@ class NearField:
         far : Seeds
             Corners of the sources' own faces beyond `radius`, where another source may be nearer.
         """
+        points, segments = self._carried(points, segments)
         found = _Found(self.triangulation.n)
         windows = _joined([*self._of_points(points, found), *self._of_segments(segments, found)])
         own = found.seeds()
@@ -175,7 +176,8 @@ class NearField:
 
         Each lies in the middle of its piece, where a linear function takes its mean.
         """
-        along = np.einsum("kc,kcx->kx", segments.end - segments.start, self._layout(segments.faces))
+        _, carried = self._carried(segments.ends(), segments)
+        along = np.einsum("kc,kcx->kx", carried.end - carried.start, self._layout(carried.faces))
         lengths = np.linalg.norm(along, axis=1)
         counts = np.ceil(lengths / spacing).astype(np.int64)
         which = np.repeat(np.arange(len(counts)), counts)
@@ -183,6 +185,16 @@ class NearField:
         barycentric = (1 - share)[:, None] * segments.start[which] + share[:, None] * segments.end[which]
         points = SourcePoints(segments.faces[which], barycentric, segments.label[which], segments.offset[which])
         return points, lengths[which] / counts[which]
+
+    def _carried(self, points: SourcePoints, segments: SourceSegments) -> tuple[SourcePoints, SourceSegments]:
+        """The same in the faces of the triangulation, which may lack some that were given twice."""
+        faces, barycentric = self.triangulation.locate(points.faces, points.barycentric)
+        faces_of_segments, start = self.triangulation.locate(segments.faces, segments.start)
+        _, end = self.triangulation.locate(segments.faces, segments.end)
+        return (
+            replace(points, faces=faces, barycentric=barycentric),
+            replace(segments, faces=faces_of_segments, start=start, end=end),
+        )
 
     def _of_points(self, points: SourcePoints, found: _Found) -> list[_Windows]:
         """Windows on the sides of each point's face, and its corners."""

@@ -72,7 +72,7 @@ class Operators:
         Triangles of the surface itself, each once, where `triangulation` is its tufted cover and goes over it twice.
         Paths are to be unfolded in these: on the cover a path over an edge of five faces goes on in one of them only.
     faces : IntrinsicTriangulation or None
-        The triangles as they were given, before any flip: those that points and curves on faces refer to. None where
+        The triangles before any flip, but each once: what points and curves on faces are carried to. None where
         `triangulation` is.
     is_surface : bool
         Whether the domain has two dimensions; tetrahedra have three.
@@ -97,6 +97,17 @@ class Operators:
     def n(self) -> int:
         """Number of vertices."""
         return int(self.L.shape[0])
+
+    @property
+    def given_faces(self) -> IntArray | None:
+        """Vertices (m, 3) of the triangles that points and curves refer to; None without `faces`."""
+        if self.faces is None:
+            return None
+        F = self.faces.F
+        for move in self.faces.history:
+            if isinstance(move, Merged):
+                F = move.before(F)
+        return F
 
     @property
     def dimension(self) -> int:
@@ -139,16 +150,15 @@ def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operat
         raise ValueError(f"laplacian must be 'intrinsic-delaunay' or 'cotan', not {laplacian!r}")
     if mesh.is_tetrahedral:
         return cotan_operators(mesh)
-    faces = triangulation = intrinsic_triangulation(mesh)
-    if laplacian == "intrinsic-delaunay":
+    history: tuple[Merged, ...] = ()
+    if laplacian == "intrinsic-delaunay" and has_nonmanifold_edges(mesh):
+        # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being manifold.
+        mesh, history = _without_duplicates(mesh)
         if has_nonmanifold_edges(mesh):
-            # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being
-            # manifold.
-            mesh, history = _without_duplicates(mesh)
-            if has_nonmanifold_edges(mesh):
-                return replace(tufted_operators(mesh, history), faces=faces)
-            triangulation = replace(intrinsic_triangulation(mesh), history=history)
-        triangulation = intrinsic_delaunay(triangulation)
+            return tufted_operators(mesh, history)
+    faces = triangulation = replace(intrinsic_triangulation(mesh), history=history)
+    if laplacian == "intrinsic-delaunay":
+        triangulation = intrinsic_delaunay(faces)
     if triangulation.n_flips or triangulation.lengthening:
         # Paths along the mesh's own edges are paths on the surface too, and already known.
         return replace(intrinsic_operators(triangulation, mesh.longest_distance), faces=faces)

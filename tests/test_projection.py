@@ -119,7 +119,7 @@ def test_refused_polylines(positions, options, message):
 def test_a_jump_between_two_sheets_is_refused():
     """Between two parallel sheets the closest point jumps from one to the other."""
     sheet = shapes.grid(4)
-    sheets = Mesh(np.concatenate([sheet.V, sheet.V + [0, 0, 0.2]]), np.concatenate([sheet.F, sheet.F + 25]))
+    sheets = Mesh(np.concatenate([sheet.V, sheet.V + np.array([0, 0, 0.2])]), np.concatenate([sheet.F, sheet.F + 25]))
     with pytest.raises(SourceError, match=r"line from positions\[0\] jumps from face .* draw it closer"):
         curve_on(sheets, [[0.2, 0.2, 0.05], [0.7, 0.2, 0.15]])
 
