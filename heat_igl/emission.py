@@ -24,8 +24,10 @@ _EDGES_PER_POINT = 4.0
 _SPACING = 0.25
 # A straight line longer than the integrated distance by more than this does not lead to the nearest source.
 _HEAT_ERROR = 0.2
-# A binary digit of a label is taken as it is where its share of the heat is so far from one half.
-_DOUBT = 0.3
+# A source is overtaken where heat is so many times what it would be if all began as late: after 2 edges or so.
+_OVERTAKEN = 5.0
+# Right-hand sides of labels solved together.
+_BLOCK = 8
 _NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
 
 
@@ -86,28 +88,39 @@ class Emitter:
         """`sources` ready for step 1."""
         rim = self._rim(sources)
         near_vertices = self._near_vertices(sources, rim)
-        lines, far = self._straight_lines(sources)
+        lines, far = self._straight_lines(sources, rim)
         near = Seeds.nearest(_joined(near_vertices, lines))
-        guides = np.isin(near.vertex, lines.vertex) & ~np.isin(near.vertex, near_vertices.vertex)
+        guides = np.isin(near.vertex, lines.vertex) & ~np.isin(near.vertex, sources.vertices)
         own = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         anchors = _joined(own, near.at(guides))
         vertex, share, label, offset = self._heat(sources, rim)
         return Emission(sources, vertex, share, self._delay(vertex, offset), label, anchors, near, guides, far)
 
     def on_time(self, found: Emission) -> Emission:
-        """Less the sources at which the front of another arrives before they begin, and values it arrives before at."""
+        """Less the sources that others overtake before they begin, and the values that others come before.
+
+        Two solves tell: there the heat is many times what it would be if all began as late as this source does.
+        """
         if np.ptp(found.sources.offsets) == 0:
             return found
-        label = self._warmest(found, self._heat_flow.solve(self.heat(found)), _NONE)
-        anchors = found.anchors.at(label[found.anchors.vertex] == found.anchors.label)
-        on_time = np.isin(found.label, anchors.label)
-        kept = label[found.near.vertex] == found.near.label
+        both = np.stack([self.heat(found), self.heat(replace(found, delay=np.zeros_like(found.delay)))], axis=1)
+        u, u_at_once = self._heat_flow.solve(both).T
+        delay = np.zeros(found.sources.n_labels)
+        delay[found.label] = found.delay
+
+        def is_on_time(vertex: IntArray, label: IntArray) -> BoolArray:
+            with np.errstate(divide="ignore"):
+                return np.asarray(np.log(u[vertex]) < np.log(u_at_once[vertex]) - delay[label] + np.log(_OVERTAKEN))
+
+        anchors = found.anchors.at(is_on_time(found.anchors.vertex, found.anchors.label))
+        kept = is_on_time(found.near.vertex, found.near.label)
+        alive = np.isin(found.label, anchors.label)
         return replace(
             found,
-            vertex=found.vertex[on_time],
-            share=found.share[on_time],
-            delay=found.delay[on_time],
-            label=found.label[on_time],
+            vertex=found.vertex[alive],
+            share=found.share[alive],
+            delay=found.delay[alive],
+            label=found.label[alive],
             anchors=anchors,
             near=found.near.at(kept),
             guides=found.guides[kept],
@@ -166,42 +179,20 @@ class Emitter:
         take_shorter(distance, emission.far, _HEAT_ERROR, start)
         return self._continued(emission.near, distance)
 
-    def labels(self, emission: Emission, u: FloatArray) -> IntArray:
-        """The source (n,) from which each vertex gets most of its heat `u`, -1 where it gets none."""
-        return self._warmest(emission, u, emission.near)
-
-    def _warmest(self, emission: Emission, u: FloatArray, known: Seeds) -> IntArray:
-        """By one solve for each binary digit of the labels: the share of heat from sources with that digit.
-
-        Where the digits leave no doubt they spell the label. Between cells the label is one of a neighbour that has
-        one, the likeliest; the digits alone could be spelled by different sources together.
-        """
-        present, index = np.unique(np.concatenate([emission.label, known.label]), return_inverse=True)
-        digits = np.arange(max(1, int(len(present) - 1).bit_length()))
-        of_source = (index[: len(emission.label), None] >> digits) & 1
-        parts = self._heat_flow.solve(
-            np.stack([self._heat_of(emission, emission.share * digit) for digit in of_source.T], axis=1)
-        )
-        warm = u > 0
-        share = np.divide(parts, u[:, None], out=np.full_like(parts, 0.5), where=warm[:, None])
-        found = np.minimum((share > 0.5) @ (1 << digits), len(present) - 1)
-        settled = (np.abs(share - 0.5) > _DOUBT).all(axis=1) & warm
-        found[known.vertex], settled[known.vertex] = index[len(emission.label) :], True
-        while True:
-            v, offered = self._offers(np.flatnonzero(~settled & warm), found, settled)
-            if not len(v):
-                return np.where(warm | settled, present[found], -1)
-            is_one = (offered[:, None] >> digits) & 1
-            likely = np.where(is_one, share[v], 1 - share[v]).prod(axis=1)
-            order = np.argsort(likely, kind="stable")  # of several for one vertex, what is written last stays
-            found[v[order]], settled[v] = offered[order], True
-
-    def _offers(self, vertices: IntArray, found: IntArray, settled: BoolArray) -> tuple[IntArray, IntArray]:
-        """Each of `vertices` with the label of each neighbour that has one."""
-        neighbours = self._domain.L[:, vertices]
-        v, w = np.repeat(vertices, np.diff(neighbours.indptr)), neighbours.indices
-        held = settled[w]
-        return v[held], found[w[held]]
+    def labels(self, emission: Emission) -> IntArray:
+        """The source (n,) from which each vertex gets most of its heat, -1 where it gets none; a solve for each."""
+        labels = np.full(self._domain.n, -1)
+        most = np.zeros(self._domain.n)
+        present = np.unique(emission.label)
+        for block in np.split(present, range(_BLOCK, len(present), _BLOCK)):
+            shares = [emission.share * (emission.label == label) for label in block]
+            parts = self._heat_flow.solve(np.stack([self._heat_of(emission, share) for share in shares], axis=1))
+            warmest = parts.argmax(axis=1)
+            heat = np.take_along_axis(parts, warmest[:, None], axis=1)[:, 0]
+            labels = np.where(heat > most, block[warmest], labels)
+            np.maximum(most, heat, out=most)
+        labels[emission.near.vertex] = emission.near.label
+        return labels
 
     def _rim(self, sources: SourceSet) -> BoolArray:
         """The source vertices that have a neighbour which is none.
@@ -233,13 +224,16 @@ class Emitter:
             found.append(Seeds(ends, offset[which] + lengths, label[which]))
         return _joined(*found)
 
-    def _straight_lines(self, sources: SourceSet) -> tuple[Seeds, Seeds]:
-        """Distance of the vertices that see a point or a curve in a straight line, as `NearField.seeds` has it."""
+    def _straight_lines(self, sources: SourceSet, rim: BoolArray) -> tuple[Seeds, Seeds]:
+        """Distance of the vertices that see a source in a straight line, as `NearField.seeds` has it.
+
+        Only where there are points or curves; for vertices alone, the ring of edges is enough.
+        """
         if self._on_faces is None or sources.on_vertices_alone:
             return _NONE, _NONE
-        return self._on_faces.seeds(
-            sources.points.joined(sources.segments.ends()), sources.segments, _RADIUS * self._domain.mean_edge_length
-        )
+        vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
+        points = sources.points.joined(sources.segments.ends())
+        return self._on_faces.seeds(points, sources.segments, _RADIUS * self._domain.mean_edge_length, vertices)
 
     def _heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""

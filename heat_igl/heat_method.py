@@ -296,8 +296,8 @@ class HeatMethodSolver:
         Returns
         -------
         LabelledDistance
-            Without `refine`, labels say from which source most of the heat comes, which at the border of two cells is
-            right to about an edge.
+            Without `refine`, labels say from which source most of the heat comes: a solve for each source, and right
+            but for vertices less than an edge from the border of two cells. With it, they come with the distance.
         """
         beyond = _cutoff(cutoff)
         emissions, u = self._diffuse([self._set(sources)])
@@ -305,7 +305,7 @@ class HeatMethodSolver:
             distance, labels = self._heat_order.labelled(emissions[0], u[:, 0])
         else:
             distance = self._integrated(emissions, u, *self._field(emissions, u))[0]
-            labels = self._emitter.labels(emissions[0], u[:, 0])
+            labels = self._emitter.labels(emissions[0])
         distance = _within(beyond, distance)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)

@@ -129,7 +129,9 @@ class NearField:
         lengths = np.concatenate([tri.l[f, (c + 2) % 3], tri.l[f, (c + 1) % 3]])
         return np.concatenate([which, which]), ends, lengths
 
-    def seeds(self, points: SourcePoints, segments: SourceSegments, radius: float) -> tuple[Seeds, Seeds]:
+    def seeds(
+        self, points: SourcePoints, segments: SourceSegments, radius: float, vertices: Seeds | None = None
+    ) -> tuple[Seeds, Seeds]:
         """Distance at the vertices that see a source in a straight line.
 
         Parameters
@@ -138,6 +140,8 @@ class NearField:
             The sources. The ends of segments are no sources by themselves.
         radius : float
             How far to look.
+        vertices : Seeds, optional
+            Vertices that are sources too.
 
         Returns
         -------
@@ -148,6 +152,8 @@ class NearField:
             Corners of the sources' own faces beyond `radius`, where another source may be nearer.
         """
         points, segments = self._carried(points, segments)
+        if vertices is not None:
+            points = points.joined(self._as_points(vertices))
         found = _Found(self.triangulation.n)
         windows = _joined([*self._of_points(points, found), *self._of_segments(segments, found)])
         own = found.seeds()
@@ -224,6 +230,13 @@ class NearField:
                 )
             )
         return windows
+
+    def _as_points(self, vertices: Seeds) -> SourcePoints:
+        """Vertices as points in the first of their faces; those without a face see nothing."""
+        corner, which = self.corners_at(vertices.vertex)
+        which, first = np.unique(which, return_index=True)
+        corner = corner[first]
+        return SourcePoints(corner // 3, np.eye(3)[corner % 3], vertices.label[which], vertices.value[which])
 
     def _on_both_sides(self, points: SourcePoints) -> SourcePoints:
         """The same, with points on an edge in both of its faces, and points in a vertex in all faces around it."""
