@@ -1,6 +1,7 @@
 """Geodesic distance on meshes by the heat method, on libigl's operators."""
 
 from heat_igl import baselines, closed_forms, cluster, metrics, reference, sampling, shapes
+from heat_igl.curve_files import write_curves
 from heat_igl.errors import (
     AccuracyWarning,
     BatchError,
@@ -13,7 +14,9 @@ from heat_igl.errors import (
 from heat_igl.heat_method import HeatMethodSolver, heat_method_distance
 from heat_igl.images import ImageDomain, image_domain
 from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_mesh
+from heat_igl.isolines import enclosed_areas, isolines, offset_curves, sublevel_areas
 from heat_igl.mesh import Mesh, MeshReport
+from heat_igl.paths import shortest_paths
 from heat_igl.polygons import PolygonMesh, polygon_operators
 from heat_igl.projection import ClosestPoints, closest_points, curve_on, edge_curve
 from heat_igl.refine import Refinement, unfolded_distance
@@ -37,8 +40,8 @@ from heat_igl.validation_report import ValidationReport, ValidationRow
 
 __all__ = [
     "AccuracyWarning",
-    "ClosestPoints",
     "BatchError",
+    "ClosestPoints",
     "Diagnostics",
     "FactorizationError",
     "HeatMethodSolver",
@@ -67,12 +70,15 @@ __all__ = [
     "diameter",
     "distance_matrix",
     "dual_triangulation",
+    "enclosed_areas",
     "farthest_cells",
     "farthest_points",
     "geodesic_centre",
     "heat_method_distance",
     "image_domain",
+    "isolines",
     "metrics",
+    "offset_curves",
     "polygon_operators",
     "read_attributes",
     "read_mesh",
@@ -80,11 +86,14 @@ __all__ = [
     "reference",
     "sampling",
     "shapes",
+    "shortest_paths",
     "speed_operators",
     "split_long_edges",
+    "sublevel_areas",
     "unfolded_distance",
     "validate",
     "voronoi_cells",
+    "write_curves",
     "write_mesh",
 ]
 

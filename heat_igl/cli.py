@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, cast, get_args
 
 import numpy as np
 import typer
@@ -24,6 +24,7 @@ from rich.progress import Progress
 from rich.text import Text
 
 import heat_igl
+from heat_igl.curve_files import CURVE_SUFFIXES
 from heat_igl.errors import (
     AccuracyWarning,
     BatchError,
@@ -38,7 +39,7 @@ from heat_igl.heat_method import HeatMethodSolver, Magnitude
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Laplacian
-from heat_igl.picture import PICTURE_SUFFIXES, Picture
+from heat_igl.picture import PAGE_SUFFIXES, PICTURE_SUFFIXES, Picture, replace_file
 from heat_igl.refine import Refine
 from heat_igl.sources import vertex_sources
 from heat_igl.steps import Boundary
@@ -49,6 +50,9 @@ __all__ = ["app", "run"]
 
 # What a user can cause; anything else is a fault of the package and shows its traceback.
 _EXPECTED = (OSError, ValueError, BatchError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
+
+# More isolines than this are a mistaken spacing.
+_MOST_LINES = 10000
 
 _DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
 
@@ -144,17 +148,6 @@ def _check_writable(path: Path) -> None:
         raise OSError(f"{path} cannot be written: {error.strerror}") from error
 
 
-def _write_text(path: Path, text: str) -> None:
-    """Write a file that replaces an existing one only when it is complete."""
-    target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{target.name}.{os.getpid()}")
-    try:
-        temporary.write_text(text, encoding="utf8")
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
 def _one_of(choices: tuple[str, ...]) -> Callable[[str | None], str | None]:
     def check(value: str | None) -> str | None:
         if value is not None and value not in choices:
@@ -226,6 +219,49 @@ def distance(
 
 
 @app.command()
+def isolines(
+    mesh: MeshArgument,
+    source: Annotated[list[int], typer.Option(help="Source vertex, counted from 0; repeat for several.")],
+    spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=_positive)],
+    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the lines.")],
+    refine: Annotated[str | None, _choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+) -> None:
+    """Curves of equal distance from one or more source vertices."""
+    loaded = read_mesh(mesh)
+    sources = vertex_sources(np.array(source), loaded.n_vertices)
+    _check_curves(output)
+    phi = HeatMethodSolver(loaded, refine=cast(Refine | None, refine)).distance(sources)
+    farthest = float(phi[np.isfinite(phi)].max())
+    if farthest > _MOST_LINES * spacing:
+        raise ValueError(
+            f"--spacing {spacing:g} makes over {_MOST_LINES} lines up to {farthest:.3g}: choose a larger one"
+        )
+    levels = spacing * np.arange(1, int(farthest / spacing) + 1)
+    curves = heat_igl.isolines(loaded, phi, levels)
+    heat_igl.write_curves(output, loaded, {f"{level:g}": each for level, each in zip(levels, curves, strict=True)})
+    rows = [("farthest", f"{farthest:.6g}"), ("lines", f"{sum(map(len, curves))} at {len(levels)} distances")]
+    _print_rows([*rows, ("wrote", str(output))])
+
+
+@app.command()
+def path(
+    mesh: MeshArgument,
+    start: Annotated[int, typer.Option("--from", help="Vertex where the path begins, counted from 0.")],
+    end: Annotated[int, typer.Option("--to", help="Vertex where it ends.")],
+    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the path.")],
+) -> None:
+    """A locally shortest path between two vertices."""
+    loaded = read_mesh(mesh)
+    for vertex in (start, end):
+        vertex_sources(vertex, loaded.n_vertices)
+    _check_curves(output)
+    found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), start, end)
+    heat_igl.write_curves(output, loaded, found)
+    length = float(found[0].lengths(loaded).sum())
+    _print_rows([("length", f"{length:.6g}"), ("segments", str(len(found[0]))), ("wrote", str(output))])
+
+
+@app.command()
 def validate(
     mesh: MeshArgument,
     sources: Annotated[int, typer.Option(min=1, help="Single source vertices, one distance from each.")] = 3,
@@ -257,13 +293,62 @@ def validate(
     if picture is not None:
         Picture(report.plot()).save(picture)
     if json_file is not None:
-        _write_text(json_file, json.dumps(report.to_dict(), indent=1, allow_nan=False) + "\n")
+        replace_file(json_file, (json.dumps(report.to_dict(), indent=1, allow_nan=False) + "\n").encode("utf8"))
     print(report.to_markdown(), end="")
     exceeding = report.exceeding(fail_above) if fail_above is not None else ()
     if exceeding:
         names = ", ".join(row.method for row in exceeding)
         _say(f"no mean error of at most {fail_above:g} % for {names}")
         raise typer.Exit(1)
+
+
+@app.command()
+def view(
+    mesh: MeshArgument,
+    source: Annotated[list[int] | None, typer.Option(help="Source vertex to start with; repeat for several.")] = None,
+    t_coef: Annotated[float, typer.Option(help="Time step in squared mean edge lengths.", callback=_positive)] = 1.0,
+    boundary: Annotated[str, _choice(Boundary, "What heat does at the boundary.")] = "neumann",
+    refine: Annotated[str | None, _choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
+) -> None:
+    """A window in which a click moves the source and the distance follows; where there is no display, a page."""
+    from heat_igl.viewer import Exploration, Options, Window, display_problem
+
+    loaded = read_mesh(mesh)
+    sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
+    chosen: dict[str, Any] = {"boundary": boundary, "refine": refine}
+    target = html or Path(f"{mesh.stem}-view.html")
+    problem = None if html else display_problem()
+    if html or problem:
+        _check_page(target)
+    with Console(stderr=True).status("factoring"):
+        shown = Exploration(loaded, sources, Options(t_coef=t_coef, **chosen))
+    if html is None and problem is None:
+        try:
+            window = Window(shown, title=f"heat-igl: {mesh.name}")
+        except RuntimeError as error:
+            problem = str(error)
+            _check_page(target)
+        else:
+            window.run()
+            return
+    from heat_igl.plots import write_html
+
+    kind = f"unfolded in heat order (refine = {refine})" if refine else "the heat method"
+    write_html(
+        target, loaded, shown.distance, sources=sources, title=mesh.name,
+        method=f"Distance by {kind}, t = {t_coef:g} h^2, boundary {boundary}.",
+    )  # fmt: skip
+    if problem:
+        _say(f"no window: {problem}")
+    _print_rows([("mesh", f"{mesh}: {loaded.n_vertices} vertices"), ("wrote", f"{target} (open it in a browser)")])
+
+
+def _check_page(path: Path) -> None:
+    if path.suffix.lower() not in PAGE_SUFFIXES:
+        raise ValueError(f"--html {path}: pages go to {' or '.join(PAGE_SUFFIXES)} files")
+    _require("matplotlib", "a page", "view")
+    _check_writable(path)
 
 
 @app.command()
@@ -340,6 +425,14 @@ def _check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> Non
             raise ValueError(f"--picture {picture}: pictures go to {', '.join(PICTURE_SUFFIXES)} files")
         _require("matplotlib", "a picture", "view")
         _check_writable(picture)
+
+
+def _check_curves(output: Path) -> None:
+    if output.suffix.lower() not in CURVE_SUFFIXES:
+        raise ValueError(f"--output {output}: curves go to {', '.join(CURVE_SUFFIXES)} files")
+    if output.suffix.lower() == ".dxf":
+        _require("ezdxf", "a .dxf file", "io")
+    _check_writable(output)
 
 
 def _require(package: str, purpose: str, extra: str) -> None:

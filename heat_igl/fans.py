@@ -14,9 +14,9 @@ from typing import Any, NamedTuple, TypeVar, cast
 import numba
 import numpy as np
 
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["Tables", "inline", "jit", "tables"]
+__all__ = ["Tables", "breadth_first", "inline", "jit", "tables"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -33,8 +33,11 @@ def inline(function: Function) -> Function:
 
 
 # Columns of `Tables.spoke`, and of its view as integers.
-LENGTH, ANGLE_HERE, ANGLE_THERE, APEX_X, APEX_Y, BASE = 0, 1, 2, 3, 4, 5
-NEIGHBOUR, FAN_THERE, CORNER, NEXT_SPOKE, FAN_HERE = 12, 13, 14, 15, 16
+LENGTH, ALONG, HEIGHT, BASE, PER_BASE = 0, 1, 2, 3, 4
+NEIGHBOUR, NEXT_SPOKE = 10, 11
+# Columns of `Tables.turn`, and of its view as integers.
+ANGLE_HERE, ANGLE_THERE = 0, 1
+FAN_HERE, FAN_THERE, CORNER, MANY = 4, 5, 6, 7
 # Columns of `Tables.step`, and of its view as integers.
 FAR_X, FAR_Y, FAR_ANGLE = 0, 1, 2
 FAR, TO_RIGHT, TO_LEFT, FAR_FAN = 6, 7, 8, 9
@@ -47,13 +50,17 @@ class Tables(NamedTuple):
     ----------
     first : (n + 1,) int64
         Spokes of vertex v are ``first[v]`` to ``first[v + 1]``, counter-clockwise, fan after fan.
-    spoke : (s, 9) float64
-        Length; direction of the spoke at v; direction of the same edge at the neighbour (angles in their fans). Of the
-        triangle to the left of the spoke: v's place over the opposite side, along it and to its left in units of that
-        side, and the length of the side.
-    spoke_id : (s, 18) int32
-        The same memory. The neighbour; the neighbour's fan; the half-edge opposite v in the triangle to the left (-1
-        past the end of an open fan); the next spoke, on the other side of that triangle; v's fan.
+    spoke : (s, 6) float64
+        Length. Of the triangle to the left of the spoke: v's place over the opposite side, along it from the spoke's
+        end and in height; the length of that side, and one over it. Past the end of an open fan, where there is no
+        triangle: 0, nan, 0, nan, so that whatever is computed from them compares false.
+    spoke_id : (s, 12) int32
+        The same memory. The neighbour; the next spoke, on the other side of that triangle (or the spoke itself).
+    turn : (s, 4) float64
+        Direction of the spoke at v; direction of the same edge at the neighbour (angles in their fans).
+    turn_id : (s, 8) int32
+        The same memory. v's fan; the neighbour's; the half-edge opposite v in the triangle to the left, -1 if none;
+        whether more than two faces meet at that half-edge.
     step : (3 m, 5) float64
         For a half-edge that is crossed, where the far vertex lies, in units of the half-edge on the other side; the
         direction of the edge from the far vertex to the right end (seen in the walk: to b) in the far vertex's fan.
@@ -62,14 +69,19 @@ class Tables(NamedTuple):
         when passing left of it; its fan.
     total : (k,) float64
         Sum of the angles of each fan, negative for a fan that is open.
+    is_flat : (n,) bool
+        Whether a vertex, or its first fan, has no curvature; true on the boundary.
     """
 
     first: IntArray
     spoke: FloatArray
     spoke_id: AnyArray
+    turn: FloatArray
+    turn_id: AnyArray
     step: FloatArray
     step_id: AnyArray
     total: FloatArray
+    is_flat: BoolArray
 
 
 @inline
@@ -166,6 +178,8 @@ def _fill_spokes(
     first: IntArray,
     spoke: FloatArray,
     spoke_id: AnyArray,
+    turn: FloatArray,
+    turn_id: AnyArray,
 ) -> None:
     """The spokes of each vertex, from its corners in fan order."""
     vertex = F.ravel()
@@ -178,21 +192,22 @@ def _fill_spokes(
         k = fill[v]
         if i == 0 or fan[h] != fan[in_order[i - 1]]:
             fan_start = k
-        row, ids = spoke[k], spoke_id[k]
-        row[LENGTH], row[ANGLE_HERE], row[ANGLE_THERE] = length[left], angle[h], angle[right] + corner_angle[right]
-        row[APEX_X], row[APEX_Y], row[BASE] = apex[h, 0], apex[h, 1], length[h]
-        ids[NEIGHBOUR], ids[FAN_THERE], ids[CORNER] = vertex[right], fan[right], h
-        ids[NEXT_SPOKE], ids[FAN_HERE] = k + 1, fan[h]
+        spoke[k, LENGTH], spoke[k, BASE], spoke[k, PER_BASE] = length[left], length[h], 1.0 / length[h]
+        spoke[k, ALONG], spoke[k, HEIGHT] = apex[h, 0] * length[h], apex[h, 1] * length[h]
+        spoke_id[k, NEIGHBOUR], spoke_id[k, NEXT_SPOKE] = vertex[right], k + 1
+        turn[k, ANGLE_HERE], turn[k, ANGLE_THERE] = angle[h], angle[right] + corner_angle[right]
+        turn_id[k, FAN_HERE], turn_id[k, FAN_THERE], turn_id[k, CORNER] = fan[h], fan[right], h
+        turn_id[k, MANY] = twin[h] < -1
         fill[v] += 1
         if twin[_next(h)] < 0:
             k += 1
-            row, ids = spoke[k], spoke_id[k]
-            row[LENGTH], row[ANGLE_HERE], row[ANGLE_THERE] = length[right], angle[h] + corner_angle[h], angle[left]
-            ids[NEIGHBOUR], ids[FAN_THERE], ids[CORNER] = vertex[left], fan[left], -1
-            ids[NEXT_SPOKE], ids[FAN_HERE] = k, fan[h]
+            spoke[k, LENGTH], spoke[k, HEIGHT], spoke[k, PER_BASE] = length[right], np.nan, np.nan
+            spoke_id[k, NEIGHBOUR], spoke_id[k, NEXT_SPOKE] = vertex[left], k
+            turn[k, ANGLE_HERE], turn[k, ANGLE_THERE] = angle[h] + corner_angle[h], angle[left]
+            turn_id[k, FAN_HERE], turn_id[k, FAN_THERE], turn_id[k, CORNER] = fan[h], fan[left], -1
             fill[v] += 1
         elif i + 1 == len(in_order) or fan[in_order[i + 1]] != fan[h]:
-            ids[NEXT_SPOKE] = fan_start
+            spoke_id[k, NEXT_SPOKE] = fan_start
 
 
 @jit
@@ -216,14 +231,50 @@ def _fill_steps(
         ids[FAR], ids[TO_RIGHT], ids[TO_LEFT], ids[FAR_FAN] = vertex[t], _next(t), _previous(t), fan[t]
 
 
+@jit
+def breadth_first(F: IntArray, twin: IntArray, n: int) -> tuple[IntArray, IntArray]:
+    """Number (n,) of each vertex, and the faces (m,), in the order in which a front over glued faces meets them."""
+    m = len(F)
+    number = np.full(n, -1, np.int64)
+    faces = np.empty(m, np.int64)
+    is_met = np.zeros(m, np.bool_)
+    n_met = n_numbered = n_done = 0
+    for start in range(m):
+        if not is_met[start]:
+            is_met[start] = True
+            faces[n_met] = start
+            n_met += 1
+        while n_done < n_met:
+            f = faces[n_done]
+            n_done += 1
+            for c in range(3):
+                if number[F[f, c]] < 0:
+                    number[F[f, c]] = n_numbered
+                    n_numbered += 1
+                t = twin[3 * f + c]
+                if t >= 0 and not is_met[t // 3]:
+                    is_met[t // 3] = True
+                    faces[n_met] = t // 3
+                    n_met += 1
+    for v in range(n):
+        if number[v] < 0:
+            number[v] = n_numbered
+            n_numbered += 1
+    return number, faces
+
+
 def tables(F: IntArray, l: FloatArray, twin: IntArray, n: int) -> Tables:  # noqa: E741
-    """The tables of m triangles on n vertices, oriented alike; `twin` < 0 on the boundary."""
+    """The tables of m triangles on n vertices, oriented alike; `twin` is -1 on the boundary, -2 between more than two."""
     length = l.ravel()
     apex, corner_angle = _shapes(l)
     angle, fan, total, in_order = _fans(twin, corner_angle)
     first = _count_spokes(F, twin, n)
-    spoke, step = np.zeros((first[-1], 9)), np.zeros((F.size, 5))
-    spoke_id, step_id = spoke.view(np.int32), step.view(np.int32)
-    _fill_spokes(F, twin, length, apex, corner_angle, angle, fan, in_order, first, spoke, spoke_id)
+    spoke, turn, step = np.zeros((first[-1], 6)), np.zeros((first[-1], 4)), np.zeros((F.size, 5))
+    spoke_id, turn_id, step_id = spoke.view(np.int32), turn.view(np.int32), step.view(np.int32)
+    _fill_spokes(F, twin, length, apex, corner_angle, angle, fan, in_order, first, spoke, spoke_id, turn, turn_id)
     _fill_steps(F, twin, apex, angle, fan, step, step_id)
-    return Tables(first, spoke, spoke_id, step, step_id, total)
+    is_flat = np.ones(n, bool)
+    used = np.flatnonzero(np.diff(first))
+    around = total[turn_id[first[used], FAN_HERE]]
+    is_flat[used] = (around < 0) | (np.abs(around - 2 * np.pi) < 1e-9)
+    return Tables(first, spoke, spoke_id, turn, turn_id, step, step_id, total, is_flat)

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
+from heat_igl.blocks import block_size, float_type, in_blocks, in_order, progress_bar, row_writer
 from heat_igl.emission import Emission, Emitter
-from heat_igl.errors import AccuracyWarning, MissingExtraError, SourceError
-from heat_igl.factorization import Backend
+from heat_igl.errors import AccuracyWarning, SourceError
+from heat_igl.factorization import Analysis, Backend
 from heat_igl.heat_order import HeatOrder
 from heat_igl.mesh import RANGE_LIMIT, Mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators, operators
+from heat_igl.processors import n_threads
 from heat_igl.refine import Refine
 from heat_igl.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.sources import Sources, SourceSet, source_set
-from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, damping, normalize
+from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, analysis, damping, descent, normalize
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_time_step"]
@@ -27,8 +30,6 @@ Magnitude = Literal["auto", "unit", "damped"]
 
 # Below this the heat has lost digits to gradual underflow.
 _LOWEST_HEAT = 1e-300
-# Right-hand sides solved together; wider blocks measured no faster.
-_BLOCK = 8
 
 
 def _positive(name: str, value: float) -> float:
@@ -78,7 +79,7 @@ class HeatMethodSolver:
         Integrate nothing, and find the distance in the order of the heat by unfolding triangles, one at a time or in
         strips: 0.2 to 0.7 % and 0.001 to 0.01 % mean error on common meshes, see `Refinement`. Needs triangles, and
         numba (extra ``fast``); no Poisson problem is factored.
-    backend : {"auto", "scipy", "cholespy"}
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
         Linear solver, see `factorize`.
 
     Raises
@@ -103,6 +104,9 @@ class HeatMethodSolver:
     so. The solver is immutable; threads may share it, and a pickled copy gives the same bits.
     """
 
+    _mesh: Mesh | None
+    _options: dict[str, Any]
+
     def __init__(
         self,
         mesh: Mesh | ArrayLike,
@@ -116,12 +120,27 @@ class HeatMethodSolver:
         refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> None:
+        options = {
+            "t_coef": t_coef,
+            "t": t,
+            "laplacian": laplacian,
+            "boundary": boundary,
+            "magnitude": magnitude,
+            "refine": refine,
+            "backend": backend,
+        }
+        self._set_up_mesh(_as_mesh(mesh, F), options)
+
+    def _set_up_mesh(self, mesh: Mesh, options: dict[str, Any], known: Analysis | None = None) -> None:
         start = time.perf_counter()
-        domain = operators(_as_mesh(mesh, F), laplacian)
-        seconds = time.perf_counter() - start
-        if magnitude == "auto" and laplacian == "cotan":
-            magnitude = "unit"
-        self._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, seconds)
+        self._mesh = mesh
+        self._options = options
+        rest = dict(options)
+        laplacian = rest.pop("laplacian")
+        domain = operators(mesh, laplacian)
+        if rest["magnitude"] == "auto" and laplacian == "cotan":
+            rest["magnitude"] = "unit"
+        self._set_up(domain, **rest, seconds_operators=time.perf_counter() - start, known=known)
 
     @classmethod
     def from_operators(
@@ -137,6 +156,7 @@ class HeatMethodSolver:
     ) -> HeatMethodSolver:
         """A solver on any domain that has operators; parameters as for the class."""
         solver = cls.__new__(cls)
+        solver._mesh = None
         solver._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, 0.0)
         return solver
 
@@ -181,7 +201,38 @@ class HeatMethodSolver:
         if magnitude == "auto" and laplacian == "cotan":
             magnitude = "unit"
         solver = cls.__new__(cls)
+        solver._mesh = None
         solver._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, seconds)
+        return solver
+
+    def with_vertices(self, V: ArrayLike) -> HeatMethodSolver:
+        """A new solver after the vertices have moved; this one stays as it is.
+
+        Parameters
+        ----------
+        V : (n, 3) array_like
+            New positions of all vertices.
+
+        Returns
+        -------
+        HeatMethodSolver
+            With the same faces and options, and the same results as one made anew. The time step follows `t_coef`,
+            unless `t` was given. What the faces alone say is shared: they are not validated, and edges, boundary and
+            components not found again; nor is the order of elimination, unless other edges are flipped.
+
+        Raises
+        ------
+        MeshError
+            If `V` cannot be used; the message names the first offender.
+        ValueError
+            If the solver was made from operators.
+        """
+        if self._mesh is None:
+            raise ValueError(
+                "this solver was made from operators and has no vertices to move: use from_operators again"
+            )
+        solver = HeatMethodSolver.__new__(HeatMethodSolver)
+        solver._set_up_mesh(self._mesh.with_vertices(V), self._options, self._analysis)
         return solver
 
     def _set_up(
@@ -194,6 +245,7 @@ class HeatMethodSolver:
         refine: Refine | None,
         backend: Backend,
         seconds_operators: float,
+        known: Analysis | None = None,
     ) -> None:
         start = time.perf_counter()
         if magnitude not in ("auto", "unit", "damped"):
@@ -210,17 +262,22 @@ class HeatMethodSolver:
                 stacklevel=3,
             )
         self._operators = domain
-        self._heat_flow = HeatFlow(domain, step, boundary, backend)
+        self._analysis = analysis(domain, backend, known)
+        analysed = time.perf_counter()
+        makers: list[Callable[[], Any]] = [lambda: HeatFlow(domain, step, boundary, backend, self._analysis)]
+        if refine is None:
+            makers.append(lambda: PoissonProblem(domain, backend, self._analysis))
+        # Both matrices at once: the backends run without the interpreter's lock.
+        self._heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
+        self._poisson: PoissonProblem | None = poisson[0] if poisson else None
+        factored = time.perf_counter()
         self._emitter = Emitter(domain, self._heat_flow)
         self._given_faces = domain.given_faces
-        self._poisson: PoissonProblem | None = None
-        self._heat_order: HeatOrder | None = None
+        self._heat_order = None if refine is None else HeatOrder(domain, refine)
         if refine is None:
-            self._poisson = PoissonProblem(domain, backend)
-            _ = domain.D  # made on first use otherwise, in the middle of the first query
-        else:
-            self._heat_order = HeatOrder(domain, refine)
+            _ = domain.gradient_rows  # made on first use otherwise, in the middle of the first query
         triangulation = domain.triangulation
+        factors = self._heat_flow.factors + ([] if self._poisson is None else [self._poisson.factor])
         self._diagnostics = Diagnostics(
             t=step,
             t_requested=requested,
@@ -230,7 +287,10 @@ class HeatMethodSolver:
             lengthening=triangulation.lengthening if triangulation else 0.0,
             backend=self._heat_flow.backend,
             seconds_operators=seconds_operators,
-            seconds_factorization=time.perf_counter() - start,
+            factor_nonzeros=sum(factor.nonzeros for factor in factors),
+            factor_bytes=sum(factor.n_bytes for factor in factors),
+            seconds_analysis=analysed - start,
+            seconds_factorization=factored - analysed,
         )
 
     @property
@@ -282,7 +342,8 @@ class HeatMethodSolver:
         AccuracyWarning
             If heat underflowed on the way, so that distances beyond are too short.
         """
-        return np.asarray(self._distances([self._set(sources)], _cutoff(cutoff))[0])
+        beyond = _cutoff(cutoff)
+        return np.asarray(_within(beyond, self._distances([self._set(sources)]))[0])
 
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
         """Distance, and which source is nearest: a geodesic Voronoi diagram.
@@ -304,7 +365,7 @@ class HeatMethodSolver:
         if self._heat_order is not None:
             distance, labels = self._heat_order.labelled(emissions[0], u[:, 0])
         else:
-            distance = self._integrated(emissions, u, *self._field(emissions, u))[0]
+            distance = self._integrated(emissions, u)[0]
             labels = self._emitter.labels(emissions[0])
         distance = _within(beyond, distance)
         labels[np.isinf(distance)] = -1
@@ -315,52 +376,111 @@ class HeatMethodSolver:
         source_sets: Sequence[Sources],
         out: AnyArray | None = None,
         progress: bool = False,
+        dtype: npt.DTypeLike | None = None,
         *,
         cutoff: float | None = None,
     ) -> AnyArray:
-        """Distance from each of several sets of sources, solved in blocks.
+        """Distance from each of several sets of sources, solved in blocks, on all processors.
 
         Parameters
         ----------
         source_sets : sequence of sources
             k entries, each as for `distance`.
         out : (k, n) array of float, optional
-            Where to write, for instance a `numpy.memmap`; float64 or float32.
+            Where to write: an array, a `numpy.memmap`, a zarr array, or whatever has a shape and a dtype and takes
+            ``out[start:stop] = rows``. A chunked array is written a whole row of chunks at a time.
         progress : bool
             Show a progress bar on standard error (extra ``cli``).
+        dtype : float64 or float32, optional
+            Of the result; float64, or that of `out`.
         cutoff : float, optional
             Distances beyond this are ``inf``.
 
         Returns
         -------
-        (k, n) float64, or `out`
-            Row i is the distance from ``source_sets[i]``; the same as one by one to rounding.
+        (k, n) array of `dtype`, or `out`
+            Row i is the distance from ``source_sets[i]``; the same as one by one to rounding, whatever the number of
+            threads.
 
         Raises
         ------
         SourceError
-            Before anything is solved, if an entry does not describe places on the mesh; the message says which.
+            Before anything is solved, if an entry does not name sources; the message says which.
         ValueError
-            If `out` has the wrong shape or cannot hold floats, or `cutoff` is not positive.
+            If `out` has the wrong shape, cannot hold floats or cannot be written, if `dtype` is none for distances, or
+            if `cutoff` is not positive.
+
+        Notes
+        -----
+        Beside the result and one row of chunks of `out`, it holds at most 1 GiB, or what one query takes where that is
+        more: 130 bytes per face. The number of threads is that of the processors, or ``HEAT_IGL_NUM_THREADS``.
         """
         if not hasattr(source_sets, "__len__"):
             raise SourceError(f"source_sets must be a sequence of sets of sources, not {source_sets!r}: try distance")
         beyond = _cutoff(cutoff)
-        chosen = []
-        for i, sources in enumerate(source_sets):
-            try:
-                chosen.append(self._set(sources))
-            except SourceError as error:
-                raise SourceError(f"source_sets[{i}]: {error}") from None
+        chosen = list(self._named(source_sets))
         shape = (len(chosen), self.n_vertices)
         if out is None:
-            out = np.empty(shape)
-        elif out.shape != shape or out.dtype.kind != "f":
+            out = np.empty(shape, float_type(dtype))
+        elif tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f":
             raise ValueError(f"out must be an array of floats of shape {shape}, not {out.dtype} of shape {out.shape}")
-        starts: Any = range(0, len(chosen), _BLOCK)
-        for start in _tracked(starts) if progress else starts:
-            out[start : start + _BLOCK] = self._distances(chosen[start : start + _BLOCK], beyond)
+        elif dtype is not None and float_type(dtype) != out.dtype:
+            raise ValueError(f"dtype is {np.dtype(dtype)}, but out holds {out.dtype}: leave one of them away")
+        elif isinstance(out, np.ndarray) and not out.flags.writeable:
+            raise ValueError("out is read-only: open a memmap with mode='r+'")
+        write = row_writer(out)
+        with progress_bar("distances", len(chosen), progress) as advance:
+            for rows in self._blocks(chosen, len(chosen)):
+                write(_within(beyond, rows).astype(out.dtype, copy=False))
+                advance(len(rows))
         return out
+
+    def iter_distances(self, source_sets: Iterable[Sources], dtype: npt.DTypeLike | None = None) -> Iterator[AnyArray]:
+        """Distance from each of several sets of sources, a row as soon as its block is solved.
+
+        Parameters
+        ----------
+        source_sets : iterable of sources
+            Each as for `distance`; drawn from as the rows are taken, so it may be a generator without an end.
+        dtype : float64 or float32, optional
+            Of the rows.
+
+        Yields
+        ------
+        (n,) array of `dtype`
+            In the order of `source_sets`; no view of anything else.
+
+        Raises
+        ------
+        SourceError
+            When the row of an entry that does not name sources would be next; the message says which.
+        ValueError
+            At once, if `dtype` is none for distances.
+
+        Notes
+        -----
+        Memory is bounded as for `distances`, whatever the number of sets; blocks are solved ahead on all processors
+        while rows are being used.
+        """
+        row_type = float_type(dtype)
+        if not isinstance(source_sets, Iterable):
+            raise SourceError(f"source_sets must be an iterable of sets of sources, not {source_sets!r}: try distance")
+        n_sets = len(source_sets) if isinstance(source_sets, Sized) else None
+        blocks = self._blocks(self._named(source_sets), n_sets)
+        return (row.astype(row_type) for rows in blocks for row in rows)
+
+    def _named(self, source_sets: Iterable[Sources]) -> Iterator[SourceSet]:
+        """The sources of each set; errors say which set they are in."""
+        for i, sources in enumerate(source_sets):
+            try:
+                yield self._set(sources)
+            except SourceError as error:
+                raise SourceError(f"source_sets[{i}]: {error}") from None
+
+    def _blocks(self, source_sets: Iterable[SourceSet], n_sets: int | None) -> Iterator[FloatArray]:
+        """Distances of a block of sets after the other."""
+        size, threads = block_size(len(self._operators.weights), n_sets, n_threads())
+        return in_order(self._distances, in_blocks(source_sets, size), threads)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
@@ -370,7 +490,7 @@ class HeatMethodSolver:
         if self._heat_order is not None:
             distance = self._heat_order.distances(emissions, u)
         else:
-            distance = self._integrated(emissions, u, X, magnitude)
+            distance = self._integrated(emissions, u)
         with np.errstate(under="ignore"):
             heat = u[:, 0] / self._emitter.unit(emissions[0]) / self._heat_flow.mean_mass
         direction = np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T)
@@ -386,14 +506,12 @@ class HeatMethodSolver:
     def _set(self, sources: Sources) -> SourceSet:
         return source_set(sources, self.n_vertices, self._given_faces)
 
-    def _distances(self, source_sets: list[SourceSet], cutoff: float | None) -> FloatArray:
+    def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
         """Distances (k, n) from k sets of sources."""
         emissions, u = self._diffuse(source_sets)
         if self._heat_order is not None:
-            distances = self._heat_order.distances(emissions, u)
-        else:
-            distances = self._integrated(emissions, u, *self._field(emissions, u))
-        return _within(cutoff, distances)
+            return self._heat_order.distances(emissions, u)
+        return self._integrated(emissions, u)
 
     def _diffuse(self, source_sets: list[SourceSet]) -> tuple[list[Emission], FloatArray]:
         """Heat (n, k) from k sets of sources."""
@@ -411,12 +529,19 @@ class HeatMethodSolver:
             self._emitter.guide(emission, X[:, column], magnitude[:, column])
         return X, magnitude
 
-    def _integrated(self, emissions: list[Emission], u: FloatArray, X: FloatArray, magnitude: FloatArray) -> FloatArray:
+    def _divergence(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
+        """Right-hand sides (n, k) of step 3."""
+        domain = self._operators
+        if not any(emission.guides.any() for emission in emissions):
+            return descent(domain, u, self.t if self._damped else None)
+        X, magnitude = self._field(emissions, u)
+        return np.asarray(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1))))
+
+    def _integrated(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
         """Distances (k, n) by step 3."""
         if self._poisson is None:
             raise RuntimeError("this solver unfolds and has no Poisson problem")
-        domain = self._operators
-        phi = self._poisson.solve(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1))))
+        phi = self._poisson.solve(self._divergence(emissions, u))
         distances = np.empty(phi.T.shape)
         for column, emission in enumerate(emissions):
             self._warn_if_cold(u[:, column], emission)
@@ -449,14 +574,6 @@ def _within(cutoff: float | None, distances: FloatArray) -> FloatArray:
     if cutoff is not None:
         distances[distances > cutoff] = np.inf
     return distances
-
-
-def _tracked(starts: Any) -> Any:
-    try:
-        from rich.progress import track
-    except ImportError:
-        raise MissingExtraError.of("progress=True", "rich", "cli") from None
-    return track(starts, description="distances")
 
 
 def _as_mesh(mesh: Mesh | ArrayLike, F: ArrayLike | None) -> Mesh:

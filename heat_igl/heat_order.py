@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 
 from heat_igl.emission import Emission, take_shorter
 from heat_igl.near_field import NearField
 from heat_igl.operators import Operators
-from heat_igl.processors import n_threads
 from heat_igl.refine import Refine, Refinement
 from heat_igl.sources import SourcePoints
 from heat_igl.surface_points import SurfacePoints
@@ -55,14 +52,11 @@ class HeatOrder:
         self._spacing = _SPACING * domain.mean_edge_length
 
     def distances(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
-        """Distances (k, n) for heat (n, k), on all processors: the kernels run without the interpreter's lock.
+        """Distances (k, n) for heat (n, k).
 
         Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
         """
-        if len(emissions) == 1:
-            return self._distance(emissions[0], u[:, 0])[None]
-        with ThreadPoolExecutor(n_threads()) as pool:
-            return np.stack(list(pool.map(self._distance, emissions, u.T)))
+        return np.stack([self._distance(emission, one) for emission, one in zip(emissions, u.T, strict=True)])
 
     def labelled(self, emission: Emission, u: FloatArray) -> tuple[FloatArray, IntArray]:
         """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 where none is reached."""

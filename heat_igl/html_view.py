@@ -21,7 +21,7 @@ import numpy as np
 
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.mesh import Mesh
-from heat_igl.picture import replace_file
+from heat_igl.picture import PAGE_SUFFIXES, replace_file
 from heat_igl.scene import DISTANCE_LABEL, LINE_INK, STRIPE_INK, Style, check_style, colours, scene
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike
@@ -57,8 +57,8 @@ class Page:
             If the file cannot be written.
         """
         target = Path(path)
-        if target.suffix.lower() not in (".html", ".htm"):
-            raise ValueError(f"{target} must end in .html to be a page")
+        if target.suffix.lower() not in PAGE_SUFFIXES:
+            raise ValueError(f"{target} must end in {' or '.join(PAGE_SUFFIXES)} to be a page")
         replace_file(target, self.html.encode("utf8"))
 
     def _repr_html_(self) -> str:
@@ -83,8 +83,9 @@ def page(
 
     Dragging turns it, the wheel or two fingers zoom, Shift moves. The page reads out vertex, position and distance
     under the pointer. A click makes the vertex the source, and the distance follows: computed in the page by unfolding
-    triangle after triangle over the intrinsic Delaunay triangulation, to 1e-4 what ``refine="sweep"`` gives. Of
-    tetrahedra the outside is shown, and a click reads only: the way leads through the inside.
+    triangle after triangle over the intrinsic Delaunay triangulation, to 1e-3 (on average 1e-5) what
+    ``refine="sweep"`` gives. Of tetrahedra the outside is shown, and a click reads only: the way leads through the
+    inside.
 
     Parameters
     ----------
@@ -98,7 +99,7 @@ def page(
     Returns
     -------
     Page
-        Shown by notebooks; `Page.save` writes it. It takes 25 kB and about 55 bytes per vertex, and needs
+        Shown by notebooks; `Page.save` writes it. It takes 35 kB and 50 to 55 bytes per vertex, and needs
         a browser with WebGL 2 and DecompressionStream (2023 or later).
 
     Raises

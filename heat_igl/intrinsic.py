@@ -176,9 +176,12 @@ def from_edge_lengths(
     if bad.any():
         f, c = (int(i) for i in np.argwhere(bad)[0])
         raise MeshError(f"l[{f}, {c}] = {lengths[f, c]} is not a length ({int(bad.sum())} entries are not)")
-    half_edge = np.argsort(found.of_face.ravel(), kind="stable")
-    half_edge = half_edge[(found.n_faces[found.of_face] == 2).ravel()[half_edge]]
-    a, b = half_edge[0::2], half_edge[1::2]
+    half_edge = np.arange(F.size)
+    first, last = np.empty((2, len(found.n_faces)), np.int64)
+    # Of what is written to one place several times, the last stays.
+    last[found.of_face.ravel()] = half_edge
+    first[found.of_face.ravel()[::-1]] = half_edge[::-1]
+    a, b = first[found.n_faces == 2], last[found.n_faces == 2]
     differs = np.abs(lengths.ravel()[a] - lengths.ravel()[b]) > 1e-9 * lengths.ravel()[a]
     if differs.any():
         one, other = int(a[differs][0]), int(b[differs][0])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import combinations
 from typing import TypeVar
 
 import igl
@@ -32,6 +33,9 @@ DELAUNAY_TOLERANCE = -1e-7
 _LARGEST_EXTENT = 1e60
 _SMALLEST_EXTENT = 1e-60
 
+
+# Cached properties of a mesh that do not depend on its positions.
+_OF_THE_FACES = {"facets", "edges", "components", "referenced", "boundary"}
 
 ArrayT = TypeVar("ArrayT", bound=AnyArray)
 
@@ -98,8 +102,9 @@ def checked_faces(F: ArrayLike, n: int | None) -> IntArray:
             f"faces are affected): there are {n} vertices, so indices run from 0 to {n - 1}{hint}"
         )
     faces = np.array(array, dtype=np.int64, order="C", copy=True)
-    ordered = np.sort(faces, axis=1)
-    repeats = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    repeats = np.zeros(len(faces), bool)
+    for one, other in combinations(faces.T, 2):
+        repeats |= one == other
     if repeats.any():
         row = int(np.flatnonzero(repeats)[0])
         raise MeshError(
@@ -140,7 +145,13 @@ class Mesh:
     def __init__(self, V: ArrayLike, F: ArrayLike) -> None:
         positions = checked_positions(V)
         faces = checked_faces(F, len(positions))
-        used = positions[np.unique(faces)]
+        faces.setflags(write=False)
+        self._hold(positions, faces)
+
+    def _hold(self, positions: FloatArray, faces: IntArray) -> None:
+        is_used = np.zeros(len(positions), bool)
+        is_used[faces] = True
+        used = positions[is_used]
         with np.errstate(over="ignore"):
             extent = float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
         if extent == 0:
@@ -148,9 +159,30 @@ class Mesh:
         if not _SMALLEST_EXTENT < extent < _LARGEST_EXTENT:
             raise MeshError(f"V spans {extent:.3g} units, outside what areas in double precision allow: rescale V")
         positions.setflags(write=False)
-        faces.setflags(write=False)
         object.__setattr__(self, "V", positions)
         object.__setattr__(self, "F", faces)
+
+    def with_vertices(self, V: ArrayLike) -> Mesh:
+        """The same faces on other positions; whatever the faces alone say is shared and not found again.
+
+        Parameters
+        ----------
+        V : (n, 3) array_like
+            New positions of all vertices; copied to float64.
+
+        Raises
+        ------
+        MeshError
+            If V cannot be positions, or are not as many as the mesh has vertices.
+        """
+        positions = checked_positions(V)
+        if len(positions) != self.n_vertices:
+            raise MeshError(f"V has {len(positions)} rows, but the mesh has {self.n_vertices} vertices")
+        moved = object.__new__(Mesh)
+        moved._hold(positions, self.F)
+        for name in _OF_THE_FACES & self.__dict__.keys():
+            moved.__dict__[name] = self.__dict__[name]
+        return moved
 
     def __repr__(self) -> str:
         kind = "tetrahedra" if self.is_tetrahedral else "triangles"

@@ -115,6 +115,11 @@ class Operators:
         return int(self.G.shape[0]) // len(self.weights)
 
     @cached_property
+    def gradient_rows(self) -> sp.csr_matrix:
+        """G by rows, as it is used."""
+        return self.G.tocsr()
+
+    @cached_property
     def boundary_faces(self) -> IntArray:
         """Faces (k,) with a vertex on the boundary."""
         return np.asarray(np.unique(self.G[:, self.boundary].indices % len(self.weights)))
@@ -122,10 +127,9 @@ class Operators:
     @cached_property
     def D(self) -> sp.csc_matrix:
         """Integrated divergence (n, d m)."""
-        divergence = self.G.T.tocsc()
-        scale = np.tile(-self.weights, self.dimension)
-        divergence.data *= np.repeat(scale, np.diff(divergence.indptr))
-        return divergence
+        rows = self.gradient_rows
+        scale = np.repeat(np.tile(-self.weights, self.dimension), np.diff(rows.indptr))
+        return sp.csc_matrix((scale * rows.data, rows.indices, rows.indptr), shape=rows.shape[::-1])
 
 
 def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operators:

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["DPI", "PICTURE_SUFFIXES", "Picture", "replace_file"]
+__all__ = ["DPI", "PAGE_SUFFIXES", "PICTURE_SUFFIXES", "Picture", "replace_file"]
 
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
+PAGE_SUFFIXES = (".html", ".htm")
 DPI = 400  # of raster output: 8 cm become 1260 pixels
 
 
@@ -65,6 +66,7 @@ def replace_file(target: Path, content: bytes) -> None:
     OSError
         If it cannot be written; then the old one is as it was.
     """
+    target = Path(os.path.realpath(target))  # through a link, to what it points to
     descriptor, temporary = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
     try:
         with os.fdopen(descriptor, "wb") as file:

@@ -242,7 +242,7 @@ def _surface(
     colour = table((here - low) / (high - low))[:, :3]
     per_pixel = screen_gradient(fine, F, finite)[pixels.face]
     if style == "lines":
-        line = isoline_coverage(here, per_pixel, seen.step, _LINE * DPI * _OVERSAMPLING)
+        line = isoline_coverage(here, per_pixel, seen.step, _LINE * DPI * _OVERSAMPLING, at_zero=low < 0)
         colour *= 1 - LINE_INK * line[:, None]
     elif style == "stripes":
         colour += STRIPE_INK * stripe_coverage(here, per_pixel, seen.step)[:, None] * (1 - colour)
@@ -268,6 +268,8 @@ def _draw_curves(axes: Any, lines: list[FloatArray], depth: FloatArray) -> None:
         for is_seen, run in visible_runs(fine, depth, 0.01 * max(depth.shape)):
             runs[is_seen].append((run[:, :2] - (_OVERSAMPLING - 1) / 2) / _OVERSAMPLING)
     for is_seen, colour, width in ((False, _CURVE, 0.6), (True, "white", 1.9), (True, _CURVE, 1.1)):
+        if not runs[is_seen]:
+            continue
         style = "solid" if is_seen else (0, (0.8, 1.6))
         axes.add_collection(
             LineCollection(
@@ -298,7 +300,7 @@ def _colour_bar(axes: Any, seen: Scene, style: Style, table: Any, label: str) ->
     axes.set_ylim(low, high)
     levels = step * np.arange(np.floor(low / step) + 1, np.ceil(high / step))
     if style == "lines":
-        axes.hlines(levels[levels != 0], 0, 1, colors=(0, 0, 0, LINE_INK), linewidth=_LINE * 72)
+        axes.hlines(levels if low < 0 else levels[levels > 0], 0, 1, colors=(0, 0, 0, LINE_INK), linewidth=_LINE * 72)
     elif style == "stripes":
         for level in levels[np.rint(levels / step) % 2 == 1]:
             axes.axhspan(level, min(level + step, high), color=(1, 1, 1, STRIPE_INK), linewidth=0)

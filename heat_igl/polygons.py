@@ -244,14 +244,11 @@ def _mean_distance(mesh: PolygonMesh, owner: IntArray) -> float:
 
 def _check_areas(mesh: PolygonMesh, areas: FloatArray, owner: IntArray, sides: FloatArray) -> None:
     """Areas and sides are in one unit of length."""
-    begin = np.cumsum(mesh.degree) - mesh.degree
-    flat = np.add.reduceat(areas, begin) <= 1e-12 * np.add.reduceat(sides, begin) ** 2
-    flat[owner[areas <= 0]] = True
-    if flat.any():
-        i = int(np.argmax(flat))
+    flat = np.unique(owner[areas <= 1e-12 * sides**2])
+    if len(flat):
         raise MeshError(
-            f"polygons[{i}] = {mesh.polygons[i].tolist()} has no area, or a corner where it folds back ("
-            f"{int(flat.sum())} of {mesh.n_faces} polygons): remove or split these polygons"
+            f"polygons[{flat[0]}] = {mesh.polygons[flat[0]].tolist()} has no area, or a side that its middle does not "
+            f"see ({len(flat)} of {mesh.n_faces} polygons): remove or split these polygons"
         )
 
 

@@ -185,8 +185,10 @@ def screen_gradient(points: FloatArray, F: IntArray, values: FloatArray) -> Floa
     return result
 
 
-def isoline_coverage(values: FloatArray, per_pixel: FloatArray, step: float, width: float) -> FloatArray:
-    """How much of each pixel (p,) a contour line at a positive multiple of `step` covers, from 0 to 1.
+def isoline_coverage(
+    values: FloatArray, per_pixel: FloatArray, step: float, width: float, at_zero: bool = False
+) -> FloatArray:
+    """How much of each pixel (p,) a contour line at a multiple of `step` covers, from 0 to 1.
 
     Lines are `width` pixels wide on the screen, but no wider than a quarter of their distance, so that a surface that
     turns away does not go black.
@@ -201,13 +203,15 @@ def isoline_coverage(values: FloatArray, per_pixel: FloatArray, step: float, wid
         Distance between levels.
     width : float
         In pixels.
+    at_zero : bool
+        Whether there is a line at 0; a distance is 0 at its sources, which are marked otherwise.
     """
     level = np.rint(values / step)
     with np.errstate(divide="ignore", invalid="ignore"):
         apart = np.abs(values - level * step) / per_pixel
         width_here = np.minimum(width, 0.25 * step / per_pixel)
     coverage = np.clip(width_here / 2 + 0.5 - apart, 0.0, 1.0) * np.minimum(1.0, width_here)
-    coverage[(level < 1) | ~np.isfinite(per_pixel) | (per_pixel == 0)] = 0.0
+    coverage[((level == 0) & (not at_zero)) | ~np.isfinite(per_pixel) | (per_pixel == 0)] = 0.0
     return np.asarray(coverage)
 
 

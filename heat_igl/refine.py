@@ -123,7 +123,7 @@ class Refinement:
         if labels is not None or offsets is not None or point_offsets is not None:
             label = np.full(len(distance), -1)
             label[starts.row] = starts.label
-        sweeping.sweep(self._order(key), self._tables, distance[:n], _MAX_PASSES, label, starts.offset)
+        sweeping.sweep(self._order(key), self._tables, distance[:n], label, starts.offset)
         return self._on_base(distance, label, labels)
 
     def unfold(
@@ -180,7 +180,10 @@ class Refinement:
 
     def _order(self, key: FloatArray) -> IntArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
-        return np.asarray(self._number[np.argsort(np.tile(key, self._n_sheets))])
+        from heat_igl.ordering import ascending
+
+        on_sheets = np.tile(key, self._n_sheets) if self._n_sheets > 1 else np.ascontiguousarray(key)
+        return np.asarray(self._number[ascending(on_sheets)])
 
     def _starts(
         self,
@@ -285,12 +288,8 @@ def _renumbered(
     Neighbours on the surface become neighbours in memory: nothing on most meshes, a fifth of the time where vertices
     come in an arbitrary order.
     """
-    graph = sp.csr_array((np.ones(F.size, np.int8), (F.ravel(), np.roll(F, -1, axis=1).ravel())), shape=(n, n))
-    found = csgraph.breadth_first_order(graph, int(F[0, 0]), directed=False, return_predecessors=False)
-    number = np.full(n, -1)
-    number[found] = np.arange(len(found))
-    number[number < 0] = np.arange(len(found), n)
-    face = np.argsort(number[F].min(axis=1), kind="stable")
+    fans, _, _ = _kernels()
+    number, face = fans.breadth_first(F, twin, n)
     new_face = np.empty(len(F), np.int64)
     new_face[face] = np.arange(len(F))
     twin = twin.reshape(-1, 3)[face].ravel()

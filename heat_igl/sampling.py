@@ -15,7 +15,7 @@ from heat_igl import connectivity
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.mesh import Mesh
-from heat_igl.sources import Sources, vertex_sources
+from heat_igl.sources import vertex_sources
 from heat_igl.surface_points import SurfacePoints
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
@@ -53,7 +53,7 @@ class VoronoiCells:
     distance: FloatArray
 
 
-def farthest_points(solver: HeatMethodSolver, k: int, *, start: Sources = 0) -> IntArray:
+def farthest_points(solver: HeatMethodSolver, k: int, *, start: ArrayLike = 0) -> IntArray:
     """`k` vertices, each as far as possible from those before it (Gonzalez 1985; Moenning and Dodgson 2003).
 
     Parameters
@@ -81,9 +81,9 @@ def farthest_points(solver: HeatMethodSolver, k: int, *, start: Sources = 0) -> 
     return farthest_cells(solver, k, start=start).sites
 
 
-def farthest_cells(solver: HeatMethodSolver, k: int, *, start: Sources = 0) -> VoronoiCells:
+def farthest_cells(solver: HeatMethodSolver, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
     """The Voronoi cells of `farthest_points`, which cost one query more; arguments and errors as there."""
-    first = vertex_sources(start, solver.n_vertices)
+    first = vertex_sources(np.asarray(start), solver.n_vertices)
     referenced = solver.operators.referenced
     used = referenced.copy()
     used[first] = True

@@ -29,9 +29,11 @@ class Diagnostics:
     lengthening : float
         What was added to every edge length because of degenerate triangles; 0 on other meshes.
     backend : str
-        Library that holds the factors.
-    seconds_operators, seconds_factorization : float
-        Wall-clock time of the two stages of the constructor.
+        What holds the factors.
+    factor_nonzeros, factor_bytes : int
+        Entries of all factors, and the memory that a query reads twice, indices included.
+    seconds_operators, seconds_analysis, seconds_factorization : float
+        Wall-clock time of the stages of the constructor: operators; order of elimination; factors.
     """
 
     t: float
@@ -41,7 +43,10 @@ class Diagnostics:
     n_flips: int
     lengthening: float
     backend: str
+    factor_nonzeros: int
+    factor_bytes: int
     seconds_operators: float
+    seconds_analysis: float
     seconds_factorization: float
 
     @property

@@ -40,7 +40,7 @@ def speed_operators(mesh: Mesh, speed: ArrayLike) -> Operators:
     Operators
         For `HeatMethodSolver.from_operators`, with every length a travel time. Edges are flipped towards a Delaunay
         triangulation where both faces have the same speed, and stay where it changes. No `triangulation`: ways bend at
-        edges here, so there is nothing to unfold and `refine` is refused.
+        edges here, so there is nothing to unfold and `refine` is refused, and sources are vertices.
 
     Raises
     ------

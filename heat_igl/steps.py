@@ -9,19 +9,32 @@ like the rows of G: (d m,) or (d m, k).
 
 from __future__ import annotations
 
+import importlib.util
 from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.factorization import Backend, Factorization, factorize
+from heat_igl.factorization import Analysis, Backend, Factorization, analyse
 from heat_igl.operators import Operators
-from heat_igl.typing import BoolArray, FloatArray
+from heat_igl.typing import FloatArray
 
-__all__ = ["Boundary", "HeatFlow", "PoissonProblem", "damping", "diffuse", "integrate", "normalize"]
+__all__ = [
+    "Boundary",
+    "HeatFlow",
+    "PoissonProblem",
+    "analysis",
+    "damping",
+    "descent",
+    "diffuse",
+    "integrate",
+    "normalize",
+]
 
 # Below this, gradients lose digits to gradual underflow and no longer have a direction worth keeping.
 _SMALLEST_GRADIENT = 1e-300
+# Share of a front's rate of decay from which on a direction is trusted fully; docs/heat_path.md compares values.
+_FULL_RATE = 0.9
 
 Boundary = Literal["neumann", "dirichlet", "average"]
 
@@ -41,8 +54,10 @@ class HeatFlow:
     boundary : {"neumann", "dirichlet", "average"}
         Insulated boundary, boundary held at zero, or the mean of both solutions. Under "dirichlet" heat that is put on
         a boundary vertex stays there as its fixed value.
-    backend : {"auto", "scipy", "cholespy"}
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
         See `factorize`.
+    analysis : Analysis, optional
+        As `analysis` makes it for a domain with the same pattern of L, to be shared; made anew where it does not fit.
 
     Raises
     ------
@@ -53,7 +68,12 @@ class HeatFlow:
     """
 
     def __init__(
-        self, operators: Operators, t: float, boundary: Boundary = "neumann", backend: Backend = "auto"
+        self,
+        operators: Operators,
+        t: float,
+        boundary: Boundary = "neumann",
+        backend: Backend = "auto",
+        analysis: Analysis | None = None,
     ) -> None:
         if not (np.isfinite(t) and t > 0):
             raise ValueError(f"t must be a positive number (a squared length), not {t!r}")
@@ -61,24 +81,28 @@ class HeatFlow:
             raise ValueError(f"boundary must be 'neumann', 'dirichlet' or 'average', not {boundary!r}")
         if not operators.boundary.any():
             boundary = "neumann"
-        self.mean_mass = float(operators.M.diagonal()[operators.referenced].mean())
-        matrix = ((operators.M - t * operators.L) / self.mean_mass).tocsc()
+        mass = operators.M.diagonal()
+        self.mean_mass = float(mass[operators.referenced].mean())
+        matrix = _shifted(operators.L, -t / self.mean_mass, mass / self.mean_mass)
+        if analysis is None or not analysis.fits(matrix):
+            analysis = analyse(matrix, backend)
         self.t = t
         self.boundary = boundary
-        self._neumann: _Restricted | None = None
-        self._dirichlet: _Restricted | None = None
+        self.backend = analysis.backend
+        self._neumann: Factorization | None = None
+        self._dirichlet: Factorization | None = None
         if boundary in ("neumann", "average"):
-            self._neumann = _Restricted(matrix, operators.referenced, backend)
+            self._neumann = analysis.factorize(matrix, operators.referenced)
         if boundary in ("dirichlet", "average"):
-            self._dirichlet = _Restricted(matrix, operators.referenced & ~operators.boundary, backend)
+            self._dirichlet = analysis.factorize(matrix, operators.referenced & ~operators.boundary)
             self._from_boundary = matrix[:, operators.boundary]
             self._boundary_diagonal = matrix.diagonal()[operators.boundary]
             self._on_boundary = operators.boundary
 
     @property
-    def backend(self) -> str:
-        """Library that holds the factors."""
-        return next(part.backend for part in (self._neumann, self._dirichlet) if part is not None)
+    def factors(self) -> list[Factorization]:
+        """The factored matrices, for what they hold."""
+        return [part for part in (self._neumann, self._dirichlet) if part is not None]
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Heat u (n,) or (n, k) after the time step, for initial heat `b` in units of `mean_mass`."""
@@ -100,41 +124,42 @@ class PoissonProblem:
     nothing else; adding a small multiple of the identity instead would bend the solution on large domains.
     """
 
-    def __init__(self, operators: Operators, backend: Backend = "auto") -> None:
+    def __init__(self, operators: Operators, backend: Backend = "auto", analysis: Analysis | None = None) -> None:
         free = operators.referenced.copy()
         # The first vertex of every component; components without faces are not free anyway.
         free[np.unique(operators.components, return_index=True)[1]] = False
         # Here, and only here, the sign is turned: L is negative semidefinite, Cholesky wants positive.
-        self._negative = _Restricted(-operators.L, free, backend)
-        self.backend = self._negative.backend
+        matrix = _shifted(operators.L, -1.0, np.zeros(operators.n))
+        if analysis is None or not analysis.fits(matrix):
+            analysis = analyse(matrix, backend)
+        self.backend = analysis.backend
+        self.factor = analysis.factorize(matrix, free)
 
     def solve(self, b: FloatArray) -> FloatArray:
         """The solution phi, 0 at the grounded vertices. On each component b must sum to 0, as a divergence does."""
-        return self._negative.solve(-b)
+        return self.factor.solve(-b)
 
 
-class _Restricted:
-    """A factored principal submatrix: solves on some vertices, gives 0 on the others."""
+def analysis(operators: Operators, backend: Backend = "auto", known: Analysis | None = None) -> Analysis:
+    """Order and analyse the pattern that the matrices of the heat flow and of the Poisson problem have in common.
 
-    def __init__(self, matrix: sp.csc_matrix, mask: BoolArray, backend: Backend) -> None:
-        self._mask = None if mask.all() else mask
-        self._factor: Factorization | None = None
-        if mask.any():
-            restricted = matrix if mask.all() else matrix[mask][:, mask]
-            self._factor = factorize(restricted.tocsc(), backend)
+    An analysis that is `known` is returned as it is if it fits.
+    """
+    pattern = _shifted(operators.L, 1.0, np.zeros(operators.n))
+    return known if known is not None and known.fits(pattern) else analyse(pattern, backend)
 
-    def solve(self, b: FloatArray) -> FloatArray:
-        if self._factor is None:
-            return np.zeros_like(b)
-        if self._mask is None:
-            return self._factor.solve(b)
-        x = np.zeros_like(b)
-        x[self._mask] = self._factor.solve(b[self._mask])
-        return x
 
-    @property
-    def backend(self) -> str:
-        return "none" if self._factor is None else self._factor.backend
+def _shifted(L: sp.csc_matrix, factor: float, diagonal: FloatArray) -> sp.csc_matrix:
+    """``factor * L + diag(diagonal)`` with the pattern of L and its whole diagonal, zeros stored."""
+    on_diagonal = np.flatnonzero(L.indices == np.repeat(np.arange(len(diagonal)), np.diff(L.indptr)))
+    if len(on_diagonal) == len(diagonal):
+        data = factor * L.data
+        data[on_diagonal] += diagonal
+        return sp.csc_matrix((data, L.indices, L.indptr), shape=L.shape)
+    # Vertices that no face uses have no entry of their own.
+    entries, everyone = L.tocoo(), np.arange(len(diagonal))
+    rows, columns = np.append(entries.row, everyone), np.append(entries.col, everyone)
+    return sp.csc_matrix((np.append(factor * entries.data, diagonal), (rows, columns)), shape=L.shape)
 
 
 def diffuse(operators: Operators, u0: FloatArray, t: float, boundary: Boundary = "neumann") -> FloatArray:
@@ -177,7 +202,7 @@ def normalize(operators: Operators, u: FloatArray) -> FloatArray:
     (d m,) or (d m, k) float64
         Unit vectors; 0 on faces where the gradient is zero or below 1e-300, which have no direction.
     """
-    gradient = operators.G @ u
+    gradient = operators.gradient_rows @ u
     components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
     # Squares of entries below 1e-154 would vanish, and heat far away is far below that; so each face is divided by its
     # largest entry before the norm is taken.
@@ -189,7 +214,7 @@ def normalize(operators: Operators, u: FloatArray) -> FloatArray:
     return np.asarray(gradient)
 
 
-def damping(operators: Operators, u: FloatArray, t: float, full_rate: float = 0.9) -> FloatArray:
+def damping(operators: Operators, u: FloatArray, t: float, full_rate: float = _FULL_RATE) -> FloatArray:
     """How sure the direction of X is on each face: 1 almost everywhere, less where heat arrives from several sides.
 
     A front of heat falls by the same factor over each length, |grad log u| = 1 / sqrt(t) for small faces, and by
@@ -216,15 +241,54 @@ def damping(operators: Operators, u: FloatArray, t: float, full_rate: float = 0.
         boundary turns the front into its own mirror image, or where u is not positive.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        gradient = operators.G @ np.log(u)
+        gradient = operators.gradient_rows @ np.log(u)
         components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
         rate = np.sqrt(np.einsum("k...,k...->...", components, components))
-    size = operators.face_sizes
-    # The same as arccosh(1 + size^2 / (2 t)) / size, which is 0 where size^2 is lost beside 1: faces of no size at all.
-    front = 2 * np.arcsinh(size / (2 * np.sqrt(t))) / size
-    factor = (rate.T / (full_rate * front)).T
+    factor = (rate.T / (full_rate * _front_rate(operators, t))).T
     factor[operators.boundary_faces] = 1
     return np.asarray(np.where(factor < 1, factor, 1.0))
+
+
+def _front_rate(operators: Operators, t: float) -> FloatArray:
+    """How fast a front of heat falls on each face (m,), in e-foldings per length."""
+    size = operators.face_sizes
+    # The same as arccosh(1 + size^2 / (2 t)) / size, which is 0 where size^2 is lost beside 1: faces of no size at all.
+    return np.asarray(2 * np.arcsinh(size / (2 * np.sqrt(t))) / size)
+
+
+def descent(operators: Operators, u: FloatArray, t: float | None = None) -> FloatArray:
+    """The right-hand side of step 3, the divergence of the field X of step 2, in one pass over the faces.
+
+    The same as ``D @ normalize(operators, u)`` to rounding, and without storing a field; by a compiled kernel where
+    numba is installed.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    u : (n, k) float64
+        Heat.
+    t : float, optional
+        Time step that the heat was made with, to have the field damped by `damping`; it has length 1 otherwise.
+
+    Returns
+    -------
+    (n, k) float64
+        Integrated divergence.
+    """
+    if importlib.util.find_spec("numba") is None:
+        X = normalize(operators, u)
+        if t is not None:
+            X *= np.tile(damping(operators, u, t), (operators.dimension, 1))
+        return np.asarray(operators.D @ X)
+    from heat_igl import descending
+
+    rows = operators.gradient_rows
+    full = np.zeros(len(operators.weights)) if t is None else _FULL_RATE * _front_rate(operators, t)
+    full[operators.boundary_faces] = 0.0
+    return descending.descent(
+        rows.indptr, rows.indices, rows.data, operators.weights, full, np.ascontiguousarray(u), _SMALLEST_GRADIENT
+    )
 
 
 def integrate(operators: Operators, X: FloatArray) -> FloatArray:

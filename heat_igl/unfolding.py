@@ -14,10 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.fans import (
+    ALONG,
     ANGLE_HERE,
     ANGLE_THERE,
-    APEX_X,
-    APEX_Y,
     BASE,
     CORNER,
     FAN_HERE,
@@ -27,7 +26,9 @@ from heat_igl.fans import (
     FAR_FAN,
     FAR_X,
     FAR_Y,
+    HEIGHT,
     LENGTH,
+    MANY,
     NEIGHBOUR,
     NEXT_SPOKE,
     TO_LEFT,
@@ -120,9 +121,9 @@ def _settle(v: int, t: Tables, state: FloatArray, found: FloatArray) -> None:
         zx, zy = zx + further * (zx * cosine - zy * sine), zy + further * (zx * sine + zy * cosine)
         reach = math.sqrt(zx * zx + zy * zy)
         offset = state[z, OFFSET]
-    fan = t.spoke_id[k, FAN_HERE]
+    fan = t.turn_id[k, FAN_HERE]
     state[v, DISTANCE], state[v, OFFSET], state[v, REACH] = found[0], offset, reach
-    state[v, ANGLE] = t.spoke[k, ANGLE_HERE] + math.atan2(ax * zy - ay * zx, ax * zx + ay * zy)
+    state[v, ANGLE] = t.turn[k, ANGLE_HERE] + math.atan2(ax * zy - ay * zx, ax * zx + ay * zy)
     state[v, FAN], state[v, TOTAL] = fan, t.total[fan]
 
 
@@ -175,6 +176,43 @@ def _common_source(
     return float(offset + math.sqrt(qx * qx + qy * qy))
 
 
+@jit
+def _over_many(k: int, t: Tables, state: FloatArray, found: FloatArray) -> None:
+    """Note the straight path over an edge of more than two faces, left of a spoke k of the vertex to be visited.
+
+    Which face it comes from, the ends of the edge know: if both see one point in a straight line, at the distances and
+    at an angle that belong together in a plane, the leaf in which they see it is flat as far as that point.
+    """
+    a, b = t.spoke_id[k, NEIGHBOUR], t.spoke_id[t.spoke_id[k, NEXT_SPOKE], NEIGHBOUR]
+    ra, rb, begin = state[a, REACH], state[b, REACH], state[a, OFFSET]
+    if not (0.0 < ra < np.inf and 0.0 < rb < np.inf):
+        return
+    rounding = 1e-11 * (begin + ra)
+    if (
+        abs(begin - state[b, OFFSET]) > rounding
+        or abs(state[a, DISTANCE] - begin - ra) > rounding
+        or abs(state[b, DISTANCE] - begin - rb) > rounding
+    ):
+        return
+    along, height, base = t.spoke[k, ALONG], t.spoke[k, HEIGHT], t.spoke[k, BASE]
+    x = 0.5 * ((ra - rb) * (ra + rb) / base + base)
+    y = math.sqrt(max(ra * ra - x * x, 0.0))
+    crossing = x * height + along * y
+    distance = begin + math.sqrt((along - x) ** 2 + (height + y) ** 2)
+    if not 0.0 <= crossing <= (y + height) * base or distance >= found[0]:
+        return
+    for i in range(t.first[a], t.first[a + 1]):
+        if t.spoke_id[i, NEIGHBOUR] == b and t.turn_id[i, FAN_HERE] == state[a, FAN]:
+            turn = abs(state[a, ANGLE] - t.turn[i, ANGLE_HERE])
+            if state[a, TOTAL] > 0.0:
+                turn = min(turn, state[a, TOTAL] - turn)
+            if abs(turn - math.atan2(y, x)) < 1e-8:
+                # Seen from v, a lies at (-along, -height), and the point x further along and y below it.
+                saving = math.atan2(along * y + height * x, height * y - along * x)
+                _take(found, distance, a, -along, -height, saving, k, -along, -height)
+                return
+
+
 @inline
 def _look_around(
     v: int,
@@ -201,8 +239,8 @@ def _look_around(
         length = t.spoke[k, LENGTH]
         side[i] = 0
         most = -1.0
-        if state[w, FAN] == t.spoke_id[k, FAN_THERE]:
-            right, left = _savings(t.spoke[k, ANGLE_THERE], state[w, ANGLE], state[w, TOTAL])
+        if state[w, FAN] == t.turn_id[k, FAN_THERE]:
+            right, left = _savings(t.turn[k, ANGLE_THERE], state[w, ANGLE], state[w, TOTAL])
             most = max(right, left)
             if most > _STRAIGHT:
                 side[i] = 1 if left >= right else -1
@@ -282,18 +320,18 @@ def views(faces: IntArray, barycentric: FloatArray, F: IntArray, t: Tables) -> t
             h = 3 * faces[i] + c
             v = vertex[3 * i + c] = F[faces[i], c]
             k = t.first[v]
-            while t.spoke_id[k, CORNER] != h:
+            while t.turn_id[k, CORNER] != h:
                 k += 1
             base = t.spoke[k, BASE]
-            ax, ay = -t.spoke[k, APEX_X] * base, -t.spoke[k, APEX_Y] * base
+            ax, ay = -t.spoke[k, ALONG], -t.spoke[k, HEIGHT]
             at_a, at_b = barycentric[i, (c + 1) % 3], barycentric[i, (c + 2) % 3]
             x, y = at_a * ax + at_b * (ax + base), (at_a + at_b) * ay
             row = state[3 * i + c]
             row[DISTANCE] = row[REACH] = math.sqrt(x * x + y * y)
             # A source at v itself leaves v without a direction.
-            row[FAN] = t.spoke_id[k, FAN_HERE] if row[REACH] > 1e-12 * base else NO_FAN
-            row[ANGLE] = t.spoke[k, ANGLE_HERE] + math.atan2(ax * y - ay * x, ax * x + ay * y)
-            row[TOTAL] = t.total[t.spoke_id[k, FAN_HERE]]
+            row[FAN] = t.turn_id[k, FAN_HERE] if row[REACH] > 1e-12 * base else NO_FAN
+            row[ANGLE] = t.turn[k, ANGLE_HERE] + math.atan2(ax * y - ay * x, ax * x + ay * y)
+            row[TOTAL] = t.total[t.turn_id[k, FAN_HERE]]
     return vertex, state
 
 
@@ -317,7 +355,7 @@ def _walk(
     i, i_left = k - t.first[v], k_left - t.first[v]
     base = t.spoke[k, BASE]
     right, left = t.spoke_id[k, NEIGHBOUR], t.spoke_id[k_left, NEIGHBOUR]
-    ax, ay = -t.spoke[k, APEX_X] * base, -t.spoke[k, APEX_Y] * base
+    ax, ay = -t.spoke[k, ALONG], -t.spoke[k, HEIGHT]
     bx, by = ax + base, ay
     first_x, first_y = ax, ay
     rx, ry, lx, ly = ax, ay, bx, by
@@ -330,7 +368,7 @@ def _walk(
             _take(found, distance, right, rx, ry, right_saving, k, first_x, first_y)
             return -1
     far = 4.0 * found[0] * found[0]
-    h = t.spoke_id[k, CORNER]
+    h = t.turn_id[k, CORNER]
     wait_for = -1
     while True:
         w = t.step_id[h, FAR]
@@ -442,12 +480,12 @@ def _search(
     """
     top = 0
     for k in range(t.first[v], t.first[v + 1]):
-        corner = t.spoke_id[k, CORNER]
+        corner = t.turn_id[k, CORNER]
         if corner < 0:
             continue
         a, b = t.spoke_id[k, NEIGHBOUR], t.spoke_id[t.spoke_id[k, NEXT_SPOKE], NEIGHBOUR]
         base = t.spoke[k, BASE]
-        ax, ay = -t.spoke[k, APEX_X] * base, -t.spoke[k, APEX_Y] * base
+        ax, ay = -t.spoke[k, ALONG], -t.spoke[k, HEIGHT]
         bx, by = ax + base, ay
         forecast = _cone_forecast(ax, ay, bx, by, state[a, DISTANCE], state[b, DISTANCE], ax, ay, bx, by)
         if forecast < found[0]:
@@ -477,7 +515,7 @@ def _search(
             wx = bx + x * ux - y * uy
             wy = by + x * uy + y * ux
             to_right, to_left = t.step_id[h, TO_RIGHT], t.step_id[h, TO_LEFT]
-            first_x, first_y = -t.spoke[spoke, APEX_X], -t.spoke[spoke, APEX_Y]
+            first_x, first_y = -t.spoke[spoke, ALONG], -t.spoke[spoke, HEIGHT]
             _arrive(points, t, state, found, h, spoke, first_x, first_y, wx, wy, ax, ay, bx, by, rx, ry, lx, ly)
             if rx * wy - ry * wx <= 0.0:
                 a, ax, ay, h = w, wx, wy, to_left
@@ -542,8 +580,10 @@ def _visit(
     for _ in range(2):
         best, best_promise = -1, found[0] * (1 - 1e-12)
         for k in range(t.first[v], t.first[v + 1]):
-            if t.spoke_id[k, CORNER] < 0:
+            if t.turn_id[k, CORNER] < 0:
                 continue
+            if t.turn_id[k, MANY] > 0:
+                _over_many(k, t, state, found)
             i, i_left = k - t.first[v], t.spoke_id[k, NEXT_SPOKE] - t.first[v]
             # A way in lies where one neighbour says left and the next one right (or is not known yet).
             if side[i] > 0 and (side[i_left] == -1 or side[i_left] == 2):

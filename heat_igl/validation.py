@@ -114,7 +114,7 @@ def draw_sources(mesh: Mesh, count: int, seed: int = 0) -> list[list[int]]:
 def _source_sets(sources: Sources | Sequence[Sources], n: int) -> list[IntArray]:
     several = isinstance(sources, (list, tuple)) and any(np.ndim(entry) > 0 for entry in sources)
     if not several:
-        return [vertex_sources(sources, n)]  # type: ignore[arg-type]
+        return [vertex_sources(sources, n)]
     return [vertex_sources(entry, n) for entry in sources]  # type: ignore[union-attr]
 
 

@@ -96,7 +96,7 @@ def exact_distance(mesh: heat_igl.Mesh, source: int, cache: Path | None) -> tupl
 def errors(distance: FloatArray, exact: FloatArray) -> tuple[float, float, float]:
     """Mean and 99th percentile of the relative error, and the largest error in largest distances; in percent."""
     there = np.isfinite(exact) & (exact > 0)
-    off = np.abs(distance - exact)[there]
+    off = np.abs(distance[there] - exact[there])
     relative = 100 * off / exact[there]
     return float(relative.mean()), float(np.percentile(relative, 99)), float(100 * off.max() / exact[there].max())
 

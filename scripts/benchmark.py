@@ -1,14 +1,18 @@
-"""Time, memory and accuracy of heat_igl beside potpourri3d and libigl's own heat method.
+"""Time, memory and accuracy of heat_igl beside potpourri3d, libigl's heat method, MeshLab's front and exact distances.
 
 Every method runs in a process of its own, which measures its peak memory; the processes take turns, so that what else
 happens on the machine hits all of them alike, and ratios are medians over paired runs.
 
-    python scripts/benchmark.py                  # 10k to 300k vertices, range and accuracy
-    python scripts/benchmark.py --size 100000    # one size
-    python scripts/benchmark.py --quick          # less than 2 minutes
-    python scripts/benchmark.py --large          # adds the icosphere with 655 362 vertices
+    python scripts/benchmark.py                           # 10k to 3M vertices, range and accuracy: hours
+    python scripts/benchmark.py --size 100000             # one size
+    python scripts/benchmark.py --mesh MESH [--mesh ...]  # real meshes, subdivided to the sizes, in place of the bunny
+    python scripts/benchmark.py --quick                   # less than 2 minutes
+    python scripts/benchmark.py --large                   # adds the icosphere with 655 362 vertices
+    python scripts/benchmark.py --huge 10000000           # one query on a sphere of about that size, and nothing else
+    python scripts/benchmark.py --docs docs/cost.md       # also writes the tables of that page
 
-Writes benchmark.json and benchmark.md. Needs the extras ``bench`` (potpourri3d), ``fast``, ``cli`` and ``validate``.
+Writes benchmark.json, benchmark.md and pictures. Needs the extras ``bench`` (potpourri3d), ``fast``, ``cli``, ``view``
+and ``validate``.
 """
 
 from __future__ import annotations
@@ -37,32 +41,43 @@ from heat_igl.peak_memory import PeakMemory
 
 from environment import environment
 
-METHODS = ("heat_igl", "heat_igl (scipy)", "potpourri3d", "libigl heat")
-SIZES = (10_000, 30_000, 100_000, 300_000)
-BATCH = 16
+HEAT = ("heat_igl", "potpourri3d", "libigl heat")
+SINGLE = ("MeshLab's front", "pygeodesic")  # nothing of a query is left for the next
+METHODS = HEAT + SINGLE
+SIZES = (10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000)
+BATCH = 64
+LATER = 5
+# Above these sizes, minutes and gigabytes go to what is known by then.
+LARGEST = {"potpourri3d": 1_250_000, "libigl heat": 1_250_000, "MeshLab's front": 125_000, "pygeodesic": 50_000}
+QUANTITIES = {
+    "precomputation": "precomputation [s]",
+    "later": "a later query [s]",
+    "batch": f"each of {BATCH} [s]",
+    "peak_memory": "peak memory [bytes]",
+}
+FITTED = (9_000, 1_250_000)  # range of sizes that exponents are fitted in
 Solve = Callable[[int], np.ndarray]
 Batch = Callable[[Sequence[int]], Any]
 
 
-# The methods: each makes two functions of positions and faces.
+# The methods: each makes functions of positions and faces, for one query and a batch, and says what it holds.
 
 
-def _heat_igl(backend: str) -> Callable[[np.ndarray, np.ndarray], tuple[Solve, Batch]]:
-    def prepare(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch]:
-        solver = HeatMethodSolver(V, F, backend=backend)
-        return solver.distance, solver.distances
+def _heat_igl(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch | None, dict[str, Any]]:
+    solver = HeatMethodSolver(V, F)
+    found = solver.diagnostics
+    factor_bytes = getattr(found, "factor_bytes", None)
+    return solver.distance, solver.distances, {"factor_bytes": factor_bytes, "backend": found.backend}
 
-    return prepare
 
-
-def _potpourri3d(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch]:
+def _potpourri3d(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch | None, dict[str, Any]]:
     import potpourri3d
 
     solver = potpourri3d.MeshHeatMethodDistanceSolver(V, F)
-    return solver.compute_distance, lambda sources: [solver.compute_distance(int(s)) for s in sources]
+    return solver.compute_distance, lambda sources: [solver.compute_distance(int(s)) for s in sources], {}
 
 
-def _libigl(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch]:
+def _libigl(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch | None, dict[str, Any]]:
     import igl
 
     data = igl.HeatGeodesicsData()
@@ -71,16 +86,29 @@ def _libigl(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch]:
     def solve(source: int) -> np.ndarray:
         return np.asarray(igl.heat_geodesics_solve(data, np.array([source])))
 
-    return solve, lambda sources: [solve(s) for s in sources]
+    return solve, lambda sources: [solve(s) for s in sources], {}
+
+
+def _front(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch | None, dict[str, Any]]:
+    from heat_igl.native import meshlab_front
+
+    return lambda source: meshlab_front(V, F, np.array([source]))["distance"], None, {}
+
+
+def _exact(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch | None, dict[str, Any]]:
+    from heat_igl.native import pygeodesic_exact
+
+    return lambda source: pygeodesic_exact(V, F, np.array([source]))["distance"], None, {}
 
 
 PREPARE = {
-    "heat_igl": _heat_igl("auto"),
-    "heat_igl (scipy)": _heat_igl("scipy"),
+    "heat_igl": _heat_igl,
     "potpourri3d": _potpourri3d,
     "libigl heat": _libigl,
+    "MeshLab's front": _front,
+    "pygeodesic": _exact,
 }
-NEEDS = {"potpourri3d": "potpourri3d"}
+NEEDS = {"potpourri3d": "potpourri3d", "MeshLab's front": "pymeshlab", "pygeodesic": "pygeodesic"}
 
 
 # The child process: one method on one mesh, one run per line of its input.
@@ -90,22 +118,29 @@ def _child(method: str, path: str) -> None:
     replies = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # what native code prints is no reply
     prepare = PREPARE[method]
-    warm_up = shapes.icosphere(2)
-    solve, batch = prepare(warm_up.V, warm_up.F)
+    warm_up = shapes.icosphere(4)
+    solve, batch, _ = prepare(warm_up.V, warm_up.F)
     solve(0)
-    batch([0, 1])
+    if batch is not None:
+        batch(range(16))
     with np.load(path) as arrays:
         V, F, sources = arrays["V"], arrays["F"], arrays["sources"]
     for line in sys.stdin:
         request = json.loads(line)
         with PeakMemory() as peak:
             start = time.perf_counter()
-            solve, batch = prepare(V, F)
+            solve, batch, facts = prepare(V, F)
             ready = time.perf_counter()
             distance = solve(int(sources[0]))
             solved = time.perf_counter()
-        reply = {"precomputation": ready - start, "query": solved - ready, "peak_memory": peak.bytes}
-        if len(sources) > 1:
+        reply = {"precomputation": ready - start, "query": solved - ready, "peak_memory": peak.bytes, **facts}
+        later = []
+        for source in sources[1 : 1 + LATER] if batch is not None else []:
+            start = time.perf_counter()
+            solve(int(source))
+            later.append(time.perf_counter() - start)
+        reply["later"] = statistics.median(later) if later else None
+        if batch is not None and len(sources) > 1:
             start = time.perf_counter()
             batch(sources[1:])
             reply["batch"] = (time.perf_counter() - start) / (len(sources) - 1)
@@ -180,27 +215,30 @@ def great_circles(V: np.ndarray, source: int) -> np.ndarray:
     return np.arctan2(across, V @ V[source])
 
 
-def timed_meshes(sizes: Sequence[int], rng: np.random.Generator) -> list[tuple[str, Mesh]]:
-    """A sphere of each size, and the bunny at the levels of subdivision that come near one."""
-    meshes = [(f"sphere {n}", noisy_sphere(n, rng)) for n in sizes]
-    path = sample_mesh()
-    if path is None:
-        print("no bunny: pymeshlab is missing", file=sys.stderr)
-        return meshes
-    bunny = read_mesh(path)
-    while bunny.n_vertices < 1.25 * max(sizes):
-        if any(0.8 < bunny.n_vertices / n < 1.25 for n in sizes):
-            meshes.append((f"bunny {bunny.n_vertices}", bunny))
-        bunny = subdivided(bunny)
+def timed_meshes(sizes: Sequence[int], paths: Sequence[Path], rng: np.random.Generator) -> list[tuple[str, Mesh, Mesh]]:
+    """Name, mesh, and a mesh for exact distances: spheres, and meshes subdivided to the sizes.
+
+    Subdivision leaves the surface as it is, so that exact distances between the vertices of the first mesh hold.
+    """
+    meshes = []
+    for n in sizes:
+        sphere = noisy_sphere(n, rng)
+        meshes.append((f"sphere {n}", sphere, sphere))
+    for path in paths:
+        mesh = first = read_mesh(path)
+        while mesh.n_vertices < 1.25 * max(sizes):
+            if any(0.8 < mesh.n_vertices / n < 1.25 for n in sizes):
+                meshes.append((f"{path.stem} {mesh.n_vertices}", mesh, first))
+            mesh = subdivided(mesh)
     return meshes
 
 
-def exact_distance(name: str, mesh: Mesh, source: int) -> np.ndarray | None:
-    """Closed form on spheres, polyhedral on the bunny; None where no exact solver can be had."""
-    if not name.startswith("bunny"):
-        return great_circles(mesh.V, source)
+def exact_distance(name: str, first: Mesh, source: int) -> np.ndarray | None:
+    """Closed form on spheres, polyhedral for the vertices of the first mesh; None where no exact solver can be had."""
+    if name.startswith("sphere"):
+        return great_circles(first.V, source)
     try:
-        return reference.exact(mesh, source)
+        return reference.exact(first, source)
     except (MissingExtraError, ReferenceSolverError) as error:
         print(f"no exact distance for {name}: {error}", file=sys.stderr)
         return None
@@ -210,6 +248,7 @@ def errors(distance: np.ndarray, exact: np.ndarray | None) -> dict[str, float | 
     """Mean relative error, and largest error over largest distance, both in percent."""
     if exact is None:
         return {"mean_error": None, "max_error": None}
+    distance = distance[: len(exact)]
     away = exact > 0
     return {
         "mean_error": 100 * float(np.mean(np.abs(distance[away] / exact[away] - 1))),
@@ -224,7 +263,7 @@ def measure(
     name: str, mesh: Mesh, methods: Sequence[str], runs: int, sources: np.ndarray, exact: np.ndarray | None
 ) -> list[dict[str, Any]]:
     """One row per method: medians over `runs` rounds in which the methods take turns."""
-    found: dict[str, list[dict[str, float]]] = {method: [] for method in methods}
+    found: dict[str, list[dict[str, Any]]] = {method: [] for method in methods}
     accurate: dict[str, dict[str, float | None]] = {}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "mesh.npz")
@@ -247,17 +286,24 @@ def measure(
     ]
 
 
-def medians(found: dict[str, list[dict[str, float]]], method: str) -> dict[str, float | None]:
-    """What a method cost, and its time over that of potpourri3d in the same round."""
-    row: dict[str, float | None] = {
-        key: statistics.median(run[key] for run in found[method])
-        for key in ("precomputation", "query", "batch")
-        if key in found[method][0]
+def medians(found: dict[str, list[dict[str, Any]]], method: str) -> dict[str, Any]:
+    """What a method cost, and the same over what each heat method of others cost in the same round."""
+    runs = found[method]
+    row: dict[str, Any] = {
+        key: statistics.median(run[key] for run in runs)
+        for key in ("precomputation", "query", "later", "batch")
+        if runs[0].get(key) is not None
     }
-    row["peak_memory"] = found[method][0]["peak_memory"]
+    row |= {key: runs[0].get(key) for key in ("peak_memory", "factor_bytes", "backend")}
+    for peer in set(HEAT[1:]) & set(found):
+        row[f"over {peer}"] = {
+            key: statistics.median(a[key] / b[key] for a, b in zip(runs, found[peer], strict=True))
+            for key in ("precomputation", "query", "later", "batch", "peak_memory")
+            if runs[0].get(key) and found[peer][0].get(key)
+        }
     if "potpourri3d" in found:
-        own, peer = ([r["precomputation"] + r["query"] for r in found[m]] for m in (method, "potpourri3d"))
-        row["ratio"] = statistics.median(a / b for a, b in zip(own, peer, strict=True))
+        own, peer_total = ([r["precomputation"] + r["query"] for r in found[m]] for m in (method, "potpourri3d"))
+        row["ratio"] = statistics.median(a / b for a, b in zip(own, peer_total, strict=True))
     return row
 
 
@@ -278,6 +324,119 @@ def accuracy(methods: Sequence[str], large: bool) -> list[dict[str, Any]]:
     return rows
 
 
+def bandwidth(size: int = 2**28, repetitions: int = 7) -> float:
+    """Bytes read and written per second by one thread that copies a large array; the best of some repetitions."""
+    source, target = np.ones(size // 8), np.zeros(size // 8)
+    best = np.inf
+    for _ in range(repetitions):
+        start = time.perf_counter()
+        np.copyto(target, source)
+        best = min(best, time.perf_counter() - start)
+    return 2 * size / best
+
+
+def import_seconds(repetitions: int = 7) -> dict[str, float]:
+    """Median seconds of a new interpreter that imports heat_igl, and of one that imports what it is built on."""
+    statements = {
+        "import heat_igl": "import heat_igl",
+        "what it is built on": "import igl, scipy.sparse.linalg, scipy.sparse.csgraph",
+    }
+    seconds: dict[str, list[float]] = {name: [] for name in statements}
+    for _ in range(repetitions):
+        for name, statement in statements.items():
+            start = time.perf_counter()
+            subprocess.run([sys.executable, "-c", statement], check=True)
+            seconds[name].append(time.perf_counter() - start)
+    found = {name: statistics.median(values) for name, values in seconds.items()}
+    own, base = seconds.values()
+    return found | {"difference": statistics.median(a - b for a, b in zip(own, base, strict=True))}
+
+
+def exponents(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float]]:
+    """By method and quantity, the exponent p of the power law n^p through the spheres."""
+    found: dict[str, dict[str, float]] = {}
+    for method in METHODS:
+        for key in QUANTITIES:
+            points = [
+                (row["n"], row[key])
+                for row in rows
+                if row["method"] == method
+                and row["mesh"].startswith("sphere")
+                and FITTED[0] <= row["n"] <= FITTED[1]
+                and row.get(key)
+                and not (key == "precomputation" and method in SINGLE)
+            ]
+            if len({n for n, _ in points}) > 1:
+                n, values = np.log(np.array(points, dtype=float)).T
+                found.setdefault(method, {})[key] = float(np.polyfit(n, values, 1)[0])
+    return found
+
+
+def floors(rows: Sequence[dict[str, Any]], bytes_per_second: float) -> list[dict[str, Any]]:
+    """What reading the factors takes, forward and backward, beside what a query takes."""
+    found = []
+    for row in rows:
+        if row["method"] == "heat_igl" and row.get("factor_bytes"):
+            floor = 2 * row["factor_bytes"] / bytes_per_second
+            found.append({**row, "floor": floor, "over_floor": row["later"] / floor})
+    return found
+
+
+def break_even(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """From how many queries on a mesh heat_igl's precomputation has paid, against methods without one."""
+    found = []
+    for row in (row for row in rows if row["method"] == "heat_igl"):
+        for other in (o for o in rows if o["mesh"] == row["mesh"] and o["method"] in SINGLE):
+            gain = other["query"] - row["later"]
+            queries = max(1, int(np.ceil(row["precomputation"] / gain))) if gain > 0 else None
+            found.append({"mesh": row["mesh"], "method": other["method"], "query": other["query"], "queries": queries})
+    return found
+
+
+# The largest meshes: one method, one query.
+
+
+def huge(n: int, mesh_path: Path | None) -> dict[str, Any]:
+    """One query on an icosphere of about `n` vertices, or on a mesh subdivided to at least `n`, and two more."""
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    result: dict[str, Any] = {}
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with PeakMemory() as peak, Progress(*columns, console=Console(stderr=True), refresh_per_second=2) as bar:
+
+        def timed(stage: str, work: Callable[[], Any]) -> Any:
+            task = bar.add_task(stage)
+            start = time.perf_counter()
+            value = work()
+            result[stage] = time.perf_counter() - start
+            bar.stop_task(task)
+            return value
+
+        mesh, exact_mesh = timed("making the mesh", lambda: huge_mesh(n, mesh_path))
+        V, n_first = mesh.V, exact_mesh.n_vertices if exact_mesh is not None else mesh.n_vertices
+        result |= {"mesh": mesh_path.stem if mesh_path else "icosphere", "n": mesh.n_vertices}
+        solver = timed("precomputation", lambda: HeatMethodSolver(mesh))
+        result["backend"] = solver.diagnostics.backend
+        distance = timed("first query", lambda: solver.distance(0))
+        timed("later query", lambda: solver.distance(n_first // 2))
+        timed("last query", lambda: solver.distance(n_first // 3))
+    result["peak_memory"] = peak.bytes
+    if exact_mesh is None:
+        return result | errors(distance, great_circles(V, 0))
+    return result | errors(distance, exact_distance("", exact_mesh, 0))
+
+
+def huge_mesh(n: int, path: Path | None) -> tuple[Mesh, Mesh | None]:
+    """The icosphere nearest to `n` vertices; or a mesh subdivided to at least 0.8 n, and the mesh itself."""
+    if path is None:
+        return shapes.icosphere(max(0, round(np.log(n / 10) / np.log(4)))), None
+    mesh = first = read_mesh(path)
+    while mesh.n_vertices < 0.8 * n:
+        mesh = subdivided(mesh)
+    return mesh, first
+
+
 # The report.
 
 
@@ -285,52 +444,177 @@ def _row(cells: Sequence[tuple[Any, str]]) -> str:
     return f"| {' | '.join('-' if value is None else format(value, digits) for value, digits in cells)} |"
 
 
+def _table(head: str, rows: Sequence[Sequence[tuple[Any, str]]]) -> list[str]:
+    names = head.split(" | ")
+    rule = ["---" if i == 0 else "--:" for i in range(len(names))]
+    return [f"| {head} |", f"|{'|'.join(rule)}|", *(_row(row) for row in rows)]
+
+
 def markdown(result: dict[str, Any]) -> str:
-    """The result as two tables."""
-    lines = [
-        ", ".join(f"{name} {value}" for name, value in result["environment"].items()),
-        "",
-        "Seconds are medians of runs in which the methods take turns; *ratio* is precomputation and one query over "
-        "potpourri3d's. Errors in percent: mean relative error, and largest error over largest distance.",
-        "",
-        "| mesh | method | precomputation | query | each of 16 | ratio | peak MB | mean error | largest error |",
-        "|---|---|--:|--:|--:|--:|--:|--:|--:|",
+    """The whole result."""
+    parts = [", ".join(f"{name} {value}" for name, value in result["environment"].items())]
+    parts += [part for name, part in tables(result).items() if part]
+    return "\n\n".join(parts) + "\n"
+
+
+def tables(result: dict[str, Any]) -> dict[str, str]:
+    """The tables by name; docs/cost.md holds those that it has a place for."""
+    rows = result["timings"]
+    timings = [
+        [
+            (row["mesh"], ""),
+            (row["method"], ""),
+            (row["precomputation"] if row["method"] in HEAT else None, ".3f"),
+            (row["query"], ".4f"),
+            (row.get("later"), ".4f"),
+            (row.get("batch"), ".4f"),
+            (None if row["peak_memory"] is None else row["peak_memory"] / 1e6, ".0f"),
+            (row["mean_error"], ".2f"),
+            (row["max_error"], ".2f"),
+        ]
+        for row in rows
     ]
-    for row in result["timings"]:
-        cells = [(row["mesh"], ""), (row["method"], ""), (row["precomputation"], ".3f"), (row["query"], ".4f")]
-        memory = None if row["peak_memory"] is None else row["peak_memory"] / 1e6
-        cells += [(row["batch"], ".4f"), (row.get("ratio"), ".2f"), (memory, ".0f")]
-        lines.append(_row([*cells, (row["mean_error"], ".2f"), (row["max_error"], ".2f")]))
-    lines += [
-        "",
-        "| case | method | largest distance | exact | mean error | largest error | seconds |",
-        "|---|---|--:|--:|--:|--:|--:|",
+    head = f"mesh | method | precomputation | first query | later query | each of {BATCH} | peak MB"
+    found = {"timings": _table(f"{head} | mean error | largest error", timings)}
+    ratios = [
+        [(row["mesh"], ""), (peer, "")]
+        + [(row[f"over {peer}"].get(key), ".2f") for key in ("precomputation", "later", "batch", "peak_memory")]
+        for row in rows
+        if row["method"] == "heat_igl"
+        for peer in HEAT[1:]
+        if f"over {peer}" in row
     ]
-    for row in result["accuracy"]:
+    if ratios:
+        head = f"mesh | heat_igl over | precomputation | later query | each of {BATCH} | peak memory"
+        found["ratios"] = _table(head, ratios)
+    fitted = [[(m, ""), *((p.get(key), ".2f") for key in QUANTITIES)] for m, p in exponents(rows).items()]
+    if fitted:
+        found["exponents"] = _table(f"exponent of n | precomputation | later query | each of {BATCH} | memory", fitted)
+    if "bandwidth" in result:
         cells = [
+            [
+                (row["mesh"], ""),
+                (row["factor_bytes"] / 1e6, ".0f"),
+                (1e3 * row["floor"], ".1f"),
+                (1e3 * row["later"], ".1f"),
+                (row["over_floor"], ".2f"),
+            ]
+            for row in floors(rows, result["bandwidth"])
+        ]
+        found["floor"] = [f"Copying runs at {result['bandwidth'] / 1e9:.1f} GB/s, read and written.", ""]
+        if cells:
+            found["floor"] += _table("mesh | factors MB | floor ms | later query ms | over floor", cells)
+    paid = [
+        [(row["mesh"], ""), (row["method"], ""), (row["query"], ".3f"), (row["queries"], "")]
+        for row in break_even(rows)
+    ]
+    if paid:
+        found["break-even"] = _table("mesh | against | its query | heat_igl pays from query", paid)
+    if result.get("import"):
+        cells = [[(name, ""), (seconds, ".3f")] for name, seconds in result["import"].items()]
+        found["import"] = _table("new interpreter | seconds", cells)
+    if result.get("accuracy"):
+        found["accuracy"] = _accuracy_table(result["accuracy"])
+    if result.get("huge"):
+        found["huge"] = _huge_table(result["huge"])
+    return {name: "\n".join(lines) for name, lines in found.items()}
+
+
+def _accuracy_table(rows: Sequence[dict[str, Any]]) -> list[str]:
+    cells = [
+        [
             (row["mesh"], ""),
             (row["method"], ""),
             (row["largest_distance"], ".6g"),
             (row["exact_largest"], ".6g"),
+            (row["mean_error"], ".3f"),
+            (row["max_error"], ".3f"),
+            (row["precomputation"] + row["query"], ".2f"),
         ]
-        cells += [(row["mean_error"], ".3f"), (row["max_error"], ".3f"), (row["precomputation"] + row["query"], ".2f")]
-        lines.append(_row(cells))
-    for row in result["timings"]:
-        if row["method"] == "heat_igl" and "ratio" in row:
-            lines += ["", f"{row['mesh']}: precomputation and one query take {row['ratio']:.2f} of potpourri3d's time."]
-    return "\n".join(lines) + "\n"
+        for row in rows
+    ]
+    return _table("case | method | largest distance | exact | mean error | largest error | seconds", cells)
+
+
+def _huge_table(row: dict[str, Any]) -> list[str]:
+    names = ("precomputation", "first query", "later query", "last query")
+    memory = None if row["peak_memory"] is None else row["peak_memory"] / 2**30
+    cells = [(row["mesh"], ""), (row["n"], ""), (row["backend"], ""), *((row[name], ".1f") for name in names)]
+    head = f"mesh | vertices | backend | {' | '.join(names)} | peak GiB | mean error | largest error"
+    return _table(head, [[*cells, (memory, ".1f"), (row["mean_error"], ".3f"), (row["max_error"], ".3f")]])
+
+
+def fill_in(page: str, parts: dict[str, str]) -> str:
+    """`page` with what stands between ``<!-- name -->`` and ``<!-- /name -->`` replaced by the part of that name."""
+    for name, text in parts.items():
+        first, last = f"<!-- {name} -->", f"<!-- /{name} -->"
+        if first in page:
+            before, rest = page.split(first, 1)
+            page = f"{before}{first}\n{text}\n{last}{rest.split(last, 1)[1]}"
+    return page
+
+
+def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
+    """A log-log picture of each quantity over the number of vertices, with the fitted exponents in the legend."""
+    from matplotlib.figure import Figure
+
+    fitted = exponents(rows)
+    figure = Figure(figsize=(12, 9), layout="constrained")
+    for axes, (key, label) in zip(figure.subplots(2, 2).flat, QUANTITIES.items(), strict=True):
+        for color, method in enumerate(METHODS):
+            for spheres in (True, False):
+                points = sorted(
+                    (row["n"], row[key])
+                    for row in rows
+                    if row["method"] == method and row["mesh"].startswith("sphere") == spheres and row.get(key)
+                )
+                if not points or (key == "precomputation" and method in SINGLE):
+                    continue
+                power = fitted.get(method, {}).get(key)
+                name = method + (f", n^{power:.2f}" if power is not None else "") if spheres else None
+                axes.loglog(*zip(*points, strict=True), "o-" if spheres else "x", color=f"C{color}", label=name)
+        axes.set(xlabel="vertices", ylabel=label)
+        axes.grid(alpha=0.3)
+        axes.legend()
+    figure.savefig(path, dpi=120)
 
 
 def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--size", type=int, action="append", help="number of vertices; may be repeated")
+    parser.add_argument("--mesh", type=Path, action="append", help="real mesh; may be repeated; default: the bunny")
     parser.add_argument("--runs", type=int, default=5, help="paired runs per mesh")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--quick", action="store_true", help="10k and 30k vertices, at most 3 runs")
+    parser.add_argument(
+        "--quick", action="store_true", help="10k and 30k vertices, at most 3 runs, single queries at 10k only"
+    )
     parser.add_argument("--large", action="store_true", help="add the icosphere with 655 362 vertices")
+    parser.add_argument("--huge", type=int, help="one query on an icosphere of about so many vertices, or on --mesh")
+    parser.add_argument("--docs", type=Path, help="page whose tables are to be written")
     parser.add_argument("--out", type=Path, default=Path("benchmark-results"), help="directory of the results")
     parser.add_argument("--child", nargs=2, help=argparse.SUPPRESS)
     return parser.parse_args(argv)
+
+
+def _measured(arguments: argparse.Namespace) -> dict[str, Any]:
+    rng = np.random.default_rng(arguments.seed)
+    sizes = arguments.size or (SIZES[:2] if arguments.quick else SIZES)
+    runs = min(arguments.runs, 3) if arguments.quick else arguments.runs
+    methods = [m for m in METHODS if importlib.util.find_spec(NEEDS.get(m, "heat_igl")) is not None]
+    paths = arguments.mesh or [path for path in [sample_mesh()] if path is not None]
+    result: dict[str, Any] = {"bandwidth": bandwidth(), "import": import_seconds(), "timings": []}
+    for name, mesh, first in timed_meshes(sizes, paths, rng):
+        print(name, file=sys.stderr)
+        others = rng.choice(mesh.n_vertices, BATCH, replace=False)
+        sources = np.concatenate([rng.choice(first.n_vertices, 1), others])
+        exact = exact_distance(name, first, int(sources[0]))
+        n = mesh.n_vertices
+        chosen = [m for m in methods if n <= LARGEST.get(m, n) and not (arguments.quick and m in SINGLE and n > 15_000)]
+        some_runs = runs if n <= LARGEST["potpourri3d"] else 1
+        result["timings"] += measure(name, mesh, chosen, some_runs, sources, exact)
+    reference.close()
+    result["accuracy"] = accuracy([m for m in methods if m in HEAT], arguments.large)
+    return result
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -340,20 +624,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         _child(*arguments.child)
         return 0
     arguments.out.mkdir(parents=True, exist_ok=True)
-    rng = np.random.default_rng(arguments.seed)
-    sizes = arguments.size or (SIZES[:2] if arguments.quick else SIZES)
-    runs = min(arguments.runs, 3) if arguments.quick else arguments.runs
-    methods = [m for m in METHODS if importlib.util.find_spec(NEEDS.get(m, "heat_igl")) is not None]
     result: dict[str, Any] = {"environment": environment() | {"seed": str(arguments.seed)}, "timings": []}
-    for name, mesh in timed_meshes(sizes, rng):
-        print(name, file=sys.stderr)
-        sources = rng.choice(mesh.n_vertices, 1 + BATCH, replace=False)
-        exact = exact_distance(name, mesh, int(sources[0]))
-        result["timings"] += measure(name, mesh, methods, runs, sources, exact)
-    reference.close()
-    result["accuracy"] = accuracy([m for m in methods if m != "heat_igl (scipy)"], arguments.large)
-    (arguments.out / "benchmark.json").write_text(json.dumps(result, indent=2) + "\n")
-    (arguments.out / "benchmark.md").write_text(markdown(result))
+    name = "benchmark"
+    if arguments.huge:
+        name = "huge"
+        result["huge"] = huge(arguments.huge, arguments.mesh[0] if arguments.mesh else None)
+        reference.close()
+    else:
+        result |= _measured(arguments)
+        draw(result["timings"], arguments.out / "benchmark.png")
+    (arguments.out / f"{name}.json").write_text(json.dumps(result, indent=2) + "\n")
+    (arguments.out / f"{name}.md").write_text(markdown(result))
+    if arguments.docs:
+        arguments.docs.write_text(fill_in(arguments.docs.read_text(), tables(result)))
     print(markdown(result))
     return 0
 

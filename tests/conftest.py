@@ -36,6 +36,11 @@ def perturbed(mesh: heat_igl.Mesh, amount: float = 0.15, seed: int = 0) -> heat_
     return heat_igl.Mesh(mesh.V + offset, mesh.F)
 
 
+def flat_perturbed(mesh: heat_igl.Mesh, amount: float = 0.3, seed: int = 0) -> heat_igl.Mesh:
+    """A mesh of z = 0, its inner vertices moved in their plane."""
+    return heat_igl.Mesh(perturbed(mesh, amount, seed).V * [1, 1, 0], mesh.F)
+
+
 @pytest.fixture(scope="session")
 def cow() -> heat_igl.Mesh:
     return heat_igl.read_mesh(wheel_path("cow.obj"))

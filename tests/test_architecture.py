@@ -17,6 +17,7 @@ PACKAGE = Path(heat_igl.__file__).parent
 ORDER = """
 typing
 errors
+processors
 connectivity
 mesh
 surface_points
@@ -31,21 +32,32 @@ operators
 speed
 polygons
 io
+fans
+relaxation
+iterative
+dissection
+multifrontal
 factorization
 sources
 near_field
-fans
+ordering
 sweeping
 unfolding
 refine
+descending
 steps
 emission
-processors
 heat_order
 solution
+blocks
 heat_method
+isolines
+tracing
+paths
+curve_files
 sampling
 baselines
+applications
 bounds
 closed_forms
 peak_memory
@@ -62,6 +74,7 @@ scene
 picture
 html_view
 plots
+viewer
 demo
 cluster
 cli
@@ -69,16 +82,20 @@ __main__
 """.split()
 
 EXTRAS = """
+Xlib
 cholespy
+colorspacious
 dask
 distributed
-colorspacious
+ezdxf
 gdist
 matplotlib
 meshio
 numba
+polyscope
 potpourri3d
 psutil
+pyamg
 pygeodesic
 pymeshlab
 pytest

@@ -686,6 +686,17 @@ def test_graph_limit_counts_no_rounding_as_an_edge():
     np.testing.assert_allclose(limit, steps, rtol=0, atol=1e-7)
 
 
+def test_graph_limit_keeps_what_is_near_the_source():
+    """Along the side of a square the only shortest path has n edges of weight 1/2; across it there are 1e40 paths."""
+    n = 70
+    mesh = shapes.grid(n)
+    log_t = -1000 * np.log(10)
+    limit = baselines.graph_limit(operators(mesh, "cotan").L, 0, log_t)
+    along = np.arange(1, n)
+    for vertices in (along, along * (n + 1)):
+        np.testing.assert_allclose((limit[vertices] - along) * log_t, along * np.log(0.5), rtol=0, atol=1e-9)
+
+
 def test_graph_limit_where_nothing_arrives():
     limit = baselines.graph_limit(sp.block_diag([np.ones((2, 2)), np.ones((1, 1))]), 1, -50.0)
     np.testing.assert_allclose(limit, [1, 0, np.inf], atol=1e-12)

@@ -54,11 +54,14 @@ def test_measured_rows_and_their_table(benchmark: ModuleType) -> None:
     assert 0 < own["query"] < own["precomputation"]
     if len(rows) == 2:
         assert rows[1]["ratio"] == 1
+        assert set(own["over potpourri3d"].values()) != {1.0}
         assert own["ratio"] > 0
     result = {
         "environment": benchmark.environment() | {"seed": "0"},
         "timings": rows,
         "accuracy": [{**own, "exact_largest": np.pi}],
+        "bandwidth": 1e10,
+        "import": {"import heat_igl": 0.5},
     }
     table = benchmark.markdown(result)
     assert f"| sphere 2000 | heat_igl | {own['precomputation']:.3f} |" in table
@@ -70,3 +73,52 @@ def test_a_method_that_dies_is_named(benchmark: ModuleType, tmp_path: Path) -> N
     with pytest.raises(RuntimeError, match="heat_igl ended with status 1"):
         child.run()
     child.close()
+
+
+def test_exponents_are_those_of_a_power_law_on_spheres(benchmark: ModuleType) -> None:
+    rows = [
+        {"mesh": f"sphere {n}", "n": n, "method": "heat_igl", "precomputation": 3e-6 * n**1.2, "later": 1e-7 * n}
+        for n in (10_000, 100_000, 1_000_000)
+    ]
+    outlier = {"mesh": "bunny 30000", "n": 30_000, "method": "heat_igl", "precomputation": 99.0, "later": 99.0}
+    found = benchmark.exponents([*rows, outlier, {**rows[0], "n": 3_000_000}])
+    assert found["heat_igl"] == pytest.approx({"precomputation": 1.2, "later": 1.0})
+    assert benchmark.exponents(rows[:1]) == {}
+
+
+def test_floor_and_break_even(benchmark: ModuleType) -> None:
+    own = {"mesh": "m", "method": "heat_igl", "precomputation": 2.0, "query": 0.2, "later": 0.1, "factor_bytes": 2e8}
+    front = {"mesh": "m", "method": "MeshLab's front", "query": 0.6}
+    slower = {"mesh": "m", "method": "pygeodesic", "query": 0.05}
+    assert benchmark.floors([own, front], 1e10)[0]["floor"] == pytest.approx(0.04)
+    assert benchmark.floors([own, front], 1e10)[0]["over_floor"] == pytest.approx(2.5)
+    # 2 + 4 * 0.1 = 2.4 = 4 * 0.6
+    assert [row["queries"] for row in benchmark.break_even([own, front, slower])] == [4, None]
+
+
+def test_tables_are_put_between_their_marks(benchmark: ModuleType) -> None:
+    page = "a\n<!-- floor -->\nold\n<!-- /floor -->\nb <!-- timings --><!-- /timings -->\n"
+    filled = benchmark.fill_in(page, {"floor": "new | 1", "elsewhere": "x"})
+    assert filled == "a\n<!-- floor -->\nnew | 1\n<!-- /floor -->\nb <!-- timings --><!-- /timings -->\n"
+    assert benchmark.fill_in(filled, {"floor": "new | 1"}) == filled
+
+
+def test_a_huge_mesh_small(benchmark: ModuleType) -> None:
+    pytest.importorskip("rich")
+    found = benchmark.huge(2500, None)
+    assert found["n"] == 2562
+    sphere = heat_igl.shapes.icosphere(4)
+    exact = benchmark.great_circles(sphere.V, 0)
+    expected = benchmark.errors(heat_igl.HeatMethodSolver(sphere).distance(0), exact)
+    assert found["mean_error"] == pytest.approx(expected["mean_error"])
+    assert "| icosphere | 2562 |" in benchmark.tables({"timings": [], "huge": found})["huge"]
+
+
+def test_subdivided_meshes_keep_their_exact_distances(benchmark: ModuleType, tmp_path: Path) -> None:
+    cone = heat_igl.shapes.cone(20, 6)
+    heat_igl.write_mesh(tmp_path / "cone.off", cone)
+    meshes = benchmark.timed_meshes([2000], [tmp_path / "cone.off"], np.random.default_rng(0))
+    name, mesh, first = meshes[-1]
+    assert name == f"cone {mesh.n_vertices}"
+    assert 1600 < mesh.n_vertices < 2500
+    np.testing.assert_allclose(mesh.V[: first.n_vertices], cone.V, atol=1e-12)

@@ -211,7 +211,7 @@ def test_a_warning_of_the_package_is_one_line(sphere: Path, capsys: pytest.Captu
         (["--laplacian=graph"], 2, ("graph", "intrinsic-delaunay, cotan")),
         (["--boundary=hot"], 2, ("hot", "neumann, dirichlet, average")),
         (["--magnitude=long"], 2, ("long", "auto, unit, damped")),
-        (["--backend=abacus"], 2, ("abacus", "auto, scipy, cholespy")),
+        (["--backend=abacus"], 2, ("abacus", "auto, scipy, multifrontal")),
         (["--output=out.obj"], 1, ("out.obj", ".ply or .vtu")),
         (["--picture=out.gif"], 1, ("out.gif", ".png, .pdf, .svg")),
         (["--output=.ply/out.ply"], 1, (".ply",)),

@@ -82,7 +82,7 @@ def test_what_cannot_be_shown_is_rejected_by_name(tmp_path: Path) -> None:
         page(mesh, x, style="dots")  # type: ignore[arg-type]
     with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 25"):
         page(mesh, x, sources=25)
-    with pytest.raises(ValueError, match=r"a\.png must end in \.html to be a page"):
+    with pytest.raises(ValueError, match=r"a\.png must end in \.html or \.htm to be a page"):
         write_html(tmp_path / "a.png", mesh, x)
 
 
@@ -185,6 +185,16 @@ def browser(chromium: Browser) -> Iterator[Browser]:
     assert chromium.driver.get_log("browser") == []
 
 
+def assert_agree(found: np.ndarray, expected: np.ndarray) -> None:
+    """The same fixed point, though Python's sweep does not pass on changes below 3e-4 and the page's all above 1e-7."""
+    np.testing.assert_array_equal(np.isfinite(found), np.isfinite(expected))
+    away = np.isfinite(expected) & (expected > 0)
+    np.testing.assert_array_equal(found[expected == 0], 0)
+    relative = np.abs(found[away] / expected[away] - 1)
+    assert relative.max() < 1e-3
+    assert relative.mean() < 3e-5
+
+
 def colour_at(image: np.ndarray, at: np.ndarray) -> np.ndarray:
     return image[int(at[1]), int(at[0])]
 
@@ -285,13 +295,13 @@ def test_a_click_moves_the_source_and_the_distance_follows(browser: Browser, bun
     assert "sweep" in browser.text("method")
     assert (np.abs(browser.image() - image).max(axis=2) > 0.1).mean() > 0.1
     sweep = heat_igl.HeatMethodSolver(bunny, refine="sweep")
-    np.testing.assert_allclose(browser.distance(), sweep.distance(source), rtol=1e-4)
+    assert_agree(browser.distance(), sweep.distance(source))
 
     browser.click(np.array([0.4 * width, 0.5 * height]), modifiers=8)
     both = browser.sources()
     assert both[0] == source
     assert len(both) == 2
-    np.testing.assert_allclose(browser.distance(), sweep.distance(both), rtol=1e-4)
+    assert_agree(browser.distance(), sweep.distance(both))
     browser.mouse("mouseMoved", browser.on_canvas(source) + np.array([0, -40, 0]), buttons=0)
     browser.wait(lambda: f"vertex {both[1]} " not in browser.text("readout"))
     vertex, value = re.fullmatch(r"vertex (\d+) at \(.*\): (\S+)", browser.text("readout")).groups()  # type: ignore[union-attr]
@@ -317,10 +327,7 @@ def test_bad_meshes_agree_with_python_too(browser: Browser, name: str) -> None:
     mesh = heat_igl.read_mesh(shared_path(name))
     browser.open(page(mesh, np.zeros(mesh.n_vertices)))
     browser.run("window.heatIgl.setSources([7])")
-    expected = heat_igl.HeatMethodSolver(mesh, refine="sweep").distance(7)
-    np.testing.assert_allclose(
-        browser.distance(), expected, rtol=2e-4, atol=1e-6 * expected[np.isfinite(expected)].max()
-    )
+    assert_agree(browser.distance(), heat_igl.HeatMethodSolver(mesh, refine="sweep").distance(7))
 
 
 def test_what_is_behind_is_not_picked(browser: Browser) -> None:

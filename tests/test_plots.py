@@ -195,6 +195,20 @@ def test_errors_of_both_signs_are_white_in_the_middle() -> None:
     np.testing.assert_allclose(row[-1], bar.cmap(1.0)[:3], atol=0.02)
 
 
+def test_isolines_of_a_field_are_also_at_zero_and_below() -> None:
+    mesh, x = flat_grid()
+    image, plain = (
+        surface_image(plot_field(mesh, x - 0.5, label="height", spacing=spacing, colormap="viridis"))
+        for spacing in (0.2, None)
+    )
+    middle = image.shape[0] // 2
+    columns = np.flatnonzero(plain[middle, :, 3] > 0.99)
+    ratio = image[middle, columns, :3].sum(axis=1) / plain[middle, columns, :3].sum(axis=1)
+    found = np.split(np.flatnonzero(ratio < 0.9), np.flatnonzero(np.diff(np.flatnonzero(ratio < 0.9)) > 1) + 1)
+    levels = [(line.mean() + 0.5) / len(columns) - 0.5 for line in found]
+    np.testing.assert_allclose(levels, [-0.4, -0.2, 0, 0.2, 0.4], atol=0.005)
+
+
 def test_fields_of_one_sign_start_at_zero_and_end_where_they_are_told() -> None:
     mesh, x = flat_grid()
     assert plot_field(mesh, x, label="heat").figure.axes[1].get_ylim() == (0, 1)

@@ -16,6 +16,8 @@ from heat_igl import HeatMethodSolver, Mesh, Refinement, shapes, unfolded_distan
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 
+from refinement_table import book, with_slivers
+
 pytest.importorskip("numba")
 
 METHODS = ("sweep", "unfold")
@@ -60,28 +62,6 @@ def moebius_strip(around: int, across: int) -> Mesh:
             c, d = (a + across + 1, b + across + 1) if i < around - 1 else (across - j, across - j - 1)
             faces += [[a, c, b], [b, c, d]]
     return Mesh(V.reshape(-1, 3), faces)
-
-
-def with_slivers(mesh: Mesh, seed: int) -> Mesh:
-    """The same surface with up to a tenth of the edges split at 1e-4 of their length; vertices keep their numbers."""
-    rng = np.random.default_rng(seed)
-    faces_of: list[list[tuple[int, int]]] = [[] for _ in mesh.edges]
-    for f, row in enumerate(mesh.facets.of_face):
-        for c, e in enumerate(row):
-            faces_of[e].append((f, c))
-    alive = np.ones(mesh.n_faces, bool)
-    points, added = [], []
-    for e in rng.permutation(len(mesh.edges))[: len(mesh.edges) // 10]:
-        if not all(alive[f] for f, _ in faces_of[e]):
-            continue
-        i, j = rng.permutation(mesh.edges[e])
-        points.append(mesh.V[i] + 1e-4 * (mesh.V[j] - mesh.V[i]))
-        new = mesh.n_vertices + len(points) - 1
-        for f, c in faces_of[e]:
-            alive[f] = False
-            w, a, b = mesh.F[f, c], mesh.F[f, (c + 1) % 3], mesh.F[f, (c + 2) % 3]
-            added += [[w, a, new], [w, new, b]]
-    return Mesh(np.concatenate([mesh.V, points]), np.concatenate([mesh.F[alive], added]))
 
 
 FLAT = {
@@ -238,18 +218,8 @@ def test_faces_turned_over_change_nothing(bumpy):
 def test_more_than_two_faces_at_an_edge():
     """Five half planes on one line: paths between two of them turn on the line."""
     k = 8
-    y, x = np.divmod(np.arange((k + 1) ** 2), k + 1)
-    V, F = [np.stack([np.zeros(k + 1), np.zeros(k + 1), np.arange(k + 1) / k], axis=1)], []
-    n = k + 1
-    for i in range(5):
-        direction = np.array([np.cos(2 * np.pi * i / 5), np.sin(2 * np.pi * i / 5)])
-        inner = x > 0
-        number = np.where(inner, n + np.cumsum(inner) - 1, y)
-        V.append(np.column_stack([np.outer(x[inner] / k, direction), y[inner] / k]))
-        F.append(number[shapes.grid(k).F])
-        n += int(inner.sum())
-    mesh = Mesh(np.concatenate(V), np.concatenate(F))
-    source = n - 1
+    mesh = book(5, k)
+    source = mesh.n_vertices - 1
     leaf = np.arange(mesh.n_vertices) < k + 1
     d = unfolded_distance(mesh.V, mesh.F, source)
     assert np.isfinite(d).all()
@@ -257,6 +227,23 @@ def test_more_than_two_faces_at_an_edge():
     truth = np.linalg.norm(mesh.V - mesh.V[source], axis=1)
     np.testing.assert_allclose(d[leaf], truth[leaf], rtol=1e-9)
     assert (d >= truth * (1 - 1e-9)).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("k", [1, 2, 5])
+def test_straight_over_an_edge_of_more_than_two_faces(method, k):
+    """Any two of five pages are a plane folded on the line: the path between them is straight when rolled out."""
+    mesh = book(5, k)
+    surface = Refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)))
+    source = mesh.n_vertices - 1
+    page = (np.arange(mesh.n_vertices) - (k + 1)) // (k * (k + 1))
+    from_line, height = np.hypot(mesh.V[:, 0], mesh.V[:, 1]), mesh.V[:, 2] - mesh.V[source, 2]
+    same = (page == 4) | (from_line < 1e-9)
+    truth = np.hypot(np.where(same, from_line - 1, from_line + 1), height)
+    d = getattr(surface, method)(truth, np.array([source]))
+    # Beyond the first row of a page, straight paths are found where both ends of an edge on the line see the source.
+    first_row = same | (from_line < 1.5 / k)
+    np.testing.assert_allclose(d[first_row], truth[first_row], rtol=1e-9)
 
 
 def test_slivers_do_little_harm(bumpy):

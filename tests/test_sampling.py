@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
@@ -9,6 +11,7 @@ from scipy.spatial import Delaunay
 import heat_igl
 from heat_igl import shapes
 from heat_igl.mesh import Mesh
+from heat_igl.sampling import _least_in_faces
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +62,19 @@ def test_all_vertices_can_be_sampled():
     mesh = shapes.icosphere(1)
     points = heat_igl.farthest_points(heat_igl.HeatMethodSolver(mesh), mesh.n_vertices)
     assert np.array_equal(np.sort(points), np.arange(mesh.n_vertices))
+
+
+def test_points_are_distinct_where_distances_are_zero():
+    """As between vertices in one place: a solver that says 0 everywhere."""
+
+    class Nowhere:
+        n_vertices = 5
+        operators = SimpleNamespace(referenced=np.ones(5, bool))
+
+        def distance(self, _source):
+            return np.zeros(5)
+
+    assert sorted(heat_igl.farthest_points(Nowhere(), 5, start=2).tolist()) == [0, 1, 2, 3, 4]
 
 
 def test_every_component_gets_a_point_first_and_loose_vertices_none():
@@ -175,6 +191,46 @@ def test_too_few_sites_have_no_dual(square):
         heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(solver, 2))
     with pytest.raises(heat_igl.MeshError, match="the cells have 1200 vertices and the mesh 441"):
         heat_igl.dual_triangulation(square[0], heat_igl.farthest_cells(solver, 2))
+
+
+def every_vertex_a_site(mesh: Mesh) -> heat_igl.VoronoiCells:
+    """Cells whose dual is the mesh itself."""
+    every = np.arange(mesh.n_vertices)
+    return heat_igl.VoronoiCells(every, every, np.zeros(mesh.n_vertices))
+
+
+def test_dual_must_be_a_manifold_with_every_site():
+    sphere = shapes.icosphere(1)
+    dual = heat_igl.dual_triangulation(sphere, every_vertex_a_site(sphere))
+    assert {tuple(sorted(face)) for face in dual.F.tolist()} == {tuple(sorted(face)) for face in sphere.F.tolist()}
+    loose = Mesh(np.concatenate([sphere.V, np.ones((2, 3))]), sphere.F)
+    with pytest.raises(heat_igl.MeshError, match=r"cell 42 has no triangle \(2 of 44 cells have none\)"):
+        heat_igl.dual_triangulation(loose, every_vertex_a_site(loose))
+    book = shapes.book(3, 2)
+    with pytest.raises(heat_igl.MeshError, match=r"between cells 0 and 1 has more than two triangles \(2 edges have\)"):
+        heat_igl.dual_triangulation(book, every_vertex_a_site(book))
+    bow_tie = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]])
+    with pytest.raises(heat_igl.MeshError, match=r"the triangles at cell 0 are not one fan \(1 cells"):
+        heat_igl.dual_triangulation(bow_tie, every_vertex_a_site(bow_tie))
+
+
+def test_least_value_on_a_face_against_a_search():
+    """f of random distances on random triangles: inside, on an edge and in a corner."""
+    rng = np.random.default_rng(2)
+    corner = rng.standard_normal((200, 3, 3))
+    value = rng.uniform(0, 6, (200, 3))
+    x, least = _least_in_faces(corner, value, 1.5)
+    i, j = np.divmod(np.arange(101 * 101), 101)
+    grid = np.stack([i, j, 100 - i - j], axis=1)[i + j <= 100] / 100
+    points = np.einsum("gc,mcx->mgx", grid, corner)
+    # f is linear plus W |p|^2, whatever the origin.
+    squares = (corner**2).sum(axis=2)
+    f = np.einsum("gc,mc->mg", grid, value - 1.5 * squares) + 1.5 * (points**2).sum(axis=2)
+    assert (least <= f.min(axis=1) + 1e-9).all()
+    np.testing.assert_allclose(least, f.min(axis=1), atol=0.01)
+    n_positive = (x > 1e-12).sum(axis=1)
+    assert {1, 2, 3} <= set(n_positive.tolist())
+    np.testing.assert_allclose(x.sum(axis=1), 1)
 
 
 def test_centre_in_the_plane_is_the_weighted_mean(square):

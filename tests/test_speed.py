@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import perturbed
@@ -42,7 +44,9 @@ def test_identities(mesh):
 
 @pytest.mark.parametrize("mesh", [shapes.icosphere(3), shapes.box(6)], ids=["sphere", "box"])
 def test_one_speed_divides_all_distances(mesh):
-    expected = heat_igl.HeatMethodSolver(mesh).distance(5) / 2.5
+    # Without triangles there is no near field of straight lines around the source, as there is none with a speed.
+    plain = heat_igl.HeatMethodSolver.from_operators(replace(operators(mesh), faces=None, triangulation=None))
+    expected = plain.distance(5) / 2.5
     found = solver(mesh, np.full(mesh.n_faces, 2.5)).distance(5)
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 

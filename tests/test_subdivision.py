@@ -3,11 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import perturbed
-from steiner import graph_distance
 
 from heat_igl import HeatMethodSolver, Mesh, MeshError, shapes
 from heat_igl.connectivity import boundary_loops
 from heat_igl.subdivision import split_long_edges
+
+from steiner import graph_distance
 
 
 def uneven() -> Mesh:

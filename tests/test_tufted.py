@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import perturbed, shared_path
-from steiner import graph_distance, steiner_distance
 
 import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, shapes
@@ -14,6 +13,8 @@ from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.operators import Operators, cotan_operators, intrinsic_operators, operators, tufted_operators
 from heat_igl.subdivision import split_long_edges
 from heat_igl.tufted import has_nonmanifold_edges, tufted_cover
+
+from steiner import graph_distance, steiner_distance
 
 
 def fan_of_five(longest: float) -> Mesh:

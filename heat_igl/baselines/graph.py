@@ -97,8 +97,11 @@ def graph_limit(A: sp.spmatrix, sources: Sources, log_t: float) -> FloatArray:
     with np.errstate(under="ignore"):
         power = np.exp(log_t * (1 + n[graph.col] - n[graph.row]))
         scaled = sp.csc_array((graph.data * power, (graph.row, graph.col)), shape=graph.shape)
-    y = spl.spsolve(sp.eye_array(len(n), format="csc") - scaled, np.isin(reached, chosen).astype(np.float64))
+    # No pivoting: where no entry of A off the diagonal is negative, elimination in place only ever adds. y grows like
+    # the number of paths, and among 1e40 of them a pivoted factorization loses the values near the source.
+    factor = spl.splu(sp.eye_array(len(n), format="csc") - scaled, diag_pivot_thresh=0.0)
+    y = factor.solve(np.isin(reached, chosen).astype(np.float64))
     limit = np.full(matrix.shape[0], np.inf)
     with np.errstate(divide="ignore"):
-        limit[reached] = n + np.log(np.abs(np.atleast_1d(y))) / log_t
+        limit[reached] = n + np.log(np.abs(y)) / log_t
     return limit

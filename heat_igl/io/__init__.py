@@ -25,7 +25,7 @@ from heat_igl.mesh import Mesh
 from heat_igl.polygons import PolygonMesh
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "read_polygon_mesh", "write_mesh"]
+__all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "read_polygon_mesh", "replacing", "write_mesh"]
 
 
 class _Format(NamedTuple):
@@ -187,7 +187,7 @@ def write_mesh(path: str | os.PathLike[str], mesh: Mesh, /, **attributes: ArrayL
             f"{path}: this format holds no vertex attributes ({', '.join(attributes)}); {_those_with('attributes')} do"
         )
     arrays = _arrays(attributes, mesh.n_vertices)
-    with _replacing(path) as temporary:
+    with replacing(path) as temporary:
         form.write(temporary, mesh, arrays)
 
 
@@ -258,14 +258,20 @@ def _arrays(attributes: Mapping[str, ArrayLike], n: int) -> dict[str, FloatArray
 
 
 @contextlib.contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path`, which takes its place when the block ends well."""
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary file beside `path`, which takes its place when the block ends well.
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be written.
+    """
     try:
         # Through symbolic links, which should go on pointing where they do.
         target = Path(os.path.realpath(path))
         temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(4)}{target.suffix}")
         if target.exists() and not target.is_file():
-            raise MeshError(f"{path} is not a regular file: it cannot be replaced by a mesh")
+            raise MeshError(f"{path} is not a regular file: it cannot be replaced")
         try:
             yield temporary
             if target.exists():

@@ -4,7 +4,8 @@
 
 // Changes by less than this are not passed on: lengths come in single precision.
 const NEGLIGIBLE = 1e-7;
-const MAX_PASSES = 50;
+// Visits per vertex up to which the sweep goes back at once, and after which it gives up.
+const GO_BACK = 10, GIVE_UP = 50;
 
 // n vertices; F[3 f + c] the corners of face f, lengths[3 f + c] the edge opposite corner c.
 function sweepTables(n, F, lengths) {
@@ -80,34 +81,45 @@ function sweepDistance(tables, sources) {
   for (let i = 0; i < n; i++) rank[order[i]] = i;
   const d = new Float64Array(n).fill(Infinity), isStale = new Uint8Array(n).fill(1);
   for (const s of sources) d[s] = 0;
-  let found = true;
-  const mark = (v) => { if (!isStale[rank[v]]) isStale[rank[v]] = found = true; };
-  for (let turn = 0; found && turn < MAX_PASSES; turn++) {
-    found = false;
-    for (let i = 0; i < n; i++) {
-      if (!isStale[i]) continue;
-      isStale[i] = 0;
-      const v = order[i], old = d[v];
-      let best = old;
-      for (let k = first[v]; k < first[v + 1]; k++) {
-        const da = d[ends[2 * k]], db = d[ends[2 * k + 1]], row = 5 * k, base = shape[row + 2];
-        best = Math.min(best, da + shape[row + 3], db + shape[row + 4]);
-        if ((da >= best && db >= best) || da === Infinity || db === Infinity) continue;
-        // The source in units of the edge ab: x along it, y behind it.
-        const x = 0.5 * ((da - db) * (da + db) / (base * base) + 1), ySquared = da * da / (base * base) - x * x;
-        if (!(ySquared >= 0)) continue;
-        const y = Math.sqrt(ySquared), px = shape[row], py = shape[row + 1], crossing = x * py + px * y;
-        if (crossing >= 0 && crossing <= y + py) best = Math.min(best, base * Math.hypot(px - x, py + y));
-      }
-      if (!(best < old)) continue;
-      d[v] = best;
-      if (best >= old * (1 - NEGLIGIBLE)) continue;
-      // Farther neighbours depend on v, and nearer ones whose way can cross an edge that ends in v.
-      for (let k = first[v]; k < first[v + 1]; k++) {
-        const a = ends[2 * k], b = ends[2 * k + 1], row = 5 * k, along = shape[row] * shape[row + 2];
-        if (best < d[a] || 2 * d[a] * along < shape[row + 3] ** 2) mark(a);
-        if (best < d[b] || 2 * d[b] * (shape[row + 2] - along) < shape[row + 4] ** 2) mark(b);
-      }
+  let lowest = n;
+  const mark = (v) => { if (!isStale[v]) { isStale[v] = 1; lowest = Math.min(lowest, rank[v]); } };
+  let i = 0, again = n;
+  for (let visits = 0; visits < GIVE_UP * n;) {
+    if (i === n) {
+      if (again === n) break;
+      i = again;
+      again = n;
+    }
+    const v = order[i++];
+    if (!isStale[v]) continue;
+    isStale[v] = 0;
+    visits++;
+    const old = d[v];
+    let best = old;
+    for (let k = first[v]; k < first[v + 1]; k++) {
+      const da = d[ends[2 * k]], db = d[ends[2 * k + 1]], row = 5 * k, base = shape[row + 2];
+      best = Math.min(best, da + shape[row + 3], db + shape[row + 4]);
+      if ((da >= best && db >= best) || da === Infinity || db === Infinity) continue;
+      // The source in units of the edge ab: x along it, y behind it.
+      const x = 0.5 * ((da - db) * (da + db) / (base * base) + 1), ySquared = da * da / (base * base) - x * x;
+      if (!(ySquared >= 0)) continue;
+      const y = Math.sqrt(ySquared), px = shape[row], py = shape[row + 1], crossing = x * py + px * y;
+      if (crossing >= 0 && crossing <= y + py) best = Math.min(best, base * Math.sqrt((px - x) ** 2 + (py + y) ** 2));
+    }
+    if (!(best < old)) continue;
+    d[v] = best;
+    if (best >= old * (1 - NEGLIGIBLE)) continue;
+    // Farther neighbours depend on v, and nearer ones whose way can cross an edge that ends in v.
+    lowest = n;
+    for (let k = first[v]; k < first[v + 1]; k++) {
+      const a = ends[2 * k], b = ends[2 * k + 1], row = 5 * k, along = shape[row] * shape[row + 2];
+      if (best < d[a] || 2 * d[a] * along < shape[row + 3] ** 2) mark(a);
+      if (best < d[b] || 2 * d[b] * (shape[row + 2] - along) < shape[row + 4] ** 2) mark(b);
+    }
+    // Back to those that came too early, at once, before what is wrong there spreads.
+    if (lowest < i) {
+      if (visits < GO_BACK * n) i = lowest;
+      else again = Math.min(again, lowest);
     }
   }
   return d;

@@ -179,7 +179,7 @@
       const last = meta.colours.length - 1, rgb = meta.colours[Math.round(at * last)];
       const isLine = style === "0" && Math.abs(level - Math.round(level)) <= 0.5 * across / rows / spacing;
       const isLight = style === "1" && Math.floor(level) % 2 !== 0;
-      const ink = rgb.map((c) => (isLine && Math.round(level) !== 0 ? c * (1 - meta.lineInk) : isLight ? c + meta.stripeInk * (255 - c) : c));
+      const ink = rgb.map((c) => (isLine && (low < 0 || Math.round(level) !== 0) ? c * (1 - meta.lineInk) : isLight ? c + meta.stripeInk * (255 - c) : c));
       pen.fillStyle = "rgb(" + ink.join(",") + ")";
       pen.fillRect(0, row, 1, 1);
     }

@@ -1,0 +1,98 @@
+"""Pictures for the documentation, from generated shapes and from a mesh that the pymeshlab wheel ships.
+
+``python docs/gallery.py --out DIR`` writes the pictures, a page to turn, and gallery.md, which shows all of it with the
+code that made it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+import heat_igl
+from heat_igl import shapes
+from heat_igl.demo import sample_mesh
+from heat_igl.plots import Page, Picture, page, plot, plot_field
+
+
+def torus() -> Picture:
+    """Stripes of equal distance from one vertex: their kinks are where fronts meet."""
+    mesh = shapes.torus(160, 80)
+    phi = heat_igl.HeatMethodSolver(mesh).distance(0)
+    return plot(mesh, phi, sources=0, style="stripes", view=(30, 50))
+
+
+def bunny() -> Picture:
+    """Isolines of the distance from the nearest of three vertices."""
+    path = sample_mesh()
+    mesh = heat_igl.read_mesh(path) if path else shapes.icosphere(5)
+    sources = [1234, 4000, 9000]
+    phi = heat_igl.HeatMethodSolver(mesh).distance(sources)
+    return plot(mesh, phi, sources=sources)
+
+
+def heat() -> Picture:
+    """What step 1 leaves: heat falls by the same factor over each length."""
+    mesh = shapes.disk(40)
+    solution = heat_igl.HeatMethodSolver(mesh).solve(0)
+    return plot_field(mesh, np.log10(solution.heat), spacing=5, label="log10 of heat", sources=0, colormap="magma")
+
+
+def error() -> Picture:
+    """The error of the heat method on a sphere: too short where fronts meet, opposite the source."""
+    mesh = shapes.icosphere(5)
+    source = int(np.argmax(mesh.V[:, 2]))
+    phi = heat_igl.HeatMethodSolver(mesh).distance(source)
+    exact = np.arccos(np.clip(mesh.V @ mesh.V[source], -1, 1))
+    relative = np.divide(phi - exact, exact, out=np.zeros_like(exact), where=exact > 0)
+    return plot_field(mesh, 100 * relative, limits=(-2, 2), label="error, % of exact", view=(150, -20))
+
+
+def book() -> Picture:
+    """Five pages that share an edge: paths go over the spine from one to another."""
+    mesh = shapes.book(5, 24)
+    phi = heat_igl.HeatMethodSolver(mesh).distance(40)
+    return plot(mesh, phi, sources=40, view=(35, 35))
+
+
+def asked() -> Page:
+    """A page to turn and to ask: a click moves the source."""
+    mesh = shapes.torus(100, 50)
+    phi = heat_igl.HeatMethodSolver(mesh).distance(0)
+    return page(mesh, phi, sources=0, view=(30, 50), title="Distance on a torus", method="Distance by the heat method.")
+
+
+ENTRIES = (torus, bunny, heat, error, book, asked)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--out", type=Path, default=Path("gallery"), help="directory for the results; made if missing")
+    out: Path = parser.parse_args(argv).out
+    (out / "pages").mkdir(parents=True, exist_ok=True)
+    text = []
+    for entry in ENTRIES:
+        result = entry()
+        if isinstance(result, Picture):
+            result.save(out / f"{entry.__name__}.png")
+            shown = f"![{entry.__doc__}]({entry.__name__}.png)"
+        else:
+            result.save(out / "pages" / f"{entry.__name__}.html")
+            shown = f'<iframe src="{entry.__name__}.html" style="width: 100%; height: 520px; border: 0"></iframe>'
+        text.append(f"## {entry.__doc__}\n\n{shown}\n\n```python\n{_body(entry)}```\n")
+    (out / "gallery.md").write_text("\n".join(text), encoding="utf8")
+    return 0
+
+
+def _body(entry: Callable[[], object]) -> str:
+    """The lines of a function, without its head and docstring."""
+    lines = inspect.getsource(entry).splitlines(keepends=True)[2:]
+    return "".join(line[4:] for line in lines)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,55 @@
+"""The pictures of the documentation.
+
+    python scripts/pictures.py                      # into docs/images: about three minutes
+    python scripts/pictures.py --out DIRECTORY --picture bunny
+
+``bunny`` heads the README, ``paper`` makes those of docs/paper.md. Needs the extras ``view`` and ``fast``, and the
+meshes of the pymeshlab wheel.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from heat_igl import HeatMethodSolver
+from heat_igl.plots import plot
+
+import paper_figures
+
+DOCS = Path(__file__).resolve().parents[1] / "docs" / "images"
+
+
+def bunny(out: Path) -> None:
+    mesh = paper_figures.sample("bunny")
+    source = 1234
+    plot(mesh, HeatMethodSolver(mesh).distance(source), sources=source).save(out / "bunny.png")
+
+
+def paper(out: Path) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        paper_figures.main(["--out", folder])
+        for name in ("1_heat", "1_distance", "2", "3", "5", "5_jump"):
+            shutil.copyfile(Path(folder, f"figure_{name}.png"), out / f"paper_{name}.png")
+
+
+PICTURES: dict[str, Callable[[Path], None]] = {"bunny": bunny, "paper": paper}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=DOCS, help="directory (default docs/images)")
+    parser.add_argument("--picture", choices=list(PICTURES), action="append", help="one of them; repeatable")
+    arguments = parser.parse_args(argv)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    for name in arguments.picture or PICTURES:
+        PICTURES[name](arguments.out)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,190 @@
+"""What refinement keeps of its accuracy and speed off the beaten track.
+
+    python scripts/refinement_table.py bunny.obj cow.obj --nonmanifold suzanne.obj --json refinement.json
+
+For each mesh: the mean error with slivers inserted relative to that without; the time per source of 64 sources together
+relative to one alone; the time of `unfolded_distance` relative to potpourri3d's factorization and one query, and the
+number of queries from which the factored solver pays. Then an icosphere against the sphere, and surfaces with edges of
+more than two faces against shortest paths in a graph with extra points on the edges. ``--icosphere 0`` leaves the
+sphere out; at 8 subdivisions (655 362 vertices) it needs a minute and 2 GiB.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import heat_igl
+from heat_igl import HeatMethodSolver, Mesh, Refinement, shapes
+from heat_igl.intrinsic import intrinsic_triangulation
+from heat_igl.typing import FloatArray
+
+from accuracy_table import errors, exact_distance, potpourri
+from environment import environment
+from steiner import steiner_distance
+
+REFINED = ("sweep", "unfold")
+Row = dict[str, Any]
+
+
+def with_slivers(mesh: Mesh, seed: int) -> Mesh:
+    """The same surface with up to a tenth of the edges split at 1e-4 of their length; vertices keep their numbers."""
+    rng = np.random.default_rng(seed)
+    faces_of: list[list[tuple[int, int]]] = [[] for _ in mesh.edges]
+    for f, row in enumerate(mesh.facets.of_face):
+        for c, e in enumerate(row):
+            faces_of[e].append((f, c))
+    alive = np.ones(mesh.n_faces, bool)
+    points, added = [], []
+    for e in rng.permutation(len(mesh.edges))[: len(mesh.edges) // 10]:
+        if not all(alive[f] for f, _ in faces_of[e]):
+            continue
+        i, j = rng.permutation(mesh.edges[e])
+        points.append(mesh.V[i] + 1e-4 * (mesh.V[j] - mesh.V[i]))
+        new = mesh.n_vertices + len(points) - 1
+        for f, c in faces_of[e]:
+            alive[f] = False
+            w, a, b = mesh.F[f, c], mesh.F[f, (c + 1) % 3], mesh.F[f, (c + 2) % 3]
+            added += [[w, a, new], [w, new, b]]
+    return Mesh(np.concatenate([mesh.V, points]), np.concatenate([mesh.F[alive], added]))
+
+
+def book(n_pages: int, k: int) -> Mesh:
+    """Half planes, k by k squares each, on one line: an edge of `n_pages` faces."""
+    y, x = np.divmod(np.arange((k + 1) ** 2), k + 1)
+    V, F = [np.stack([np.zeros(k + 1), np.zeros(k + 1), np.arange(k + 1) / k], axis=1)], []
+    n = k + 1
+    for angle in 2 * np.pi * np.arange(n_pages) / n_pages:
+        inner = x > 0
+        number = np.where(inner, n + np.cumsum(inner) - 1, y)
+        V.append(np.column_stack([np.outer(x[inner] / k, [np.cos(angle), np.sin(angle)]), y[inner] / k]))
+        F.append(number[shapes.grid(k).F])
+        n += int(inner.sum())
+    return Mesh(np.concatenate(V), np.concatenate(F))
+
+
+def fan(n_faces: int) -> Mesh:
+    """Triangles on one edge, undivided."""
+    angle = 2 * np.pi * np.arange(n_faces) / n_faces
+    tips = np.stack([np.cos(angle), np.sin(angle), 0.3 * np.arange(n_faces)], axis=1)
+    F = np.stack([np.zeros(n_faces, int), np.ones(n_faces, int), np.arange(n_faces) + 2], axis=1)
+    return Mesh(np.concatenate([[[0, 0, 0], [0, 0, 1]], tips]), F)
+
+
+def median_seconds(call: Callable[[], object], repeats: int) -> float:
+    call()
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        call()
+        seconds.append(time.perf_counter() - start)
+    return float(np.median(seconds))
+
+
+def slivers(mesh: Mesh, sources: list[int], cache: Path | None) -> Row:
+    """Mean error in percent with slivers inserted, at the vertices of the mesh, and without."""
+    row: Row = {}
+    exact = [exact_distance(mesh, source, cache)[0] for source in sources]
+    for refine in REFINED:
+        for name, surface in (("clean", mesh), ("slivers", with_slivers(mesh, 0))):
+            solver = HeatMethodSolver(surface, refine=refine)
+            found = [errors(solver.distance(s)[: mesh.n_vertices], e)[0] for s, e in zip(sources, exact, strict=True)]
+            row[f"{refine} {name} %"] = float(np.mean(found))
+        row[f"{refine} ratio"] = row[f"{refine} slivers %"] / row[f"{refine} clean %"]
+    return row
+
+
+def speed(mesh: Mesh, source: int, repeats: int) -> Row:
+    """Times in ratios: 64 sources, and the one query without a factorization."""
+    row: Row = {}
+    sources = np.random.default_rng(0).choice(np.unique(mesh.F), 64).tolist()
+    setup = {}
+    for refine in REFINED:
+        setup[refine] = median_seconds(lambda refine=refine: HeatMethodSolver(mesh, refine=refine), 2)
+        solver = HeatMethodSolver(mesh, refine=refine)
+        query = median_seconds(lambda solver=solver: [solver.distance(s) for s in sources[:8]], repeats) / 8
+        row[f"64 sources, {refine}"] = median_seconds(lambda solver=solver: solver.distances(sources), 3) / 64 / query
+    once = median_seconds(lambda: heat_igl.unfolded_distance(mesh.V, mesh.F, source), repeats)
+    other = median_seconds(lambda: potpourri(mesh)(source), repeats)
+    row["unfolded_distance of potpourri3d"] = once / other
+    row["solver pays from query"] = int(np.ceil(setup["unfold"] / (once - query))) if once > query else None
+    return row
+
+
+def sphere(subdivisions: int) -> Row:
+    """Mean error in percent against the sphere; the order is that of the distance itself, to save the factorization."""
+    mesh = shapes.icosphere(subdivisions)
+    truth = np.arccos(np.clip(mesh.V @ mesh.V[0], -1, 1))
+    refinement = Refinement(intrinsic_triangulation(mesh))
+    row: Row = {"vertices": mesh.n_vertices}
+    for refine in REFINED:
+        distance: FloatArray = getattr(refinement, refine)(truth, np.array([0]))
+        row[f"{refine} %"] = errors(distance, truth)[0]
+    return row
+
+
+def nonmanifold(mesh: Mesh, sources: list[int]) -> Row:
+    """Mean error in percent against a graph with extra points on the edges."""
+    truth = steiner_distance(mesh, sources)
+    row: Row = {}
+    for refine in (None, *REFINED):
+        solver = HeatMethodSolver(mesh, refine=refine)
+        found = [errors(solver.distance(s), d)[0] for s, d in zip(sources, truth, strict=True)]
+        row[f"{refine or 'heat'} %"] = float(np.mean(found))
+    return row
+
+
+def markdown(rows: dict[str, Row]) -> str:
+    lines = []
+    for name, row in rows.items():
+        cells = (f"{key}: {value:.4g}" if isinstance(value, float) else f"{key}: {value}" for key, value in row.items())
+        lines.append(f"- **{name}** " + "; ".join(cells))
+    return "\n".join(lines)
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("meshes", nargs="*")
+    parser.add_argument("--nonmanifold", nargs="*", default=[], help="meshes with edges of more than two faces")
+    parser.add_argument("--seeds", type=int, default=3, help="sources per mesh, one per seed")
+    parser.add_argument("--repeats", type=int, default=5, help="timed calls")
+    parser.add_argument("--icosphere", type=int, default=8, help="subdivisions")
+    parser.add_argument("--exact-cache", type=Path, help="directory that keeps exact distances")
+    parser.add_argument("--json", type=Path, help="where to write the rows")
+    options = parser.parse_args(argv)
+    print("environment:", ", ".join(f"{name} {version}" for name, version in environment().items()), flush=True)
+
+    def drawn(mesh: Mesh) -> list[int]:
+        return [int(np.random.default_rng(seed).choice(np.unique(mesh.F))) for seed in range(options.seeds)]
+
+    rows: dict[str, Row] = {}
+    for path in options.meshes:
+        mesh = heat_igl.read_mesh(path)
+        rows[Path(path).stem] = slivers(mesh, drawn(mesh), options.exact_cache) | speed(
+            mesh, drawn(mesh)[0], options.repeats
+        )
+        print(f"{Path(path).stem} done", file=sys.stderr, flush=True)
+    rows["fan of five"] = nonmanifold(fan(5), [2, 3, 4])
+    for k in (8, 24):
+        mesh = book(5, k)
+        rows[f"five pages, {k} edges on the line"] = nonmanifold(mesh, [mesh.n_vertices - 1])
+    for path in options.nonmanifold:
+        mesh = heat_igl.read_mesh(path)
+        rows[Path(path).stem] = nonmanifold(mesh, drawn(mesh))
+    if options.icosphere:
+        rows["icosphere"] = sphere(options.icosphere)
+    print(markdown(rows))
+    if options.json:
+        options.json.write_text(json.dumps({"environment": environment(), "rows": rows}, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,254 @@
+from __future__ import annotations
+
+import itertools
+import pickle
+import threading
+
+import numpy as np
+import pytest
+from conftest import perturbed
+
+from heat_igl import HeatMethodSolver, Mesh, MeshError, MissingExtraError, SourceError, blocks, shapes
+from heat_igl.operators import operators
+from heat_igl.peak_memory import PeakMemory
+
+
+@pytest.fixture(scope="module")
+def sphere() -> Mesh:
+    return perturbed(shapes.icosphere(4))
+
+
+@pytest.fixture(scope="module")
+def solver(sphere) -> HeatMethodSolver:
+    return HeatMethodSolver(sphere)
+
+
+def test_blocks_keep_to_the_memory_and_use_the_threads():
+    assert blocks.block_size(10_000, 1000, 2) == (8, 2)
+    assert blocks.block_size(10_000, None, 2) == (8, 2)
+    assert blocks.block_size(10_000, 6, 2) == (8, 2)
+    assert blocks.block_size(10_000, 1, 4) == (8, 1)
+    size, threads = blocks.block_size(1_600_000, 64, 2)
+    assert threads == 2
+    assert 1 < size < 8
+    assert blocks.block_size(10_000, 6, 64)[0] == blocks.block_size(10_000, 6, 1)[0]  # bits do not depend on threads
+    assert blocks.block_size(6_400_000, 64, 2) == (1, 1)
+    assert blocks.block_size(20_000_000, 64, 2) == (1, 1)
+
+
+def test_in_order_works_on_several_threads_and_draws_no_more_than_it_has_room_for():
+    drawn: list[int] = []
+    both_busy = threading.Barrier(2, timeout=10)
+
+    def items():
+        for i in itertools.count():
+            drawn.append(i)
+            yield i
+
+    def work(i: int) -> int:
+        both_busy.wait()
+        return 10 * i
+
+    results = blocks.in_order(work, items(), 2)
+    assert list(itertools.islice(results, 4)) == [0, 10, 20, 30]
+    assert len(drawn) <= 6
+    both_busy.abort()
+    results.close()
+
+
+@pytest.mark.parametrize("n_threads", [1, 2])
+def test_an_error_in_the_items_comes_after_the_results_before_it(n_threads):
+    def items():
+        yield from range(5)
+        raise KeyError("the sixth")
+
+    results = blocks.in_order(sum, blocks.in_blocks(items(), 2), n_threads)
+    found = []
+    with pytest.raises(KeyError, match="the sixth"):
+        found.extend(itertools.chain.from_iterable([r] for r in results))
+    results = blocks.in_order(sum, blocks.in_blocks(items(), 2), n_threads)
+    assert [next(results) for _ in range(3)] == [1, 5, 4]
+
+
+class Chunked:
+    """What a row writer needs of a zarr array, with a record of what was written."""
+
+    def __init__(self, shape: tuple[int, int], height: int) -> None:
+        self.shape, self.dtype, self.chunks = shape, np.dtype(np.float32), (height, shape[1])
+        self.values = np.full(shape, np.nan, np.float32)
+        self.writes: list[tuple[int, int]] = []
+
+    def __setitem__(self, rows: slice, values: np.ndarray) -> None:
+        self.values[rows] = values
+        self.writes.append((rows.start, rows.stop))
+
+
+@pytest.mark.parametrize("height", [3, 10, 100])
+def test_chunks_are_written_whole_and_once(solver, height):
+    sets = list(range(23))
+    out = Chunked((23, solver.n_vertices), height)
+    assert solver.distances(sets, out=out) is out
+    assert all(start % height == 0 and (stop % height == 0 or stop == 23) for start, stop in out.writes)
+    assert [start for start, _ in out.writes[1:]] == [stop for _, stop in out.writes[:-1]]
+    np.testing.assert_array_equal(out.values, solver.distances(sets, dtype=np.float32))
+
+
+def test_a_zarr_array_and_a_memmap_hold_the_same(tmp_path, solver):
+    zarr = pytest.importorskip("zarr")
+    sets = [[i, i + 1] for i in range(11)]
+    expected = solver.distances(sets)
+    store = zarr.create_array(
+        str(tmp_path / "d.zarr"), shape=expected.shape, chunks=(4, 1000), dtype="float32", compressors=None
+    )
+    assert solver.distances(sets, out=store) is store
+    np.testing.assert_array_equal(store[:], expected.astype(np.float32))
+    mapped = np.lib.format.open_memmap(tmp_path / "d.npy", mode="w+", dtype=np.float64, shape=expected.shape)
+    solver.distances(sets, out=mapped)
+    mapped.flush()
+    np.testing.assert_array_equal(np.load(tmp_path / "d.npy"), expected)
+    with pytest.raises(ValueError, match="out is read-only: open a memmap with mode='r\\+'"):
+        solver.distances(sets, out=np.load(tmp_path / "d.npy", mmap_mode="r"))
+
+
+def test_types_of_the_result(solver):
+    single = solver.distances([4, 5], dtype="float32")
+    assert single.dtype == np.float32
+    np.testing.assert_array_equal(single, solver.distances([4, 5]).astype(np.float32))
+    with pytest.raises(ValueError, match="dtype must be float64 or float32, not int64"):
+        solver.distances([4], dtype=int)
+    with pytest.raises(ValueError, match="dtype is float32, but out holds float64"):
+        solver.distances([4], out=np.empty((1, solver.n_vertices)), dtype=np.float32)
+    with pytest.raises(ValueError, match="dtype must be float64 or float32, not float16"):
+        solver.iter_distances([4], dtype=np.float16)
+
+
+@pytest.mark.parametrize("refine", [None, "sweep"])
+def test_rows_do_not_depend_on_blocks_or_threads(sphere, refine, monkeypatch):
+    if refine:
+        pytest.importorskip("numba")
+    solver = HeatMethodSolver(sphere, refine=refine)
+    sets = [[int(i)] for i in np.random.default_rng(0).choice(sphere.n_vertices, 19, replace=False)]
+    one_by_one = np.stack([solver.distance(sources) for sources in sets])
+    for n_threads in ("1", "2"):
+        monkeypatch.setenv("HEAT_IGL_NUM_THREADS", n_threads)
+        for most in (1, 5, 8):
+            monkeypatch.setattr(blocks, "_MOST", most)
+            assert np.abs(solver.distances(sets) - one_by_one).max() < 1e-9 * np.pi
+    monkeypatch.setattr(blocks, "_MOST", 8)
+    monkeypatch.setattr("heat_igl.heat_method.n_threads", lambda: 3)
+    three = solver.distances(sets)
+    assert (three == solver.distances(sets)).all()
+
+
+def test_rows_come_in_order_from_a_generator_without_end(solver):
+    expected = solver.distances([7, 8, 9])
+    rows = solver.iter_distances((i for i in itertools.count(7)), dtype=np.float32)
+    for row, known in zip(itertools.islice(rows, 3), expected, strict=True):
+        assert row.dtype == np.float32
+        assert row.base is None
+        np.testing.assert_allclose(row, known, rtol=1e-6)
+    rows.close()
+
+
+def test_a_bad_set_is_named_when_it_is_reached(solver):
+    rows = solver.iter_distances(iter([3, 4, 99999, 5]))
+    assert next(rows)[3] == 0
+    assert next(rows)[4] == 0
+    with pytest.raises(SourceError, match=r"source_sets\[2\]: sources\[0\] = 99999 is no vertex"):
+        next(rows)
+    with pytest.raises(SourceError, match="source_sets must be an iterable of sets of sources, not 5: try distance"):
+        solver.iter_distances(5)
+
+
+def test_all_pairs_in_single_precision_are_symmetric():
+    """A distance matrix in one call. Nothing makes it symmetric but being right."""
+    mesh = perturbed(shapes.icosphere(3))
+    all_pairs = HeatMethodSolver(mesh).distances(range(mesh.n_vertices), dtype=np.float32)
+    assert (np.diag(all_pairs) == 0).all()
+    assert np.abs(all_pairs - all_pairs.T).max() < 0.1
+    directions = mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True)
+    angle = np.arccos(np.clip(directions @ directions.T, -1, 1))
+    assert np.abs(all_pairs - angle).mean() < 0.02
+
+
+def test_memory_does_not_grow_with_the_number_of_sets(solver):
+    """600 rows of 2562 doubles are 12 MB; from a generator none of them is kept."""
+    list(itertools.islice(solver.iter_distances(range(40)), 40))
+    grown = []
+    for n_sets in (40, 600):
+        with PeakMemory() as peak:
+            for _ in solver.iter_distances(iter([[i] for i in range(n_sets)])):
+                pass
+        grown.append(peak.bytes)
+    if grown[0] is None:
+        pytest.skip("nobody can tell how much memory is in use here")
+    assert grown[1] < grown[0] + 4e6  # all rows together: 12 MB
+
+
+def test_stated_memory_bound(monkeypatch):
+    """What a batch needs beside its result is below what the docstring says per face, block and thread."""
+    mesh = perturbed(shapes.torus(150, 200))
+    solver = HeatMethodSolver(mesh)
+    out = np.zeros((32, mesh.n_vertices), np.float32)
+    solver.distances(range(32), out=out)
+    allowed = 4 * 130 * mesh.n_faces
+    monkeypatch.setattr(blocks, "WORKING_MEMORY", allowed)
+    with PeakMemory() as peak:
+        solver.distances(range(32), out=out)
+    if peak.bytes is None:
+        pytest.skip("nobody can tell how much memory is in use here")
+    assert peak.bytes < 1.25 * allowed
+
+
+def test_progress_bar_counts_the_rows(solver, capsys):
+    pytest.importorskip("rich")
+    solver.distances(range(11), progress=True)
+    shown = capsys.readouterr()
+    assert "11/11" in shown.err
+    assert shown.out == ""
+
+
+def test_progress_without_rich_names_the_extra(solver, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "rich.console", None)
+    with pytest.raises(MissingExtraError, match=r'pip install "heat-igl\[cli\]"'):
+        solver.distances([0], progress=True)
+
+
+# A solver after the vertices moved.
+
+
+@pytest.mark.parametrize("options", [{}, {"t_coef": 2.0}, {"t": 0.01}, {"laplacian": "cotan"}, {"boundary": "average"}])
+def test_moved_vertices_give_what_a_new_solver_gives(cow, options):
+    moved = cow.V * [1.0, 1.7, 0.6] + 0.05 * np.sin(7 * cow.V[:, [1, 2, 0]])
+    solver = HeatMethodSolver(cow, **options)
+    before = solver.distance(5)
+    found = solver.with_vertices(moved)
+    anew = HeatMethodSolver(moved, cow.F, **options)
+    expected = anew.distance(5)
+    assert np.abs(found.distance(5) - expected).max() <= 1e-9 * expected.max()
+    assert found.t == anew.t
+    assert found.diagnostics.n_flips == anew.diagnostics.n_flips
+    assert np.abs(expected - before).max() > 0.01 * expected.max()
+    assert (solver.distance(5) == before).all()
+    assert (found.with_vertices(cow.V).distance(5) == before).all()
+
+
+def test_a_mesh_that_moves_shares_what_its_faces_say(cow):
+    facets, components = cow.facets, cow.components
+    moved = cow.with_vertices(cow.V + 1)
+    assert moved.F is cow.F
+    assert moved.facets is facets
+    assert moved.components is components
+    assert "edge_lengths" not in moved.__dict__
+    np.testing.assert_allclose(moved.edge_lengths, Mesh(cow.V + 1, cow.F).edge_lengths, rtol=1e-12)
+    copy = pickle.loads(pickle.dumps(moved))
+    assert (copy.V == moved.V).all()
+    with pytest.raises(MeshError, match="V has 3 rows, but the mesh has 2904 vertices"):
+        cow.with_vertices(cow.V[:3])
+    with pytest.raises(MeshError, match=r"V\[0, 1\] is nan"):
+        cow.with_vertices(np.where([False, True, False], np.nan, cow.V))
+
+
+def test_only_vertices_can_move(sphere):
+    with pytest.raises(ValueError, match="made from operators and has no vertices to move"):
+        HeatMethodSolver.from_operators(operators(sphere)).with_vertices(sphere.V)

@@ -1,0 +1,340 @@
+"""Isolines: where they run, what they enclose, and the files that they are written to."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import flat_perturbed, shared_path
+
+import heat_igl
+from heat_igl import (
+    HeatMethodSolver,
+    Mesh,
+    MeshError,
+    enclosed_areas,
+    isolines,
+    offset_curves,
+    shapes,
+    sublevel_areas,
+    write_curves,
+)
+
+SQUARE = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+
+
+def length(mesh, curves):
+    return sum(curve.lengths(mesh).sum() for curve in curves)
+
+
+def signed_area(mesh, curve):
+    x, y, _ = curve.positions(mesh).T
+    return (x[:-1] * y[1:] - x[1:] * y[:-1]).sum() / 2
+
+
+def assert_connected(mesh, curve):
+    starts = np.einsum("kc,kcx->kx", curve.start, mesh.V[mesh.F[curve.faces]])
+    np.testing.assert_allclose(starts, curve.positions(mesh)[:-1], atol=1e-13)
+    if curve.is_closed:
+        np.testing.assert_allclose(curve.positions(mesh)[-1], curve.positions(mesh)[0], atol=1e-13)
+
+
+def test_isolines_of_distance_on_a_plane_are_circles():
+    pytest.importorskip("numba")
+    mesh = flat_perturbed(shapes.grid(160))  # 51 200 triangles
+    source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1)))
+    radii = np.array([0.1, 0.25, 0.4])
+    # The heat alone is off by 1 to 2 % so near its source, and the circles with it.
+    phi = HeatMethodSolver(mesh, refine="unfold").distance(source)
+    for r, curves, area in zip(radii, isolines(mesh, phi, radii), sublevel_areas(mesh, phi, radii), strict=True):
+        assert [curve.is_closed for curve in curves] == [True]
+        assert_connected(mesh, curves[0])
+        assert length(mesh, curves) == pytest.approx(2 * np.pi * r, rel=0.01)
+        assert area == pytest.approx(np.pi * r**2, rel=0.01)
+        # The polygon, with the low values on its left.
+        assert signed_area(mesh, curves[0]) == pytest.approx(area, rel=1e-12)
+        np.testing.assert_allclose(enclosed_areas(mesh, phi, r), area, rtol=1e-12)
+
+
+def test_a_circle_that_leaves_the_plane_loses_nothing():
+    mesh = shapes.grid(100)
+    phi = np.hypot(mesh.V[:, 0], mesh.V[:, 1])
+    inside, across = isolines(mesh, phi, [0.5, 1.2])
+    assert [curve.is_closed for curve in inside] == [False]
+    assert length(mesh, inside) == pytest.approx(np.pi / 4, rel=1e-3)
+    # Past the corners of the square: two arcs are cut off, and one is left.
+    angle = np.pi / 2 - 2 * np.arccos(1 / 1.2)
+    assert len(across) == 1
+    assert length(mesh, across) == pytest.approx(1.2 * angle, rel=1e-3)
+    assert_connected(mesh, across[0])
+    for curve in [*inside, *across]:
+        ends = curve.positions(mesh)[[0, -1], :2]
+        assert (np.isclose(ends, 0) | np.isclose(ends, 1)).any(axis=1).all()
+
+
+def test_linear_values_have_straight_isolines_of_exact_length_and_area():
+    mesh = flat_perturbed(shapes.grid(9))
+    values = mesh.V @ [3.0, 4.0, 0.0]
+    levels = np.array([1.0, 3.0, 3.5, 5.0])
+    widths = np.array([5 / 12, 5 / 4, 5 / 4, 5 / 6])
+    for level, width, curves in zip(levels, widths, isolines(mesh, values, levels), strict=True):
+        assert len(curves) == 1
+        assert length(mesh, curves) == pytest.approx(width, rel=1e-12)
+        np.testing.assert_allclose(curves[0].positions(mesh) @ [3, 4, 0], level, rtol=1e-12)
+    # Triangles and trapezoids cut off the unit square by 3 x + 4 y = level.
+    expected = [1 / 24, 3 / 8, 1 / 2, 1 - 2 * 2 / 24]
+    np.testing.assert_allclose(sublevel_areas(mesh, values, levels), expected, rtol=1e-12)
+
+
+def test_a_level_through_vertices_and_along_edges_is_drawn_once():
+    mesh = shapes.grid(8)
+    for level in (0.25, 0.5, 1.0):
+        (curve,) = isolines(mesh, mesh.V[:, 0], level)[0]
+        assert curve.lengths(mesh).sum() == pytest.approx(1, rel=1e-14)
+        assert (curve.lengths(mesh) > 0).all()
+        np.testing.assert_array_equal(curve.positions(mesh)[:, 0], level)
+    # The diagonal passes a vertex in every other triangle.
+    (diagonal,) = isolines(mesh, mesh.V[:, 0] + mesh.V[:, 1], 1.0)[0]
+    assert diagonal.lengths(mesh).sum() == pytest.approx(np.sqrt(2), rel=1e-14)
+
+
+def test_a_plateau_has_its_lower_rim_and_no_other():
+    mesh = shapes.grid(8)
+    plateau = np.minimum(np.abs(mesh.V[:, :2] - 0.5).max(axis=1), 0.25)
+    (rim,) = isolines(mesh, plateau, 0.25)[0]
+    assert rim.is_closed
+    # A square of side 1/2, but for the two corners that a triangle with no lower vertex cuts off.
+    h = 1 / 8
+    assert rim.lengths(mesh).sum() == pytest.approx(2 - 2 * h * (2 - np.sqrt(2)), rel=1e-14)
+    assert sublevel_areas(mesh, plateau, 0.25)[0] == pytest.approx(0.25 - h**2, rel=1e-14)
+    # The same turned upside down: now the plateau is the part below, which does not reach its own level.
+    assert isolines(mesh, -plateau, -0.25) == [[]]
+    assert isolines(mesh, np.zeros(mesh.n_vertices), 0.0) == [[]]
+
+
+def test_extrema_at_the_level_have_no_curve_and_a_saddle_is_crossed():
+    assert isolines(SQUARE, [0, 1, 2, 1], [0.0, 2.0])[0] == []
+    assert length(SQUARE, isolines(SQUARE, [0, 1, 2, 1], [2.0])[0]) == 0
+    mesh = shapes.grid(4)
+    x, y = (mesh.V[:, :2] - 0.5).T
+    curves = isolines(mesh, x * y, 0.0)[0]
+    # Both axes, of which neither is lost at the vertex where they cross.
+    assert length(mesh, curves) == pytest.approx(2, rel=1e-14)
+
+
+def test_an_annulus_has_two_rims_that_share_its_area():
+    mesh = shapes.disk(40)
+    values = np.abs(np.linalg.norm(mesh.V, axis=1) - 0.6)
+    curves = isolines(mesh, values, 0.2)[0]
+    assert [curve.is_closed for curve in curves] == [True, True]
+    areas = enclosed_areas(mesh, values, 0.2)
+    np.testing.assert_allclose(areas, np.pi * (0.8**2 - 0.4**2), rtol=5e-3)
+    assert sum(signed_area(mesh, curve) for curve in curves) == pytest.approx(areas[0], rel=1e-12)
+
+
+def test_separate_regions_have_areas_of_their_own():
+    mesh = shapes.strip(40, 4)
+    values = np.minimum(mesh.V[:, 0], 0.5 * (mesh.V[:, 0].max() - mesh.V[:, 0]))
+    width = np.ptp(mesh.V[:, 1])
+    assert sorted(enclosed_areas(mesh, values, 2.0)) == pytest.approx([2 * width, 4 * width], rel=1e-12)
+
+
+def test_an_unreachable_component_is_left_out():
+    one = shapes.icosphere(3)
+    both = Mesh(np.concatenate([one.V, one.V + 5]), np.concatenate([one.F, one.F + one.n_vertices]))
+    phi = HeatMethodSolver(both).distance(0)
+    assert np.isinf(phi[one.n_vertices :]).all()
+    curves = isolines(both, phi, [1.0])[0]
+    assert [curve.is_closed for curve in curves] == [True]
+    assert (curves[0].faces < one.n_faces).all()
+    assert sublevel_areas(both, phi, 1e9)[0] == pytest.approx(one.measures.sum(), rel=1e-12)
+
+
+def test_faces_with_an_infinite_value_end_a_curve():
+    mesh = shapes.grid(8)
+    values = np.where(mesh.V[:, 0] > 0.8, np.inf, mesh.V[:, 1])
+    (curve,) = isolines(mesh, values, 0.3)[0]
+    assert not curve.is_closed
+    assert curve.positions(mesh)[:, 0].max() == pytest.approx(0.75, rel=1e-12)
+    np.testing.assert_allclose(curve.positions(mesh)[:, 1], 0.3, rtol=1e-12)
+
+
+def test_curves_end_where_three_faces_meet():
+    mesh = shapes.book(3, 4)
+    spine = mesh.facets.vertices[mesh.facets.n_faces == 3]
+    assert len(spine)
+    axis = int(np.argmax(np.ptp(mesh.V[spine].reshape(-1, 3), axis=0)))
+    middle = mesh.V[:, axis].mean() + 0.01
+    curves = isolines(mesh, mesh.V[:, axis], middle)[0]
+    assert len(curves) == 3
+    assert not any(curve.is_closed for curve in curves)
+
+
+def test_crossings_are_those_of_libigl(bunny):
+    import igl
+
+    phi = HeatMethodSolver(bunny).distance(0)
+    levels = np.linspace(0.1, 0.9, 5) * phi.max()
+    V, E, which = igl.isolines(bunny.V, bunny.F, phi, levels)
+    theirs = np.bincount(which, weights=np.linalg.norm(V[E[:, 0]] - V[E[:, 1]], axis=1))
+    ours = [length(bunny, curves) for curves in isolines(bunny, phi, levels)]
+    np.testing.assert_allclose(ours, theirs, rtol=1e-10)
+    for curves in isolines(bunny, phi, levels):
+        for curve in curves:
+            assert_connected(bunny, curve)
+
+
+def test_an_offset_curve_on_a_part():
+    pytest.importorskip("numba")
+    mesh = heat_igl.read_mesh(shared_path("fandisk.off"))
+    solver = HeatMethodSolver(mesh, refine="unfold")
+    radius = 0.05 * np.ptp(mesh.V, axis=0).max()
+    curves = offset_curves(mesh, solver, [100, 200], radius)
+    assert curves
+    phi = solver.distance([100, 200])
+    for curve in curves:
+        assert curve.is_closed
+        corners = phi[mesh.F[curve.faces]]
+        np.testing.assert_allclose((curve.start * corners).sum(axis=1), radius, rtol=1e-10)
+    assert offset_curves(mesh, solver, 100, 1e6) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "levels", "message"),
+    [
+        ([0, np.nan, 1, 2], 0.5, r"values\[1\] is nan \(1 of 4"),
+        ([0, 1, 1, -np.inf], 0.5, r"values\[3\] is -inf"),
+        ([0, 1, 2], 0.5, r"values must have shape \(4,\)"),
+        ([0, 1, 2, 1], np.inf, "levels must be finite"),
+        ([0, 1, 2, 1], [[0.5]], "levels must be finite numbers in one dimension"),
+        (["a", "b", "c", "d"], 0.5, "values must be real numbers"),
+    ],
+)
+def test_wrong_values_are_refused(values, levels, message):
+    with pytest.raises(ValueError, match=message):
+        isolines(SQUARE, values, levels)
+    with pytest.raises(ValueError, match=message):
+        sublevel_areas(SQUARE, values, levels)
+
+
+def test_tetrahedra_and_another_mesh_are_refused():
+    box = shapes.box(1)
+    with pytest.raises(MeshError, match="isolines need triangles"):
+        isolines(box, np.zeros(box.n_vertices), 0.5)
+    solver = HeatMethodSolver(shapes.grid(3))
+    with pytest.raises(ValueError, match="16 vertices, but mesh has 4"):
+        offset_curves(SQUARE, solver, 0, 0.1)
+    for radius in (0, -1, np.nan):
+        with pytest.raises(ValueError, match="radius must be a positive number"):
+            offset_curves(SQUARE, HeatMethodSolver(SQUARE), 0, radius)
+
+
+def circle_and_arc():
+    mesh = shapes.grid(20)
+    near, far = isolines(mesh, np.linalg.norm(mesh.V - [0.4, 0.5, 0], axis=1), [0.2, 0.45])
+    return mesh, {"near": near, "far": far}
+
+
+def test_obj_lines_come_back(tmp_path):
+    mesh, groups = circle_and_arc()
+    write_curves(tmp_path / "lines.obj", mesh, groups)
+    text = (tmp_path / "lines.obj").read_text()
+    V = np.array([line.split()[1:] for line in text.splitlines() if line.startswith("v ")], float)
+    lines = [np.array(line.split()[1:], int) - 1 for line in text.splitlines() if line.startswith("l ")]
+    assert re.findall("^g (.*)$", text, re.MULTILINE) == ["near", "far"]
+    for line, curve in zip(lines, [*groups["near"], *groups["far"]], strict=True):
+        np.testing.assert_array_equal(V[line][:-1], curve.positions(mesh)[:-1])
+        assert (line[0] == line[-1]) == curve.is_closed
+
+
+def test_svg_shows_a_flat_domain_upright_and_at_its_size(tmp_path):
+    mesh, groups = circle_and_arc()
+    write_curves(tmp_path / "lines.svg", mesh, groups)
+    import xml.etree.ElementTree as ET
+
+    root = ET.parse(tmp_path / "lines.svg").getroot()
+    name = "{http://www.w3.org/2000/svg}"
+    drawn = [*root.iter(f"{name}polygon"), *root.iter(f"{name}polyline")]
+    assert [element.tag for element in drawn] == [f"{name}polygon", f"{name}polyline"]
+    points = np.array([pair.split(",") for pair in drawn[0].attrib["points"].split()], float)
+    np.testing.assert_array_equal(points * [1, -1], groups["near"][0].positions(mesh)[:-1, :2])
+    x, y, width, height = map(float, root.attrib["viewBox"].split())
+    every = np.concatenate([curve.positions(mesh)[:, :2] * [1, -1] for group in groups.values() for curve in group])
+    assert (every >= [x, y]).all()
+    assert (every <= [x + width, y + height]).all()
+
+
+def test_svg_of_a_tilted_plane_keeps_lengths_and_of_a_sphere_needs_a_projection(tmp_path):
+    mesh, groups = circle_and_arc()
+    tilted = Mesh(mesh.V @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0], mesh.F)
+    write_curves(tmp_path / "tilted.svg", tilted, groups["near"])
+    pairs = re.findall(r'<polygon points="([^"]*)"', (tmp_path / "tilted.svg").read_text())[0].split()
+    points = np.array([pair.split(",") for pair in pairs], float)
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    np.testing.assert_allclose(steps, groups["near"][0].lengths(mesh)[:-1], rtol=1e-9, atol=1e-14)
+
+    sphere = shapes.icosphere(2)
+    curves = isolines(sphere, sphere.V[:, 2], 0.3)[0]
+    with pytest.raises(ValueError, match=r"needs a flat mesh.*pass a projection"):
+        write_curves(tmp_path / "sphere.svg", sphere, curves)
+    write_curves(tmp_path / "sphere.svg", sphere, curves, projection=np.eye(2, 3))
+    assert "<polygon" in (tmp_path / "sphere.svg").read_text()
+    with pytest.raises(ValueError, match=r"projection must be a finite array of shape \(2, 3\)"):
+        write_curves(tmp_path / "sphere.svg", sphere, curves, projection=np.eye(3))
+
+
+def test_dxf_comes_back_with_layers(tmp_path):
+    ezdxf = pytest.importorskip("ezdxf.filemanagement")
+    mesh, groups = circle_and_arc()
+    write_curves(tmp_path / "lines.dxf", mesh, groups)
+    found = list(ezdxf.readfile(tmp_path / "lines.dxf").modelspace())
+    assert [(line.dxf.layer, line.is_closed) for line in found] == [("near", True), ("far", False)]
+    points = np.array([tuple(vertex.dxf.location) for vertex in found[0].vertices])
+    np.testing.assert_allclose(points, groups["near"][0].positions(mesh)[:-1], rtol=1e-14, atol=1e-15)
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path):
+    mesh, groups = circle_and_arc()
+    target = tmp_path / "lines.obj"
+    target.write_text("old")
+    with pytest.raises(heat_igl.SourceError, match="is no face"):
+        write_curves(target, SQUARE, groups)
+    with pytest.raises(ValueError, match=r"curves go to .obj, .svg, .dxf files"):
+        write_curves(tmp_path / "lines.png", mesh, groups)
+    with pytest.raises(ValueError, match=r"projection is for .svg"):
+        write_curves(target, mesh, groups, projection=np.eye(2, 3))
+    with pytest.raises(MeshError, match="cannot be written"):
+        write_curves(tmp_path / "nowhere" / "lines.obj", mesh, groups)
+    assert target.read_text() == "old"
+    assert [file.name for file in tmp_path.iterdir()] == ["lines.obj"]
+
+
+def test_the_command_line_writes_the_same_lines(tmp_path):
+    pytest.importorskip("typer")
+    mesh = shapes.icosphere(3)
+    heat_igl.write_mesh(tmp_path / "sphere.off", mesh)
+    command = [sys.executable, "-m", "heat_igl", "isolines", "sphere.off", "--source", "5", "--spacing"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(heat_igl.__file__).parents[1])}
+    run = {"cwd": tmp_path, "env": environment, "capture_output": True, "text": True, "check": False}
+    done = subprocess.run([*command, "0.5", "--output", "lines.obj"], **run)
+    assert (done.returncode, done.stderr) == (0, "")
+    phi = HeatMethodSolver(mesh).distance(5)
+    levels = np.arange(0.5, phi.max(), 0.5)
+    assert re.search(rf"lines +{len(levels)} at {len(levels)} distances", done.stdout)
+    curves = dict(zip([f"{level:g}" for level in levels], isolines(mesh, phi, levels), strict=True))
+    write_curves(tmp_path / "expected.obj", mesh, curves)
+    assert (tmp_path / "lines.obj").read_text() == (tmp_path / "expected.obj").read_text()
+    for wrong, message in (
+        (["0.5", "--output", "a.png"], "curves go to"),
+        (["1e-9", "--output", "a.obj"], "over 10000"),
+    ):
+        done = subprocess.run([*command, *wrong], **run)
+        assert done.returncode == 1
+        assert done.stderr.count("\n") == 1
+        assert message in done.stderr
+    assert not (tmp_path / "a.obj").exists()

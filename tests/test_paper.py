@@ -1,0 +1,224 @@
+"""What docs/paper.md says of the paper, and the scripts that make its figures and tables."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse.linalg as spl
+
+import heat_igl
+from heat_igl import shapes
+from heat_igl.operators import operators
+from heat_igl.steps import diffuse, integrate, normalize
+
+import paper_claims
+import paper_figures
+import paper_formulas
+from paper_formulas import Square, mean_error
+
+# The jump at i = 56.
+
+
+@pytest.fixture(scope="module")
+def squares() -> dict[int, Square]:
+    return {i: Square(i) for i in range(50, 59)}
+
+
+def errors(squares: dict[int, Square], **options: object) -> np.ndarray:
+    return np.array([mean_error(square, **options) for square in squares.values()])
+
+
+def test_in_double_precision_the_error_falls_through_56(squares: dict[int, Square]) -> None:
+    found = errors(squares)
+    assert (np.diff(found) < 0).all()
+    # By as much as a smooth curve does: neighbouring ratios are all alike.
+    ratio = found[1:] / found[:-1]
+    assert np.ptp(ratio) < 0.003
+
+
+def test_in_single_precision_it_rises_before_56_because_squares_underflow(squares: dict[int, Square]) -> None:
+    double, single = errors(squares), errors(squares, dtype=np.float32)
+    at = {i: k for k, i in enumerate(squares)}
+    # The same curve as long as nothing underflows, then a rise that goes on.
+    np.testing.assert_allclose(single[: at[52]], double[: at[52]], rtol=0.01)
+    assert (np.diff(single[at[54] :]) > 0).all()
+    assert single[at[56]] > 1.05 * double[at[56]]
+    assert single[at[58]] > 1.2 * double[at[58]]
+    # Still in single precision, with a norm that squares nothing small: no rise.
+    safe = errors(squares, dtype=np.float32, safe_norm=True)
+    assert (np.diff(safe) < 0).all()
+    np.testing.assert_allclose(safe, double, rtol=0.01)
+
+
+def test_squared_gradients_underflow_in_the_far_corner() -> None:
+    """Below 1.2e-38 a single has fewer digits, below 1.4e-45 it is 0."""
+    lost = {}
+    for i in (40, 56):
+        square = Square(i)
+        u = np.zeros(len(square.V))
+        u[0] = 1
+        u = spl.spsolve((square.M - 1.3 / i**2 * square.L).tocsc(), u)
+        gradient = (square.G @ u).reshape(3, -1).astype(np.float32)
+        assert (np.abs(gradient).max(axis=0) > 1e-30).all()
+        with np.errstate(under="ignore"):
+            lost[i] = square.V[square.F].mean(axis=1)[(gradient**2).sum(axis=0) == 0]
+    assert len(lost[40]) == 0
+    assert len(lost[56]) > 100
+    assert lost[56].sum(axis=1).min() > 1.7  # x + y, at most 2
+
+
+@pytest.mark.parametrize("suspect", ["heat_tolerance", "threshold", "per_row"])
+def test_other_suspects_spoil_the_curve_long_before(suspect: str) -> None:
+    options = {"heat_tolerance": 1e-5, "threshold": 1e-8, "per_row": 1}[suspect]
+    found = [paper_claims.suspect_error(Square(i), {suspect: options}) for i in (20, 40)]
+    right = [mean_error(Square(i)) for i in (20, 40)]
+    assert found[1] > 5 * right[1]
+    assert found[1] > found[0]
+
+
+def test_truncated_one_over_eps_jumps_at_56_and_elsewhere() -> None:
+    def jumps(i: int, real: type) -> bool:
+        return paper_claims.suspect_error(Square(i), {"truncated": real}) > 0.1
+
+    assert [i for i in (51, 52, 55, 56, 57, 60) if jumps(i, np.float32)] == [52, 56, 60]
+    assert not any(jumps(i, np.float64) for i in (51, 52, 55, 56, 57, 60))
+
+
+# The formulas.
+
+
+def test_formulas_agree_with_the_steps() -> None:
+    """In double precision, and with the package's mass: libigl's default is not the third of the areas of (11)."""
+    square = Square(20)
+    domain = operators(shapes.grid(20), "cotan")
+    square.M = domain.M
+    u0 = np.zeros(domain.n)
+    u0[0] = 1
+    phi = integrate(domain, normalize(domain, diffuse(domain, u0, 1.3 / 400)))
+    np.testing.assert_allclose(paper_formulas.distance(square), phi - phi.min(), atol=1e-11)
+
+
+def test_printed_triangulation_goes_around() -> None:
+    """With n vertices to a row, n - 1 rows end in two faces to the next row's start, and 2 (n - 1)^2 do not."""
+    n = 6
+    V, F = paper_formulas.printed_triangulation(5, n)
+    across = np.ptp(V[F, 0], axis=1) > 0.5
+    assert across.sum() == 2 * (n - 1)
+    assert (~across).sum() == 2 * (n - 1) ** 2
+    inside = {tuple(sorted(face)) for face in F[~across].tolist()}
+    assert inside == {tuple(sorted(face)) for face in shapes.grid(5).F.tolist()}
+
+
+def test_mean_edge_length_of_the_square() -> None:
+    """2 i (i + 1) edges of length eps and i^2 of length sqrt(2) eps."""
+    for row, i in zip(paper_claims.edge_length((3, 50)), (3, 50), strict=False):
+        expected = (2 * (i + 1) + np.sqrt(2) * i) / (3 * i + 2)
+        assert row["h / eps"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_signs_and_factors() -> None:
+    found = {row["what"][:5].strip(": "): row["value"] for row in paper_claims.signs(12)}
+    values = [row["value"] for row in paper_claims.signs(12)]
+    assert found["(5) a"] < 1e-13
+    assert values[2] < 1e-13
+    # M - t Lap is positive definite with one sign of (10) alone.
+    assert values[3] < 0 < values[4]
+    # Without the factor 1/2, distances are half as long.
+    assert values[6] / values[5] == pytest.approx(0.5, abs=0.02)
+
+
+def test_varadhan_without_the_half() -> None:
+    line = paper_claims.varadhan(20)[0]
+    assert line["-sqrt(t) log v / d"] == pytest.approx(1, abs=0.002)
+    assert line["-sqrt(t) / 2 log v / d"] == pytest.approx(0.5, abs=0.001)
+
+
+def test_expected_accuracy() -> None:
+    """The mean of x + y - hypot(x, y) over the unit square is 1 - (sqrt 2 + asinh 1) / 3, whatever the step."""
+    limit = 1 - (np.sqrt(2) + np.arcsinh(1)) / 3
+    coarse, fine = paper_claims.expected_accuracy((20, 40))
+    assert fine["edges"] == pytest.approx(limit, abs=0.005)
+    assert fine["edges"] > coarse["edges"]
+    assert fine["heat"] < 0.65 * coarse["heat"]
+    assert fine["sweep"] < 1e-14
+    assert fine["largest (eps phi - d) / (eps phi)"] == pytest.approx(1 - np.sqrt(0.5), rel=1e-12)
+
+
+# The fits.
+
+
+def test_points_left_out_are_predicted_by_fits_without_them() -> None:
+    rng = np.random.default_rng(0)
+    i = np.arange(10.0, 130, 10)
+    seconds = 1e-4 * i**2 + rng.normal(0, 0.02, len(i))
+    for row in paper_figures.polynomial_errors(i, seconds, (1, 2, 4)):
+        missed = [
+            np.polynomial.Polynomial.fit(np.delete(i, k), np.delete(seconds, k), row["degree"])(i[k]) - seconds[k]
+            for k in range(len(i))
+        ]
+        assert row["left_out"] == pytest.approx(np.sqrt(np.mean(np.square(missed))) / seconds.mean(), rel=1e-8)
+        fit = np.polynomial.Polynomial.fit(i, seconds, row["degree"])
+        assert row["in_sample"] == pytest.approx(np.sqrt(np.mean((fit(i) - seconds) ** 2)) / seconds.mean(), rel=1e-8)
+
+
+def test_power_law() -> None:
+    i = np.arange(10.0, 310, 10)
+    law = paper_figures.power_law(i, 3e-6 * i**2.3)
+    assert law["exponent"] == pytest.approx(2.3, rel=1e-8)
+    assert law["left_out"] < 1e-8
+    noisy = paper_figures.power_law(i, 3e-6 * i**2.3 * (1 + 0.1 * np.cos(i)))
+    assert noisy["left_out"] > noisy["in_sample"] > 0.03
+
+
+# The scripts.
+
+
+def test_figures_from_one_command(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("numba")
+    assert paper_figures.main(["--quick", "--out", str(tmp_path)]) == 0
+    names = ["1_heat", "1_distance", "2", "3", "4", "5", "5_jump"]
+    for name in names:
+        assert (tmp_path / f"figure_{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert (tmp_path / f"figure_{name}.pdf").read_bytes().startswith(b"%PDF")
+    tables = {}
+    for name in ("1", "2", "3", "4", "5", "5_jump"):
+        with (tmp_path / f"figure_{name}.csv").open(encoding="utf8") as file:
+            tables[name] = list(csv.DictReader(file))
+    assert min(float(row["distance"]) for row in tables["1"]) == 0
+    assert [int(row["i"]) for row in tables["2"]] == list(paper_figures.SIZES_QUICK)
+    assert {row["time"] for row in tables["3"]} == {"precomputation", "solve"}
+    fourth = np.array([[float(row["distance"]), float(row["truth"])] for row in tables["4"]])
+    assert np.abs(fourth[:, 0] - fourth[:, 1]).max() < 0.08
+    heat = np.array([float(row["heat"]) for row in tables["5"]])
+    assert (np.diff(heat) < 0).all()
+    assert "numpy" in json.loads((tmp_path / "environment.json").read_text(encoding="utf8"))
+
+
+def test_figure_of_another_mesh(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    sphere = shapes.icosphere(2)
+    heat_igl.write_mesh(tmp_path / "sphere.off", sphere)
+    arguments = ["--figure", "1", "--mesh", str(tmp_path / "sphere.off"), "--source", "5", "--out", str(tmp_path)]
+    assert paper_figures.main(arguments) == 0
+    with (tmp_path / "figure_1.csv").open(encoding="utf8") as file:
+        rows = list(csv.DictReader(file))
+    assert [k for k, row in enumerate(rows) if float(row["distance"]) == 0] == [5]
+    assert not (tmp_path / "figure_2.csv").exists()
+
+
+def test_claims_from_one_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("numba")
+    assert paper_claims.main(["--quick", "--output", str(tmp_path)]) == 0
+    text = (tmp_path / "paper_claims.md").read_text(encoding="utf8")
+    assert capsys.readouterr().out == text
+    tables = json.loads((tmp_path / "paper_claims.json").read_text(encoding="utf8"))["tables"]
+    assert all(f"## {title}" in text for title in tables)
+    suspects = {row["suspect"]: row for row in tables["The jump at i = 56"]}
+    assert set(suspects) == set(paper_claims.SUSPECTS)
+    assert suspects["double precision"]["upward from"] is None
+    assert suspects["single precision"]["upward from"] == 54
