@@ -122,21 +122,21 @@ def test_a_line_across_the_square(refine, amount):
 def test_a_circle_around_the_sphere(refine):
     """Distance from a circle of latitude is the difference of latitudes."""
     errors = []
-    for subdivisions in (3, 4, 5):
+    for subdivisions in (2, 3, 4):
         mesh = shapes.icosphere(subdivisions)
         angle = np.linspace(0, 2 * np.pi, 300, endpoint=False)
         circle = np.stack([0.8 * np.cos(angle), 0.8 * np.sin(angle), np.full(300, 0.6)], axis=1)
         distance = HeatMethodSolver(mesh, refine=refine).distance(curve_on(mesh, circle, closed=True))
         truth = np.abs(np.arcsin(np.clip(mesh.V[:, 2], -1, 1)) - np.arcsin(0.6))
         errors.append(np.abs(distance - truth).mean())
-    assert errors[2] < {None: 0.01, "sweep": 0.02, "unfold": 1e-3}[refine]
+    assert errors[2] < {None: 0.02, "sweep": 0.04, "unfold": 4e-3}[refine]
     assert np.log2(errors[0] / errors[2]) > (0.9 if refine != "unfold" else 3)
 
 
 def test_a_ring_and_a_generator_of_the_cylinder(refine):
     for along in (True, False):
         errors = []
-        for around in (24, 48, 96):
+        for around in (16, 32, 64):
             mesh = shapes.cylinder(around, around)
             angle = np.arctan2(mesh.V[:, 1], mesh.V[:, 0])
             low, high = mesh.V[:, 2].min(), mesh.V[:, 2].max()
@@ -153,7 +153,7 @@ def test_a_ring_and_a_generator_of_the_cylinder(refine):
                 truth = np.abs(mesh.V[:, 2] - height)
             distance = HeatMethodSolver(mesh, refine=refine).distance(curve)
             errors.append(np.abs(distance - truth).mean())
-        assert errors[2] < {None: 0.03, "sweep": 0.03, "unfold": 0.003}[refine]
+        assert errors[2] < {None: 0.05, "sweep": 0.05, "unfold": 0.006}[refine]
         assert max(errors) < 1e-12 or np.log2(errors[0] / errors[2]) > 0.9
 
 
@@ -356,7 +356,7 @@ def test_points_on_pages_of_a_book(refine):
     assert (distance < 1.02 * near).all()
 
 
-@pytest.mark.parametrize("name", ["cow", "bunny"])
+@pytest.mark.parametrize("name", ["cow", pytest.param("bunny", marks=pytest.mark.slow)])
 def test_edge_lengths_alone(name, refine, request):
     mesh = request.getfixturevalue(name)
     solver = HeatMethodSolver(mesh, refine=refine)
@@ -411,7 +411,7 @@ def test_tetrahedra_take_vertices_with_offsets():
 def test_depth_in_a_ball():
     """The surface of a ball as source: distance is the depth below it."""
     errors = []
-    for n in (6, 12, 24):
+    for n in (5, 10, 20):
         cube = shapes.box(n)
         V = 2 * cube.V - 1
         largest, norm = np.abs(V).max(axis=1), np.linalg.norm(V, axis=1)
