@@ -22,9 +22,9 @@ Result = TypeVar("Result")
 # Right-hand sides solved together: reading the factors once for all of them pays up to here.
 _MOST = 8
 # Bytes per face and right-hand side that the three steps hold at their worst moment.
-_BYTES_PER_FACE = 130
+_BYTES_PER_FACE = 40
 # What all threads together may hold, unless a single right-hand side needs more.
-WORKING_MEMORY = 2**30
+WORKING_MEMORY = 2**31
 
 
 def block_size(n_faces: int, n_sets: int | None, n_threads: int) -> tuple[int, int]:

@@ -2,8 +2,9 @@
 
 George (1973) with separators from a sweep: in each piece of the graph two vertices far apart are found by breadth-first
 searches, and the vertices are lined up by how much nearer they are to one than to the other. Every threshold along that
-line cuts the piece in two; all of them are weighed at once. On meshes this leaves 12 % more nonzeros than METIS's
-multilevel scheme, in a fraction of its time, and METIS can use one processor only and holds the interpreter's lock.
+line cuts the piece in two; all of them are weighed at once. On meshes this leaves somewhat more nonzeros than
+METIS's multilevel scheme, in a fraction of its time: METIS (pymetis) uses one processor and holds the interpreter's
+lock.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from heat_igl.fans import jit
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray as FloatArray  # of 32 bits too
+from heat_igl.typing import AnyArray as IntArray
+from heat_igl.typing import BoolArray
 
 __all__ = ["Dissection", "dissect"]
 

@@ -2,7 +2,12 @@
 
 `analyse` looks at the pattern alone; what it returns factors every matrix of that pattern, and principal submatrices,
 so that the heat and the Poisson problem share one ordering. Each backend is one small class of analysis and one of
-factorization; docs/cost.md has the measurements that they were chosen by.
+factorization; scripts/tune_backends.py measures them.
+
+SuperLU comes with scipy and is the choice without numba. The package's own `multifrontal` solver is faster from a few
+hundred vertices on. Libraries that were tried and left:
+cholespy holds the interpreter's lock and orders each matrix anew; cvxopt and scikit-sparse are GPL; MKL's PARDISO is
+proprietary and for one kind of processor.
 """
 
 from __future__ import annotations
@@ -24,7 +29,7 @@ __all__ = ["Analysis", "Backend", "Factorization", "analyse", "factorize"]
 
 Backend = Literal["auto", "scipy", "multifrontal", "iterative"]
 
-# Smaller matrices go to scipy: printed by scripts/tune_backends.py.
+# Smaller matrices take milliseconds either way, and loading the compiled kernels takes longer.
 _SMALLEST_MULTIFRONTAL = 1000
 
 

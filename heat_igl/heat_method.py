@@ -412,8 +412,9 @@ class HeatMethodSolver:
 
         Notes
         -----
-        Beside the result and one row of chunks of `out`, it holds at most 1 GiB, or what one query takes where that is
-        more: 130 bytes per face. The number of threads is that of the processors, or ``HEAT_IGL_NUM_THREADS``.
+        Beside the result and one row of chunks of `out`, it holds at most 2 GiB, or what one query takes where that is
+        more: 40 bytes per face. For sources inside faces it may be three times as much. The number of threads is that
+        of the processors, or ``HEAT_IGL_NUM_THREADS``.
         """
         if not hasattr(source_sets, "__len__"):
             raise SourceError(f"source_sets must be a sequence of sets of sources, not {source_sets!r}: try distance")

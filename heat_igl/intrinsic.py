@@ -376,9 +376,18 @@ def intrinsic_gradient(triangulation: IntrinsicTriangulation) -> sp.csc_matrix:
     base = lengths[:, 2]
     x, y = apex(base, lengths[:, 1], lengths[:, 0])
     # Corners at (0, 0), (base, 0), (x, y): the gradient of the hat function of each corner.
-    along = np.stack([-1 / base, 1 / base, np.zeros(m)], axis=1)
-    across = np.stack([(x - base) / (base * y), -x / (base * y), 1 / y], axis=1)
-    rows = np.repeat(np.arange(2 * m), 3)
-    columns = np.concatenate([F.ravel(), F.ravel()])
-    values = np.concatenate([along.ravel(), across.ravel()])
-    return sp.csc_matrix((values, (rows, columns)), shape=(2 * m, triangulation.n))
+    values = np.empty((2, m, 3))
+    along, across = values
+    np.divide(1, base, out=along[:, 1])
+    np.negative(along[:, 1], out=along[:, 0])
+    along[:, 2] = 0
+    across[:, 0] = (x - base) / (base * y)
+    across[:, 1] = -x / (base * y)
+    np.divide(1, y, out=across[:, 2])
+    vertices = np.tile(F.astype(np.int32), (2, 1))
+    rows = sp.csr_matrix(
+        (values.ravel(), vertices.ravel(), np.arange(0, 6 * m + 1, 3, dtype=np.int32)), shape=(2 * m, triangulation.n)
+    )
+    if (F[:, [1, 2, 0]] == F).any():
+        rows.sum_duplicates()  # an edge from a vertex to itself
+    return rows.tocsc()

@@ -43,9 +43,10 @@ _RESIDUAL = 1e-10
 _MOST_ITERATIONS = 300
 # A matrix has an excess of the diagonal in every row, or it does not; this is rounding.
 _EXCESS = 1e-13
-# Bytes per row of a factor while it is made: measured 58 to 64 log2 n on spheres of 41k and 164k vertices.
-_BYTES_SURFACE = 65.0
-_BYTES_VOLUME = 200.0
+# Bytes per row of each of two factors while they are made, on log2 n and on n^(1/3): the multifrontal ones of spheres
+# and tori of 150k vertices took 25 to 37, those of a box of 30k vertices 35. Rather too much than too little.
+_BYTES_SURFACE = 45.0
+_BYTES_VOLUME = 100.0
 
 
 class IterativeAnalysis:

@@ -1,4 +1,4 @@
-"""Multifrontal Cholesky factorization on a tree of separators (Duff and Reid 1983; Liu 1992).
+"""Multifrontal LDL^T factorization on a tree of separators (Duff and Reid 1983; Liu 1992).
 
 Every block of the dissection is a *front*, a dense matrix over its own columns and the rows below that they reach. The
 columns are eliminated in place and kept; what is left over, the update, is added to the parent's front. The factor is
@@ -13,8 +13,9 @@ import numba
 import numpy as np
 
 from heat_igl.dissection import Dissection
-from heat_igl.fans import Function, inline
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.fans import Function
+from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
+from heat_igl.typing import BoolArray, FloatArray
 
 __all__ = ["WIDTH", "Fronts", "factor", "fronts", "solve_block", "solve_one"]
 
@@ -22,6 +23,8 @@ __all__ = ["WIDTH", "Fronts", "factor", "fronts", "solve_block", "solve_one"]
 WIDTH = 8
 # Fewer are solved one by one.
 FEW = 4
+# A pivot that has shrunk to less than this share of the diagonal is rounding.
+_SINGULAR = 1e-13
 # Rows of an update that are finished before the next ones: with the factor's rows they fit in the second cache.
 _ROWS = 192
 
@@ -113,7 +116,7 @@ def fronts(ends: IntArray, neighbours: IntArray, dissection: Dissection) -> Fron
     return Fronts(order, place, start, parent, first_row, rows, first_entry)
 
 
-@inline
+@jit
 def _at(column: int, row: int, size: int) -> int:
     """Where an entry on or below the diagonal is in the columns of a front with `size` rows."""
     return column * size - column * (column + 1) // 2 + row
@@ -121,25 +124,25 @@ def _at(column: int, row: int, size: int) -> int:
 
 @jit
 def _subtract(c: FloatArray, a: FloatArray, size: int, row: int, factor_row: int, count: int) -> None:
-    """Subtract from c the first `count` columns of the front a, from `row` on, each times its entry `factor_row`."""
+    """Subtract from c the first `count` columns of the front a, from `row` on, as much as eliminates `factor_row`."""
     length = len(c)
     t = 0
     while t + 8 <= count:
-        c0, f0 = a[_at(t, row, size) :], a[_at(t, factor_row, size)]
-        c1, f1 = a[_at(t + 1, row, size) :], a[_at(t + 1, factor_row, size)]
-        c2, f2 = a[_at(t + 2, row, size) :], a[_at(t + 2, factor_row, size)]
-        c3, f3 = a[_at(t + 3, row, size) :], a[_at(t + 3, factor_row, size)]
-        c4, f4 = a[_at(t + 4, row, size) :], a[_at(t + 4, factor_row, size)]
-        c5, f5 = a[_at(t + 5, row, size) :], a[_at(t + 5, factor_row, size)]
-        c6, f6 = a[_at(t + 6, row, size) :], a[_at(t + 6, factor_row, size)]
-        c7, f7 = a[_at(t + 7, row, size) :], a[_at(t + 7, factor_row, size)]
+        c0, f0 = a[_at(t, row, size) :], a[_at(t, factor_row, size)] * a[_at(t, t, size)]
+        c1, f1 = a[_at(t + 1, row, size) :], a[_at(t + 1, factor_row, size)] * a[_at(t + 1, t + 1, size)]
+        c2, f2 = a[_at(t + 2, row, size) :], a[_at(t + 2, factor_row, size)] * a[_at(t + 2, t + 2, size)]
+        c3, f3 = a[_at(t + 3, row, size) :], a[_at(t + 3, factor_row, size)] * a[_at(t + 3, t + 3, size)]
+        c4, f4 = a[_at(t + 4, row, size) :], a[_at(t + 4, factor_row, size)] * a[_at(t + 4, t + 4, size)]
+        c5, f5 = a[_at(t + 5, row, size) :], a[_at(t + 5, factor_row, size)] * a[_at(t + 5, t + 5, size)]
+        c6, f6 = a[_at(t + 6, row, size) :], a[_at(t + 6, factor_row, size)] * a[_at(t + 6, t + 6, size)]
+        c7, f7 = a[_at(t + 7, row, size) :], a[_at(t + 7, factor_row, size)] * a[_at(t + 7, t + 7, size)]
         for i in range(length):
             c[i] -= ((c0[i] * f0 + c1[i] * f1) + (c2[i] * f2 + c3[i] * f3)) + (
                 (c4[i] * f4 + c5[i] * f5) + (c6[i] * f6 + c7[i] * f7)
             )
         t += 8
     while t < count:
-        column, factor = a[_at(t, row, size) :], a[_at(t, factor_row, size)]
+        column, factor = a[_at(t, row, size) :], a[_at(t, factor_row, size)] * a[_at(t, t, size)]
         for i in range(length):
             c[i] -= column[i] * factor
         t += 1
@@ -147,16 +150,17 @@ def _subtract(c: FloatArray, a: FloatArray, size: int, row: int, factor_row: int
 
 @jit
 def _eliminate(panel: FloatArray, columns: int, size: int, update: FloatArray) -> bool:
-    """Cholesky of the columns of a front in place, and what they subtract from the rest, stored by columns."""
+    """LDL^T of the columns of a front in place, and what they subtract from the rest, stored by columns.
+
+    Pivots stay on the diagonal. Taking their roots, as in Cholesky's form, would round once more.
+    """
     for j in range(columns):
         column = panel[_at(j, j, size) : _at(j, size, size)]
         _subtract(column, panel, size, j, j, j)
         if not column[0] > 0.0:
             return False
-        column[0] = np.sqrt(column[0])
-        inverse = 1.0 / column[0]
         for i in range(1, len(column)):
-            column[i] *= inverse
+            column[i] /= column[0]
     left = size - columns
     for low in range(0, left, _ROWS):
         high = min(low + _ROWS, left)
@@ -190,6 +194,7 @@ def factor(ends: IntArray, neighbours: IntArray, data: FloatArray, free: BoolArr
     n, k = len(f.order), len(f.parent)
     local = np.empty(n, np.int64)
     stack = np.empty(_largest_stack(f.first_row, f.parent))
+    diagonal = np.empty(n)
     children = np.zeros(k, np.int64)
     waiting = np.empty(k, np.int64)  # fronts whose updates are on the stack, in its order
     top = n_waiting = 0
@@ -213,6 +218,8 @@ def factor(ends: IntArray, neighbours: IntArray, data: FloatArray, free: BoolArr
                 row = f.place[w]
                 if row >= start + j and free[w]:
                     panel[_at(j, row - start if row < end else local[row], size)] += data[p]
+        for j in range(columns):
+            diagonal[start + j] = panel[_at(j, j, size)]
         update = stack[top : top + left * left]
         update[:] = 0.0
         # The children's updates lie below, the last one uppermost.
@@ -237,6 +244,9 @@ def factor(ends: IntArray, neighbours: IntArray, data: FloatArray, free: BoolArr
                         update[at + local[its_rows[i]]] += column[i]
         if not _eliminate(panel, columns, size, update):
             return int(f.order[start])
+        for j in range(columns):
+            if panel[_at(j, j, size)] < _SINGULAR * diagonal[start + j]:
+                return int(f.order[start + j])
         for i in range(left * left):
             stack[below + i] = update[i]
         top = below + left * left
@@ -260,8 +270,7 @@ def solve_one(f: Fronts, L: FloatArray, x: FloatArray) -> None:
         below = room[:left]
         below[:] = 0.0
         for j in range(columns):
-            y = x[start + j] / L[at]
-            x[start + j] = y
+            y = x[start + j]
             own = columns - j
             if y != 0.0:
                 for i in range(1, own):
@@ -289,54 +298,91 @@ def solve_one(f: Fronts, L: FloatArray, x: FloatArray) -> None:
                 total += column[i] * below[i]
             for i in range(1, own):
                 total += L[at + i] * x[start + j + i]
-            x[start + j] = (x[start + j] - total) / L[at]
+            x[start + j] = x[start + j] / L[at] - total
 
 
 @jit
 def solve_block(f: Fronts, L: FloatArray, x: FloatArray) -> None:
     """Solve in place for x (n, WIDTH), in the order of elimination."""
     k = len(f.parent)
-    total = np.empty(WIDTH)
+    room = np.empty((len(x), WIDTH))
     for b in range(k):
         start, end = f.start[b], f.start[b + 1]
         rows = f.rows[f.first_row[b] : f.first_row[b + 1]]
-        columns = end - start
-        size = columns + len(rows)
+        columns, left = end - start, len(rows)
+        size = columns + left
         panel = L[f.first_entry[b] : f.first_entry[b + 1]]
-        own = x[start:end]
-        for i in range(size):
-            for c in range(WIDTH):
-                total[c] = 0.0
-            for j in range(min(i, columns)):
-                entry = panel[_at(j, i, size)]
-                for c in range(WIDTH):
-                    total[c] += entry * own[j, c]
-            if i < columns:
-                inverse = 1.0 / panel[_at(i, i, size)]
-                for c in range(WIDTH):
-                    own[i, c] = (own[i, c] - total[c]) * inverse
-            else:
-                row = rows[i - columns]
-                for c in range(WIDTH):
-                    x[row, c] -= total[c]
-    for b in range(k - 1, -1, -1):
-        start, end = f.start[b], f.start[b + 1]
-        rows = f.rows[f.first_row[b] : f.first_row[b + 1]]
-        columns = end - start
-        size = columns + len(rows)
-        panel = L[f.first_entry[b] : f.first_entry[b + 1]]
-        own = x[start:end]
-        for j in range(columns - 1, -1, -1):
-            for c in range(WIDTH):
-                total[c] = own[j, c]
+        own, below = x[start:end], room[:left]
+        for j in range(columns):
             for i in range(j + 1, columns):
                 entry = panel[_at(j, i, size)]
                 for c in range(WIDTH):
-                    total[c] -= entry * own[i, c]
-            for i in range(columns, size):
-                entry, row = panel[_at(j, i, size)], rows[i - columns]
-                for c in range(WIDTH):
-                    total[c] -= entry * x[row, c]
-            inverse = 1.0 / panel[_at(j, j, size)]
+                    own[i, c] -= entry * own[j, c]
+        below[:] = 0.0
+        _forward(panel, columns, left, own, below)
+        for i in range(left):
             for c in range(WIDTH):
-                own[j, c] = total[c] * inverse
+                x[rows[i], c] -= below[i, c]
+    for b in range(k - 1, -1, -1):
+        start, end = f.start[b], f.start[b + 1]
+        rows = f.rows[f.first_row[b] : f.first_row[b + 1]]
+        columns, left = end - start, len(rows)
+        size = columns + left
+        panel = L[f.first_entry[b] : f.first_entry[b + 1]]
+        own, below = x[start:end], room[:left]
+        for i in range(left):
+            for c in range(WIDTH):
+                below[i, c] = x[rows[i], c]
+        for j in range(columns):
+            pivot = panel[_at(j, j, size)]
+            for c in range(WIDTH):
+                own[j, c] /= pivot
+        _backward(panel, columns, left, below, own)
+        for j in range(columns - 1, -1, -1):
+            for i in range(j + 1, columns):
+                entry = panel[_at(j, i, size)]
+                for c in range(WIDTH):
+                    own[j, c] -= entry * own[i, c]
+
+
+@jit
+def _forward(panel: FloatArray, columns: int, left: int, own: FloatArray, below: FloatArray) -> None:
+    """Add the rows below the columns of a front, times `own`, to `below`; four columns per turn."""
+    size = columns + left
+    j = 0
+    while j + 4 <= columns:
+        c0, c1 = panel[_at(j, columns, size) :], panel[_at(j + 1, columns, size) :]
+        c2, c3 = panel[_at(j + 2, columns, size) :], panel[_at(j + 3, columns, size) :]
+        x0, x1, x2, x3 = own[j], own[j + 1], own[j + 2], own[j + 3]
+        for i in range(left):
+            e0, e1, e2, e3 = c0[i], c1[i], c2[i], c3[i]
+            for c in range(WIDTH):
+                below[i, c] += (e0 * x0[c] + e1 * x1[c]) + (e2 * x2[c] + e3 * x3[c])
+        j += 4
+    while j < columns:
+        c0, x0 = panel[_at(j, columns, size) :], own[j]
+        for i in range(left):
+            e0 = c0[i]
+            for c in range(WIDTH):
+                below[i, c] += e0 * x0[c]
+        j += 1
+
+
+@jit
+def _backward(panel: FloatArray, columns: int, left: int, below: FloatArray, own: FloatArray) -> None:
+    """Subtract the rows below the columns of a front, times `below`, from `own`; four rows per turn."""
+    size = columns + left
+    for j in range(columns):
+        column, x = panel[_at(j, columns, size) :], own[j]
+        i = 0
+        while i + 4 <= left:
+            e0, e1, e2, e3 = column[i], column[i + 1], column[i + 2], column[i + 3]
+            b0, b1, b2, b3 = below[i], below[i + 1], below[i + 2], below[i + 3]
+            for c in range(WIDTH):
+                x[c] -= (e0 * b0[c] + e1 * b1[c]) + (e2 * b2[c] + e3 * b3[c])
+            i += 4
+        while i < left:
+            e0, b0 = column[i], below[i]
+            for c in range(WIDTH):
+                x[c] -= e0 * b0[c]
+            i += 1

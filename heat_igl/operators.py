@@ -212,15 +212,19 @@ def cotan_operators(mesh: Mesh) -> Operators:
     return replace(domain, L=L)
 
 
-def intrinsic_operators(triangulation: IntrinsicTriangulation, longest_distance: float | None = None) -> Operators:
+def intrinsic_operators(
+    triangulation: IntrinsicTriangulation, longest_distance: float | None = None, components: IntArray | None = None
+) -> Operators:
     """The operators of triangles that are known by their edge lengths, gradients in the plane of each (d = 2).
 
-    `longest_distance` is the field of `Operators`; found along the edges of the triangulation when not given.
+    `longest_distance` and `components` are fields of `Operators`; found along the edges of the triangulation when not
+    given.
     """
     F, lengths, n = triangulation.F, triangulation.l, triangulation.n
     referenced = np.zeros(n, bool)
     referenced[F] = True
-    components = connectivity.connected_components(F, n)
+    if components is None:
+        components = connectivity.connected_components(F, n)
     if longest_distance is None:
         edges = triangulation.edges
         ends = np.stack([triangulation.tail(edges), triangulation.head(edges)], axis=1)

@@ -74,8 +74,8 @@ def plot(
         Triangles, or tetrahedra, whose surface is drawn.
     distance : (n,) array_like
         As a solver returns it; ``inf`` is drawn grey.
-    sources : int, sequence of int, or (n,) mask of bool, optional
-        Vertices to mark.
+    sources : optional
+        To mark: whatever ``solver.distance`` takes, vertices, points in faces and curves.
     spacing : float, optional
         Distance between isolines; a round number near a sixteenth of the largest distance by default.
     style : {"lines", "stripes", "plain"}
@@ -216,8 +216,9 @@ def _laid_out(
     axes.set_axis_off()
     image, depth = _surface(points, seen, columns, rows, style, table)
     axes.imshow(image, interpolation="antialiased", aspect="auto")
-    _draw_curves(axes, [to_pixels(line, scale, centre) for line in lines], depth)
-    hidden = _mark(axes, points, depth, seen)
+    for colour, drawn in ((_CURVE, lines), (_SOURCE, list(seen.lines @ seen.turn.T))):
+        _draw_curves(axes, [to_pixels(line, scale, centre) for line in drawn], depth, colour)
+    hidden = _mark(axes, to_pixels(seen.dots @ seen.turn.T, scale, centre), depth)
     bar = figure.add_axes(((left + across + 0.08) / _WIDTH, bottom / height, 0.09 / _WIDTH, tall / height))
     _colour_bar(bar, seen, style, table, label)
     lacking = without_value if bool(np.isinf(seen.values[seen.used]).any()) else None
@@ -257,7 +258,7 @@ def _surface(
     return np.concatenate([np.clip(mixed, 0, 1), covered[..., None]], axis=2), pixels.depth
 
 
-def _draw_curves(axes: Any, lines: list[FloatArray], depth: FloatArray) -> None:
+def _draw_curves(axes: Any, lines: list[FloatArray], depth: FloatArray, colour: str) -> None:
     """Lines through points given in pixels: full where they are seen, dotted where they are behind the surface."""
     from matplotlib.collections import LineCollection
 
@@ -267,28 +268,25 @@ def _draw_curves(axes: Any, lines: list[FloatArray], depth: FloatArray) -> None:
         fine[:, :2] += (_OVERSAMPLING - 1) / 2
         for is_seen, run in visible_runs(fine, depth, 0.01 * max(depth.shape)):
             runs[is_seen].append((run[:, :2] - (_OVERSAMPLING - 1) / 2) / _OVERSAMPLING)
-    for is_seen, colour, width in ((False, _CURVE, 0.6), (True, "white", 1.9), (True, _CURVE, 1.1)):
+    for is_seen, ink, width in ((False, colour, 0.6), (True, "white", 1.9), (True, colour, 1.1)):
         if not runs[is_seen]:
             continue
         style = "solid" if is_seen else (0, (0.8, 1.6))
         axes.add_collection(
-            LineCollection(
-                runs[is_seen], colors=colour, linewidths=width, linestyles=style, capstyle="round", zorder=2.5
-            ),
+            LineCollection(runs[is_seen], colors=ink, linewidths=width, linestyles=style, capstyle="round", zorder=2.5),
             autolim=False,
         )
 
 
-def _mark(axes: Any, points: FloatArray, depth: FloatArray, seen: Scene) -> BoolArray:
-    """Dots at the sources, rings at those behind the surface; returns which are."""
-    marked = seen.marked
-    if marked is None:
+def _mark(axes: Any, dots: FloatArray, depth: FloatArray) -> BoolArray:
+    """Dots at the sources, given in pixels, and rings at those behind the surface; returns which are."""
+    if not len(dots):
         return np.zeros(0, bool)
-    fine = points * _OVERSAMPLING
-    is_seen = visible(fine, depth, marked, 0.01 * max(depth.shape))
-    size = 16.0 if len(marked) <= 20 else 4.0
+    fine = dots * _OVERSAMPLING
+    is_seen = visible(fine, depth, np.arange(len(dots)), 0.01 * max(depth.shape))
+    size = 16.0 if len(dots) <= 20 else 4.0
     for chosen, fill in ((is_seen, _SOURCE), (~is_seen, "none")):
-        x, y = points[marked[chosen], :2].T
+        x, y = dots[chosen, :2].T
         axes.scatter(x, y, s=size, c=fill, edgecolors="white" if fill != "none" else _SOURCE, linewidths=0.6, zorder=3)
     return ~is_seen
 
@@ -329,10 +327,12 @@ def _legend(
         )  # fmt: skip
 
     handles: list[Any] = []
-    if seen.marked is not None and not hidden.all():
+    if not hidden.all():
         handles.append(dot(_SOURCE, "white", "source" if (~hidden).sum() == 1 else "sources"))
     if hidden.any():
         handles.append(dot("none", _SOURCE, "source behind" if hidden.sum() == 1 else "sources behind"))
+    if len(seen.lines):
+        handles.append(Line2D([], [], color=_SOURCE, linewidth=1.1, label="source curve"))
     if n_curves:
         handles.append(Line2D([], [], color=_CURVE, linewidth=1.1, label="curve" if n_curves == 1 else "curves"))
     if style == "lines":

@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl.errors import MissingExtraError
 from heat_igl.mesh import Mesh
 from heat_igl.raster import default_rotation, isoline_spacing, rotation
-from heat_igl.sources import Sources, vertex_sources
+from heat_igl.sources import Sources, source_set
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = [
@@ -61,8 +61,12 @@ class Scene:
         Values at the ends of the colour bar.
     step : float
         Between isolines or stripes.
-    marked : (s,) int64 or None
-        Sources.
+    vertices : (s,) int64
+        Sources that are vertices.
+    dots : (k, 3) float64
+        Sources that are vertices or points in faces, as `V`.
+    lines : (l, 2, 3) float64
+        Segments of sources that are curves, as `V`.
     """
 
     V: FloatArray
@@ -74,7 +78,9 @@ class Scene:
     values: FloatArray
     limits: tuple[float, float]
     step: float
-    marked: IntArray | None
+    vertices: IntArray
+    dots: FloatArray
+    lines: FloatArray
 
     @property
     def turned(self) -> FloatArray:
@@ -104,7 +110,7 @@ def scene(
         If `sources` does not name vertices of the mesh.
     """
     checked = _checked(name, values, mesh.n_vertices)
-    marked = None if sources is None else vertex_sources(sources, mesh.n_vertices)
+    vertices, dots, lines = _places(mesh, sources)
     if up not in _PERMUTATION:
         raise ValueError(f"up must be 'x', 'y' or 'z', not {up!r}")
     finite = checked[np.isfinite(checked)]
@@ -121,13 +127,35 @@ def scene(
     centre = (mesh.V[used].min(axis=0) + mesh.V[used].max(axis=0)) / 2
     V = mesh.V - centre
     unit = float(np.abs(V[used]).max())
-    V = V / unit
+    V, dots, lines = V / unit, (dots - centre) / unit, (lines - centre) / unit
     upright = np.eye(3)[_PERMUTATION[up]]
-    turn = default_rotation(V @ upright.T, F, used, marked) if view is None else rotation(*view)
+    if view is None:
+        shown = np.concatenate([V, dots, lines.reshape(-1, 3)])
+        marked = np.arange(len(V), len(shown)) if len(shown) > len(V) else None
+        turn = default_rotation(shown @ upright.T, F, used, marked)
+    else:
+        turn = rotation(*view)
     return Scene(
         V=V, F=F, used=used, centre=centre, unit=unit, turn=turn @ upright, values=checked,
-        limits=(low, high if high > low else low + 1.0), step=step, marked=marked,
+        limits=(low, high if high > low else low + 1.0), step=step, vertices=vertices, dots=dots, lines=lines,
     )  # fmt: skip
+
+
+def _places(mesh: Mesh, sources: Sources | None) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Source vertices, and where in space vertices and points (k, 3) and segments of curves (l, 2, 3) lie."""
+    if sources is None:
+        return np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 2, 3))
+    found = source_set(sources, mesh.n_vertices, None if mesh.is_tetrahedral else mesh.F)
+    points, segments = found.points, found.segments
+
+    def positions(faces: IntArray, barycentric: FloatArray) -> FloatArray:
+        if not len(faces):
+            return np.zeros((0, 3))
+        return np.asarray(np.einsum("kc,kcx->kx", barycentric, mesh.V[mesh.F[faces]]))
+
+    dots = np.concatenate([mesh.V[found.vertices], positions(points.faces, points.barycentric)])
+    ends = [positions(segments.faces, barycentric) for barycentric in (segments.start, segments.end)]
+    return found.vertices, dots, np.stack(ends, axis=1)
 
 
 def colours(colormap: str, is_trimmed: bool = True) -> Any:

@@ -83,7 +83,11 @@ def speed_operators(mesh: Mesh, speed: ArrayLike) -> Operators:
         triangulation=None,
         faces=None,
     )
-    return replace(scaled, L=(scaled.D @ scaled.G).tocsc()) if p == 3 else scaled
+    if p == 2:
+        return scaled
+    L = (scaled.D @ scaled.G).tocsc()
+    L.sort_indices()
+    return replace(scaled, L=L)
 
 
 def _checked(speed: ArrayLike, m: int) -> FloatArray:

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 import heat_igl
 
 PACKAGES = (
-    "numpy scipy libigl cholespy numba potpourri3d pygeodesic tvb-gdist pymeshlab meshio matplotlib scikit-fmm "
+    "numpy scipy libigl numba pyamg potpourri3d pygeodesic tvb-gdist pymeshlab meshio matplotlib scikit-fmm "
     "distributed zarr"
 ).split()
 

@@ -325,7 +325,7 @@ def claims(quick: bool) -> dict[str, Rows]:
         "Varadhan's factor": lambda: varadhan(40 if quick else 300),
         f"Theorem 3.1, i = {i}": lambda: graph_limit(i),
         f"Small time steps, i = {i}": lambda: small_steps(i),
-        "Growth": lambda: growth((10, 20, 30, 40) if quick else (50, 100, 150, 200, 250, 300), 1 if quick else 5),
+        "Growth": lambda: growth((10, 20, 30, 40) if quick else (50, 100, 150, 200, 250, 300), 1 if quick else 3),
         "Memory": lambda: memory(shapes.torus(25, 20) if quick else shapes.torus(250, 200)),
         "Expected accuracy": lambda: expected_accuracy((5, 10, 20) if quick else (10, 30, 56, 100, 200)),
         "The jump at i = 56": lambda: jump(range(52, 60) if quick else range(10, 81)),

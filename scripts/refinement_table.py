@@ -56,20 +56,6 @@ def with_slivers(mesh: Mesh, seed: int) -> Mesh:
     return Mesh(np.concatenate([mesh.V, points]), np.concatenate([mesh.F[alive], added]))
 
 
-def book(n_pages: int, k: int) -> Mesh:
-    """Half planes, k by k squares each, on one line: an edge of `n_pages` faces."""
-    y, x = np.divmod(np.arange((k + 1) ** 2), k + 1)
-    V, F = [np.stack([np.zeros(k + 1), np.zeros(k + 1), np.arange(k + 1) / k], axis=1)], []
-    n = k + 1
-    for angle in 2 * np.pi * np.arange(n_pages) / n_pages:
-        inner = x > 0
-        number = np.where(inner, n + np.cumsum(inner) - 1, y)
-        V.append(np.column_stack([np.outer(x[inner] / k, [np.cos(angle), np.sin(angle)]), y[inner] / k]))
-        F.append(number[shapes.grid(k).F])
-        n += int(inner.sum())
-    return Mesh(np.concatenate(V), np.concatenate(F))
-
-
 def fan(n_faces: int) -> Mesh:
     """Triangles on one edge, undivided."""
     angle = 2 * np.pi * np.arange(n_faces) / n_faces
@@ -173,7 +159,7 @@ def main(argv: list[str] | None = None) -> int:
         print(f"{Path(path).stem} done", file=sys.stderr, flush=True)
     rows["fan of five"] = nonmanifold(fan(5), [2, 3, 4])
     for k in (8, 24):
-        mesh = book(5, k)
+        mesh = shapes.book(5, k)
         rows[f"five pages, {k} edges on the line"] = nonmanifold(mesh, [mesh.n_vertices - 1])
     for path in options.nonmanifold:
         mesh = heat_igl.read_mesh(path)

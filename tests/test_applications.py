@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import shared_path
 
 import heat_igl
 from heat_igl import shapes
@@ -198,3 +199,45 @@ def test_skeleton_keeps_pieces_and_holes(seed):
         assert measure.label(thin, connectivity=2).max() == measure.label(mask, connectivity=2).max()
         assert measure.euler_number(thin, connectivity=2) == measure.euler_number(mask, connectivity=2)
         assert (thin <= mask).all()
+
+
+# The offset of a curve drawn on a surface.
+
+
+def test_offset_of_a_curve_drawn_on_the_plane():
+    """Around a segment: two sides and two half circles, by a distance that is off by less than an edge on average."""
+    pytest.importorskip("numba")
+    mesh = shapes.grid(60)
+    solver = heat_igl.HeatMethodSolver(mesh)
+    first, last = 20 * 61 + 20, 30 * 61 + 40
+    drawn = heat_igl.shortest_paths(mesh, solver, last, first)[0]
+    length = np.linalg.norm(mesh.V[first] - mesh.V[last])
+    assert drawn.lengths(mesh).sum() == pytest.approx(length, rel=1e-9)
+    (curve,) = heat_igl.offset_curves(mesh, solver, drawn, 0.2)
+    assert curve.is_closed
+    assert curve.lengths(mesh).sum() == pytest.approx(2 * length + 2 * np.pi * 0.2, abs=2 * np.pi / 60)
+    points = curve.positions(mesh)
+    along = np.clip((points - mesh.V[first]) @ (mesh.V[last] - mesh.V[first]) / length**2, 0, 1)[:, None]
+    nearest = mesh.V[first] + along * (mesh.V[last] - mesh.V[first])
+    off = np.abs(np.linalg.norm(points - nearest, axis=1) - 0.2)
+    assert off.mean() < 1 / 60
+    assert off.max() < 2 / 60
+
+
+def test_offset_of_a_curve_drawn_on_a_part():
+    """Of a path over sharp edges, against exact distance from the vertices of the faces that it crosses."""
+    pytest.importorskip("numba")
+    pytest.importorskip("pygeodesic")
+    mesh = heat_igl.read_mesh(shared_path("fandisk.off"))
+    solver = heat_igl.HeatMethodSolver(mesh)
+    drawn = heat_igl.shortest_paths(mesh, solver, 1000, 3000)[0]
+    radius = 4 * mesh.edge_lengths.mean()
+    curves = heat_igl.offset_curves(mesh, solver, drawn, radius)
+    assert curves
+    # Those are an edge from the path at most, and an offset point lies in a face as well.
+    exact = heat_igl.reference.exact(mesh, np.unique(mesh.F[drawn.faces]))
+    slack = mesh.edge_lengths.max()
+    for curve in curves:
+        corners = (exact[mesh.F[curve.faces]] * curve.start).sum(axis=1)
+        assert corners.max() < radius + slack
+        assert corners.min() > radius - 2 * slack

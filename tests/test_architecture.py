@@ -83,7 +83,6 @@ __main__
 
 EXTRAS = """
 Xlib
-cholespy
 colorspacious
 dask
 distributed

@@ -28,12 +28,13 @@ def test_blocks_keep_to_the_memory_and_use_the_threads():
     assert blocks.block_size(10_000, None, 2) == (8, 2)
     assert blocks.block_size(10_000, 6, 2) == (8, 2)
     assert blocks.block_size(10_000, 1, 4) == (8, 1)
-    size, threads = blocks.block_size(1_600_000, 64, 2)
+    size, threads = blocks.block_size(6_400_000, 64, 2)
     assert threads == 2
     assert 1 < size < 8
-    assert blocks.block_size(10_000, 6, 64)[0] == blocks.block_size(10_000, 6, 1)[0]  # bits do not depend on threads
-    assert blocks.block_size(6_400_000, 64, 2) == (1, 1)
-    assert blocks.block_size(20_000_000, 64, 2) == (1, 1)
+    assert blocks.block_size(20_000_000, 64, 2) == (1, 2)
+    assert blocks.block_size(60_000_000, 64, 2) == (1, 1)
+    # The bits of the results do not depend on the threads.
+    assert blocks.block_size(10_000, 6, 64)[0] == blocks.block_size(10_000, 6, 1)[0]
 
 
 def test_in_order_works_on_several_threads_and_draws_no_more_than_it_has_room_for():
@@ -191,7 +192,7 @@ def test_stated_memory_bound(monkeypatch):
     solver = HeatMethodSolver(mesh)
     out = np.zeros((32, mesh.n_vertices), np.float32)
     solver.distances(range(32), out=out)
-    allowed = 4 * 130 * mesh.n_faces
+    allowed = 8 * 40 * mesh.n_faces
     monkeypatch.setattr(blocks, "WORKING_MEMORY", allowed)
     with PeakMemory() as peak:
         solver.distances(range(32), out=out)

@@ -321,3 +321,9 @@ def test_cold_boundary_that_cuts_the_mesh_is_reported():
         HeatMethodSolver(mesh, boundary="dirichlet").distance(0)
     distance = HeatMethodSolver(mesh, boundary="average").distance(0)
     assert distance[label[0]] == pytest.approx(2, abs=0.2)
+
+
+def test_volumes_are_not_damped():
+    mesh = shapes.box(6)
+    assert (HeatMethodSolver(mesh).solve(0).magnitude == 1).all()
+    assert (HeatMethodSolver(mesh, magnitude="damped").solve(0).magnitude < 1).any()

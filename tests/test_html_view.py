@@ -250,6 +250,18 @@ def test_what_is_not_reached_is_grey(browser: Browser) -> None:
     np.testing.assert_allclose(colour_at(browser.image(), browser.on_canvas(middle)), UNREACHABLE, atol=0.02)
 
 
+def test_a_source_inside_a_face_is_marked_there_until_a_click(browser: Browser) -> None:
+    mesh = heat_igl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    inside = heat_igl.SurfacePoints([0], [[0.5, 0.25, 0.25]])
+    browser.open(page(mesh, [0.35, 0.8, 0.8], sources=inside))
+    at = 0.5 * browser.on_canvas(0) + 0.25 * browser.on_canvas(1) + 0.25 * browser.on_canvas(2)
+    red = [0.91, 0.0, 0.043]
+    np.testing.assert_allclose(colour_at(browser.image(), at), red, atol=0.02)
+    browser.click(0.1 * browser.on_canvas(0) + 0.8 * browser.on_canvas(1) + 0.1 * browser.on_canvas(2))
+    assert browser.sources() == [1]
+    assert np.abs(colour_at(browser.image(), at) - red).max() > 0.2
+
+
 def test_a_drag_turns_the_surface_with_the_hand(browser: Browser) -> None:
     mesh, front, _, distance = sphere()
     browser.open(page(mesh, distance, sources=front, view=(0, 0)))

@@ -252,6 +252,21 @@ def test_sources_in_front_are_dots_and_those_behind_are_rings() -> None:
     assert len(hidden.get_facecolors()) == 0
 
 
+def test_sources_in_faces_and_on_curves_are_marked_where_they_are() -> None:
+    mesh = heat_igl.Mesh([[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]])
+    inside = heat_igl.SurfacePoints([0], [[0.5, 0.25, 0.25]])
+    along = heat_igl.SurfaceCurve([0], [[0.75, 0, 0.25]], [[0, 0.75, 0.25]])
+    drawn = plot(mesh, [0.0, 1, 1], sources=[inside, along], view=(0, 0))
+    axes = drawn.figure.axes[0]
+    (dots,) = [marks for marks in axes.collections if len(marks.get_offsets()) and marks.get_offsets().any()][:1]
+    line = next(lines for lines in axes.collections if hasattr(lines, "get_segments"))
+    start, end = line.get_segments()[0][[0, -1]]
+    # The point lies at (0.5, 0.5), the curve runs from there to the left and right along y = 0.5: x from 0 to 1.5.
+    (dot,) = dots.get_offsets()
+    np.testing.assert_allclose(dot, start + (end - start) / 3, atol=0.01)
+    assert legend_texts(drawn)[:2] == ["source", "source curve"]
+
+
 def test_the_default_view_shows_the_source() -> None:
     sphere = shapes.icosphere(3)
     for axis in (0, 2):

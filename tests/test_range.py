@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from heat_igl import HeatMethodSolver, Mesh, shapes
+from heat_igl.operators import operators
+from heat_igl.steps import HeatFlow
 
 
 @pytest.mark.parametrize("laplacian", ["intrinsic-delaunay", "cotan"])
@@ -15,6 +17,30 @@ def test_strip_4000_long(laplacian):
     distance = solver.distance(0)
     assert distance[4000] == pytest.approx(4000, rel=0.01)
     assert (np.diff(distance[:4001]) > 0).all()
+
+
+@pytest.mark.parametrize("backend", ["scipy", "multifrontal"])
+def test_heat_keeps_its_relative_accuracy_over_500_decades(backend):
+    """Four vertices wide, 4000 cells long: the heat per cell falls by the closed form acosh(1 + h^2 / 2 t)."""
+    if backend == "multifrontal":
+        pytest.importorskip("numba")
+    domain = operators(shapes.strip(4000, 3))
+    t = 10.0
+    b = np.zeros((domain.n, 9))
+    b[::4001, 0] = 1e290  # a row of sources across the end: one-dimensional
+    b[:, 1:] = b[:, :1]
+    u = HeatFlow(domain, t, backend=backend).solve(b)
+    rate = -np.diff(np.log(u[:4001]), axis=0)[100:3900]
+    assert u[3900].max() < 1e-200
+    np.testing.assert_allclose(rate, np.arccosh(1 + 1 / (2 * t)), rtol=1e-9)
+
+
+def test_backends_agree_on_the_strip():
+    pytest.importorskip("numba")
+    mesh = shapes.strip(4000, 3)
+    one, other = (HeatMethodSolver(mesh, backend=name) for name in ("scipy", "multifrontal"))
+    for sources in (0, [17, 9000]):
+        np.testing.assert_allclose(one.distance(sources), other.distance(sources), rtol=0, atol=1e-9 * 4000)
 
 
 def test_grid_450_from_a_corner():

@@ -16,7 +16,7 @@ from heat_igl import HeatMethodSolver, Mesh, Refinement, shapes, unfolded_distan
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 
-from refinement_table import book, with_slivers
+from refinement_table import with_slivers
 
 pytest.importorskip("numba")
 
@@ -218,7 +218,7 @@ def test_faces_turned_over_change_nothing(bumpy):
 def test_more_than_two_faces_at_an_edge():
     """Five half planes on one line: paths between two of them turn on the line."""
     k = 8
-    mesh = book(5, k)
+    mesh = shapes.book(5, k)
     source = mesh.n_vertices - 1
     leaf = np.arange(mesh.n_vertices) < k + 1
     d = unfolded_distance(mesh.V, mesh.F, source)
@@ -233,7 +233,7 @@ def test_more_than_two_faces_at_an_edge():
 @pytest.mark.parametrize("k", [1, 2, 5])
 def test_straight_over_an_edge_of_more_than_two_faces(method, k):
     """Any two of five pages are a plane folded on the line: the path between them is straight when rolled out."""
-    mesh = book(5, k)
+    mesh = shapes.book(5, k)
     surface = Refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)))
     source = mesh.n_vertices - 1
     page = (np.arange(mesh.n_vertices) - (k + 1)) // (k * (k + 1))

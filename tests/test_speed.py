@@ -49,6 +49,8 @@ def test_one_speed_divides_all_distances(mesh):
     expected = plain.distance(5) / 2.5
     found = solver(mesh, np.full(mesh.n_faces, 2.5)).distance(5)
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+    across = speed_operators(mesh, np.full(mesh.n_faces, 2.5)).longest_distance
+    assert across == pytest.approx(mesh.longest_distance / 2.5)
 
 
 def test_one_speed_flips_the_same_edges(cow):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from conftest import perturbed
 
-from heat_igl import Mesh, shapes
+from heat_igl import Mesh, shapes, steps
 from heat_igl.operators import operators
-from heat_igl.steps import HeatFlow, PoissonProblem, damping, diffuse, integrate, normalize
+from heat_igl.steps import HeatFlow, PoissonProblem, damping, descent, diffuse, integrate, normalize
 
 
 @pytest.fixture(scope="module")
@@ -139,3 +139,44 @@ def test_time_step_must_be_positive(disk, t):
 def test_unknown_boundary(disk):
     with pytest.raises(ValueError, match="boundary must be 'neumann', 'dirichlet' or 'average'"):
         HeatFlow(disk, 1.0, "robin")
+
+
+@pytest.mark.parametrize("k", [1, 5])
+@pytest.mark.parametrize("damped", [False, True])
+@pytest.mark.parametrize("scale", [1e-280, 1.0, 1e280])
+def test_one_kernel_is_the_matrix_form(disk, k, damped, scale):
+    """On triangles, intrinsic triangles and tetrahedra; some of the field vanishes and some of the heat is negative."""
+    pytest.importorskip("numba")
+    t = 0.02
+    box = operators(shapes.box(4))
+    for domain in (disk, operators(perturbed(shapes.icosphere(3))), box):
+        initial = np.zeros((domain.n, k))
+        initial[7 * np.arange(k), np.arange(k)] = 1
+        u = diffuse(domain, initial, t) * scale
+        u[: domain.n // 8] = 0.0
+        u[domain.n // 2] *= -1
+        X = normalize(domain, u)
+        if damped:
+            X *= np.tile(damping(domain, u, t), (domain.dimension, 1))
+        expected = domain.D @ X
+        found = descent(domain, u, t if damped else None)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * abs(expected).max())
+
+
+def test_without_numba_there_is_the_matrix_form(disk, monkeypatch):
+    u = diffuse(disk, np.eye(disk.n)[:, [3, 90]], 0.02)
+    expected = disk.D @ (normalize(disk, u) * np.tile(damping(disk, u, 0.02), (2, 1)))
+    monkeypatch.setattr(steps.importlib.util, "find_spec", lambda _: None)
+    assert (descent(disk, u, 0.02) == expected).all()
+
+
+def test_an_analysis_is_shared_where_it_fits(disk):
+    shared = steps.analysis(disk, "multifrontal")
+    b = np.random.default_rng(1).random(disk.n)
+    for make in (lambda a: HeatFlow(disk, 0.02, analysis=a), lambda a: PoissonProblem(disk, analysis=a)):
+        assert make(shared).backend == "multifrontal"
+        np.testing.assert_allclose(make(shared).solve(b - b.mean()), make(None).solve(b - b.mean()), rtol=0, atol=1e-11)
+    other = operators(shapes.icosphere(2))
+    flow = HeatFlow(other, 0.02, analysis=shared)  # does not fit
+    u0 = np.random.default_rng(1).random(other.n)
+    np.testing.assert_allclose(flow.solve(u0), HeatFlow(other, 0.02).solve(u0), rtol=1e-12)

@@ -177,9 +177,7 @@ def skeleton(mask: ArrayLike, shortest_branch: float, **options: Any) -> BoolArr
     tips = thin & (n_neighbours == 1)
     length = ndimage.maximum(np.where(tips, from_fork, -1.0), branch, np.arange(n_branches + 1))
     is_short = (length >= 0) & (length < shortest_branch)
-    is_short[0] = False
-    # Once more: what is left of a fork may be two pixels wide.
-    return np.asarray(skeletonize(thin & ~is_short[branch]))
+    return np.asarray(thin & ~is_short[branch])
 
 
 def _solver(mask: ArrayLike, options: dict[str, Any]) -> tuple[ImageDomain, HeatMethodSolver]:

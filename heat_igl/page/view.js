@@ -34,7 +34,7 @@
   let tables = null;
   const sweepFaces = arrays.sweepFaces;
   if (sweepFaces && meta.sweepFacesAreDifferences) for (let i = 0; i < F.length; i++) sweepFaces[i] += F[i];
-  let values = Float64Array.from(arrays.distance), sources = meta.sources.slice();
+  let values = Float64Array.from(arrays.distance), sources = meta.sources.slice(), dots = meta.dots;
 
   function vertexNormals() {
     const normals = new Float32Array(3 * n);
@@ -115,7 +115,7 @@
     return new Proxy({ made }, { get: (self, name) => (name === "made" ? made : gl.getUniformLocation(made, name)) });
   }
   const inked = SURFACE_FRAGMENT.replace("LINE_INK", meta.lineInk).replace("STRIPE_INK", meta.stripeInk);
-  const surface = program(SURFACE_VERTEX, inked), dots = program(DOT_VERTEX, DOT_FRAGMENT);
+  const surface = program(SURFACE_VERTEX, inked), dotProgram = program(DOT_VERTEX, DOT_FRAGMENT);
 
   function attribute(owner, name, size) {
     const buffer = gl.createBuffer(), at = gl.getAttribLocation(owner.made, name);
@@ -133,7 +133,7 @@
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, F, gl.STATIC_DRAW);
   const dotArrays = gl.createVertexArray();
   gl.bindVertexArray(dotArrays);
-  const setDots = attribute(dots, "position", 3);
+  const setDots = attribute(dotProgram, "position", 3);
   gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
   const table = Uint8Array.from(meta.colours.flatMap((rgb) => [...rgb, 255]));
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, meta.colours.length, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, table);
@@ -162,7 +162,7 @@
     const pairs = new Float32Array(2 * n);
     for (let v = 0; v < n; v++) if (isFinite(values[v])) { pairs[2 * v] = values[v]; pairs[2 * v + 1] = 1; }
     setValues(pairs);
-    setDots(Float32Array.from(sources.flatMap((s) => [V[3 * s], V[3 * s + 1], V[3 * s + 2]])));
+    setDots(Float32Array.from(dots));
     drawBar();
     redraw();
   }
@@ -201,6 +201,7 @@
     values = sweepDistance(tables, chosen);
     const milliseconds = { prepare: prepared - start, solve: performance.now() - prepared };
     sources = chosen;
+    dots = chosen.flatMap((s) => [V[3 * s], V[3 * s + 1], V[3 * s + 2]]);
     byId("method").textContent = "Computed in this page by the sweep, which unfolds triangles: " + milliseconds.solve.toFixed(0) + " ms.";
     showValues();
     return milliseconds;
@@ -270,14 +271,14 @@
     gl.uniform1i(surface.style, Number(byId("style").value));
     gl.bindVertexArray(surfaceArrays);
     gl.drawElements(gl.TRIANGLES, F.length, gl.UNSIGNED_INT, 0);
-    place(dots);
-    gl.uniform1f(dots.size, (sources.length <= 20 ? 11 : 5) * ratio);
+    place(dotProgram);
+    gl.uniform1f(dotProgram.size, (dots.length <= 60 ? 11 : 5) * ratio);
     gl.bindVertexArray(dotArrays);
     gl.depthMask(false);
     for (const [isHidden, compare] of [[1, gl.GREATER], [0, gl.LEQUAL]]) {
       gl.depthFunc(compare);
-      gl.uniform1i(dots.isHidden, isHidden);
-      gl.drawArrays(gl.POINTS, 0, sources.length);
+      gl.uniform1i(dotProgram.isHidden, isHidden);
+      gl.drawArrays(gl.POINTS, 0, dots.length / 3);
     }
     gl.depthFunc(gl.LESS);
     gl.depthMask(true);
@@ -385,6 +386,7 @@
     resetView();
     values = Float64Array.from(arrays.distance);
     sources = meta.sources.slice();
+    dots = meta.dots;
     byId("spacing").value = meta.spacing === null ? "" : meta.spacing;
     byId("style").value = meta.style;
     byId("method").textContent = meta.method;
