@@ -136,7 +136,7 @@ def test_a_circle_around_the_sphere(refine):
 def test_a_ring_and_a_generator_of_the_cylinder(refine):
     for along in (True, False):
         errors = []
-        for around in (16, 32, 64):
+        for around in (24, 48, 96):
             mesh = shapes.cylinder(around, around)
             angle = np.arctan2(mesh.V[:, 1], mesh.V[:, 0])
             low, high = mesh.V[:, 2].min(), mesh.V[:, 2].max()
@@ -153,7 +153,7 @@ def test_a_ring_and_a_generator_of_the_cylinder(refine):
                 truth = np.abs(mesh.V[:, 2] - height)
             distance = HeatMethodSolver(mesh, refine=refine).distance(curve)
             errors.append(np.abs(distance - truth).mean())
-        assert errors[2] < {None: 0.05, "sweep": 0.05, "unfold": 0.006}[refine]
+        assert errors[2] < {None: 0.03, "sweep": 0.03, "unfold": 0.003}[refine]
         assert max(errors) < 1e-12 or np.log2(errors[0] / errors[2]) > 0.9
 
 
