@@ -264,7 +264,7 @@ def breadth_first(F: IntArray, twin: IntArray, n: int) -> tuple[IntArray, IntArr
 
 
 def tables(F: IntArray, l: FloatArray, twin: IntArray, n: int) -> Tables:  # noqa: E741
-    """The tables of m triangles on n vertices, oriented alike; `twin` is -1 on the boundary, -2 between more than two."""
+    """The tables of m oriented triangles on n vertices; `twin` is -1 on the boundary, -2 where more than two meet."""
     length = l.ravel()
     apex, corner_angle = _shapes(l)
     angle, fan, total, in_order = _fans(twin, corner_angle)

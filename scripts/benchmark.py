@@ -597,7 +597,7 @@ def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--runs", type=int, default=5, help="paired runs per mesh")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(
-        "--quick", action="store_true", help="10k and 30k vertices, at most 3 runs, single queries at 10k only"
+        "--quick", action="store_true", help="10k and 30k vertices, at most 2 runs, single queries at 10k only"
     )
     parser.add_argument("--large", action="store_true", help="add the icosphere with 655 362 vertices")
     parser.add_argument("--huge", type=int, help="one query on an icosphere of about so many vertices, or on --mesh")
@@ -611,7 +611,7 @@ def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
 def _measured(arguments: argparse.Namespace) -> dict[str, Any]:
     rng = np.random.default_rng(arguments.seed)
     sizes = arguments.size or (SIZES[:2] if arguments.quick else SIZES)
-    runs = min(arguments.runs, 3) if arguments.quick else arguments.runs
+    runs = min(arguments.runs, 2) if arguments.quick else arguments.runs
     methods = [m for m in METHODS if importlib.util.find_spec(NEEDS.get(m, "heat_igl")) is not None]
     paths = arguments.mesh or [path for path in [sample_mesh()] if path is not None]
     result: dict[str, Any] = {"bandwidth": bandwidth(), "import": import_seconds(), "timings": []}

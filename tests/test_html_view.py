@@ -262,6 +262,15 @@ def test_a_source_inside_a_face_is_marked_there_until_a_click(browser: Browser) 
     assert np.abs(colour_at(browser.image(), at) - red).max() > 0.2
 
 
+def test_the_page_works_in_the_frame_that_a_notebook_shows(browser: Browser) -> None:
+    mesh, x = square(4)
+    (browser._folder / "notebook.html").write_text(page(mesh, x)._repr_html_(), encoding="utf8")
+    browser.driver.get((browser._folder / "notebook.html").as_uri())
+    browser.driver.switch_to.frame(0)
+    browser.wait(lambda: browser.run("return !!window.heatIgl"))
+    np.testing.assert_allclose(browser.distance(), x, atol=1e-7)
+
+
 def test_a_drag_turns_the_surface_with_the_hand(browser: Browser) -> None:
     mesh, front, _, distance = sphere()
     browser.open(page(mesh, distance, sources=front, view=(0, 0)))
