@@ -32,6 +32,7 @@ from heat_igl.errors import (
     MeshError,
     MissingExtraError,
     ReferenceSolverError,
+    SourceError,
 )
 from heat_igl.factorization import Backend
 from heat_igl.guarded import TIMEOUT
@@ -40,6 +41,7 @@ from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Laplacian
 from heat_igl.picture import PAGE_SUFFIXES, PICTURE_SUFFIXES, Picture, replace_file
+from heat_igl.projection import closest_points
 from heat_igl.refine import Refine
 from heat_igl.sources import vertex_sources
 from heat_igl.steps import Boundary
@@ -187,7 +189,11 @@ def info(mesh: MeshArgument) -> None:
 @app.command()
 def distance(
     mesh: MeshArgument,
-    source: Annotated[list[int], typer.Option(help="Source vertex, counted from 0; repeat for several.")],
+    source: Annotated[list[int] | None, typer.Option(help="Source vertex, counted from 0; repeat for several.")] = None,
+    at: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y,Z", help="Source at the closest point of the surface; repeatable.")
+    ] = None,
+    cutoff: Annotated[float | None, typer.Option(help="Distances beyond this are inf.", callback=_positive)] = None,
     output: Annotated[Path | None, typer.Option(help="PLY or VTU file for mesh and distance.")] = None,
     picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for a picture.")] = None,
     t_coef: Annotated[float, typer.Option(help="Time step in squared mean edge lengths.", callback=_positive)] = 1.0,
@@ -198,9 +204,17 @@ def distance(
     refine: Annotated[str | None, _choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
     backend: Annotated[str, _choice(Backend, "Linear solver.")] = "auto",
 ) -> None:
-    """Distance from one or more source vertices."""
+    """Distance from one or more sources: vertices, or points of the surface."""
     loaded = read_mesh(mesh)
-    sources = vertex_sources(np.array(source), loaded.n_vertices)
+    if not source and not at:
+        raise SourceError("no source: name vertices with --source, or positions with --at x,y,z")
+    vertices = vertex_sources(np.array(source), loaded.n_vertices) if source else None
+    sources: Any = vertices
+    gaps: list[tuple[str, str]] = []
+    if at:
+        points, gap = closest_points(loaded, [_position(text) for text in at])
+        sources = points if vertices is None else [vertices, points]
+        gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap))]
     _check_outputs(loaded, output, picture)
     with Console(stderr=True).status("factoring"):
         options: dict[str, Any] = {
@@ -212,10 +226,10 @@ def distance(
         }
         solver = HeatMethodSolver(loaded, t_coef=t_coef, t=t, **options)
     start = time.perf_counter()
-    phi = solver.distance(sources)
+    phi = solver.distance(sources, cutoff=cutoff)
     seconds = time.perf_counter() - start
-    written = _write(loaded, phi, sources, output, picture)
-    _print_rows([*_summary(mesh, loaded, phi, solver, seconds), *(("wrote", str(path)) for path in written)])
+    written = _write(loaded, phi, vertices, output, picture)
+    _print_rows([*_summary(mesh, loaded, phi, solver, seconds), *gaps, *(("wrote", str(path)) for path in written)])
 
 
 @app.command()
@@ -409,6 +423,14 @@ def _logged(path: Path | None) -> Iterator[None]:
     finally:
         logger.removeHandler(handler)
         handler.close()
+
+
+def _position(text: str) -> list[float]:
+    try:
+        x, y, z = (float(number) for number in text.split(","))
+    except ValueError:
+        raise SourceError(f"--at {text}: three numbers separated by commas are expected, such as 0.5,0,1.25") from None
+    return [x, y, z]
 
 
 def _check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> None:

@@ -12,14 +12,23 @@ from heat_igl.sources import SourceSet
 from heat_igl.steps import HeatFlow
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Emission", "Emitter"]
+__all__ = ["Emission", "Emitter", "take_shorter"]
 
 # Largest heat at a source, in units of h: leaves room for the gradient's 1 / length on slivers.
 _SOURCE_HEAT = 1e290
 # How far around points and curves distance is taken from straight lines, in mean edge lengths.
-_RADIUS = 2.0
+_RADIUS = 6.0
 # Point and curve are equally warm some edges away if the heat of a point is spread over so many edges of the curve.
 _EDGES_PER_POINT = 4.0
+# Points that a curve is integrated by are at most so many edges apart.
+_SPACING = 0.25
+# A straight line longer than the integrated distance by more than this does not lead to the nearest source.
+_HEAT_ERROR = 0.2
+# A source is overtaken where heat is so many times what it would be if all began as late: after 2 edges or so.
+_OVERTAKEN = 5.0
+# Right-hand sides of labels solved together.
+_BLOCK = 8
+_NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +48,8 @@ class Emission:
     guides : (g,) bool
         Which of `near` were found by straight lines from points and curves: on faces with such corners alone, the
         field is the gradient of these values.
+    far : Seeds
+        Corners of sources' faces that are too far away to be among `near`, by straight lines.
     """
 
     sources: SourceSet
@@ -49,6 +60,7 @@ class Emission:
     anchors: Seeds
     near: Seeds
     guides: BoolArray
+    far: Seeds
 
 
 class Emitter:
@@ -66,24 +78,53 @@ class Emitter:
         self._domain = domain
         self._heat_flow = heat_flow
         self._on_solved = None if domain.triangulation is None else NearField(domain.triangulation)
-        self._on_faces = self._on_solved
-        if domain.faces is not None and domain.faces is not domain.triangulation:
-            self._on_faces = NearField(domain.faces)
+        self._on_faces = None if domain.faces is None else NearField(domain.faces)
+        # Triangulations on which the edges are straight lines: one, if none was flipped.
+        self._fields = [field for field in (self._on_solved, self._on_faces) if field is not None]
+        if domain.faces is domain.triangulation:
+            self._fields = self._fields[:1]
 
     def emission(self, sources: SourceSet) -> Emission:
-        """`sources` ready for the steps; those with offsets only as far as no other's front comes first."""
+        """`sources` ready for step 1."""
         rim = self._rim(sources)
         near_vertices = self._near_vertices(sources, rim)
-        lines = self._straight_lines(sources)
+        lines, far = self._straight_lines(sources, rim)
         near = Seeds.nearest(_joined(near_vertices, lines))
-        guides = np.isin(near.vertex, lines.vertex) & ~np.isin(near.vertex, near_vertices.vertex)
+        guides = np.isin(near.vertex, lines.vertex) & ~np.isin(near.vertex, sources.vertices)
         own = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         anchors = _joined(own, near.at(guides))
         vertex, share, label, offset = self._heat(sources, rim)
-        found = Emission(sources, vertex, share, self._delay(vertex, offset), label, anchors, near, guides)
-        if np.ptp(sources.offsets) == 0:
+        return Emission(sources, vertex, share, self._delay(vertex, offset), label, anchors, near, guides, far)
+
+    def on_time(self, found: Emission) -> Emission:
+        """Less the sources that others overtake before they begin, and the values that others come before.
+
+        Two solves tell: there the heat is many times what it would be if all began as late as this source does.
+        """
+        if np.ptp(found.sources.offsets) == 0:
             return found
-        return self._without_late(found)
+        both = np.stack([self.heat(found), self.heat(replace(found, delay=np.zeros_like(found.delay)))], axis=1)
+        u, u_at_once = self._heat_flow.solve(both).T
+        delay = np.zeros(found.sources.n_labels)
+        delay[found.label] = found.delay
+
+        def is_on_time(vertex: IntArray, label: IntArray) -> BoolArray:
+            with np.errstate(divide="ignore"):
+                return np.asarray(np.log(u[vertex]) < np.log(u_at_once[vertex]) - delay[label] + np.log(_OVERTAKEN))
+
+        anchors = found.anchors.at(is_on_time(found.anchors.vertex, found.anchors.label))
+        kept = is_on_time(found.near.vertex, found.near.label)
+        alive = np.isin(found.label, anchors.label)
+        return replace(
+            found,
+            vertex=found.vertex[alive],
+            share=found.share[alive],
+            delay=found.delay[alive],
+            label=found.label[alive],
+            anchors=anchors,
+            near=found.near.at(kept),
+            guides=found.guides[kept],
+        )
 
     def heat(self, emission: Emission) -> FloatArray:
         """Right-hand side (n,) of `HeatFlow.solve`: as much heat as cannot overflow."""
@@ -133,37 +174,25 @@ class Emitter:
         shift = np.where(n_anchors > 0, total / np.maximum(n_anchors, 1), -np.inf)
         lowest = np.full(len(n_anchors), np.inf)
         np.minimum.at(lowest, components[emission.near.vertex], emission.near.value)
-        distance = np.maximum(phi - shift[components], lowest[components])
+        start = lowest[components]
+        distance = np.maximum(phi - shift[components], start)
+        take_shorter(distance, emission.far, _HEAT_ERROR, start)
         return self._continued(emission.near, distance)
 
-    def labels(self, emission: Emission, u: FloatArray) -> IntArray:
-        """The source (n,) from which each vertex gets most of its heat `u`, -1 where it gets none."""
-        labels = self._warmest(emission, u)
+    def labels(self, emission: Emission) -> IntArray:
+        """The source (n,) from which each vertex gets most of its heat, -1 where it gets none; a solve for each."""
+        labels = np.full(self._domain.n, -1)
+        most = np.zeros(self._domain.n)
+        present = np.unique(emission.label)
+        for block in np.split(present, range(_BLOCK, len(present), _BLOCK)):
+            shares = [emission.share * (emission.label == label) for label in block]
+            parts = self._heat_flow.solve(np.stack([self._heat_of(emission, share) for share in shares], axis=1))
+            warmest = parts.argmax(axis=1)
+            heat = np.take_along_axis(parts, warmest[:, None], axis=1)[:, 0]
+            labels = np.where(heat > most, block[warmest], labels)
+            np.maximum(most, heat, out=most)
         labels[emission.near.vertex] = emission.near.label
         return labels
-
-    def _warmest(self, emission: Emission, u: FloatArray) -> IntArray:
-        """By one solve for each binary digit of the labels: the share of heat from sources with that digit."""
-        present, index = np.unique(emission.label, return_inverse=True)
-        digits = np.arange(max(1, int(len(present) - 1).bit_length()))
-        of_source = (index[:, None] >> digits) & 1
-        parts = self._heat_flow.solve(
-            np.stack([self._heat_of(emission, emission.share * digit) for digit in of_source.T], axis=1)
-        )
-        share = np.divide(parts, u[:, None], out=np.zeros_like(parts), where=u[:, None] > 0)
-        found = (share > 0.5) @ (1 << digits)
-        # Where three sources or more are equally warm, the digits may come from different ones.
-        unsure = np.flatnonzero((np.abs(share - 0.5) < 0.25).any(axis=1) & (u > 0))
-        neighbours = self._domain.L[:, unsure]
-        which = np.repeat(np.arange(len(unsure)), np.diff(neighbours.indptr))
-        others = neighbours.indices != unsure[which]
-        which, offered = which[others], found[neighbours.indices[others]]
-        alone = np.bincount(which, offered == found[unsure[which]], minlength=len(unsure)) == 0
-        which, offered = which[alone[which]], offered[alone[which]]
-        chance = np.where((offered[:, None] >> digits) & 1, share[unsure[which]], 1 - share[unsure[which]]).prod(axis=1)
-        order = np.argsort(chance, kind="stable")
-        found[unsure[which[order]]] = offered[order]
-        return np.where(u > 0, present[np.minimum(found, len(present) - 1)], -1)
 
     def _rim(self, sources: SourceSet) -> BoolArray:
         """The source vertices that have a neighbour which is none.
@@ -188,35 +217,42 @@ class Emitter:
     def _near_vertices(self, sources: SourceSet, rim: BoolArray) -> Seeds:
         """Source vertices, and those at the rim with their neighbours at the lengths of edges."""
         itself = Seeds(sources.vertices, sources.vertex_offset, sources.vertex_label)
-        if self._on_solved is None:
-            return itself
-        which, ends, lengths = self._on_solved.spokes(sources.vertices[rim])
-        return _joined(
-            itself, Seeds(ends, sources.vertex_offset[rim][which] + lengths, sources.vertex_label[rim][which])
-        )
+        vertices, offset, label = sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim]
+        found = [itself]
+        for field in self._fields:
+            which, ends, lengths = field.spokes(vertices)
+            found.append(Seeds(ends, offset[which] + lengths, label[which]))
+        return _joined(*found)
 
-    def _straight_lines(self, sources: SourceSet) -> Seeds:
-        """Exact distance of all vertices that see a point or a curve in a straight line, some edges around it."""
+    def _straight_lines(self, sources: SourceSet, rim: BoolArray) -> tuple[Seeds, Seeds]:
+        """Distance of the vertices that see a source in a straight line, as `NearField.seeds` has it.
+
+        Only where there are points or curves; for vertices alone, the ring of edges is enough.
+        """
         if self._on_faces is None or sources.on_vertices_alone:
-            return Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
-        return self._on_faces.seeds(
-            sources.points.joined(sources.segments.ends()), sources.segments, _RADIUS * self._domain.mean_edge_length
-        )
+            return _NONE, _NONE
+        vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
+        points = sources.points.joined(sources.segments.ends())
+        return self._on_faces.seeds(points, sources.segments, _RADIUS * self._domain.mean_edge_length, vertices)
 
     def _heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""
         parts = [(sources.vertices[rim], np.ones(rim.sum()), sources.vertex_label[rim], sources.vertex_offset[rim])]
-        if self._on_faces is not None and not sources.on_vertices_alone:
-            F = self._on_faces.triangulation.F
-            points, segments = sources.points, sources.segments
-            # The integral of a linear function along a segment: its length times the mean of both ends.
-            lengths = self._on_faces.lengths(segments)
-            per_length = 1 / (_EDGES_PER_POINT * self._domain.mean_edge_length)
-            along = (segments.start + segments.end) / 2 * (lengths * per_length)[:, None]
-            for part, share in ((points, points.barycentric), (segments, along)):
-                parts.append(
-                    (F[part.faces].ravel(), share.ravel(), np.repeat(part.label, 3), np.repeat(part.offset, 3))
+        triangulation = self._domain.triangulation
+        if self._on_faces is not None and triangulation is not None and not sources.on_vertices_alone:
+            h = self._domain.mean_edge_length
+            samples, lengths = self._on_faces.samples(sources.segments, h * _SPACING)
+            amount = np.concatenate([np.ones(len(sources.points.faces)), lengths / (h * _EDGES_PER_POINT)])
+            points = sources.points.joined(samples)
+            faces, barycentric = triangulation.locate(points.faces, points.barycentric)
+            parts.append(
+                (
+                    triangulation.F[faces].ravel(),
+                    (amount[:, None] * barycentric).ravel(),
+                    np.repeat(points.label, 3),
+                    np.repeat(points.offset, 3),
                 )
+            )
         vertex, share, label, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
         used = share > 0
         return vertex[used], share[used], label[used], offset[used]
@@ -264,27 +300,21 @@ class Emitter:
         distance[near.vertex] = near.value
         return distance
 
-    def _without_late(self, found: Emission) -> Emission:
-        """Less the sources at which the front of another arrives before they begin, and values it arrives before at."""
-        label = self._warmest(found, self._heat_flow.solve(self.heat(found)))
-        anchors = found.anchors.at(label[found.anchors.vertex] == found.anchors.label)
-        on_time = np.isin(found.label, anchors.label)
-        kept = label[found.near.vertex] == found.near.label
-        return replace(
-            found,
-            vertex=found.vertex[on_time],
-            share=found.share[on_time],
-            delay=found.delay[on_time],
-            label=found.label[on_time],
-            anchors=anchors,
-            near=found.near.at(kept),
-            guides=found.guides[kept],
-        )
+
+def take_shorter(distance: FloatArray, seeds: Seeds, error: float, start: FloatArray) -> BoolArray:
+    """Set known values where they are shorter, or longer by less than the error of `distance`; which were.
+
+    The error is relative to the distance from where it begins, `start` (n,).
+    """
+    begin = start[seeds.vertex]
+    taken = seeds.value - begin < (distance[seeds.vertex] - begin) * (1 + error)
+    distance[seeds.vertex[taken]] = seeds.value[taken]
+    return np.asarray(taken)
 
 
-def _joined(one: Seeds, other: Seeds) -> Seeds:
+def _joined(*parts: Seeds) -> Seeds:
     return Seeds(
-        np.concatenate([one.vertex, other.vertex]),
-        np.concatenate([one.value, other.value]),
-        np.concatenate([one.label, other.label]),
+        np.concatenate([part.vertex for part in parts]),
+        np.concatenate([part.value for part in parts]),
+        np.concatenate([part.label for part in parts]),
     )

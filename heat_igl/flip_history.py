@@ -13,7 +13,7 @@ import numpy as np
 
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Flipped", "Turned", "apex"]
+__all__ = ["Flipped", "Merged", "Turned", "apex"]
 
 
 def apex(base: FloatArray, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -21,6 +21,31 @@ def apex(base: FloatArray, left: FloatArray, right: FloatArray) -> tuple[FloatAr
     x = (base + (left - right) * ((left + right) / base)) / 2
     height = igl.doublearea(np.stack([base, left, right], axis=1), 0.0) / base
     return x, np.asarray(height)
+
+
+class Merged(NamedTuple):
+    """Faces that were left out because another has the same vertices.
+
+    Attributes
+    ----------
+    face : (m,) int64
+        What each face became.
+    corner : (m, 3) int64
+        Which corner of that face each corner became.
+    """
+
+    face: IntArray
+    corner: IntArray
+
+    def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
+        """The points (k,), (k, 3) afterwards."""
+        moved = np.empty_like(barycentric)
+        np.put_along_axis(moved, self.corner[faces], barycentric, axis=1)
+        return self.face[faces], moved
+
+    def before(self, F: IntArray) -> IntArray:
+        """The vertices (m, 3) of all faces, from those of the faces that are left."""
+        return np.asarray(np.take_along_axis(F[self.face], self.corner, axis=1))
 
 
 class Turned(NamedTuple):

@@ -14,14 +14,15 @@ from heat_igl.blocks import block_size, float_type, in_blocks, in_order, progres
 from heat_igl.emission import Emission, Emitter
 from heat_igl.errors import AccuracyWarning, SourceError
 from heat_igl.factorization import Analysis, Backend
+from heat_igl.heat_order import HeatOrder
 from heat_igl.mesh import RANGE_LIMIT, Mesh
-from heat_igl.operators import Laplacian, Operators, operators
+from heat_igl.operators import Laplacian, Operators, edge_length_operators, operators
 from heat_igl.processors import n_threads
-from heat_igl.refine import Refine, Refinement
-from heat_igl.solution import Diagnostics, HeatSolution
+from heat_igl.refine import Refine
+from heat_igl.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, analysis, damping, descent, normalize
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_time_step"]
 
@@ -159,6 +160,51 @@ class HeatMethodSolver:
         solver._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, 0.0)
         return solver
 
+    @classmethod
+    def from_edge_lengths(
+        cls,
+        F: ArrayLike,
+        lengths: ArrayLike,
+        *,
+        n: int | None = None,
+        t_coef: float = 1.0,
+        t: float | None = None,
+        laplacian: Laplacian = "intrinsic-delaunay",
+        boundary: Boundary = "neumann",
+        magnitude: Magnitude = "auto",
+        refine: Refine | None = None,
+        backend: Backend = "auto",
+    ) -> HeatMethodSolver:
+        """A solver on triangles that are known by their edge lengths alone; positions are not needed.
+
+        Parameters
+        ----------
+        F : (m, 3) array_like of int
+            Vertices of each triangle.
+        lengths : (m, 3) array_like
+            ``lengths[f, c]`` is that of the side of triangle f opposite its corner c, as `igl.edge_lengths` gives it;
+            both triangles at an edge give it the same length.
+        n : int, optional
+            Number of vertices; one more than the largest in `F` if not given.
+        **options
+            As for the class. Where more than two triangles meet at an edge no tufted cover is made, which takes
+            positions: such edges are not flipped.
+
+        Raises
+        ------
+        MeshError
+            If `F` or `lengths` cannot be used; the message names the first offender.
+        """
+        start = time.perf_counter()
+        domain = edge_length_operators(F, lengths, n, laplacian)
+        seconds = time.perf_counter() - start
+        if magnitude == "auto" and laplacian == "cotan":
+            magnitude = "unit"
+        solver = cls.__new__(cls)
+        solver._mesh = None
+        solver._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, seconds)
+        return solver
+
     def with_vertices(self, V: ArrayLike) -> HeatMethodSolver:
         """A new solver after the vertices have moved; this one stays as it is.
 
@@ -206,8 +252,6 @@ class HeatMethodSolver:
             raise ValueError(f"magnitude must be 'auto', 'unit' or 'damped', not {magnitude!r}")
         if refine not in (None, "sweep", "unfold"):
             raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {refine!r}")
-        if refine is not None and domain.triangulation is None:
-            raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
         self._damped = magnitude == "damped" or (magnitude == "auto" and domain.is_surface)
         requested = _positive("t_coef", t_coef) * domain.mean_edge_length**2 if t is None else _positive("t", t)
         step = max(requested, smallest_time_step(domain))
@@ -228,14 +272,11 @@ class HeatMethodSolver:
         self._poisson: PoissonProblem | None = poisson[0] if poisson else None
         factored = time.perf_counter()
         self._emitter = Emitter(domain, self._heat_flow)
-        self._unfolded: Callable[[FloatArray, IntArray], FloatArray] | None = None
-        triangulation = domain.triangulation
-        if refine is not None and triangulation is not None:
-            # Not the tufted cover: on it, a path over an edge of five faces can go on in one of them only.
-            refinement = Refinement(domain.surface or triangulation)
-            self._unfolded = refinement.sweep if refine == "sweep" else refinement.unfold
-        else:
+        self._given_faces = domain.given_faces
+        self._heat_order = None if refine is None else HeatOrder(domain, refine)
+        if refine is None:
             _ = domain.gradient_rows  # made on first use otherwise, in the middle of the first query
+        triangulation = domain.triangulation
         factors = self._heat_flow.factors + ([] if self._poisson is None else [self._poisson.factor])
         self._diagnostics = Diagnostics(
             t=step,
@@ -272,31 +313,63 @@ class HeatMethodSolver:
         """Length of a distance array."""
         return self._operators.n
 
-    def distance(self, sources: Sources) -> FloatArray:
+    def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
         """Distance from the nearest source.
 
         Parameters
         ----------
-        sources : int, sequence of int, or (n,) mask of bool
-            Source vertices.
+        sources : sources
+            A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources`
+            where distance begins at other values than 0, or a list of such.
+        cutoff : float, optional
+            Distances beyond this are ``inf``.
 
         Returns
         -------
         (n,) float64
-            In the mesh's unit: 0 at the sources, ``inf`` at vertices that no source reaches, never negative or NaN.
+            In the mesh's unit: 0 at the sources (their offset where they have one, unless another source is nearer),
+            ``inf`` at vertices that no source reaches, never negative or NaN.
 
         Raises
         ------
         SourceError
-            If `sources` does not name vertices of the mesh.
+            If `sources` does not describe places on the mesh.
+        ValueError
+            If `cutoff` is not positive.
 
         Warns
         -----
         AccuracyWarning
             If heat underflowed on the way, so that distances beyond are too short.
         """
-        chosen = [self._set(sources)]
-        return np.asarray(self._distances(chosen)[0])
+        beyond = _cutoff(cutoff)
+        return np.asarray(_within(beyond, self._distances([self._set(sources)]))[0])
+
+    def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
+        """Distance, and which source is nearest: a geodesic Voronoi diagram.
+
+        Parameters
+        ----------
+        sources, cutoff
+            As for `distance`, with its errors. Sources are counted as they are given: each vertex of a sequence, each
+            set entry of a mask, each point, a curve as one; over the entries of a list one after another.
+
+        Returns
+        -------
+        LabelledDistance
+            Without `refine`, labels say from which source most of the heat comes: a solve for each source, and right
+            but for vertices less than an edge from the border of two cells. With it, they come with the distance.
+        """
+        beyond = _cutoff(cutoff)
+        emissions, u = self._diffuse([self._set(sources)])
+        if self._heat_order is not None:
+            distance, labels = self._heat_order.labelled(emissions[0], u[:, 0])
+        else:
+            distance = self._integrated(emissions, u)[0]
+            labels = self._emitter.labels(emissions[0])
+        distance = _within(beyond, distance)
+        labels[np.isinf(distance)] = -1
+        return LabelledDistance(distance, labels)
 
     def distances(
         self,
@@ -304,6 +377,8 @@ class HeatMethodSolver:
         out: AnyArray | None = None,
         progress: bool = False,
         dtype: npt.DTypeLike | None = None,
+        *,
+        cutoff: float | None = None,
     ) -> AnyArray:
         """Distance from each of several sets of sources, solved in blocks, on all processors.
 
@@ -318,6 +393,8 @@ class HeatMethodSolver:
             Show a progress bar on standard error (extra ``cli``).
         dtype : float64 or float32, optional
             Of the result; float64, or that of `out`.
+        cutoff : float, optional
+            Distances beyond this are ``inf``.
 
         Returns
         -------
@@ -330,7 +407,8 @@ class HeatMethodSolver:
         SourceError
             Before anything is solved, if an entry does not name sources; the message says which.
         ValueError
-            If `out` has the wrong shape, cannot hold floats or cannot be written, or if `dtype` is none for distances.
+            If `out` has the wrong shape, cannot hold floats or cannot be written, if `dtype` is none for distances, or
+            if `cutoff` is not positive.
 
         Notes
         -----
@@ -340,6 +418,7 @@ class HeatMethodSolver:
         """
         if not hasattr(source_sets, "__len__"):
             raise SourceError(f"source_sets must be a sequence of sets of sources, not {source_sets!r}: try distance")
+        beyond = _cutoff(cutoff)
         chosen = list(self._named(source_sets))
         shape = (len(chosen), self.n_vertices)
         if out is None:
@@ -353,7 +432,7 @@ class HeatMethodSolver:
         write = row_writer(out)
         with progress_bar("distances", len(chosen), progress) as advance:
             for rows in self._blocks(chosen, len(chosen)):
-                write(rows.astype(out.dtype, copy=False))
+                write(_within(beyond, rows).astype(out.dtype, copy=False))
                 advance(len(rows))
         return out
 
@@ -409,8 +488,8 @@ class HeatMethodSolver:
         chosen = [self._set(sources)]
         emissions, u = self._diffuse(chosen)
         X, magnitude = self._field(emissions, u)
-        if self._unfolded is not None:
-            distance = _in_heat_order(self._unfolded, u, chosen)
+        if self._heat_order is not None:
+            distance = self._heat_order.distances(emissions, u)
         else:
             distance = self._integrated(emissions, u)
         with np.errstate(under="ignore"):
@@ -426,19 +505,20 @@ class HeatMethodSolver:
         )
 
     def _set(self, sources: Sources) -> SourceSet:
-        faces = self._operators.faces
-        return source_set(sources, self.n_vertices, None if faces is None else faces.F)
+        return source_set(sources, self.n_vertices, self._given_faces)
 
     def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
         """Distances (k, n) from k sets of sources."""
         emissions, u = self._diffuse(source_sets)
-        if self._unfolded is not None:
-            return _in_heat_order(self._unfolded, u, source_sets)
+        if self._heat_order is not None:
+            return self._heat_order.distances(emissions, u)
         return self._integrated(emissions, u)
 
     def _diffuse(self, source_sets: list[SourceSet]) -> tuple[list[Emission], FloatArray]:
         """Heat (n, k) from k sets of sources."""
         emissions = [self._emitter.emission(sources) for sources in source_sets]
+        if self._heat_order is None:
+            emissions = [self._emitter.on_time(emission) for emission in emissions]
         return emissions, self._heat_flow.solve(np.stack([self._emitter.heat(one) for one in emissions], axis=1))
 
     def _field(self, emissions: list[Emission], u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -487,14 +567,14 @@ class HeatMethodSolver:
             )
 
 
-def _in_heat_order(
-    unfolded: Callable[[FloatArray, IntArray], FloatArray], u: FloatArray, source_sets: list[SourceSet]
-) -> FloatArray:
-    """Distances (k, n) by unfolding.
+def _cutoff(value: float | None) -> float | None:
+    return None if value is None else _positive("cutoff", value)
 
-    Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
-    """
-    return np.stack([unfolded(-column, one.vertices) for column, one in zip(u.T, source_sets, strict=True)])
+
+def _within(cutoff: float | None, distances: FloatArray) -> FloatArray:
+    if cutoff is not None:
+        distances[distances > cutoff] = np.inf
+    return distances
 
 
 def _as_mesh(mesh: Mesh | ArrayLike, F: ArrayLike | None) -> Mesh:
@@ -516,8 +596,8 @@ def heat_method_distance(V: ArrayLike, F: ArrayLike, sources: Sources, **options
         Vertex positions.
     F : (m, 3) or (m, 4) array_like
         Triangles or tetrahedra.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
+    sources : sources
+        As for `HeatMethodSolver.distance`.
     **options
         As for `HeatMethodSolver`.
 

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from heat_igl import connectivity
 from heat_igl.errors import MeshError
-from heat_igl.flip_history import Flipped, Turned, apex
+from heat_igl.flip_history import Flipped, Merged, Turned, apex
 from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -60,7 +60,7 @@ class IntrinsicTriangulation:
         How many edges were flipped to arrive here.
     lengthening : float
         What `mollify` added to every edge; 0 unless a triangle was degenerate.
-    history : tuple of Turned or Flipped
+    history : tuple of Merged, Turned or Flipped
         How these faces came from those of the mesh.
     """
 
@@ -71,7 +71,7 @@ class IntrinsicTriangulation:
     n: int
     n_flips: int = 0
     lengthening: float = 0.0
-    history: tuple[Turned | Flipped, ...] = ()
+    history: tuple[Merged | Turned | Flipped, ...] = ()
 
     @property
     def boundary(self) -> BoolArray:

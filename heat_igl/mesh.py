@@ -70,7 +70,14 @@ def checked_positions(V: ArrayLike) -> FloatArray:
     return positions
 
 
-def _faces(F: ArrayLike, n: int) -> IntArray:
+def checked_faces(F: ArrayLike, n: int | None) -> IntArray:
+    """`F` as an array of its own: indices of `n` vertices, of as many as it names if that is None.
+
+    Raises
+    ------
+    MeshError
+        As for `Mesh`.
+    """
     try:
         array = np.asarray(F)
     except ValueError as error:
@@ -85,13 +92,14 @@ def _faces(F: ArrayLike, n: int) -> IntArray:
         raise MeshError(
             f"F must have shape (m, 3) for triangles or (m, 4) for tetrahedra, but it has shape {array.shape}"
         )
+    n = int(array.max()) + 1 if n is None else n
     outside = (array < 0) | (array >= n)
     if outside.any():
         row, column = (int(i) for i in np.argwhere(outside)[0])
         hint = "; the indices look 1-based, subtract 1" if array.min() == 1 and array.max() == n else ""
         raise MeshError(
             f"F[{row}, {column}] = {array[row, column]} is no vertex ({int(outside.any(axis=1).sum())} of {len(array)} "
-            f"faces are affected): V has {n} rows, so indices run from 0 to {n - 1}{hint}"
+            f"faces are affected): there are {n} vertices, so indices run from 0 to {n - 1}{hint}"
         )
     faces = np.array(array, dtype=np.int64, order="C", copy=True)
     repeats = np.zeros(len(faces), bool)
@@ -136,7 +144,7 @@ class Mesh:
 
     def __init__(self, V: ArrayLike, F: ArrayLike) -> None:
         positions = checked_positions(V)
-        faces = _faces(F, len(positions))
+        faces = checked_faces(F, len(positions))
         faces.setflags(write=False)
         self._hold(positions, faces)
 

@@ -7,7 +7,7 @@ parallel, as from a point at infinity; both are one homogeneous point here. docs
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -74,16 +74,16 @@ class _Windows:
         return _Windows(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     def nearest(self) -> FloatArray:
-        """Distance of the nearest point of each window, offset included."""
+        """Distance of the nearest point of each window."""
         beside = np.where(self.x < self.low, self.low - self.x, np.where(self.x > self.high, self.x - self.high, 0.0))
         to_point = np.hypot(beside, self.y)
         to_line = np.minimum(-self.x * self.low, -self.x * self.high) - self.level
-        return np.asarray(self.offset + np.where(self.w > 0, to_point, to_line))
+        return np.asarray(np.where(self.w > 0, to_point, to_line))
 
     def distance(self, px: FloatArray, py: FloatArray) -> FloatArray:
-        """Distance of a place in the frame of each window, offset included."""
+        """Distance of a place in the frame of each window."""
         to_point = np.hypot(px - self.x, py - self.y)
-        return np.asarray(self.offset + np.where(self.w > 0, to_point, -self.x * px - self.y * py - self.level))
+        return np.asarray(np.where(self.w > 0, to_point, -self.x * px - self.y * py - self.level))
 
 
 def _joined(parts: list[_Windows]) -> _Windows:
@@ -129,7 +129,9 @@ class NearField:
         lengths = np.concatenate([tri.l[f, (c + 2) % 3], tri.l[f, (c + 1) % 3]])
         return np.concatenate([which, which]), ends, lengths
 
-    def seeds(self, points: SourcePoints, segments: SourceSegments, radius: float) -> Seeds:
+    def seeds(
+        self, points: SourcePoints, segments: SourceSegments, radius: float, vertices: Seeds | None = None
+    ) -> tuple[Seeds, Seeds]:
         """Distance at the vertices that see a source in a straight line.
 
         Parameters
@@ -137,31 +139,68 @@ class NearField:
         points, segments
             The sources. The ends of segments are no sources by themselves.
         radius : float
-            How far to look. The corners of a source's own faces are always found.
+            How far to look.
+        vertices : Seeds, optional
+            Vertices that are sources too.
 
         Returns
         -------
-        Seeds
-            One for each label and vertex, labels ascending.
+        near : Seeds
+            Vertices within `radius`, ascending. The length of a straight line, and as good as always the shortest way:
+            not where a way around curvature is shorter, which only a detour by an edge reveals.
+        far : Seeds
+            Corners of the sources' own faces beyond `radius`, where another source may be nearer.
         """
+        points, segments = self._carried(points, segments)
+        if vertices is not None:
+            points = points.joined(self._as_points(vertices))
         found = _Found(self.triangulation.n)
         windows = _joined([*self._of_points(points, found), *self._of_segments(segments, found)])
+        own = found.seeds()
         base = self.triangulation.l.ravel()
-        limit = radius
         for _ in range(_MOST_LEVELS):
             nearest = windows.nearest()
             ends = self.triangulation.tail(windows.half_edge), self.triangulation.head(windows.half_edge)
             by_corner = np.minimum(*(found.at(vertex) for vertex in ends))
-            windows = windows.at((nearest - windows.offset < limit) & (nearest < by_corner + base[windows.half_edge]))
+            useful = windows.offset + nearest < by_corner + base[windows.half_edge]
+            windows = windows.at((nearest < radius) & useful)
             if not len(windows):
                 break
             windows = self._cross(windows, found)
-        return found.seeds()
+        near = self._shortest(found, radius)
+        return near, own.at(~np.isin(own.vertex, near.vertex))
 
-    def lengths(self, segments: SourceSegments) -> FloatArray:
-        """Length (s,) of each segment."""
-        along = np.einsum("kc,kcx->kx", segments.end - segments.start, self._layout(segments.faces))
-        return np.asarray(np.linalg.norm(along, axis=1))
+    def _shortest(self, found: _Found, radius: float) -> Seeds:
+        """Less the vertices that a way along an edge from another serves better: there, straight is not shortest."""
+        seeds = found.seeds(radius)
+        which, ends, lengths = self.spokes(seeds.vertex)
+        beaten = found.at(ends) > (seeds.value[which] + lengths) * (1 + _ROUNDING)
+        return seeds.at(~np.isin(seeds.vertex, ends[beaten]))
+
+    def samples(self, segments: SourceSegments, spacing: float) -> tuple[SourcePoints, FloatArray]:
+        """Points along segments, at most `spacing` apart, and the length that each stands for.
+
+        Each lies in the middle of its piece, where a linear function takes its mean.
+        """
+        _, carried = self._carried(segments.ends(), segments)
+        along = np.einsum("kc,kcx->kx", carried.end - carried.start, self._layout(carried.faces))
+        lengths = np.linalg.norm(along, axis=1)
+        counts = np.ceil(lengths / spacing).astype(np.int64)
+        which = np.repeat(np.arange(len(counts)), counts)
+        share = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[which]
+        barycentric = (1 - share)[:, None] * segments.start[which] + share[:, None] * segments.end[which]
+        points = SourcePoints(segments.faces[which], barycentric, segments.label[which], segments.offset[which])
+        return points, lengths[which] / counts[which]
+
+    def _carried(self, points: SourcePoints, segments: SourceSegments) -> tuple[SourcePoints, SourceSegments]:
+        """The same in the faces of the triangulation, which may lack some that were given twice."""
+        faces, barycentric = self.triangulation.locate(points.faces, points.barycentric)
+        faces_of_segments, start = self.triangulation.locate(segments.faces, segments.start)
+        _, end = self.triangulation.locate(segments.faces, segments.end)
+        return (
+            replace(points, faces=faces, barycentric=barycentric),
+            replace(segments, faces=faces_of_segments, start=start, end=end),
+        )
 
     def _of_points(self, points: SourcePoints, found: _Found) -> list[_Windows]:
         """Windows on the sides of each point's face, and its corners."""
@@ -171,7 +210,7 @@ class NearField:
         p = np.einsum("kc,kcx->kx", points.barycentric, corners)
         distance = np.linalg.norm(corners - p[:, None], axis=2)
         for c in range(3):
-            found.add(self.triangulation.F[f, c], points.offset + distance[:, c], points.label)
+            found.add(self.triangulation.F[f, c], distance[:, c], points.offset, points.label)
         windows = []
         one = np.ones(len(f))
         for c in range(3):
@@ -191,6 +230,13 @@ class NearField:
                 )
             )
         return windows
+
+    def _as_points(self, vertices: Seeds) -> SourcePoints:
+        """Vertices as points in the first of their faces; those without a face see nothing."""
+        corner, which = self.corners_at(vertices.vertex)
+        which, first = np.unique(which, return_index=True)
+        corner = corner[first]
+        return SourcePoints(corner // 3, np.eye(3)[corner % 3], vertices.label[which], vertices.value[which])
 
     def _on_both_sides(self, points: SourcePoints) -> SourcePoints:
         """The same, with points on an edge in both of its faces, and points in a vertex in all faces around it."""
@@ -243,7 +289,8 @@ class NearField:
             beside = (u[:, c] >= -room) & (u[:, c] <= length + room) & (length > 0)
             found.add(
                 self.triangulation.F[f[beside], c],
-                segments.offset[beside] + np.abs(v[beside, c]),
+                np.abs(v[beside, c]),
+                segments.offset[beside],
                 segments.label[beside],
             )
         for side in (1.0, -1.0):
@@ -342,7 +389,7 @@ class NearField:
         x = ax - ay * (windows.x - windows.w * ax) / (windows.y - windows.w * ay)
         room = _ROUNDING * base
         seen = (x >= windows.low - room) & (x <= windows.high + room)
-        found.add(tri.F[g[seen], k[seen]], windows.distance(ax, ay)[seen], windows.label[seen])
+        found.add(tri.F[g[seen], k[seen]], windows.distance(ax, ay)[seen], windows.offset[seen], windows.label[seen])
 
         S = np.stack([windows.x, windows.y], axis=1)
         new = []
@@ -381,20 +428,23 @@ class NearField:
 
 
 class _Found:
-    """The smallest value at each vertex so far, and whose it is."""
+    """The smallest value at each vertex so far, whose it is, and how much of it is the source's offset."""
 
     def __init__(self, n: int) -> None:
         self._value = np.full(n, np.inf)
         self._label = np.full(n, -1)
+        self._offset = np.zeros(n)
 
-    def add(self, vertex: IntArray, value: FloatArray, label: IntArray) -> None:
+    def add(self, vertex: IntArray, distance: FloatArray, offset: FloatArray, label: IntArray) -> None:
+        value = offset + distance
         order = np.argsort(-value, kind="stable")  # where a vertex comes twice, what is written last stays
         better = order[value[order] < self._value[vertex[order]]]
-        self._value[vertex[better]], self._label[vertex[better]] = value[better], label[better]
+        at = vertex[better]
+        self._value[at], self._label[at], self._offset[at] = value[better], label[better], offset[better]
 
     def at(self, vertex: IntArray) -> FloatArray:
         return np.asarray(self._value[vertex])
 
-    def seeds(self) -> Seeds:
-        vertex = np.flatnonzero(self._label >= 0)
+    def seeds(self, radius: float = np.inf) -> Seeds:
+        vertex = np.flatnonzero((self._label >= 0) & (self._value - self._offset <= radius))
         return Seeds(vertex, self._value[vertex], self._label[vertex])

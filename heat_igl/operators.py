@@ -16,15 +16,17 @@ import scipy.sparse as sp
 
 from heat_igl import connectivity
 from heat_igl.errors import MeshError
+from heat_igl.flip_history import Merged
 from heat_igl.intrinsic import (
     IntrinsicTriangulation,
+    from_edge_lengths,
     intrinsic_delaunay,
     intrinsic_gradient,
     intrinsic_triangulation,
 )
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, checked_faces
 from heat_igl.tufted import has_nonmanifold_edges, tufted_cover
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["Laplacian", "Operators", "cotan_operators", "intrinsic_operators", "operators", "tufted_operators"]
 
@@ -69,10 +71,11 @@ class Operators:
     surface : IntrinsicTriangulation or None
         Triangles of the surface itself, each once, where `triangulation` is its tufted cover and goes over it twice.
         Paths are to be unfolded in these: on the cover a path over an edge of five faces goes on in one of them only.
+    faces : IntrinsicTriangulation or None
+        The triangles before any flip, but each once: what points and curves on faces are carried to. None where
+        `triangulation` is.
     is_surface : bool
         Whether the domain has two dimensions; tetrahedra have three.
-    faces : IntrinsicTriangulation or None
-        The triangles as they were given, before any flip: those that points and curves on faces refer to.
     """
 
     L: sp.csc_matrix
@@ -87,13 +90,24 @@ class Operators:
     longest_distance: float
     triangulation: IntrinsicTriangulation | None = None
     surface: IntrinsicTriangulation | None = None
-    is_surface: bool = True
     faces: IntrinsicTriangulation | None = None
+    is_surface: bool = True
 
     @property
     def n(self) -> int:
         """Number of vertices."""
         return int(self.L.shape[0])
+
+    @property
+    def given_faces(self) -> IntArray | None:
+        """Vertices (m, 3) of the triangles that points and curves refer to; None without `faces`."""
+        if self.faces is None:
+            return None
+        F = self.faces.F
+        for move in self.faces.history:
+            if isinstance(move, Merged):
+                F = move.before(F)
+        return F
 
     @property
     def dimension(self) -> int:
@@ -140,16 +154,15 @@ def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operat
         raise ValueError(f"laplacian must be 'intrinsic-delaunay' or 'cotan', not {laplacian!r}")
     if mesh.is_tetrahedral:
         return cotan_operators(mesh)
-    faces = triangulation = intrinsic_triangulation(mesh)
-    if laplacian == "intrinsic-delaunay":
+    history: tuple[Merged, ...] = ()
+    if laplacian == "intrinsic-delaunay" and has_nonmanifold_edges(mesh):
+        # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being manifold.
+        mesh, history = _without_duplicates(mesh)
         if has_nonmanifold_edges(mesh):
-            # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being
-            # manifold.
-            mesh = _without_duplicates(mesh)
-            if has_nonmanifold_edges(mesh):
-                return replace(tufted_operators(mesh), faces=faces)
-            triangulation = intrinsic_triangulation(mesh)
-        triangulation = intrinsic_delaunay(triangulation)
+            return tufted_operators(mesh, history)
+    faces = triangulation = replace(intrinsic_triangulation(mesh), history=history)
+    if laplacian == "intrinsic-delaunay":
+        triangulation = intrinsic_delaunay(faces)
     if triangulation.n_flips or triangulation.lengthening:
         # Paths along the mesh's own edges are paths on the surface too, and already known.
         return replace(intrinsic_operators(triangulation, mesh.longest_distance), faces=faces)
@@ -229,31 +242,81 @@ def intrinsic_operators(
         referenced=referenced,
         longest_distance=longest_distance,
         triangulation=triangulation,
-        faces=triangulation,
+        faces=None if triangulation.history else triangulation,
     )
 
 
-def tufted_operators(mesh: Mesh) -> Operators:
+def edge_length_operators(
+    F: ArrayLike, lengths: ArrayLike, n: int | None = None, laplacian: Laplacian = "intrinsic-delaunay"
+) -> Operators:
+    """The operators of triangles that are known by their edge lengths alone.
+
+    Parameters
+    ----------
+    F : (m, 3) array_like of int
+        Vertices of each triangle.
+    lengths : (m, 3) array_like
+        ``lengths[f, c]`` is that of the side of triangle f opposite its corner c.
+    n : int, optional
+        Number of vertices; one more than the largest in `F` if not given.
+    laplacian : {"intrinsic-delaunay", "cotan"}
+        As for `operators`.
+
+    Raises
+    ------
+    MeshError
+        If `F` or `lengths` cannot be used.
+    ValueError
+        If `laplacian` is neither.
+    """
+    if laplacian not in ("intrinsic-delaunay", "cotan"):
+        raise ValueError(f"laplacian must be 'intrinsic-delaunay' or 'cotan', not {laplacian!r}")
+    triangles = checked_faces(F, n)
+    if triangles.shape[1] != 3:
+        raise MeshError(f"F must have shape (m, 3), triangles, but it has shape {triangles.shape}")
+    faces = from_edge_lengths(lengths, triangles, int(triangles.max()) + 1 if n is None else n)
+    given = intrinsic_operators(faces)
+    if laplacian == "cotan":
+        return given
+    triangulation = intrinsic_delaunay(faces)
+    if triangulation is faces:
+        return given
+    return replace(intrinsic_operators(triangulation, given.longest_distance), faces=faces)
+
+
+def tufted_operators(mesh: Mesh, history: tuple[Merged, ...] = ()) -> Operators:
     """The operators of any triangle mesh by way of its tufted cover, made intrinsic Delaunay (d = 2).
 
     The cover goes over the surface twice, so L, M and the weights are one half of its own: a face of the mesh counts
     once, and L = D G holds. No weight is negative, not even on the boundary, which the cover does not have; `boundary`
-    is that of the mesh.
+    is that of the mesh. `history` says how its faces came from those that points refer to.
     """
-    cover = intrinsic_operators(intrinsic_delaunay(tufted_cover(mesh)), mesh.longest_distance)
+    cover = replace(tufted_cover(mesh), history=history)
+    surface = replace(intrinsic_triangulation(mesh), history=history)
+    domain = intrinsic_operators(intrinsic_delaunay(cover), mesh.longest_distance)
     return replace(
-        cover,
-        L=cover.L / 2,
-        M=cover.M / 2,
-        weights=cover.weights / 2,
+        domain,
+        L=domain.L / 2,
+        M=domain.M / 2,
+        weights=domain.weights / 2,
         boundary=mesh.boundary,
-        surface=intrinsic_delaunay(intrinsic_triangulation(mesh)),
+        surface=intrinsic_delaunay(surface),
+        faces=surface,
     )
 
 
-def _without_duplicates(mesh: Mesh) -> Mesh:
+def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Merged, ...]]:
+    """The mesh with each face once, and which faces became which."""
     repeated = connectivity.duplicate_faces(mesh.F, mesh.n_vertices)
-    return Mesh(mesh.V, np.delete(mesh.F, repeated, axis=0)) if len(repeated) else mesh
+    if not len(repeated):
+        return mesh, ()
+    kept = np.delete(np.arange(mesh.n_faces), repeated)
+    ascending = np.argsort(mesh.F, axis=1)
+    first, inverse, _ = connectivity.unique_rows(np.take_along_axis(mesh.F, ascending, axis=1), mesh.n_vertices)
+    copied = first[inverse]
+    corner = np.empty_like(mesh.F)
+    np.put_along_axis(corner, ascending, ascending[copied], axis=1)
+    return Mesh(mesh.V, mesh.F[kept]), (Merged(np.searchsorted(kept, copied), corner),)
 
 
 def _padded(matrix: sp.csc_matrix, n: int) -> sp.csc_matrix:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from heat_igl.typing import FloatArray
+from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["Diagnostics", "HeatSolution"]
 
@@ -52,6 +53,21 @@ class Diagnostics:
     def t_raised(self) -> bool:
         """Whether t was raised to keep the heat inside the double range."""
         return self.t > self.t_requested
+
+
+class LabelledDistance(NamedTuple):
+    """Distance and the source that it is measured from.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        As `HeatMethodSolver.distance` returns it.
+    labels : (n,) int64
+        The nearest source of each vertex; -1 where none reaches, or none within the cutoff.
+    """
+
+    distance: FloatArray
+    labels: IntArray
 
 
 @dataclass(frozen=True, eq=False)

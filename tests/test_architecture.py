@@ -47,6 +47,7 @@ refine
 descending
 steps
 emission
+heat_order
 solution
 blocks
 heat_method

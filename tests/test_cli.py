@@ -70,6 +70,22 @@ def test_distance_writes_what_the_library_returns_and_a_picture(sphere: Path) ->
     assert files(sphere.parent) == {"sphere.off", "out.ply", "out.png"}
 
 
+def test_distance_from_positions_in_space(sphere: Path) -> None:
+    done = command("distance", sphere, "--source", 12, "--at", "0.3,-2,0.1", "--cutoff", 0.5, "--output", "out.ply",
+                   cwd=sphere.parent)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    mesh = shapes.icosphere(2)
+    points, gap = heat_igl.closest_points(mesh, [0.3, -2, 0.1])
+    expected = heat_igl.HeatMethodSolver(mesh).distance([12, points], cutoff=0.5)
+    np.testing.assert_array_equal(io.read_attributes(sphere.parent / "out.ply")["distance"], expected)
+    assert np.isinf(expected).any()
+    assert f"{gap[0]:.6g}" in done.stdout
+    for arguments, words in ((["--at", "1,2"], "--at 1,2: three numbers"), ([], "no source: name vertices")):
+        refused = command("distance", sphere, *arguments, cwd=sphere.parent)
+        assert refused.returncode == 1
+        assert_one_line(refused.stderr, words)
+
+
 def test_refined_distance_is_that_of_the_library(sphere: Path) -> None:
     pytest.importorskip("numba")
     done = command("distance", sphere, "--source", 12, "--refine", "unfold", "--output", "out.ply", cwd=sphere.parent)

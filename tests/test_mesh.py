@@ -74,7 +74,9 @@ def test_error_counts_the_offenders() -> None:
     V = np.where(np.arange(12).reshape(4, 3) % 7 == 5, np.nan, 1.0)
     with pytest.raises(MeshError, match=r"V\[1, 2\] is nan \(1 of 4 vertices are not finite\)"):
         Mesh(V, TETRAHEDRON_F)
-    with pytest.raises(MeshError, match=r"F\[1, 2\] = 3 is no vertex \(3 of 4 faces are affected\): V has 3 rows"):
+    with pytest.raises(
+        MeshError, match=r"F\[1, 2\] = 3 is no vertex \(3 of 4 faces are affected\): there are 3 vertices"
+    ):
         Mesh(TETRAHEDRON_V[:3], TETRAHEDRON_F)
     with pytest.raises(MeshError, match=r"F\[0, 2\] = 4 is no vertex .* look 1-based, subtract 1"):
         Mesh(TETRAHEDRON_V, [[1, 2, 4], [1, 2, 3]])

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heat_igl import SourceError
-from heat_igl.sources import vertex_sources
+from heat_igl import OffsetSources, SourceError, SurfaceCurve, SurfacePoints
+from heat_igl.sources import source_set, vertex_sources
 
 
 @pytest.mark.parametrize(
@@ -46,3 +46,86 @@ def test_accepted_forms(sources, expected):
 def test_refused(sources, message):
     with pytest.raises(SourceError, match=message):
         vertex_sources(sources, 5)
+    with pytest.raises(SourceError, match=message):
+        source_set(sources, 5, F)
+
+
+F = np.array([[0, 1, 2], [2, 1, 3], [3, 4, 2]])
+CENTRE = np.full((1, 3), 1 / 3)
+CURVE = SurfaceCurve([0, 1], [[1, 0, 0], [0, 0.5, 0.5]], [[0.5, 0.5, 0], [0.2, 0.2, 0.6]])
+
+
+def test_sources_are_counted_as_they_are_given():
+    points = SurfacePoints([2, 0], [[0.2, 0.3, 0.5], [0.5, 0.5, 0]])
+    found = source_set([4, CURVE, points, [1, 0], np.array([False, True, False, False, True])], 5, F)
+    assert found.n_labels == 8
+    # Vertex 4 is named first as 0 and again as 7, vertex 1 as 4 and as 6.
+    assert found.vertices.tolist() == [0, 1, 4]
+    assert found.vertex_label.tolist() == [5, 4, 0]
+    assert found.points.label.tolist() == [2, 3]
+    assert found.points.faces.tolist() == [2, 0]
+    assert found.segments.label.tolist() == [1, 1]
+    assert found.segments.faces.tolist() == [0, 1]
+    assert not found.offsets.any()
+
+
+def test_a_point_in_a_vertex_is_that_vertex():
+    found = source_set(SurfacePoints([1, 2], [[1e-14, 0, 1 - 1e-14], [0.5, 0.5, 0]]), 5, F)
+    assert found.vertices.tolist() == [3]
+    assert found.vertex_label.tolist() == [0]
+    assert found.points.faces.tolist() == [2]
+    assert found.points.label.tolist() == [1]
+    assert found.n_labels == 2
+
+
+def test_offsets():
+    assert source_set(OffsetSources([3, 1], [0.5, 0.25]), 5, F).vertex_offset.tolist() == [0.25, 0.5]
+    assert source_set(OffsetSources([3, 1], 2), 5, F).vertex_offset.tolist() == [2, 2]
+    nested = [OffsetSources([OffsetSources(0, 1), CURVE, SurfacePoints([1], CENTRE)], [10, 20, 30]), 2]
+    found = source_set(nested, 5, F)
+    assert found.vertex_offset.tolist() == [11, 0]
+    assert found.segments.offset.tolist() == [20, 20]
+    assert found.points.offset.tolist() == [30]
+    # Of a vertex that is named twice, the smaller offset counts.
+    twice = source_set(OffsetSources([2, 2], [0.5, 0.25]), 5, F)
+    assert (twice.vertices.tolist(), twice.vertex_offset.tolist(), twice.vertex_label.tolist()) == ([2], [0.25], [1])
+
+
+@pytest.mark.parametrize(
+    ("offsets", "message"),
+    [
+        ([0.0, -1.0], r"offsets\[1\] = -1.0 must be finite and not negative"),
+        ([np.nan, 0.0], r"offsets\[0\] = nan must be finite"),
+        (np.inf, "offsets = inf must be finite"),
+        ([[0.0, 1.0]], r"one number or one for each source, not of shape \(1, 2\)"),
+        ("near", "offsets must be real numbers, not 'near'"),
+    ],
+)
+def test_refused_offsets(offsets, message):
+    with pytest.raises(SourceError, match=message):
+        OffsetSources([0, 1], offsets)
+
+
+@pytest.mark.parametrize(
+    ("sources", "message"),
+    [
+        (OffsetSources([0, 1], [0.0, 1.0, 2.0]), "offsets has 3 entries for 2 sources: give one for each"),
+        (OffsetSources([CURVE, 0], [1.0]), "offsets has 1 entries for 2 sources"),
+        (SurfacePoints([0, 3], np.tile(CENTRE, (2, 1))), r"faces\[1\] = 3 is no face: indices run from 0 to 2"),
+        (SurfaceCurve([-1], [[1, 0, 0]], [[0, 1, 0]]), r"faces\[0\] = -1 is no face"),
+        ([CURVE, 7], r"sources\[1\]: sources\[0\] = 7 is no vertex"),
+        ([3, SurfacePoints([9], CENTRE)], r"sources\[1\]: faces\[0\] = 9 is no face"),
+        ([CURVE, None], r"sources\[1\]: sources must be a vertex index"),
+        ([CURVE, []], r"sources\[1\]: sources is empty"),
+    ],
+)
+def test_refused_places(sources, message):
+    with pytest.raises(SourceError, match=message):
+        source_set(sources, 5, F)
+
+
+def test_only_triangles_hold_points():
+    with pytest.raises(SourceError, match="points and curves lie on triangles, and this domain has none: name vert"):
+        source_set([0, SurfacePoints([0], CENTRE)], 5, None)
+    with pytest.raises(SourceError, match="here, not SurfacePoints"):
+        vertex_sources(SurfacePoints([0], CENTRE), 5)

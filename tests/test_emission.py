@@ -1,0 +1,422 @@
+"""Distance from points in faces, from curves, from sources that begin later, and the cells of the nearest source."""
+
+from __future__ import annotations
+
+import pickle
+
+import igl
+import numpy as np
+import pytest
+from conftest import perturbed
+
+from heat_igl import (
+    HeatMethodSolver,
+    Mesh,
+    MeshError,
+    OffsetSources,
+    SourceError,
+    SurfacePoints,
+    closest_points,
+    curve_on,
+    edge_curve,
+    reference,
+    shapes,
+)
+from heat_igl.bounds import edge_paths
+
+
+@pytest.fixture(params=[None, "sweep", "unfold"])
+def refine(request):
+    if request.param is not None:
+        pytest.importorskip("numba")
+    return request.param
+
+
+def plane(n: int, amount: float = 0.2) -> Mesh:
+    """The unit square, its vertices moved within it."""
+    mesh = perturbed(shapes.grid(n), amount)
+    return Mesh(mesh.V * [1, 1, 0], mesh.F)
+
+
+def nearest_vertex(mesh: Mesh, position) -> int:
+    return int(np.linalg.norm(mesh.V - position, axis=1).argmin())
+
+
+def relative_error(distance, truth) -> float:
+    far = truth > 0
+    return float((np.abs(distance - truth)[far] / truth[far]).mean())
+
+
+@pytest.mark.parametrize("name", ["cow", pytest.param("bunny", marks=pytest.mark.slow)])
+def test_a_point_in_a_face_is_as_good_a_source_as_a_vertex(name, refine, request):
+    """Against the exact distance of the mesh with the point as a vertex: the corners straight, the rest no worse."""
+    mesh = request.getfixturevalue(name)
+    solver = HeatMethodSolver(mesh, refine=refine)
+    rng = np.random.default_rng(2)
+    of_points, of_vertices = [], []
+    for face in rng.choice(mesh.n_faces, 3, p=mesh.measures / mesh.measures.sum()):
+        point = SurfacePoints([face], [0.9 * rng.dirichlet(np.ones(3)) + 0.1 / 3])
+        corners, n = mesh.F[face], mesh.n_vertices
+        fan = [np.where(np.arange(3) == c, n, corners) for c in range(3)]
+        inserted = Mesh(
+            np.concatenate([mesh.V, point.positions(mesh)]), np.concatenate([np.delete(mesh.F, face, 0), fan])
+        )
+        distance, truth = solver.distance(point), reference.exact(inserted, n)[:-1]
+        straight = np.linalg.norm(mesh.V[corners] - point.positions(mesh), axis=1)
+        np.testing.assert_allclose(distance[corners], straight, rtol=1e-9)
+        of_points.append(relative_error(distance, truth))
+        of_vertices.append(relative_error(solver.distance(corners[0]), reference.exact(mesh, int(corners[0]))))
+    # As good on average; single sources differ by where their cut locus is.
+    assert np.mean(of_points) < 1.05 * np.mean(of_vertices)
+
+
+def test_near_field_joins_the_far_field(bunny):
+    """Across an edge out of the near field distance changes by no more than the length of the edge."""
+    solver = HeatMethodSolver(bunny)
+    point = SurfacePoints([1234], [[0.2, 0.5, 0.3]])
+    distance = solver.distance(point)
+    near = solver._emitter.emission(solver._set(point)).near.vertex
+    edges = bunny.edges[np.isin(bunny.edges, near).any(axis=1)]
+    assert len(near) > 50
+    change = np.abs(distance[edges[:, 0]] - distance[edges[:, 1]])
+    assert (change <= np.linalg.norm(bunny.V[edges[:, 0]] - bunny.V[edges[:, 1]], axis=1) * (1 + 1e-9)).all()
+
+
+def test_a_ring_of_edges_around_a_vertex_is_straight(cow):
+    solver = HeatMethodSolver(cow)
+    edges = cow.edges[(cow.edges == 50).any(axis=1)]
+    others = edges.sum(axis=1) - 50
+    lengths = np.linalg.norm(cow.V[others] - cow.V[50], axis=1)
+    np.testing.assert_allclose(solver.distance(50)[others], lengths, rtol=1e-12)
+
+
+def test_points_on_flat_domains_are_exact_when_refined(refine):
+    mesh = plane(20)
+    point = closest_points(mesh, [0.331, 0.672, 0.2]).points
+    distance = HeatMethodSolver(mesh, refine=refine).distance(point)
+    truth = np.linalg.norm(mesh.V - [0.331, 0.672, 0], axis=1)
+    assert relative_error(distance, truth) < (0.04 if refine is None else 1e-12)
+
+
+@pytest.mark.parametrize("amount", [0.0, 0.2])
+def test_a_line_across_the_square(refine, amount):
+    """Distance is the coordinate across, on both sides; the error falls with the size of the faces."""
+    errors = []
+    for n in (15, 30, 60):
+        mesh = plane(n, amount)
+        line = curve_on(mesh, [[0.37, 0, 0], [0.37, 1, 0]])
+        distance = HeatMethodSolver(mesh, refine=refine).distance(line)
+        errors.append(np.abs(distance - np.abs(mesh.V[:, 0] - 0.37)).mean())
+    if refine == "unfold":
+        assert max(errors) < 1e-4
+    elif refine == "sweep":
+        # From a front that is straight, planar unfolding takes a point for the source: an error of the order of h.
+        assert errors[0] < 0.025
+        assert np.log2(errors[0] / errors[2]) > 1
+    else:
+        # On faces that repeat, the direction of the heat is right; on others it scatters, by as much on small ones.
+        assert errors[0] < 0.003
+        assert amount or np.log2(errors[0] / errors[2]) > 1.5
+
+
+def test_a_circle_around_the_sphere(refine):
+    """Distance from a circle of latitude is the difference of latitudes."""
+    errors = []
+    for subdivisions in (2, 3, 4):
+        mesh = shapes.icosphere(subdivisions)
+        angle = np.linspace(0, 2 * np.pi, 300, endpoint=False)
+        circle = np.stack([0.8 * np.cos(angle), 0.8 * np.sin(angle), np.full(300, 0.6)], axis=1)
+        distance = HeatMethodSolver(mesh, refine=refine).distance(curve_on(mesh, circle, closed=True))
+        truth = np.abs(np.arcsin(np.clip(mesh.V[:, 2], -1, 1)) - np.arcsin(0.6))
+        errors.append(np.abs(distance - truth).mean())
+    assert errors[2] < {None: 0.02, "sweep": 0.04, "unfold": 4e-3}[refine]
+    assert np.log2(errors[0] / errors[2]) > (0.9 if refine != "unfold" else 3)
+
+
+def test_a_ring_and_a_generator_of_the_cylinder(refine):
+    for along in (True, False):
+        errors = []
+        for around in (24, 48, 96):
+            mesh = shapes.cylinder(around, around)
+            angle = np.arctan2(mesh.V[:, 1], mesh.V[:, 0])
+            low, high = mesh.V[:, 2].min(), mesh.V[:, 2].max()
+            if along:
+                step = 2.5 * 2 * np.pi / around
+                across = mesh.V[np.abs((angle - step + np.pi) % (2 * np.pi) - np.pi) < 0.6 * 2 * np.pi / around]
+                middle = across[:, :2][across[:, 2] == low].mean(axis=0)
+                curve = curve_on(mesh, [[*middle, low], [*middle, high]])
+                truth = np.abs((angle - step + np.pi) % (2 * np.pi) - np.pi)
+            else:
+                height = 0.43 * low + 0.57 * high
+                ring = mesh.V[mesh.V[:, 2] == low] * [1, 1, 0] + [0, 0, height]
+                curve = curve_on(mesh, ring[np.argsort(np.arctan2(ring[:, 1], ring[:, 0]))], closed=True)
+                truth = np.abs(mesh.V[:, 2] - height)
+            distance = HeatMethodSolver(mesh, refine=refine).distance(curve)
+            errors.append(np.abs(distance - truth).mean())
+        assert errors[2] < {None: 0.03, "sweep": 0.03, "unfold": 0.003}[refine]
+        assert max(errors) < 1e-12 or np.log2(errors[0] / errors[2]) > 0.9
+
+
+def test_edges_as_sources_are_nearer_than_their_ends():
+    mesh = plane(16)
+    path = [nearest_vertex(mesh, [x, 0.5, 0]) for x in np.linspace(0, 1, 17)]
+    curve = edge_curve(mesh, path)
+    solver = HeatMethodSolver(mesh)
+    distance = solver.distance(curve)
+    assert (distance[path] == 0).all()
+    a, b = mesh.V[path[:-1]], mesh.V[path[1:]]
+    share = np.clip(np.einsum("nsx,sx->ns", mesh.V[:, None] - a, b - a) / ((b - a) ** 2).sum(axis=1), 0, 1)
+    truth = np.linalg.norm(mesh.V[:, None] - a - share[:, :, None] * (b - a), axis=2).min(axis=1)
+    ring = (truth > 0) & (truth < 3 / 16)
+    np.testing.assert_allclose(distance[ring], truth[ring], rtol=1e-9)
+    to_ends = np.linalg.norm(mesh.V[:, None] - mesh.V[path], axis=2).min(axis=1)
+    assert (distance < to_ends)[ring].mean() > 0.5
+
+
+def test_offsets_move_the_border_of_two_cells(refine):
+    """The exact additively weighted Voronoi edge of the plane, a hyperbola, within one edge length."""
+    for mesh in (shapes.grid(40), plane(40)):
+        solver = HeatMethodSolver(mesh, refine=refine)
+        sources = [nearest_vertex(mesh, [0.25, 0.4, 0]), nearest_vertex(mesh, [0.75, 0.6, 0])]
+        each = np.linalg.norm(mesh.V[:, None] - mesh.V[sources], axis=2) + np.array([0, 0.2])
+        found = solver.voronoi(OffsetSources(sources, [0, 0.2]))
+        # The border is where both are equal; a step towards it changes the difference by at most twice the step.
+        wrong = found.labels != each.argmin(axis=1)
+        assert (np.abs(each[:, 0] - each[:, 1])[wrong] < 2 * mesh.edge_lengths.mean()).all()
+        assert (found.distance[sources] == [0, 0.2]).all()
+        assert relative_error(found.distance, each.min(axis=1)) < (0.03 if refine is None else 2e-3)
+
+
+def test_a_source_that_is_overtaken_is_none(refine):
+    mesh = plane(30)
+    first, late = nearest_vertex(mesh, [0.2, 0.5, 0]), nearest_vertex(mesh, [0.6, 0.5, 0])
+    solver = HeatMethodSolver(mesh, refine=refine)
+    found = solver.voronoi(OffsetSources([first, late], [0, 1]))
+    np.testing.assert_allclose(found.distance, solver.distance(first), rtol=0, atol=1e-9)
+    assert (found.labels == 0).all()
+
+
+def test_a_vertex_beside_a_point(refine):
+    """Straight lines from the point end where the vertex is nearer."""
+    mesh = plane(20)
+    vertex = nearest_vertex(mesh, [0.6, 0.5, 0])
+    at = mesh.V[vertex] - [0.17, 0.03, 0]
+    distance = HeatMethodSolver(mesh, refine=refine).distance([closest_points(mesh, at).points, vertex])
+    truth = np.minimum(np.linalg.norm(mesh.V - at, axis=1), np.linalg.norm(mesh.V - mesh.V[vertex], axis=1))
+    near = truth < 0.25
+    # A sweep mixes the distances from both in triangles on the border.
+    np.testing.assert_allclose(distance[near], truth[near], rtol=0.06 if refine == "sweep" else 1e-9)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.5])
+def test_every_vertex_of_a_side_with_an_offset(refine, slope):
+    """Sources next to one another, each a little later than the one before, do not overtake one another."""
+    mesh = shapes.grid(30)
+    side = np.flatnonzero(mesh.V[:, 0] == 0)
+    offsets = slope * mesh.V[side, 1] + 0.05 * (mesh.V[side, 1] == 1)
+    distance = HeatMethodSolver(mesh, refine=refine).distance(OffsetSources(side, offsets))
+    truth = (np.linalg.norm(mesh.V[:, None] - mesh.V[side], axis=2) + offsets).min(axis=1)
+    assert (distance[side] == offsets).mean() > 0.9
+    # Each triangle of a sweep knows one source, and here every vertex of the front has another.
+    assert relative_error(distance, truth) < (0.1 if refine == "sweep" else 0.03)
+
+
+@pytest.mark.parametrize("offset", [0.3, 1e6])
+def test_an_offset_for_all_is_added(refine, offset):
+    mesh = plane(12)
+    solver = HeatMethodSolver(mesh, refine=refine)
+    for sources in ([3, 90], closest_points(mesh, [[0.3, 0.4, 0], [0.8, 0.9, 0]]).points):
+        expected = solver.distance(sources) + offset
+        np.testing.assert_allclose(solver.distance(OffsetSources(sources, offset)), expected, rtol=1e-9)
+
+
+def test_offsets_on_components_that_are_apart(refine):
+    """However late a source, on its own component it is the first."""
+    sphere = perturbed(shapes.icosphere(2))
+    n = sphere.n_vertices
+    mesh = Mesh(
+        np.concatenate([sphere.V, sphere.V + 5, sphere.V + 9]), np.concatenate([sphere.F + k * n for k in (0, 1, 2)])
+    )
+    solver = HeatMethodSolver(mesh, refine=refine)
+    found = solver.voronoi(OffsetSources([7, n + 7], [0, 1e5]))
+    one = solver.distance(7)[:n]
+    np.testing.assert_allclose(found.distance[:n], one, rtol=1e-9)
+    np.testing.assert_allclose(found.distance[n : 2 * n], one + 1e5, rtol=1e-9)
+    assert (found.distance[2 * n :] == np.inf).all()
+    assert found.labels.tolist() == n * [0] + n * [1] + n * [-1]
+
+
+def test_cells_of_many_sources(refine):
+    """Labels are positions in the sequence, and right but for vertices near a border."""
+    mesh = plane(50)
+    sources = np.random.default_rng(0).choice(mesh.n_vertices, 40, replace=False)
+    found = HeatMethodSolver(mesh, refine=refine).voronoi(sources)
+    each = np.linalg.norm(mesh.V[:, None] - mesh.V[sources], axis=2)
+    assert (found.labels[sources] == np.arange(40)).all()
+    excess = each[np.arange(len(each)), found.labels] - each.min(axis=1)
+    # A vertex that is less than an edge from a border is by less than two edges nearer to the source across.
+    assert excess.max() < 2 * mesh.edge_lengths.mean()
+    assert (excess > 1e-12).mean() < {None: 0.05, "sweep": 0.05, "unfold": 0.005}[refine]
+
+
+def test_labels_of_several_kinds(refine):
+    mesh = plane(30)
+    line = curve_on(mesh, [[0.9, 0, 0], [0.9, 1, 0]])
+    points = closest_points(mesh, [[0.1, 0.2, 0], [0.4, 0.8, 0]]).points
+    mask = np.zeros(mesh.n_vertices, bool)
+    mask[nearest_vertex(mesh, [0.5, 0.2, 0])] = True
+    found = HeatMethodSolver(mesh, refine=refine).voronoi([line, points, mask], cutoff=0.25)
+    distances = [np.abs(mesh.V[:, 0] - 0.9)]
+    distances += [np.linalg.norm(mesh.V - [*at, 0], axis=1) for at in ((0.1, 0.2), (0.4, 0.8))]
+    distances += [np.linalg.norm(mesh.V - mesh.V[mask], axis=1)]
+    each = np.stack(distances, axis=1)
+    clear = np.sort(each, axis=1)[:, 1] - each.min(axis=1) > 0.1
+    assert (
+        found.labels[clear & (each.min(axis=1) < 0.22)] == each.argmin(axis=1)[clear & (each.min(axis=1) < 0.22)]
+    ).all()
+    assert (found.labels[each.min(axis=1) > 0.28] == -1).all()
+    assert (np.isinf(found.distance) == (found.labels == -1)).all()
+
+
+def test_cutoff(refine):
+    mesh = plane(12)
+    solver = HeatMethodSolver(mesh, refine=refine)
+    whole = solver.distance(5)
+    expected = np.where(whole > 0.4, np.inf, whole)
+    assert (solver.distance(5, cutoff=0.4) == expected).all()
+    np.testing.assert_allclose(solver.distances([5, [5]], cutoff=0.4), [expected, expected], rtol=1e-12)
+    for cutoff in (0, -1.0, np.nan, "far"):
+        with pytest.raises(ValueError, match=f"cutoff must be a positive number, not {cutoff!r}"):
+            solver.distance(5, cutoff=cutoff)
+
+
+def test_batches_of_all_kinds(refine):
+    mesh = plane(16)
+    solver = HeatMethodSolver(mesh, refine=refine)
+    line = curve_on(mesh, [[0.3, 0.1, 0], [0.8, 0.7, 0]])
+    point = SurfacePoints([77], [[0.2, 0.3, 0.5]])
+    sets = [5, point, [line, 3], OffsetSources([point, line], [0.1, 0.0]), [1, 2]]
+    for row, sources in zip(solver.distances(sets), sets, strict=True):
+        np.testing.assert_allclose(row, solver.distance(sources), rtol=0, atol=1e-12)
+    copy = pickle.loads(pickle.dumps(solver))
+    assert (copy.distance(sets[3]) == solver.distance(sets[3])).all()
+    with pytest.raises(SourceError, match=r"source_sets\[1\]: faces\[0\] = 999 is no face"):
+        solver.distances([5, SurfacePoints([999], [[0.2, 0.3, 0.5]])])
+
+
+def test_solution_of_a_point_holds_the_three_steps():
+    mesh = plane(16)
+    solver = HeatMethodSolver(mesh)
+    point = SurfacePoints([77], [[0.2, 0.3, 0.5]])
+    solution = solver.solve(point)
+    domain = solver.operators
+    initial = domain.M @ solution.heat - solution.t * (domain.L @ solution.heat)
+    # A Dirac: heat of one, with its centre at the point.
+    assert initial.sum() == pytest.approx(1)
+    np.testing.assert_allclose(initial @ mesh.V, point.positions(mesh)[0], atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(solution.direction, axis=1), 1, rtol=1e-12)
+
+
+def test_the_dirac_of_a_curve_is_its_length():
+    """The integral of hat functions along it: as much heat as length, with the curve's centre of mass."""
+    sheared = plane(16).V @ np.array([[1, 0, 0], [1.7, 1, 0], [0, 0, 1]])
+    mesh = Mesh(sheared, shapes.grid(16).F)
+    curve = curve_on(mesh, [[0.6, 0.2, 0], [1.0, 0.25, 0], [1.9, 0.8, 0]])
+    solver = HeatMethodSolver(mesh)
+    assert solver.diagnostics.n_flips > 100
+    heat = solver.solve(curve).heat
+    initial = solver.operators.M @ heat - solver.t * (solver.operators.L @ heat)
+    lengths, corners = curve.lengths(mesh), curve.positions(mesh)
+    centre = lengths @ (corners[1:] + corners[:-1]) / 2 / lengths.sum()
+    assert initial.sum() == pytest.approx(lengths.sum() / (4 * solver.diagnostics.mean_edge_length), rel=1e-9)
+    np.testing.assert_allclose(initial @ mesh.V / initial.sum(), centre, atol=1e-9)
+
+
+def test_points_on_faces_that_are_there_twice(refine):
+    mesh = plane(10)
+    twice = Mesh(mesh.V, np.concatenate([mesh.F, mesh.F[[50, 60]][:, [1, 0, 2]]]))
+    solver = HeatMethodSolver(twice, refine=refine)
+    copy = SurfacePoints([len(mesh.F) + 1], [[0.2, 0.5, 0.3]])
+    original = SurfacePoints([60], [[0.5, 0.2, 0.3]])
+    expected = HeatMethodSolver(mesh, refine=refine).distance(original)
+    np.testing.assert_allclose(solver.distance(copy)[mesh.F[60]], expected[mesh.F[60]], rtol=1e-12)
+    np.testing.assert_allclose(solver.distance(copy), expected, rtol=1e-9)
+
+
+def test_points_on_pages_of_a_book(refine):
+    """Five faces at an edge: the corners of the point's face are straight, other pages are reached over the spine."""
+    mesh = shapes.book(5, 8)
+    solver = HeatMethodSolver(mesh, refine=refine)
+    face = 20
+    point = SurfacePoints([face], [[0.2, 0.5, 0.3]])
+    distance = solver.distance(point)
+    straight = np.linalg.norm(mesh.V[mesh.F[face]] - point.positions(mesh), axis=1)
+    np.testing.assert_allclose(distance[mesh.F[face]], straight, rtol=1e-9)
+    near = edge_paths(mesh, mesh.F[face]) + straight.max()
+    assert (distance < 1.02 * near).all()
+
+
+@pytest.mark.parametrize("name", ["cow", pytest.param("bunny", marks=pytest.mark.slow)])
+def test_edge_lengths_alone(name, refine, request):
+    mesh = request.getfixturevalue(name)
+    solver = HeatMethodSolver(mesh, refine=refine)
+    by_lengths = HeatMethodSolver.from_edge_lengths(mesh.F, igl.edge_lengths(mesh.V, mesh.F), refine=refine)
+    assert by_lengths.t == pytest.approx(solver.t, rel=1e-12)
+    for sources in (5, [5, 90], SurfacePoints([300], [[0.2, 0.3, 0.5]]), edge_curve(mesh, mesh.edges[700])):
+        np.testing.assert_allclose(by_lengths.distance(sources), solver.distance(sources), rtol=1e-9, atol=1e-9)
+
+
+def test_edge_lengths_of_no_embedding(refine):
+    """The flat torus fits into no space of three dimensions."""
+    torus = shapes.flat_torus(24)
+    solver = HeatMethodSolver.from_edge_lengths(torus.F, torus.l, refine=refine)
+    row, column = np.divmod(np.arange(24 * 24), 24)
+    truth = np.hypot(*(np.minimum(k, 24 - k) / 24 for k in (row, column)))
+    assert relative_error(solver.distance(0), truth) < (0.03 if refine is None else 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("F", "lengths", "options", "message"),
+    [
+        ([[0, 1, 2]], [[1, 1, -1]], {}, r"l\[0, 2\] = -1.0 is not a length"),
+        ([[0, 1, 2]], [[1, 1, np.nan]], {}, r"l\[0, 2\] = nan is not a length"),
+        ([[0, 1, 2]], [[1, 1]], {}, "one length per side of F"),
+        ([[0, 1, 2], [2, 1, 3]], [[1, 1, 1], [1, 1, 2]], {}, "two lengths"),
+        ([[0, 1, 2]], [[1, 1, 1]], {"n": 2}, r"F\[0, 2\] = 2 is no vertex"),
+        ([[0, 1, -2]], [[1, 1, 1]], {}, r"F\[0, 2\] = -2 is no vertex"),
+        ([[0, 1, 2, 3]], [[1] * 6], {}, "triangles, but it has shape"),
+        ([[0, 1, 1]], [[1, 1, 1]], {}, "repeats a vertex"),
+    ],
+)
+def test_refused_edge_lengths(F, lengths, options, message):
+    with pytest.raises(MeshError, match=message):
+        HeatMethodSolver.from_edge_lengths(F, lengths, **options)
+    with pytest.raises(ValueError, match="laplacian must be"):
+        HeatMethodSolver.from_edge_lengths([[0, 1, 2]], [[1, 1, 1]], laplacian="graph")
+
+
+def test_tetrahedra_take_vertices_with_offsets():
+    mesh = shapes.box(6)
+    solver = HeatMethodSolver(mesh)
+    corner, opposite = 0, mesh.n_vertices - 1
+    each = np.linalg.norm(mesh.V[:, None] - mesh.V[[corner, opposite]], axis=2) + np.array([0, 0.5])
+    found = solver.voronoi(OffsetSources([corner, opposite], [0, 0.5]))
+    assert np.abs(found.distance - each.min(axis=1)).mean() < 0.06 * each.min(axis=1).max()
+    wrong = found.labels != each.argmin(axis=1)
+    assert (np.abs(each[:, 0] - each[:, 1])[wrong] < 2 * mesh.edge_lengths.mean()).all()
+    with pytest.raises(SourceError, match="points and curves lie on triangles, and this domain has none"):
+        solver.distance(SurfacePoints([0], [[0.2, 0.3, 0.5]]))
+
+
+def test_depth_in_a_ball():
+    """The surface of a ball as source: distance is the depth below it."""
+    errors = []
+    for n in (5, 10, 20):
+        cube = shapes.box(n)
+        V = 2 * cube.V - 1
+        largest, norm = np.abs(V).max(axis=1), np.linalg.norm(V, axis=1)
+        ball = Mesh(V * (largest / np.maximum(norm, 1e-300))[:, None], cube.F)
+        distance = HeatMethodSolver(ball).distance(ball.boundary)
+        errors.append(np.abs(distance - (1 - np.linalg.norm(ball.V, axis=1))).mean())
+    assert errors[2] < 0.02
+    assert np.log2(errors[0] / errors[2]) > 1
