@@ -72,10 +72,13 @@ class Emitter:
         The domain.
     heat_flow : HeatFlow
         Step 1 on it.
+    plain : bool
+        Around source vertices take every distance from heat, as the paper does, and none from edges.
     """
 
-    def __init__(self, domain: Operators, heat_flow: HeatFlow) -> None:
+    def __init__(self, domain: Operators, heat_flow: HeatFlow, plain: bool = False) -> None:
         self._domain = domain
+        self._plain = plain
         self._heat_flow = heat_flow
         self._on_solved = None if domain.triangulation is None else NearField(domain.triangulation)
         self._on_faces = None if domain.faces is None else NearField(domain.faces)
@@ -177,6 +180,9 @@ class Emitter:
         start = lowest[components]
         distance = np.maximum(phi - shift[components], start)
         take_shorter(distance, emission.far, _HEAT_ERROR, start)
+        if self._plain and emission.sources.on_vertices_alone:
+            distance[emission.near.vertex] = emission.near.value
+            return distance
         return self._continued(emission.near, distance)
 
     def labels(self, emission: Emission) -> IntArray:
@@ -215,8 +221,10 @@ class Emitter:
         return rim
 
     def _near_vertices(self, sources: SourceSet, rim: BoolArray) -> Seeds:
-        """Source vertices, and those at the rim with their neighbours at the lengths of edges."""
+        """Source vertices, and with those at the rim their neighbours at the lengths of edges."""
         itself = Seeds(sources.vertices, sources.vertex_offset, sources.vertex_label)
+        if self._plain:
+            return itself
         vertices, offset, label = sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim]
         found = [itself]
         for field in self._fields:

@@ -73,7 +73,7 @@ class HeatMethodSolver:
         What the heat does at the boundary, see `HeatFlow`.
     magnitude : {"auto", "unit", "damped"}
         Length of the field X that is integrated: 1 as in the paper, or less where heat arrives from several sides, see
-        `damping`. "auto" damps on surfaces, where it was measured to pay, but not for "cotan", where heat may be
+        `damping`; with "unit" the ring of vertices around a source is left to heat too. "auto" damps on surfaces, where it was measured to pay, but not for "cotan", where heat may be
         negative and the paper's method is wanted.
     refine : {"sweep", "unfold"}, optional
         Integrate nothing, and find the distance in the order of the heat by unfolding triangles, one at a time or in
@@ -271,7 +271,7 @@ class HeatMethodSolver:
         self._heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
         self._poisson: PoissonProblem | None = poisson[0] if poisson else None
         factored = time.perf_counter()
-        self._emitter = Emitter(domain, self._heat_flow)
+        self._emitter = Emitter(domain, self._heat_flow, plain=not self._damped)
         self._given_faces = domain.given_faces
         self._heat_order = None if refine is None else HeatOrder(domain, refine)
         if refine is None:
