@@ -397,7 +397,7 @@ def batch(
     meshes = cluster.folder(folder)
     plan = sources if sources == "all" or sources.startswith("farthest:") else cluster.read_source_sets(sources)
     options: dict[str, Any] = {"refine": refine, "dtype": dtype, "progress": Console(stderr=True).is_terminal}
-    with _logged(log), cluster.connected(scheduler, workers, dashboard) as client:
+    with cluster.connected(scheduler, workers, dashboard) as client, _logged(log):
         if dashboard:
             _say(f"dashboard: {client.dashboard_link}")
         report = cluster.distances(meshes, plan, store, client=client, **options)

@@ -182,7 +182,7 @@ class Emitter:
         take_shorter(distance, emission.far, _HEAT_ERROR, start)
         if self._plain and emission.sources.on_vertices_alone:
             distance[emission.near.vertex] = emission.near.value
-            return distance
+            return np.asarray(distance)
         return self._continued(emission.near, distance)
 
     def labels(self, emission: Emission) -> IntArray:

@@ -67,9 +67,9 @@ def test_threshold_catches_broken_heat_steps(mesh: Mesh, percent: float) -> None
 
 
 def test_threshold_catches_a_field_that_points_to_the_source(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, right = shapes.grid(20), heat_method.normalize
+    mesh, right = shapes.grid(20), heat_method.descent
     assert not validate(mesh, 0, ["heat"]).exceeding(3.5)
-    monkeypatch.setattr(heat_method, "normalize", lambda domain, u: -right(domain, u))
+    monkeypatch.setattr(heat_method, "descent", lambda domain, u, t: -right(domain, u, t))
     assert validate(mesh, 0, ["heat"]).exceeding(3.5)
 
 
