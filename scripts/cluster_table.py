@@ -24,6 +24,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import igl
 import numpy as np
 
 from heat_igl import HeatMethodSolver, Mesh, cluster, read_mesh, shapes, write_mesh
@@ -32,7 +33,7 @@ from heat_igl.cluster.memory import PROCESS_MEMORY, solver_memory
 from environment import environment
 
 SOURCES = 64
-MEMORY_SIZES = (4, 5, 6, 7)  # subdivisions of the icosphere
+MEMORY_SIZES = (3, 5, 6, 7)  # subdivisions of the icosphere
 
 
 def collect(folder: Path, count: int, real: Path | None) -> int:
@@ -114,15 +115,32 @@ def _peak() -> int:
     return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmHWM"))) * 1024
 
 
-def memory(subdivisions: int, refine: Any) -> dict[str, Any]:
+def memory(name: str, mesh: Mesh, refine: Any) -> dict[str, Any]:
     """Peak memory of a worker that does one mesh, beside the bound that the batch states for it."""
-    mesh = shapes.icosphere(subdivisions)
     with tempfile.TemporaryDirectory() as scratch, cluster.connected(n_workers=1) as client:
         sources = list(range(2 * SOURCES))
-        cluster.distances({"ball": mesh}, sources, Path(scratch) / "store", client=client, refine=refine)
+        cluster.distances({name: mesh}, sources, Path(scratch) / "store", client=client, refine=refine)
         (peak,) = client.run(_peak).values()
-    stated = PROCESS_MEMORY + solver_memory(mesh.n_vertices, mesh.n_faces)
-    return {"vertices": mesh.n_vertices, "refine": refine, "peak": peak, "stated": stated, "ratio": peak / stated}
+    stated = PROCESS_MEMORY + solver_memory(mesh)
+    return {
+        "mesh": name,
+        "vertices": mesh.n_vertices,
+        "refine": refine,
+        "peak": peak,
+        "stated": stated,
+        "ratio": peak / stated,
+    }
+
+
+def memory_meshes(real: Path | None) -> list[tuple[str, Mesh]]:
+    """Spheres, and the largest of the real meshes with each triangle cut into four."""
+    meshes = [(f"sphere {size}", shapes.icosphere(size)) for size in MEMORY_SIZES]
+    if real is not None:
+        paths = [path for path in sorted(real.iterdir()) if path.suffix in (".off", ".obj", ".ply")]
+        largest = max(paths, key=lambda path: read_mesh(path).n_vertices)
+        mesh = read_mesh(largest)
+        meshes.append((largest.stem, Mesh(*igl.upsample(mesh.V, mesh.F))))
+    return meshes
 
 
 def rates(count: int, real: Path | None, repeats: int) -> dict[str, Any]:
@@ -159,11 +177,11 @@ def markdown(result: dict[str, Any]) -> str:
         f"Two workers are {rate['rate_of_two']:.2f} times as fast as one. One worker takes "
         f"{100 * rate['overhead']:+.1f} % more time than the loop. Same bits: {'yes' if rate['same_bits'] else 'NO'}.",
         "",
-        "| vertices | refine | peak memory, MiB | stated, MiB | ratio |",
-        "|--:|---|--:|--:|--:|",
+        "| mesh | vertices | refine | peak memory, MiB | stated, MiB | ratio |",
+        "|---|--:|---|--:|--:|--:|",
         *(
-            f"| {row['vertices']} | {row['refine'] or ''} | {row['peak'] / 2**20:.0f} | {row['stated'] / 2**20:.0f} "
-            f"| {row['ratio']:.2f} |"
+            f"| {row['mesh']} | {row['vertices']} | {row['refine'] or ''} | {row['peak'] / 2**20:.0f} "
+            f"| {row['stated'] / 2**20:.0f} | {row['ratio']:.2f} |"
             for row in result["memory"]
         ),
     ]
@@ -187,7 +205,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     result = {
         "environment": environment(),
         "rates": rates(arguments.meshes, arguments.add, arguments.repeats),
-        "memory": [memory(size, refine) for refine in (None, "sweep") for size in MEMORY_SIZES],
+        "memory": [memory(*each, refine) for each in memory_meshes(arguments.add) for refine in (None, "sweep")],
     }
     (arguments.out / "cluster_table.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf8")
     text = markdown(result)

@@ -212,7 +212,7 @@ class _Shelf:
     @contextmanager
     def solver(self, mesh: Mesh, task: Task) -> Iterator[HeatMethodSolver]:
         key = f"{_fingerprint(mesh)} {task.solver_options}"
-        place = self._take(key, solver_memory(mesh.n_vertices, mesh.n_faces), _memory_for_solvers())
+        place = self._take(key, solver_memory(mesh), _memory_for_solvers())
         try:
             with place.lock:
                 if place.solver is None:
