@@ -409,7 +409,8 @@ def batch(
 @contextmanager
 def _logged(path: Path | None) -> Iterator[None]:
     """Write what the batch logs to a file; what Dask logs about lost connections is told in one line at the end."""
-    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
+    for name in ("distributed", "distributed.client", "tornado.application", "asyncio"):  # each has a level of its own
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     if path is None:
         yield
         return

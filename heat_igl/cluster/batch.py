@@ -27,6 +27,16 @@ _LOG = logging.getLogger("heat_igl.cluster")
 
 _LOST = "the cluster is lost; what is finished stays in the store: run the same again to go on"
 
+# A task carries a whole mesh. And Dask would have malloc give every large array back to the system at once, which makes
+# a solver half as slow again.
+_SETTINGS = {
+    "distributed.admin.large-graph-warning-threshold": "16GiB",
+    "distributed.nanny.pre-spawn-environ": {
+        "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
+        **{f"{name}_NUM_THREADS": "1" for name in ("HEAT_IGL", "OMP", "MKL", "OPENBLAS", "NUMBA")},
+    },
+}
+
 # Seconds to wait for a scheduler's answer.
 _PATIENCE = 10
 
@@ -276,13 +286,12 @@ def connected(scheduler: str | None = None, n_workers: int | None = None, dashbo
             yield client
         return
     with (
-        dask.config.set({"distributed.admin.large-graph-warning-threshold": "16GiB"}),
+        dask.config.set(_SETTINGS),
         distributed.LocalCluster(
             n_workers=n_workers or n_threads(),
             threads_per_worker=1,
             dashboard_address=":0" if dashboard else None,
             silence_logs=logging.CRITICAL,
-            env={"HEAT_IGL_NUM_THREADS": "1"},
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
