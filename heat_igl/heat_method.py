@@ -519,7 +519,7 @@ class HeatMethodSolver:
         emissions = [self._emitter.emission(sources) for sources in source_sets]
         if self._heat_order is None:
             emissions = [self._emitter.on_time(emission) for emission in emissions]
-        return emissions, self._heat_flow.solve(np.stack([self._emitter.heat(one) for one in emissions], axis=1))
+        return emissions, self._heat_flow.solve(self._emitter.heat(emissions))
 
     def _field(self, emissions: list[Emission], u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Directions (d m, k) and their magnitude (m, k)."""
@@ -541,11 +541,11 @@ class HeatMethodSolver:
         else:
             divergence = self._descent.divergence(u)
         phi = self._poisson.solve(divergence)
-        distances = np.empty(phi.T.shape)
-        for column, emission in enumerate(emissions):
-            self._warn_if_cold(u[:, column], emission)
-            distances[column] = self._emitter.settle(emission, phi[:, column], u[:, column])
-        return distances
+        if u.min() < _LOWEST_HEAT:
+            for emission, its_u in zip(emissions, u.T, strict=True):
+                self._warn_if_cold(its_u, emission)
+        rows = zip(emissions, np.ascontiguousarray(phi.T), u.T, strict=True)
+        return np.stack([self._emitter.settle(emission, its_phi, its_u) for emission, its_phi, its_u in rows])
 
     def _warn_if_cold(self, u: FloatArray, emission: Emission) -> None:
         """Heat that has underflowed has no gradient, and distance does not grow where X is 0: say so."""

@@ -27,7 +27,7 @@ from heat_igl.intrinsic import (
 )
 from heat_igl.mesh import Mesh, checked_faces
 from heat_igl.tufted import has_nonmanifold_edges, tufted_cover
-from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["Laplacian", "Operators", "cotan_operators", "intrinsic_operators", "operators", "tufted_operators"]
 
@@ -116,6 +116,15 @@ class Operators:
     def dimension(self) -> int:
         """Number d of gradient components per face."""
         return int(self.G.shape[0]) // len(self.weights)
+
+    @cached_property
+    def n_components(self) -> int:
+        """Number of components, vertices without faces among them."""
+        return int(self.components.max()) + 1
+
+    def on_vertices(self, of_component: AnyArray) -> AnyArray:
+        """What each vertex (n,) has by its component."""
+        return np.broadcast_to(of_component, self.n) if self.n_components == 1 else of_component[self.components]
 
     @cached_property
     def G(self) -> sp.csc_matrix:
