@@ -75,11 +75,13 @@ class Emitter:
         Step 1 on it.
     plain : bool
         Around source vertices take every distance from heat, as the paper does, and none from edges.
+    unfolds : bool
+        Distance will come by unfolding, which finds what is around source vertices by itself.
     """
 
-    def __init__(self, domain: Operators, heat_flow: HeatFlow, plain: bool = False) -> None:
+    def __init__(self, domain: Operators, heat_flow: HeatFlow, plain: bool = False, unfolds: bool = False) -> None:
         self._domain = domain
-        self._plain = plain
+        self._plain, self._unfolds = plain, unfolds
         self._heat_flow = heat_flow
         self._mass = domain.M.diagonal() / heat_flow.mean_mass
         self._on_solved = None if domain.triangulation is None else NearField(domain.triangulation)
@@ -230,7 +232,7 @@ class Emitter:
     def _near_vertices(self, sources: SourceSet, rim: BoolArray) -> Seeds:
         """Source vertices, and with those at the rim their neighbours at the lengths of edges."""
         itself = Seeds(sources.vertices, sources.vertex_offset, sources.vertex_label)
-        if self._plain:
+        if self._plain or (self._unfolds and sources.on_vertices_alone):
             return itself
         vertices, offset, label = sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim]
         found = [itself]

@@ -272,7 +272,7 @@ class HeatMethodSolver:
         self._heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
         self._poisson: PoissonProblem | None = poisson[0] if poisson else None
         factored = time.perf_counter()
-        self._emitter = Emitter(domain, self._heat_flow, plain=not self._damped)
+        self._emitter = Emitter(domain, self._heat_flow, plain=not self._damped, unfolds=refine is not None)
         self._given_faces = domain.given_faces
         self._heat_order = None if refine is None else HeatOrder(domain, refine)
         self._descent = Descent(domain, step if self._damped else None) if refine is None else None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 from typing import Literal
 
 import igl
@@ -184,7 +184,7 @@ def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operat
         triangulation = intrinsic_delaunay(faces)
     if triangulation.n_flips or triangulation.lengthening:
         # Paths along the mesh's own edges are paths on the surface too, and already known.
-        return replace(intrinsic_operators(triangulation, mesh.longest_distance), faces=faces)
+        return replace(intrinsic_operators(triangulation, mesh.longest_distance, mesh.components), faces=faces)
     return replace(cotan_operators(mesh), triangulation=triangulation, faces=faces)
 
 
@@ -214,7 +214,7 @@ def cotan_operators(mesh: Mesh) -> Operators:
         M=_padded(igl.massmatrix(V, mesh.F), mesh.n_vertices) * unit**simplex_dimension,
         gradient=partial(_gradient_in_space, V, mesh.F, unit),
         weights=mesh.measures,
-        face_sizes=igl.edge_lengths(mesh.V, mesh.F).max(axis=1),
+        face_sizes=_largest(igl.edge_lengths(mesh.V, mesh.F)),
         mean_edge_length=h,
         components=mesh.components,
         boundary=mesh.boundary,
@@ -258,7 +258,7 @@ def intrinsic_operators(
         M=_padded(igl.massmatrix_intrinsic(lengths, F), n),
         gradient=partial(intrinsic_gradient, triangulation),
         weights=triangulation.areas,
-        face_sizes=lengths.max(axis=1),
+        face_sizes=_largest(lengths),
         mean_edge_length=triangulation.mean_edge_length,
         components=components,
         boundary=triangulation.boundary,
@@ -316,7 +316,7 @@ def tufted_operators(mesh: Mesh, history: tuple[Merged, ...] = ()) -> Operators:
     """
     cover = replace(tufted_cover(mesh), history=history)
     surface = replace(intrinsic_triangulation(mesh), history=history)
-    domain = intrinsic_operators(intrinsic_delaunay(cover), mesh.longest_distance)
+    domain = intrinsic_operators(intrinsic_delaunay(cover), mesh.longest_distance, mesh.components)
     return replace(
         domain,
         L=domain.L / 2,
@@ -340,6 +340,11 @@ def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Merged, ...]]:
     corner = np.empty_like(mesh.F)
     np.put_along_axis(corner, ascending, ascending[copied], axis=1)
     return Mesh(mesh.V, mesh.F[kept]), (Merged(np.searchsorted(kept, copied), corner),)
+
+
+def _largest(rows: FloatArray) -> FloatArray:
+    """Maximum of each row; by columns, which for short rows takes a tenth of the time."""
+    return np.asarray(reduce(np.maximum, rows.T))
 
 
 def _padded(matrix: sp.csc_matrix, n: int) -> sp.csc_matrix:
