@@ -394,7 +394,9 @@ def _walk(
                 wait_for = w
                 break
             squared = wx * wx + wy * wy
-            length, reach = math.sqrt(squared), state[w, REACH]
+            length = math.sqrt(squared)
+            # Of a bend close behind w, pulling tight may leave nothing.
+            reach = max(state[w, REACH], min(length, state[w, DISTANCE]))
             to_right = to_left = -1.0
             if state[w, FAN] == t.step_id[h, FAR_FAN]:
                 back = t.step[h, FAR_ANGLE] + math.atan2(wx * by - wy * bx, squared - (bx * wx + by * wy))
