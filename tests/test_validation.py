@@ -30,13 +30,13 @@ from heat_igl import (
     ReferenceSolverError,
     SourceError,
     closed_forms,
-    heat_method,
     reference,
     shapes,
     validate,
     validation,
 )
 from heat_igl.operators import Operators, operators
+from heat_igl.steps import Descent
 from heat_igl.validation import draw_sources
 from heat_igl.validation_plots import error_figure
 
@@ -68,9 +68,9 @@ def test_threshold_catches_broken_heat_steps(mesh: Mesh, percent: float) -> None
 
 
 def test_threshold_catches_a_field_that_points_to_the_source(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, right = shapes.grid(20), heat_method.descent
+    mesh, right = shapes.grid(20), Descent.divergence
     assert not validate(mesh, 0, ["heat"]).exceeding(3.5)
-    monkeypatch.setattr(heat_method, "descent", lambda domain, u, t: -right(domain, u, t))
+    monkeypatch.setattr(Descent, "divergence", lambda self, u: -right(self, u))
     assert validate(mesh, 0, ["heat"]).exceeding(3.5)
 
 
