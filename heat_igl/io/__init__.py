@@ -207,9 +207,9 @@ def _checked(path: str | os.PathLike[str]) -> Path:
         printable = False
     if not printable:
         raise MeshError(f"{str(path)!r} cannot be a path: it holds characters that no file name may have")
-    if found.is_dir():
-        raise MeshError(f"{found} is a directory: name a mesh file in it")
     if found.suffix.lower() not in _FORMATS:
+        if found.is_dir():
+            raise MeshError(f"{found} is a directory: name a mesh file in it")
         raise MeshError(f"{found}: unknown extension '{found.suffix}'; the formats are {', '.join(_FORMATS)}")
     return found
 
