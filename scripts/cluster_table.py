@@ -27,11 +27,11 @@ from typing import Any
 
 import igl
 import numpy as np
+from benchmark import fill_in
 
 from heat_igl import HeatMethodSolver, Mesh, cluster, read_mesh, shapes, write_mesh
 from heat_igl.cluster.memory import PROCESS_MEMORY, solver_memory
 
-from benchmark import fill_in
 from environment import environment
 
 SOURCES = 64
