@@ -2,11 +2,11 @@
 
     python scripts/refinement_table.py bunny.obj cow.obj --nonmanifold suzanne.obj --json refinement.json
 
-For each mesh: the mean error with slivers inserted relative to that without; that of heat with long edges split; the time per source of 64 sources together
-relative to one alone; the time of `unfolded_distance` relative to potpourri3d's factorization and one query, and the
-number of queries from which the factored solver pays. Then an icosphere against the sphere, and surfaces with edges of
-more than two faces against shortest paths in a graph with extra points on the edges. ``--icosphere 0`` leaves the
-sphere out; at 8 subdivisions (655 362 vertices) it needs a minute and 2 GiB.
+For each mesh: the mean error with slivers inserted relative to that without; that of heat with long edges split; the
+time per source of 64 sources together relative to one alone; the time of `unfolded_distance` relative to potpourri3d's
+factorization and one query, and the number of queries from which the factored solver pays. Then an icosphere against
+the sphere, and surfaces with edges of more than two faces against shortest paths in a graph with extra points on the
+edges. ``--icosphere 0`` leaves the sphere out; at 8 subdivisions (655 362 vertices) it needs a minute and 2 GiB.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def median_seconds(call: Callable[[], object], repeats: int) -> float:
 
 
 def lifted(mesh: Mesh, n: int, seed: int) -> Mesh:
-    """Vertices from the n-th on moved by a third of a sliver: needles that are not flat, so that the surface changes."""
+    """Vertices from the n-th on moved by a third of a sliver: needles that are not flat, on another surface."""
     V = mesh.V.copy()
     V[n:] += 0.3e-4 * mesh.edge_lengths.mean() * np.random.default_rng(seed).standard_normal(V[n:].shape)
     return Mesh(V, mesh.F)
