@@ -49,6 +49,8 @@ BATCH = 64
 LATER = 5
 # Above these sizes, minutes and gigabytes go to what is known by then.
 LARGEST = {"potpourri3d": 1_250_000, "libigl heat": 1_250_000, "MeshLab's front": 125_000, "pygeodesic": 50_000}
+# Paired runs up to each number of vertices; one beyond, where a run takes minutes and noise is a small part of it.
+RUNS = {125_000: 5, 400_000: 3}
 QUANTITIES = {
     "precomputation": "precomputation [s]",
     "later": "a later query [s]",
@@ -287,7 +289,7 @@ def measure(
             for child in children:
                 child.close()
     return [
-        {"mesh": name, "n": mesh.n_vertices, "method": method, **medians(found, method), **accurate[method]}
+        {"mesh": name, "n": mesh.n_vertices, "method": method, "runs": runs} | medians(found, method) | accurate[method]
         for method in methods
     ]
 
@@ -470,6 +472,7 @@ def tables(result: dict[str, Any]) -> dict[str, str]:
         [
             (row["mesh"], ""),
             (row["method"], ""),
+            (row["runs"], ""),
             (row["precomputation"] if row["method"] in HEAT else None, ".3f"),
             (row["query"], ".4f"),
             (row.get("later"), ".4f"),
@@ -480,7 +483,7 @@ def tables(result: dict[str, Any]) -> dict[str, str]:
         ]
         for row in rows
     ]
-    head = f"mesh | method | precomputation | first query | later query | each of {BATCH} | peak MB"
+    head = f"mesh | method | runs | precomputation | first query | later query | each of {BATCH} | peak MB"
     found = {"timings": _table(f"{head} | mean error | largest error", timings)}
     ratios = [
         [(row["mesh"], ""), (peer, "")]
@@ -594,7 +597,7 @@ def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--size", type=int, action="append", help="number of vertices; may be repeated")
     parser.add_argument("--mesh", type=Path, action="append", help="real mesh; may be repeated; default: the bunny")
-    parser.add_argument("--runs", type=int, default=5, help="paired runs per mesh")
+    parser.add_argument("--runs", type=int, default=5, help="most paired runs per mesh; large ones get fewer")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(
         "--quick", action="store_true", help="10k and 30k vertices, at most 2 runs, single queries at 10k only"
@@ -611,7 +614,7 @@ def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
 def _measured(arguments: argparse.Namespace) -> dict[str, Any]:
     rng = np.random.default_rng(arguments.seed)
     sizes = arguments.size or (SIZES[:2] if arguments.quick else SIZES)
-    runs = min(arguments.runs, 2) if arguments.quick else arguments.runs
+    most_runs = 2 if arguments.quick else arguments.runs
     methods = [m for m in METHODS if importlib.util.find_spec(NEEDS.get(m, "heat_igl")) is not None]
     paths = arguments.mesh or [path for path in [sample_mesh()] if path is not None]
     result: dict[str, Any] = {"bandwidth": bandwidth(), "import": import_seconds(), "timings": []}
@@ -622,8 +625,8 @@ def _measured(arguments: argparse.Namespace) -> dict[str, Any]:
         exact = exact_distance(name, first, int(sources[0]))
         n = mesh.n_vertices
         chosen = [m for m in methods if n <= LARGEST.get(m, n) and not (arguments.quick and m in SINGLE and n > 15_000)]
-        some_runs = runs if n <= LARGEST["potpourri3d"] else 1
-        result["timings"] += measure(name, mesh, chosen, some_runs, sources, exact)
+        some_runs = next((count for size, count in RUNS.items() if n <= size), 1)
+        result["timings"] += measure(name, mesh, chosen, min(some_runs, most_runs), sources, exact)
     reference.close()
     result["accuracy"] = accuracy([m for m in methods if m in HEAT], arguments.large)
     return result

@@ -65,13 +65,14 @@ guarded
 native
 reference
 metrics
+raster
+scene
+surface_image
+picture
 validation_methods
 validation_plots
 validation_report
 validation
-raster
-scene
-picture
 html_view
 plots
 viewer

@@ -64,7 +64,7 @@ def test_measured_rows_and_their_table(benchmark: ModuleType) -> None:
         "import": {"import heat_igl": 0.5},
     }
     table = benchmark.markdown(result)
-    assert f"| sphere 2000 | heat_igl | {own['precomputation']:.3f} |" in table
+    assert f"| sphere 2000 | heat_igl | 2 | {own['precomputation']:.3f} |" in table
     assert "seed 0" in table
 
 
