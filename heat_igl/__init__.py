@@ -1,6 +1,9 @@
 """Geodesic distance on meshes by the heat method, on libigl's operators."""
 
-from heat_igl import baselines, closed_forms, cluster, metrics, reference, sampling, shapes
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from heat_igl import sampling, shapes
 from heat_igl.curve_files import write_curves
 from heat_igl.errors import (
     AccuracyWarning,
@@ -35,8 +38,11 @@ from heat_igl.sources import OffsetSources
 from heat_igl.speed import speed_operators
 from heat_igl.subdivision import split_long_edges
 from heat_igl.surface_points import SurfaceCurve, SurfacePoints
-from heat_igl.validation import validate
-from heat_igl.validation_report import ValidationReport, ValidationRow
+
+if TYPE_CHECKING:
+    from heat_igl import baselines, closed_forms, cluster, metrics, reference
+    from heat_igl.validation import validate
+    from heat_igl.validation_report import ValidationReport, ValidationRow
 
 __all__ = [
     "AccuracyWarning",
@@ -98,3 +104,28 @@ __all__ = [
 ]
 
 __version__ = "0.1.0"
+
+# What a distance does without is loaded on first use: the name, and the module that it is, or is in.
+_LATER = {
+    "ValidationReport": "validation_report",
+    "ValidationRow": "validation_report",
+    "baselines": "baselines",
+    "closed_forms": "closed_forms",
+    "cluster": "cluster",
+    "metrics": "metrics",
+    "reference": "reference",
+    "validate": "validation",
+}
+
+if not TYPE_CHECKING:  # else any misspelt name would pass for one of these
+
+    def __getattr__(name: str) -> Any:
+        if name not in _LATER:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        module = import_module(f"{__name__}.{_LATER[name]}")
+        found = globals()[name] = module if _LATER[name] == name else getattr(module, name)
+        return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -115,6 +114,8 @@ def _write_obj(path: Path, lines: _Lines) -> None:
 
 
 def _write_svg(path: Path, lines: _Lines) -> None:
+    from xml.sax.saxutils import quoteattr  # which loads a web client
+
     points = np.concatenate([P for group in lines.values() for P, _ in group] or [np.zeros((1, 2))])
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 2 * _LINE * max(float((high - low).max()), np.finfo(float).tiny)

@@ -1,64 +1,88 @@
-"""Kernel of step 2 and half of step 3: from heat to the divergence of its normalized gradient, face by face."""
+"""Kernels of step 2 and half of step 3: from heat to the divergence of its normalized gradient, face by face."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from heat_igl.fans import jit
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.flip_history import apex
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["descent"]
+__all__ = ["Triangles", "descent", "descent_on_triangles", "triangles"]
+
+# Columns of `Triangles.numbers`.
+_PER_BASE, _FOOT, _PER_HEIGHT, _AREA, _PER_RATE = 0, 1, 2, 3, 4
+
+
+class Triangles(NamedTuple):
+    """All that the divergence takes of a triangulation, a row per face, so that a pass reads little memory.
+
+    Attributes
+    ----------
+    corners : (m, 3) int32
+        Vertices.
+    numbers : (m, 5) float64
+        One over the length of the side from corner 0 to corner 1; the foot of corner 2 on it, from 0 to 1 between the
+        two; one over the height. Then the area, and one over the square of the rate below which a direction is not
+        trusted fully.
+    """
+
+    corners: AnyArray
+    numbers: FloatArray
+
+
+def triangles(F: IntArray, l: FloatArray, weights: FloatArray, full_rate: FloatArray) -> Triangles:  # noqa: E741
+    """The tables of triangles with edge lengths `l` (m, 3); the rest as for `descent`."""
+    base = l[:, 2]
+    x, y = apex(base, l[:, 1], l[:, 0])
+    numbers = np.empty((len(F), 5))
+    with np.errstate(divide="ignore"):
+        for column, values in enumerate((1 / base, x / base, 1 / y, weights, full_rate**-2.0)):
+            numbers[:, column] = values
+    return Triangles(F.astype(np.int32), numbers)
 
 
 @jit
-def _single(
-    ends: IntArray,
-    vertices: IntArray,
-    gradient: FloatArray,
-    weights: FloatArray,
-    full_rate: FloatArray,
-    u: FloatArray,
-    smallest: float,
-) -> FloatArray:
-    """`descent`, for one column (n,) and up to three coordinates, which then stay in registers."""
-    m = len(weights)
-    dimension = (len(ends) - 1) // m
+def _on_triangles(t: Triangles, u: FloatArray, log_u: FloatArray, smallest: float) -> FloatArray:
+    """`descent` for one column (n,), each triangle in the frame of `intrinsic_gradient`."""
     divergence = np.zeros(len(u))
-    log_u = np.log(u) if full_rate.any() else u
-    for f in range(m):
-        damps = full_rate[f] > 0.0
-        x = y = z = rate = 0.0
-        for d in range(dimension):
-            total = total_of_log = 0.0
-            for p in range(ends[d * m + f], ends[d * m + f + 1]):
-                total += gradient[p] * u[vertices[p]]
-                total_of_log += gradient[p] * log_u[vertices[p]]
-            rate += total_of_log * total_of_log
-            if d == 0:
-                x = total
-            elif d == 1:
-                y = total
-            else:
-                z = total
-        largest = max(abs(x), abs(y), abs(z))
+    for f in range(len(t.corners)):
+        a, b, c = t.corners[f, 0], t.corners[f, 1], t.corners[f, 2]
+        per_base, foot, per_height = t.numbers[f, _PER_BASE], t.numbers[f, _FOOT], t.numbers[f, _PER_HEIGHT]
+        rise = u[b] - u[a]
+        x, y = per_base * rise, per_height * (u[c] - u[a] - foot * rise)
+        largest = max(abs(x), abs(y))
         if not largest >= smallest:
             continue
+        rise = log_u[b] - log_u[a]
+        x_of_log, y_of_log = per_base * rise, per_height * (log_u[c] - log_u[a] - foot * rise)
+        share = (x_of_log * x_of_log + y_of_log * y_of_log) * t.numbers[f, _PER_RATE]
+        if not share < 1.0:
+            share = 1.0
         # Squares of entries below 1e-154 would vanish: the largest is made 1 first.
-        x, y, z = x / largest, y / largest, z / largest
-        scale = weights[f] / np.sqrt(x * x + y * y + z * z)
-        if damps:
-            share = np.sqrt(rate) / full_rate[f]
-            if share < 1.0:
-                scale *= share
-        for d in range(dimension):
-            component = scale * (x if d == 0 else y if d == 1 else z)
-            for p in range(ends[d * m + f], ends[d * m + f + 1]):
-                divergence[vertices[p]] += gradient[p] * component
+        x, y = x * (1.0 / largest), y * (1.0 / largest)
+        scale = t.numbers[f, _AREA] * np.sqrt(share / (x * x + y * y))
+        at_c = scale * y * per_height
+        at_b = scale * x * per_base - foot * at_c
+        divergence[a] -= at_b + at_c
+        divergence[b] += at_b
+        divergence[c] += at_c
     return divergence
 
 
+def descent_on_triangles(t: Triangles, u: FloatArray, smallest: float) -> FloatArray:
+    """`descent`, for triangles in their tables."""
+    columns = np.ascontiguousarray(u.T)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logarithms = np.log(columns)
+    parts = [_on_triangles(t, one, its_log, smallest) for one, its_log in zip(columns, logarithms, strict=True)]
+    return np.stack(parts, axis=1)
+
+
 @jit
-def _several(
+def descent(
     ends: IntArray,
     vertices: IntArray,
     gradient: FloatArray,
@@ -67,7 +91,12 @@ def _several(
     u: FloatArray,
     smallest: float,
 ) -> FloatArray:
-    """`descent`, for several columns at once."""
+    """Integrated divergence (n, k) of -grad u / |grad u|, times |grad log u| / full_rate where that is below 1.
+
+    The gradient is given by its rows (compressed, stacked by coordinate), per face of size `weights` (m,). Where
+    `full_rate` (m,) is 0, and where u is not positive, the field has length 1; it is 0 where no component of grad u
+    reaches `smallest`.
+    """
     m, k = len(weights), u.shape[1]
     dimension = (len(ends) - 1) // m
     divergence = np.zeros(u.shape)
@@ -116,23 +145,3 @@ def _several(
                 for c in range(k):
                     divergence[v, c] -= g * X[d, c]
     return divergence
-
-
-def descent(
-    ends: IntArray,
-    vertices: IntArray,
-    gradient: FloatArray,
-    weights: FloatArray,
-    full_rate: FloatArray,
-    u: FloatArray,
-    smallest: float,
-) -> FloatArray:
-    """Integrated divergence (n, k) of -grad u / |grad u|, times |grad log u| / full_rate where that is below 1.
-
-    The gradient is given by its rows (compressed, stacked by coordinate), per face of size `weights` (m,). Where
-    `full_rate` (m,) is 0, and where u is not positive, the field has length 1; it is 0 where no component of grad u
-    reaches `smallest`.
-    """
-    if u.shape[1] == 1 and len(ends) - 1 <= 3 * len(weights):
-        return np.asarray(_single(ends, vertices, gradient, weights, full_rate, u[:, 0].copy(), smallest)[:, None])
-    return np.asarray(_several(ends, vertices, gradient, weights, full_rate, u, smallest))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,12 +75,15 @@ class Emitter:
         Step 1 on it.
     plain : bool
         Around source vertices take every distance from heat, as the paper does, and none from edges.
+    unfolds : bool
+        Distance will come by unfolding, which finds what is around source vertices by itself.
     """
 
-    def __init__(self, domain: Operators, heat_flow: HeatFlow, plain: bool = False) -> None:
+    def __init__(self, domain: Operators, heat_flow: HeatFlow, plain: bool = False, unfolds: bool = False) -> None:
         self._domain = domain
-        self._plain = plain
+        self._plain, self._unfolds = plain, unfolds
         self._heat_flow = heat_flow
+        self._mass = domain.M.diagonal() / heat_flow.mean_mass
         self._on_solved = None if domain.triangulation is None else NearField(domain.triangulation)
         self._on_faces = None if domain.faces is None else NearField(domain.faces)
         # Triangulations on which the edges are straight lines: one, if none was flipped.
@@ -93,7 +97,9 @@ class Emitter:
         near_vertices = self._near_vertices(sources, rim)
         lines, far = self._straight_lines(sources, rim)
         near = Seeds.nearest(_joined(near_vertices, lines))
-        guides = np.isin(near.vertex, lines.vertex) & ~np.isin(near.vertex, sources.vertices)
+        guides = np.zeros(len(near.vertex), bool)
+        if len(lines.vertex):
+            guides = np.isin(near.vertex, lines.vertex) & ~np.isin(near.vertex, sources.vertices)
         own = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         anchors = _joined(own, near.at(guides))
         vertex, share, label, offset = self._heat(sources, rim)
@@ -104,10 +110,11 @@ class Emitter:
 
         Two solves tell: there the heat is many times what it would be if all began as late as this source does.
         """
-        if np.ptp(found.sources.offsets) == 0:
+        offsets = found.sources.offsets
+        if offsets.min() == offsets.max():
             return found
-        both = np.stack([self.heat(found), self.heat(replace(found, delay=np.zeros_like(found.delay)))], axis=1)
-        u, u_at_once = self._heat_flow.solve(both).T
+        at_once = replace(found, delay=np.zeros_like(found.delay))
+        u, u_at_once = self._heat_flow.solve(self.heat([found, at_once])).T
         delay = np.zeros(found.sources.n_labels)
         delay[found.label] = found.delay
 
@@ -129,21 +136,22 @@ class Emitter:
             guides=found.guides[kept],
         )
 
-    def heat(self, emission: Emission) -> FloatArray:
-        """Right-hand side (n,) of `HeatFlow.solve`: as much heat as cannot overflow."""
-        return self._heat_of(emission, emission.share)
+    def heat(self, emissions: Sequence[Emission]) -> FloatArray:
+        """Right-hand sides (n, k) of `HeatFlow.solve`: as much heat as cannot overflow."""
+        return self._heat_of(emissions, [emission.share for emission in emissions])
 
     def unit(self, emission: Emission) -> float:
         """The heat that a share of 1 stands for.
 
         Rows of L sum to zero, so the maximum principle bounds the heat by the largest initial heat over mass.
         """
-        domain = self._domain
-        largest = np.bincount(emission.vertex, emission.share, minlength=domain.n)[emission.vertex]
-        bound = domain.M.diagonal()[emission.vertex] / self._heat_flow.mean_mass
+        bound, largest = self._mass[emission.vertex], emission.share
+        if len(largest) > 1:
+            _, which = np.unique(emission.vertex, return_inverse=True)
+            largest = np.asarray(np.bincount(which, emission.share), np.float64)[which]
         held = (bound > 0) & (largest > 0)
         smallest = float((bound[held] / largest[held]).min(initial=1.0))
-        return _SOURCE_HEAT * min(domain.mean_edge_length, 1e10) * smallest
+        return _SOURCE_HEAT * min(self._domain.mean_edge_length, 1e10) * smallest
 
     def guide(self, emission: Emission, X: FloatArray, magnitude: FloatArray) -> None:
         """Near points and curves, replace the field X (d m,) of length `magnitude` (m,) by the exact gradient."""
@@ -165,10 +173,10 @@ class Emitter:
 
     def settle(self, emission: Emission, phi: FloatArray, u: FloatArray) -> FloatArray:
         """Distance (n,) from the integrated phi: begun at the right level, exact where it is known."""
-        components = self._domain.components
+        domain, components = self._domain, self._domain.components
         anchors = emission.anchors
         misfit = phi[anchors.vertex] - anchors.value
-        n_anchors = np.bincount(components[anchors.vertex], minlength=int(components.max()) + 1)
+        n_anchors = np.bincount(components[anchors.vertex], minlength=domain.n_components)
         if (n_anchors > 1).any():
             level = self._level(emission, misfit, u)
             phi = phi - level
@@ -177,8 +185,9 @@ class Emitter:
         shift = np.where(n_anchors > 0, total / np.maximum(n_anchors, 1), -np.inf)
         lowest = np.full(len(n_anchors), np.inf)
         np.minimum.at(lowest, components[emission.near.vertex], emission.near.value)
-        start = lowest[components]
-        distance = np.maximum(phi - shift[components], start)
+        start = domain.on_vertices(lowest)
+        distance = phi - domain.on_vertices(shift)
+        np.maximum(distance, start, out=distance)
         take_shorter(distance, emission.far, _HEAT_ERROR, start)
         if self._plain and emission.sources.on_vertices_alone:
             distance[emission.near.vertex] = emission.near.value
@@ -192,7 +201,7 @@ class Emitter:
         present = np.unique(emission.label)
         for block in np.split(present, range(_BLOCK, len(present), _BLOCK)):
             shares = [emission.share * (emission.label == label) for label in block]
-            parts = self._heat_flow.solve(np.stack([self._heat_of(emission, share) for share in shares], axis=1))
+            parts = self._heat_flow.solve(self._heat_of([emission] * len(block), shares))
             warmest = parts.argmax(axis=1)
             heat = np.take_along_axis(parts, warmest[:, None], axis=1)[:, 0]
             labels = np.where(heat > most, block[warmest], labels)
@@ -223,7 +232,7 @@ class Emitter:
     def _near_vertices(self, sources: SourceSet, rim: BoolArray) -> Seeds:
         """Source vertices, and with those at the rim their neighbours at the lengths of edges."""
         itself = Seeds(sources.vertices, sources.vertex_offset, sources.vertex_label)
-        if self._plain:
+        if self._plain or (self._unfolds and sources.on_vertices_alone):
             return itself
         vertices, offset, label = sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim]
         found = [itself]
@@ -245,9 +254,13 @@ class Emitter:
 
     def _heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""
-        parts = [(sources.vertices[rim], np.ones(rim.sum()), sources.vertex_label[rim], sources.vertex_offset[rim])]
+        vertices = sources.vertices[rim]
+        of_vertices = vertices, np.ones(len(vertices)), sources.vertex_label[rim], sources.vertex_offset[rim]
+        if sources.on_vertices_alone:
+            return of_vertices
+        parts = [of_vertices]
         triangulation = self._domain.triangulation
-        if self._on_faces is not None and triangulation is not None and not sources.on_vertices_alone:
+        if self._on_faces is not None and triangulation is not None:
             h = self._domain.mean_edge_length
             samples, lengths = self._on_faces.samples(sources.segments, h * _SPACING)
             amount = np.concatenate([np.ones(len(sources.points.faces)), lengths / (h * _EDGES_PER_POINT)])
@@ -267,16 +280,21 @@ class Emitter:
 
     def _delay(self, vertex: IntArray, offset: FloatArray) -> FloatArray:
         """Heat falls by exp(-d / sqrt(t)) over a distance d, so that is what a later source has less of."""
+        if offset.min(initial=np.inf) == offset.max(initial=0.0):
+            return np.zeros(len(offset))
         components = self._domain.components
-        earliest = np.full(int(components.max()) + 1, np.inf)
+        earliest = np.full(self._domain.n_components, np.inf)
         np.minimum.at(earliest, components[vertex], offset)
         return np.asarray((offset - earliest[components[vertex]]) / np.sqrt(self._heat_flow.t))
 
-    def _heat_of(self, emission: Emission, share: FloatArray) -> FloatArray:
-        # Together, since exp(-delay) alone would underflow.
-        with np.errstate(under="ignore"):
-            weights = share * np.exp(np.log(self.unit(emission)) - emission.delay)
-        return np.asarray(np.bincount(emission.vertex, weights, minlength=self._domain.n), np.float64)
+    def _heat_of(self, emissions: Sequence[Emission], shares: Sequence[FloatArray]) -> FloatArray:
+        heat = np.zeros((self._domain.n, len(emissions)))
+        for column, emission, share in zip(heat.T, emissions, shares, strict=True):
+            # Together, since exp(-delay) alone would underflow.
+            with np.errstate(under="ignore"):
+                weights = share * np.exp(np.log(self.unit(emission)) - emission.delay)
+            np.add.at(column, emission.vertex, weights)
+        return heat
 
     def _level(self, emission: Emission, misfit: FloatArray, u: FloatArray) -> FloatArray:
         """The value that phi has at the source from which a vertex got its heat, less that source's offset.
@@ -293,7 +311,7 @@ class Emitter:
         if low == high:
             return np.full_like(u, low)
         relative = np.where(count > 0, (level - low) / (high - low), 0.0)
-        part = self._heat_flow.solve(self._heat_of(emission, emission.share * relative[emission.label]))
+        part = self._heat_flow.solve(self._heat_of([emission], [emission.share * relative[emission.label]]))[:, 0]
         warm = u > 0  # always, but for noise under "cotan" and a cold boundary
         return low + (high - low) * np.clip(np.divide(part, u, out=np.zeros_like(u), where=warm), 0.0, 1.0)
 
@@ -301,10 +319,9 @@ class Emitter:
         """Set known values; across an edge from one, distance changes by no more than the edge's length."""
         if self._on_solved is not None:
             which, ends, lengths = self._on_solved.spokes(near.vertex)
-            upper = np.full_like(distance, np.inf)
-            np.minimum.at(upper, ends, near.value[which] + lengths)
-            np.maximum.at(distance, ends, near.value[which] - lengths)
-            np.minimum(distance, upper, out=distance)
+            value = near.value[which]
+            np.maximum.at(distance, ends, value - lengths)
+            np.minimum.at(distance, ends, value + lengths)
         distance[near.vertex] = near.value
         return distance
 
@@ -321,6 +338,9 @@ def take_shorter(distance: FloatArray, seeds: Seeds, error: float, start: FloatA
 
 
 def _joined(*parts: Seeds) -> Seeds:
+    parts = tuple(part for part in parts if len(part.vertex)) or parts[:1]
+    if len(parts) == 1:
+        return parts[0]
     return Seeds(
         np.concatenate([part.vertex for part in parts]),
         np.concatenate([part.value for part in parts]),

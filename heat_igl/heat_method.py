@@ -21,7 +21,7 @@ from heat_igl.processors import n_threads
 from heat_igl.refine import Refine
 from heat_igl.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.sources import Sources, SourceSet, source_set
-from heat_igl.steps import Boundary, HeatFlow, PoissonProblem, analysis, damping, descent, normalize
+from heat_igl.steps import Boundary, Descent, HeatFlow, PoissonProblem, analysis, damping, normalize
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_time_step"]
@@ -272,11 +272,10 @@ class HeatMethodSolver:
         self._heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
         self._poisson: PoissonProblem | None = poisson[0] if poisson else None
         factored = time.perf_counter()
-        self._emitter = Emitter(domain, self._heat_flow, plain=not self._damped)
+        self._emitter = Emitter(domain, self._heat_flow, plain=not self._damped, unfolds=refine is not None)
         self._given_faces = domain.given_faces
         self._heat_order = None if refine is None else HeatOrder(domain, refine)
-        if refine is None:
-            _ = domain.gradient_rows  # made on first use otherwise, in the middle of the first query
+        self._descent = Descent(domain, step if self._damped else None) if refine is None else None
         triangulation = domain.triangulation
         factors = self._heat_flow.factors + ([] if self._poisson is None else [self._poisson.factor])
         self._diagnostics = Diagnostics(
@@ -520,7 +519,7 @@ class HeatMethodSolver:
         emissions = [self._emitter.emission(sources) for sources in source_sets]
         if self._heat_order is None:
             emissions = [self._emitter.on_time(emission) for emission in emissions]
-        return emissions, self._heat_flow.solve(np.stack([self._emitter.heat(one) for one in emissions], axis=1))
+        return emissions, self._heat_flow.solve(self._emitter.heat(emissions))
 
     def _field(self, emissions: list[Emission], u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Directions (d m, k) and their magnitude (m, k)."""
@@ -531,24 +530,22 @@ class HeatMethodSolver:
             self._emitter.guide(emission, X[:, column], magnitude[:, column])
         return X, magnitude
 
-    def _divergence(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
-        """Right-hand sides (n, k) of step 3."""
-        domain = self._operators
-        if not any(emission.guides.any() for emission in emissions):
-            return descent(domain, u, self.t if self._damped else None)
-        X, magnitude = self._field(emissions, u)
-        return np.asarray(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1))))
-
     def _integrated(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
         """Distances (k, n) by step 3."""
-        if self._poisson is None:
+        if self._poisson is None or self._descent is None:
             raise RuntimeError("this solver unfolds and has no Poisson problem")
-        phi = self._poisson.solve(self._divergence(emissions, u))
-        distances = np.empty(phi.T.shape)
-        for column, emission in enumerate(emissions):
-            self._warn_if_cold(u[:, column], emission)
-            distances[column] = self._emitter.settle(emission, phi[:, column], u[:, column])
-        return distances
+        if any(emission.guides.any() for emission in emissions):
+            X, magnitude = self._field(emissions, u)
+            domain = self._operators
+            divergence = domain.D @ (X * np.tile(magnitude, (domain.dimension, 1)))
+        else:
+            divergence = self._descent.divergence(u)
+        phi = self._poisson.solve(divergence)
+        if u.min() < _LOWEST_HEAT:
+            for emission, its_u in zip(emissions, u.T, strict=True):
+                self._warn_if_cold(its_u, emission)
+        rows = zip(emissions, np.ascontiguousarray(phi.T), u.T, strict=True)
+        return np.stack([self._emitter.settle(emission, its_phi, its_u) for emission, its_phi, its_u in rows])
 
     def _warn_if_cold(self, u: FloatArray, emission: Emission) -> None:
         """Heat that has underflowed has no gradient, and distance does not grow where X is 0: say so."""

@@ -221,7 +221,8 @@ class Mesh:
     @cached_property
     def edge_lengths(self) -> FloatArray:
         """The length (k,) of each of `edges`, in the mesh's unit."""
-        return _frozen(np.linalg.norm(self.V[self.edges[:, 0]] - self.V[self.edges[:, 1]], axis=1))
+        along = self.V[self.edges[:, 0]] - self.V[self.edges[:, 1]]
+        return _frozen(np.sqrt(np.einsum("kx,kx->k", along, along)))
 
     @cached_property
     def components(self) -> IntArray:

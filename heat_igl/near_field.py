@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from heat_igl.flip_history import apex
 from heat_igl.intrinsic import IntrinsicTriangulation
-from heat_igl.sources import SourcePoints, SourceSegments
+from heat_igl.sources import SourcePoints, SourceSegments, nearest_first
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["NearField", "Seeds"]
@@ -24,6 +24,8 @@ __all__ = ["NearField", "Seeds"]
 _MOST_LEVELS = 50
 # A line that misses a vertex by less than this share of an edge goes through it.
 _ROUNDING = 1e-10
+# From a corner of a face to the others.
+_FOLLOWING, _PRECEDING = np.array([1, 1, -2]), np.array([2, -1, -1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +39,8 @@ class Seeds:
     @classmethod
     def nearest(cls, several: Seeds) -> Seeds:
         """Of several values at a vertex, the smallest."""
-        order = np.lexsort((several.label, several.value, several.vertex))
-        vertex = several.vertex[order]
-        first = np.ones(len(vertex), bool)
-        first[1:] = vertex[1:] != vertex[:-1]
-        kept = order[first]
-        return cls(vertex[first], several.value[kept], several.label[kept])
+        kept = nearest_first(several.vertex, several.value, several.label)
+        return cls(several.vertex[kept], several.value[kept], several.label[kept])
 
     def at(self, chosen: BoolArray) -> Seeds:
         """Some of them."""
@@ -103,19 +101,20 @@ class NearField:
         self.triangulation = triangulation
 
     @cached_property
-    def _corners(self) -> sp.csr_array:
-        """Corners of faces by vertex: the column indices of each row."""
+    def _corners(self) -> tuple[IntArray, IntArray]:
+        """Corners of faces by vertex: those of vertex v end where those of v + 1 begin, at ``ends[v + 1]``."""
         F = self.triangulation.F
         entries = (np.ones(F.size, np.int8), (F.ravel(), np.arange(F.size)))
-        return sp.csr_array(entries, shape=(self.triangulation.n, F.size))
+        by_vertex = sp.csr_array(entries, shape=(self.triangulation.n, F.size))
+        return by_vertex.indptr.astype(np.int64), by_vertex.indices.astype(np.int64)
 
     def corners_at(self, vertices: IntArray) -> tuple[IntArray, IntArray]:
         """The corners (k,) of faces at the given vertices, and for each the position of its vertex in `vertices`."""
-        first, last = self._corners.indptr[vertices].astype(np.int64), self._corners.indptr[vertices + 1]
-        counts = last - first
+        ends, corners = self._corners
+        first = ends[vertices]
+        counts = ends[vertices + 1] - first
         which = np.repeat(np.arange(len(vertices)), counts)
-        within = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-        return self._corners.indices[first[which] + within].astype(np.int64), which
+        return corners[np.arange(len(which)) + np.repeat(first - (counts.cumsum() - counts), counts)], which
 
     def spokes(self, vertices: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
         """Edges from the given vertices: position of the vertex in `vertices`, the other end, and the length.
@@ -124,9 +123,10 @@ class NearField:
         """
         tri = self.triangulation
         corner, which = self.corners_at(vertices)
-        f, c = corner // 3, corner % 3
-        ends = np.concatenate([tri.F[f, (c + 1) % 3], tri.F[f, (c + 2) % 3]])
-        lengths = np.concatenate([tri.l[f, (c + 2) % 3], tri.l[f, (c + 1) % 3]])
+        within = corner % 3
+        following, preceding = corner + _FOLLOWING[within], corner + _PRECEDING[within]
+        ends = tri.F.ravel()[np.concatenate([following, preceding])]
+        lengths = tri.l.ravel()[np.concatenate([preceding, following])]
         return np.concatenate([which, which]), ends, lengths
 
     def seeds(

@@ -15,16 +15,7 @@ import numpy as np
 from heat_igl.html_view import Page, page
 from heat_igl.mesh import Mesh
 from heat_igl.picture import DPI, Picture
-from heat_igl.raster import (
-    isoline_coverage,
-    rasterize,
-    screen_gradient,
-    shading,
-    stripe_coverage,
-    to_pixels,
-    visible,
-    visible_runs,
-)
+from heat_igl.raster import to_pixels, visible_runs
 from heat_igl.scene import (
     DISTANCE_LABEL,
     LINE_INK,
@@ -37,6 +28,7 @@ from heat_igl.scene import (
     scene,
 )
 from heat_igl.sources import Sources
+from heat_igl.surface_image import LINE, OVERSAMPLING, SOURCE, fitted, mark_dots, surface_image
 from heat_igl.surface_points import SurfaceCurve
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 
@@ -45,11 +37,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Page", "Picture", "page", "picture", "plot", "plot_field", "write_html"]
 
-_OVERSAMPLING = 2
 _WIDTH = 3.15  # inches, one column of a journal
 _FONT = 7.0  # points
-_LINE = 0.0055  # width of an isoline in inches
-_SOURCE = "#e8000b"
 _CURVE = "#ff4fd8"
 
 
@@ -204,9 +193,7 @@ def _laid_out(
     across = _WIDTH - left - right
     tall = float(np.clip(across * extent[1] / extent[0], 1.5, 2.6))
     columns, rows = (round(length * DPI) for length in (across, tall))
-    margin = 0.07 * DPI  # for markers at the rim
-    scale = float(min((columns - 2 * margin) / extent[0], (rows - 2 * margin) / extent[1]))
-    centre = np.array([columns - 1, rows - 1]) / 2 - (low + high) / 2 * scale * [1, -1]
+    scale, centre = fitted(seen, columns, rows, 0.07 * DPI)  # a margin for markers at the rim
     points = to_pixels(turned, scale, centre)
 
     figure = Figure(figsize=(_WIDTH, bottom + tall + top), dpi=DPI / 2, facecolor="white")
@@ -214,48 +201,16 @@ def _laid_out(
     height = bottom + tall + top
     axes = figure.add_axes((left / _WIDTH, bottom / height, across / _WIDTH, tall / height))
     axes.set_axis_off()
-    image, depth = _surface(points, seen, columns, rows, style, table)
+    image, depth = surface_image(points, seen, columns, rows, style, table)
     axes.imshow(image, interpolation="antialiased", aspect="auto")
-    for colour, drawn in ((_CURVE, lines), (_SOURCE, list(seen.lines @ seen.turn.T))):
+    for colour, drawn in ((_CURVE, lines), (SOURCE, list(seen.lines @ seen.turn.T))):
         _draw_curves(axes, [to_pixels(line, scale, centre) for line in drawn], depth, colour)
-    hidden = _mark(axes, to_pixels(seen.dots @ seen.turn.T, scale, centre), depth)
+    hidden = mark_dots(axes, to_pixels(seen.dots @ seen.turn.T, scale, centre), depth)
     bar = figure.add_axes(((left + across + 0.08) / _WIDTH, bottom / height, 0.09 / _WIDTH, tall / height))
     _colour_bar(bar, seen, style, table, label)
     lacking = without_value if bool(np.isinf(seen.values[seen.used]).any()) else None
     _legend(figure, seen, hidden, style, len(lines), lacking, left / _WIDTH)
     return Picture(figure)
-
-
-def _surface(
-    points: FloatArray, seen: Scene, columns: int, rows: int, style: Style, table: Any
-) -> tuple[FloatArray, FloatArray]:
-    """The image (rows, columns, 4) of the surface, and its depth on the finer grid that it was drawn on."""
-    F, values = seen.F, seen.values
-    fine = points * _OVERSAMPLING
-    fine[:, :2] += (_OVERSAMPLING - 1) / 2  # centres of pixels, not corners, are at whole numbers
-    pixels = rasterize(fine, F, columns * _OVERSAMPLING, rows * _OVERSAMPLING)
-    reached: BoolArray = np.asarray(np.isfinite(values[F]).all(axis=1))
-    finite = np.where(np.isfinite(values), values, 0.0)
-    here = np.einsum("pk,pk->p", pixels.weights, finite[F[pixels.face]])
-    known: BoolArray = reached[pixels.face]
-
-    low, high = seen.limits
-    colour = table((here - low) / (high - low))[:, :3]
-    per_pixel = screen_gradient(fine, F, finite)[pixels.face]
-    if style == "lines":
-        line = isoline_coverage(here, per_pixel, seen.step, _LINE * DPI * _OVERSAMPLING, at_zero=low < 0)
-        colour *= 1 - LINE_INK * line[:, None]
-    elif style == "stripes":
-        colour += STRIPE_INK * stripe_coverage(here, per_pixel, seen.step)[:, None] * (1 - colour)
-    colour[~known] = UNREACHABLE
-    colour *= shading(fine, F, pixels)[:, None]
-
-    image = np.zeros((rows * columns * _OVERSAMPLING**2, 4))
-    image[pixels.place] = np.concatenate([colour, np.ones((len(colour), 1))], axis=1)
-    blocks = image.reshape(rows, _OVERSAMPLING, columns, _OVERSAMPLING, 4)
-    covered = blocks[..., 3].mean(axis=(1, 3))
-    mixed = blocks[..., :3].mean(axis=(1, 3)) / np.maximum(covered, 1e-9)[..., None]
-    return np.concatenate([np.clip(mixed, 0, 1), covered[..., None]], axis=2), pixels.depth
 
 
 def _draw_curves(axes: Any, lines: list[FloatArray], depth: FloatArray, colour: str) -> None:
@@ -264,10 +219,10 @@ def _draw_curves(axes: Any, lines: list[FloatArray], depth: FloatArray, colour: 
 
     runs: dict[bool, list[FloatArray]] = {False: [], True: []}
     for points in lines:
-        fine = points * _OVERSAMPLING
-        fine[:, :2] += (_OVERSAMPLING - 1) / 2
+        fine = points * OVERSAMPLING
+        fine[:, :2] += (OVERSAMPLING - 1) / 2
         for is_seen, run in visible_runs(fine, depth, 0.01 * max(depth.shape)):
-            runs[is_seen].append((run[:, :2] - (_OVERSAMPLING - 1) / 2) / _OVERSAMPLING)
+            runs[is_seen].append((run[:, :2] - (OVERSAMPLING - 1) / 2) / OVERSAMPLING)
     for is_seen, ink, width in ((False, colour, 0.6), (True, "white", 1.9), (True, colour, 1.1)):
         if not runs[is_seen]:
             continue
@@ -278,19 +233,6 @@ def _draw_curves(axes: Any, lines: list[FloatArray], depth: FloatArray, colour: 
         )
 
 
-def _mark(axes: Any, dots: FloatArray, depth: FloatArray) -> BoolArray:
-    """Dots at the sources, given in pixels, and rings at those behind the surface; returns which are."""
-    if not len(dots):
-        return np.zeros(0, bool)
-    fine = dots * _OVERSAMPLING
-    is_seen = visible(fine, depth, np.arange(len(dots)), 0.01 * max(depth.shape))
-    size = 16.0 if len(dots) <= 20 else 4.0
-    for chosen, fill in ((is_seen, _SOURCE), (~is_seen, "none")):
-        x, y = dots[chosen, :2].T
-        axes.scatter(x, y, s=size, c=fill, edgecolors="white" if fill != "none" else _SOURCE, linewidths=0.6, zorder=3)
-    return ~is_seen
-
-
 def _colour_bar(axes: Any, seen: Scene, style: Style, table: Any, label: str) -> None:
     (low, high), step = seen.limits, seen.step
     axes.imshow(np.linspace(0, 1, 512)[:, None], cmap=table, origin="lower", extent=(0, 1, low, high), vmin=0, vmax=1)
@@ -298,7 +240,9 @@ def _colour_bar(axes: Any, seen: Scene, style: Style, table: Any, label: str) ->
     axes.set_ylim(low, high)
     levels = step * np.arange(np.floor(low / step) + 1, np.ceil(high / step))
     if style == "lines":
-        axes.hlines(levels if low < 0 else levels[levels > 0], 0, 1, colors=(0, 0, 0, LINE_INK), linewidth=_LINE * 72)
+        axes.hlines(
+            levels if low < 0 else levels[levels > 0], 0, 1, colors=(0, 0, 0, LINE_INK), linewidth=LINE / DPI * 72
+        )
     elif style == "stripes":
         for level in levels[np.rint(levels / step) % 2 == 1]:
             axes.axhspan(level, min(level + step, high), color=(1, 1, 1, STRIPE_INK), linewidth=0)
@@ -328,11 +272,11 @@ def _legend(
 
     handles: list[Any] = []
     if not hidden.all():
-        handles.append(dot(_SOURCE, "white", "source" if (~hidden).sum() == 1 else "sources"))
+        handles.append(dot(SOURCE, "white", "source" if (~hidden).sum() == 1 else "sources"))
     if hidden.any():
-        handles.append(dot("none", _SOURCE, "source behind" if hidden.sum() == 1 else "sources behind"))
+        handles.append(dot("none", SOURCE, "source behind" if hidden.sum() == 1 else "sources behind"))
     if len(seen.lines):
-        handles.append(Line2D([], [], color=_SOURCE, linewidth=1.1, label="source curve"))
+        handles.append(Line2D([], [], color=SOURCE, linewidth=1.1, label="source curve"))
     if n_curves:
         handles.append(Line2D([], [], color=_CURVE, linewidth=1.1, label="curve" if n_curves == 1 else "curves"))
     if style == "lines":

@@ -223,7 +223,7 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
     return Operators(
         L=L,
         M=M * unit**2,
-        G=(igl.grad(refined, F) @ P).tocsc() / unit,
+        gradient=(igl.grad(refined, F) @ P).tocsc() / unit,
         weights=areas * unit**2,
         face_sizes=np.repeat(np.maximum.reduceat(sides, begin), mesh.degree),
         mean_edge_length=h,

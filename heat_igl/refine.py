@@ -34,7 +34,7 @@ Refine = Literal["sweep", "unfold"]
 _TOLERANCE = 4e-5
 # The search starts at vertices that fall short of what a neighbour promised by this many tolerances: by more than the
 # paths that the promise rests on may have been cut short.
-_SHORTFALL = 25.0
+_SHORTFALL = 15.0
 # Passes over vertices whose neighbours turned out to be nearer than the order said. They are few, and ever fewer.
 _MAX_PASSES = 50
 # Steps that the search from one vertex may take; a walk takes 20 to 50.

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,16 @@ from heat_igl.errors import SourceError
 from heat_igl.surface_points import SurfaceCurve, SurfacePoints
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
-__all__ = ["OffsetSources", "SourcePoints", "SourceSegments", "SourceSet", "Sources", "source_set", "vertex_sources"]
+__all__ = [
+    "OffsetSources",
+    "SourcePoints",
+    "SourceSegments",
+    "SourceSet",
+    "Sources",
+    "nearest_first",
+    "source_set",
+    "vertex_sources",
+]
 
 _ACCEPTED = "a vertex index, a sequence of vertex indices, or a boolean mask with one entry per vertex"
 # Barycentric coordinates below this are 0: the point lies on the edge, or in the vertex.
@@ -90,6 +99,11 @@ class SourceSegments:
         )
 
 
+_NOWHERE = np.empty(0, np.int64)
+_NO_POINTS = SourcePoints(_NOWHERE, np.empty((0, 3)), _NOWHERE, np.empty(0))
+_NO_SEGMENTS = SourceSegments(_NOWHERE, np.empty((0, 3)), np.empty((0, 3)), _NOWHERE, np.empty(0))
+
+
 @dataclass(frozen=True, eq=False)
 class SourceSet:
     """One set of sources, checked.
@@ -121,6 +135,8 @@ class SourceSet:
     @property
     def offsets(self) -> FloatArray:
         """The offset of every vertex, point and segment."""
+        if self.on_vertices_alone:
+            return self.vertex_offset
         return np.concatenate([self.vertex_offset, self.points.offset, self.segments.offset])
 
 
@@ -275,41 +291,50 @@ class _Builder:
             raise SourceError(f"faces[{first}] = {faces[first]} is no face: indices run from 0 to {len(self._F) - 1}")
 
     def finish(self) -> SourceSet:
-        points = self._all_points()
-        self._snap(points)
-        vertices, label = _concatenated(self._vertices, (np.empty(0, np.int64), np.empty(0, np.int64)))
-        inside = points.barycentric.max(axis=1, initial=0) < 1
+        points = self._points_in_faces() if self._points else _NO_POINTS
+        vertices, label = _concatenated(self._vertices, (_NOWHERE, _NOWHERE))
         # A vertex that is named twice is the one with the smallest offset; of equal ones, the first.
-        order = np.lexsort((label, self._offset[label], vertices))
-        vertices, first = np.unique(vertices[order], return_index=True)
-        label = label[order][first]
+        kept = nearest_first(vertices, self._offset[label], label)
+        label = label[kept]
         return SourceSet(
-            vertices=vertices,
+            vertices=vertices[kept],
             vertex_label=label,
             vertex_offset=self._offset[label],
-            points=SourcePoints(*(getattr(points, field.name)[inside] for field in fields(points))),
-            segments=self._all_segments(),
+            points=points,
+            segments=self._all_segments() if self._curves else _NO_SEGMENTS,
             n_labels=len(self._offset),
         )
 
-    def _all_points(self) -> SourcePoints:
-        none = (np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, np.int64))
+    def _points_in_faces(self) -> SourcePoints:
+        """All points but those in a vertex, which are counted among the vertices."""
+        none = (_NOWHERE, np.empty((0, 3)), _NOWHERE)
         faces, barycentric, label = _concatenated([(p.faces, p.barycentric, label) for p, label in self._points], none)
-        return SourcePoints(faces, on_simplex(barycentric), label, self._offset[label])
-
-    def _snap(self, points: SourcePoints) -> None:
-        """Count points in a vertex among the vertices."""
-        in_vertex = points.barycentric.max(axis=1, initial=0) == 1
+        barycentric = on_simplex(barycentric)
+        in_vertex = barycentric.max(axis=1) == 1
         if self._F is not None and in_vertex.any():
-            corner = points.barycentric[in_vertex].argmax(axis=1)
-            self._vertices.append((self._F[points.faces[in_vertex], corner], points.label[in_vertex]))
+            corner = barycentric[in_vertex].argmax(axis=1)
+            self._vertices.append((self._F[faces[in_vertex], corner], label[in_vertex]))
+        inside = ~in_vertex
+        label = label[inside]
+        return SourcePoints(faces[inside], barycentric[inside], label, self._offset[label])
 
     def _all_segments(self) -> SourceSegments:
-        none = (np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.int64))
+        none = (_NOWHERE, np.empty((0, 3)), np.empty((0, 3)), _NOWHERE)
         faces, start, end, label = _concatenated(
             [(c.faces, c.start, c.end, np.full(len(c), label)) for c, label in self._curves], none
         )
         return SourceSegments(faces, on_simplex(start), on_simplex(end), label, self._offset[label])
+
+
+def nearest_first(vertex: IntArray, value: FloatArray, label: IntArray) -> IntArray:
+    """Where the smallest of the values at each vertex is, of equal ones that of the first label; vertices ascending."""
+    if len(vertex) < 2:
+        return np.arange(len(vertex))
+    order = np.lexsort((label, value, vertex))
+    ordered = vertex[order]
+    first = np.ones(len(order), bool)
+    first[1:] = ordered[1:] != ordered[:-1]
+    return np.asarray(order[first])
 
 
 def on_simplex(barycentric: FloatArray) -> FloatArray:
@@ -319,4 +344,4 @@ def on_simplex(barycentric: FloatArray) -> FloatArray:
 
 
 def _concatenated(rows: list[tuple[Any, ...]], none: tuple[AnyArray, ...]) -> tuple[AnyArray, ...]:
-    return tuple(np.concatenate(column) for column in zip(none, *rows, strict=True))
+    return rows[0] if len(rows) == 1 else tuple(np.concatenate(column) for column in zip(none, *rows, strict=True))

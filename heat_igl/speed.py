@@ -74,7 +74,7 @@ def speed_operators(mesh: Mesh, speed: ArrayLike) -> Operators:
     scaled = replace(
         domain,
         M=sp.diags(mass, format="csc"),
-        G=(sp.diags(np.tile(s, domain.dimension)) @ domain.G).tocsc(),
+        gradient=(sp.diags(np.tile(s, domain.dimension)) @ domain.G).tocsc(),
         weights=domain.weights / s**p,
         face_sizes=domain.face_sizes / s,
         mean_edge_length=float(times.data.mean()),

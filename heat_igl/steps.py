@@ -21,11 +21,11 @@ from heat_igl.typing import FloatArray
 
 __all__ = [
     "Boundary",
+    "Descent",
     "HeatFlow",
     "PoissonProblem",
     "analysis",
     "damping",
-    "descent",
     "diffuse",
     "integrate",
     "normalize",
@@ -256,39 +256,62 @@ def _front_rate(operators: Operators, t: float) -> FloatArray:
     return np.asarray(2 * np.arcsinh(size / (2 * np.sqrt(t))) / size)
 
 
-def descent(operators: Operators, u: FloatArray, t: float | None = None) -> FloatArray:
+class Descent:
     """The right-hand side of step 3, the divergence of the field X of step 2, in one pass over the faces.
 
     The same as ``D @ normalize(operators, u)`` to rounding, and without storing a field; by a compiled kernel where
-    numba is installed.
+    numba is installed. What the kernel reads of the faces is put together once.
 
     Parameters
     ----------
     operators : Operators
         The domain.
-    u : (n, k) float64
-        Heat.
     t : float, optional
         Time step that the heat was made with, to have the field damped by `damping`; it has length 1 otherwise.
-
-    Returns
-    -------
-    (n, k) float64
-        Integrated divergence.
     """
-    if importlib.util.find_spec("numba") is None:
-        X = normalize(operators, u)
-        if t is not None:
-            X *= np.tile(damping(operators, u, t), (operators.dimension, 1))
-        return np.asarray(operators.D @ X)
-    from heat_igl import descending
 
-    rows = operators.gradient_rows
-    full = np.zeros(len(operators.weights)) if t is None else _FULL_RATE * _front_rate(operators, t)
-    full[operators.boundary_faces] = 0.0
-    return descending.descent(
-        rows.indptr, rows.indices, rows.data, operators.weights, full, np.ascontiguousarray(u), _SMALLEST_GRADIENT
-    )
+    def __init__(self, operators: Operators, t: float | None = None) -> None:
+        self._operators, self._t = operators, t
+        triangulation = operators.triangulation
+        self._full_rate = self._triangles = None
+        if importlib.util.find_spec("numba") is None:
+            _ = operators.D  # made on first use otherwise, in the middle of the first query
+            return
+        from heat_igl import descending
+
+        full_rate = np.zeros(len(operators.weights)) if t is None else _FULL_RATE * _front_rate(operators, t)
+        full_rate[operators.boundary_faces] = 0.0
+        if triangulation is None:
+            self._full_rate = full_rate
+            _ = operators.gradient_rows
+        else:
+            F, lengths = triangulation.F, triangulation.l
+            self._triangles = descending.triangles(F, lengths, operators.weights, full_rate)
+
+    def divergence(self, u: FloatArray) -> FloatArray:
+        """Integrated divergence (n, k) for heat (n, k)."""
+        operators = self._operators
+        if self._triangles is not None:
+            from heat_igl.descending import descent_on_triangles
+
+            return descent_on_triangles(self._triangles, u, _SMALLEST_GRADIENT)
+        rows = operators.gradient_rows
+        if self._full_rate is not None:
+            from heat_igl.descending import descent
+
+            heat = np.ascontiguousarray(u)
+            return np.asarray(
+                descent(
+                    rows.indptr, rows.indices, rows.data, operators.weights, self._full_rate, heat, _SMALLEST_GRADIENT
+                )
+            )
+        X = normalize(operators, u)
+        if self._t is not None:
+            X *= np.tile(damping(operators, u, self._t), (operators.dimension, 1))
+        return np.asarray(operators.D @ X)
+
+    def __reduce__(self) -> tuple[type[Descent], tuple[Operators, float | None]]:
+        return Descent, (self._operators, self._t)
 
 
 def integrate(operators: Operators, X: FloatArray) -> FloatArray:

@@ -238,7 +238,7 @@ def _look_around(
             continue
         length = t.spoke[k, LENGTH]
         side[i] = 0
-        most = -1.0
+        most = right = left = -1.0
         if state[w, FAN] == t.turn_id[k, FAN_THERE]:
             right, left = _savings(t.turn[k, ANGLE_THERE], state[w, ANGLE], state[w, TOTAL])
             most = max(right, left)
@@ -247,7 +247,9 @@ def _look_around(
                 saving[i] = most
                 promise[i] = _promise(length, state[w, OFFSET], state[w, REACH], most)
                 smallest = min(smallest, promise[i])
-        bend = most if abs(most) <= _STRAIGHT else _REAL_BEND
+        bend = _REAL_BEND
+        if most >= -_STRAIGHT:
+            bend = most if left >= right else -most
         _take(found, length + state[w, DISTANCE], w, length, 0.0, bend, k, 1.0, 0.0)
     return float(smallest)
 
@@ -392,7 +394,9 @@ def _walk(
                 wait_for = w
                 break
             squared = wx * wx + wy * wy
-            length, reach = math.sqrt(squared), state[w, REACH]
+            length = math.sqrt(squared)
+            # Of a bend close behind w, pulling tight may leave nothing.
+            reach = max(state[w, REACH], min(length, state[w, DISTANCE]))
             to_right = to_left = -1.0
             if state[w, FAN] == t.step_id[h, FAR_FAN]:
                 back = t.step[h, FAR_ANGLE] + math.atan2(wx * by - wy * bx, squared - (bx * wx + by * wy))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,9 @@ import numpy as np
 from heat_igl.errors import MissingExtraError
 from heat_igl.mesh import Mesh
 from heat_igl.metrics import relative_error
+from heat_igl.raster import to_pixels
+from heat_igl.scene import Scene, colours, scene
+from heat_igl.surface_image import fitted, mark_dots, surface_image
 from heat_igl.typing import FloatArray
 
 if TYPE_CHECKING:
@@ -20,6 +24,7 @@ __all__ = ["error_figure"]
 # Errors from 0.001 % to 10 %: what tells methods apart. All panels share the range, so that they can be compared.
 _LOWEST, _HIGHEST = 1e-5, 1e-1
 _ROW_INCHES = 2.6
+_COLUMNS, _LARGEST_ROWS = 800, 640  # of the picture of the surface
 
 
 def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[str, FloatArray]) -> Figure:
@@ -30,7 +35,7 @@ def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[s
     title : str
         Of the figure.
     mesh : Mesh
-        Triangles, or tetrahedra whose boundary is drawn.
+        Triangles, or tetrahedra whose boundary is drawn; seen as `heat_igl.plots.plot` shows it, with y upwards.
     truth : (n,) float64
         Distance to compare with.
     distances : mapping of str to (n,) float64
@@ -46,6 +51,7 @@ def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[s
         If matplotlib is not installed.
     """
     try:
+        from matplotlib.cm import ScalarMappable
         from matplotlib.colors import LogNorm
         from matplotlib.figure import Figure
     except ImportError:
@@ -55,48 +61,31 @@ def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[s
     axes = figure.subplots(len(distances), 2, squeeze=False, width_ratios=(1, 1.2))
     norm = LogNorm(_LOWEST, _HIGHEST)
     reachable = np.isfinite(truth) & (truth > 0)
+    limits = float(np.log10(_LOWEST)), float(np.log10(_HIGHEST))
+    seen = scene(mesh, np.zeros(mesh.n_vertices), sources=np.flatnonzero(truth == 0), limits=limits)
+    table = colours("viridis", is_trimmed=False)
     for (surface, scatter), (method, distance) in zip(axes, distances.items(), strict=True):
-        # A source has no relative error; it is drawn as if it had the smallest.
-        error = np.where(reachable, relative_error(distance, truth), _LOWEST)
-        painted = _paint(surface, mesh, np.clip(error, _LOWEST, _HIGHEST), norm)
+        error = np.nan_to_num(relative_error(distance, truth), nan=_HIGHEST)
+        # A source has no relative error; it is drawn as if it had the smallest. What is out of reach has no colour.
+        shown = np.where(reachable, np.clip(error, _LOWEST, _HIGHEST), np.where(truth == 0, _LOWEST, np.inf))
+        _paint(surface, replace(seen, values=np.log10(shown)), table)
         surface.set_title(method, fontsize=10)
         size = float(np.clip(60 / np.sqrt(reachable.sum()), 0.3, 3))
         errors = np.maximum(error[reachable], _LOWEST)
         scatter.plot(truth[reachable], errors, "o", ms=size, mew=0, color="tab:blue", rasterized=True)
         scatter.set(yscale="log", ylim=(_LOWEST / 2, 1), xlim=(0, truth[reachable].max()), ylabel="relative error")
         scatter.grid(visible=True, alpha=0.3)
-        figure.colorbar(painted, ax=surface, extend="both")
+        figure.colorbar(ScalarMappable(norm, table), ax=surface, extend="both")
     axes[-1, 1].set_xlabel("distance")
     return figure
 
 
-def _paint(axes: Any, mesh: Mesh, values: FloatArray, norm: Any) -> Any:
-    """Draw the surface in parallel projection along its shortest extent, far triangles first."""
-    from matplotlib.collections import PolyCollection
-
-    triangles = mesh.F if not mesh.is_tetrahedral else _skin(mesh)
-    centred = mesh.V - mesh.V[mesh.referenced].mean(axis=0)
-    _, _, directions = np.linalg.svd(centred[mesh.referenced], full_matrices=False)
-    projected = centred @ directions.T
-    order = np.argsort(projected[triangles, 2].mean(axis=1), kind="stable")
-    painted = PolyCollection(
-        projected[triangles[order], :2],
-        array=values[triangles[order]].mean(axis=1),
-        norm=norm,
-        cmap="viridis",
-        edgecolors="face",  # without, the seams between triangles shine through
-        linewidths=0.2,
-        rasterized=True,
-    )
-    axes.add_collection(painted)
-    axes.set_aspect("equal")
-    axes.autoscale_view()
+def _paint(axes: Any, seen: Scene, table: Any) -> None:
+    """Draw the surface in the colours of its values, and mark the sources."""
+    width, height = np.ptp(seen.turned[seen.used, :2], axis=0)
+    rows = int(np.clip(_COLUMNS * height / max(width, 1e-3 * height), 200, _LARGEST_ROWS))
+    scale, centre = fitted(seen, _COLUMNS, rows, 0.02 * _COLUMNS)
+    image, depth = surface_image(to_pixels(seen.turned, scale, centre), seen, _COLUMNS, rows, "plain", table)
+    axes.imshow(image, interpolation="antialiased")
+    mark_dots(axes, to_pixels(seen.dots @ seen.turn.T, scale, centre), depth)
     axes.set_axis_off()
-    return painted
-
-
-def _skin(mesh: Mesh) -> Any:
-    from heat_igl.connectivity import facets
-
-    found = facets(mesh.F, mesh.n_vertices)
-    return found.vertices[found.n_faces == 1]

@@ -29,7 +29,7 @@ from scipy.spatial import ConvexHull
 from heat_igl import Mesh, read_mesh
 from heat_igl.factorization import analyse
 from heat_igl.operators import Operators, operators
-from heat_igl.steps import HeatFlow, PoissonProblem, descent
+from heat_igl.steps import Descent, HeatFlow, PoissonProblem
 
 from environment import environment
 
@@ -74,7 +74,8 @@ def run(domain: Operators, backend: str) -> dict[str, float]:
         b[np.arange(k) * (n // k), np.arange(k)] = 1e290
         row[name] = seconds(lambda b=b: poisson.solve(heat.solve(b))) / k
     u = heat.solve(b[:, :1])
-    row["kernel"] = seconds(lambda: descent(domain, u, t))
+    descent = Descent(domain, t)
+    row["kernel"] = seconds(lambda: descent.divergence(u))
     factors = [*heat.factors, poisson.factor]
     row["nonzeros"] = sum(factor.nonzeros for factor in factors)
     row["bytes"] = sum(factor.n_bytes for factor in factors)

@@ -66,13 +66,14 @@ guarded
 native
 reference
 metrics
+raster
+scene
+surface_image
+picture
 validation_methods
 validation_plots
 validation_report
 validation
-raster
-scene
-picture
 html_view
 plots
 viewer
@@ -141,10 +142,32 @@ def test_imports_run_one_way(name):
     assert imported_modules(name) <= allowed
 
 
-def test_import_loads_no_extra():
-    code = f"import sys, heat_igl; print(*[name for name in {EXTRAS!r} if name in sys.modules])"
+def loaded(statement: str, names: list[str]) -> list[str]:
+    """Which of these modules a statement loads in a new interpreter."""
+    code = f"{statement}\nimport sys; print(*[name for name in {names!r} if name in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout.strip() == ""
+    return result.stdout.split()
+
+
+def test_import_loads_no_extra():
+    assert loaded("import heat_igl", EXTRAS) == []
+    assert loaded("from heat_igl import *", EXTRAS) == []
+
+
+def test_import_loads_what_a_distance_needs_and_little_else():
+    others = [f"heat_igl.{name}" for name in ("baselines", "cluster", "guarded", "metrics", "validation")] + ["ssl"]
+    assert loaded("import heat_igl", others) == []
+    assert loaded("from heat_igl import *", others) == others[:-1]
+
+
+def test_names_loaded_on_first_use_are_those_of_their_modules():
+    from heat_igl import validation
+
+    assert heat_igl.validate is validation.validate
+    assert heat_igl.metrics.__name__ == "heat_igl.metrics"
+    assert set(heat_igl.__all__) <= set(dir(heat_igl))
+    with pytest.raises(AttributeError, match="module 'heat_igl' has no attribute 'valdate'"):
+        _ = heat_igl.valdate
 
 
 def test_public_names_exist_and_are_documented():

@@ -13,6 +13,7 @@ import heat_igl
 from heat_igl import plots, raster, shapes
 from heat_igl.plots import Picture, picture, plot, plot_field
 from heat_igl.scene import LINE_INK, STRIPE_INK, colours
+from heat_igl.surface_image import LINE
 
 matplotlib = pytest.importorskip("matplotlib")
 
@@ -95,7 +96,7 @@ def test_isolines_lie_at_the_levels_and_have_the_width_asked_for() -> None:
     middle = image.shape[0] // 2
     columns = np.flatnonzero(plain[middle, :, 3] > 0.99)
     ratio = image[middle, columns, :3].sum(axis=1) / plain[middle, columns, :3].sum(axis=1)
-    line = plots._LINE * plots.DPI
+    line = LINE
     expected = columns[0] - 0.5 + len(columns) * np.array([0.3, 0.6, 0.9])
     away = np.abs(columns[:, None] - expected).min(axis=1)
     np.testing.assert_allclose(ratio[away > line / 2 + 2], 1, atol=1e-12)

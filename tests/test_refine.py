@@ -255,8 +255,20 @@ def test_slivers_do_little_harm(bumpy):
         for method in METHODS:
             d = HeatMethodSolver(mesh, refine=method).distance(5)[: bumpy.n_vertices]
             error[name, method] = relative_error(d, truth).mean()
-    assert error["slivers", "sweep"] < 1.5 * error["clean", "sweep"]
-    assert error["slivers", "unfold"] < 3e-4
+    for method in METHODS:
+        assert error["slivers", method] < 1.5 * error["clean", method]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_slivers_do_little_harm_on_the_cow(cow, seed):
+    """Saddles with a twin a hair away: its path may neither keep the direction to its twin nor end in its bend."""
+    sources = [901, 2227, 808]
+    clean, bad = (HeatMethodSolver(mesh, refine="unfold") for mesh in (cow, with_slivers(cow, seed)))
+    error = np.zeros(2)
+    for source in sources:
+        truth = exact(cow, source)
+        error += [relative_error(s.distance(source)[: cow.n_vertices], truth).mean() for s in (clean, bad)]
+    assert error[1] < 1.5 * error[0]
 
 
 def test_any_order_will_do(bumpy):

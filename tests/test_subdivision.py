@@ -45,6 +45,13 @@ def test_what_is_short_enough_is_left_alone():
     assert split_long_edges(mesh, mesh.edge_lengths.max()) is mesh
 
 
+def test_by_default_no_edge_stays_longer_than_the_mean():
+    mesh = uneven()
+    mean = mesh.edge_lengths.mean()
+    assert mean / 2 < split_long_edges(mesh).edge_lengths.max() <= mean
+    assert split_long_edges(mesh).n_vertices == split_long_edges(mesh, mean).n_vertices
+
+
 def test_edges_of_many_faces_keep_all_of_them():
     book = shapes.book(5, 3)
     fine = split_long_edges(book, 0.1)

@@ -30,14 +30,15 @@ from heat_igl import (
     ReferenceSolverError,
     SourceError,
     closed_forms,
-    heat_method,
     reference,
     shapes,
     validate,
     validation,
 )
 from heat_igl.operators import Operators, operators
+from heat_igl.steps import Descent
 from heat_igl.validation import draw_sources
+from heat_igl.validation_plots import error_figure
 
 
 def with_changed_operators(**changes: Callable[[Operators], Any]) -> Callable[[Mesh], HeatMethodSolver]:
@@ -67,9 +68,9 @@ def test_threshold_catches_broken_heat_steps(mesh: Mesh, percent: float) -> None
 
 
 def test_threshold_catches_a_field_that_points_to_the_source(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, right = shapes.grid(20), heat_method.descent
+    mesh, right = shapes.grid(20), Descent.divergence
     assert not validate(mesh, 0, ["heat"]).exceeding(3.5)
-    monkeypatch.setattr(heat_method, "descent", lambda domain, u, t: -right(domain, u, t))
+    monkeypatch.setattr(Descent, "divergence", lambda self, u: -right(self, u))
     assert validate(mesh, 0, ["heat"]).exceeding(3.5)
 
 
@@ -122,6 +123,28 @@ def test_report_in_every_format(cow: Mesh) -> None:
     assert len(lines) == 6
     figure = report.plot(case=1)
     assert len(figure.axes) == 2 * 2 + 2  # a surface, a scatter and a colour bar for each method
+
+
+def test_the_figure_shows_the_surface_upright_and_where_the_errors_are() -> None:
+    pytest.importorskip("matplotlib")
+    from matplotlib import colormaps
+
+    sphere = shapes.icosphere(4)
+    mesh = Mesh(sphere.V * [1, 3, 1], sphere.F)  # three times as tall, y upwards
+    truth = 1 + mesh.V[:, 1] - mesh.V[:, 1].min()
+    source = int(np.argmin(truth))
+    truth[source] = 0
+    # An error of 10 % in the upper half and none in the lower.
+    figure = error_figure("tall", mesh, truth, {"method": truth * np.where(mesh.V[:, 1] > 0, 1.1, 1.0)})
+    image = np.asarray(figure.axes[0].images[0].get_array())
+    row, column = np.nonzero(image[..., 3] > 0.5)
+    assert np.ptp(row) == pytest.approx(3 * np.ptp(column), rel=0.1)
+    dark, light = (np.array(colormaps["viridis"](end)[:3]) for end in (0.0, 1.0))
+    top, bottom = (image[row.min() + round(share * np.ptp(row)), int(np.median(column)), :3] for share in (0.3, 0.7))
+    # Shading makes colours darker and leaves the hue.
+    for found, colour, other in ((top, light, dark), (bottom, dark, light)):
+        cosine = [found @ each / np.linalg.norm(found) / np.linalg.norm(each) for each in (colour, other)]
+        assert cosine[0] > 0.99 > 0.9 > cosine[1]
 
 
 def test_infinite_errors_reach_json_as_text() -> None:

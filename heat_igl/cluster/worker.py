@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -67,11 +68,18 @@ def begin(task: Task) -> Outcome:
     """Read and validate a mesh, factor it, make its group or continue the one that is there, and solve a first span."""
     try:
         mesh = _loaded(task.item)
-        known = Store(task.store).attributes(task.item.name)
-        if known.get("status") == "done" and known["fingerprint"] == _fingerprint(mesh):
+        fingerprint = _fingerprint(mesh)
+        store = Store(task.store)
+        known = store.attributes(task.item.name)
+        if known.get("status") == "done" and known["fingerprint"] == fingerprint:
             return Outcome(task.item.name)
-        with _SHELF.solver(mesh, task) as solver:
-            group = _group(task, mesh, solver)
+        with _SHELF.solver(mesh, fingerprint, task) as solver:
+            made_of = {"fingerprint": fingerprint, "t": solver.t, "backend": solver.diagnostics.backend}
+            if all(known.get(key) == value for key, value in made_of.items()):
+                group = store.group(task.item.name)
+                group.resume()
+            else:
+                group = _new_group(task, store, mesh, solver, made_of)
             spans = _spans(group)
             _report("begun", task, blocks=sum(map(len, spans)))
             if spans:
@@ -88,10 +96,11 @@ def carry_on(task: Task) -> Outcome:
     """Solve the blocks of a task in a group that `begin` has made."""
     try:
         mesh = _loaded(task.item)
+        fingerprint = _fingerprint(mesh)
         group = Store(task.store).group(task.item.name)
-        if group.attributes["fingerprint"] != _fingerprint(mesh):
+        if group.attributes["fingerprint"] != fingerprint:
             raise ValueError("the file changed while it was worked on")
-        with _SHELF.solver(mesh, task) as solver:
+        with _SHELF.solver(mesh, fingerprint, task) as solver:
             _solve(task, group, solver, task.blocks)
         return Outcome(task.item.name)
     except BatchError:
@@ -125,23 +134,20 @@ def _fingerprint(mesh: Mesh) -> str:
     return digest.hexdigest()
 
 
-def _group(task: Task, mesh: Mesh, solver: HeatMethodSolver) -> MeshGroup:
-    """The group of the mesh: continued, if it was made of the same mesh and has the same t; else made anew."""
-    store = Store(task.store)
-    name = task.item.name
-    made_of = {"fingerprint": _fingerprint(mesh), "t": solver.t, "backend": solver.diagnostics.backend}
-    known = store.attributes(name)
-    if all(known.get(key) == value for key, value in made_of.items()):
-        group = store.group(name)
-        group.resume()
-        return group
+def _new_group(task: Task, store: Store, mesh: Mesh, solver: HeatMethodSolver, made_of: dict[str, Any]) -> MeshGroup:
     attributes = {
         "mesh": task.item.label,
         **made_of,
-        "versions": {"heat_igl": heat_igl.__version__} | {name: version(name) for name in ("libigl", "numpy", "scipy")},
+        "versions": _versions(),
         "report": {key: _plain(value) for key, value in asdict(mesh.report()).items()},
     }
-    return store.begin(name, _source_sets(task.plan, mesh, solver), mesh.n_vertices, task.dtype, attributes)
+    source_sets = _source_sets(task.plan, mesh, solver)
+    return store.begin(task.item.name, source_sets, mesh.n_vertices, task.dtype, attributes)
+
+
+@cache
+def _versions() -> dict[str, str]:
+    return {"heat_igl": heat_igl.__version__} | {name: version(name) for name in ("libigl", "numpy", "scipy")}
 
 
 def _source_sets(plan: SourcePlan, mesh: Mesh, solver: HeatMethodSolver) -> list[IntArray]:
@@ -208,10 +214,11 @@ class _Shelf:
     def __init__(self) -> None:
         self._changed = threading.Condition()
         self._places: dict[str, _Place] = {}
+        self._highest = 0
 
     @contextmanager
-    def solver(self, mesh: Mesh, task: Task) -> Iterator[HeatMethodSolver]:
-        key = f"{_fingerprint(mesh)} {task.solver_options}"
+    def solver(self, mesh: Mesh, fingerprint: str, task: Task) -> Iterator[HeatMethodSolver]:
+        key = f"{fingerprint} {task.solver_options}"
         place = self._take(key, solver_memory(mesh), _memory_for_solvers())
         try:
             with place.lock:
@@ -238,18 +245,23 @@ class _Shelf:
                 self._drop_idle(but=key)
             place = self._places.setdefault(key, _Place(needed))
             place.users += 1
+            taken = sum(place.bytes for place in self._places.values())
+            if taken > self._highest:
+                # What smaller solvers left in pieces must not add to a larger one. One that is no larger finds room in
+                # what the process holds already, and need not have it mapped again.
+                self._highest = taken
+                release_free_memory()
             return place
 
     def _drop_idle(self, but: str = "") -> None:
-        idle = [key for key, place in self._places.items() if not place.users and key != but]
-        for key in idle:
+        for key in [key for key, place in self._places.items() if not place.users and key != but]:
             del self._places[key]
-        if idle:
-            release_free_memory()
 
     def clear(self) -> None:
         with self._changed:
             self._drop_idle()
+            self._highest = 0
+            release_free_memory()
 
 
 def _memory_for_solvers() -> int:
