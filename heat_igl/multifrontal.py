@@ -30,7 +30,7 @@ _SINGULAR = 1e-13
 _ROWS = 192
 # Pieces of the tree that are solved side by side, about; and the entries that are worth a thread.
 _PIECES = 6
-_SMALLEST_PIECE = 300_000
+_SMALLEST_PIECE = 1_500_000
 
 
 def jit(function: Function) -> Function:

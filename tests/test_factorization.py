@@ -123,7 +123,7 @@ def graph(name: str) -> sp.csc_matrix:
     if name == "star":
         return sp.csc_matrix((np.ones(4000), (np.zeros(4000, int), np.arange(1, 4001))), shape=(4001, 4001))
     if name == "one large front":
-        return sp.csc_matrix(np.ones((900, 900)))
+        return sp.csc_matrix(np.ones((1800, 1800)))
     if name == "path":
         return sp.diags([np.ones(29_999)], [1], format="csc")
     if name == "many pieces":
@@ -172,7 +172,7 @@ def many_pieces():
     domain = operators(shapes.icosphere(6))
     A = (domain.M - domain.mean_edge_length**2 * domain.L).tocsc()
     factor = factorize(A, "multifrontal")
-    assert len(factor._fronts.piece_end) > 4
+    assert len(factor._fronts.piece_end) > 3
     return A, factor
 
 
