@@ -91,7 +91,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _body(entry: Callable[[], object]) -> str:
     """The lines of a function, without its head and docstring."""
     lines = inspect.getsource(entry).splitlines(keepends=True)[2:]
-    return "".join(line[4:] for line in lines)
+    return "".join(line[4:].removeprefix("return ") for line in lines)
 
 
 if __name__ == "__main__":

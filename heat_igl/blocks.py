@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heat_igl.errors import MissingExtraError
+from heat_igl.processors import pool
 from heat_igl.typing import AnyArray
 
 __all__ = ["WORKING_MEMORY", "block_size", "float_type", "in_blocks", "in_order", "progress_bar", "row_writer"]
@@ -83,12 +84,12 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], n_threads: i
     failure: Exception | None = None
     pending: deque[Future[Result]] = deque()
     iterator = iter(items)
-    with ThreadPoolExecutor(n_threads) as pool:
+    with pool(n_threads) as workers:
         try:
             while True:
                 while failure is None and len(pending) < n_threads:
                     try:
-                        pending.append(pool.submit(work, next(iterator)))
+                        pending.append(workers.submit(work, next(iterator)))
                     except StopIteration:
                         break
                     except Exception as error:

@@ -246,6 +246,8 @@ def isolines(
     _check_curves(output)
     phi = HeatMethodSolver(loaded, refine=cast(Refine | None, refine)).distance(sources)
     farthest = float(phi[np.isfinite(phi)].max())
+    if farthest < spacing:
+        raise ValueError(f"--spacing {spacing:g} makes no line: the farthest vertex is at {farthest:.3g}")
     if farthest > _MOST_LINES * spacing:
         raise ValueError(
             f"--spacing {spacing:g} makes over {_MOST_LINES} lines up to {farthest:.3g}: choose a larger one"
@@ -266,8 +268,9 @@ def path(
 ) -> None:
     """A locally shortest path between two vertices."""
     loaded = read_mesh(mesh)
-    for vertex in (start, end):
-        vertex_sources(vertex, loaded.n_vertices)
+    for option, vertex in (("--from", start), ("--to", end)):
+        if not 0 <= vertex < loaded.n_vertices:
+            raise SourceError(f"{option} {vertex} is no vertex: the mesh has {loaded.n_vertices}, counted from 0")
     _check_curves(output)
     found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), start, end)
     heat_igl.write_curves(output, loaded, found)
@@ -286,7 +289,8 @@ def validate(
     json_file: Annotated[Path | None, typer.Option("--json", help="JSON file for the report.")] = None,
     picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for errors on the surface.")] = None,
     fail_above: Annotated[
-        float | None, typer.Option(metavar="PERCENT", help="Exit with 1 if a mean error is larger.")
+        float | None,
+        typer.Option(metavar="PERCENT", help="Exit with 1 if a mean error is larger.", callback=_positive),
     ] = None,
 ) -> None:
     """How far each method is from a reference, and what it costs."""

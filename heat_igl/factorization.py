@@ -98,6 +98,9 @@ class _ScipyFactorization:
     backend = "scipy"
 
     def __init__(self, A: sp.csc_matrix, free: BoolArray | None) -> None:
+        if not A.has_sorted_indices:
+            # SuperLU's wrapper would sort in place indices that other matrices share.
+            A = A.sorted_indices()
         self._arguments = A, free
         self._free = None if free is None or free.all() else np.flatnonzero(free)
         restricted = A.tocsc() if self._free is None else A[self._free][:, self._free].tocsc()
@@ -159,7 +162,7 @@ class _MultifrontalFactorization:
         _check_finite(A)
         self._arguments = analysis, A, free
         self._fronts = fronts = analysis.fronts
-        self.nonzeros = int(fronts.first_entry[-1])
+        self.nonzeros = int(fronts.end_entry[-1])
         self._held = np.empty(0, np.intp) if free is None else np.flatnonzero(~free)
         self._entries = np.empty(self.nonzeros)
         everywhere = np.ones(A.shape[0], bool) if free is None else free
@@ -170,29 +173,29 @@ class _MultifrontalFactorization:
         _check_probe(self, A, free)
 
     def solve(self, b: FloatArray) -> FloatArray:
-        from heat_igl import multifrontal
+        from heat_igl import substitution
 
-        order, width = self._fronts.order, multifrontal.WIDTH
+        order, width = self._fronts.order, substitution.WIDTH
         # A block costs as much as a few single columns, however many of its columns are used.
-        if b.ndim == 1 or b.shape[1] < multifrontal.FEW:
+        if b.ndim == 1 or b.shape[1] < substitution.FEW:
             x = np.empty(b.shape)
             for column, its_x in zip(b.reshape(len(b), -1).T, x.reshape(len(b), -1).T, strict=True):
                 ordered = column[order].astype(np.float64)
                 ordered[self._fronts.place[self._held]] = 0.0
-                multifrontal.solve_one(self._fronts, self._entries, ordered)
+                substitution.substitute(self._fronts, self._entries, ordered)
                 its_x[order] = ordered
             return x
         x = np.empty(b.shape)
         block = np.zeros((len(order), width))
         for first in range(0, b.shape[1], width):
             columns = b[:, first : first + width]
-            if columns.shape[1] < multifrontal.FEW:
+            if columns.shape[1] < substitution.FEW:
                 x[:, first:] = self.solve(columns)
                 continue
             block[:, : columns.shape[1]] = columns[order]
             block[:, columns.shape[1] :] = 0.0
             block[self._fronts.place[self._held]] = 0.0
-            multifrontal.solve_block(self._fronts, self._entries, block)
+            substitution.substitute(self._fronts, self._entries, block)
             x[order, first : first + width] = block[:, : columns.shape[1]]
         return x
 

@@ -7,32 +7,57 @@ stored by fronts, one row index for a whole front's columns, so that a solve rea
 
 from __future__ import annotations
 
-from typing import NamedTuple, cast
+from collections.abc import Callable
+from typing import Any, NamedTuple, cast
 
 import numba
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 from heat_igl.dissection import Dissection
 from heat_igl.fans import Function
 from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 from heat_igl.typing import BoolArray, FloatArray
 
-__all__ = ["WIDTH", "Fronts", "factor", "fronts", "solve_block", "solve_one"]
+__all__ = ["Fronts", "factor", "fronts", "in_panel", "jit", "prefetch"]
 
-# Right-hand sides that are solved together; known to the compiler.
-WIDTH = 8
-# Fewer are solved one by one.
-FEW = 4
 # A pivot that has shrunk to less than this share of the diagonal is rounding.
 _SINGULAR = 1e-13
 # Rows of an update that are finished before the next ones: with the factor's rows they fit in the second cache.
 _ROWS = 192
+# Pieces of the tree that are solved side by side, about; and the entries that are worth a thread.
+_PIECES = 6
+_SMALLEST_PIECE = 300_000
 
 
 def jit(function: Function) -> Function:
     """Compile with sums in any order and fused multiplications, which never add a cancellation."""
     options = {"reassoc", "contract", "nsz"}
     return cast(Function, numba.njit(nogil=True, cache=True, error_model="numpy", fastmath=options)(function))
+
+
+def _prefetch(context: Any, array: Any, index: Any) -> Any:  # noqa: ARG001
+    """Have ``array[index]`` fetched into the cache; where there is no such element, nothing happens."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        at = builder.bitcast(builder.gep(data, [arguments[1]]), cgutils.voidptr_t)
+        number = cgutils.int32_t
+        called = ir.FunctionType(ir.VoidType(), [cgutils.voidptr_t, number, number, number])
+        to_read, everywhere, is_data = number(0), number(3), number(1)
+        builder.call(
+            builder.module.declare_intrinsic("llvm.prefetch", [cgutils.voidptr_t], called),
+            [at, to_read, everywhere, is_data],
+        )
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp), code
+
+
+prefetch = cast(Callable[[FloatArray, int], None], intrinsic(_prefetch))
 
 
 class Fronts(NamedTuple):
@@ -50,8 +75,21 @@ class Fronts(NamedTuple):
         The rows of front b below its own columns are ``rows[first_row[b]:first_row[b + 1]]``, ascending.
     rows : (r,) int32
         Places in the order.
-    first_entry : (k + 1,) int64
-        Where the columns of each front are in the factor, one after the other, each from its diagonal on down.
+    first_entry : (k,) int64
+        Where the columns of a front begin in the factor, one after the other, each from its diagonal on down. The
+        fronts lie there in the order back from the roots, as ascending memory is read fastest, and a single source's
+        heat skips most of the way forward.
+    pieces : (k,) int64
+        Fronts by piece of the tree, ascending within each.
+    piece_end : (p + 2,) int64
+        Piece i is ``pieces[piece_end[i]:piece_end[i + 1]]``; neighbours of its columns are in it or in the last one,
+        piece p, which holds the fronts above all others.
+    end_entry : (p + 1,) int64
+        Entries of the factor before each piece.
+    own_rows : (k,) int64
+        How many of a front's rows are in its own piece; the rest are in piece p.
+    above : (n,) int32
+        Numbers the columns of piece p; -1 elsewhere.
     """
 
     order: IntArray
@@ -61,6 +99,11 @@ class Fronts(NamedTuple):
     first_row: IntArray
     rows: IntArray
     first_entry: IntArray
+    pieces: IntArray
+    piece_end: IntArray
+    end_entry: IntArray
+    own_rows: IntArray
+    above: IntArray
 
 
 @jit
@@ -105,6 +148,37 @@ def _rows(
     return first_row, rows[:count].copy()
 
 
+@jit
+def _pieces(parent: IntArray, entries: IntArray) -> tuple[int, IntArray]:
+    """The number of pieces, and that of each front: subtrees of about one size, small ones together.
+
+    What is above them all is numbered as one more.
+    """
+    k = len(parent)
+    below = entries.copy()
+    for b in range(k):
+        if parent[b] >= 0:
+            below[parent[b]] += below[b]
+    most = max(entries.sum() / _PIECES, _SMALLEST_PIECE)
+    piece = np.full(k, -1, np.int64)
+    count = held = 0
+    for b in range(k - 1, -1, -1):
+        if below[b] > most:
+            continue
+        if parent[b] >= 0 and piece[parent[b]] >= 0:
+            piece[b] = piece[parent[b]]
+            continue
+        held += below[b]
+        if count == 0 or held > most:
+            count += 1
+            held = below[b]
+        piece[b] = count - 1
+    for b in range(k):
+        if piece[b] < 0:
+            piece[b] = count
+    return count, piece
+
+
 def fronts(ends: IntArray, neighbours: IntArray, dissection: Dissection) -> Fronts:
     """Symbolic factorization of a symmetric pattern, as `dissect` takes it."""
     order, start, parent = dissection
@@ -112,12 +186,36 @@ def fronts(ends: IntArray, neighbours: IntArray, dissection: Dissection) -> Fron
     place[order] = np.arange(len(order), dtype=order.dtype)
     first_row, rows = _rows(ends, neighbours, order, place, start, parent)
     columns = np.diff(start)
-    first_entry = np.concatenate([[0], np.cumsum(columns * (columns + 1) // 2 + columns * np.diff(first_row))])
-    return Fronts(order, place, start, parent, first_row, rows, first_entry)
+    entries = columns * (columns + 1) // 2 + columns * np.diff(first_row)
+    last, piece = _pieces(parent, entries)
+    pieces = np.argsort(piece, kind="stable")
+    piece_end = np.searchsorted(piece[pieces], np.arange(last + 2))
+    end_entry = np.concatenate([[0], np.cumsum(entries[pieces])])
+    first_entry = np.empty_like(entries)
+    first_entry[pieces] = end_entry[-1] - end_entry[1:]
+    is_above = np.repeat(piece == last, columns)
+    above = np.where(is_above, np.cumsum(is_above) - 1, -1).astype(np.int32)
+    # Ancestors ascend, so the rows of a front's own piece come first.
+    rows_above = np.diff(np.concatenate([[0], np.cumsum(is_above[rows])])[first_row])
+    own_rows = np.diff(first_row) - np.where(piece < last, rows_above, 0)
+    return Fronts(
+        order,
+        place,
+        start,
+        parent,
+        first_row,
+        rows,
+        first_entry,
+        pieces,
+        piece_end,
+        end_entry[piece_end],
+        own_rows,
+        above,
+    )
 
 
 @jit
-def _at(column: int, row: int, size: int) -> int:
+def in_panel(column: int, row: int, size: int) -> int:
     """Where an entry on or below the diagonal is in the columns of a front with `size` rows."""
     return column * size - column * (column + 1) // 2 + row
 
@@ -128,21 +226,21 @@ def _subtract(c: FloatArray, a: FloatArray, size: int, row: int, factor_row: int
     length = len(c)
     t = 0
     while t + 8 <= count:
-        c0, f0 = a[_at(t, row, size) :], a[_at(t, factor_row, size)] * a[_at(t, t, size)]
-        c1, f1 = a[_at(t + 1, row, size) :], a[_at(t + 1, factor_row, size)] * a[_at(t + 1, t + 1, size)]
-        c2, f2 = a[_at(t + 2, row, size) :], a[_at(t + 2, factor_row, size)] * a[_at(t + 2, t + 2, size)]
-        c3, f3 = a[_at(t + 3, row, size) :], a[_at(t + 3, factor_row, size)] * a[_at(t + 3, t + 3, size)]
-        c4, f4 = a[_at(t + 4, row, size) :], a[_at(t + 4, factor_row, size)] * a[_at(t + 4, t + 4, size)]
-        c5, f5 = a[_at(t + 5, row, size) :], a[_at(t + 5, factor_row, size)] * a[_at(t + 5, t + 5, size)]
-        c6, f6 = a[_at(t + 6, row, size) :], a[_at(t + 6, factor_row, size)] * a[_at(t + 6, t + 6, size)]
-        c7, f7 = a[_at(t + 7, row, size) :], a[_at(t + 7, factor_row, size)] * a[_at(t + 7, t + 7, size)]
+        c0, f0 = a[in_panel(t, row, size) :], a[in_panel(t, factor_row, size)] * a[in_panel(t, t, size)]
+        c1, f1 = a[in_panel(t + 1, row, size) :], a[in_panel(t + 1, factor_row, size)] * a[in_panel(t + 1, t + 1, size)]
+        c2, f2 = a[in_panel(t + 2, row, size) :], a[in_panel(t + 2, factor_row, size)] * a[in_panel(t + 2, t + 2, size)]
+        c3, f3 = a[in_panel(t + 3, row, size) :], a[in_panel(t + 3, factor_row, size)] * a[in_panel(t + 3, t + 3, size)]
+        c4, f4 = a[in_panel(t + 4, row, size) :], a[in_panel(t + 4, factor_row, size)] * a[in_panel(t + 4, t + 4, size)]
+        c5, f5 = a[in_panel(t + 5, row, size) :], a[in_panel(t + 5, factor_row, size)] * a[in_panel(t + 5, t + 5, size)]
+        c6, f6 = a[in_panel(t + 6, row, size) :], a[in_panel(t + 6, factor_row, size)] * a[in_panel(t + 6, t + 6, size)]
+        c7, f7 = a[in_panel(t + 7, row, size) :], a[in_panel(t + 7, factor_row, size)] * a[in_panel(t + 7, t + 7, size)]
         for i in range(length):
             c[i] -= ((c0[i] * f0 + c1[i] * f1) + (c2[i] * f2 + c3[i] * f3)) + (
                 (c4[i] * f4 + c5[i] * f5) + (c6[i] * f6 + c7[i] * f7)
             )
         t += 8
     while t < count:
-        column, factor = a[_at(t, row, size) :], a[_at(t, factor_row, size)] * a[_at(t, t, size)]
+        column, factor = a[in_panel(t, row, size) :], a[in_panel(t, factor_row, size)] * a[in_panel(t, t, size)]
         for i in range(length):
             c[i] -= column[i] * factor
         t += 1
@@ -155,7 +253,7 @@ def _eliminate(panel: FloatArray, columns: int, size: int, update: FloatArray) -
     Pivots stay on the diagonal. Taking their roots, as in Cholesky's form, would round once more.
     """
     for j in range(columns):
-        column = panel[_at(j, j, size) : _at(j, size, size)]
+        column = panel[in_panel(j, j, size) : in_panel(j, size, size)]
         _subtract(column, panel, size, j, j, j)
         if not column[0] > 0.0:
             return False
@@ -206,20 +304,20 @@ def factor(ends: IntArray, neighbours: IntArray, data: FloatArray, free: BoolArr
         size = columns + left
         for i in range(left):
             local[rows[i]] = columns + i
-        panel = L[f.first_entry[b] : f.first_entry[b + 1]]
+        panel = L[f.first_entry[b] : f.first_entry[b] + columns * size - columns * (columns - 1) // 2]
         panel[:] = 0.0
         for j in range(columns):
             v = f.order[start + j]
             if not free[v]:
-                panel[_at(j, j, size)] = 1.0
+                panel[in_panel(j, j, size)] = 1.0
                 continue
             for p in range(ends[v], ends[v + 1]):
                 w = neighbours[p]
                 row = f.place[w]
                 if row >= start + j and free[w]:
-                    panel[_at(j, row - start if row < end else local[row], size)] += data[p]
+                    panel[in_panel(j, row - start if row < end else local[row], size)] += data[p]
         for j in range(columns):
-            diagonal[start + j] = panel[_at(j, j, size)]
+            diagonal[start + j] = panel[in_panel(j, j, size)]
         update = stack[top : top + left * left]
         update[:] = 0.0
         # The children's updates lie below, the last one uppermost.
@@ -234,7 +332,7 @@ def factor(ends: IntArray, neighbours: IntArray, data: FloatArray, free: BoolArr
                 row = its_rows[j]
                 column = stack[below + j * m : below + (j + 1) * m]
                 if row < end:
-                    at = _at(row - start, 0, size)
+                    at = in_panel(row - start, 0, size)
                     for i in range(j, m):
                         r = its_rows[i]
                         panel[at + (r - start if r < end else local[r])] += column[i]
@@ -245,7 +343,7 @@ def factor(ends: IntArray, neighbours: IntArray, data: FloatArray, free: BoolArr
         if not _eliminate(panel, columns, size, update):
             return int(f.order[start])
         for j in range(columns):
-            if panel[_at(j, j, size)] < _SINGULAR * diagonal[start + j]:
+            if panel[in_panel(j, j, size)] < _SINGULAR * diagonal[start + j]:
                 return int(f.order[start + j])
         for i in range(left * left):
             stack[below + i] = update[i]
@@ -255,134 +353,3 @@ def factor(ends: IntArray, neighbours: IntArray, data: FloatArray, free: BoolArr
             waiting[n_waiting] = b
             n_waiting += 1
     return -1
-
-
-@jit
-def solve_one(f: Fronts, L: FloatArray, x: FloatArray) -> None:
-    """Solve in place for x (n,), in the order of elimination."""
-    k = len(f.parent)
-    room = np.empty(len(x))
-    for b in range(k):
-        start, end = f.start[b], f.start[b + 1]
-        rows = f.rows[f.first_row[b] : f.first_row[b + 1]]
-        columns, left = end - start, len(rows)
-        at = f.first_entry[b]  # of the diagonal
-        below = room[:left]
-        below[:] = 0.0
-        for j in range(columns):
-            y = x[start + j]
-            own = columns - j
-            if y != 0.0:
-                for i in range(1, own):
-                    x[start + j + i] -= L[at + i] * y
-                column = L[at + own : at + own + left]
-                for i in range(left):
-                    below[i] += column[i] * y
-            at += own + left
-        for i in range(left):
-            x[rows[i]] -= below[i]
-    for b in range(k - 1, -1, -1):
-        start, end = f.start[b], f.start[b + 1]
-        rows = f.rows[f.first_row[b] : f.first_row[b + 1]]
-        columns, left = end - start, len(rows)
-        below = room[:left]
-        for i in range(left):
-            below[i] = x[rows[i]]
-        at = f.first_entry[b + 1]
-        for j in range(columns - 1, -1, -1):
-            own = columns - j
-            at -= own + left
-            total = 0.0
-            column = L[at + own : at + own + left]
-            for i in range(left):
-                total += column[i] * below[i]
-            for i in range(1, own):
-                total += L[at + i] * x[start + j + i]
-            x[start + j] = x[start + j] / L[at] - total
-
-
-@jit
-def solve_block(f: Fronts, L: FloatArray, x: FloatArray) -> None:
-    """Solve in place for x (n, WIDTH), in the order of elimination."""
-    k = len(f.parent)
-    room = np.empty((len(x), WIDTH))
-    for b in range(k):
-        start, end = f.start[b], f.start[b + 1]
-        rows = f.rows[f.first_row[b] : f.first_row[b + 1]]
-        columns, left = end - start, len(rows)
-        size = columns + left
-        panel = L[f.first_entry[b] : f.first_entry[b + 1]]
-        own, below = x[start:end], room[:left]
-        for j in range(columns):
-            for i in range(j + 1, columns):
-                entry = panel[_at(j, i, size)]
-                for c in range(WIDTH):
-                    own[i, c] -= entry * own[j, c]
-        below[:] = 0.0
-        _forward(panel, columns, left, own, below)
-        for i in range(left):
-            for c in range(WIDTH):
-                x[rows[i], c] -= below[i, c]
-    for b in range(k - 1, -1, -1):
-        start, end = f.start[b], f.start[b + 1]
-        rows = f.rows[f.first_row[b] : f.first_row[b + 1]]
-        columns, left = end - start, len(rows)
-        size = columns + left
-        panel = L[f.first_entry[b] : f.first_entry[b + 1]]
-        own, below = x[start:end], room[:left]
-        for i in range(left):
-            for c in range(WIDTH):
-                below[i, c] = x[rows[i], c]
-        for j in range(columns):
-            pivot = panel[_at(j, j, size)]
-            for c in range(WIDTH):
-                own[j, c] /= pivot
-        _backward(panel, columns, left, below, own)
-        for j in range(columns - 1, -1, -1):
-            for i in range(j + 1, columns):
-                entry = panel[_at(j, i, size)]
-                for c in range(WIDTH):
-                    own[j, c] -= entry * own[i, c]
-
-
-@jit
-def _forward(panel: FloatArray, columns: int, left: int, own: FloatArray, below: FloatArray) -> None:
-    """Add the rows below the columns of a front, times `own`, to `below`; four columns per turn."""
-    size = columns + left
-    j = 0
-    while j + 4 <= columns:
-        c0, c1 = panel[_at(j, columns, size) :], panel[_at(j + 1, columns, size) :]
-        c2, c3 = panel[_at(j + 2, columns, size) :], panel[_at(j + 3, columns, size) :]
-        x0, x1, x2, x3 = own[j], own[j + 1], own[j + 2], own[j + 3]
-        for i in range(left):
-            e0, e1, e2, e3 = c0[i], c1[i], c2[i], c3[i]
-            for c in range(WIDTH):
-                below[i, c] += (e0 * x0[c] + e1 * x1[c]) + (e2 * x2[c] + e3 * x3[c])
-        j += 4
-    while j < columns:
-        c0, x0 = panel[_at(j, columns, size) :], own[j]
-        for i in range(left):
-            e0 = c0[i]
-            for c in range(WIDTH):
-                below[i, c] += e0 * x0[c]
-        j += 1
-
-
-@jit
-def _backward(panel: FloatArray, columns: int, left: int, below: FloatArray, own: FloatArray) -> None:
-    """Subtract the rows below the columns of a front, times `below`, from `own`; four rows per turn."""
-    size = columns + left
-    for j in range(columns):
-        column, x = panel[_at(j, columns, size) :], own[j]
-        i = 0
-        while i + 4 <= left:
-            e0, e1, e2, e3 = column[i], column[i + 1], column[i + 2], column[i + 3]
-            b0, b1, b2, b3 = below[i], below[i + 1], below[i + 2], below[i + 3]
-            for c in range(WIDTH):
-                x[c] -= (e0 * b0[c] + e1 * b1[c]) + (e2 * b2[c] + e3 * b3[c])
-            i += 4
-        while i < left:
-            e0, b0 = column[i], below[i]
-            for c in range(WIDTH):
-                x[c] -= e0 * b0[c]
-            i += 1

@@ -3,6 +3,7 @@
     python scripts/cluster_table.py                     # 200 generated meshes, 64 sources each
     python scripts/cluster_table.py --meshes 20         # a shorter look
     python scripts/cluster_table.py --add FOLDER        # real meshes among them
+    python scripts/cluster_table.py --docs docs/cluster.md    # also writes the tables of that page
 
 The plain loop reads each file, makes a solver, solves, and saves one file of float32. All use one thread a process; the
 three take turns, so that what else happens on the machine hits them alike. Writes cluster_table.json and .md. Needs the
@@ -26,6 +27,7 @@ from typing import Any
 
 import igl
 import numpy as np
+from benchmark import fill_in
 
 from heat_igl import HeatMethodSolver, Mesh, cluster, read_mesh, shapes, write_mesh
 from heat_igl.cluster.memory import PROCESS_MEMORY, solver_memory
@@ -95,6 +97,8 @@ def seconds_of_batch(folder: Path, store: Path, workers: int) -> float:
 
 def _warm() -> None:
     """Imports, which the loop's time does not include either."""
+    import zarr  # noqa: F401
+
     import heat_igl.cluster.worker  # noqa: F401
 
     HeatMethodSolver(shapes.icosphere(2)).distance(0)
@@ -194,6 +198,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--add", type=Path, metavar="FOLDER", help="real meshes")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--out", type=Path, default=Path())
+    parser.add_argument("--docs", type=Path, help="page whose tables are to be written")
     parser.add_argument("--loop", type=Path, nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args(argv)
     if arguments.loop:
@@ -211,6 +216,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     text = markdown(result)
     (arguments.out / "cluster_table.md").write_text(text, encoding="utf8")
     print(text)
+    if arguments.docs:
+        page = arguments.docs.read_text(encoding="utf8")
+        arguments.docs.write_text(fill_in(page, {"rates and memory": text}), encoding="utf8")
     return 0
 
 

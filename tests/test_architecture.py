@@ -37,6 +37,7 @@ relaxation
 iterative
 dissection
 multifrontal
+substitution
 factorization
 sources
 near_field

@@ -122,6 +122,25 @@ def test_an_output_directory_that_does_not_exist(sphere: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a directory in which even root cannot write")
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["path", "--from=0", "--to=162", "--output=p.obj"], 1, ("--to 162 is no vertex", "162, counted from 0")),
+        (["path", "--from=-1", "--to=0", "--output=p.obj"], 1, ("--from -1 is no vertex",)),
+        (["isolines", "--source=0", "--spacing=9", "--output=l.obj"], 1, ("--spacing 9 makes no line",)),
+        (["validate", "--methods=heat", "--fail-above=nan"], 2, ("--fail-above", "nan is not a positive number")),
+    ],
+)
+def test_a_request_without_meaning_names_its_option_and_leaves_no_file(
+    sphere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str], status: int, words: tuple[str, ...],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(sphere.parent)
+    assert cli.run([arguments[0], str(sphere), *arguments[1:]]) == status
+    assert_one_line(capsys.readouterr().err, *words)
+    assert files(sphere.parent) == {"sphere.off"}
+
+
 @pytest.mark.parametrize("option", ["--output=/proc/out.ply", "--picture=/proc/out.png"])
 def test_an_output_that_cannot_be_written(sphere: Path, option: str) -> None:
     done = command("distance", sphere, "--source", 0, option, cwd=sphere.parent)

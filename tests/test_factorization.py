@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 
@@ -8,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from heat_igl import FactorizationError, MissingExtraError, factorization, shapes
+from heat_igl import FactorizationError, MissingExtraError, factorization, processors, shapes
 from heat_igl.factorization import analyse, factorize
 from heat_igl.operators import operators
 
@@ -121,6 +122,8 @@ def graph(name: str) -> sp.csc_matrix:
         return sp.csc_matrix(np.ones((60, 60)))
     if name == "star":
         return sp.csc_matrix((np.ones(4000), (np.zeros(4000, int), np.arange(1, 4001))), shape=(4001, 4001))
+    if name == "one large front":
+        return sp.csc_matrix(np.ones((900, 900)))
     if name == "path":
         return sp.diags([np.ones(29_999)], [1], format="csc")
     if name == "many pieces":
@@ -128,7 +131,9 @@ def graph(name: str) -> sp.csc_matrix:
     return sp.random(1500, 1500, density=0.003, rng=rng, format="csc")
 
 
-@pytest.mark.parametrize("name", ["one vertex", "no edges", "complete", "star", "path", "many pieces", "random"])
+@pytest.mark.parametrize(
+    "name", ["one vertex", "no edges", "complete", "one large front", "star", "path", "many pieces", "random"]
+)
 def test_any_graph(name):
     """Of every graph the Laplacian plus the identity is solved, whatever its separators look like."""
     pytest.importorskip("numba")
@@ -158,3 +163,82 @@ def test_the_order_does_not_depend_on_threads():
     assert L.shape[0] > 40_000  # large enough to be cut up among threads
     assert all((a == b).all() for a, b in zip(alone, together, strict=True))
     assert (np.sort(alone.order) == np.arange(L.shape[0])).all()
+
+
+@pytest.fixture(scope="module")
+def many_pieces():
+    """A factor that is solved in pieces side by side."""
+    pytest.importorskip("numba")
+    domain = operators(shapes.icosphere(6))
+    A = (domain.M - domain.mean_edge_length**2 * domain.L).tocsc()
+    factor = factorize(A, "multifrontal")
+    assert len(factor._fronts.piece_end) > 4
+    return A, factor
+
+
+def test_pieces_side_by_side_solve_the_system(many_pieces, monkeypatch):
+    """Noise, and a single source, most of whose way forward is skipped; the bits do not depend on the threads."""
+    A, factor = many_pieces
+    noise = np.random.default_rng(7).standard_normal((A.shape[0], 11))
+    noise[:, 3:] = 0.0
+    noise[np.arange(3, 11) * 3000, np.arange(3, 11)] = 1.0
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: set(range(3)), raising=False)
+    solutions = []
+    for n_threads in ("1", "2", "3"):
+        monkeypatch.setenv("HEAT_IGL_NUM_THREADS", n_threads)
+        x = factor.solve(noise)
+        one = np.stack([factor.solve(column) for column in noise.T], axis=1)
+        np.testing.assert_allclose(A @ x, noise, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(A @ one, noise, rtol=0, atol=1e-13)
+        solutions.append((x, one))
+    for several in solutions[1:]:
+        assert all((a == b).all() for a, b in zip(several, solutions[0], strict=True))
+
+
+def test_pieces_have_no_neighbours_but_above(many_pieces):
+    A, factor = many_pieces
+    fronts = factor._fronts
+    assert (np.sort(fronts.pieces) == np.arange(len(fronts.parent))).all()
+    last = len(fronts.piece_end) - 2
+    piece = np.empty(len(fronts.parent), int)
+    piece[fronts.pieces] = np.repeat(np.arange(last + 1), np.diff(fronts.piece_end))
+    at = np.repeat(piece, np.diff(fronts.start))[fronts.place]
+    entries = A.tocoo()
+    one, other = at[entries.row], at[entries.col]
+    assert ((one == other) | (one == last) | (other == last)).all()
+
+
+def test_one_thread_starts_no_other(many_pieces, monkeypatch):
+    A, factor = many_pieces
+    monkeypatch.setattr("heat_igl.processors.ThreadPoolExecutor", None)
+    monkeypatch.setenv("HEAT_IGL_NUM_THREADS", "1")
+    factor.solve(np.ones(A.shape[0]))
+
+
+def test_threads_divide_the_processors(monkeypatch):
+    """So that work which is on all processors already does not start more threads."""
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: set(range(8)), raising=False)
+    monkeypatch.setattr("os.cpu_count", lambda: 8)
+
+    def inside() -> tuple[int, int]:
+        with processors.pool(3) as workers:
+            return processors.n_threads(), workers.submit(processors.n_threads).result()
+
+    with processors.pool(2) as workers:
+        assert workers.submit(inside).result() == (4, 1)
+    assert processors.n_threads() == 8
+
+
+def test_unsorted_indices(heat_matrix, backend):
+    """Other matrices may share them: they are not sorted behind their back."""
+    rng = np.random.default_rng(8)
+    shuffled = np.concatenate(
+        [low + rng.permutation(high - low) for low, high in itertools.pairwise(heat_matrix.indptr)]
+    )
+    indices = heat_matrix.indices[shuffled]
+    A = sp.csc_matrix((heat_matrix.data[shuffled], indices, heat_matrix.indptr), shape=heat_matrix.shape)
+    kept = indices.copy()
+    b = rng.standard_normal(A.shape[0])
+    np.testing.assert_allclose(heat_matrix @ factorize(A, backend).solve(b), b, rtol=0, atol=1e-12)
+    assert (indices == kept).all()
+    assert np.shares_memory(A.indices, indices)

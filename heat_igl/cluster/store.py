@@ -221,7 +221,7 @@ class MeshGroup:
 
 
 def _checksum(distances: AnyArray) -> int:
-    return zlib.crc32(np.ascontiguousarray(distances))
+    return zlib.crc32(np.ascontiguousarray(distances).data)
 
 
 def _group(attributes: Mapping[str, Any]) -> dict[str, Any]:

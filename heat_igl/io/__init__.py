@@ -208,6 +208,8 @@ def _checked(path: str | os.PathLike[str]) -> Path:
     if not printable:
         raise MeshError(f"{str(path)!r} cannot be a path: it holds characters that no file name may have")
     if found.suffix.lower() not in _FORMATS:
+        if found.is_dir():
+            raise MeshError(f"{found} is a directory: name a mesh file in it")
         raise MeshError(f"{found}: unknown extension '{found.suffix}'; the formats are {', '.join(_FORMATS)}")
     return found
 
