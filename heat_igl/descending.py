@@ -82,7 +82,7 @@ def descent_on_triangles(t: Triangles, u: FloatArray, smallest: float) -> FloatA
 
 
 @jit
-def descent(
+def _single(
     ends: IntArray,
     vertices: IntArray,
     gradient: FloatArray,
@@ -91,12 +91,54 @@ def descent(
     u: FloatArray,
     smallest: float,
 ) -> FloatArray:
-    """Integrated divergence (n, k) of -grad u / |grad u|, times |grad log u| / full_rate where that is below 1.
+    """`descent` for one column (n,) and up to three coordinates, which then stay in registers."""
+    m = len(weights)
+    dimension = (len(ends) - 1) // m
+    divergence = np.zeros(len(u))
+    log_u = np.log(u) if full_rate.any() else u
+    for f in range(m):
+        damps = full_rate[f] > 0.0
+        x = y = z = rate = 0.0
+        for d in range(dimension):
+            total = total_of_log = 0.0
+            for p in range(ends[d * m + f], ends[d * m + f + 1]):
+                total += gradient[p] * u[vertices[p]]
+                total_of_log += gradient[p] * log_u[vertices[p]]
+            rate += total_of_log * total_of_log
+            if d == 0:
+                x = total
+            elif d == 1:
+                y = total
+            else:
+                z = total
+        largest = max(abs(x), abs(y), abs(z))
+        if not largest >= smallest:
+            continue
+        # Squares of entries below 1e-154 would vanish: the largest is made 1 first.
+        x, y, z = x / largest, y / largest, z / largest
+        scale = weights[f] / np.sqrt(x * x + y * y + z * z)
+        if damps:
+            share = np.sqrt(rate) / full_rate[f]
+            if share < 1.0:
+                scale *= share
+        for d in range(dimension):
+            component = scale * (x if d == 0 else y if d == 1 else z)
+            for p in range(ends[d * m + f], ends[d * m + f + 1]):
+                divergence[vertices[p]] += gradient[p] * component
+    return divergence
 
-    The gradient is given by its rows (compressed, stacked by coordinate), per face of size `weights` (m,). Where
-    `full_rate` (m,) is 0, and where u is not positive, the field has length 1; it is 0 where no component of grad u
-    reaches `smallest`.
-    """
+
+@jit
+def _several(
+    ends: IntArray,
+    vertices: IntArray,
+    gradient: FloatArray,
+    weights: FloatArray,
+    full_rate: FloatArray,
+    u: FloatArray,
+    smallest: float,
+) -> FloatArray:
+    """`descent` for several columns at once."""
     m, k = len(weights), u.shape[1]
     dimension = (len(ends) - 1) // m
     divergence = np.zeros(u.shape)
@@ -145,3 +187,23 @@ def descent(
                 for c in range(k):
                     divergence[v, c] -= g * X[d, c]
     return divergence
+
+
+def descent(
+    ends: IntArray,
+    vertices: IntArray,
+    gradient: FloatArray,
+    weights: FloatArray,
+    full_rate: FloatArray,
+    u: FloatArray,
+    smallest: float,
+) -> FloatArray:
+    """Integrated divergence (n, k) of -grad u / |grad u|, times |grad log u| / full_rate where that is below 1.
+
+    The gradient is given by its rows (compressed, stacked by coordinate), per face of size `weights` (m,). Where
+    `full_rate` (m,) is 0, and where u is not positive, the field has length 1; it is 0 where no component of grad u
+    reaches `smallest`.
+    """
+    if u.shape[1] == 1 and len(ends) - 1 <= 3 * len(weights):
+        return np.asarray(_single(ends, vertices, gradient, weights, full_rate, u[:, 0].copy(), smallest)[:, None])
+    return np.asarray(_several(ends, vertices, gradient, weights, full_rate, u, smallest))
