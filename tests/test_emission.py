@@ -66,8 +66,9 @@ def test_a_point_in_a_face_is_as_good_a_source_as_a_vertex(name, refine, request
         np.testing.assert_allclose(distance[corners], straight, rtol=1e-9)
         of_points.append(relative_error(distance, truth))
         of_vertices.append(relative_error(solver.distance(corners[0]), reference.exact(mesh, int(corners[0]))))
-    # As good on average; single sources differ by where their cut locus is.
-    assert np.mean(of_points) < 1.05 * np.mean(of_vertices)
+    # As good on average; single sources differ by where their cut locus is, and what is below the tolerance of the
+    # unfolding is chance.
+    assert np.mean(of_points) < max(1.05 * np.mean(of_vertices), 4e-5)
 
 
 def test_near_field_joins_the_far_field(bunny):
