@@ -42,7 +42,7 @@ from heat_igl.surface_points import SurfaceCurve, SurfacePoints
 if TYPE_CHECKING:
     from heat_igl import baselines, closed_forms, cluster, metrics, reference
     from heat_igl.validation import validate
-    from heat_igl.validation_report import ValidationReport, ValidationRow
+    from heat_igl.validation.report import ValidationReport, ValidationRow
 
 __all__ = [
     "AccuracyWarning",
@@ -107,8 +107,8 @@ __version__ = "0.1.0"
 
 # What a distance does without is loaded on first use: the name, and the module that it is, or is in.
 _LATER = {
-    "ValidationReport": "validation_report",
-    "ValidationRow": "validation_report",
+    "ValidationReport": "validation.report",
+    "ValidationRow": "validation.report",
     "baselines": "baselines",
     "closed_forms": "closed_forms",
     "cluster": "cluster",

@@ -25,6 +25,7 @@ from rich.text import Text
 
 import heat_igl
 from heat_igl.curve_files import CURVE_SUFFIXES
+from heat_igl.drawing.picture import PAGE_SUFFIXES, PICTURE_SUFFIXES, Picture, replace_file
 from heat_igl.errors import (
     AccuracyWarning,
     BatchError,
@@ -35,13 +36,12 @@ from heat_igl.errors import (
     SourceError,
 )
 from heat_igl.factorization import Backend
-from heat_igl.guarded import TIMEOUT
 from heat_igl.heat_method import HeatMethodSolver, Magnitude
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Laplacian
-from heat_igl.picture import PAGE_SUFFIXES, PICTURE_SUFFIXES, Picture, replace_file
 from heat_igl.projection import closest_points
+from heat_igl.reference.guarded import TIMEOUT
 from heat_igl.refine import Refine
 from heat_igl.sources import vertex_sources
 from heat_igl.steps import Boundary

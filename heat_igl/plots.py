@@ -1,7 +1,7 @@
 """Pictures of a distance, or of another field, on a mesh: static ones without a display or OpenGL, and pages to turn.
 
-matplotlib lays out the figure; `heat_igl.raster` draws the surface, since matplotlib cannot hide what is behind and VTK
-needs OpenGL system libraries that slim machines lack. Needs the extra ``view``.
+matplotlib lays out the figure; `heat_igl.drawing` draws the surface, since matplotlib cannot hide what is behind and
+VTK needs OpenGL system libraries that slim machines lack. Needs the extra ``view``.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from heat_igl.html_view import Page, page
-from heat_igl.mesh import Mesh
-from heat_igl.picture import DPI, Picture
-from heat_igl.raster import to_pixels, visible_runs
-from heat_igl.scene import (
+from heat_igl.drawing.html_view import Page, page
+from heat_igl.drawing.picture import DPI, Picture
+from heat_igl.drawing.raster import to_pixels, visible_runs
+from heat_igl.drawing.scene import (
     DISTANCE_LABEL,
     LINE_INK,
     STRIPE_INK,
@@ -27,8 +26,9 @@ from heat_igl.scene import (
     colours,
     scene,
 )
+from heat_igl.drawing.surface_image import LINE, OVERSAMPLING, SOURCE, fitted, mark_dots, surface_image
+from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources
-from heat_igl.surface_image import LINE, OVERSAMPLING, SOURCE, fitted, mark_dots, surface_image
 from heat_igl.surface_points import SurfaceCurve
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 
@@ -73,8 +73,8 @@ def plot(
     curves : sequence of SurfaceCurve
         Drawn on the surface; thin and dotted where they are behind it.
     view : (azimuth, elevation), optional
-        Where the viewer is, in degrees; see `heat_igl.raster.rotation`. By default a flat mesh is seen face on, and
-        another from the one of eight directions that shows the most of it and of its sources.
+        Where the viewer is, in degrees; see `heat_igl.drawing.raster.rotation`. By default a flat mesh is seen face on,
+        and another from the one of eight directions that shows the most of it and of its sources.
     up : {"x", "y", "z"}
         The coordinate that points upwards.
     colormap : str

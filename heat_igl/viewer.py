@@ -15,10 +15,10 @@ from typing import Any, get_args
 import numpy as np
 
 from heat_igl import reference
+from heat_igl.drawing.raster import isoline_spacing
 from heat_igl.errors import FactorizationError, MissingExtraError, ReferenceSolverError
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.mesh import Mesh
-from heat_igl.raster import isoline_spacing
 from heat_igl.refine import Refine
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.steps import Boundary

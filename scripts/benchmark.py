@@ -93,13 +93,13 @@ def _libigl(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch | None, dict[str
 
 
 def _front(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch | None, dict[str, Any]]:
-    from heat_igl.native import meshlab_front
+    from heat_igl.reference.native import meshlab_front
 
     return lambda source: meshlab_front(V, F, np.array([source]))["distance"], None, {}
 
 
 def _exact(V: np.ndarray, F: np.ndarray) -> tuple[Solve, Batch | None, dict[str, Any]]:
-    from heat_igl.native import pygeodesic_exact
+    from heat_igl.reference.native import pygeodesic_exact
 
     return lambda source: pygeodesic_exact(V, F, np.array([source]))["distance"], None, {}
 

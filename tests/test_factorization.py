@@ -155,7 +155,7 @@ def test_dissection_keeps_fill_low():
 
 def test_the_order_does_not_depend_on_threads():
     pytest.importorskip("numba")
-    from heat_igl.dissection import dissect
+    from heat_igl.factorization.dissection import dissect
 
     L = operators(shapes.icosphere(6)).L
     with ThreadPoolExecutor(3) as workers:

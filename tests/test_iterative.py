@@ -8,7 +8,8 @@ import scipy.sparse as sp
 from conftest import perturbed, shared_path
 
 import heat_igl
-from heat_igl import FactorizationError, HeatMethodSolver, Mesh, factorization, iterative, shapes
+from heat_igl import FactorizationError, HeatMethodSolver, Mesh, factorization, shapes
+from heat_igl.factorization import iterative
 from heat_igl.operators import operators
 
 pytest.importorskip("numba")

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import plots, raster, shapes
+from heat_igl import plots, shapes
+from heat_igl.drawing import raster
+from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, colours
+from heat_igl.drawing.surface_image import LINE
 from heat_igl.plots import Picture, picture, plot, plot_field
-from heat_igl.scene import LINE_INK, STRIPE_INK, colours
-from heat_igl.surface_image import LINE
 
 matplotlib = pytest.importorskip("matplotlib")
 

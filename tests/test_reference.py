@@ -475,7 +475,7 @@ def test_real_segmentation_faults_stay_in_the_child(name: str, function: str) ->
     mesh = load(name)
     arrays = {"V": mesh.V, "F": mesh.F, "sources": mesh.F[0, :1]}
     with pytest.raises(ReferenceSolverError, match=f"native:{function} died with"):
-        guarded.call(f"heat_igl.native:{function}", arrays)
+        guarded.call(f"heat_igl.reference.native:{function}", arrays)
 
 
 @pytest.mark.parametrize("function", ["pygeodesic_exact", "igl_exact", "meshlab_front", "igl_heat"])
@@ -488,7 +488,7 @@ def test_an_index_out_of_range_takes_nothing_down(function: str) -> None:
     # And if it got past that, it would take the child only.
     options = {"t": None, "intrinsic_delaunay": False} if function == "igl_heat" else {}
     with pytest.raises(ReferenceSolverError, match=f"native:{function} (died with|failed with)"):
-        guarded.call(f"heat_igl.native:{function}", {"V": mesh.V, "F": F, "sources": np.array([0])}, options)
+        guarded.call(f"heat_igl.reference.native:{function}", {"V": mesh.V, "F": F, "sources": np.array([0])}, options)
     assert np.isfinite(reference.exact(mesh, 0)).all()
 
 
@@ -608,7 +608,7 @@ def test_a_child_that_leaks_is_replaced() -> None:
     arrays = {"V": mesh.V, "F": mesh.F, "sources": np.array([0])}
     first, pids = 0, []
     for _ in range(30):
-        guard.call("heat_igl.native:meshlab_heat", arrays, {"m": 1.0})
+        guard.call("heat_igl.reference.native:meshlab_heat", arrays, {"m": 1.0})
         if guard.pid is None:
             continue
         resident = psutil.Process(guard.pid).memory_info().rss
@@ -646,7 +646,7 @@ def test_repeated_crashes_leave_no_child_no_memory_and_no_file() -> None:
 
 ABANDON = """
 import os, threading, time
-from heat_igl import guarded
+from heat_igl.reference import guarded
 threading.Thread(target=lambda: guarded.call("signal:pause", {}, timeout=0.5), daemon=True).start()
 while guarded._shared.pid is None:
     time.sleep(0.01)

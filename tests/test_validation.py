@@ -38,7 +38,7 @@ from heat_igl import (
 from heat_igl.operators import Operators, operators
 from heat_igl.steps import Descent
 from heat_igl.validation import draw_sources
-from heat_igl.validation_plots import error_figure
+from heat_igl.validation.plots import error_figure
 
 
 def with_changed_operators(**changes: Callable[[Operators], Any]) -> Callable[[Mesh], HeatMethodSolver]:

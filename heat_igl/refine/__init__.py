@@ -23,7 +23,7 @@ from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from heat_igl.fans import Tables
-    from heat_igl.unfolding import Points
+    from heat_igl.refine.unfolding import Points
 
 __all__ = ["Refine", "Refinement", "unfolded_distance"]
 
@@ -180,7 +180,7 @@ class Refinement:
 
     def _order(self, key: FloatArray) -> IntArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
-        from heat_igl.ordering import ascending
+        from heat_igl.refine.ordering import ascending
 
         on_sheets = np.tile(key, self._n_sheets) if self._n_sheets > 1 else np.ascontiguousarray(key)
         return np.asarray(self._number[ascending(on_sheets)])
@@ -301,7 +301,8 @@ def _renumbered(
 def _kernels() -> tuple[ModuleType, ModuleType, ModuleType]:
     """The modules of compiled kernels, loaded when they are first needed."""
     try:
-        from heat_igl import fans, sweeping, unfolding
+        from heat_igl import fans
+        from heat_igl.refine import sweeping, unfolding
     except ImportError as error:
         if error.name is None or not error.name.startswith(("numba", "llvmlite")):
             raise

@@ -7,7 +7,7 @@ the other side of the vertex, which makes the path shorter (Xin and Wang 2007); 
 left. Nothing here needs faces that are oriented alike. Side "left" is the side of the second of a half-edge's ends for
 the first crossing of a strip, and carried along from there.
 
-All in one file, as in `heat_igl.unfolding`, for the sake of numba's cache.
+All in one file, as in `heat_igl.refine.unfolding`, for the sake of numba's cache.
 """
 
 from __future__ import annotations

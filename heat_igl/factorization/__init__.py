@@ -21,7 +21,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from heat_igl.errors import FactorizationError, MissingExtraError
-from heat_igl.iterative import IterativeAnalysis, factors_fit, has_iterative
+from heat_igl.factorization.iterative import IterativeAnalysis, factors_fit, has_iterative
 from heat_igl.processors import n_threads
 from heat_igl.typing import BoolArray, FloatArray
 
@@ -134,7 +134,7 @@ class _MultifrontalAnalysis:
     backend = "multifrontal"
 
     def __init__(self, pattern: sp.csc_matrix) -> None:
-        from heat_igl import dissection, multifrontal
+        from heat_igl.factorization import dissection, multifrontal
 
         self._ends, self._neighbours = pattern.indptr, pattern.indices
         with ThreadPoolExecutor(n_threads()) as workers:
@@ -157,7 +157,7 @@ class _MultifrontalFactorization:
     backend = "multifrontal"
 
     def __init__(self, analysis: _MultifrontalAnalysis, A: sp.csc_matrix, free: BoolArray | None) -> None:
-        from heat_igl import multifrontal
+        from heat_igl.factorization import multifrontal
 
         _check_finite(A)
         self._arguments = analysis, A, free
@@ -173,7 +173,7 @@ class _MultifrontalFactorization:
         _check_probe(self, A, free)
 
     def solve(self, b: FloatArray) -> FloatArray:
-        from heat_igl import substitution
+        from heat_igl.factorization import substitution
 
         order, width = self._fronts.order, substitution.WIDTH
         # A block costs as much as a few single columns, however many of its columns are used.

@@ -18,7 +18,7 @@ from heat_igl.surface_points import SurfaceCurve, SurfacePoints
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from heat_igl.tracing import Surface
+    from heat_igl.paths.tracing import Surface
 
 __all__ = ["shortest_paths"]
 
@@ -101,7 +101,7 @@ def shortest_paths(
 
 def _kernel() -> ModuleType:
     try:
-        from heat_igl import tracing
+        from heat_igl.paths import tracing
     except ImportError as error:
         if error.name is None or not error.name.startswith(("numba", "llvmlite")):
             raise

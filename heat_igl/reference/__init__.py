@@ -1,7 +1,7 @@
 """Distances to compare with: exact polyhedral ones, MeshLab's filters, and the heat methods of other libraries.
 
-Every native solver runs in a child process (`heat_igl.guarded`), on one connected component at a time, so that
-sources in several components work and what no source reaches is ``inf``, whichever number the solver would write
+Every native solver runs in a child process (`heat_igl.reference.guarded`), on one connected component at a time, so
+that sources in several components work and what no source reaches is ``inf``, whichever number the solver would write
 there. `docs/references.md` says how far each can be trusted. Closed forms are in `heat_igl.closed_forms`.
 """
 
@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl import connectivity, guarded
+from heat_igl import connectivity
 from heat_igl.bounds import edge_paths, straight_lines
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
-from heat_igl.guarded import MEMORY, TIMEOUT
 from heat_igl.mesh import Mesh
+from heat_igl.reference import guarded
+from heat_igl.reference.guarded import MEMORY, TIMEOUT
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray, IntArray
 
@@ -254,7 +255,11 @@ def measured(
         if not to_boundary:
             arrays["sources"] = part_seeds
         reply = guarded.call(
-            f"heat_igl.native:{chosen.function}", arrays, {**chosen.options, **options}, timeout=timeout, memory=memory
+            f"heat_igl.reference.native:{chosen.function}",
+            arrays,
+            {**chosen.options, **options},
+            timeout=timeout,
+            memory=memory,
         )
         _check(solver, chosen, part, part_seeds, reply.values["distance"])
         return reply

@@ -9,13 +9,13 @@ import numpy as np
 from heat_igl import metrics
 from heat_igl.bounds import edge_paths, straight_lines
 from heat_igl.errors import FactorizationError, MeshError, MissingExtraError, ReferenceSolverError, SourceError
-from heat_igl.guarded import MEMORY, TIMEOUT
 from heat_igl.mesh import Mesh
 from heat_igl.metrics import BoundViolations
+from heat_igl.reference.guarded import MEMORY, TIMEOUT
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
-from heat_igl.validation_methods import METHODS, Counter, Method, Progress, Run, Solver, named, run
-from heat_igl.validation_report import ValidationReport, ValidationRow
+from heat_igl.validation.methods import METHODS, Counter, Method, Progress, Run, Solver, named, run
+from heat_igl.validation.report import ValidationReport, ValidationRow
 
 __all__ = ["METHODS", "Method", "Progress", "Solver", "draw_sources", "validate"]
 

@@ -7,9 +7,9 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from heat_igl.drawing.raster import default_rotation, isoline_spacing, rotation
 from heat_igl.errors import MissingExtraError
 from heat_igl.mesh import Mesh
-from heat_igl.raster import default_rotation, isoline_spacing, rotation
 from heat_igl.sources import Sources, source_set
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 

@@ -264,7 +264,7 @@ def available_memory() -> float:
 def _kernel() -> ModuleType:
     """The compiled kernel, loaded when it is first needed."""
     try:
-        from heat_igl import relaxation
+        from heat_igl.factorization import relaxation
     except ImportError as error:
         if error.name is None or not error.name.startswith(("numba", "llvmlite")):
             raise

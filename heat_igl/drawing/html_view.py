@@ -1,7 +1,8 @@
 """An interactive view as one HTML file: no server, no network, no library.
 
 The surface is drawn with WebGL; a click moves the source, and the page computes the distance anew, by the sweep of
-`heat_igl.sweeping` written a second time for browsers (page/sweep.js). Needs the extra ``view`` for the colours only.
+`heat_igl.refine.sweeping` written a second time for browsers (page/sweep.js). Needs the extra ``view`` for the colours
+only.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from typing import Any, get_args
 
 import numpy as np
 
+from heat_igl.drawing.picture import PAGE_SUFFIXES, replace_file
+from heat_igl.drawing.scene import DISTANCE_LABEL, LINE_INK, STRIPE_INK, Style, check_style, colours, scene
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.mesh import Mesh
-from heat_igl.picture import PAGE_SUFFIXES, replace_file
-from heat_igl.scene import DISTANCE_LABEL, LINE_INK, STRIPE_INK, Style, check_style, colours, scene
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike
 
@@ -138,7 +139,7 @@ def page(
     meta["arrays"] = [
         (name, "float" if array.dtype.kind == "f" else "int", array.size) for name, array in arrays.items()
     ]
-    folder = files("heat_igl") / "page"
+    folder = files("heat_igl.drawing") / "page"
     parts = {name: (folder / name).read_text(encoding="utf8") for name in ("page.html", "sweep.js", "view.js")}
     return Page(
         Template(parts["page.html"]).substitute(

@@ -277,7 +277,7 @@ class Descent:
         if importlib.util.find_spec("numba") is None:
             _ = operators.D  # made on first use otherwise, in the middle of the first query
             return
-        from heat_igl import descending
+        from heat_igl.steps import descending
 
         full_rate = np.zeros(len(operators.weights)) if t is None else _FULL_RATE * _front_rate(operators, t)
         full_rate[operators.boundary_faces] = 0.0
@@ -292,12 +292,12 @@ class Descent:
         """Integrated divergence (n, k) for heat (n, k)."""
         operators = self._operators
         if self._triangles is not None:
-            from heat_igl.descending import descent_on_triangles
+            from heat_igl.steps.descending import descent_on_triangles
 
             return descent_on_triangles(self._triangles, u, _SMALLEST_GRADIENT)
         rows = operators.gradient_rows
         if self._full_rate is not None:
-            from heat_igl.descending import descent
+            from heat_igl.steps.descending import descent
 
             heat = np.ascontiguousarray(u)
             return np.asarray(

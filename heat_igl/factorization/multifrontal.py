@@ -17,7 +17,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from heat_igl.dissection import Dissection
+from heat_igl.factorization.dissection import Dissection
 from heat_igl.fans import Function
 from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 from heat_igl.typing import BoolArray, FloatArray

@@ -41,7 +41,7 @@ _GRACE = 5.0
 _LONGEST_ALARM = 2.0**20
 _NO_BOUND = 2.0**62
 
-_START = "import sys; sys.path[:] = sys.argv[1:]; from heat_igl.guarded import _serve; _serve()"
+_START = "import sys; sys.path[:] = sys.argv[1:]; from heat_igl.reference.guarded import _serve; _serve()"
 
 
 class Reply(NamedTuple):

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from heat_igl.drawing.raster import to_pixels
+from heat_igl.drawing.scene import Scene, colours, scene
+from heat_igl.drawing.surface_image import fitted, mark_dots, surface_image
 from heat_igl.errors import MissingExtraError
 from heat_igl.mesh import Mesh
 from heat_igl.metrics import relative_error
-from heat_igl.raster import to_pixels
-from heat_igl.scene import Scene, colours, scene
-from heat_igl.surface_image import fitted, mark_dots, surface_image
 from heat_igl.typing import FloatArray
 
 if TYPE_CHECKING:

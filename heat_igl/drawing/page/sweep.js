@@ -1,4 +1,4 @@
-// Distance by unfolding one triangle at a time, in the order of Dijkstra's algorithm: what heat_igl/sweeping.py does in
+// Distance by unfolding one triangle at a time, in the order of Dijkstra's algorithm: what heat_igl/refine/sweeping.py does in
 // the order of the heat. It needs triangles by their corners and edge lengths, and nothing about how they are glued.
 "use strict";
 
