@@ -404,8 +404,8 @@ def break_even(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 # The largest meshes: one method, one query.
 
 
-def huge(n: int, mesh_path: Path | None, backend: Any = "auto") -> dict[str, Any]:
-    """One query on an icosphere of about `n` vertices, or on a mesh subdivided to at least `n`, and two more."""
+def huge(n: int, mesh_path: Path | None, backend: Any = "auto", later: bool = True) -> dict[str, Any]:
+    """One query on an icosphere of about `n` vertices, or on a mesh subdivided to at least `n`, and maybe two more."""
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -427,8 +427,9 @@ def huge(n: int, mesh_path: Path | None, backend: Any = "auto") -> dict[str, Any
         solver = timed("precomputation", lambda: HeatMethodSolver(mesh, backend=backend))
         result["backend"] = solver.diagnostics.backend
         distance = timed("first query", lambda: solver.distance(0))
-        timed("later query", lambda: solver.distance(n_first // 2))
-        timed("last query", lambda: solver.distance(n_first // 3))
+        if later:
+            timed("later query", lambda: solver.distance(n_first // 2))
+            timed("last query", lambda: solver.distance(n_first // 3))
     result["peak_memory"] = peak.bytes
     if exact_mesh is None:
         return result | errors(distance, great_circles(V, 0))
@@ -553,7 +554,7 @@ def _accuracy_table(rows: Sequence[dict[str, Any]]) -> list[str]:
 def _huge_table(row: dict[str, Any]) -> list[str]:
     names = ("precomputation", "first query", "later query", "last query")
     memory = None if row["peak_memory"] is None else row["peak_memory"] / 2**30
-    cells = [(row["mesh"], ""), (row["n"], ""), (row["backend"], ""), *((row[name], ".1f") for name in names)]
+    cells = [(row["mesh"], ""), (row["n"], ""), (row["backend"], ""), *((row.get(name), ".1f") for name in names)]
     head = f"mesh | vertices | backend | {' | '.join(names)} | peak GiB | mean error | largest error"
     return _table(head, [[*cells, (memory, ".1f"), (row["mean_error"], ".3f"), (row["max_error"], ".3f")]])
 
@@ -605,6 +606,7 @@ def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--large", action="store_true", help="add the icosphere with 655 362 vertices")
     parser.add_argument("--huge", type=int, help="one query on an icosphere of about so many vertices, or on --mesh")
     parser.add_argument("--backend", default="auto", help="of --huge")
+    parser.add_argument("--single", action="store_true", help="no later queries after --huge's first")
     parser.add_argument("--docs", type=Path, help="page whose tables are to be written")
     parser.add_argument("--out", type=Path, default=Path("benchmark-results"), help="directory of the results")
     parser.add_argument("--child", nargs=2, help=argparse.SUPPRESS)
@@ -643,7 +645,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     name = "benchmark"
     if arguments.huge:
         name = "huge"
-        result["huge"] = huge(arguments.huge, arguments.mesh[0] if arguments.mesh else None, arguments.backend)
+        result["huge"] = huge(
+            arguments.huge, arguments.mesh[0] if arguments.mesh else None, arguments.backend, not arguments.single
+        )
         reference.close()
     else:
         result |= _measured(arguments)

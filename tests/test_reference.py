@@ -28,13 +28,12 @@ from heat_igl import (
     MissingExtraError,
     ReferenceSolverError,
     closed_forms,
-    guarded,
-    native,
     read_mesh,
     reference,
     shapes,
 )
 from heat_igl.peak_memory import PeakMemory
+from heat_igl.reference import guarded, native
 from heat_igl.typing import FloatArray, IntArray
 
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import json
 import os
 import shutil
-import uuid
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -117,17 +115,20 @@ class Store:
             "source_vertex": np.concatenate(source_sets),
             "source_row": np.repeat(np.arange(k), [len(vertices) for vertices in source_sets]),
         }
-        folder = self.path / name
+        chunk = (min(rows, k), min(n, _COLUMNS))
+        arrays = {
+            "distance": _array((k, n), chunk, dtype, "NaN", ("source", "vertex")),
+            "block_checksum": _array((-(-k // rows),), (1,), "int64", -1, ("block",)),
+        } | {label: _array(v.shape, v.shape, "int64", 0, ("source_entry",)) for label, v in entries.items()}
         with _writing(self.path):
             self._remove(name)
-            chunk = (min(rows, k), min(n, _COLUMNS))
-            _put_json(folder / "distance", _array((k, n), chunk, dtype, "NaN", ("source", "vertex")))
-            _put_json(folder / "block_checksum", _array((-(-k // rows),), (1,), "int64", -1, ("block",)))
+            # All at once takes half as long as one after the other.
+            nodes = {name: _zarr().core.group.GroupMetadata()} | {f"{name}/{key}": node for key, node in arrays.items()}
+            made = dict(_zarr().create_hierarchy(store=self._root.store, nodes=nodes))
             for label, values in entries.items():
-                _put_json(folder / label, _array(values.shape, values.shape, "int64", 0, ("source_entry",)))
-                _put(folder / label / "c" / "0", values.astype("<i8").tobytes())
-            # Last: without it there is no group.
-            _put_json(folder, _group({**attributes, "rows_per_block": rows, "status": "running"}))
+                made[f"{name}/{label}"][:] = values
+            # Last, all at once: a group without a status was not finished being made.
+            made[name].update_attributes({**attributes, "rows_per_block": rows, "status": "running"})
         return MeshGroup(self, name, source_sets)
 
     def _remove(self, name: str) -> None:
@@ -224,44 +225,27 @@ def _checksum(distances: AnyArray) -> int:
     return zlib.crc32(np.ascontiguousarray(distances).data)
 
 
-def _group(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """What zarr's format 3 says of a group."""
-    return {"zarr_format": 3, "node_type": "group", "attributes": dict(attributes)}
-
-
 def _array(
     shape: tuple[int, ...], chunk: tuple[int, ...], dtype: str, fill_value: Any, dimensions: tuple[str, ...]
-) -> dict[str, Any]:
-    """What zarr's format 3 says of an array. Uncompressed: zstd saves an eighth of the space and doubles the time."""
-    return {
-        "zarr_format": 3,
-        "node_type": "array",
-        "shape": shape,
-        "data_type": dtype,
-        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}},
-        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
-        "fill_value": fill_value,
-        "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}],
-        "dimension_names": dimensions,
-        "attributes": {},
-        "storage_transformers": [],
-    }
+) -> Any:
+    """Metadata of an array. Uncompressed: zstd saves an eighth of the space and doubles the time to write."""
+    from zarr.core.metadata import ArrayV3Metadata
 
-
-def _put_json(folder: Path, node: Mapping[str, Any]) -> None:
-    _put(folder / "zarr.json", json.dumps(node, indent=2).encode())
-
-
-def _put(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all, as zarr does; making a group by zarr takes four times as long."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(f".{uuid.uuid4().hex}.partial")
-    try:
-        partial.write_bytes(data)
-        partial.replace(path)
-    except OSError:
-        partial.unlink(missing_ok=True)
-        raise
+    return ArrayV3Metadata.from_dict(
+        {
+            "zarr_format": 3,
+            "node_type": "array",
+            "shape": shape,
+            "data_type": dtype,
+            "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}},
+            "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
+            "fill_value": fill_value,
+            "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}],
+            "dimension_names": dimensions,
+            "attributes": {},
+            "storage_transformers": [],
+        }
+    )
 
 
 @contextlib.contextmanager
