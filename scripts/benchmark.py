@@ -485,7 +485,7 @@ def tables(result: dict[str, Any]) -> dict[str, str]:
         for row in rows
     ]
     head = f"mesh | method | runs | precomputation | first query | later query | each of {BATCH} | peak MB"
-    found = {"timings": _table(f"{head} | mean error | largest error", timings)}
+    found = {"timings": _table(f"{head} | mean error | largest error", timings)} if timings else {}
     ratios = [
         [(row["mesh"], ""), (peer, "")]
         + [(row[f"over {peer}"].get(key), ".2f") for key in ("precomputation", "later", "batch", "peak_memory")]

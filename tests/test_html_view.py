@@ -405,3 +405,4 @@ def test_a_page_that_fails_says_so_in_the_console(browser: Browser) -> None:
     browser.driver.get((browser._folder / "broken.html").as_uri())
     found: list[Any] = []
     browser.wait(lambda: bool(found.extend(browser.driver.get_log("browser")) or found))
+    assert "SEVERE" in {entry["level"] for entry in found}
