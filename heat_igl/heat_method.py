@@ -275,7 +275,9 @@ class HeatMethodSolver:
         self._emitter = Emitter(domain, self._heat_flow, plain=not self._damped, unfolds=refine is not None)
         self._given_faces = domain.given_faces
         self._heat_order = None if refine is None else HeatOrder(domain, refine)
-        self._descent = Descent(domain, step if self._damped else None) if refine is None else None
+        self._descent = None
+        if refine is None:
+            self._descent = Descent(domain, step if self._damped else None, self._analysis.order)
         triangulation = domain.triangulation
         factors = self._heat_flow.factors + ([] if self._poisson is None else [self._poisson.factor])
         self._diagnostics = Diagnostics(

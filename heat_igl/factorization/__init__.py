@@ -23,7 +23,7 @@ import scipy.sparse.linalg as spl
 from heat_igl.errors import FactorizationError, MissingExtraError
 from heat_igl.factorization.iterative import IterativeAnalysis, factors_fit, has_iterative
 from heat_igl.processors import n_threads
-from heat_igl.typing import BoolArray, FloatArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["Analysis", "Backend", "Factorization", "analyse", "factorize"]
 
@@ -62,9 +62,12 @@ class Analysis(Protocol):
     ----------
     backend : str
         What factors the matrices.
+    order : (n,) int32, optional
+        ``order[i]`` is eliminated as the i-th; neighbours mostly are near each other in it. None if that is not known.
     """
 
     backend: str
+    order: IntArray | None
 
     def fits(self, A: sp.csc_matrix) -> bool:
         """Whether A has the pattern that was analysed."""
@@ -79,6 +82,7 @@ class _ScipyAnalysis:
     """SuperLU orders the matrix while it factors it, so there is nothing to keep."""
 
     backend = "scipy"
+    order: IntArray | None = None
 
     def fits(self, A: sp.csc_matrix) -> bool:  # noqa: ARG002 - the protocol's
         return True
@@ -140,6 +144,7 @@ class _MultifrontalAnalysis:
         with ThreadPoolExecutor(n_threads()) as workers:
             tree = dissection.dissect(self._ends, self._neighbours, workers)
         self.fronts = multifrontal.fronts(self._ends, self._neighbours, tree)
+        self.order: IntArray | None = self.fronts.order
 
     def fits(self, A: sp.csc_matrix) -> bool:
         own = self._ends, self._neighbours

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 
 from heat_igl.errors import FactorizationError, MissingExtraError
 from heat_igl.processors import n_threads
-from heat_igl.typing import BoolArray, FloatArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = [
     "IterativeAnalysis",
@@ -53,6 +53,7 @@ class IterativeAnalysis:
     """In place of an ordering: there is nothing to analyse, and every matrix fits."""
 
     backend = "iterative"
+    order: IntArray | None = None
 
     def fits(self, A: sp.csc_matrix) -> bool:  # noqa: ARG002 - any will do
         """Whether the analysis may be used for A: always."""

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from heat_igl.factorization import Analysis, Backend, Factorization, analyse
 from heat_igl.operators import Operators
-from heat_igl.typing import FloatArray
+from heat_igl.typing import FloatArray, IntArray
 
 __all__ = [
     "Boundary",
@@ -268,10 +268,13 @@ class Descent:
         The domain.
     t : float, optional
         Time step that the heat was made with, to have the field damped by `damping`; it has length 1 otherwise.
+    order : (n,) int, optional
+        All vertices, near ones near each other, to read memory in; that of the mesh may jump, and a pass that waits for
+        memory takes several times as long.
     """
 
-    def __init__(self, operators: Operators, t: float | None = None) -> None:
-        self._operators, self._t = operators, t
+    def __init__(self, operators: Operators, t: float | None = None, order: IntArray | None = None) -> None:
+        self._operators, self._t, self._order = operators, t, order
         triangulation = operators.triangulation
         self._full_rate = self._triangles = None
         if importlib.util.find_spec("numba") is None:
@@ -286,7 +289,7 @@ class Descent:
             _ = operators.gradient_rows
         else:
             F, lengths = triangulation.F, triangulation.l
-            self._triangles = descending.triangles(F, lengths, operators.weights, full_rate)
+            self._triangles = descending.triangles(F, lengths, operators.weights, full_rate, order)
 
     def divergence(self, u: FloatArray) -> FloatArray:
         """Integrated divergence (n, k) for heat (n, k)."""
@@ -310,8 +313,8 @@ class Descent:
             X *= np.tile(damping(operators, u, self._t), (operators.dimension, 1))
         return np.asarray(operators.D @ X)
 
-    def __reduce__(self) -> tuple[type[Descent], tuple[Operators, float | None]]:
-        return Descent, (self._operators, self._t)
+    def __reduce__(self) -> tuple[type[Descent], tuple[Operators, float | None, IntArray | None]]:
+        return Descent, (self._operators, self._t, self._order)
 
 
 def integrate(operators: Operators, X: FloatArray) -> FloatArray:

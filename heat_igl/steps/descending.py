@@ -21,27 +21,44 @@ class Triangles(NamedTuple):
 
     Attributes
     ----------
+    order : (n,) int
+        The vertices as they are visited.
     corners : (m, 3) int32
-        Vertices.
+        Places in `order`; the faces in the order of their first corners there.
     numbers : (m, 5) float64
         One over the length of the side from corner 0 to corner 1; the foot of corner 2 on it, from 0 to 1 between the
         two; one over the height. Then the area, and one over the square of the rate below which a direction is not
         trusted fully.
     """
 
+    order: IntArray
     corners: AnyArray
     numbers: FloatArray
 
 
-def triangles(F: IntArray, l: FloatArray, weights: FloatArray, full_rate: FloatArray) -> Triangles:  # noqa: E741
+def triangles(
+    F: IntArray,
+    l: FloatArray,  # noqa: E741
+    weights: FloatArray,
+    full_rate: FloatArray,
+    order: IntArray | None,
+) -> Triangles:
     """The tables of triangles with edge lengths `l` (m, 3); the rest as for `descent`."""
+    n, m = 1 + int(F.max(initial=-1)) if order is None else len(order), len(F)
+    order = np.arange(n) if order is None else order
+    place = np.empty(n, np.int32)
+    place[order] = np.arange(n, dtype=np.int32)
+    corners = place[F]
+    first = np.minimum(np.minimum(corners[:, 0], corners[:, 1]), corners[:, 2])
+    # No two of these numbers are equal, so that every way of sorting gives the same.
+    by_first = np.sort(first.astype(np.int64) * m + np.arange(m)) % m
     base = l[:, 2]
     x, y = apex(base, l[:, 1], l[:, 0])
-    numbers = np.empty((len(F), 5))
+    numbers = np.empty((m, 5))
     with np.errstate(divide="ignore"):
         for column, values in enumerate((1 / base, x / base, 1 / y, weights, full_rate**-2.0)):
-            numbers[:, column] = values
-    return Triangles(F.astype(np.int32), numbers)
+            numbers[:, column] = values[by_first]
+    return Triangles(order, corners[by_first], numbers)
 
 
 @jit
@@ -74,11 +91,12 @@ def _on_triangles(t: Triangles, u: FloatArray, log_u: FloatArray, smallest: floa
 
 def descent_on_triangles(t: Triangles, u: FloatArray, smallest: float) -> FloatArray:
     """`descent`, for triangles in their tables."""
-    columns = np.ascontiguousarray(u.T)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        logarithms = np.log(columns)
-    parts = [_on_triangles(t, one, its_log, smallest) for one, its_log in zip(columns, logarithms, strict=True)]
-    return np.stack(parts, axis=1)
+    divergence = np.zeros(u.shape)
+    for column, of_column in zip(u.T, divergence.T, strict=True):
+        ordered = column[t.order]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            of_column[t.order] = _on_triangles(t, ordered, np.log(ordered), smallest)
+    return divergence
 
 
 @jit
