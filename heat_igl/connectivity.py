@@ -137,20 +137,18 @@ def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
     bad: BoolArray = np.zeros(n, bool)
     bad[found.vertices[found.n_faces > 2]] = True
     corner = np.arange(F.size).reshape(F.shape)
-    # Both faces of an inner edge list its two end points; sorting the half-edges by edge puts the mates side by side.
-    half_edge = np.argsort(found.of_face.ravel(), kind="stable")
-    edge_of = found.of_face.ravel()[half_edge]
-    mate = np.flatnonzero(edge_of[1:] == edge_of[:-1])
-    face, opposite = np.divmod(half_edge, 3)
-    joined = []
-    for step_a in (1, 2):
-        for step_b in (1, 2):
-            a = corner[face[mate], (opposite[mate] + step_a) % 3]
-            b = corner[face[mate + 1], (opposite[mate + 1] + step_b) % 3]
-            same = F.ravel()[a] == F.ravel()[b]
-            joined.append(np.stack([a[same], b[same]], axis=1))
-    pairs = np.concatenate(joined)
-    graph = sp.coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(F.size, F.size))
+    after, before = np.roll(corner, -1, axis=1).ravel(), np.roll(corner, 1, axis=1).ravel()
+    # The last half-edge of each edge, and the first; where there are more, both ends are bad already.
+    edge_of = found.of_face.ravel()
+    one, other = np.empty((2, len(found.vertices)), np.int64)
+    one[edge_of] = corner.ravel()
+    other[edge_of[::-1]] = corner.ravel()[::-1]
+    inner = found.n_faces > 1
+    one, other = one[inner], other[inner]
+    alike = F.ravel()[after[one]] == F.ravel()[after[other]]
+    rows = np.append(after[one], before[one])
+    columns = np.append(np.where(alike, after[other], before[other]), np.where(alike, before[other], after[other]))
+    graph = sp.coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(F.size, F.size))
     n_fans, fan = csgraph.connected_components(graph, directed=False)
     centre = np.empty(n_fans, np.int64)
     centre[fan] = F.ravel()

@@ -128,8 +128,8 @@ class Store:
             for label, values in entries.items():
                 made[f"{name}/{label}"][:] = values
             # Last, all at once: a group without a status was not finished being made.
-            made[name].update_attributes({**attributes, "rows_per_block": rows, "status": "running"})
-        return MeshGroup(self, name, source_sets)
+            group = made[name].update_attributes({**attributes, "rows_per_block": rows, "status": "running"})
+        return MeshGroup(self, name, (group, made[f"{name}/distance"], made[f"{name}/block_checksum"]), source_sets)
 
     def _remove(self, name: str) -> None:
         if name in self._root:
@@ -138,18 +138,19 @@ class Store:
 
     def group(self, name: str) -> MeshGroup:
         """The group of a mesh that was begun."""
-        return MeshGroup(self, name)
+        group = self._root[name]
+        return MeshGroup(self, name, (group, group["distance"], group["block_checksum"]))
 
 
 class MeshGroup:
     """The distances of one mesh in a store."""
 
-    def __init__(self, store: Store, name: str, source_sets: Sequence[IntArray] | None = None) -> None:
+    def __init__(
+        self, store: Store, name: str, nodes: tuple[Any, Any, Any], source_sets: Sequence[IntArray] | None = None
+    ) -> None:
         self.name = name
         self._path = store.path
-        self._group = store._root[name]
-        self._distance = self._group["distance"]
-        self._checksum = self._group["block_checksum"]
+        self._group, self._distance, self._checksum = nodes
         self._rows = int(self._group.attrs["rows_per_block"])
         self._source_sets = source_sets
 
