@@ -28,10 +28,12 @@ _LOG = logging.getLogger("heat_igl.cluster")
 _LOST = "the cluster is lost; what is finished stays in the store: run the same again to go on"
 
 # A task carries a whole mesh. And Dask would have malloc give every large array back to the system at once, which makes
-# a solver half as slow again.
+# a solver half as slow again. Dask's watch over its own event loop wakes every process 50 times a second.
 _SETTINGS = {
     "distributed.admin.large-graph-warning-threshold": "16GiB",
+    "distributed.admin.tick.interval": "1s",
     "distributed.nanny.pre-spawn-environ": {
+        "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
         "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
         **{f"{name}_NUM_THREADS": "1" for name in ("HEAT_IGL", "OMP", "MKL", "OPENBLAS", "NUMBA")},
     },
@@ -129,7 +131,8 @@ class _Run:
         running: dict[Any, Task] = {}
         try:
             while waiting or running:
-                while waiting and len(running) < self._n_threads() + _AHEAD:
+                most = self._n_threads() + _AHEAD
+                while waiting and len(running) < most:
                     function, task = waiting.popleft()
                     running[self._submit(function, task)] = task
                 with contextlib.suppress(distributed.TimeoutError):
