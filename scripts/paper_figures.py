@@ -248,7 +248,7 @@ def figure_2(out: Path, options: argparse.Namespace) -> None:
 def _times(options: argparse.Namespace) -> list[dict[str, float]]:
     """The times of figures 2 and 3, measured once in a run."""
     if options.times is None:
-        options.times = computation_times(SIZES_QUICK if options.quick else SIZES, 1 if options.quick else 3)
+        options.times = computation_times(SIZES_QUICK if options.quick else SIZES, 1 if options.quick else 9)
     return list(options.times)
 
 

@@ -358,7 +358,7 @@ def _double_cover(triangulation: IntrinsicTriangulation) -> tuple[IntArray, Floa
 def unfolded_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, tolerance: float = _TOLERANCE) -> FloatArray:
     """Near-exact geodesic distance without a factorization: strip unfolding in the order of Dijkstra's algorithm.
 
-    For up to four or five queries on a mesh; from there on, ``HeatMethodSolver(mesh, refine="unfold")`` is faster.
+    For one or two queries on a mesh; from the third on, ``HeatMethodSolver(mesh, refine="unfold")`` is faster.
 
     Parameters
     ----------
