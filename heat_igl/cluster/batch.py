@@ -7,10 +7,10 @@ import importlib
 import logging
 import os
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from heat_igl.cluster.collection import MeshLike, SourcePlan, items
 from heat_igl.cluster.report import BatchReport, rows
@@ -42,8 +42,10 @@ _SETTINGS = {
 # Seconds to wait for a scheduler's answer.
 _PATIENCE = 10
 
-# Tasks handed out beyond the threads that work on them, so that none of these waits for the client.
+# Handed out beyond the threads that work, so that none of these waits for the client.
 _AHEAD = 2
+# Most meshes handed out as one: what Dask takes for each, on small meshes, is a tenth of what a worker takes.
+_TOGETHER = 4
 
 
 def distances(
@@ -113,6 +115,22 @@ def distances(
     return BatchReport(os.fspath(store), rows(opened, [task.item.name for task in tasks]))
 
 
+class _Parcel(NamedTuple):
+    """Tasks that a worker does one after the other."""
+
+    function: Callable[[Sequence[Task]], list[Outcome]]
+    tasks: Sequence[Task]
+
+
+def _parcels(tasks: Sequence[Task], at_once: int) -> Iterator[_Parcel]:
+    """All meshes, to be begun in parcels that become smaller towards the end, so that no worker is left waiting."""
+    start = 0
+    while start < len(tasks):
+        k = max(1, min(_TOGETHER, (len(tasks) - start) // (2 * at_once)))
+        yield _Parcel(begin, tasks[start : start + k])
+        start += k
+
+
 class _Run:
     """Tasks in flight, and what is still to be done for each mesh."""
 
@@ -127,22 +145,21 @@ class _Run:
     def all(self, tasks: Sequence[Task]) -> None:
         """Run all tasks, and those that they leave behind; raises `BatchError` if the store or the cluster is lost."""
         _, distributed = _dask()
-        waiting = deque((begin, task) for task in tasks)
-        running: dict[Any, Task] = {}
+        waiting: deque[_Parcel] = deque()
+        running: dict[Any, _Parcel] = {}
         try:
+            waiting.extend(_parcels(tasks, self._n_threads() + _AHEAD))
             while waiting or running:
                 most = self._n_threads() + _AHEAD
                 while waiting and len(running) < most:
-                    function, task = waiting.popleft()
-                    running[self._submit(function, task)] = task
+                    parcel = waiting.popleft()
+                    running[self._submit(parcel)] = parcel
                 with contextlib.suppress(distributed.TimeoutError):
                     distributed.wait(list(running), timeout=1, return_when="FIRST_COMPLETED")
                 if self._client.status != "running":
                     raise BatchError(_LOST)
                 for future in [future for future in running if future.done()]:
-                    # The rest of a mesh comes before the next one: its solver is at hand.
-                    left = self._settled(future, running.pop(future))
-                    waiting.extendleft((carry_on, task) for task in reversed(left))
+                    waiting.extendleft(reversed(self._settled(future, running.pop(future))))
         except (OSError, distributed.CancelledError) as error:
             raise BatchError(f"{_LOST} ({error or type(error).__name__})") from None
         finally:
@@ -153,19 +170,34 @@ class _Run:
     def _n_threads(self) -> int:
         return sum(self._client.nthreads().values())
 
-    def _submit(self, function: Any, task: Task) -> Any:
+    def _submit(self, parcel: _Parcel) -> Any:
         self._priority -= 1
         # Not pure: what a task does is write to the store, which its arguments do not tell.
-        return self._client.submit(function, task, pure=False, priority=self._priority)
+        return self._client.submit(parcel.function, parcel.tasks, pure=False, priority=self._priority)
 
-    def _settled(self, future: Any, task: Task) -> list[Task]:
-        """Take in the outcome of a task; returns the tasks that it leaves."""
+    def _settled(self, future: Any, parcel: _Parcel) -> list[_Parcel]:
+        """Take in what a parcel came to; returns what it leaves, first that of meshes whose solver is at hand."""
         _, distributed = _dask()
-        name = task.item.name
+        function, tasks = parcel
         try:
-            outcome: Outcome = future.result()
+            outcomes: list[Outcome] = future.result()
         except distributed.KilledWorker:
-            outcome = Outcome(name, reason="the workers that tried it died: out of memory, or a crash in a library")
+            if len(tasks) > 1:
+                # One of them did it; alone, it will do so again.
+                return [_Parcel(function, [task]) for task in tasks]
+            reason = "the workers that tried it died: out of memory, or a crash in a library"
+            outcomes = [Outcome(tasks[0].item.name, reason=reason)]
+        left = [
+            _Parcel(carry_on, [rest])
+            for task, outcome in zip(tasks, outcomes, strict=False)
+            for rest in self._taken_in(task, outcome)
+        ]
+        begun = len(outcomes)
+        return left + ([_Parcel(function, tasks[begun:])] if tasks[begun:] else [])
+
+    def _taken_in(self, task: Task, outcome: Outcome) -> list[Task]:
+        """Note the outcome of a task; returns the tasks that it leaves."""
+        name = task.item.name
         remaining = [replace(task, blocks=blocks) for blocks in outcome.remaining]
         self._tasks_left[name] = self._tasks_left.get(name, 1) - 1 + len(remaining)
         if outcome.reason is not None:

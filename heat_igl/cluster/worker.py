@@ -64,7 +64,17 @@ class Outcome:
     reason: str | None = None
 
 
-def begin(task: Task) -> Outcome:
+def begin(tasks: Sequence[Task]) -> list[Outcome]:
+    """Begin one mesh after the other, as far as the first that leaves blocks for others: its solver is at hand."""
+    outcomes = []
+    for task in tasks:
+        outcomes.append(_begin(task))
+        if outcomes[-1].remaining:
+            break
+    return outcomes
+
+
+def _begin(task: Task) -> Outcome:
     """Read and validate a mesh, factor it, make its group or continue the one that is there, and solve a first span."""
     try:
         mesh = _loaded(task.item)
@@ -92,8 +102,12 @@ def begin(task: Task) -> Outcome:
         return Outcome(task.item.name, reason=_reason(error))
 
 
-def carry_on(task: Task) -> Outcome:
-    """Solve the blocks of a task in a group that `begin` has made."""
+def carry_on(tasks: Sequence[Task]) -> list[Outcome]:
+    """Solve the blocks of tasks in groups that `begin` has made."""
+    return [_carry_on(task) for task in tasks]
+
+
+def _carry_on(task: Task) -> Outcome:
     try:
         mesh = _loaded(task.item)
         fingerprint = _fingerprint(mesh)
