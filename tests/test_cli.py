@@ -166,7 +166,9 @@ def test_without_typer_one_line_names_the_extra(tmp_path: Path) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
 def test_interrupt(tmp_path: Path) -> None:
     code = (
-        "import sys, time; from heat_igl import cli\n"
+        # A process started in the background inherits that interrupts are ignored; a user's is not.
+        "import signal, sys, time; from heat_igl import cli\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def read_mesh(path):\n    print('ready', flush=True)\n    time.sleep(60)\n"
         "cli.read_mesh = read_mesh; sys.exit(cli.run(['info', 'a.off']))"
     )

@@ -185,7 +185,7 @@ class _MultifrontalFactorization:
         if b.ndim == 1 or b.shape[1] < substitution.FEW:
             x = np.empty(b.shape)
             for column, its_x in zip(b.reshape(len(b), -1).T, x.reshape(len(b), -1).T, strict=True):
-                ordered = column[order].astype(np.float64)
+                ordered = column[order].astype(np.float64, copy=False)
                 ordered[self._fronts.place[self._held]] = 0.0
                 substitution.substitute(self._fronts, self._entries, ordered)
                 its_x[order] = ordered
