@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -399,3 +400,19 @@ def test_killed_processes_lose_nothing_and_repeat_nothing(processes, tmp_path):
     for name, mesh in meshes.items():
         got = zarr.open_group(store / name, mode="r")["distance"][:]
         np.testing.assert_array_equal(got, expected(mesh, range(256)))
+
+
+def test_a_parcel_that_kills_its_workers_is_handed_out_again_mesh_by_mesh() -> None:
+    """So that only the mesh to blame ends in the report."""
+    from distributed import Future, KilledWorker
+
+    from heat_igl.cluster import batch
+
+    future = Mock(spec=Future)
+    future.result.side_effect = KilledWorker("task", None, 3)
+    run = batch._Run(Mock(), Mock(), Mock())
+    tasks = [Mock(), Mock(), Mock()]
+    left = run._settled(future, batch._Parcel(batch.begin, tasks))
+    assert left == [(batch.begin, [task]) for task in tasks]
+    assert not run._settled(future, left[1])
+    assert run._reason == {tasks[1].item.name: "the workers that tried it died: out of memory, or a crash in a library"}

@@ -44,7 +44,7 @@ _PATIENCE = 10
 
 # Handed out beyond the threads that work, so that none of these waits for the client.
 _AHEAD = 2
-# Most meshes handed out as one: what Dask takes for each, on small meshes, is a tenth of what a worker takes.
+# Most meshes handed out as one: what Dask takes for each, on small meshes, is about a tenth of what a worker takes.
 _TOGETHER = 4
 
 
