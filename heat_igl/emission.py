@@ -100,8 +100,8 @@ class Emitter:
         guides = np.zeros(len(near.vertex), bool)
         if len(lines.vertex):
             guides = np.isin(near.vertex, lines.vertex) & ~np.isin(near.vertex, sources.vertices)
-        own = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
-        anchors = _joined(own, near.at(guides))
+        # Inside a region of sources there is no heat flow, and phi says nothing.
+        anchors = near.at(~np.isin(near.vertex, sources.vertices[~rim]))
         vertex, share, label, offset = self._heat(sources, rim)
         return Emission(sources, vertex, share, self._delay(vertex, offset), label, anchors, near, guides, far)
 

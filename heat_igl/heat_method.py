@@ -42,12 +42,14 @@ def _positive(name: str, value: float) -> float:
     return number
 
 
-def smallest_time_step(domain: Operators) -> float:
+def smallest_time_step(domain: Operators, fitted: bool = False) -> float:
     """The smallest time step whose heat crosses `domain` without underflow in double precision.
 
-    Along a line of edges of length h, one backward Euler step falls by acosh(1 + h^2 / (2 t)) e-foldings per edge. The
-    result makes that, times the number of edges across, `RANGE_LIMIT`.
+    Along a line of edges of length h, one backward Euler step falls by acosh(1 + h^2 / (2 t)) e-foldings per edge, and
+    by h / sqrt(t) where the flow is `fitted`. The result makes that, times the number of edges across, `RANGE_LIMIT`.
     """
+    if fitted:
+        return (domain.longest_distance / RANGE_LIMIT) ** 2
     h = domain.mean_edge_length
     per_edge = RANGE_LIMIT / (domain.longest_distance / h)
     return h**2 / (2 * (float(np.cosh(per_edge)) - 1)) if per_edge < 700 else 0.0
@@ -255,7 +257,8 @@ class HeatMethodSolver:
             raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {refine!r}")
         self._damped = magnitude == "damped" or (magnitude == "auto" and domain.is_surface)
         requested = _positive("t_coef", t_coef) * domain.mean_edge_length**2 if t is None else _positive("t", t)
-        step = max(requested, smallest_time_step(domain))
+        fitted = self._fitted = self._damped and domain.triangulation is not None
+        step = max(requested, smallest_time_step(domain, fitted))
         if t is not None and step > requested:
             warnings.warn(
                 f"t = {requested:.4g} is too small for heat to cross the mesh in double precision; using {step:.4g}",
@@ -265,7 +268,7 @@ class HeatMethodSolver:
         self._operators = domain
         self._analysis = analysis(domain, backend, known)
         analysed = time.perf_counter()
-        makers: list[Callable[[], Any]] = [lambda: HeatFlow(domain, step, boundary, backend, self._analysis)]
+        makers: list[Callable[[], Any]] = [lambda: HeatFlow(domain, step, boundary, backend, self._analysis, fitted)]
         if refine is None:
             makers.append(lambda: PoissonProblem(domain, backend, self._analysis))
         # Both matrices at once: the backends run without the interpreter's lock.
@@ -277,7 +280,7 @@ class HeatMethodSolver:
         self._heat_order = None if refine is None else HeatOrder(domain, refine)
         self._descent = None
         if refine is None:
-            self._descent = Descent(domain, step if self._damped else None, self._analysis.order)
+            self._descent = Descent(domain, step if self._damped else None, self._analysis.order, fitted)
         triangulation = domain.triangulation
         factors = self._heat_flow.factors + ([] if self._poisson is None else [self._poisson.factor])
         self._diagnostics = Diagnostics(
@@ -526,8 +529,10 @@ class HeatMethodSolver:
     def _field(self, emissions: list[Emission], u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Directions (d m, k) and their magnitude (m, k)."""
         domain = self._operators
-        X = normalize(domain, u)
-        magnitude = damping(domain, u, self.t) if self._damped else np.ones((len(domain.weights), u.shape[1]))
+        X = normalize(domain, u, self._fitted)
+        magnitude = np.ones((len(domain.weights), u.shape[1]))
+        if self._damped:
+            magnitude = damping(domain, u, self.t, fitted=self._fitted)
         for column, emission in enumerate(emissions):
             self._emitter.guide(emission, X[:, column], magnitude[:, column])
         return X, magnitude

@@ -14,6 +14,7 @@ from typing import Literal
 import igl
 import numpy as np
 import scipy.sparse as sp
+from scipy.special import i0e
 
 from heat_igl import connectivity
 from heat_igl.errors import MeshError
@@ -29,7 +30,15 @@ from heat_igl.mesh import Mesh, checked_faces
 from heat_igl.tufted import has_nonmanifold_edges, tufted_cover
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["Laplacian", "Operators", "cotan_operators", "intrinsic_operators", "operators", "tufted_operators"]
+__all__ = [
+    "Laplacian",
+    "Operators",
+    "cotan_operators",
+    "fitted_laplacian",
+    "intrinsic_operators",
+    "operators",
+    "tufted_operators",
+]
 
 Laplacian = Literal["intrinsic-delaunay", "cotan"]
 
@@ -326,6 +335,59 @@ def tufted_operators(mesh: Mesh, history: tuple[Merged, ...] = ()) -> Operators:
         surface=intrinsic_delaunay(surface),
         faces=surface,
     )
+
+
+def fitted_laplacian(domain: Operators, t: float) -> sp.csc_matrix:
+    """L with the weight of each edge fitted to heat that falls like exp(-d / sqrt(t)), however long the edge.
+
+    Where (1 - t Laplace) u = 0, the mean of u over a circle of radius r is I0(r / sqrt(t)) times its value in the centre,
+    I0 the modified Bessel function. Linear elements know the first term of that series alone, 1 + r^2 / (4 t): over an
+    edge much longer than sqrt(t) heat falls by too little, and turns towards long edges as light does towards a thinner
+    medium. So an edge of length r gets its weight times (r^2 / (4 t)) / (I0(r / sqrt(t)) - 1), which is 1 for short ones.
+
+    Parameters
+    ----------
+    domain : Operators
+        One that has a `triangulation`.
+    t : float
+        Time step, a squared length.
+
+    Returns
+    -------
+    (n, n) csc_matrix
+        Symmetric, rows sum to 0, no new signs. Negative semidefinite where L is: of a triangle's weights at most one is
+        negative, that of its longest edge, and that is reduced the most.
+    """
+    triangulation = domain.triangulation
+    if triangulation is None:
+        raise ValueError("weights are fitted to the lengths of edges, and this domain has no triangulation")
+    edges, twin, n = triangulation.edges, triangulation.twin, triangulation.n
+    square, areas = triangulation.l**2, triangulation.areas
+    # Half the cotangent opposite each side, times one half where the domain is a tufted cover.
+    of_half_edge = ((sum(square.T)[:, None] - 2 * square) * (domain.weights / (8 * areas**2))[:, None]).ravel()
+    weight = of_half_edge[edges] + np.where(twin[edges] >= 0, of_half_edge[twin[edges]], 0.0)
+    weight *= _fit(triangulation.l.ravel()[edges] / np.sqrt(t))
+    tail, head = triangulation.tail(edges), triangulation.head(edges)
+    weight_sum = np.bincount(tail, weight, n) + np.bincount(head, weight, n)
+    rows, columns = np.concatenate([tail, head, np.arange(n)]), np.concatenate([head, tail, np.arange(n)])
+    return sp.csc_matrix((np.concatenate([weight, weight, -weight_sum]), (rows, columns)), shape=(n, n))
+
+
+def _fit(x: FloatArray) -> FloatArray:
+    """(x^2 / 4) / (I0(x) - 1)."""
+    # I0 is the sum of y^k / (k!)^2, and 13 terms give it to rounding up to x = 4; beyond, nothing cancels.
+    y = np.minimum(x, 4.0) ** 2 / 4
+    share = np.ones_like(x)
+    for k in range(13, 1, -1):
+        share *= y
+        share /= k * k
+        share += 1
+    fitted = 1 / share
+    far = x > 4
+    # exp(-600) is as good as no heat, and leaves the weight a number.
+    beyond = np.minimum(x[far], 600.0)
+    fitted[far] = beyond**2 / 4 / (np.exp(beyond) * i0e(beyond) - 1)
+    return np.asarray(fitted)
 
 
 def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Merged, ...]]:

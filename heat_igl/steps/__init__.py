@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.factorization import Analysis, Backend, Factorization, analyse
-from heat_igl.operators import Operators
+from heat_igl.operators import Operators, fitted_laplacian
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = [
@@ -33,8 +33,9 @@ __all__ = [
 
 # Below this, gradients lose digits to gradual underflow and no longer have a direction worth keeping.
 _SMALLEST_GRADIENT = 1e-300
-# Share of a front's rate of decay from which on a direction is trusted fully; docs/heat_path.md compares values.
-_FULL_RATE = 0.9
+# Share of a front's rate of decay from which on a direction is trusted fully; docs/heat_path.md compares values. Fronts
+# of a fitted flow scatter less.
+_FULL_RATE, _FULL_RATE_FITTED = 0.9, 0.95
 
 Boundary = Literal["neumann", "dirichlet", "average"]
 
@@ -58,6 +59,8 @@ class HeatFlow:
         See `factorize`.
     analysis : Analysis, optional
         As `analysis` makes it for a domain with the same pattern of L, to be shared; made anew where it does not fit.
+    fitted : bool
+        Whether to take `fitted_laplacian` for L, with which heat falls by the right factor over long edges too.
 
     Raises
     ------
@@ -74,6 +77,7 @@ class HeatFlow:
         boundary: Boundary = "neumann",
         backend: Backend = "auto",
         analysis: Analysis | None = None,
+        fitted: bool = False,
     ) -> None:
         if not (np.isfinite(t) and t > 0):
             raise ValueError(f"t must be a positive number (a squared length), not {t!r}")
@@ -83,7 +87,8 @@ class HeatFlow:
             boundary = "neumann"
         mass = operators.M.diagonal()
         self.mean_mass = float(mass[operators.referenced].mean())
-        matrix = _shifted(operators.L, -t / self.mean_mass, mass / self.mean_mass)
+        L = fitted_laplacian(operators, t) if fitted else operators.L
+        matrix = _shifted(L, -t / self.mean_mass, mass / self.mean_mass)
         if analysis is None or not analysis.fits(matrix):
             analysis = analyse(matrix, backend)
         self.t = t
@@ -189,7 +194,7 @@ def diffuse(operators: Operators, u0: FloatArray, t: float, boundary: Boundary =
     return flow.solve(np.asarray(u0, dtype=np.float64) / flow.mean_mass)
 
 
-def normalize(operators: Operators, u: FloatArray) -> FloatArray:
+def normalize(operators: Operators, u: FloatArray, of_log: bool = False) -> FloatArray:
     """Step 2: the unit field X = -grad u / |grad u| that points away from the heat.
 
     Parameters
@@ -198,6 +203,9 @@ def normalize(operators: Operators, u: FloatArray) -> FloatArray:
         The domain.
     u : (n,) or (n, k) float64
         Heat; only its direction of descent matters.
+    of_log : bool
+        Take the direction of grad log u instead, where u is not below 1e-300. Both are the same but for interpolation:
+        log u is nearly linear where u is nearly exponential.
 
     Returns
     -------
@@ -213,14 +221,19 @@ def normalize(operators: Operators, u: FloatArray) -> FloatArray:
         components /= largest
         components /= -np.sqrt(np.einsum("k...,k...->...", components, components))
     components[:, largest < _SMALLEST_GRADIENT] = 0
+    if of_log:
+        along_log = normalize(operators, np.log(u, out=np.full_like(u, np.nan), where=u >= _SMALLEST_GRADIENT))
+        np.copyto(gradient, along_log, where=np.isfinite(along_log))
     return np.asarray(gradient)
 
 
-def damping(operators: Operators, u: FloatArray, t: float, full_rate: float = _FULL_RATE) -> FloatArray:
+def damping(
+    operators: Operators, u: FloatArray, t: float, full_rate: float | None = None, fitted: bool = False
+) -> FloatArray:
     """How sure the direction of X is on each face: 1 almost everywhere, less where heat arrives from several sides.
 
-    A front of heat falls by the same factor over each length, |grad log u| = 1 / sqrt(t) for small faces, and by
-    arccosh(1 + l^2 / (2 t)) over an edge of length l on large ones. Where fronts meet, at the cut locus and between
+    A front of heat falls by the same factor over each length, |grad log u| = 1 / sqrt(t) for small faces and in a fitted
+    flow, else by arccosh(1 + l^2 / (2 t)) over an edge of length l on large ones. Where fronts meet, at the cut locus and between
     two sources, it falls more slowly, and the distance has no gradient of length 1 there either. Integrating a unit
     field all the same overestimates distance on both sides.
 
@@ -232,9 +245,11 @@ def damping(operators: Operators, u: FloatArray, t: float, full_rate: float = _F
         Heat.
     t : float
         Time step that the heat was made with.
-    full_rate : float
+    full_rate : float, optional
         Share of a front's rate from which on a direction is trusted fully: on a mesh, fronts scatter by some percent
-        around 1. docs/heat_path.md compares values.
+        around 1. 0.95 for a fitted flow and 0.9 else; docs/heat_path.md compares values.
+    fitted : bool
+        Whether the heat comes from a fitted `HeatFlow`.
 
     Returns
     -------
@@ -246,13 +261,22 @@ def damping(operators: Operators, u: FloatArray, t: float, full_rate: float = _F
         gradient = operators.gradient_rows @ np.log(u)
         components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
         rate = np.sqrt(np.einsum("k...,k...->...", components, components))
-    factor = (rate.T / (full_rate * _front_rate(operators, t))).T
+    factor = (rate.T / _lowest_full_rate(operators, t, fitted, full_rate)).T
     factor[operators.boundary_faces] = 1
     return np.asarray(np.where(factor < 1, factor, 1.0))
 
 
+def _lowest_full_rate(
+    operators: Operators, t: float, fitted: bool, full_rate: float | None = None
+) -> FloatArray:
+    """The rate (m,), in e-foldings per length, from which on a direction is trusted fully."""
+    if full_rate is None:
+        full_rate = _FULL_RATE_FITTED if fitted else _FULL_RATE
+    return full_rate * (np.full(len(operators.weights), t**-0.5) if fitted else _front_rate(operators, t))
+
+
 def _front_rate(operators: Operators, t: float) -> FloatArray:
-    """How fast a front of heat falls on each face (m,), in e-foldings per length."""
+    """How fast a front of heat falls on each face (m,), in e-foldings per length, where the flow is not fitted."""
     size = operators.face_sizes
     # The same as arccosh(1 + size^2 / (2 t)) / size, which is 0 where size^2 is lost beside 1: faces of no size at all.
     return np.asarray(2 * np.arcsinh(size / (2 * np.sqrt(t))) / size)
@@ -261,7 +285,7 @@ def _front_rate(operators: Operators, t: float) -> FloatArray:
 class Descent:
     """The right-hand side of step 3, the divergence of the field X of step 2, in one pass over the faces.
 
-    The same as ``D @ normalize(operators, u)`` to rounding, and without storing a field; by a compiled kernel where
+    The same as ``D @ normalize(operators, u, fitted)`` to rounding, and without storing a field; by a compiled kernel where
     numba is installed. What the kernel reads of the faces is put together once.
 
     Parameters
@@ -273,10 +297,14 @@ class Descent:
     order : (n,) int, optional
         All vertices, near ones near each other, to read memory in; that of the mesh may jump, and a pass that waits for
         memory takes several times as long.
+    fitted : bool
+        Whether the heat comes from a fitted `HeatFlow`; the field then follows the gradient of log u.
     """
 
-    def __init__(self, operators: Operators, t: float | None = None, order: IntArray | None = None) -> None:
-        self._operators, self._t, self._order = operators, t, order
+    def __init__(
+        self, operators: Operators, t: float | None = None, order: IntArray | None = None, fitted: bool = False
+    ) -> None:
+        self._operators, self._t, self._order, self._fitted = operators, t, order, fitted
         triangulation = operators.triangulation
         self._full_rate = self._triangles = None
         if importlib.util.find_spec("numba") is None:
@@ -284,7 +312,7 @@ class Descent:
             return
         from heat_igl.steps import descending
 
-        full_rate = np.zeros(len(operators.weights)) if t is None else _FULL_RATE * _front_rate(operators, t)
+        full_rate = np.zeros(len(operators.weights)) if t is None else _lowest_full_rate(operators, t, fitted)
         full_rate[operators.boundary_faces] = 0.0
         if triangulation is None:
             self._full_rate = full_rate
@@ -299,7 +327,7 @@ class Descent:
         if self._triangles is not None:
             from heat_igl.steps.descending import descent_on_triangles
 
-            return descent_on_triangles(self._triangles, u, _SMALLEST_GRADIENT)
+            return descent_on_triangles(self._triangles, u, _SMALLEST_GRADIENT, self._fitted)
         rows = operators.gradient_rows
         if self._full_rate is not None:
             from heat_igl.steps.descending import descent
@@ -310,13 +338,13 @@ class Descent:
                     rows.indptr, rows.indices, rows.data, operators.weights, self._full_rate, heat, _SMALLEST_GRADIENT
                 )
             )
-        X = normalize(operators, u)
+        X = normalize(operators, u, self._fitted)
         if self._t is not None:
-            X *= np.tile(damping(operators, u, self._t), (operators.dimension, 1))
+            X *= np.tile(damping(operators, u, self._t, fitted=self._fitted), (operators.dimension, 1))
         return np.asarray(operators.D @ X)
 
-    def __reduce__(self) -> tuple[type[Descent], tuple[Operators, float | None, IntArray | None]]:
-        return Descent, (self._operators, self._t, self._order)
+    def __reduce__(self) -> tuple[type[Descent], tuple[Operators, float | None, IntArray | None, bool]]:
+        return Descent, (self._operators, self._t, self._order, self._fitted)
 
 
 def integrate(operators: Operators, X: FloatArray) -> FloatArray:

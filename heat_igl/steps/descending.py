@@ -62,19 +62,25 @@ def triangles(
 
 
 @jit
-def _on_triangles(t: Triangles, u: FloatArray, log_u: FloatArray, smallest: float) -> FloatArray:
+def _on_triangles(t: Triangles, u: FloatArray, log_u: FloatArray, smallest: float, of_log: bool) -> FloatArray:
     """`descent` for one column (n,), each triangle in the frame of `intrinsic_gradient`."""
     divergence = np.zeros(len(u))
     for f in range(len(t.corners)):
         a, b, c = t.corners[f, 0], t.corners[f, 1], t.corners[f, 2]
         per_base, foot, per_height = t.numbers[f, _PER_BASE], t.numbers[f, _FOOT], t.numbers[f, _PER_HEIGHT]
-        rise = u[b] - u[a]
-        x, y = per_base * rise, per_height * (u[c] - u[a] - foot * rise)
-        largest = max(abs(x), abs(y))
-        if not largest >= smallest:
-            continue
         rise = log_u[b] - log_u[a]
         x_of_log, y_of_log = per_base * rise, per_height * (log_u[c] - log_u[a] - foot * rise)
+        if of_log and min(u[a], u[b], u[c]) >= smallest:
+            x, y = x_of_log, y_of_log
+            largest = max(abs(x), abs(y))
+            if largest == 0.0:
+                continue
+        else:
+            rise = u[b] - u[a]
+            x, y = per_base * rise, per_height * (u[c] - u[a] - foot * rise)
+            largest = max(abs(x), abs(y))
+            if not largest >= smallest:
+                continue
         share = (x_of_log * x_of_log + y_of_log * y_of_log) * t.numbers[f, _PER_RATE]
         if not share < 1.0:
             share = 1.0
@@ -89,13 +95,13 @@ def _on_triangles(t: Triangles, u: FloatArray, log_u: FloatArray, smallest: floa
     return divergence
 
 
-def descent_on_triangles(t: Triangles, u: FloatArray, smallest: float) -> FloatArray:
-    """`descent`, for triangles in their tables."""
+def descent_on_triangles(t: Triangles, u: FloatArray, smallest: float, of_log: bool = False) -> FloatArray:
+    """`descent`, for triangles in their tables; along the gradient of log u where no corner is below `smallest`."""
     divergence = np.zeros(u.shape)
     for column, of_column in zip(u.T, divergence.T, strict=True):
         ordered = column[t.order]
         with np.errstate(divide="ignore", invalid="ignore"):
-            of_column[t.order] = _on_triangles(t, ordered, np.log(ordered), smallest)
+            of_column[t.order] = _on_triangles(t, ordered, np.log(ordered), smallest, of_log)
     return divergence
 
 
