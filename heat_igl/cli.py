@@ -196,7 +196,9 @@ def distance(
     cutoff: Annotated[float | None, typer.Option(help="Distances beyond this are inf.", callback=_positive)] = None,
     output: Annotated[Path | None, typer.Option(help="PLY or VTU file for mesh and distance.")] = None,
     picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for a picture.")] = None,
-    t_coef: Annotated[float, typer.Option(help="Time step in squared mean edge lengths.", callback=_positive)] = 1.0,
+    t_coef: Annotated[
+        float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=_positive)
+    ] = None,
     t: Annotated[float | None, typer.Option(help="Time step, a squared length.", callback=_positive)] = None,
     laplacian: Annotated[str, _choice(Laplacian, "Triangulation to solve on.")] = "intrinsic-delaunay",
     boundary: Annotated[str, _choice(Boundary, "What heat does at the boundary.")] = "neumann",
@@ -324,7 +326,9 @@ def validate(
 def view(
     mesh: MeshArgument,
     source: Annotated[list[int] | None, typer.Option(help="Source vertex to start with; repeat for several.")] = None,
-    t_coef: Annotated[float, typer.Option(help="Time step in squared mean edge lengths.", callback=_positive)] = 1.0,
+    t_coef: Annotated[
+        float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=_positive)
+    ] = None,
     boundary: Annotated[str, _choice(Boundary, "What heat does at the boundary.")] = "neumann",
     refine: Annotated[str | None, _choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
@@ -355,7 +359,7 @@ def view(
     kind = f"unfolded in heat order (refine = {refine})" if refine else "the heat method"
     write_html(
         target, loaded, shown.distance, sources=sources, title=mesh.name,
-        method=f"Distance by {kind}, t = {t_coef:g} h^2, boundary {boundary}.",
+        method=f"Distance by {kind}, t = {shown.t_coef:.3g} h^2, boundary {boundary}.",
     )  # fmt: skip
     if problem:
         _say(f"no window: {problem}")

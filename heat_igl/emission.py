@@ -244,10 +244,15 @@ class Emitter:
     def _straight_lines(self, sources: SourceSet, rim: BoolArray) -> tuple[Seeds, Seeds]:
         """Distance of the vertices that see a source in a straight line, as `NearField.seeds` has it.
 
-        Only where there are points or curves; for vertices alone, the ring of edges is enough.
+        Only where there are points or curves; for vertices alone, the ring of edges is enough. But not beside an edge of
+        more than two faces: the tufted cover leads over it from a face to two of the others alone.
         """
-        if self._on_faces is None or sources.on_vertices_alone:
+        if self._on_faces is None:
             return _NONE, _NONE
+        if sources.on_vertices_alone:
+            is_covered = self._domain.surface is not None and not (self._plain or self._unfolds)
+            if not (is_covered and self._on_faces.meets_shared_edge(sources.vertices[rim])):
+                return _NONE, _NONE
         vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         points = sources.points.joined(sources.segments.ends())
         return self._on_faces.seeds(points, sources.segments, _RADIUS * self._domain.mean_edge_length, vertices)

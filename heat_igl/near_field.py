@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from heat_igl.connectivity import unique_rows
 from heat_igl.flip_history import apex
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.sources import SourcePoints, SourceSegments, nearest_first
@@ -115,6 +116,48 @@ class NearField:
         counts = ends[vertices + 1] - first
         which = np.repeat(np.arange(len(vertices)), counts)
         return corners[np.arange(len(which)) + np.repeat(first - (counts.cumsum() - counts), counts)], which
+
+    @cached_property
+    def _shared(self) -> tuple[IntArray, IntArray, IntArray]:
+        """Half-edges where more than two faces meet, edge by edge, and for each half-edge where its edge begins and ends.
+
+        No such edge is ever flipped, so its vertices tell it.
+        """
+        tri = self.triangulation
+        half_edge = np.flatnonzero(tri.twin == -2)
+        tail, head = tri.tail(half_edge), tri.head(half_edge)
+        ends = np.stack([np.minimum(tail, head), np.maximum(tail, head)], axis=1)
+        _, edge, counts = unique_rows(ends, tri.n)
+        end = np.zeros((2, len(tri.twin)), np.int64)
+        end[1, half_edge] = np.cumsum(counts)[edge]
+        end[0, half_edge] = end[1, half_edge] - counts[edge]
+        return half_edge[np.argsort(edge, kind="stable")], *end
+
+    def _behind(self, half_edge: IntArray) -> tuple[IntArray, IntArray, BoolArray]:
+        """All that half-edges are glued to: position in `half_edge`, the other half-edge, and whether it is aligned.
+
+        None on the boundary, one inside, and several where more than two faces meet.
+        """
+        tri = self.triangulation
+        twin = tri.twin[half_edge]
+        rows = np.flatnonzero(twin != -1)
+        at_shared = rows[twin[rows] == -2]
+        if not len(at_shared):
+            return rows, twin[rows], tri.aligned[half_edge[rows]]
+        others, begin, end = self._shared
+        counts = end[half_edge[at_shared]] - begin[half_edge[at_shared]]
+        which = np.repeat(at_shared, counts)
+        place = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
+        other = others[begin[half_edge[which]] + place]
+        which, other = which[other != half_edge[which]], other[other != half_edge[which]]
+        rows = rows[twin[rows] >= 0]
+        aligned = np.append(tri.aligned[half_edge[rows]], tri.tail(half_edge[which]) == tri.head(other))
+        return np.append(rows, which), np.append(twin[rows], other), aligned
+
+    def meets_shared_edge(self, vertices: IntArray) -> bool:
+        """Whether a face at one of the vertices has a side where more than two faces meet."""
+        corner, _ = self.corners_at(vertices)
+        return bool((self.triangulation.twin.reshape(-1, 3)[corner // 3] == -2).any())
 
     def spokes(self, vertices: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
         """Edges from the given vertices: position of the vertex in `vertices`, the other end, and the length.
@@ -250,14 +293,13 @@ class NearField:
             c = np.argmax(zero[on_edge], axis=1)
             h = 3 * points.faces[on_edge] + c
             parts.append((points.faces[on_edge], points.barycentric[on_edge], on_edge))
-            glued = tri.twin[h] >= 0
-            on_edge, c, h = on_edge[glued], c[glued], h[glued]
-            t = tri.twin[h]
+            glued, t, aligned = self._behind(h)
+            on_edge, c = on_edge[glued], c[glued]
             at_tail = points.barycentric[on_edge, (c + 1) % 3]
             at_head = points.barycentric[on_edge, (c + 2) % 3]
             there = np.zeros((len(t), 3))
             rows = np.arange(len(t))
-            same = ~tri.aligned[h]
+            same = ~aligned
             there[rows, (t % 3 + 1) % 3] = np.where(same, at_tail, at_head)
             there[rows, (t % 3 + 2) % 3] = np.where(same, at_head, at_tail)
             parts.append((t // 3, there, on_edge))
@@ -342,17 +384,18 @@ class NearField:
         label: IntArray,
         offset: FloatArray,
     ) -> _Windows:
-        """Windows that leave faces through `half_edge`, in the frame of the face behind it; none at the boundary.
+        """Windows that leave faces through `half_edge`, in the frame of each face behind it; none at the boundary.
 
         `corners` (k, 3, 2) are those of the face in its present frame, `c` the one opposite the edge; `low` and `high`
         run from 0 at the edge's tail to 1 at its head.
         """
         tri = self.triangulation
-        t = tri.twin[half_edge]
-        rows = np.arange(len(t))
+        rows, t, aligned = self._behind(half_edge)
+        half_edge, c, S, w, level, low, high, label, offset = (
+            array[rows] for array in (half_edge, c, S, w, level, low, high, label, offset)
+        )
         tail, head, opposite = corners[rows, (c + 1) % 3], corners[rows, (c + 2) % 3], corners[rows, c]
         length = tri.l.ravel()[half_edge]
-        aligned = tri.aligned[half_edge]
         origin = np.where(aligned[:, None], head, tail)
         other = np.where(aligned[:, None], tail, head)
         e = (other - origin) / np.maximum(length, np.finfo(float).tiny)[:, None]
@@ -372,7 +415,7 @@ class NearField:
             offset=offset,
         )
         # Grazing rays see nothing that the corners do not see.
-        return windows.at((t >= 0) & (high - low > _ROUNDING) & (windows.y < 0))
+        return windows.at((high - low > _ROUNDING) & (windows.y < 0))
 
     def _cross(self, windows: _Windows, found: _Found) -> _Windows:
         """The windows behind the two far sides of the faces that windows enter; their far corners, where seen."""

@@ -14,7 +14,6 @@ from typing import Literal
 import igl
 import numpy as np
 import scipy.sparse as sp
-from scipy.special import i0e
 
 from heat_igl import connectivity
 from heat_igl.errors import MeshError
@@ -88,6 +87,9 @@ class Operators:
         `triangulation` is.
     is_surface : bool
         Whether the domain has two dimensions; tetrahedra have three.
+    chords : (n, n) csc_matrix or None
+        How far apart the vertices are that an entry of L couples, in the pattern of L, where there is no `triangulation`
+        to say so; None where that is not known.
     """
 
     L: sp.csc_matrix
@@ -104,6 +106,7 @@ class Operators:
     surface: IntrinsicTriangulation | None = None
     faces: IntrinsicTriangulation | None = None
     is_surface: bool = True
+    chords: sp.csc_matrix | None = None
 
     @property
     def n(self) -> int:
@@ -120,6 +123,11 @@ class Operators:
             if isinstance(move, Merged):
                 F = move.before(F)
         return F
+
+    @property
+    def has_lengths(self) -> bool:
+        """Whether the lengths of what L couples are known, see `fitted_laplacian`."""
+        return self.triangulation is not None or self.chords is not None
 
     @property
     def dimension(self) -> int:
@@ -341,41 +349,60 @@ def fitted_laplacian(domain: Operators, t: float) -> sp.csc_matrix:
     """L with the weight of each edge fitted to heat that falls like exp(-d / sqrt(t)), however long the edge.
 
     Where (1 - t Laplace) u = 0, the mean of u over a circle of radius r is I0(r / sqrt(t)) times its value in the centre,
-    I0 the modified Bessel function. Linear elements know the first term of that series alone, 1 + r^2 / (4 t): over an
-    edge much longer than sqrt(t) heat falls by too little, and turns towards long edges as light does towards a thinner
+    I0 the modified Bessel function. Linear elements know the first terms of that series alone, 1 + r^2 / (4 t): along an
+    edge much longer than sqrt(t) heat falls by too little, and bends towards long edges as light does towards a thinner
     medium. So an edge of length r gets its weight times (r^2 / (4 t)) / (I0(r / sqrt(t)) - 1), which is 1 for short ones.
+    Negative weights are left out, so that heat is positive and keeps its digits on any triangles.
 
     Parameters
     ----------
     domain : Operators
-        One that has a `triangulation`.
+        One whose lengths are known (`Operators.has_lengths`).
     t : float
         Time step, a squared length.
 
     Returns
     -------
     (n, n) csc_matrix
-        Symmetric, rows sum to 0, no new signs. Negative semidefinite where L is: of a triangle's weights at most one is
-        negative, that of its longest edge, and that is reduced the most.
+        Symmetric, negative semidefinite, rows sum to 0; no entry off the diagonal is negative.
+
+    Raises
+    ------
+    ValueError
+        If the lengths are not known.
     """
-    triangulation = domain.triangulation
-    if triangulation is None:
-        raise ValueError("weights are fitted to the lengths of edges, and this domain has no triangulation")
-    edges, twin, n = triangulation.edges, triangulation.twin, triangulation.n
+    n = domain.n
+    if domain.triangulation is not None:
+        rows, columns, weight, length = _edge_weights(domain.triangulation, domain.weights)
+    elif domain.chords is not None:
+        above = sp.triu(domain.L, 1, format="coo")
+        rows, columns, weight = above.row, above.col, above.data
+        length = sp.triu(domain.chords, 1, format="coo").data
+    else:
+        raise ValueError("weights are fitted to the lengths of edges, which this domain does not have")
+    weight = np.maximum(weight, 0.0) * _fit(length / np.sqrt(t))
+    total = np.bincount(rows, weight, n) + np.bincount(columns, weight, n)
+    everyone = np.arange(n)
+    entries = np.concatenate([weight, weight, -total])
+    return sp.csc_matrix(
+        (entries, (np.concatenate([rows, columns, everyone]), np.concatenate([columns, rows, everyone]))), shape=(n, n)
+    )
+
+
+def _edge_weights(
+    triangulation: IntrinsicTriangulation, areas_counted: FloatArray
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Both ends, cotangent weight and length of each edge; triangles count by the area that they have in the domain."""
     square, areas = triangulation.l**2, triangulation.areas
-    # Half the cotangent opposite each side, times one half where the domain is a tufted cover.
-    of_half_edge = ((sum(square.T)[:, None] - 2 * square) * (domain.weights / (8 * areas**2))[:, None]).ravel()
-    weight = of_half_edge[edges] + np.where(twin[edges] >= 0, of_half_edge[twin[edges]], 0.0)
-    weight *= _fit(triangulation.l.ravel()[edges] / np.sqrt(t))
-    tail, head = triangulation.tail(edges), triangulation.head(edges)
-    weight_sum = np.bincount(tail, weight, n) + np.bincount(head, weight, n)
-    rows, columns = np.concatenate([tail, head, np.arange(n)]), np.concatenate([head, tail, np.arange(n)])
-    return sp.csc_matrix((np.concatenate([weight, weight, -weight_sum]), (rows, columns)), shape=(n, n))
+    half_cotangents = ((sum(square.T)[:, None] - 2 * square) * (areas_counted / (8 * areas**2))[:, None]).ravel()
+    edges, twin = triangulation.edges, triangulation.twin[triangulation.edges]
+    weight = half_cotangents[edges] + np.where(twin >= 0, half_cotangents[twin], 0.0)
+    return triangulation.tail(edges), triangulation.head(edges), weight, triangulation.l.ravel()[edges]
 
 
 def _fit(x: FloatArray) -> FloatArray:
     """(x^2 / 4) / (I0(x) - 1)."""
-    # I0 is the sum of y^k / (k!)^2, and 13 terms give it to rounding up to x = 4; beyond, nothing cancels.
+    # I0 is the sum of y^k / (k!)^2, and 13 terms give it to 1e-12 up to x = 4; beyond, nothing cancels.
     y = np.minimum(x, 4.0) ** 2 / 4
     share = np.ones_like(x)
     for k in range(13, 1, -1):
@@ -386,7 +413,7 @@ def _fit(x: FloatArray) -> FloatArray:
     far = x > 4
     # exp(-600) is as good as no heat, and leaves the weight a number.
     beyond = np.minimum(x[far], 600.0)
-    fitted[far] = beyond**2 / 4 / (np.exp(beyond) * i0e(beyond) - 1)
+    fitted[far] = beyond**2 / 4 / (np.i0(beyond) - 1)
     return np.asarray(fitted)
 
 

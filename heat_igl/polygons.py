@@ -231,7 +231,14 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
         boundary=boundary,
         referenced=triangles.referenced,
         longest_distance=connectivity.longest_path(graph, triangles.components),
+        chords=_chords(mesh.V, L),
     )
+
+
+def _chords(V: FloatArray, L: sp.csc_matrix) -> sp.csc_matrix:
+    """Distances in space (n, n) of the vertices that L couples: all pairs of a polygon."""
+    columns = np.repeat(np.arange(L.shape[1]), np.diff(L.indptr))
+    return sp.csc_matrix((np.linalg.norm(V[L.indices] - V[columns], axis=1), L.indices, L.indptr), shape=L.shape)
 
 
 def _mean_distance(mesh: PolygonMesh, owner: IntArray) -> float:

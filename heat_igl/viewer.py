@@ -38,7 +38,7 @@ _STILL = 4.0
 class Options:
     """What can be changed in the window, as `HeatMethodSolver` takes it."""
 
-    t_coef: float = 1.0
+    t_coef: float | None = None
     boundary: Boundary = "neumann"
     refine: Refine | None = None
 
@@ -124,6 +124,7 @@ class Exploration:
         while len(self._solvers) > _KEPT_SOLVERS:
             del self._solvers[next(iter(self._solvers))]
         self.distance = solver.distance(sources)
+        self.t_coef = solver.t / solver.diagnostics.mean_edge_length**2
         self.sources, self.options, self.error = sources, options, None
         finite = np.where(np.isfinite(self.distance), self.distance, -1.0)
         self.message = (
@@ -197,9 +198,9 @@ class Window:
         """What happens once per frame: the controls, and the vertex that was clicked."""
         gui, now = self._gui, self.exploration
         gui.TextUnformatted("Click: source here. Shift and click: one more, or one less.")
-        moved, t_coef = gui.SliderFloat("t / h^2", now.options.t_coef, *_T_COEF, flags=gui.ImGuiSliderFlags_Logarithmic)
+        moved, t_coef = gui.SliderFloat("t / h^2", now.t_coef, *_T_COEF, flags=gui.ImGuiSliderFlags_Logarithmic)
         # Factoring follows when the slider is let go.
-        self._t_coef = t_coef if moved else getattr(self, "_t_coef", now.options.t_coef)
+        self._t_coef = t_coef if moved else getattr(self, "_t_coef", now.t_coef)
         changes: dict[str, Any] = {}
         if gui.IsItemDeactivatedAfterEdit():
             changes["t_coef"] = float(self._t_coef)

@@ -1,7 +1,8 @@
 """Distance converges to the known one, at the rate the theory gives and no faster, on every kind of domain.
 
 With t = c h^(3/2) both parts of the error vanish: the smoothing of the distance, of the order of sqrt(t) = h^(3/4), and
-the error of the direction, of the order of h^2 / t = h^(1/2). At t = h^2 the second stays on regular meshes.
+the error of the direction, of the order of h^2 / t = h^(1/2). At t = h^2 the second stays on regular meshes. That holds
+for the paper's unit field. The fitted flow leaves less of the second, and on some surfaces converges faster.
 """
 
 from __future__ import annotations
@@ -57,11 +58,12 @@ def box(n: int) -> tuple[Operators, int, np.ndarray]:
     return operators(mesh), source, np.linalg.norm(mesh.V - mesh.V[source], axis=1)
 
 
-def mean_error(domain: Operators, source: int, exact: np.ndarray, t: float) -> float:
-    distance = HeatMethodSolver.from_operators(domain, t=t).distance(source)
+def mean_error(domain: Operators, source: int, exact: np.ndarray, t: float, **options) -> float:
+    distance = HeatMethodSolver.from_operators(domain, t=t, **options).distance(source)
     return float(np.abs(distance - exact).mean())
 
 
+@pytest.mark.parametrize(("magnitude", "fastest"), [("unit", 1.0), ("auto", 1.6)])
 @pytest.mark.parametrize(
     ("shape", "sizes"),
     [
@@ -73,17 +75,17 @@ def mean_error(domain: Operators, source: int, exact: np.ndarray, t: float) -> f
         (box, (6, 12, 24)),
     ],
 )
-def test_order_and_bound(shape, sizes):
+def test_order_and_bound(shape, sizes, magnitude, fastest):
     h, error, bound = [], [], []
     for n in sizes:
         domain, source, exact = shape(n)
         t = 0.3 * domain.mean_edge_length**1.5
         h.append(domain.mean_edge_length)
-        error.append(mean_error(domain, source, exact, t))
+        error.append(mean_error(domain, source, exact, t, magnitude=magnitude))
         bound.append(np.sqrt(t) / 2)
     assert (np.array(error) < bound).all()
     order = np.polyfit(np.log(h), np.log(error), 1)[0]
-    assert 0.5 < order < 1.0
+    assert 0.5 < order < fastest
 
 
 @pytest.mark.parametrize(("n", "coarser"), [(64, 32)])
@@ -95,7 +97,7 @@ def test_where_the_source_is_the_centre_of_symmetry(n, coarser):
             mesh = make(size)
             domain = operators(mesh)
             exact = np.linalg.norm(mesh.V, axis=1)
-            errors.append(mean_error(domain, 0, exact, domain.mean_edge_length**2))
+            errors.append(mean_error(domain, 0, exact, domain.mean_edge_length**2, magnitude="unit"))
         assert np.log2(errors[0] / errors[1]) == pytest.approx(expected, abs=0.1)
         assert errors[1] < 0.01
 

@@ -181,7 +181,11 @@ def test_bad_source_set_is_named_before_anything_is_solved(solver):
 
 def test_time_step(sphere):
     h = HeatMethodSolver(sphere).diagnostics.mean_edge_length
-    assert HeatMethodSolver(sphere).t == pytest.approx(h**2, rel=1e-14)
+    assert HeatMethodSolver(sphere).t == pytest.approx(h**2 / 2, rel=1e-14)
+    assert HeatMethodSolver(sphere, magnitude="unit").t == pytest.approx(h**2, rel=1e-14)
+    assert HeatMethodSolver(shapes.box(3), t_coef=None).diagnostics.t_requested == pytest.approx(
+        operators(shapes.box(3)).mean_edge_length ** 2, rel=1e-14
+    )
     assert HeatMethodSolver(sphere, t_coef=4).t == pytest.approx(4 * h**2, rel=1e-14)
     assert HeatMethodSolver(sphere, t_coef=4, t=0.03).t == 0.03
     assert not HeatMethodSolver(sphere).diagnostics.t_raised

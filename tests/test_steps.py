@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from conftest import perturbed
 
 from heat_igl import Mesh, shapes, steps
-from heat_igl.operators import operators, tufted_operators
+from heat_igl.operators import fitted_laplacian, operators, tufted_operators
 from heat_igl.speed import speed_operators
 from heat_igl.steps import Descent, HeatFlow, PoissonProblem, damping, diffuse, integrate, normalize
 
@@ -143,9 +144,9 @@ def test_unknown_boundary(disk):
 
 
 @pytest.mark.parametrize("k", [1, 5])
-@pytest.mark.parametrize("damped", [False, True])
+@pytest.mark.parametrize(("damped", "fitted"), [(False, False), (True, False), (True, True)])
 @pytest.mark.parametrize("scale", [1e-280, 1.0, 1e280])
-def test_one_kernel_is_the_matrix_form(disk, k, damped, scale):
+def test_one_kernel_is_the_matrix_form(disk, k, damped, fitted, scale):
     """On all kinds of domains; some of the field vanishes and some of the heat is negative."""
     pytest.importorskip("numba")
     t = 0.02
@@ -159,12 +160,12 @@ def test_one_kernel_is_the_matrix_form(disk, k, damped, scale):
         u = diffuse(domain, initial, t) * scale
         u[: domain.n // 8] = 0.0
         u[domain.n // 2] *= -1
-        X = normalize(domain, u)
+        X = normalize(domain, u, fitted)
         if damped:
-            X *= np.tile(damping(domain, u, t), (domain.dimension, 1))
+            X *= np.tile(damping(domain, u, t, fitted=fitted), (domain.dimension, 1))
         expected = domain.D @ X
         for order in (None, np.random.default_rng(k).permutation(domain.n)):
-            found = Descent(domain, t if damped else None, order).divergence(u)
+            found = Descent(domain, t if damped else None, order, fitted).divergence(u)
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * abs(expected).max())
 
 
@@ -173,6 +174,54 @@ def test_without_numba_there_is_the_matrix_form(disk, monkeypatch):
     expected = disk.D @ (normalize(disk, u) * np.tile(damping(disk, u, 0.02), (2, 1)))
     monkeypatch.setattr(steps.importlib.util, "find_spec", lambda _: None)
     assert (Descent(disk, 0.02).divergence(u) == expected).all()
+
+
+def test_fitted_laplacian_of_equal_edges_is_right_in_the_mean_over_a_circle():
+    """Around the middle of a regular hexagon waves exp(x / sqrt(t)) solve (1 - t Laplace) u = 0, on average over x."""
+    hexagon = shapes.disk(1)
+    domain = operators(hexagon)
+    for t in (0.05, 0.3, 1.0, 50.0):
+        L = fitted_laplacian(domain, t)
+        angles = np.linspace(0, np.pi, 200, endpoint=False)
+        waves = [np.exp(hexagon.V @ [np.cos(a), np.sin(a), 0] / np.sqrt(t)) for a in angles]
+        area_of_cell = np.sqrt(3) / 2
+        assert t * np.mean([(L @ u)[0] for u in waves]) == pytest.approx(area_of_cell, rel=1e-9)
+
+
+def test_fitted_laplacian_is_a_laplacian():
+    """Symmetric, rows sum to 0, no negative weight even on slivers; that of short edges is L."""
+    stretched = perturbed(shapes.icosphere(3), 0.3)
+    stretched = Mesh(stretched.V * [1.0, 0.6, 0.1], stretched.F)
+    for domain in (operators(stretched), operators(stretched, "cotan"), tufted_operators(shapes.book(3, 4))):
+        h = domain.mean_edge_length
+        for t in (1e-8 * h**2, h**2, 1e3 * h**2):
+            L = fitted_laplacian(domain, t)
+            assert abs(L - L.T).max() == 0
+            assert abs(L.sum(axis=1)).max() <= 1e-12 * abs(L).max()
+            assert (L - sp.diags(L.diagonal())).min() >= 0
+    domain = operators(perturbed(shapes.icosphere(3)))
+    assert abs(fitted_laplacian(domain, 1e12) - domain.L).max() < 1e-9
+    with pytest.raises(ValueError, match="fitted to the lengths of edges, which this domain does not have"):
+        fitted_laplacian(operators(shapes.box(2)), 1.0)
+
+
+def test_a_fitted_front_falls_by_its_length_whatever_the_edges():
+    """Heat that crosses cells of length 1, then of 8, which is 4 sqrt(t)."""
+    x = np.concatenate([np.arange(0, 8), np.arange(8, 49, 8.0)])
+    fine = shapes.grid(len(x) - 1)
+    V = np.stack([x[np.round(fine.V[:, 0] * (len(x) - 1)).astype(int)], 8 * fine.V[:, 1], 0 * fine.V[:, 0]], axis=1)
+    domain = operators(Mesh(V, fine.F))
+    t = 4.0
+    left = (V[:, 0] == 0).astype(float)
+    rates = []
+    for fitted in (False, True):
+        u = HeatFlow(domain, t, fitted=fitted).solve(left)
+        column = [np.log(u[V[:, 0] == value].mean()) for value in x]
+        rates.append(-np.diff(column) / np.diff(x) * np.sqrt(t))
+    plain, fitted_rate = rates
+    np.testing.assert_allclose(plain[8:-1], np.arccosh(1 + 64 / (2 * t)) / 4, rtol=1e-3)
+    np.testing.assert_allclose(fitted_rate[:3], 1, atol=0.01)
+    np.testing.assert_allclose(fitted_rate[8:-1], 1, atol=0.06)
 
 
 def test_an_analysis_is_shared_where_it_fits(disk):

@@ -53,15 +53,15 @@ def with_changed_operators(**changes: Callable[[Operators], Any]) -> Callable[[M
 
 BROKEN: dict[str, Callable[[Mesh], HeatMethodSolver]] = {
     "t ten times too large": lambda mesh: HeatMethodSolver(mesh, t_coef=10.0),
-    "t ten times too small": lambda mesh: HeatMethodSolver(mesh, t_coef=0.1),
+    "no time": lambda mesh: HeatMethodSolver(mesh, t_coef=0.01, magnitude="unit"),
     "no mass": with_changed_operators(M=lambda good: sp.identity(good.n, format="csc")),
     "sign of the Laplacian": with_changed_operators(L=lambda good: -good.L),
 }
 
 
-@pytest.mark.parametrize(("mesh", "percent"), [(shapes.grid(40), 3.0), (shapes.disk(20), 2.7)], ids=["grid", "disk"])
+@pytest.mark.parametrize(("mesh", "percent"), [(shapes.grid(40), 3.0), (shapes.disk(20), 2.3)], ids=["grid", "disk"])
 def test_threshold_catches_broken_heat_steps(mesh: Mesh, percent: float) -> None:
-    # Heat is at 1.5 % on the grid and 2.1 % on the disk, the best of the broken ones at 4.6 and 3.4 %.
+    # Heat is at 1.8 % on the grid and 2.1 % on the disk, the best of the broken ones at 4.7 and 2.5 %.
     report = validate(mesh, draw_sources(mesh, 3), ["heat", *BROKEN.items()])
     assert [row.method for row in report.exceeding(percent)] == list(BROKEN)
     assert [row.method for row in report.exceeding(0.5)] == ["heat", *BROKEN]

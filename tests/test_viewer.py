@@ -71,7 +71,7 @@ def test_few_solvers_are_kept(sphere: heat_igl.Mesh, monkeypatch: pytest.MonkeyP
     now = Exploration(sphere, 0)
     for t_coef in (2.0, 1.0, 3.0, 4.0, 1.0, 5.0, 2.0):
         now.change(t_coef=t_coef)
-    assert made == [1.0, 2.0, 3.0, 4.0, 5.0, 2.0]  # 1 was used in between, so 2 was the one to go
+    assert made == [None, 2.0, 1.0, 3.0, 4.0, 5.0, 2.0]  # 1 was used in between, so 2 was the one to go
 
 
 def test_what_cannot_be_solved_changes_nothing(sphere: heat_igl.Mesh) -> None:

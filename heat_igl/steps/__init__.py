@@ -266,9 +266,7 @@ def damping(
     return np.asarray(np.where(factor < 1, factor, 1.0))
 
 
-def _lowest_full_rate(
-    operators: Operators, t: float, fitted: bool, full_rate: float | None = None
-) -> FloatArray:
+def _lowest_full_rate(operators: Operators, t: float, fitted: bool, full_rate: float | None = None) -> FloatArray:
     """The rate (m,), in e-foldings per length, from which on a direction is trusted fully."""
     if full_rate is None:
         full_rate = _FULL_RATE_FITTED if fitted else _FULL_RATE
@@ -335,7 +333,14 @@ class Descent:
             heat = np.ascontiguousarray(u)
             return np.asarray(
                 descent(
-                    rows.indptr, rows.indices, rows.data, operators.weights, self._full_rate, heat, _SMALLEST_GRADIENT
+                    rows.indptr,
+                    rows.indices,
+                    rows.data,
+                    operators.weights,
+                    self._full_rate,
+                    heat,
+                    _SMALLEST_GRADIENT,
+                    self._fitted,
                 )
             )
         X = normalize(operators, u, self._fitted)

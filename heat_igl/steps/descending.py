@@ -114,35 +114,40 @@ def _single(
     full_rate: FloatArray,
     u: FloatArray,
     smallest: float,
+    of_log: bool,
 ) -> FloatArray:
     """`descent` for one column (n,) and up to three coordinates, which then stay in registers."""
     m = len(weights)
     dimension = (len(ends) - 1) // m
     divergence = np.zeros(len(u))
-    log_u = np.log(u) if full_rate.any() else u
+    log_u = np.log(u) if of_log or full_rate.any() else u
     for f in range(m):
         damps = full_rate[f] > 0.0
-        x = y = z = rate = 0.0
+        x = y = z = x_of_log = y_of_log = z_of_log = 0.0
+        coldest = np.inf
         for d in range(dimension):
             total = total_of_log = 0.0
             for p in range(ends[d * m + f], ends[d * m + f + 1]):
                 total += gradient[p] * u[vertices[p]]
+                coldest = min(coldest, u[vertices[p]])
                 total_of_log += gradient[p] * log_u[vertices[p]]
-            rate += total_of_log * total_of_log
             if d == 0:
-                x = total
+                x, x_of_log = total, total_of_log
             elif d == 1:
-                y = total
+                y, y_of_log = total, total_of_log
             else:
-                z = total
+                z, z_of_log = total, total_of_log
+        along_log = of_log and coldest >= smallest
+        if along_log:
+            x, y, z = x_of_log, y_of_log, z_of_log
         largest = max(abs(x), abs(y), abs(z))
-        if not largest >= smallest:
+        if not largest >= (np.finfo(np.float64).tiny if along_log else smallest):
             continue
         # Squares of entries below 1e-154 would vanish: the largest is made 1 first.
         x, y, z = x / largest, y / largest, z / largest
         scale = weights[f] / np.sqrt(x * x + y * y + z * z)
         if damps:
-            share = np.sqrt(rate) / full_rate[f]
+            share = np.sqrt(x_of_log**2 + y_of_log**2 + z_of_log**2) / full_rate[f]
             if share < 1.0:
                 scale *= share
         for d in range(dimension):
@@ -221,13 +226,17 @@ def descent(
     full_rate: FloatArray,
     u: FloatArray,
     smallest: float,
+    of_log: bool = False,
 ) -> FloatArray:
     """Integrated divergence (n, k) of -grad u / |grad u|, times |grad log u| / full_rate where that is below 1.
 
     The gradient is given by its rows (compressed, stacked by coordinate), per face of size `weights` (m,). Where
     `full_rate` (m,) is 0, and where u is not positive, the field has length 1; it is 0 where no component of grad u
-    reaches `smallest`.
+    reaches `smallest`. It follows the gradient of log u if `of_log`, where no corner is below `smallest`.
     """
-    if u.shape[1] == 1 and len(ends) - 1 <= 3 * len(weights):
-        return np.asarray(_single(ends, vertices, gradient, weights, full_rate, u[:, 0].copy(), smallest)[:, None])
+    if of_log or (u.shape[1] == 1 and len(ends) - 1 <= 3 * len(weights)):
+        divergence = np.empty(u.shape)
+        for column, of_column in zip(u.T, divergence.T, strict=True):
+            of_column[:] = _single(ends, vertices, gradient, weights, full_rate, column.copy(), smallest, of_log)
+        return divergence
     return np.asarray(_several(ends, vertices, gradient, weights, full_rate, u, smallest))
