@@ -30,8 +30,8 @@ __all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_ti
 
 Magnitude = Literal["auto", "unit", "damped"]
 
-# Best by the table in docs/heat_path.md, and flat around: a smaller one tells the sides of a cut locus better apart, a larger
-# one the directions of a regular grid.
+# By the table in docs/heat_path.md, and flat around: a smaller one tells the sides of a cut locus better apart, a larger
+# one blurs the preferred directions of a regular grid.
 _T_COEF_FITTED = 0.5
 # Below this the heat has lost digits to gradual underflow.
 _LOWEST_HEAT = 1e-300
@@ -71,8 +71,8 @@ class HeatMethodSolver:
         Faces, when `mesh` is V.
     t_coef : float, optional
         Scale-free time step, t = t_coef h^2 with h the mean edge length of the triangulation that is solved on. Larger
-        values smooth the distance across the cut locus. 0.5 where the flow is fitted (see `magnitude`), else the paper's
-        1.
+        values smooth the distance across the cut locus. 0.5 where heat is fitted to the lengths of edges (see
+        `magnitude`), else the paper's 1.
     t : float, optional
         Time step as a squared length; overrides `t_coef`.
     laplacian : {"intrinsic-delaunay", "cotan"}
@@ -82,8 +82,9 @@ class HeatMethodSolver:
     magnitude : {"auto", "unit", "damped"}
         Length of the field X that is integrated: 1 as in the paper, or less where heat arrives from several sides, see
         `damping`. "auto" damps on surfaces, where it was measured to pay, but not for "cotan", where heat may be
-        negative and the paper's method is wanted. "unit" also leaves the vertices next to a source vertex to heat,
-        which otherwise get the lengths of the edges.
+        negative and the paper's method is wanted. "unit" is the paper's method throughout: otherwise the heat flow is
+        fitted to the lengths of edges (`fitted_laplacian`), X follows the gradient of log u, and the vertices next to a
+        source vertex get the lengths of the edges.
     refine : {"sweep", "unfold"}, optional
         Integrate nothing, and find the distance in the order of the heat by unfolding triangles, one at a time or in
         strips: 0.2 to 0.7 % and 0.001 to 0.01 % mean error on common meshes, see `Refinement`. Needs triangles, and

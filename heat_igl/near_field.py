@@ -119,7 +119,7 @@ class NearField:
 
     @cached_property
     def _shared(self) -> tuple[IntArray, IntArray, IntArray]:
-        """Half-edges where more than two faces meet, edge by edge, and for each half-edge where its edge begins and ends.
+        """Half-edges where more than two faces meet, edge by edge; for each half-edge, where its edge begins and ends.
 
         No such edge is ever flipped, so its vertices tell it.
         """
@@ -391,9 +391,8 @@ class NearField:
         """
         tri = self.triangulation
         rows, t, aligned = self._behind(half_edge)
-        half_edge, c, S, w, level, low, high, label, offset = (
-            array[rows] for array in (half_edge, c, S, w, level, low, high, label, offset)
-        )
+        half_edge, c, label = half_edge[rows], c[rows], label[rows]
+        S, w, level, low, high, offset = (array[rows] for array in (S, w, level, low, high, offset))
         tail, head, opposite = corners[rows, (c + 1) % 3], corners[rows, (c + 2) % 3], corners[rows, c]
         length = tri.l.ravel()[half_edge]
         origin = np.where(aligned[:, None], head, tail)

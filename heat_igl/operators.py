@@ -89,8 +89,8 @@ class Operators:
     is_surface : bool
         Whether the domain has two dimensions; tetrahedra have three.
     chords : (n, n) csc_matrix or None
-        How far apart the vertices are that an entry of L couples, in the pattern of L, where there is no `triangulation`
-        to say so; None where that is not known.
+        How far apart the vertices are that an entry of L couples, in the pattern of L, where there is no
+        `triangulation` to say so; None where that is not known.
     """
 
     L: sp.csc_matrix
@@ -365,11 +365,11 @@ def tufted_operators(
 def fitted_laplacian(domain: Operators, t: float) -> sp.csc_matrix:
     """L with the weight of each edge fitted to heat that falls like exp(-d / sqrt(t)), however long the edge.
 
-    Where (1 - t Laplace) u = 0, the mean of u over a circle of radius r is I0(r / sqrt(t)) times its value in the centre,
-    I0 the modified Bessel function. Linear elements know the first terms of that series alone, 1 + r^2 / (4 t): along an
-    edge much longer than sqrt(t) heat falls by too little, and bends towards long edges as light does towards a thinner
-    medium. So an edge of length r gets its weight times (r^2 / (4 t)) / (I0(r / sqrt(t)) - 1), which is 1 for short ones.
-    Negative weights are left out, so that heat is positive and keeps its digits on any triangles.
+    Where (1 - t Laplace) u = 0, the mean of u over a circle of radius r is I0(r / sqrt(t)) times its value in the
+    centre, I0 the modified Bessel function. Linear elements know the first terms of that series alone, 1 + r^2 / (4 t):
+    along an edge much longer than sqrt(t) heat falls by too little, and the front runs ahead there and bends. So an
+    edge of length r gets its weight times (r^2 / (4 t)) / (I0(r / sqrt(t)) - 1), which is 1 for short ones. Negative
+    weights are left out, so that heat is positive and keeps its digits on any triangles.
 
     Parameters
     ----------
@@ -411,7 +411,8 @@ def _edge_weights(
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
     """Both ends, cotangent weight and length of each edge; triangles count by the area that they have in the domain."""
     square, areas = triangulation.l**2, triangulation.areas
-    half_cotangents = ((sum(square.T)[:, None] - 2 * square) * (areas_counted / (8 * areas**2))[:, None]).ravel()
+    total = square[:, 0] + square[:, 1] + square[:, 2]
+    half_cotangents = ((total[:, None] - 2 * square) / (8 * areas / (areas_counted / areas))[:, None]).ravel()
     edges, twin = triangulation.edges, triangulation.twin[triangulation.edges]
     weight = half_cotangents[edges] + np.where(twin >= 0, half_cotangents[twin], 0.0)
     return triangulation.tail(edges), triangulation.head(edges), weight, triangulation.l.ravel()[edges]

@@ -224,8 +224,8 @@ def test_flat_faces_far_larger_and_far_smaller_than_the_mean(share):
     assert mesh.edge_lengths.max() > 50 * mesh.edge_lengths.mean()
     clean = heat_igl.HeatMethodSolver(coarse, t=0.1).distance(0)
     distance = heat_igl.HeatMethodSolver(mesh, t=0.1).distance(0)[: len(clean)]
-    # A vertex in the middle of an edge is one more that distance is known at: next to the source's neighbours that shows,
-    # and beyond them in the level, which is taken from all of these.
+    # A vertex in the middle of an edge is one more that distance is known at: that shows next to the source's
+    # neighbours, and beyond them in the level, which is taken from all of these.
     ring = np.isin(coarse.F, coarse.F[(coarse.F == 0).any(axis=1)]).any(axis=1)
     beyond = np.setdiff1d(np.arange(len(clean)), coarse.F[ring])
     assert len(beyond) > len(clean) / 2

@@ -232,10 +232,10 @@ def damping(
 ) -> FloatArray:
     """How sure the direction of X is on each face: 1 almost everywhere, less where heat arrives from several sides.
 
-    A front of heat falls by the same factor over each length, |grad log u| = 1 / sqrt(t) for small faces and in a fitted
-    flow, else by arccosh(1 + l^2 / (2 t)) over an edge of length l on large ones. Where fronts meet, at the cut locus and between
-    two sources, it falls more slowly, and the distance has no gradient of length 1 there either. Integrating a unit
-    field all the same overestimates distance on both sides.
+    A front of heat falls by the same factor over each length, |grad log u| = 1 / sqrt(t) for small faces and in a
+    fitted flow, else by arccosh(1 + l^2 / (2 t)) over an edge of length l on large ones. Where fronts meet, at the cut
+    locus and between two sources, it falls more slowly, and the distance has no gradient of length 1 there either.
+    Integrating a unit field all the same overestimates distance on both sides.
 
     Parameters
     ----------
@@ -283,8 +283,8 @@ def _front_rate(operators: Operators, t: float) -> FloatArray:
 class Descent:
     """The right-hand side of step 3, the divergence of the field X of step 2, in one pass over the faces.
 
-    The same as ``D @ normalize(operators, u, fitted)`` to rounding, and without storing a field; by a compiled kernel where
-    numba is installed. What the kernel reads of the faces is put together once.
+    The same as ``D @ normalize(operators, u, fitted)`` to rounding, and without storing a field; by a compiled kernel
+    where numba is installed. What the kernel reads of the faces is put together once.
 
     Parameters
     ----------
