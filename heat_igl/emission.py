@@ -244,8 +244,8 @@ class Emitter:
     def _straight_lines(self, sources: SourceSet, rim: BoolArray) -> tuple[Seeds, Seeds]:
         """Distance of the vertices that see a source in a straight line, as `NearField.seeds` has it.
 
-        Only where there are points or curves; for vertices alone, the ring of edges is enough, but not beside an edge of
-        more than two faces: the tufted cover leads over it from a face to two of the others alone.
+        Only where there are points or curves; for vertices alone, the ring of edges is enough, but beside an edge of
+        more than two faces it is not: the tufted cover leads over it from a face to two of the others alone.
         """
         if self._on_faces is None:
             return _NONE, _NONE

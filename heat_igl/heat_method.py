@@ -30,8 +30,8 @@ __all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_ti
 
 Magnitude = Literal["auto", "unit", "damped"]
 
-# By the table in docs/heat_path.md, and flat around: a smaller one tells the sides of a cut locus better apart, a larger
-# one blurs the preferred directions of a regular grid.
+# By the table in docs/heat_path.md, and flat around: a smaller one tells the sides of a cut locus better apart, a
+# larger one blurs the preferred directions of a regular grid.
 _T_COEF_FITTED = 0.5
 # Below this the heat has lost digits to gradual underflow.
 _LOWEST_HEAT = 1e-300

@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl import HeatMethodSolver, Mesh, read_mesh, reference
-from heat_igl.steps import PoissonProblem, damping, normalize
+from heat_igl.operators import operators
+from heat_igl.steps import HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.typing import FloatArray
 from heat_igl.validation import draw_sources
 
@@ -31,25 +32,24 @@ def options(**kept: object) -> Callable[[Mesh], Distance]:
     return lambda mesh: HeatMethodSolver(mesh, **kept).distance
 
 
-def field(of_log_u: bool = False, full_rate: float | None = None) -> Callable[[Mesh], Distance]:
-    """X put together from the steps: along the gradient of u or of log u, damped with a given constant or not."""
+def field(
+    fitted: bool = True, of_log: bool = True, full_rate: float | None = 0.95, t_coef: float = 0.5
+) -> Callable[[Mesh], Distance]:
+    """Put together from the steps: the flow, what X follows, the rate from which it has length 1, and the time step."""
 
     def prepare(mesh: Mesh) -> Distance:
-        solver = HeatMethodSolver(mesh)
-        domain = solver.operators
-        poisson = PoissonProblem(domain)
+        domain = operators(mesh)
+        t = t_coef * domain.mean_edge_length**2
+        flow, poisson = HeatFlow(domain, t, fitted=fitted), PoissonProblem(domain)
 
         def distance(source: int) -> FloatArray:
-            u = solver.solve(source).heat
-            X = normalize(domain, u).reshape(domain.dimension, -1)
-            if of_log_u:
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    gradient = (domain.G @ np.log(u)).reshape(domain.dimension, -1)
-                    along_log = -gradient / np.linalg.norm(gradient, axis=0)
-                X = np.where(np.isfinite(along_log).all(axis=0), along_log, X)
+            initial = np.zeros(domain.n)
+            initial[source] = 1e280
+            u = flow.solve(initial)
+            X = normalize(domain, u, of_log)
             if full_rate is not None:
-                X = X * damping(domain, u, solver.t, full_rate)
-            phi = poisson.solve(domain.D @ X.ravel())
+                X *= np.tile(damping(domain, u, t, full_rate, fitted), domain.dimension)
+            phi = poisson.solve(domain.D @ X)
             return np.maximum(phi - phi[source], 0)
 
         return distance
@@ -64,22 +64,30 @@ def potpourri3d(mesh: Mesh) -> Distance:
 VARIANTS: dict[str, Callable[[Mesh], Distance]] = {
     "potpourri3d": potpourri3d,
     "default": options(),
-    "unit field": options(magnitude="unit"),
-    "unit, average boundary": options(magnitude="unit", boundary="average"),
+    "default, t_coef 0.25": options(t_coef=0.25),
+    "default, t_coef 0.35": options(t_coef=0.35),
+    "default, t_coef 0.7": options(t_coef=0.7),
+    "default, t_coef 1": options(t_coef=1),
+    "default, t_coef 2": options(t_coef=2),
     "default, average boundary": options(boundary="average"),
     "default, dirichlet boundary": options(boundary="dirichlet"),
-    "default, t_coef 0.5": options(t_coef=0.5),
-    "default, t_coef 2": options(t_coef=2),
+    "unit field": options(magnitude="unit"),
     "unit, t_coef 0.5": options(magnitude="unit", t_coef=0.5),
     "unit, t_coef 2": options(magnitude="unit", t_coef=2),
+    "unit, average boundary": options(magnitude="unit", boundary="average"),
     "cotan, the paper's": options(laplacian="cotan"),
     "cotan, damped": options(laplacian="cotan", magnitude="damped"),
-    "damped from 0.8": field(full_rate=0.8),
-    "damped from 0.85": field(full_rate=0.85),
-    "damped from 0.95": field(full_rate=0.95),
+    "steps of the default": field(),
+    "damped from 0.9": field(full_rate=0.9),
     "damped from 1": field(full_rate=1.0),
-    "gradient of log u": field(of_log_u=True),
-    "gradient of log u, damped": field(of_log_u=True, full_rate=0.9),
+    "not damped": field(full_rate=None),
+    "along u": field(of_log=False),
+    "not fitted": field(fitted=False, full_rate=0.9),
+    "not fitted, along u": field(fitted=False, of_log=False, full_rate=0.9),
+    "t_coef 1": field(t_coef=1.0),
+    "t_coef 1, along u": field(of_log=False, t_coef=1.0),
+    "t_coef 1, not fitted": field(fitted=False, full_rate=0.9, t_coef=1.0),
+    "t_coef 1, not fitted, along u": field(fitted=False, of_log=False, full_rate=0.9, t_coef=1.0),
 }
 
 

@@ -220,7 +220,7 @@ def test_a_fitted_front_falls_by_its_length_whatever_the_edges():
         rates.append(-np.diff(column) / np.diff(x) * np.sqrt(t))
     plain, fitted_rate = rates
     np.testing.assert_allclose(plain[8:-2], np.arccosh(1 + 64 / (2 * t)) / 4, rtol=1e-3)
-    np.testing.assert_allclose(fitted_rate[:3], 1, atol=0.01)
+    np.testing.assert_allclose(fitted_rate[:3], 1, atol=0.02)
     np.testing.assert_allclose(fitted_rate[8:-1], 1, atol=0.06)
 
 
