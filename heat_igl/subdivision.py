@@ -1,7 +1,7 @@
 """More vertices where triangles are large, on the same surface.
 
-The heat method's error is one of resolution, and its time step follows the mean edge: where edges are much longer than
-that, heat has to cross them in one step of linear interpolation.
+The heat method's error is one of resolution: where edges are much longer than the mean, which the time step follows, one
+direction has to do for a large triangle.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def split_long_edges(mesh: Mesh, longest: float | None = None) -> Mesh:
         Triangles, manifold or not.
     longest : float, optional
         In the mesh's unit; ``mesh.edge_lengths.mean()`` by default. Where triangles are of very different size, heat's
-        error falls by a third at twice the mean already (docs/refinement.md).
+        error falls by up to a fifth at twice the mean already (docs/refinement.md).
 
     Returns
     -------
