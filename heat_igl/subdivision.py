@@ -1,7 +1,7 @@
 """More vertices where triangles are large, on the same surface.
 
-The heat method's error is one of resolution: where edges are much longer than the mean, which the time step follows, one
-direction has to do for a large triangle.
+The heat method's error is one of resolution: where edges are much longer than the mean, which the time step follows,
+one direction has to do for a large triangle.
 """
 
 from __future__ import annotations
