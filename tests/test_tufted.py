@@ -313,6 +313,7 @@ def test_undivided_fan():
     fan = fan_of_five(2.0)
     assert fan.n_vertices == 7
     sources = np.arange(2, 7)
+    fan = Mesh(fan.V + [[0, 0, 0.2 * (k - 4) * (k > 1)] for k in range(7)], fan.F)
     for shared in (fan, Mesh(fan.V, np.where(np.arange(5)[:, None] % 2, fan.F[:, ::-1], fan.F))):
         distance = HeatMethodSolver(shared).distances(list(sources))
         np.testing.assert_allclose(distance, book_distance(fan, 5, sources), rtol=1e-12, atol=1e-12)
@@ -339,7 +340,7 @@ def test_stretched_book(pages):
 
 
 def test_every_face_twice(cow):
-    """Without a remedy no edge of it could be flipped: 2.7 % then, and 14 % by the paper's method."""
+    """Without a remedy no edge of it could be flipped: 5 % then, and 14 % by the paper's method."""
     twice = Mesh(cow.V, np.concatenate([cow.F, cow.F[:, ::-1]]))
     sources = sample_sources(cow)
     truth = graph_distance(cow, sources, 12)
@@ -347,7 +348,7 @@ def test_every_face_twice(cow):
     once = heat_error(cow, sources, truth)
     assert once < 0.03
     assert heat_error(twice, sources, truth) == once
-    assert heat_error(plain, sources, truth) > 1.5 * once
+    assert heat_error(plain, sources, truth) > 3 * once
     assert heat_error(plain, sources, truth, magnitude="unit") > 0.1
 
 
