@@ -63,6 +63,8 @@ class Exploration:
         `choose` changes them.
     distance : (n,) float64
         From `sources` with `options`.
+    t_coef : float
+        The time step in use, in squared mean edge lengths.
     error : (n,) float64 or None
         Of `distance`, in percent of the exact distance, 0 at the sources and ``inf`` out of reach; None until
         `compare`, and again after any change.

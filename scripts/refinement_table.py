@@ -160,7 +160,7 @@ def splitting(mesh: Mesh, sources: list[int], truth: list[FloatArray] | FloatArr
     fine = mesh if whole else heat_igl.split_long_edges(mesh, longest * float(mesh.edge_lengths.mean()))
     name = "heat" if whole else f"heat, edges up to {longest:g} mean edges"
     row: Row = {f"{name}, vertices": fine.n_vertices}
-    for t_coef in (1.0, 0.5):
+    for t_coef in (0.5, 0.25):
         solver = HeatMethodSolver(fine, t_coef=t_coef)
         found = [errors(solver.distance(s)[: mesh.n_vertices], d)[0] for s, d in zip(sources, truth, strict=True)]
         row[f"{name}, t_coef {t_coef:g} %"] = float(np.mean(found))
