@@ -12,12 +12,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
-import numba.extending
 import numpy as np
 
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["Tables", "breadth_first", "inline", "jit", "tables", "uncounted"]
+__all__ = ["Tables", "breadth_first", "inline", "jit", "tables"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -31,34 +30,6 @@ def jit(function: Function) -> Function:
 def inline(function: Function) -> Function:
     """Compile into the caller: what runs once per step or visit, where a call would cost as much as the work."""
     return cast(Function, numba.njit(nogil=True, inline="always", error_model="numpy")(function))
-
-
-def _uncounted(_: Any, kind: Any) -> Any:
-    """The same arrays, or tuple of them, without a count of references: only for those that the caller keeps.
-
-    Numba counts at every use of a tuple's member, by atomic additions that hold up all memory traffic around them: a
-    tenth of the time of a kernel whose inner loop reads tables.
-    """
-
-    def without_owner(context: Any, builder: Any, kind: Any, given: Any) -> Any:
-        is_tuple, is_array = (isinstance(kind, one) for one in (numba.types.BaseTuple, numba.types.Array))
-        if is_tuple:
-            members = [builder.extract_value(given, i) for i in range(len(kind))]
-            members = [without_owner(context, builder, *member) for member in zip(kind, members, strict=True)]
-            return context.make_tuple(builder, kind, members)
-        if not is_array:
-            return given
-        view = context.make_array(kind)(context, builder, given)
-        view.meminfo, view.parent = view.meminfo.type(None), view.parent.type(None)
-        return view._getvalue()
-
-    def code(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
-        return without_owner(context, builder, kind, arguments[0])
-
-    return kind(kind), code
-
-
-uncounted = cast("Callable[[Any], Any]", numba.extending.intrinsic(_uncounted))
 
 
 # Columns of `Tables.spoke`, and of its view as integers.

@@ -36,8 +36,8 @@ from heat_igl.fans import (
     Tables,
     inline,
     jit,
-    uncounted,
 )
+from heat_igl.memory_access import prefetch, uncounted
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["NO_FAN", "Points", "unfold", "views"]
@@ -377,6 +377,9 @@ def _walk(
         w = t.step_id[h, FAR]
         if w < 0:
             break
+        # Where the walk goes next is known late, but both ways are known now.
+        prefetch(t.step, t.step_id[h, TO_RIGHT])
+        prefetch(t.step, t.step_id[h, TO_LEFT])
         ux, uy = ax - bx, ay - by
         x, y = t.step[h, FAR_X], t.step[h, FAR_Y]
         wx = bx + x * ux - y * uy
@@ -614,6 +617,23 @@ def _visit(
     return -1
 
 
+@inline
+def _read_ahead(order: IntArray, i: int, t: Tables, state: FloatArray) -> None:
+    """Have what the next visits begin with fetched: a third of the time would go by waiting for it."""
+    if i + 3 < len(order):
+        prefetch(t.first, order[i + 3])
+    if i + 2 < len(order):
+        v = order[i + 2]
+        for k in range(t.first[v], t.first[v + 1]):
+            prefetch(t.spoke, k)
+            prefetch(t.turn, k)
+    if i + 1 < len(order):
+        v = order[i + 1]
+        for k in range(t.first[v], t.first[v + 1]):
+            prefetch(state, t.spoke_id[k, NEIGHBOUR])
+            prefetch(t.step, t.turn_id[k, CORNER])
+
+
 @jit
 def _unfold(
     order: IntArray,
@@ -634,7 +654,9 @@ def _unfold(
     is_stale, work, waiting = uncounted((is_stale, work, waiting))
     for _ in range(max_passes):
         found_stale = False
-        for start in order:
+        for i in range(len(order)):
+            _read_ahead(order, i, t, state)
+            start = order[i]
             if not is_stale[start]:
                 continue
             waiting[0] = start
@@ -647,8 +669,8 @@ def _unfold(
                 wait_for = _visit(v, may_wait, t, points, state, label, work, tolerance, shortfall, max_steps)
                 if wait_for >= 0:
                     may_wait = depth < _MAX_WAITING
-                    for i in range(depth):
-                        may_wait = may_wait and waiting[i] != wait_for
+                    for j in range(depth):
+                        may_wait = may_wait and waiting[j] != wait_for
                     if may_wait:
                         waiting[depth] = wait_for
                         depth += 1
