@@ -3,6 +3,9 @@ from __future__ import annotations
 import sys
 
 import numpy as np
+import pytest
+
+pytest.importorskip("numba")
 
 from heat_igl.fans import jit
 from heat_igl.memory_access import prefetch, uncounted
