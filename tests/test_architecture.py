@@ -33,6 +33,7 @@ speed
 polygons
 io
 fans
+memory_access
 factorization
 sources
 near_field
