@@ -23,7 +23,7 @@ from heat_igl import (
     shapes,
 )
 from heat_igl.bounds import edge_paths
-from heat_igl.operators import fitted_laplacian
+from heat_igl.steps import fitted_laplacian
 
 
 @pytest.fixture(params=[None, "sweep", "unfold"])

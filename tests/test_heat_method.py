@@ -10,8 +10,8 @@ from conftest import perturbed, shared_path
 
 import heat_igl
 from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, MeshError, SourceError, shapes
-from heat_igl.operators import fitted_laplacian, operators
-from heat_igl.steps import integrate
+from heat_igl.operators import operators
+from heat_igl.steps import fitted_laplacian, integrate
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ import scipy.sparse as sp
 from conftest import perturbed
 
 from heat_igl import Mesh, shapes, steps
-from heat_igl.operators import fitted_laplacian, operators, tufted_operators
+from heat_igl.operators import operators, tufted_operators
 from heat_igl.speed import speed_operators
-from heat_igl.steps import Descent, HeatFlow, PoissonProblem, damping, diffuse, integrate, normalize
+from heat_igl.steps import Descent, HeatFlow, PoissonProblem, damping, diffuse, fitted_laplacian, integrate, normalize
 
 
 @pytest.fixture(scope="module")

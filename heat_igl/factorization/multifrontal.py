@@ -7,22 +7,17 @@ stored by fronts, one row index for a whole front's columns, so that a solve rea
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numba
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from heat_igl.factorization.dissection import Dissection
 from heat_igl.fans import Function
 from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 from heat_igl.typing import BoolArray, FloatArray
 
-__all__ = ["Fronts", "factor", "fronts", "in_panel", "jit", "prefetch"]
+__all__ = ["Fronts", "factor", "fronts", "in_panel", "jit"]
 
 # A pivot that has shrunk to less than this share of the diagonal is rounding.
 _SINGULAR = 1e-13
@@ -37,27 +32,6 @@ def jit(function: Function) -> Function:
     """Compile with sums in any order and fused multiplications, which never add a cancellation."""
     options = {"reassoc", "contract", "nsz"}
     return cast(Function, numba.njit(nogil=True, cache=True, error_model="numpy", fastmath=options)(function))
-
-
-def _prefetch(context: Any, array: Any, index: Any) -> Any:  # noqa: ARG001
-    """Have ``array[index]`` fetched into the cache; where there is no such element, nothing happens."""
-
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        at = builder.bitcast(builder.gep(data, [arguments[1]]), cgutils.voidptr_t)
-        number = cgutils.int32_t
-        called = ir.FunctionType(ir.VoidType(), [cgutils.voidptr_t, number, number, number])
-        to_read, everywhere, is_data = number(0), number(3), number(1)
-        builder.call(
-            builder.module.declare_intrinsic("llvm.prefetch", [cgutils.voidptr_t], called),
-            [at, to_read, everywhere, is_data],
-        )
-        return context.get_dummy_value()
-
-    return types.void(array, types.intp), code
-
-
-prefetch = cast(Callable[[FloatArray, int], None], intrinsic(_prefetch))
 
 
 class Fronts(NamedTuple):

@@ -11,7 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from heat_igl.factorization.multifrontal import Fronts, in_panel, jit, prefetch
+from heat_igl.factorization.multifrontal import Fronts, in_panel, jit
+from heat_igl.memory_access import prefetch
 from heat_igl.processors import n_threads, side_by_side
 from heat_igl.typing import FloatArray
 

@@ -16,7 +16,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.factorization import Analysis, Backend, Factorization, analyse
-from heat_igl.operators import Operators, fitted_laplacian
+from heat_igl.operators import Operators
+from heat_igl.steps.fitted import fitted_laplacian
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "analysis",
     "damping",
     "diffuse",
+    "fitted_laplacian",
     "integrate",
     "normalize",
 ]
