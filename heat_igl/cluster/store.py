@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import json
 import os
 import shutil
 import zlib
@@ -24,7 +25,9 @@ _MOST_ROWS = 64
 _ENTRIES = 2**22
 # Longest row of one zarr chunk.
 _COLUMNS = 2**20
-_FORMAT = 1
+_FORMAT = 2
+# A chunk ends in its CRC-32C.
+_CHECKSUM_BYTES = 4
 
 
 def rows_per_block(n: int) -> int:
@@ -85,84 +88,79 @@ class Store:
 
     def names(self) -> list[str]:
         """Names of the meshes that the store knows, sorted."""
-        return sorted(self._root.group_keys())
+        return sorted(metadata.parent.name for metadata in self.path.glob("*/zarr.json"))
 
     def attributes(self, name: str) -> dict[str, Any]:
-        """What is known of a mesh; empty if it was not begun."""
-        try:
-            return dict(self._root[name].attrs)
-        except KeyError:
-            return {}
+        """What is known of a mesh: status, t, versions, checksum, report; empty if it was not begun."""
+        return dict(self._root[name].attrs) if (self.path / name / "zarr.json").is_file() else {}
+
+    def update(self, name: str, attributes: Mapping[str, Any]) -> None:
+        """Change some of what is known of a mesh that was begun."""
+        with _writing(self.path):
+            self._root[name].update_attributes(dict(attributes))
 
     def fail(self, name: str, mesh: str, reason: str) -> None:
         """Record that a mesh has no distances, or not all, and why. Those that it has stay."""
         failure = {"mesh": mesh, "status": "failed", "reason": reason}
-        with _writing(self.path):
-            if "status" in self.attributes(name):
-                self._root[name].update_attributes(failure)
-            else:
-                self._remove(name)
-                self._root.create_group(name, attributes=failure)
+        if self.attributes(name):
+            self.update(name, failure)
+        else:
+            self._make(name, {}, failure)
 
     def begin(
         self, name: str, source_sets: Sequence[IntArray], n: int, dtype: str, attributes: Mapping[str, Any]
     ) -> MeshGroup:
         """The group of a mesh with empty distances; replaces what was there."""
-        rows = rows_per_block(n)
         k = len(source_sets)
+        chunk = (min(rows_per_block(n), k), min(n, _COLUMNS))
         # The vertices of all source sets in one list, each with the row of `distance` that starts at it.
-        entries = {
-            "source_vertex": np.concatenate(source_sets),
-            "source_row": np.repeat(np.arange(k), [len(vertices) for vertices in source_sets]),
+        vertices = np.concatenate(source_sets).astype("<i8", copy=False)
+        row = np.repeat(np.arange(k, dtype="<i8"), [len(one) for one in source_sets])
+        distance = _array((k, n), chunk, dtype, "NaN", ("source", "vertex"), {"name": "crc32c"})
+        sources = _array(row.shape, row.shape, "int64", 0, ("source_entry",))
+        files = {
+            "distance/zarr.json": _json(distance),
+            "source_vertex/zarr.json": _json(sources),
+            "source_vertex/c/0": vertices.tobytes(),
+            "source_row/zarr.json": _json(sources),
+            "source_row/c/0": row.tobytes(),
         }
-        chunk = (min(rows, k), min(n, _COLUMNS))
-        arrays = {
-            "distance": _array((k, n), chunk, dtype, "NaN", ("source", "vertex")),
-            "block_checksum": _array((-(-k // rows),), (1,), "int64", -1, ("block",)),
-        } | {label: _array(v.shape, v.shape, "int64", 0, ("source_entry",)) for label, v in entries.items()}
-        with _writing(self.path):
-            self._remove(name)
-            # All at once takes half as long as one after the other.
-            nodes = {name: _zarr().core.group.GroupMetadata()} | {f"{name}/{key}": node for key, node in arrays.items()}
-            made = dict(_zarr().create_hierarchy(store=self._root.store, nodes=nodes))
-            for label, values in entries.items():
-                made[f"{name}/{label}"][:] = values
-            # Last, all at once: a group without a status was not finished being made.
-            group = made[name].update_attributes({**attributes, "rows_per_block": rows, "status": "running"})
-        return MeshGroup(self, name, (group, made[f"{name}/distance"], made[f"{name}/block_checksum"]), source_sets)
+        self._make(name, files, {**attributes, "status": "running"})
+        return MeshGroup(self, name, _zarr().Array.from_dict(self._root.store_path / name / "distance", distance))
 
-    def _remove(self, name: str) -> None:
-        if name in self._root:
-            del self._root[name]
-        shutil.rmtree(self.path / name, ignore_errors=True)  # what a crash left without metadata
+    def _make(self, name: str, files: Mapping[str, bytes], attributes: Mapping[str, Any]) -> None:
+        """Make a group, by hand: a few small files, for which zarr takes several times as long."""
+        path = self.path / name
+        metadata = path / "zarr.json"
+        with _writing(self.path):
+            # Removed first and written last, whole: without it there is no group, only what a crash has left of one.
+            metadata.unlink(missing_ok=True)
+            shutil.rmtree(path, ignore_errors=True)
+            for key, content in files.items():
+                (path / key).parent.mkdir(parents=True, exist_ok=True)
+                (path / key).write_bytes(content)
+            path.mkdir(exist_ok=True)
+            whole = metadata.with_suffix(".partial")
+            whole.write_bytes(_json({"zarr_format": 3, "node_type": "group", "attributes": dict(attributes)}))
+            whole.replace(metadata)
 
     def group(self, name: str) -> MeshGroup:
         """The group of a mesh that was begun."""
-        group = self._root[name]
-        return MeshGroup(self, name, (group, group["distance"], group["block_checksum"]))
+        return MeshGroup(self, name, self._root[name]["distance"])
 
 
 class MeshGroup:
-    """The distances of one mesh in a store."""
+    """The distances of one mesh in a store.
 
-    def __init__(
-        self, store: Store, name: str, nodes: tuple[Any, Any, Any], source_sets: Sequence[IntArray] | None = None
-    ) -> None:
+    A block of rows is a row of zarr's chunks. Each chunk ends in its checksum, and its file is renamed into place: it
+    is there whole, or not finished.
+    """
+
+    def __init__(self, store: Store, name: str, distance: Any) -> None:
         self.name = name
-        self._path = store.path
-        self._group, self._distance, self._checksum = nodes
-        self._rows = int(self._group.attrs["rows_per_block"])
-        self._source_sets = source_sets
-
-    @property
-    def attributes(self) -> dict[str, Any]:
-        """Sources, t, versions, checksum, and the mesh's report."""
-        return dict(self._group.attrs)
-
-    @property
-    def n_blocks(self) -> int:
-        """Number of blocks of rows."""
-        return int(self._checksum.shape[0])
+        self._store = store
+        self._distance = distance
+        self._path = store.path / name
 
     @property
     def n_rows(self) -> int:
@@ -174,79 +172,76 @@ class MeshGroup:
         """Number of vertices."""
         return int(self._distance.shape[1])
 
-    @property
-    def source_sets(self) -> Sequence[IntArray]:
+    def source_sets(self) -> list[IntArray]:
         """The source vertices of each row."""
-        if self._source_sets is None:
-            vertices, row = self._group["source_vertex"][:], self._group["source_row"][:]
-            self._source_sets = list(np.split(vertices, np.searchsorted(row, np.arange(1, self.n_rows))))
-        return self._source_sets
+        zarr = _zarr()
+        vertices, row = (zarr.open_array(self._path / f"source_{label}", mode="r")[:] for label in ("vertex", "row"))
+        return list(np.split(vertices, np.searchsorted(row, np.arange(1, self.n_rows))))
 
     def rows(self, block: int) -> slice:
         """The rows of a block."""
-        return slice(block * self._rows, min((block + 1) * self._rows, self.n_rows))
-
-    def resume(self) -> None:
-        """Go on with a mesh that had failed, or was interrupted."""
-        with _writing(self._path):
-            self._group.update_attributes({"status": "running", "reason": ""})
+        height = self._distance.chunks[0]
+        return slice(block * height, min((block + 1) * height, self.n_rows))
 
     def missing(self) -> list[int]:
         """Blocks that were not finished, or do not read back with the checksum that they were written with."""
-        return [
-            block
-            for block, checksum in enumerate(self._checksum[:].tolist())
-            if checksum < 0 or not self._is_intact(block, checksum)
-        ]
+        n_blocks = -(-self.n_rows // self._distance.chunks[0])
+        return [block for block in range(n_blocks) if not self._is_finished(block)]
 
-    def _is_intact(self, block: int, checksum: int) -> bool:
+    def _is_finished(self, block: int) -> bool:
+        if not (self._path / "distance" / "c" / str(block)).is_dir():
+            return False
         try:
-            return _checksum(self._distance[self.rows(block)]) == checksum
+            # No distance is NaN, as what lies in a chunk that is missing.
+            return not np.isnan(self._distance[self.rows(block)]).any()
         except Exception:
             # Each of zarr's codecs has its own exception for bytes that it cannot decode.
             return False
 
     def write(self, block: int, distances: AnyArray) -> None:
-        """Write one block; it counts as finished only once its checksum stands beside it."""
-        with _writing(self._path):
+        """Write one block."""
+        with _writing(self._store.path):
             self._distance[self.rows(block)] = distances
-            self._checksum[block] = _checksum(distances)
 
     def finish(self) -> None:
-        """Mark a mesh whose blocks are all written, with one checksum over those of the blocks."""
-        checksums = self._checksum[:]
-        whole = f"{zlib.crc32(np.ascontiguousarray(checksums, dtype='<i8').tobytes()):08x}"
-        with _writing(self._path):
-            self._group.update_attributes({"checksum": whole, "status": "done"})
-            for partial in (self._path / self.name).rglob("*.partial"):  # of writers that were killed
-                partial.unlink(missing_ok=True)
-
-
-def _checksum(distances: AnyArray) -> int:
-    return zlib.crc32(np.ascontiguousarray(distances).data)
+        """Mark a mesh whose blocks are all written, with one checksum over those of the chunks."""
+        whole = 0
+        for block in range(-(-self.n_rows // self._distance.chunks[0])):
+            for column in range(-(-self.n_columns // self._distance.chunks[1])):
+                with (self._path / "distance" / "c" / str(block) / str(column)).open("rb") as chunk:
+                    chunk.seek(-_CHECKSUM_BYTES, os.SEEK_END)
+                    whole = zlib.crc32(chunk.read(), whole)
+        self._store.update(self.name, {"checksum": f"{whole:08x}", "status": "done"})
+        for partial in self._path.rglob("*.partial"):  # of writers that were killed
+            partial.unlink(missing_ok=True)
 
 
 def _array(
-    shape: tuple[int, ...], chunk: tuple[int, ...], dtype: str, fill_value: Any, dimensions: tuple[str, ...]
-) -> Any:
+    shape: tuple[int, ...],
+    chunk: tuple[int, ...],
+    dtype: str,
+    fill_value: Any,
+    dimensions: tuple[str, ...],
+    *codecs: dict[str, Any],
+) -> dict[str, Any]:
     """Metadata of an array. Uncompressed: zstd saves an eighth of the space and doubles the time to write."""
-    from zarr.core.metadata import ArrayV3Metadata
+    return {
+        "zarr_format": 3,
+        "node_type": "array",
+        "shape": shape,
+        "data_type": dtype,
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}},
+        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
+        "fill_value": fill_value,
+        "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}, *codecs],
+        "dimension_names": dimensions,
+        "attributes": {},
+        "storage_transformers": [],
+    }
 
-    return ArrayV3Metadata.from_dict(
-        {
-            "zarr_format": 3,
-            "node_type": "array",
-            "shape": shape,
-            "data_type": dtype,
-            "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}},
-            "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
-            "fill_value": fill_value,
-            "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}],
-            "dimension_names": dimensions,
-            "attributes": {},
-            "storage_transformers": [],
-        }
-    )
+
+def _json(metadata: Mapping[str, Any]) -> bytes:
+    return json.dumps(metadata).encode()
 
 
 @contextlib.contextmanager
