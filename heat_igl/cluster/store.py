@@ -9,6 +9,7 @@ import os
 import shutil
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,9 @@ _COLUMNS = 2**20
 _FORMAT = 2
 # A chunk ends in its CRC-32C.
 _CHECKSUM_BYTES = 4
+_METADATA = "zarr.json"
+# What a writer leaves that was killed, zarr's own or this one.
+_PARTIAL = ".partial"
 
 
 def rows_per_block(n: int) -> int:
@@ -56,56 +60,53 @@ class Store:
     """
 
     def __init__(self, path: str | os.PathLike[str], options: Mapping[str, Any] | None = None) -> None:
-        zarr = _zarr()
+        _zarr()
         self.path = Path(path)
-        if self.path.exists() and not (self.path / "zarr.json").is_file() and (self._is_occupied()):
-            raise ValueError(f"store {self.path} is not a zarr group of distances: name a new or an empty directory")
+        is_group = (self.path / _METADATA).is_file()
+        begun = _read(self.path).get("attributes", {}).get("heat_igl") if is_group else None
         if options is None:
-            self._root = zarr.open_group(self.path, mode="r+")
-            return
-        with _writing(self.path):
-            self._root = zarr.open_group(self.path, mode="a")
-            begun = self._root.attrs.get("heat_igl")
-            if begun is None and len(list(self._root.keys())):
-                raise ValueError(f"store {self.path} holds other data: name a new or an empty directory")
-            wanted = {"format": _FORMAT, **options}
             if begun is None:
-                self._root.attrs["heat_igl"] = wanted
-            elif begun != wanted:
-                name = next(key for key in [*wanted, *begun] if begun.get(key) != wanted.get(key))
-                raise ValueError(
-                    f"store {self.path} was begun with {name}={begun.get(name)!r}, not {wanted.get(name)!r}: "
-                    "continue it with the same, or name a new store"
-                )
+                raise ValueError(f"store {self.path} is not a zarr group of distances")
+            return
+        if not is_group and self._is_occupied():
+            raise ValueError(f"store {self.path} is not a zarr group of distances: name a new or an empty directory")
+        if begun is None and self.names():
+            raise ValueError(f"store {self.path} holds other data: name a new or an empty directory")
+        wanted = {"format": _FORMAT, **options}
+        if begun is None:
+            with _writing(self.path):
+                _write(self.path, _group({"heat_igl": wanted}))
+        elif begun != wanted:
+            name = next(key for key in [*wanted, *begun] if begun.get(key) != wanted.get(key))
+            raise ValueError(
+                f"store {self.path} was begun with {name}={begun.get(name)!r}, not {wanted.get(name)!r}: "
+                "continue it with the same, or name a new store"
+            )
 
     def _is_occupied(self) -> bool:
-        return not self.path.is_dir() or any(self.path.iterdir())
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """What the store was begun with."""
-        return dict(self._root.attrs["heat_igl"])
+        if not self.path.is_dir():
+            return self.path.exists()
+        return any(entry.suffix != _PARTIAL for entry in self.path.iterdir())
 
     def names(self) -> list[str]:
         """Names of the meshes that the store knows, sorted."""
-        return sorted(metadata.parent.name for metadata in self.path.glob("*/zarr.json"))
+        return sorted(metadata.parent.name for metadata in self.path.glob(f"*/{_METADATA}"))
 
     def attributes(self, name: str) -> dict[str, Any]:
         """What is known of a mesh: status, t, versions, checksum, report; empty if it was not begun."""
-        return dict(self._root[name].attrs) if (self.path / name / "zarr.json").is_file() else {}
+        try:
+            return dict(_read(self.path / name)["attributes"])
+        except FileNotFoundError:
+            return {}
 
     def update(self, name: str, attributes: Mapping[str, Any]) -> None:
         """Change some of what is known of a mesh that was begun."""
         with _writing(self.path):
-            self._root[name].update_attributes(dict(attributes))
+            _write(self.path / name, _group({**self.attributes(name), **attributes}))
 
     def fail(self, name: str, mesh: str, reason: str) -> None:
         """Record that a mesh has no distances, or not all, and why. Those that it has stay."""
-        failure = {"mesh": mesh, "status": "failed", "reason": reason}
-        if self.attributes(name):
-            self.update(name, failure)
-        else:
-            self._make(name, {}, failure)
+        self.update(name, {"mesh": mesh, "status": "failed", "reason": reason})
 
     def begin(
         self, name: str, source_sets: Sequence[IntArray], n: int, dtype: str, attributes: Mapping[str, Any]
@@ -113,86 +114,70 @@ class Store:
         """The group of a mesh with empty distances; replaces what was there."""
         k = len(source_sets)
         chunk = (min(rows_per_block(n), k), min(n, _COLUMNS))
-        # The vertices of all source sets in one list, each with the row of `distance` that starts at it.
-        vertices = np.concatenate(source_sets).astype("<i8", copy=False)
-        row = np.repeat(np.arange(k, dtype="<i8"), [len(one) for one in source_sets])
-        distance = _array((k, n), chunk, dtype, "NaN", ("source", "vertex"), {"name": "crc32c"})
-        sources = _array(row.shape, row.shape, "int64", 0, ("source_entry",))
-        files = {
-            "distance/zarr.json": _json(distance),
-            "source_vertex/zarr.json": _json(sources),
-            "source_vertex/c/0": vertices.tobytes(),
-            "source_row/zarr.json": _json(sources),
-            "source_row/c/0": row.tobytes(),
+        sources = {
+            # The vertices of all source sets in one list, each with the row of `distance` that starts at it.
+            "source_vertex": np.concatenate(source_sets),
+            "source_row": np.repeat(np.arange(k), [len(one) for one in source_sets]),
         }
-        self._make(name, files, {**attributes, "status": "running"})
-        return MeshGroup(self, name, _zarr().Array.from_dict(self._root.store_path / name / "distance", distance))
-
-    def _make(self, name: str, files: Mapping[str, bytes], attributes: Mapping[str, Any]) -> None:
-        """Make a group, by hand: a few small files, for which zarr takes several times as long."""
         path = self.path / name
-        metadata = path / "zarr.json"
         with _writing(self.path):
-            # Removed first and written last, whole: without it there is no group, only what a crash has left of one.
-            metadata.unlink(missing_ok=True)
+            # Its metadata goes first and comes last: without them there is no group, only what a crash has left of one.
+            (path / _METADATA).unlink(missing_ok=True)
             shutil.rmtree(path, ignore_errors=True)
-            for key, content in files.items():
-                (path / key).parent.mkdir(parents=True, exist_ok=True)
-                (path / key).write_bytes(content)
-            path.mkdir(exist_ok=True)
-            whole = metadata.with_suffix(".partial")
-            whole.write_bytes(_json({"zarr_format": 3, "node_type": "group", "attributes": dict(attributes)}))
-            whole.replace(metadata)
+            for label, entries in sources.items():
+                _write(path / label, _array(entries.shape, entries.shape, "int64", 0, ("source_entry",)))
+                (path / label / "c").mkdir()
+                (path / label / "c" / "0").write_bytes(entries.astype("<i8", copy=False).tobytes())
+            checksum = {"name": "crc32c"}
+            _write(path / "distance", _array((k, n), chunk, dtype, "NaN", ("source", "vertex"), checksum))
+            _write(path, _group({**attributes, "status": "running"}))
+        return self.group(name)
 
     def group(self, name: str) -> MeshGroup:
         """The group of a mesh that was begun."""
-        return MeshGroup(self, name, self._root[name]["distance"])
+        return MeshGroup(self, name)
 
 
 class MeshGroup:
     """The distances of one mesh in a store.
 
-    A block of rows is a row of zarr's chunks. Each chunk ends in its checksum, and its file is renamed into place: it
-    is there whole, or not finished.
+    A block of rows is a row of zarr's chunks. Each chunk ends in its checksum, so that one that was not written to its
+    end does not read back.
     """
 
-    def __init__(self, store: Store, name: str, distance: Any) -> None:
-        self.name = name
+    def __init__(self, store: Store, name: str) -> None:
         self._store = store
-        self._distance = distance
-        self._path = store.path / name
+        self._name = name
+        self._path = store.path / name / "distance"
+        metadata = _read(self._path)
+        self.n_rows, self.n_columns = metadata["shape"]  # source sets, vertices
+        self._height, self._width = metadata["chunk_grid"]["configuration"]["chunk_shape"]
+        self._n_blocks = -(-self.n_rows // self._height)
 
-    @property
-    def n_rows(self) -> int:
-        """Number of source sets."""
-        return int(self._distance.shape[0])
-
-    @property
-    def n_columns(self) -> int:
-        """Number of vertices."""
-        return int(self._distance.shape[1])
+    @cached_property
+    def _distance(self) -> Any:
+        return _zarr().open_array(self._path, mode="r+")
 
     def source_sets(self) -> list[IntArray]:
         """The source vertices of each row."""
-        zarr = _zarr()
-        vertices, row = (zarr.open_array(self._path / f"source_{label}", mode="r")[:] for label in ("vertex", "row"))
+        vertices, row = (
+            _zarr().open_array(self._path.with_name(label), mode="r")[:] for label in ("source_vertex", "source_row")
+        )
         return list(np.split(vertices, np.searchsorted(row, np.arange(1, self.n_rows))))
 
     def rows(self, block: int) -> slice:
         """The rows of a block."""
-        height = self._distance.chunks[0]
-        return slice(block * height, min((block + 1) * height, self.n_rows))
+        return slice(block * self._height, min((block + 1) * self._height, self.n_rows))
 
     def missing(self) -> list[int]:
         """Blocks that were not finished, or do not read back with the checksum that they were written with."""
-        n_blocks = -(-self.n_rows // self._distance.chunks[0])
-        return [block for block in range(n_blocks) if not self._is_finished(block)]
+        return [block for block in range(self._n_blocks) if not self._is_finished(block)]
 
     def _is_finished(self, block: int) -> bool:
-        if not (self._path / "distance" / "c" / str(block)).is_dir():
+        if not (self._path / "c" / str(block)).is_dir():
             return False
         try:
-            # No distance is NaN, as what lies in a chunk that is missing.
+            # Where a chunk is missing zarr reads NaN, which no distance is.
             return not np.isnan(self._distance[self.rows(block)]).any()
         except Exception:
             # Each of zarr's codecs has its own exception for bytes that it cannot decode.
@@ -206,14 +191,31 @@ class MeshGroup:
     def finish(self) -> None:
         """Mark a mesh whose blocks are all written, with one checksum over those of the chunks."""
         whole = 0
-        for block in range(-(-self.n_rows // self._distance.chunks[0])):
-            for column in range(-(-self.n_columns // self._distance.chunks[1])):
-                with (self._path / "distance" / "c" / str(block) / str(column)).open("rb") as chunk:
+        for block in range(self._n_blocks):
+            for column in range(-(-self.n_columns // self._width)):
+                with (self._path / "c" / str(block) / str(column)).open("rb") as chunk:
                     chunk.seek(-_CHECKSUM_BYTES, os.SEEK_END)
                     whole = zlib.crc32(chunk.read(), whole)
-        self._store.update(self.name, {"checksum": f"{whole:08x}", "status": "done"})
-        for partial in self._path.rglob("*.partial"):  # of writers that were killed
+        self._store.update(self._name, {"checksum": f"{whole:08x}", "status": "done"})
+        for partial in self._path.rglob(f"*{_PARTIAL}"):
             partial.unlink(missing_ok=True)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Metadata of a group or an array. What zarr does to read or write them takes several times as long."""
+    return dict(json.loads((path / _METADATA).read_bytes()))
+
+
+def _write(path: Path, metadata: Mapping[str, Any]) -> None:
+    """Write metadata, whole or not at all."""
+    path.mkdir(parents=True, exist_ok=True)
+    partial = path / (_METADATA + _PARTIAL)
+    partial.write_bytes(json.dumps(metadata).encode())
+    partial.replace(path / _METADATA)
+
+
+def _group(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    return {"zarr_format": 3, "node_type": "group", "attributes": attributes}
 
 
 def _array(
@@ -238,10 +240,6 @@ def _array(
         "attributes": {},
         "storage_transformers": [],
     }
-
-
-def _json(metadata: Mapping[str, Any]) -> bytes:
-    return json.dumps(metadata).encode()
 
 
 @contextlib.contextmanager
