@@ -368,7 +368,8 @@ def _report(mesh: Mesh) -> MeshReport:
     found = mesh.facets
     triangles = found.vertices if mesh.is_tetrahedral else F
     cotangents, angles = _cotangents_and_angles(mesh.V, triangles)
-    longest = reduce(np.maximum, igl.edge_lengths(mesh.V, F).T)  # of each face
+    sides = igl.edge_lengths(mesh.V, F) if mesh.is_tetrahedral else mesh.edge_lengths[found.of_face]
+    longest = reduce(np.maximum, sides.T)
     n_unreferenced = int((~mesh.referenced).sum())
     cells = len(found.vertices) - len(F) if mesh.is_tetrahedral else len(F)
     mean_edge = float(mesh.edge_lengths.mean())

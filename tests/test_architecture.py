@@ -71,6 +71,7 @@ dask
 distributed
 ezdxf
 gdist
+google_crc32c
 matplotlib
 meshio
 numba

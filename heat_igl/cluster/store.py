@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 
@@ -75,7 +76,7 @@ class Store:
         wanted = {"format": _FORMAT, **options}
         if begun is None:
             with _writing(self.path):
-                _write(self.path, _group({"heat_igl": wanted}))
+                _write(self.path / _METADATA, _group({"heat_igl": wanted}))
         elif begun != wanted:
             name = next(key for key in [*wanted, *begun] if begun.get(key) != wanted.get(key))
             raise ValueError(
@@ -102,7 +103,7 @@ class Store:
     def update(self, name: str, attributes: Mapping[str, Any]) -> None:
         """Change some of what is known of a mesh that was begun."""
         with _writing(self.path):
-            _write(self.path / name, _group({**self.attributes(name), **attributes}))
+            _write(self.path / name / _METADATA, _group({**self.attributes(name), **attributes}))
 
     def fail(self, name: str, mesh: str, reason: str) -> None:
         """Record that a mesh has no distances, or not all, and why. Those that it has stay."""
@@ -125,12 +126,12 @@ class Store:
             (path / _METADATA).unlink(missing_ok=True)
             shutil.rmtree(path, ignore_errors=True)
             for label, entries in sources.items():
-                _write(path / label, _array(entries.shape, entries.shape, "int64", 0, ("source_entry",)))
-                (path / label / "c").mkdir()
-                (path / label / "c" / "0").write_bytes(entries.astype("<i8", copy=False).tobytes())
-            checksum = {"name": "crc32c"}
-            _write(path / "distance", _array((k, n), chunk, dtype, "NaN", ("source", "vertex"), checksum))
-            _write(path, _group({**attributes, "status": "running"}))
+                array = _array(entries.shape, entries.shape, "int64", 0, ("source_entry",))
+                _write(path / label / _METADATA, _json(array))
+                _write(path / label / "c" / "0", entries.astype("<i8").data)
+            array = _array((k, n), chunk, dtype, "NaN", ("source", "vertex"), {"name": "crc32c"})
+            _write(path / "distance" / _METADATA, _json(array))
+            _write(path / _METADATA, _group({**attributes, "status": "running"}))
         return self.group(name)
 
     def group(self, name: str) -> MeshGroup:
@@ -152,6 +153,7 @@ class MeshGroup:
         metadata = _read(self._path)
         self.n_rows, self.n_columns = metadata["shape"]  # source sets, vertices
         self._height, self._width = metadata["chunk_grid"]["configuration"]["chunk_shape"]
+        self._dtype = np.dtype(metadata["data_type"]).newbyteorder("<")
         self._n_blocks = -(-self.n_rows // self._height)
 
     @cached_property
@@ -186,7 +188,13 @@ class MeshGroup:
     def write(self, block: int, distances: AnyArray) -> None:
         """Write one block."""
         with _writing(self._store.path):
-            self._distance[self.rows(block)] = distances
+            for column, first in enumerate(range(0, self.n_columns, self._width)):
+                chunk = distances[:, first : first + self._width]
+                beyond = self._height - chunk.shape[0], self._width - chunk.shape[1]
+                if any(beyond):
+                    chunk = np.pad(chunk, [(0, k) for k in beyond])  # all chunks of an array are equally large
+                chunk = np.ascontiguousarray(chunk, dtype=self._dtype)
+                _write(self._path / "c" / str(block) / str(column), chunk.data, _crc32c(chunk))
 
     def finish(self) -> None:
         """Mark a mesh whose blocks are all written, with one checksum over those of the chunks."""
@@ -202,20 +210,38 @@ class MeshGroup:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Metadata of a group or an array. What zarr does to read or write them takes several times as long."""
+    """Metadata of a group or an array."""
     return dict(json.loads((path / _METADATA).read_bytes()))
 
 
-def _write(path: Path, metadata: Mapping[str, Any]) -> None:
-    """Write metadata, whole or not at all."""
-    path.mkdir(parents=True, exist_ok=True)
-    partial = path / (_METADATA + _PARTIAL)
-    partial.write_bytes(json.dumps(metadata).encode())
-    partial.replace(path / _METADATA)
+def _write(path: Path, *contents: bytes | memoryview) -> None:
+    """A file of the store, whole or not at all."""
+    # Several writers may be at it, with the same bytes, where Dask took a worker for dead.
+    partial = path.with_name(f"{path.name}.{uuid4().hex}{_PARTIAL}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with partial.open("wb") as file:
+            for content in contents:
+                file.write(content)
+        partial.replace(path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
 
 
-def _group(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    return {"zarr_format": 3, "node_type": "group", "attributes": attributes}
+def _json(metadata: Mapping[str, Any]) -> bytes:
+    return json.dumps(metadata).encode()
+
+
+def _group(attributes: Mapping[str, Any]) -> bytes:
+    return _json({"zarr_format": 3, "node_type": "group", "attributes": attributes})
+
+
+def _crc32c(chunk: AnyArray) -> bytes:
+    """What zarr's codec puts at the end of a chunk."""
+    import google_crc32c  # zarr needs it too
+
+    return int(google_crc32c.value(chunk)).to_bytes(_CHECKSUM_BYTES, "little")
 
 
 def _array(

@@ -72,6 +72,7 @@ def begin(tasks: Sequence[Task]) -> list[Outcome]:
         outcomes.append(_begin(task, store))
         if outcomes[-1].remaining:
             break
+        _SHELF.drop_idle()
     return outcomes
 
 
@@ -157,8 +158,8 @@ def _loaded(item: Item) -> Mesh:
 
 def _fingerprint(mesh: Mesh) -> str:
     digest = hashlib.sha256(f"{mesh.V.shape} {mesh.F.shape}".encode())
-    digest.update(mesh.V.tobytes())
-    digest.update(mesh.F.tobytes())
+    digest.update(mesh.V.data)
+    digest.update(mesh.F.data)
     return digest.hexdigest()
 
 
@@ -270,6 +271,11 @@ class _Shelf:
                 self._highest = taken
                 release_free_memory()
             return place
+
+    def drop_idle(self) -> None:
+        """Free the solvers that nobody uses."""
+        with self._changed:
+            self._drop_idle()
 
     def _drop_idle(self, but: str = "") -> None:
         for key in [key for key, place in self._places.items() if not place.users and key != but]:
