@@ -50,15 +50,14 @@ class Facets(NamedTuple):
 def unique_rows(rows: IntArray, n: int) -> tuple[IntArray, IntArray, IntArray]:
     """Distinct rows of small non-negative integers, with the inverse map and the counts.
 
-    Packs a row into one 64-bit key where ``n ** columns`` fits, which sorts an order of magnitude faster
-    than `numpy.unique` with ``axis=0``.
+    In linear time, a tenth of that of `numpy.unique` with ``axis=0`` or less.
 
     Parameters
     ----------
     rows : (r, d) int64
         Values in ``range(n)``.
     n : int
-        Exclusive upper bound of the values.
+        Exclusive upper bound of the values; as many integers are held in passing.
 
     Returns
     -------
@@ -69,15 +68,20 @@ def unique_rows(rows: IntArray, n: int) -> tuple[IntArray, IntArray, IntArray]:
     counts : (k,) int64
         How often each occurs.
     """
-    if float(n) ** rows.shape[1] < 2.0**62:
-        key = rows[:, 0].copy()
-        for column in rows.T[1:]:
-            key *= n
-            key += column
-        _, first, inverse, counts = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
-    else:
-        _, first, inverse, counts = np.unique(rows, axis=0, return_index=True, return_inverse=True, return_counts=True)
-    return first.astype(np.int64, copy=False), inverse.ravel().astype(np.int64, copy=False), counts.astype(np.int64)
+    ascending = np.arange(len(rows))
+    for column in rows.T[::-1]:
+        # From rows to columns scipy goes by counting, and keeps the order within each.
+        keys = sp.csr_array((ascending, column[ascending], [0, len(rows)]), shape=(1, n))
+        ascending = keys.tocsc().data
+    is_new = np.zeros(len(rows), bool)
+    is_new[:1] = True
+    for column in rows.T:
+        sorted_column = column[ascending]
+        is_new[1:] |= sorted_column[1:] != sorted_column[:-1]
+    start = np.flatnonzero(is_new)
+    inverse = np.empty(len(rows), np.int64)
+    inverse[ascending] = np.cumsum(is_new) - 1
+    return ascending[start], inverse, np.diff(start, append=len(rows))
 
 
 def edges(F: IntArray, n: int) -> IntArray:

@@ -32,6 +32,7 @@ from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 __all__ = ["Laplacian", "Operators", "cotan_operators", "intrinsic_operators", "operators", "tufted_operators"]
 
 Laplacian = Literal["intrinsic-delaunay", "cotan"]
+OnLaplacian = Callable[[sp.csc_matrix], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +152,9 @@ class Operators:
         return sp.csc_matrix((scale * rows.data, rows.indices, rows.indptr), shape=rows.shape[::-1])
 
 
-def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operators:
+def operators(
+    mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay", on_laplacian: OnLaplacian | None = None
+) -> Operators:
     """The operators of `mesh`.
 
     Parameters
@@ -163,6 +166,8 @@ def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operat
         negative weight, or the mesh's own faces, as in the paper. Where more than two faces meet at an edge, the
         former takes faces that are there twice once, and goes by the tufted cover if such edges remain. Tetrahedra
         always keep their own.
+    on_laplacian : callable, optional
+        Called with L, or a multiple of it, as soon as it is there, so that what needs no more can begin.
 
     Raises
     ------
@@ -172,24 +177,23 @@ def operators(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> Operat
     if laplacian not in ("intrinsic-delaunay", "cotan"):
         raise ValueError(f"laplacian must be 'intrinsic-delaunay' or 'cotan', not {laplacian!r}")
     if mesh.is_tetrahedral:
-        return cotan_operators(mesh)
+        return cotan_operators(mesh, on_laplacian)
     history: tuple[Merged, ...] = ()
     if laplacian == "intrinsic-delaunay" and has_nonmanifold_edges(mesh):
         # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being manifold.
         mesh, history = _without_duplicates(mesh)
         if has_nonmanifold_edges(mesh):
-            return tufted_operators(mesh, history)
+            return tufted_operators(mesh, history, on_laplacian)
     faces = triangulation = replace(intrinsic_triangulation(mesh), history=history)
     if laplacian == "intrinsic-delaunay":
         triangulation = intrinsic_delaunay(faces)
     if triangulation.n_flips or triangulation.lengthening:
-        # Paths along the mesh's own edges are paths on the surface too, and already known.
-        return replace(intrinsic_operators(triangulation, mesh.longest_distance, mesh.components), faces=faces)
-    return replace(cotan_operators(mesh), triangulation=triangulation, faces=faces)
+        return replace(intrinsic_operators(triangulation, mesh, on_laplacian), faces=faces)
+    return replace(cotan_operators(mesh, on_laplacian), triangulation=triangulation, faces=faces)
 
 
-def cotan_operators(mesh: Mesh) -> Operators:
-    """The operators on the mesh's own triangles or tetrahedra, gradients in space (d = 3).
+def cotan_operators(mesh: Mesh, on_laplacian: OnLaplacian | None = None) -> Operators:
+    """The operators on the mesh's own triangles or tetrahedra, gradients in space (d = 3); `on_laplacian` as above.
 
     Raises
     ------
@@ -209,8 +213,11 @@ def cotan_operators(mesh: Mesh) -> Operators:
     unit = 2.0 ** round(np.log2(h))
     V = mesh.V / unit
     simplex_dimension = mesh.F.shape[1] - 1
+    L = _padded(igl.cotmatrix(V, mesh.F), mesh.n_vertices) * unit ** (simplex_dimension - 2)
+    if on_laplacian is not None and not mesh.is_tetrahedral:
+        on_laplacian(L)
     domain = Operators(
-        L=_padded(igl.cotmatrix(V, mesh.F), mesh.n_vertices) * unit ** (simplex_dimension - 2),
+        L=L,
         M=_padded(igl.massmatrix(V, mesh.F), mesh.n_vertices) * unit**simplex_dimension,
         gradient=partial(_gradient_in_space, V, mesh.F, unit),
         weights=mesh.measures,
@@ -228,6 +235,8 @@ def cotan_operators(mesh: Mesh) -> Operators:
     # the gradient does not, and D G is the same matrix.
     L = (domain.D @ domain.G).tocsc()
     L.sort_indices()
+    if on_laplacian is not None:
+        on_laplacian(L)
     return replace(domain, L=L)
 
 
@@ -236,25 +245,31 @@ def _gradient_in_space(V: FloatArray, F: IntArray, unit: float) -> sp.csc_matrix
 
 
 def intrinsic_operators(
-    triangulation: IntrinsicTriangulation, longest_distance: float | None = None, components: IntArray | None = None
+    triangulation: IntrinsicTriangulation,
+    paths: Mesh | Operators | None = None,
+    on_laplacian: OnLaplacian | None = None,
 ) -> Operators:
     """The operators of triangles that are known by their edge lengths, gradients in the plane of each (d = 2).
 
-    `longest_distance` and `components` are fields of `Operators`; found along the edges of the triangulation when not
-    given.
+    `paths` knows paths along edges of the same surface, and its components; without it they are found along the edges
+    of the triangulation.
     """
     F, lengths, n = triangulation.F, triangulation.l, triangulation.n
+    L = _padded(igl.cotmatrix_intrinsic(lengths, F), n)
+    if on_laplacian is not None:
+        on_laplacian(L)
     referenced = np.zeros(n, bool)
     referenced[F] = True
-    if components is None:
+    if paths is not None:
+        components, longest_distance = paths.components, paths.longest_distance
+    else:
         components = connectivity.connected_components(F, n)
-    if longest_distance is None:
         edges = triangulation.edges
         ends = np.stack([triangulation.tail(edges), triangulation.head(edges)], axis=1)
         graph = connectivity.shortest_edge_graph(ends, lengths.ravel()[edges], n)
         longest_distance = connectivity.longest_path(graph, components)
     return Operators(
-        L=_padded(igl.cotmatrix_intrinsic(lengths, F), n),
+        L=L,
         M=_padded(igl.massmatrix_intrinsic(lengths, F), n),
         gradient=partial(intrinsic_gradient, triangulation),
         weights=triangulation.areas,
@@ -304,19 +319,21 @@ def edge_length_operators(
     triangulation = intrinsic_delaunay(faces)
     if triangulation is faces:
         return given
-    return replace(intrinsic_operators(triangulation, given.longest_distance), faces=faces)
+    return replace(intrinsic_operators(triangulation, given), faces=faces)
 
 
-def tufted_operators(mesh: Mesh, history: tuple[Merged, ...] = ()) -> Operators:
+def tufted_operators(
+    mesh: Mesh, history: tuple[Merged, ...] = (), on_laplacian: OnLaplacian | None = None
+) -> Operators:
     """The operators of any triangle mesh by way of its tufted cover, made intrinsic Delaunay (d = 2).
 
     The cover goes over the surface twice, so L, M and the weights are one half of its own: a face of the mesh counts
     once, and L = D G holds. No weight is negative, not even on the boundary, which the cover does not have; `boundary`
-    is that of the mesh. `history` says how its faces came from those that points refer to.
+    is that of the mesh. `history` says how its faces came from those that points refer to; `on_laplacian` as above.
     """
     cover = replace(tufted_cover(mesh), history=history)
     surface = replace(intrinsic_triangulation(mesh), history=history)
-    domain = intrinsic_operators(intrinsic_delaunay(cover), mesh.longest_distance, mesh.components)
+    domain = intrinsic_operators(intrinsic_delaunay(cover), mesh, on_laplacian)
     return replace(
         domain,
         L=domain.L / 2,

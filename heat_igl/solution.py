@@ -33,7 +33,8 @@ class Diagnostics:
     factor_nonzeros, factor_bytes : int
         Entries of all factors, and the memory that a query reads twice, indices included.
     seconds_operators, seconds_analysis, seconds_factorization : float
-        Wall-clock time of the stages of the constructor: operators; order of elimination; factors.
+        Wall-clock time of the stages of the constructor: operators; order of elimination, which begins beside them, as
+        far as it takes longer; factors.
     """
 
     t: float

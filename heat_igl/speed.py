@@ -64,7 +64,7 @@ def speed_operators(mesh: Mesh, speed: ArrayLike) -> Operators:
     else:
         triangulation = _flipped_within_speeds(intrinsic_triangulation(mesh), s)
         # The path length is replaced below.
-        domain, F = intrinsic_operators(triangulation, longest_distance=0.0), triangulation.F
+        domain, F = intrinsic_operators(triangulation, mesh), triangulation.F
         lengths = triangulation.l
         corner_mass = igl.massmatrix_intrinsic(lengths, np.arange(F.size).reshape(-1, 3)).diagonal()
         pairs = np.concatenate([F[:, pair] for pair in ([1, 2], [2, 0], [0, 1])])

@@ -288,11 +288,11 @@ def test_nonmanifold_vertices_against_links(given_faces: tuple[int, list[list[in
     assert nonmanifold_vertices(np.array(faces, np.int64), n) == bad
 
 
-@pytest.mark.parametrize("n", [50, 2**31, 2**40])
+@pytest.mark.parametrize("n", [4, 10**6])
 @pytest.mark.parametrize("columns", [1, 2, 3])
-def test_unique_rows_packed_or_not(n: int, columns: int) -> None:
-    """The key of three columns fits 64 bits for n = 50 only; both ways agree with numpy."""
-    rows = np.random.default_rng(31).integers(0, 4, (200, columns)) * (n // 4)
+@pytest.mark.parametrize("count", [0, 1, 200])
+def test_unique_rows(n: int, columns: int, count: int) -> None:
+    rows = np.random.default_rng(31).integers(0, 4, (count, columns)) * (n // 4)
     first, inverse, counts = connectivity.unique_rows(rows, n)
     expected, expected_first, expected_counts = np.unique(rows, axis=0, return_index=True, return_counts=True)
     assert np.array_equal(rows[first], expected)

@@ -151,6 +151,21 @@ def test_flat_tetrahedron_is_refused():
     assert operators(Mesh(mesh.V, mesh.F[:1])).n == 5
 
 
+@pytest.mark.parametrize("laplacian", ["intrinsic-delaunay", "cotan"])
+@pytest.mark.parametrize(
+    "mesh",
+    [shapes.icosphere(2), bad_sphere(), shapes.box(3), Mesh(shapes.disk(4).V, [*shapes.disk(4).F, [0, 1, 30]])],
+    ids=["Delaunay", "bad", "tetrahedra", "three faces at an edge"],
+)
+def test_laplacian_is_handed_out_early(mesh, laplacian):
+    """Once, and with the pattern that an order of elimination for the final one needs."""
+    early = []
+    final = operators(mesh, laplacian, early.append).L
+    assert len(early) == 1
+    assert np.array_equal(early[0].indptr, final.indptr)
+    assert np.array_equal(early[0].indices, final.indices)
+
+
 def test_unknown_laplacian():
     with pytest.raises(ValueError, match="laplacian must be"):
         operators(shapes.grid(2), "cotangent")

@@ -176,7 +176,7 @@ def test_without_numba_there_is_the_matrix_form(disk, monkeypatch):
 
 
 def test_an_analysis_is_shared_where_it_fits(disk):
-    shared = steps.analysis(disk, "multifrontal")
+    shared = steps.analysis(disk.L, "multifrontal")
     b = np.random.default_rng(1).random(disk.n)
     for make in (lambda a: HeatFlow(disk, 0.02, analysis=a), lambda a: PoissonProblem(disk, analysis=a)):
         assert make(shared).backend == "multifrontal"

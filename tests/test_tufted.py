@@ -345,5 +345,5 @@ def test_truck():
     truck = heat_igl.read_mesh(shared_path("truck.obj"))
     sources = sample_sources(truck, 5)
     truth = graph_distance(truck, sources, 12)
-    plain = intrinsic_operators(intrinsic_delaunay(intrinsic_triangulation(truck)), truck.longest_distance)
+    plain = intrinsic_operators(intrinsic_delaunay(intrinsic_triangulation(truck)), truck)
     assert heat_error(truck, sources, truth) < 0.7 * heat_error(plain, sources, truth)

@@ -9,7 +9,7 @@ lock.
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,8 +28,10 @@ _LEAF = 4
 # Rounds of averaging that straighten the cuts, and the size up to which it does not matter.
 _SMOOTHING = 2
 _ROUGH = 100
-# Larger pieces are cut one at a time, and their parts side by side; smaller ones are done in one go.
-_LARGE = 10_000
+# Pieces with more vertices than this, and than this share of all, are cut one at a time and their parts side by side;
+# others are done in one go.
+_LARGE = 3000
+_SHARE = 1 / 64
 
 _SEPARATOR = 2
 
@@ -184,9 +186,9 @@ def _arrange(order: IntArray, low: int, high: int, part: IntArray, scratch: IntA
 
 @jit
 def _dissect(
-    ends: IntArray, neighbours: IntArray, order: IntArray, is_start: BoolArray, parent: IntArray
+    ends: IntArray, neighbours: IntArray, order: IntArray, is_start: BoolArray, parent: IntArray, large: float
 ) -> list[tuple[int, int, int]]:
-    """Dissect, but for large pieces that were cut off, which are returned: (first, end, parent).
+    """Dissect, but for pieces of more than `large` that were cut off, which are returned: (first, end, parent).
 
     `is_start` marks where in `order` a block starts, `parent` there the start of its parent or -1.
     """
@@ -207,7 +209,7 @@ def _dissect(
         size = high - low
         if size == 0:
             continue
-        if _LARGE < size < 0.75 * n:
+        if large < size < 0.75 * n:
             rest.append((low, high, above))
             continue
         some = order[low:high]
@@ -323,12 +325,13 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
     inner = n - int(is_hub.sum())
     is_start, parent = np.zeros(n, bool), np.full(n, -1, np.int64)
     is_start[inner:][:1] = True
+    large = max(_LARGE, _SHARE * n)
 
     def cut(graph: tuple[IntArray, IntArray], low: int, high: int, above: int) -> list[Any]:
         """Dissect order[low:high], or cut it once if it is large, and return what is then left to dissect."""
         some = np.arange(high - low, dtype=np.int32)
         parent_here = parent[low:high]
-        rest = _dissect(*graph, some, is_start[low:high], parent_here)
+        rest = _dissect(*graph, some, is_start[low:high], parent_here, large)
         order[low:high] = order[low:high][some]
         parent_here[:] = np.where(parent_here < 0, above, parent_here + low)
         return [
@@ -337,9 +340,14 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
         ]
 
     pieces = [(_subgraph(ends, neighbours, order[:inner]), 0, inner, inner if inner < n else -1)]
-    while pieces:
-        found = (map if workers is None else workers.map)(cut, *zip(*pieces, strict=True))
-        pieces = [piece for several in found for piece in several]
+    running: set[Future[list[Any]]] = set()
+    while pieces or running:
+        if workers is None:
+            pieces.extend(cut(*pieces.pop()))
+            continue
+        running.update(workers.submit(cut, *piece) for piece in pieces)
+        done, running = wait(running, return_when=FIRST_COMPLETED)
+        pieces = [piece for future in done for piece in future.result()]
     start = np.flatnonzero(is_start)
     number = np.cumsum(is_start) - 1
     return Dissection(order, np.append(start, n), np.where(parent[start] < 0, -1, number[parent[start]]))

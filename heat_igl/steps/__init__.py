@@ -142,12 +142,12 @@ class PoissonProblem:
         return np.asarray(np.subtract(0.0, phi, out=phi))
 
 
-def analysis(operators: Operators, backend: Backend = "auto", known: Analysis | None = None) -> Analysis:
+def analysis(L: sp.csc_matrix, backend: Backend = "auto", known: Analysis | None = None) -> Analysis:
     """Order and analyse the pattern that the matrices of the heat flow and of the Poisson problem have in common.
 
-    An analysis that is `known` is returned as it is if it fits.
+    Of the Laplacian `L` only the pattern matters. An analysis that is `known` is returned as it is if it fits.
     """
-    pattern = _shifted(operators.L, 1.0, np.zeros(operators.n))
+    pattern = _shifted(L, 1.0, np.zeros(L.shape[0]))
     return known if known is not None and known.fits(pattern) else analyse(pattern, backend)
 
 
