@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,7 +18,9 @@ import pytest
 
 import heat_igl
 from heat_igl import BatchError, Mesh, SourceError, cluster
+from heat_igl.cluster.collection import SourcePlan, items
 from heat_igl.cluster.store import Store, rows_per_block
+from heat_igl.cluster.worker import Task, begin
 
 pytest.importorskip("distributed")
 zarr = pytest.importorskip("zarr")
@@ -155,6 +158,64 @@ def test_only_what_is_missing_is_computed_again(client, tmp_path):
     assert {Path(path).parent.name for path in changed} == {"3", "5", "6", "7"}
     np.testing.assert_array_equal(zarr.open_group(store / "ball", mode="r")["distance"][:], first)
     assert after == before
+
+
+def test_long_rows_lie_in_several_chunks(client, tmp_path, monkeypatch):
+    monkeypatch.setattr("heat_igl.cluster.store._COLUMNS", 250)
+    mesh = heat_igl.shapes.icosphere(3)  # 642 vertices: 3 chunks a row, the last one padded
+    store = tmp_path / "store"
+    before = cluster.distances({"ball": mesh}, range(70), store, client=client)  # and the last block
+    np.testing.assert_array_equal(zarr.open_group(store / "ball", mode="r")["distance"][:], expected(mesh, range(70)))
+    assert len(chunk_times(store)) == 6
+    (store / "ball" / "distance" / "c" / "1" / "2").unlink()
+    assert Store(store).group("ball").missing() == [1]
+    Store(store).update("ball", {"status": "running"})
+    assert cluster.distances({"ball": mesh}, range(70), store, client=client) == before
+    np.testing.assert_array_equal(zarr.open_group(store / "ball", mode="r")["distance"][:], expected(mesh, range(70)))
+
+
+def test_a_group_that_a_crash_left_half_made_is_made_anew(client, tmp_path, monkeypatch):
+    """Wherever it happened: nothing counts before all is there."""
+    store = tmp_path / "store"
+    plain = heat_igl.cluster.store._write
+    whole = cluster.distances({"fan": FAN}, [0, 4], tmp_path / "whole", client=client)
+    for crash in range(7):
+        shutil.rmtree(store, ignore_errors=True)
+        written = []
+
+        def killed(path, *contents, crash=crash, written=written):
+            if len(written) == crash:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.with_name(path.name + ".partial").write_bytes(b"half of it")
+                raise KeyboardInterrupt
+            written.append(path)
+            plain(path, *contents)
+
+        monkeypatch.setattr("heat_igl.cluster.store._write", killed)
+        with contextlib.suppress(KeyboardInterrupt):
+            made = Store(store, {"sources": "0 4", "dtype": "float32", "solver": {"refine": None}})
+            made.begin("fan", [np.array([0]), np.array([4])], 7, "float32", {})
+        assert len(written) == crash
+        monkeypatch.setattr("heat_igl.cluster.store._write", plain)
+        assert cluster.distances({"fan": FAN}, [0, 4], store, client=client).rows == whole.rows
+        np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["distance"][:], expected(FAN, [0, 4]))
+
+
+def test_a_worker_that_does_not_see_the_store_ends_the_batch(tmp_path):
+    (item,) = items({"fan": FAN})
+    task = Task(item, tmp_path / "elsewhere", SourcePlan.of("all"), "float32", {})
+    with pytest.raises(BatchError, match=r"a worker cannot open store .*elsewhere.* Name a folder that .* share"):
+        begin([task])
+
+
+@pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")  # Dask's, when it looks for a free port
+def test_workers_are_not_slowed_by_what_nobody_asked_for():
+    """Dask's profiler takes 5 % of a worker, and its setting of malloc makes a solver half as slow again."""
+    with cluster.connected(n_workers=1) as own:
+        (found,) = own.run(
+            lambda dask_worker: ("profile" in dask_worker.periodic_callbacks, os.environ.get("MALLOC_TRIM_THRESHOLD_"))
+        ).values()
+    assert found == (False, None)
 
 
 def test_a_mesh_that_changed_is_computed_again(client, tmp_path):

@@ -171,7 +171,11 @@ def _versions() -> dict[str, str]:
 def _source_sets(plan: SourcePlan, mesh: Mesh, solver: HeatMethodSolver) -> list[IntArray]:
     n = mesh.n_vertices
     if plan.source_sets is not None:
-        return [vertex_sources(list(vertices), n) for vertices in plan.source_sets]
+        # Each ascends: its last vertex tells whether all are there.
+        return [
+            vertex_sources(list(vertices), n) if vertices[-1] >= n else np.array(vertices)
+            for vertices in plan.source_sets
+        ]
     if plan.farthest is None:
         return list(np.arange(n).reshape(-1, 1))
     return list(farthest_points(solver, min(plan.farthest, n)).reshape(-1, 1))
