@@ -208,7 +208,8 @@ def test_a_worker_that_does_not_see_the_store_ends_the_batch(tmp_path):
         begin([task])
 
 
-@pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")  # Dask's, when it looks for a free port
+# Dask's, when it looks for a free port.
+@pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning", "ignore:\\s*Port 8787 is already in use:UserWarning")
 def test_workers_are_not_slowed_by_what_nobody_asked_for():
     """Dask's profiler takes 5 % of a worker, and its setting of malloc makes a solver half as slow again."""
     with cluster.connected(n_workers=1) as own:
