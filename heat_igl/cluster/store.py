@@ -215,7 +215,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _write(path: Path, *contents: bytes | memoryview) -> None:
-    """A file of the store, whole or not at all."""
+    """A file of the store, whole or not at all. Zarr takes several times as long and copies what is large."""
     # Several writers may be at it, with the same bytes, where Dask took a worker for dead.
     partial = path.with_name(f"{path.name}.{uuid4().hex}{_PARTIAL}")
     path.parent.mkdir(parents=True, exist_ok=True)
