@@ -6,7 +6,7 @@ libigl trusts its input (a face index out of range corrupts memory), so everythi
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import combinations
 from typing import TypeVar
 
@@ -346,18 +346,30 @@ def _shown(value: object) -> str:
     return "-" if value is None else str(value)
 
 
-def _is_intrinsic_delaunay(mesh: Mesh) -> bool:
-    cotangents = 2 * igl.cotmatrix_entries(mesh.V, mesh.F)
-    total = np.bincount(mesh.facets.of_face.ravel(), weights=cotangents.ravel())
-    return not (total[mesh.facets.n_faces == 2] < DELAUNAY_TOLERANCE).any()
+def _cotangents_and_angles(V: FloatArray, F: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Cotangent and angle (3, m) at each corner of triangles; 0 is the angle at a corner without a side."""
+    dot = np.zeros((3, len(F)))
+    for x in V.T:
+        a, b, c = x[F.T]
+        ab, bc, ca = b - a, c - b, a - c
+        dot -= ca * ab, ab * bc, bc * ca
+    cross = igl.doublearea(V, F)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return dot / cross, np.arctan2(cross, dot)
+
+
+def _is_delaunay(found: connectivity.Facets, cotangents: FloatArray) -> bool:
+    total = np.bincount(found.of_face.T.ravel(), weights=cotangents.ravel())
+    return not (total[found.n_faces == 2] < DELAUNAY_TOLERANCE).any()
 
 
 def _report(mesh: Mesh) -> MeshReport:
     n, F = mesh.n_vertices, mesh.F
     found = mesh.facets
     triangles = found.vertices if mesh.is_tetrahedral else F
-    angles = np.degrees(igl.internal_angles(mesh.V, triangles))
-    lengths = igl.edge_lengths(mesh.V, F)
+    cotangents, angles = _cotangents_and_angles(mesh.V, triangles)
+    sides = igl.edge_lengths(mesh.V, F) if mesh.is_tetrahedral else mesh.edge_lengths[found.of_face]
+    longest = reduce(np.maximum, sides.T)
     n_unreferenced = int((~mesh.referenced).sum())
     cells = len(found.vertices) - len(F) if mesh.is_tetrahedral else len(F)
     mean_edge = float(mesh.edge_lengths.mean())
@@ -372,15 +384,15 @@ def _report(mesh: Mesh) -> MeshReport:
         nonmanifold_vertices=np.empty(0, np.int64)
         if mesh.is_tetrahedral
         else connectivity.nonmanifold_vertices(F, found, n),
-        degenerate_faces=np.flatnonzero(mesh.measures <= 1e-12 * lengths.max(axis=1) ** (F.shape[1] - 1)),
+        degenerate_faces=np.flatnonzero(mesh.measures <= 1e-12 * longest ** (F.shape[1] - 1)),
         duplicate_faces=connectivity.duplicate_faces(F, n),
         unreferenced_vertices=np.flatnonzero(~mesh.referenced),
         shortest_edge=float(mesh.edge_lengths.min()),
         mean_edge=mean_edge,
         longest_edge=float(mesh.edge_lengths.max()),
-        smallest_angle=float(angles.min()),
-        largest_angle=float(angles.max()),
-        is_intrinsic_delaunay=None if mesh.is_tetrahedral else _is_intrinsic_delaunay(mesh),
+        smallest_angle=float(np.degrees(angles.min())),
+        largest_angle=float(np.degrees(angles.max())),
+        is_intrinsic_delaunay=None if mesh.is_tetrahedral else _is_delaunay(found, cotangents),
         edges_across=mesh.longest_distance / mean_edge,
         range_limit=RANGE_LIMIT,
     )

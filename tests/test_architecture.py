@@ -72,6 +72,7 @@ dask
 distributed
 ezdxf
 gdist
+google_crc32c
 matplotlib
 meshio
 numba

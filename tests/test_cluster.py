@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,7 +18,9 @@ import pytest
 
 import heat_igl
 from heat_igl import BatchError, Mesh, SourceError, cluster
+from heat_igl.cluster.collection import SourcePlan, items
 from heat_igl.cluster.store import Store, rows_per_block
+from heat_igl.cluster.worker import Task, begin
 
 pytest.importorskip("distributed")
 zarr = pytest.importorskip("zarr")
@@ -141,16 +144,79 @@ def test_only_what_is_missing_is_computed_again(client, tmp_path):
     before = cluster.distances({"ball": mesh}, "all", store, client=client)
     first = zarr.open_group(store / "ball", mode="r")["distance"][:]
     group = zarr.open_group(store / "ball", mode="r+")
-    group["block_checksum"][3] = -1  # not finished
-    (store / "ball" / "distance" / "c" / "5" / "0").write_bytes(b"half of it")  # damaged
-    (store / "ball" / "distance" / "c" / "7" / "0").unlink()  # lost
+    chunk = [store / "ball" / "distance" / "c" / str(block) / "0" for block in range(11)]
+    chunk[3].rename(chunk[3].with_suffix(".partial"))  # not finished
+    chunk[5].write_bytes(b"half of it")  # damaged
+    bits = bytearray(chunk[6].read_bytes())
+    bits[1000] ^= 1
+    chunk[6].write_bytes(bits)
+    chunk[7].unlink()  # lost
     group.update_attributes({"status": "running"})
     times = chunk_times(store)
     after = cluster.distances({"ball": mesh}, "all", store, client=client)
     changed = {path for path, written in chunk_times(store).items() if times.get(path) != written}
-    assert {Path(path).parent.name for path in changed} == {"3", "5", "7"}
+    assert {Path(path).parent.name for path in changed} == {"3", "5", "6", "7"}
     np.testing.assert_array_equal(zarr.open_group(store / "ball", mode="r")["distance"][:], first)
     assert after == before
+
+
+def test_long_rows_lie_in_several_chunks(client, tmp_path, monkeypatch):
+    monkeypatch.setattr("heat_igl.cluster.store._COLUMNS", 250)
+    mesh = heat_igl.shapes.icosphere(3)  # 642 vertices: 3 chunks a row, the last one padded
+    store = tmp_path / "store"
+    before = cluster.distances({"ball": mesh}, range(70), store, client=client)  # and the last block
+    np.testing.assert_array_equal(zarr.open_group(store / "ball", mode="r")["distance"][:], expected(mesh, range(70)))
+    assert len(chunk_times(store)) == 6
+    (store / "ball" / "distance" / "c" / "1" / "2").unlink()
+    assert Store(store).group("ball").missing() == [1]
+    Store(store).update("ball", {"status": "running"})
+    assert cluster.distances({"ball": mesh}, range(70), store, client=client) == before
+    np.testing.assert_array_equal(zarr.open_group(store / "ball", mode="r")["distance"][:], expected(mesh, range(70)))
+
+
+def test_a_group_that_a_crash_left_half_made_is_made_anew(client, tmp_path, monkeypatch):
+    """Wherever it happened: nothing counts before all is there."""
+    store = tmp_path / "store"
+    plain = heat_igl.cluster.store._write
+    whole = cluster.distances({"fan": FAN}, [0, 4], tmp_path / "whole", client=client)
+    for crash in range(7):
+        shutil.rmtree(store, ignore_errors=True)
+        written = []
+
+        def killed(path, *contents, crash=crash, written=written):
+            if len(written) == crash:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.with_name(path.name + ".partial").write_bytes(b"half of it")
+                raise KeyboardInterrupt
+            written.append(path)
+            plain(path, *contents)
+
+        monkeypatch.setattr("heat_igl.cluster.store._write", killed)
+        with contextlib.suppress(KeyboardInterrupt):
+            made = Store(store, {"sources": "0 4", "dtype": "float32", "solver": {"refine": None}})
+            made.begin("fan", [np.array([0]), np.array([4])], 7, "float32", {})
+        assert len(written) == crash
+        monkeypatch.setattr("heat_igl.cluster.store._write", plain)
+        assert cluster.distances({"fan": FAN}, [0, 4], store, client=client).rows == whole.rows
+        np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["distance"][:], expected(FAN, [0, 4]))
+
+
+def test_a_worker_that_does_not_see_the_store_ends_the_batch(tmp_path):
+    (item,) = items({"fan": FAN})
+    task = Task(item, tmp_path / "elsewhere", SourcePlan.of("all"), "float32", {})
+    with pytest.raises(BatchError, match=r"a worker cannot open store .*elsewhere.* Name a folder that .* share"):
+        begin([task])
+
+
+# Dask's, when it looks for a free port.
+@pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning", "ignore:\\s*Port 8787 is already in use:UserWarning")
+def test_workers_are_not_slowed_by_what_nobody_asked_for():
+    """Dask's profiler takes 5 % of a worker, and its setting of malloc makes a solver half as slow again."""
+    with cluster.connected(n_workers=1) as own:
+        (found,) = own.run(
+            lambda dask_worker: ("profile" in dask_worker.periodic_callbacks, os.environ.get("MALLOC_TRIM_THRESHOLD_"))
+        ).values()
+    assert found == (False, None)
 
 
 def test_a_mesh_that_changed_is_computed_again(client, tmp_path):
@@ -331,16 +397,6 @@ def wait_until(condition, seconds=60):
         time.sleep(0.02)
 
 
-def finished_chunks(store: Path) -> dict[str, int]:
-    """Chunks whose checksum stands beside them, and when they were written."""
-    found = {}
-    for path, written in chunk_times(store).items():
-        mesh, block = Path(path).parents[3], Path(path).parent.name
-        if (mesh / "block_checksum" / "c" / block).exists():
-            found[path] = written
-    return found
-
-
 @pytest.fixture
 def processes(tmp_path):
     running = Processes(tmp_path)
@@ -371,22 +427,22 @@ def test_killed_processes_lose_nothing_and_repeat_nothing(processes, tmp_path):
     scheduler = processes.scheduler()
     victim, _ = processes.worker(), processes.worker()
     batch = client("--scheduler", processes.address)
-    wait_until(lambda: len(finished_chunks(store)) >= 2)
+    wait_until(lambda: len(chunk_times(store)) >= 2)
     victim.kill()
-    at_worker = finished_chunks(store)
-    wait_until(lambda: len(finished_chunks(store)) >= len(at_worker) + 2)
+    at_worker = chunk_times(store)
+    wait_until(lambda: len(chunk_times(store)) >= len(at_worker) + 2)
     scheduler.kill()
     _, errors = batch.communicate(timeout=120)
     assert batch.returncode == 1
     assert "the cluster is lost; what is finished stays" in errors
     assert "Traceback" not in errors
-    at_scheduler = finished_chunks(store)
+    at_scheduler = chunk_times(store)
 
     batch = client("--workers", "2")
-    wait_until(lambda: len(finished_chunks(store)) >= len(at_scheduler) + 2)
+    wait_until(lambda: len(chunk_times(store)) >= len(at_scheduler) + 2)
     os.killpg(batch.pid, signal.SIGKILL)
     batch.communicate()
-    at_client = finished_chunks(store)
+    at_client = chunk_times(store)
     assert 6 <= len(at_client) < 16, "nothing was left to do: the test is too small for this machine"
 
     batch = client("--workers", "2")

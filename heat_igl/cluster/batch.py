@@ -28,14 +28,14 @@ _LOG = logging.getLogger("heat_igl.cluster")
 _LOST = "the cluster is lost; what is finished stays in the store: run the same again to go on"
 
 # A task carries a whole mesh. And Dask would have malloc give every large array back to the system at once, which makes
-# a solver half as slow again. Dask's watch over its own event loop wakes every process 50 times a second.
+# a solver half as slow again. Dask's watch over its own event loop wakes every process 50 times a second, its profiler
+# 100 times; a nanny hands these settings on, over what the environment says.
 _SETTINGS = {
     "distributed.admin.large-graph-warning-threshold": "16GiB",
     "distributed.admin.tick.interval": "1s",
+    "distributed.worker.profile.enabled": False,
     "distributed.nanny.pre-spawn-environ": {
-        "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
-        "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
-        **{f"{name}_NUM_THREADS": "1" for name in ("HEAT_IGL", "OMP", "MKL", "OPENBLAS", "NUMBA")},
+        f"{name}_NUM_THREADS": "1" for name in ("HEAT_IGL", "OMP", "MKL", "OPENBLAS", "NUMBA")
     },
 }
 

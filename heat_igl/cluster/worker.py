@@ -66,34 +66,39 @@ class Outcome:
 
 def begin(tasks: Sequence[Task]) -> list[Outcome]:
     """Begin one mesh after the other, as far as the first that leaves blocks for others: its solver is at hand."""
+    store = _opened(tasks[0].store)
     outcomes = []
     for task in tasks:
-        outcomes.append(_begin(task))
+        outcomes.append(_begin(task, store))
         if outcomes[-1].remaining:
             break
+        _SHELF.drop_idle()
     return outcomes
 
 
-def _begin(task: Task) -> Outcome:
+def _begin(task: Task, store: Store) -> Outcome:
     """Read and validate a mesh, factor it, make its group or continue the one that is there, and solve a first span."""
     try:
         mesh = _loaded(task.item)
         fingerprint = _fingerprint(mesh)
-        store = Store(task.store)
         known = store.attributes(task.item.name)
         if known.get("status") == "done" and known["fingerprint"] == fingerprint:
             return Outcome(task.item.name)
         with _SHELF.solver(mesh, fingerprint, task) as solver:
             made_of = {"fingerprint": fingerprint, "t": solver.t, "backend": solver.diagnostics.backend}
             if all(known.get(key) == value for key, value in made_of.items()):
+                store.update(task.item.name, {"status": "running", "reason": ""})
                 group = store.group(task.item.name)
-                group.resume()
+                source_sets = group.source_sets()
             else:
-                group = _new_group(task, store, mesh, solver, made_of)
+                source_sets = _source_sets(task.plan, mesh, solver)
+                report = {key: _plain(value) for key, value in asdict(mesh.report()).items()}
+                attributes = {"mesh": task.item.label, **made_of, "versions": _versions(), "report": report}
+                group = store.begin(task.item.name, source_sets, mesh.n_vertices, task.dtype, attributes)
             spans = _spans(group)
             _report("begun", task, blocks=sum(map(len, spans)))
             if spans:
-                _solve(task, group, solver, spans[0])
+                _solve(task, group, source_sets, solver, spans[0])
             return Outcome(task.item.name, remaining=tuple(spans[1:]))
     except BatchError:
         raise
@@ -104,18 +109,19 @@ def _begin(task: Task) -> Outcome:
 
 def carry_on(tasks: Sequence[Task]) -> list[Outcome]:
     """Solve the blocks of tasks in groups that `begin` has made."""
-    return [_carry_on(task) for task in tasks]
+    store = _opened(tasks[0].store)
+    return [_carry_on(task, store) for task in tasks]
 
 
-def _carry_on(task: Task) -> Outcome:
+def _carry_on(task: Task, store: Store) -> Outcome:
     try:
         mesh = _loaded(task.item)
         fingerprint = _fingerprint(mesh)
-        group = Store(task.store).group(task.item.name)
-        if group.attributes["fingerprint"] != fingerprint:
+        if store.attributes(task.item.name)["fingerprint"] != fingerprint:
             raise ValueError("the file changed while it was worked on")
+        group = store.group(task.item.name)
         with _SHELF.solver(mesh, fingerprint, task) as solver:
-            _solve(task, group, solver, task.blocks)
+            _solve(task, group, group.source_sets(), solver, task.blocks)
         return Outcome(task.item.name)
     except BatchError:
         raise
@@ -126,6 +132,15 @@ def _carry_on(task: Task) -> Outcome:
 def release() -> None:
     """Free the solver that the worker still holds."""
     _SHELF.clear()
+
+
+def _opened(path: Path) -> Store:
+    try:
+        return Store(path)
+    except Exception as error:
+        raise BatchError(
+            f"a worker cannot open store {path}: {_reason(error)}. Name a folder that the client and all workers share"
+        ) from None
 
 
 def _reason(error: Exception) -> str:
@@ -143,20 +158,9 @@ def _loaded(item: Item) -> Mesh:
 
 def _fingerprint(mesh: Mesh) -> str:
     digest = hashlib.sha256(f"{mesh.V.shape} {mesh.F.shape}".encode())
-    digest.update(mesh.V.tobytes())
-    digest.update(mesh.F.tobytes())
+    digest.update(mesh.V.data)
+    digest.update(mesh.F.data)
     return digest.hexdigest()
-
-
-def _new_group(task: Task, store: Store, mesh: Mesh, solver: HeatMethodSolver, made_of: dict[str, Any]) -> MeshGroup:
-    attributes = {
-        "mesh": task.item.label,
-        **made_of,
-        "versions": _versions(),
-        "report": {key: _plain(value) for key, value in asdict(mesh.report()).items()},
-    }
-    source_sets = _source_sets(task.plan, mesh, solver)
-    return store.begin(task.item.name, source_sets, mesh.n_vertices, task.dtype, attributes)
 
 
 @cache
@@ -167,7 +171,11 @@ def _versions() -> dict[str, str]:
 def _source_sets(plan: SourcePlan, mesh: Mesh, solver: HeatMethodSolver) -> list[IntArray]:
     n = mesh.n_vertices
     if plan.source_sets is not None:
-        return [vertex_sources(list(vertices), n) for vertices in plan.source_sets]
+        # Each ascends: its last vertex tells whether all are there.
+        return [
+            vertex_sources(list(vertices), n) if vertices[-1] >= n else np.array(vertices)
+            for vertices in plan.source_sets
+        ]
     if plan.farthest is None:
         return list(np.arange(n).reshape(-1, 1))
     return list(farthest_points(solver, min(plan.farthest, n)).reshape(-1, 1))
@@ -189,8 +197,9 @@ def _spans(group: MeshGroup) -> list[tuple[int, ...]]:
     return [tuple(missing[start : start + per_task]) for start in range(0, len(missing), per_task)]
 
 
-def _solve(task: Task, group: MeshGroup, solver: HeatMethodSolver, blocks: Sequence[int]) -> None:
-    source_sets = group.source_sets
+def _solve(
+    task: Task, group: MeshGroup, source_sets: Sequence[IntArray], solver: HeatMethodSolver, blocks: Sequence[int]
+) -> None:
     for block in blocks:
         start = time.perf_counter()
         rows = group.rows(block)
@@ -266,6 +275,11 @@ class _Shelf:
                 self._highest = taken
                 release_free_memory()
             return place
+
+    def drop_idle(self) -> None:
+        """Free the solvers that nobody uses."""
+        with self._changed:
+            self._drop_idle()
 
     def _drop_idle(self, but: str = "") -> None:
         for key in [key for key, place in self._places.items() if not place.users and key != but]:
