@@ -208,15 +208,32 @@ def test_a_worker_that_does_not_see_the_store_ends_the_batch(tmp_path):
         begin([task])
 
 
-# Dask's, when it looks for a free port.
-@pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning", "ignore:\\s*Port 8787 is already in use:UserWarning")
-def test_workers_are_not_slowed_by_what_nobody_asked_for():
-    """Dask's profiler takes 5 % of a worker, and its setting of malloc makes a solver half as slow again."""
-    with cluster.connected(n_workers=1) as own:
-        (found,) = own.run(
-            lambda dask_worker: ("profile" in dask_worker.periodic_callbacks, os.environ.get("MALLOC_TRIM_THRESHOLD_"))
-        ).values()
-    assert found == (False, None)
+WORKERS = """
+import os
+from heat_igl import cluster
+
+def found(dask_worker):
+    named = "HEAT_IGL_NUM_THREADS", "MALLOC_TRIM_THRESHOLD_"
+    return "profile" in dask_worker.periodic_callbacks, *map(os.environ.get, named)
+
+if __name__ == "__main__":
+    with cluster.connected(n_workers=1) as client:
+        print(*client.run(found).values(), os.environ.get("HEAT_IGL_NUM_THREADS"))
+        client.restart()
+    print(os.environ.get("HEAT_IGL_NUM_THREADS"))
+"""
+
+
+def test_workers_have_settings_of_their_own(tmp_path):
+    """Not Dask's profiler, which takes 5 % of a worker, nor its malloc, which makes a solver half as slow again.
+
+    And none of what is theirs stays behind in the process that started them.
+    """
+    script = tmp_path / "workers.py"
+    script.write_text(WORKERS)
+    environ = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    result = subprocess.run([sys.executable, script], env=environ, capture_output=True, text=True, check=True)
+    assert result.stdout == "(False, '1', None) None\nNone\n"
 
 
 def test_a_mesh_that_changed_is_computed_again(client, tmp_path):

@@ -30,7 +30,7 @@ _LOST = "the cluster is lost; what is finished stays in the store: run the same 
 # A task carries a whole mesh. And Dask would have malloc give every large array back to the system at once, which makes
 # a solver half as slow again. Dask's watch over its own event loop wakes every process 50 times a second, its profiler
 # 100 times; a nanny hands these settings on, over what the environment says.
-_SETTINGS = {
+_SETTINGS: dict[str, Any] = {
     "distributed.admin.large-graph-warning-threshold": "16GiB",
     "distributed.admin.tick.interval": "1s",
     "distributed.worker.profile.enabled": False,
@@ -320,17 +320,37 @@ def connected(scheduler: str | None = None, n_workers: int | None = None, dashbo
         with client:
             yield client
         return
-    with (
-        dask.config.set(_SETTINGS),
-        distributed.LocalCluster(
-            n_workers=n_workers or n_threads(),
-            threads_per_worker=1,
-            dashboard_address=":0" if dashboard else None,
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        yield client
+    with ExitStack() as stack:
+        stack.enter_context(dask.config.set(_SETTINGS))
+        stack.enter_context(_own_environment())
+        with _own_environment():
+            cluster = stack.enter_context(
+                distributed.LocalCluster(
+                    n_workers=n_workers or n_threads(),
+                    threads_per_worker=1,
+                    dashboard_address=":0" if dashboard else None,
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+        yield stack.enter_context(distributed.Client(cluster))
+
+
+@contextmanager
+def _own_environment() -> Iterator[None]:
+    """Take back what a nanny puts into the environment of its own process when it starts a worker, or starts it again.
+
+    Left there, it would have this process work with one thread from then on.
+    """
+    names = [*_SETTINGS["distributed.nanny.pre-spawn-environ"], "PYTHONHASHSEED"]
+    before = {name: os.environ.get(name) for name in names}
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 def _dask() -> tuple[Any, Any]:
