@@ -61,8 +61,10 @@ def _edge_weights(
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
     """Both ends, cotangent weight and length of each edge; triangles count by the area that they have in the domain."""
     square, areas = triangulation.l**2, triangulation.areas
-    total = square[:, 0] + square[:, 1] + square[:, 2]
-    half_cotangents = ((total[:, None] - 2 * square) / (8 * areas / (areas_counted / areas))[:, None]).ravel()
+    scale = areas_counted / (8 * areas**2)
+    half_cotangents = (square[:, 0] + square[:, 1] + square[:, 2])[:, None] - 2 * square
+    half_cotangents *= scale[:, None]
+    half_cotangents = half_cotangents.ravel()
     edges, twin = triangulation.edges, triangulation.twin[triangulation.edges]
     weight = half_cotangents[edges] + np.where(twin >= 0, half_cotangents[twin], 0.0)
     return triangulation.tail(edges), triangulation.head(edges), weight, triangulation.l.ravel()[edges]
