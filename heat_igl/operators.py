@@ -71,7 +71,8 @@ class Operators:
     longest_distance : float
         Length of a longest shortest path along edges; heat has to last that far.
     triangulation : IntrinsicTriangulation or None
-        The triangles that the operators belong to; None for tetrahedra.
+        The triangles that the operators belong to; None for tetrahedra, and where L is not their cotangent Laplacian:
+        the fitted heat flow takes its weights from them (`fitted_laplacian`).
     surface : IntrinsicTriangulation or None
         Triangles of the surface itself, each once, where `triangulation` is its tufted cover and goes over it twice.
         Paths are to be unfolded in these: on the cover a path over an edge of five faces goes on in one of them only.
