@@ -209,18 +209,51 @@ def test_beyond_a_cutoff_paths_go_on_along_edges():
     np.testing.assert_allclose(lengths(mesh, paths), straight, rtol=1e-12, atol=1e-15)
 
 
-def test_over_an_edge_of_three_faces_and_through_a_single_vertex():
-    book = shapes.book(3, 6)
-    spine = np.unique(book.facets.vertices[book.facets.n_faces == 3])
-    solver = HeatMethodSolver(book, refine="unfold")
-    middle = int(spine[len(spine) // 2])
-    paths = shortest_paths(book, solver, np.arange(book.n_vertices), middle)
-    # Each page is flat and convex, and holds the spine.
-    np.testing.assert_allclose(lengths(book, paths), np.linalg.norm(book.V - book.V[middle], axis=1), rtol=1e-12)
-    far = int(np.argmax(np.linalg.norm(book.V - book.V[middle], axis=1)))
-    across = shortest_paths(book, solver, np.arange(book.n_vertices), far)
-    np.testing.assert_array_equal(ends(book, across)[1], np.broadcast_to(book.V[far], book.V.shape))
+def over_a_line(start, end):
+    """Length of the shortest path between two pages on the z axis, by way of a point of it from 0 to 1."""
+    r, s = np.hypot(start[..., 0], start[..., 1]), np.hypot(end[..., 0], end[..., 1])
+    z = np.clip(start[..., 2] + (end[..., 2] - start[..., 2]) * r / (r + s), 0, 1)
+    return np.hypot(r, start[..., 2] - z) + np.hypot(s, end[..., 2] - z)
 
+
+@pytest.mark.parametrize("way", ["heat", "at random"])
+def test_pages_unfold_two_by_two(way):
+    # Any two are a flat convex domain, so the only locally shortest path is straight, whatever it is made from.
+    regular = shapes.book(5, 6)
+    rng = np.random.default_rng(0)
+    r = np.hypot(*regular.V[:, :2].T)
+    inner = ~regular.boundary
+    page = np.where(r > 0, np.round(np.arctan2(regular.V[:, 1], regular.V[:, 0]) / (0.4 * np.pi)) % 5, -1)
+    V = regular.V * np.where(inner, rng.uniform(0.98, 1.02, len(r)), 1)[:, None] ** [1, 1, 0]
+    V[inner, 2] += rng.uniform(-0.05, 0.05, inner.sum())
+    book = Mesh(V, regular.F)
+    r, z = np.hypot(*V[:, :2].T), V[:, 2]
+    solver = HeatMethodSolver(book)
+    for source in (3, 10, 20, 100, 200):
+        distance = solver.distance(source)
+        if way == "at random":
+            distance *= rng.uniform(0.6, 1.4, len(distance))
+        paths = shortest_paths(book, distance, np.arange(len(V)), source)
+        same = (page == page[source]) | (page < 0) | (page[source] < 0)
+        expected = np.where(same, np.hypot(r - r[source], z - z[source]), np.hypot(r + r[source], z - z[source]))
+        np.testing.assert_allclose(lengths(book, paths), expected, rtol=1e-12, atol=1e-15)
+        assert max(np.abs(turns(book, path)).max(initial=0) for path in paths) < 1e-6
+
+
+def test_a_fan_of_triangles_on_one_edge():
+    # The first and the last lie lower and higher than their common edge: from there it is passed at its ends.
+    angle, height = 2 * np.pi * np.arange(5) / 5, np.array([-0.5, 0.1, 0.5, 0.8, 1.7])
+    tips = np.stack([np.cos(angle), np.sin(angle), height], axis=1)
+    fan = Mesh(np.concatenate([[[0, 0, 0], [0, 0, 1]], tips]), [[0, 1, tip] for tip in range(2, 7)])
+    for source in range(2, 7):
+        targets = np.setdiff1d(np.arange(2, 7), source)
+        expected = over_a_line(fan.V[targets], fan.V[source])
+        for distance in (np.linalg.norm(fan.V - fan.V[source], axis=1), np.abs(np.arange(7.0) - source)):
+            paths = shortest_paths(fan, distance, targets, source)
+            np.testing.assert_allclose(lengths(fan, paths), expected, rtol=1e-12)
+
+
+def test_through_a_single_vertex():
     one = shapes.grid(3)
     pinched = Mesh(
         np.concatenate([one.V, 1 + one.V[1:]]), np.concatenate([one.F, np.where(one.F == 0, 15, one.F + 15)])

@@ -55,9 +55,8 @@ def shortest_paths(
     -------
     list of SurfaceCurve
         For each target a path to a source, on the faces of `mesh`; ``path.lengths(mesh).sum()`` is its length. It is
-        straight where it crosses edges, and passes vertices with an angle of pi or more on either side, so that no
-        path nearby is shorter; on the boundary, and at edges of more than two faces, with such an angle on the side
-        where the surface goes on. The path of a target that is a source is a single segment of length 0.
+        straight where it crosses edges, and passes vertices with an angle of pi or more whichever way around them, so
+        that no path nearby is shorter. The path of a target that is a source is a single segment of length 0.
 
     Raises
     ------
@@ -73,11 +72,11 @@ def shortest_paths(
     Notes
     -----
     The steepest descent of the distance, linear in each face, gives a strip of faces. The shortest path in the strip is
-    found by a funnel, and where it bends at a vertex that it could pass on the other side with an angle below pi, the
-    strip is led there, until no such vertex is left (Xin and Wang 2007). Where the descent ends at a vertex that is no
-    source, it goes on along the edges that rise least. Where three faces or more meet at an edge, a path goes straight
-    over it as it would over any other, but is not moved past a vertex of it. Nor is it moved past two vertices in one
-    place.
+    found by a funnel, and where it bends at a vertex that it could pass another way with an angle below pi, the
+    strip is led there, until no such vertex is left (Xin and Wang 2007). Where three faces or more meet at an edge, a
+    strip goes over it from any of them into any other, and the ways around a vertex of it branch; the shortest is
+    taken. Where the descent ends at a vertex that is no source, it goes on along the edges that rise least. A path is
+    not moved past two vertices in one place.
     """
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")

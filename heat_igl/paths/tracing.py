@@ -2,10 +2,12 @@
 
 A path is first a *strip*: a sequence of crossings, each from a half-edge of one face to a half-edge of the next on the
 same edge. Laid out in the plane the strip is a polygon, in which a funnel finds the shortest path (Lee and Preparata
-1984). Where that path bends at a vertex although the angle on its outer side is less than pi, the strip is led around
-the other side of the vertex, which makes the path shorter (Xin and Wang 2007); it is repeated until no such bend is
-left. Nothing here needs faces that are oriented alike. Side "left" is the side of the second of a half-edge's ends for
-the first crossing of a strip, and carried along from there.
+1984). Where that path bends at a vertex although another way around it has an angle of less than pi, the strip is led
+that way, which makes the path shorter (Xin and Wang 2007); it is repeated until no such bend is left. At most vertices
+the other way is the other side. Where more than two faces meet at an edge, a strip crosses it from any into any other
+and the ways around its ends branch, so the shortest is searched for. Nothing here needs faces that are oriented alike.
+Side "left" is the side of the second of a half-edge's ends for the first crossing of a strip, and carried along from
+there.
 
 All in one file, as in `heat_igl.refine.unfolding`, for the sake of numba's cache.
 """
@@ -24,7 +26,7 @@ __all__ = ["Surface", "trace"]
 
 # A crossing nearer to a vertex than this, in edge lengths, passes through the vertex.
 _SNAP = 1e-9
-# A bend is worth repairing when the angle on its outer side falls short of pi by more than this; it saves the square.
+# A bend is worth repairing when the angle another way falls short of pi by more than this; it saves the square.
 _STRAIGHT = 1e-7
 # The end on a curve is moved at most this often in one strip; once is enough unless the last bend changes with it.
 _MOST_SLIDES = 8
@@ -86,15 +88,6 @@ class Goals(NamedTuple):
 
 
 @inline
-def _mate(s: Surface, h: int) -> int:
-    """The half-edge on the other side of an edge of two faces, -1 at other edges."""
-    first = s.first_side[s.edge[h]]
-    if s.first_side[s.edge[h] + 1] - first != 2:
-        return -1
-    return int(s.side[first] if s.side[first] != h else s.side[first + 1])
-
-
-@inline
 def _corner_of(s: Surface, f: int, v: int) -> int:
     """The corner of face f at vertex v, -1 if it has none."""
     if s.F[f, 0] == v:
@@ -106,36 +99,64 @@ def _corner_of(s: Surface, f: int, v: int) -> int:
 
 @jit
 def _push(leave: list[int], enter: list[int], h: int, g: int) -> None:
-    """Add a crossing from half-edge h to half-edge g; going straight back takes the last one away instead."""
-    if len(leave) > 0 and enter[-1] == h and leave[-1] == g:
-        leave.pop()
-        enter.pop()
-    else:
+    """Add a crossing from half-edge h to half-edge g; two over one edge are joined, and going back takes both away."""
+    if len(leave) == 0 or enter[-1] != h:
         leave.append(h)
         enter.append(g)
+    elif leave[-1] != g:
+        enter[-1] = g
+    else:
+        leave.pop()
+        enter.pop()
 
 
 @jit
-def _around(s: Surface, v: int, h: int, goal: int, other: int, leave: list[int], enter: list[int]) -> float:
-    """Go around vertex v, out of a face through its half-edge h, to face `goal` or to a face with the vertex `other`.
+def _around(
+    s: Surface, v: int, h: int, before: tuple[float, float], goal: int, other: int, end: int,
+    after: tuple[float, float], limit: float, leave: list[int], enter: list[int],
+) -> bool:  # fmt: skip
+    """The shortest way around vertex v from the face of half-edge h to face `goal`, or to a face with vertex `other`.
 
-    Appends the crossings. Returns the sum of the angles of the faces passed on the way, not counting the first and the
-    last; -1 if an edge of one face, or of more than two, is in the way.
+    Its length is the sum of the angles at v: in the first face `before`, to h and to the other half-edge at v; in the
+    last face `after`, from half-edge `end` and from the other; and those of the faces between. Appends the crossings.
+    False if there is no way, or none below `limit`.
     """
-    total = 0.0
-    for _ in range(s.first_corner[v], s.first_corner[v + 1]):
-        g = _mate(s, h)
-        if g < 0:
-            return -1.0
-        leave.append(h)
-        enter.append(g)
-        f = g // 3
-        if f == goal or (other >= 0 and _corner_of(s, f, other) >= 0):
-            return total
-        c = _corner_of(s, f, v)
-        total += s.angle[f, c]
-        h = 3 * f + 3 - g % 3 - c
-    return -1.0
+    start = h // 3
+    # Dijkstra's algorithm. A step enters a face: the half-edge that it enters through, the one to leave it through (-1
+    # in the last face), and the step before it. Ways branch only at edges of more than two faces.
+    steps = [(-1, h, -1), (-1, 3 * start + 3 - h % 3 - _corner_of(s, start, v), -1)]
+    # The last step of each way that goes on, and its length to the edge where the face is left.
+    ends = [(before[0], 0), (before[1], 1)]
+    while len(ends) > 0:
+        nearest = 0
+        for i in range(1, len(ends)):
+            if ends[i][0] < ends[nearest][0]:
+                nearest = i
+        length, at = ends.pop(nearest)
+        out = steps[at][1]
+        if length >= limit:
+            return False
+        if out < 0:
+            n = len(leave)
+            while steps[at][2] >= 0:
+                leave.insert(n, steps[steps[at][2]][1])
+                enter.insert(n, steps[at][0])
+                at = steps[at][2]
+            return True
+        first, last = s.first_side[s.edge[out]], s.first_side[s.edge[out] + 1]
+        for k in range(first, last):
+            g = s.side[k]
+            f = g // 3
+            if g == out or f == start or (last - first > 2 and g in [step[0] for step in steps]):
+                continue
+            if f == goal or (other >= 0 and _corner_of(s, f, other) >= 0):
+                step, angle = (g, -1, at), after[0] if g == end else after[1]
+            else:
+                c = _corner_of(s, f, v)
+                step, angle = (g, 3 * f + 3 - g % 3 - c, at), s.angle[f, c]
+            ends.insert(nearest, (length + angle, len(steps)))
+            steps.append(step)
+    return False
 
 
 @jit
@@ -146,20 +167,14 @@ def _turn(s: Surface, v: int, f: int, goal: int, other: int, leave: list[int], e
     """
     if f == goal or (other >= 0 and _corner_of(s, f, other) >= 0):
         return True
-    c = _corner_of(s, f, v)
-    best = math.inf
-    best_leave, best_enter = [0], [0]
-    for i in (1, 2):
-        new_leave, new_enter = [0], [0]
-        new_leave.clear()
-        new_enter.clear()
-        total = _around(s, v, 3 * f + (c + i) % 3, goal, other, new_leave, new_enter)
-        if 0.0 <= total < best:
-            best, best_leave, best_enter = total, new_leave, new_enter
-    if best == math.inf:
+    h = 3 * f + (_corner_of(s, f, v) + 1) % 3
+    new_leave, new_enter = [0], [0]
+    new_leave.clear()
+    new_enter.clear()
+    if not _around(s, v, h, (0.0, 0.0), goal, other, -1, (0.0, 0.0), math.inf, new_leave, new_enter):
         return False
-    for i in range(len(best_leave)):
-        _push(leave, enter, best_leave[i], best_enter[i])
+    for i in range(len(new_leave)):
+        _push(leave, enter, new_leave[i], new_enter[i])
     return True
 
 
@@ -419,29 +434,24 @@ def _slide(segment: FloatArray, face: FloatArray, p: FloatArray, out: FloatArray
 
 
 @jit
-def _outer_way(
-    s: Surface, face: int, place: FloatArray, ends: IntArray, leave: list[int], enter: list[int],
-    corner: FloatArray, bend: IntArray, i: int, new_leave: list[int], new_enter: list[int],
+def _shorter_way(
+    s: Surface, place: FloatArray, ends: IntArray, leave: list[int], enter: list[int], corner: FloatArray,
+    bend: IntArray, i: int, new_leave: list[int], new_enter: list[int],
 ) -> bool:  # fmt: skip
-    """Whether the path gets shorter on the other side of its i-th corner; if so, the crossings there."""
+    """Whether the path gets shorter another way around its i-th corner; if so, the crossings there."""
     side, first, last = bend[i, 0], bend[i, 1], bend[i, 2]
     v = ends[first, side]
     zx, zy = corner[i]
     far = 2 * (1 - side)
-    before = enter[first - 1] // 3 if first > 0 else face
-    after = enter[last] // 3
-    inner = _angle(corner[i - 1, 0] - zx, corner[i - 1, 1] - zy, place[first, far] - zx, place[first, far + 1] - zy)
-    inner += _angle(corner[i + 1, 0] - zx, corner[i + 1, 1] - zy, place[last, far] - zx, place[last, far + 1] - zy)
-    c = _corner_of(s, before, v)
-    outer = s.angle[before, c] - inner
-    if before != after:
-        # The half-edge at v through which the strip does not leave.
-        h = 3 * before + 3 - c - leave[first] % 3
-        passed = _around(s, v, h, after, -1, new_leave, new_enter)
-        if passed < 0.0:
-            return False
-        outer += passed + s.angle[after, _corner_of(s, after, v)]
-    return bool(outer < math.pi - _STRAIGHT)
+    h, g = leave[first], enter[last]
+    f = h // 3
+    start = _angle(corner[i - 1, 0] - zx, corner[i - 1, 1] - zy, place[first, far] - zx, place[first, far + 1] - zy)
+    end = _angle(corner[i + 1, 0] - zx, corner[i + 1, 1] - zy, place[last, far] - zx, place[last, far + 1] - zy)
+    if f == g // 3:
+        return True  # straight through this face
+    before = (start, s.angle[f, _corner_of(s, f, v)] - start)
+    after = (end, s.angle[g // 3, _corner_of(s, g // 3, v)] - end)
+    return _around(s, v, h, before, g // 3, -1, g, after, math.pi - _STRAIGHT, new_leave, new_enter)
 
 
 @jit
@@ -486,7 +496,7 @@ def _straighten(
                 continue
             way_leave.clear()
             way_enter.clear()
-            if not _outer_way(s, face, place, ends, leave, enter, corner, bend, i, way_leave, way_enter):
+            if not _shorter_way(s, place, ends, leave, enter, corner, bend, i, way_leave, way_enter):
                 continue
             for j in range(copied, first):
                 _push(new_leave, new_enter, leave[j], enter[j])
