@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import subprocess
@@ -11,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import flat_perturbed, wheel_path
+from conftest import flat_perturbed, shared_path, wheel_path
+from scipy.spatial import ConvexHull
 
 import heat_igl
 from heat_igl import (
@@ -91,6 +93,54 @@ def test_lengths_agree_with_exact(name, refine):
     assert_on_surface(mesh, paths)
     # Straight over every edge.
     assert max(np.abs(turns(mesh, path)).max(initial=0) for path in paths) < 1e-5
+
+
+def egg():
+    """Faces across which distance is far from linear."""
+    V = np.random.default_rng(0).normal(size=(60, 3))
+    V *= [1, 0.5, 0.2] / np.linalg.norm(V, axis=1, keepdims=True)
+    return Mesh(V, ConvexHull(V).simplices)
+
+
+@pytest.mark.parametrize("name", ["cow.obj", "egg"])
+def test_the_side_on_which_to_pass_is_found_on_large_faces(name):
+    pytest.importorskip("pygeodesic")
+    mesh = egg() if name == "egg" else heat_igl.read_mesh(wheel_path(name))
+    error = []
+    for source in np.random.default_rng(1).choice(np.flatnonzero(mesh.referenced), 5, replace=False):
+        exact = reference.exact(mesh, int(source))
+        targets = np.flatnonzero(np.isfinite(exact) & (exact > 0))
+        error.append(lengths(mesh, shortest_paths(mesh, exact, targets, int(source))) / exact[targets] - 1)
+    error = np.concatenate(error)
+    assert error.min() > -1e-9
+    assert np.quantile(error, 0.99) < 1e-3
+
+
+@lru_cache
+def steiner():
+    path = Path(__file__).parents[1] / "scripts" / "steiner.py"
+    spec = importlib.util.spec_from_file_location("steiner", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_an_edge_of_four_faces_in_a_head():
+    mesh = heat_igl.read_mesh(shared_path("suzanne.obj"))
+    assert mesh.facets.n_faces.max() == 4
+    ends = mesh.facets.vertices[mesh.facets.n_faces.argmax()]
+    solver = HeatMethodSolver(mesh, refine="unfold")
+    among = np.flatnonzero(mesh.components == mesh.components[ends[0]])
+    sources = [*ends, *np.random.default_rng(5).choice(among, 3, replace=False)]
+    # From above, as every path on the surface is, and too long by some tenths of a percent at worst.
+    bound = steiner().graph_distance(mesh, sources, 24)
+    error = []
+    for source, longest in zip(sources, bound, strict=True):
+        targets = np.setdiff1d(among, source)
+        paths = shortest_paths(mesh, solver, targets, int(source))
+        assert_on_surface(mesh, paths)
+        error.append(lengths(mesh, paths) / longest[targets] - 1)
+    assert np.quantile(np.concatenate(error), 0.99) < 1e-2
 
 
 def test_paths_on_a_plane_are_straight_lines():

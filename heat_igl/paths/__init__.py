@@ -42,8 +42,8 @@ def shortest_paths(
         Triangles.
     distance : (n,) array_like or HeatMethodSolver
         Distance from the sources, or a solver to compute it. It decides which way around the surface a path takes, so
-        the better it is (``refine="unfold"``), the more often that is the shortest one; its values are not used
-        otherwise.
+        the better it is (``refine="unfold"``), the more often that is the shortest one. A path longer than it says by
+        a thousandth is looked for once more.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints
         Where the paths begin: vertices, as often and in the order given, or points on faces.
     sources : optional
@@ -71,12 +71,17 @@ def shortest_paths(
 
     Notes
     -----
-    The steepest descent of the distance, linear in each face, gives a strip of faces. The shortest path in the strip is
-    found by a funnel, and where it bends at a vertex that it could pass another way with an angle below pi, the
-    strip is led there, until no such vertex is left (Xin and Wang 2007). Where three faces or more meet at an edge, a
-    strip goes over it from any of them into any other, and the ways around a vertex of it branch; the shortest is
-    taken. Where the descent ends at a vertex that is no source, it goes on along the edges that rise least. A path is
-    not moved past two vertices in one place.
+    The steepest descent of the distance, linear in each face, gives a strip of faces. The shortest path in the
+    strip is found by a funnel, and where it bends at a vertex that it could pass another way with an angle below
+    pi, the strip is led there, until no such vertex is left (Xin and Wang 2007). Where three faces or more meet at
+    an edge, a strip goes over it from any of them into any other, and the ways around a vertex of it branch; the
+    shortest is taken. Where the descent ends at a vertex that is no source, it goes on along the edges that rise
+    least. A path is not moved past two vertices in one place.
+
+    Across large faces distance is far from linear, and the descent may pass a vertex on the wrong side. So where a
+    path is longer than the distance says, a second one goes straight from edge to edge towards vertices, or where
+    the distances at the ends of an edge place the source in the plane of the face, whichever agrees best with the
+    distance that is left; the shorter of the two is kept.
     """
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")

@@ -1,4 +1,6 @@
-"""Kernel of the paths: steepest descent over a triangulation, and straightening of the strip of faces it runs through.
+"""Kernel of the paths: the way down a distance over a triangulation, and straightening of the strip of faces on it.
+
+The way is the steepest descent, or, where the path becomes too long, found by aiming at what the distance says ahead.
 
 A path is first a *strip*: a sequence of crossings, each from a half-edge of one face to a half-edge of the next on the
 same edge. Laid out in the plane the strip is a polygon, in which a funnel finds the shortest path (Lee and Preparata
@@ -30,6 +32,10 @@ _SNAP = 1e-9
 _STRAIGHT = 1e-7
 # The end on a curve is moved at most this often in one strip; once is enough unless the last bend changes with it.
 _MOST_SLIDES = 8
+# A path that is longer than the distance by this part of it is traced a second time, by the other rule.
+_TOO_LONG = 1e-3
+# Of two paths the second is taken when it is shorter by this part: not for its rounding.
+_GAIN = 1e-9
 # A straight way to a source is taken when it is not longer than the distance says, to rounding.
 _ROUNDING = 1e-9
 
@@ -209,6 +215,22 @@ def _product(s: Surface, f: int, x: FloatArray, y: FloatArray) -> float:
     )
 
 
+@inline
+def _apart(s: Surface, f: int, x: FloatArray, y: FloatArray) -> float:
+    """How far two points of face f are apart."""
+    return math.sqrt(max(_product(s, f, x - y, x - y), 0.0))
+
+
+@jit
+def _value(s: Surface, d: FloatArray, f: int, x: FloatArray) -> float:
+    """The distance at point x of face f, where it is linear."""
+    total = 0.0
+    for c in range(3):
+        if x[c] > 0.0:
+            total += x[c] * d[s.F[f, c]]
+    return total
+
+
 @jit
 def _nearest(s: Surface, f: int, segment: FloatArray, x: FloatArray, out: FloatArray) -> float:
     """The point `out` of a segment in face f that is nearest to its point x, and how far it is."""
@@ -216,7 +238,7 @@ def _nearest(s: Surface, f: int, segment: FloatArray, x: FloatArray, out: FloatA
     squared = _product(s, f, along, along)
     share = _product(s, f, x - segment[0], along) / squared if squared > 0.0 else 0.0
     out[:] = segment[0] + min(max(share, 0.0), 1.0) * along
-    return math.sqrt(max(_product(s, f, x - out, x - out), 0.0))
+    return _apart(s, f, x, out)
 
 
 @jit
@@ -276,6 +298,71 @@ def _leave_vertex(s: Surface, d: FloatArray, v: int, rate: FloatArray, x: FloatA
             if slope > best:
                 face, other, best = f, w, slope
     return face, other
+
+
+@inline
+def _apex(a: float, b: float, side: float) -> tuple[float, float]:
+    """The third corner of a triangle on a side along the axis, from its distances to both ends: along, and height."""
+    along = 0.5 * ((a - b) * (a + b) / side + side)
+    return along, math.sqrt(max(a * a - along * along, 0.0))
+
+
+@jit
+def _over(px: float, py: float, qx: float, qy: float, side: float) -> tuple[float, float]:
+    """Where a straight line crosses a side, and its length: from py above it to qy below; inf if it passes it by."""
+    share = (px + (qx - px) * py / (py + qy)) / side if py + qy > 0.0 else 0.0
+    return share, math.hypot(qx - px, qy + py) if _SNAP < share < 1.0 - _SNAP else math.inf
+
+
+@jit
+def _aim(s: Surface, d: FloatArray, f: int, x: FloatArray, left: float, best: float, out: FloatArray) -> float:
+    """Of ways to a source, from point x of face f over a side of it, the one whose length is nearest to `left`.
+
+    They go straight to a corner, or straight over a side to the far corner of a face beyond it, and are as long as the
+    distance says from there; or straight over a side to where the distances of its ends place the source, in the plane
+    of the face. If the length differs from `left` by less than `best`, the difference is returned and `out` set to the
+    point where the way leaves the face; `best` otherwise.
+    """
+    for c in range(3):
+        a, b = (c + 1) % 3, (c + 2) % 3
+        da, db, side = d[s.F[f, a]], d[s.F[f, b]], s.l[f, c]
+        if x[c] <= 0.0 or not (math.isfinite(da) and math.isfinite(db)):
+            continue
+        # The side along the axis from a to b, the face above it.
+        along, height = _apex(s.l[f, b], s.l[f, a], side)
+        px, py = x[b] * side + x[c] * along, x[c] * height
+        qx, qy = _apex(da, db, side)
+        ways = [(0.0, math.hypot(px, py) + da), (1.0, math.hypot(px - side, py) + db), _over(px, py, qx, qy, side)]
+        h = 3 * f + c
+        for k in range(s.first_side[s.edge[h]], s.first_side[s.edge[h] + 1]):
+            g = s.side[k]
+            if g != h:
+                e = g // 3
+                qx, qy = _apex(s.l[e, _corner_of(s, e, s.F[f, b])], s.l[e, _corner_of(s, e, s.F[f, a])], side)
+                share, length = _over(px, py, qx, qy, side)
+                ways.append((share, length + d[s.F[e, g % 3]]))
+        for share, length in ways:
+            if abs(length - left) < best:
+                best = abs(length - left)
+                out[a], out[b], out[c] = 1.0 - share, share, 0.0
+    return best
+
+
+@jit
+def _aim_from_vertex(s: Surface, d: FloatArray, v: int, x: FloatArray) -> tuple[int, int]:
+    """Where the way from vertex v leads whose length is nearest to its distance; as `_leave_vertex` says it."""
+    at, out = np.empty(3), np.empty(3)
+    face, best = -1, math.inf
+    for k in range(s.first_corner[v], s.first_corner[v + 1]):
+        f = s.corner[k] // 3
+        at[:] = 0.0
+        at[s.corner[k] % 3] = 1.0
+        off = _aim(s, d, f, at, d[v], best, out)
+        if off < best:
+            face, best = f, off
+            x[:] = out
+    c = _only_corner(x) if face >= 0 else -1
+    return face, s.F[face, c] if c >= 0 else -1
 
 
 @jit
@@ -458,10 +545,11 @@ def _shorter_way(
 def _straighten(
     s: Surface, face: int, start_vertex: int, start: FloatArray, leave: list[int], enter: list[int], end_vertex: int,
     ends_on: FloatArray, faces: list[int], points: list[float],
-) -> None:  # fmt: skip
+) -> float:  # fmt: skip
     """Append the segments of a locally shortest path: their faces, and the coordinates of start and end in them.
 
-    The path ends at `end_vertex`, or, if that is -1, where it is nearest on the segment `ends_on` in the last face.
+    Returns its length. It ends at `end_vertex`, or, if that is -1, where it is nearest on the segment `ends_on` in the
+    last face.
     """
     ends_on = ends_on.copy()
     end = 0.5 * (ends_on[0] + ends_on[1])
@@ -510,6 +598,7 @@ def _straighten(
         leave, new_leave = new_leave, leave
         enter, new_enter = new_enter, enter
     _emit(s, face, start, leave, enter, end, place, ends, corner, bend, faces, points)
+    return length
 
 
 @jit
@@ -614,20 +703,25 @@ def _share(place: FloatArray, p: FloatArray, q: FloatArray) -> float:
 
 @jit
 def _path(
-    s: Surface, d: FloatArray, goals: Goals, face: int, target: FloatArray, max_steps: int, faces: list[int],
-    points: list[float],
-) -> bool:  # fmt: skip
-    """Descend from a point of a face to a source, and append the straightened path; False if there is no way."""
+    s: Surface, d: FloatArray, goals: Goals, face: int, target: FloatArray, max_steps: int, aims: bool,
+    faces: list[int], points: list[float],
+) -> float:  # fmt: skip
+    """Go down from a point of a face to a source, by steepest descent or aiming, and append the straightened path.
+
+    Returns its length and what the distance at its end is; inf if there is no way.
+    """
     leave, enter = [0], [0]
     leave.clear()
     enter.clear()
-    rate, out, nowhere = np.empty(3), np.empty(3), np.zeros((2, 3))
+    rate, out, moved, nowhere = np.empty(3), np.empty(3), np.empty(3), np.zeros((2, 3))
     x, start = target.copy(), target.copy()
     c = _only_corner(x)
     v = s.F[face, c] if c >= 0 else -1
     start_vertex, first, f = v, face, face
     is_free = v >= 0  # still at a vertex, and in no face in particular
     floor = math.inf  # descent goes on below this
+    left = _value(s, d, face, x)  # of the length, when aiming
+    length = 0.0
     steps = 0
     while True:
         steps += 1
@@ -636,19 +730,22 @@ def _path(
         goal, i, other = -1, -1, -1
         if v >= 0:
             if goals.is_source[v]:
-                _straighten(s, first, start_vertex, start, leave, enter, v, nowhere, faces, points)
-                return True
+                length += _straighten(s, first, start_vertex, start, leave, enter, v, nowhere, faces, points)
+                return float(length + d[v])
             goal, i = _source_around(s, d, goals, v, False)
             if i < 0 and d[v] < floor:
-                goal, other = _leave_vertex(s, d, v, rate, out)
-                if goal < 0:
+                if aims:
+                    goal, other = _aim_from_vertex(s, d, v, out)
+                else:
+                    goal, other = _leave_vertex(s, d, v, rate, out)
+                if aims or goal < 0:
                     floor = d[v]
             if goal < 0:
                 goal, i = _source_around(s, d, goals, v, True)
             if goal < 0:
                 other = goals.escape[v]
                 if other < 0:
-                    return False
+                    return math.inf
                 for k in range(s.first_corner[v], s.first_corner[v + 1]):
                     if _corner_of(s, s.corner[k] // 3, other) >= 0:
                         goal = s.corner[k] // 3
@@ -657,7 +754,7 @@ def _path(
                 is_free = False
             elif not _turn(s, v, f, goal, other, leave, enter):
                 # Only this vertex joins the two faces: the path cannot pass anywhere else.
-                _straighten(s, first, start_vertex, start, leave, enter, v, nowhere, faces, points)
+                length += _straighten(s, first, start_vertex, start, leave, enter, v, nowhere, faces, points)
                 leave.clear()
                 enter.clear()
                 start_vertex, first, f = v, goal, goal
@@ -668,11 +765,14 @@ def _path(
             else:
                 f = first
             if i >= 0:
-                _straighten(s, first, start_vertex, start, leave, enter, -1, goals.inside[i], faces, points)
-                return True
+                length += _straighten(s, first, start_vertex, start, leave, enter, -1, goals.inside[i], faces, points)
+                return float(length + goals.offset[i])
             if other >= 0:
                 v = other
                 continue
+            moved[:] = 0.0
+            moved[_corner_of(s, f, v)] = 1.0
+            left = d[v] - _apart(s, f, moved, out)
             x[:] = out
             v = -1
         # At a point of face f that is no vertex: on one of its sides, or (at the start) inside.
@@ -680,33 +780,38 @@ def _path(
         for c in range(3):
             if x[c] == 0.0:
                 on = c
-        goal, best, enter_by = -1, 0.0, -1
+        # The steeper the descent the better, and the less a way misses what is left of the length.
+        goal, best, enter_by = -1, -math.inf if aims else 0.0, -1
         if on < 0:
             i, _ = _source_in(s, d, goals, f, x, False)
-            best = _descent(s, d, f, rate)
-            if i >= 0 or best > 0.0:
+            better = -_aim(s, d, f, x, left, math.inf, out) if aims else _descent(s, d, f, rate)
+            if i >= 0 or better > best:
                 goal = f
         else:
             h = 3 * f + on
             i = -1
             for k in range(s.first_side[s.edge[h]], s.first_side[s.edge[h] + 1]):
                 g = s.side[k]
-                _moved(s, h, g, x, out)
-                found, _ = _source_in(s, d, goals, g // 3, out, False)
-                slope = _descent(s, d, g // 3, rate)
+                _moved(s, h, g, x, moved)
+                found, _ = _source_in(s, d, goals, g // 3, moved, False)
                 if found >= 0:
                     i, goal, enter_by = found, g // 3, g
                     break
-                if slope > best and rate[g % 3] > 0.0:
-                    best, goal, enter_by = slope, g // 3, g
+                if aims:
+                    # Straight on is not back.
+                    better = -_aim(s, d, g // 3, moved, left, -best, out) if g != h or steps == 1 else best
+                else:
+                    better = _descent(s, d, g // 3, rate)
+                if better > best and (aims or rate[g % 3] > 0.0):
+                    best, goal, enter_by = better, g // 3, g
             if goal >= 0 and enter_by != h:
-                _moved(s, h, enter_by, x, out)
-                x[:] = out
+                _moved(s, h, enter_by, x, moved)
+                x[:] = moved
                 f = goal
                 _push(leave, enter, h, enter_by)
         if i >= 0:
-            _straighten(s, first, start_vertex, start, leave, enter, -1, goals.inside[i], faces, points)
-            return True
+            length += _straighten(s, first, start_vertex, start, leave, enter, -1, goals.inside[i], faces, points)
+            return float(length + goals.offset[i])
         if goal < 0:
             # Level, or a valley along the side: on to the lowest vertex.
             c = -1
@@ -715,8 +820,12 @@ def _path(
                     c = corner
             v = s.F[f, c]
             continue
-        _descent(s, d, f, rate)
-        _exit(x, rate)
+        if aims:
+            left -= _apart(s, f, x, out)
+            x[:] = out
+        else:
+            _descent(s, d, f, rate)
+            _exit(x, rate)
         c = _only_corner(x)
         if c >= 0:
             v = s.F[f, c]
@@ -750,11 +859,23 @@ def trace(
     first : (k + 1,) int64
         Segments of path i are ``first[i]`` to ``first[i + 1]``; none where no way was found.
     """
-    faces, points = [0], [0.0]
+    faces, points, some_faces, some_points, other_faces, other_points = [0], [0.0], [0], [0.0], [0], [0.0]
     faces.clear()
     points.clear()
     first = np.zeros(len(face) + 1, np.int64)
     for i in range(len(face)):
-        _path(s, d, goals, face[i], barycentric[i], max_steps, faces, points)
+        some_faces.clear()
+        some_points.clear()
+        length = _path(s, d, goals, face[i], barycentric[i], max_steps, False, some_faces, some_points)
+        if _value(s, d, face[i], barycentric[i]) * (1.0 + _TOO_LONG) < length < math.inf:
+            other_faces.clear()
+            other_points.clear()
+            if _path(s, d, goals, face[i], barycentric[i], max_steps, True, other_faces, other_points) < length * (
+                1.0 - _GAIN
+            ):
+                some_faces, other_faces = other_faces, some_faces
+                some_points, other_points = other_points, some_points
+        faces.extend(some_faces)
+        points.extend(some_points)
         first[i + 1] = len(faces)
     return np.array(faces), np.array(points).reshape(-1, 2, 3), first
