@@ -215,7 +215,7 @@ def _product(s: Surface, f: int, x: FloatArray, y: FloatArray) -> float:
     )
 
 
-@inline
+@jit
 def _apart(s: Surface, f: int, x: FloatArray, y: FloatArray) -> float:
     """How far two points of face f are apart."""
     return math.sqrt(max(_product(s, f, x - y, x - y), 0.0))
@@ -300,7 +300,7 @@ def _leave_vertex(s: Surface, d: FloatArray, v: int, rate: FloatArray, x: FloatA
     return face, other
 
 
-@inline
+@jit
 def _apex(a: float, b: float, side: float) -> tuple[float, float]:
     """The third corner of a triangle on a side along the axis, from its distances to both ends: along, and height."""
     along = 0.5 * ((a - b) * (a + b) / side + side)
