@@ -147,8 +147,8 @@ class Refinement:
             As for `sweep`.
         tolerance : float
             A path is taken as it is once straightening it further would shorten it by less than this fraction of its
-            length, and by less than one and a half times this fraction of the way to the next bend. 0 follows every path to its
-            last bend or its source.
+            length, and by less than one and a half times this fraction of the way to the next bend. 0 follows every
+            path to its last bend or its source.
         offsets, points, point_offsets, labels
             As for `sweep`.
 
