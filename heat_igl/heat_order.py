@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from heat_igl.emission import Emission, take_shorter
 from heat_igl.near_field import NearField
 from heat_igl.operators import Operators
-from heat_igl.refine import Refine, Refinement
+from heat_igl.refine import Known, Refine, Refinement
 from heat_igl.sources import SourcePoints
 from heat_igl.surface_points import SurfacePoints
 from heat_igl.typing import FloatArray, IntArray
@@ -43,9 +45,9 @@ class HeatOrder:
         triangulation = domain.surface or domain.triangulation
         if triangulation is None:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
-        refinement = Refinement(triangulation)
-        self._unfolded = refinement.sweep if refine == "sweep" else refinement.unfold
-        self._error = _SWEEP_ERROR if refine == "sweep" else 0.0
+        self._refinement = Refinement(triangulation)
+        self._sweeps = refine == "sweep"
+        self._error = _SWEEP_ERROR if self._sweeps else 0.0
         self._faces = None if domain.faces is None else NearField(domain.faces)
         self._components = domain.components
         self._given_faces = np.empty((0, 3), np.int64) if domain.given_faces is None else domain.given_faces
@@ -74,7 +76,10 @@ class HeatOrder:
         np.minimum.at(earliest, component, offset)
         late = offset - earliest[component]
         k = len(sources.vertices)
-        distance = self._unfolded(
+        unfolded = self._refinement.unfold
+        if self._sweeps:
+            unfolded = partial(self._refinement.sweep, known=self._known(emission, points, earliest))
+        distance = unfolded(
             -u,
             sources.vertices,
             offsets=late[:k] if late.any() else None,
@@ -91,6 +96,18 @@ class HeatOrder:
             if labels is not None:
                 labels[seeds.vertex[taken]] = seeds.label[taken]
         return distance
+
+    def _known(self, emission: Emission, points: SourcePoints, earliest: FloatArray) -> Known | None:
+        """What straight lines from points and curves reach."""
+        near = emission.near.at(emission.guides)
+        if not len(near.vertex):
+            return None
+        # A curve has many sources of one label.
+        label = np.concatenate([emission.sources.vertex_label, points.label])
+        which, first, count = np.unique(label, return_index=True, return_counts=True)
+        at = np.searchsorted(which, near.label)
+        distance = near.value - earliest[self._components[near.vertex]]
+        return Known(near.vertex, distance, first[at], count[at] > 1)
 
     def _points(self, emission: Emission) -> SourcePoints:
         points, segments = emission.sources.points, emission.sources.segments

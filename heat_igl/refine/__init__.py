@@ -19,13 +19,13 @@ from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intri
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.surface_points import SurfacePoints
-from heat_igl.typing import ArrayLike, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from heat_igl.fans import Tables
     from heat_igl.refine.unfolding import Points
 
-__all__ = ["Refine", "Refinement", "unfolded_distance"]
+__all__ = ["Known", "Refine", "Refinement", "unfolded_distance"]
 
 Refine = Literal["sweep", "unfold"]
 
@@ -41,6 +41,27 @@ _MAX_PASSES = 50
 _MAX_SEARCH = 500
 # A point whose barycentric coordinate is below this lies on the side of its face.
 _ON_SIDE = 1e-8
+
+
+class Known(NamedTuple):
+    """Distances that are known before a sweep, at vertices that are no sources.
+
+    Attributes
+    ----------
+    vertex : (e,) int64
+        Vertices, each once.
+    distance : (e,) float64
+        Length of a path to each; another way may be shorter.
+    source : (e,) int64
+        The source that it comes from, as `Refinement.sweep` labels them.
+    is_front : (e,) bool
+        Whether that source is one of many in a row, whose distances come as a straight front.
+    """
+
+    vertex: IntArray
+    distance: FloatArray
+    source: IntArray
+    is_front: BoolArray
 
 
 class Refinement:
@@ -86,6 +107,7 @@ class Refinement:
         points: SurfacePoints | None = None,
         point_offsets: FloatArray | None = None,
         labels: IntArray | None = None,
+        known: Known | None = None,
     ) -> FloatArray:
         """Distance by unfolding two triangles at a time, until nothing gives less.
 
@@ -107,6 +129,8 @@ class Refinement:
         labels : (n,) int64, optional
             Filled with the source that each distance is measured from (geodesic Voronoi cells): 0 to k - 1 for
             vertices, k to k + p - 1 for points, -1 where none is reached.
+        known : Known, optional
+            Distances to begin with, besides those of the sources.
 
         Returns
         -------
@@ -123,10 +147,16 @@ class Refinement:
         if len(sources) + starts.n_points > 1 or labels is not None or offsets is not None or point_offsets is not None:
             label = np.full(len(distance), -1)
             label[starts.row] = starts.label
-        sweeping.sweep(self._order(key), self._tables, distance[:n], label, starts.offset)
+        is_stale = np.ones(n, bool)
+        if known is not None:
+            row = self._number[np.concatenate([known.vertex + self.n * sheet for sheet in range(self._n_sheets)])]
+            distance[row], is_stale[row] = np.tile(known.distance, self._n_sheets), False
+            if label is not None:
+                given = np.where(known.is_front, sweeping.FRONT - known.source, known.source)
+                label[row] = np.tile(given, self._n_sheets)
+        sweeping.sweep(self._order(key), self._tables, distance[:n], label, starts.offset, is_stale)
         if label is not None:
-            # Those of straight fronts.
-            label = np.where(label < -1, -2 - label, label)
+            label = np.where(label <= sweeping.FRONT, sweeping.FRONT - label, label)
         return self._on_base(distance, label, labels)
 
     def unfold(

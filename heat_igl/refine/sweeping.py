@@ -29,7 +29,7 @@ from heat_igl.fans import (
 from heat_igl.memory_access import prefetch, uncounted
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["sweep"]
+__all__ = ["FRONT", "sweep"]
 
 # Changes by less than this are not passed on: on a curved surface the sweep is wrong by ten times as much anyway.
 _NEGLIGIBLE = 3e-4
@@ -40,8 +40,8 @@ _ROUNDING = 1e-12
 _GO_BACK, _GIVE_UP = 10, 50
 # Part of an edge by which a source has to lie beyond it: circles about its ends, nearly touching, lose digits.
 _CLOSE = 1e-3
-# Labels up to here are of straight fronts.
-_FRONT = -2
+# The label of source 0 where its distance comes as a straight front; those of others lie below.
+FRONT = -2
 # Numbers in a table that a processor keeps in its own cache.
 _CACHED = 1 << 17
 
@@ -190,16 +190,19 @@ def _read_ahead(order: IntArray, i: int, t: Tables, d: FloatArray) -> None:
 
 @inline
 def _source(label: int) -> int:
-    """The source of a label, which is `_FRONT` minus the source where the distance came with a straight front."""
-    return label if label >= -1 else _FRONT - label
+    """The source of a label, which is `FRONT` minus the source where the distance came with a straight front."""
+    return label if label >= -1 else FRONT - label
 
 
 @jit
-def sweep(order: IntArray, t: Tables, d: FloatArray, label: IntArray | None, offset: FloatArray) -> float:
+def sweep(
+    order: IntArray, t: Tables, d: FloatArray, label: IntArray | None, offset: FloatArray, is_stale: AnyArray
+) -> float:
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, in the given order.
 
     Where a vertex turns out to be nearer than one that came before it, the sweep goes back to that one at once, before
-    what is wrong there spreads. Returns the number of visits per vertex.
+    what is wrong there spreads. Returns the number of visits per vertex. Vertices that are not in `is_stale` (n,) bool
+    are visited only if what they depend on changes.
 
     `label` (n,), needed where there is more than one source, is handed on with the distance: the source that it is
     measured from, -1 where none is reached; ``offset[label]`` is the distance at which that source begins. Circles
@@ -210,7 +213,6 @@ def sweep(order: IntArray, t: Tables, d: FloatArray, label: IntArray | None, off
     rank = np.empty(n, np.int32)
     for i in range(n):
         rank[order[i]] = i
-    is_stale = np.ones(n, np.bool_)
     kept = np.where(t.is_flat, 1 - _ROUNDING, 1 - _NEGLIGIBLE)
     n_visits, i, again = 0, 0, n
     order, t, d = uncounted((order, t, d))
@@ -268,7 +270,7 @@ def sweep(order: IntArray, t: Tables, d: FloatArray, label: IntArray | None, off
                 best = across
                 if label is not None:
                     source = _source(label[a] if d[a] < d[b] else label[b])
-                    source = source if is_of_one else _FRONT - source
+                    source = source if is_of_one else FRONT - source
         if best < old:
             d[v] = best
             begin = 0.0
