@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import factorial
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -86,12 +88,11 @@ def _fit(x: FloatArray) -> FloatArray:
     """(x^2 / 4) / (I0(x) - 1)."""
     # I0 is the sum of y^k / (k!)^2, and 13 terms give it to 1e-12 up to x = 4; beyond, nothing cancels.
     y = np.minimum(x, 4.0) ** 2 / 4
-    share = np.ones_like(x)
-    for k in range(13, 1, -1):
-        share *= y
-        share /= k * k
-        share += 1
-    fitted = 1 / share
+    over_y = np.zeros_like(x)
+    for k in range(13, 0, -1):
+        over_y *= y
+        over_y += 1 / factorial(k) ** 2
+    fitted = 1 / over_y
     far = x > 4
     # exp(-600) is as good as no heat, and leaves the weight a number.
     beyond = np.minimum(x[far], 600.0)
