@@ -71,9 +71,9 @@ class Operators:
     longest_distance : float
         Length of a longest shortest path along edges; heat has to last that far.
     triangulation : IntrinsicTriangulation or None
-        The triangles that the operators belong to; None for tetrahedra, and where G is not theirs or distance not
-        measured along them: their lengths make straight lines from sources, are unfolded, stand for G in the compiled
-        step 2, and heat is fitted to them (`fitted_laplacian`). L and M may be others.
+        The triangles that the operators belong to; None for tetrahedra, and where distance is not measured along them:
+        their lengths make straight lines from sources, are unfolded, stand for a G that is not made yet, and heat is
+        fitted to them (`fitted_laplacian`). L, M and G may be others.
     surface : IntrinsicTriangulation or None
         Triangles of the surface itself, each once, where `triangulation` is its tufted cover and goes over it twice.
         Paths are to be unfolded in these: on the cover a path over an edge of five faces goes on in one of them only.

@@ -178,6 +178,17 @@ def test_without_numba_there_is_the_matrix_form(disk, monkeypatch):
     assert (Descent(disk, 0.02).divergence(u) == expected).all()
 
 
+def test_a_gradient_exchanged_by_hand_is_used(disk):
+    """Of a surface on which the way along the first axis is half as long, which the triangles do not know."""
+    shorter = sp.kron(np.diag([2, 1]), sp.eye_array(len(disk.weights)))
+    other = replace(disk, gradient=(shorter @ disk.G).tocsc())
+    u = diffuse(disk, np.eye(disk.n)[:, [3, 90]], 0.02)
+    expected = other.D @ normalize(other, u)
+    assert abs(expected - disk.D @ normalize(disk, u)).max() > 0.1 * abs(expected).max()
+    found = Descent(other).divergence(u)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * abs(expected).max())
+
+
 def test_fitted_laplacian_of_equal_edges_is_right_in_the_mean_over_a_circle():
     """Around the middle of a regular hexagon waves exp(x / sqrt(t)) solve (1 - t Laplace) u = 0, on average over x."""
     hexagon = shapes.disk(1)
