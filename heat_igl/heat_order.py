@@ -49,7 +49,7 @@ class HeatOrder:
         self._sweeps = refine == "sweep"
         self._error = _SWEEP_ERROR if self._sweeps else 0.0
         self._faces = None if domain.faces is None else NearField(domain.faces)
-        self._components = domain.components
+        self._domain = domain
         self._given_faces = np.empty((0, 3), np.int64) if domain.given_faces is None else domain.given_faces
         self._spacing = _SPACING * domain.mean_edge_length
 
@@ -66,12 +66,12 @@ class HeatOrder:
         return self._distance(emission, u, labels), labels
 
     def _distance(self, emission: Emission, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
-        sources, points = emission.sources, self._points(emission)
+        sources, points, components = emission.sources, self._points(emission), self._domain.components
         places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
         # Tolerances are relative to the distance: what all have in common is added afterwards.
-        earliest = np.full(int(self._components.max()) + 1, np.inf)
-        component_of_point = self._components[self._given_faces[points.faces, 0]] if places else np.empty(0, np.int64)
-        component = np.concatenate([self._components[sources.vertices], component_of_point])
+        earliest = np.full(self._domain.n_components, np.inf)
+        component_of_point = components[self._given_faces[points.faces, 0]] if places else np.empty(0, np.int64)
+        component = np.concatenate([components[sources.vertices], component_of_point])
         offset = np.concatenate([sources.vertex_offset, points.offset])
         np.minimum.at(earliest, component, offset)
         late = offset - earliest[component]
@@ -87,11 +87,14 @@ class HeatOrder:
             point_offsets=late[k:] if late.any() and places else None,
             labels=labels,
         )
-        start = earliest[self._components]
-        distance += start
+        start = self._domain.on_vertices(earliest)
+        if offset.any():
+            distance += start
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, points.label, [-1]])[labels]
         for seeds in (emission.near.at(emission.guides), emission.far):
+            if not len(seeds.vertex):
+                continue
             taken = take_shorter(distance, seeds, self._error, start)
             if labels is not None:
                 labels[seeds.vertex[taken]] = seeds.label[taken]
@@ -106,7 +109,7 @@ class HeatOrder:
         label = np.concatenate([emission.sources.vertex_label, points.label])
         which, first, count = np.unique(label, return_index=True, return_counts=True)
         at = np.searchsorted(which, near.label)
-        distance = near.value - earliest[self._components[near.vertex]]
+        distance = near.value - earliest[self._domain.components[near.vertex]]
         return Known(near.vertex, distance, first[at], count[at] > 1)
 
     def _points(self, emission: Emission) -> SourcePoints:

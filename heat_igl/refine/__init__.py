@@ -283,6 +283,10 @@ class Refinement:
 
     def _on_base(self, distance: FloatArray, label: IntArray | None, labels: IntArray | None) -> FloatArray:
         on_sheets = distance[self._number].reshape(self._n_sheets, -1)
+        if self._n_sheets == 1:
+            if labels is not None and label is not None:
+                labels[:] = label[self._number]
+            return np.asarray(on_sheets[0])
         if labels is not None and label is not None:
             nearest = on_sheets.argmin(axis=0)[None]
             labels[:] = np.take_along_axis(label[self._number].reshape(self._n_sheets, -1), nearest, axis=0)[0]
