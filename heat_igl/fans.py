@@ -33,8 +33,8 @@ def inline(function: Function) -> Function:
 
 
 # Columns of `Tables.spoke`, and of its view as integers.
-LENGTH, ALONG, HEIGHT, BASE, PER_BASE = 0, 1, 2, 3, 4
-NEIGHBOUR, NEXT_SPOKE = 10, 11
+LENGTH, ALONG, HEIGHT, BASE, BEYOND_ALONG, BEYOND_DEPTH = 0, 1, 2, 3, 4, 5
+NEIGHBOUR, NEXT_NEIGHBOUR, BEYOND, NEXT_SPOKE = 12, 13, 14, 15
 # Columns of `Tables.turn`, and of its view as integers.
 ANGLE_HERE, ANGLE_THERE = 0, 1
 FAN_HERE, FAN_THERE, CORNER, MANY = 4, 5, 6, 7
@@ -50,12 +50,14 @@ class Tables(NamedTuple):
     ----------
     first : (n + 1,) int64
         Spokes of vertex v are ``first[v]`` to ``first[v + 1]``, counter-clockwise, fan after fan.
-    spoke : (s, 6) float64
+    spoke : (s, 8) float64
         Length. Of the triangle to the left of the spoke: v's place over the opposite side, along it from the spoke's
-        end and in height; the length of that side, and one over it. Past the end of an open fan, where there is no
-        triangle: 0, nan, 0, nan, so that whatever is computed from them compares false.
-    spoke_id : (s, 12) int32
-        The same memory. The neighbour; the next spoke, on the other side of that triangle (or the spoke itself).
+        end and in height; the length of that side; and the place of the vertex beyond it, along it and in depth. Past
+        the end of an open fan, where there is no triangle, 0, nan, 0, so that whatever is computed from them compares
+        false. Rows begin where lines of the processor's cache do.
+    spoke_id : (s, 16) int32
+        The same memory. The neighbour; the one at the next spoke; the vertex beyond the side between them, -1 if none;
+        the next spoke, on the other side of that triangle (or the spoke itself).
     turn : (s, 4) float64
         Direction of the spoke at v; direction of the same edge at the neighbour (angles in their fans).
     turn_id : (s, 8) int32
@@ -192,17 +194,24 @@ def _fill_spokes(
         k = fill[v]
         if i == 0 or fan[h] != fan[in_order[i - 1]]:
             fan_start = k
-        spoke[k, LENGTH], spoke[k, BASE], spoke[k, PER_BASE] = length[left], length[h], 1.0 / length[h]
+        spoke[k, LENGTH], spoke[k, BASE] = length[left], length[h]
         spoke[k, ALONG], spoke[k, HEIGHT] = apex[h, 0] * length[h], apex[h, 1] * length[h]
-        spoke_id[k, NEIGHBOUR], spoke_id[k, NEXT_SPOKE] = vertex[right], k + 1
+        spoke_id[k, NEIGHBOUR], spoke_id[k, NEXT_NEIGHBOUR] = vertex[right], vertex[left]
+        spoke_id[k, BEYOND], spoke_id[k, NEXT_SPOKE] = -1, k + 1
+        t = twin[h]
+        if t >= 0:
+            # Seen from beyond, the side runs the other way.
+            spoke[k, BEYOND_ALONG], spoke[k, BEYOND_DEPTH] = (1.0 - apex[t, 0]) * length[h], apex[t, 1] * length[h]
+            spoke_id[k, BEYOND] = vertex[t]
         turn[k, ANGLE_HERE], turn[k, ANGLE_THERE] = angle[h], angle[right] + corner_angle[right]
         turn_id[k, FAN_HERE], turn_id[k, FAN_THERE], turn_id[k, CORNER] = fan[h], fan[right], h
         turn_id[k, MANY] = twin[h] < -1
         fill[v] += 1
         if twin[_next(h)] < 0:
             k += 1
-            spoke[k, LENGTH], spoke[k, HEIGHT], spoke[k, PER_BASE] = length[right], np.nan, np.nan
-            spoke_id[k, NEIGHBOUR], spoke_id[k, NEXT_SPOKE] = vertex[left], k
+            spoke[k, LENGTH], spoke[k, HEIGHT] = length[right], np.nan
+            spoke_id[k, NEIGHBOUR], spoke_id[k, NEXT_NEIGHBOUR] = vertex[left], vertex[left]
+            spoke_id[k, BEYOND], spoke_id[k, NEXT_SPOKE] = -1, k
             turn[k, ANGLE_HERE], turn[k, ANGLE_THERE] = angle[h] + corner_angle[h], angle[left]
             turn_id[k, FAN_HERE], turn_id[k, FAN_THERE], turn_id[k, CORNER] = fan[h], fan[left], -1
             fill[v] += 1
@@ -283,13 +292,20 @@ def breadth_first(
     return number, face, new_F, new_l, new_twin
 
 
+def _aligned(n_rows: int, n_columns: int) -> FloatArray:
+    """Zeros whose first address is a multiple of a cache line, 64 bytes."""
+    room = np.zeros(n_rows * n_columns + 8)
+    start = -room.ctypes.data % 64 // 8
+    return room[start : start + n_rows * n_columns].reshape(n_rows, n_columns)
+
+
 def tables(F: IntArray, l: FloatArray, twin: IntArray, n: int) -> Tables:  # noqa: E741
     """The tables of m oriented triangles on n vertices; `twin` is -1 on the boundary, -2 where more than two meet."""
     length = l.ravel()
     apex, corner_angle = _shapes(l)
     angle, fan, total, in_order = _fans(twin, corner_angle)
     first = _count_spokes(F, twin, n)
-    spoke, turn, step = np.zeros((first[-1], 6)), np.zeros((first[-1], 4)), np.zeros((F.size, 5))
+    spoke, turn, step = _aligned(first[-1], 8), np.zeros((first[-1], 4)), np.zeros((F.size, 5))
     spoke_id, turn_id, step_id = spoke.view(np.int32), turn.view(np.int32), step.view(np.int32)
     _fill_spokes(F, twin, length, apex, corner_angle, angle, fan, in_order, first, spoke, spoke_id, turn, turn_id)
     _fill_steps(F, twin, apex, angle, fan, step, step_id)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from heat_igl.emission import Emission, take_shorter
 from heat_igl.near_field import NearField
 from heat_igl.operators import Operators
-from heat_igl.refine import Refine, Refinement
+from heat_igl.refine import Known, Refine, Refinement
 from heat_igl.sources import SourcePoints
 from heat_igl.surface_points import SurfacePoints
 from heat_igl.typing import FloatArray, IntArray
@@ -43,11 +45,11 @@ class HeatOrder:
         triangulation = domain.surface or domain.triangulation
         if triangulation is None:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
-        refinement = Refinement(triangulation)
-        self._unfolded = refinement.sweep if refine == "sweep" else refinement.unfold
-        self._error = _SWEEP_ERROR if refine == "sweep" else 0.0
+        self._refinement = Refinement(triangulation)
+        self._sweeps = refine == "sweep"
+        self._error = _SWEEP_ERROR if self._sweeps else 0.0
         self._faces = None if domain.faces is None else NearField(domain.faces)
-        self._components = domain.components
+        self._domain = domain
         self._given_faces = np.empty((0, 3), np.int64) if domain.given_faces is None else domain.given_faces
         self._spacing = _SPACING * domain.mean_edge_length
 
@@ -64,17 +66,20 @@ class HeatOrder:
         return self._distance(emission, u, labels), labels
 
     def _distance(self, emission: Emission, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
-        sources, points = emission.sources, self._points(emission)
+        sources, points, components = emission.sources, self._points(emission), self._domain.components
         places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
         # Tolerances are relative to the distance: what all have in common is added afterwards.
-        earliest = np.full(int(self._components.max()) + 1, np.inf)
-        component_of_point = self._components[self._given_faces[points.faces, 0]] if places else np.empty(0, np.int64)
-        component = np.concatenate([self._components[sources.vertices], component_of_point])
+        earliest = np.full(self._domain.n_components, np.inf)
+        component_of_point = components[self._given_faces[points.faces, 0]] if places else np.empty(0, np.int64)
+        component = np.concatenate([components[sources.vertices], component_of_point])
         offset = np.concatenate([sources.vertex_offset, points.offset])
         np.minimum.at(earliest, component, offset)
         late = offset - earliest[component]
         k = len(sources.vertices)
-        distance = self._unfolded(
+        unfolded = self._refinement.unfold
+        if self._sweeps:
+            unfolded = partial(self._refinement.sweep, known=self._known(emission, points, earliest))
+        distance = unfolded(
             -u,
             sources.vertices,
             offsets=late[:k] if late.any() else None,
@@ -82,15 +87,30 @@ class HeatOrder:
             point_offsets=late[k:] if late.any() and places else None,
             labels=labels,
         )
-        start = earliest[self._components]
-        distance += start
+        start = self._domain.on_vertices(earliest)
+        if offset.any():
+            distance += start
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, points.label, [-1]])[labels]
         for seeds in (emission.near.at(emission.guides), emission.far):
+            if not len(seeds.vertex):
+                continue
             taken = take_shorter(distance, seeds, self._error, start)
             if labels is not None:
                 labels[seeds.vertex[taken]] = seeds.label[taken]
         return distance
+
+    def _known(self, emission: Emission, points: SourcePoints, earliest: FloatArray) -> Known | None:
+        """What straight lines from points and curves reach."""
+        near = emission.near.at(emission.guides)
+        if not len(near.vertex):
+            return None
+        # A curve has many sources of one label.
+        label = np.concatenate([emission.sources.vertex_label, points.label])
+        which, first, count = np.unique(label, return_index=True, return_counts=True)
+        at = np.searchsorted(which, near.label)
+        distance = near.value - earliest[self._domain.components[near.vertex]]
+        return Known(near.vertex, distance, first[at], count[at] > 1)
 
     def _points(self, emission: Emission) -> SourcePoints:
         points, segments = emission.sources.points, emission.sources.segments

@@ -205,13 +205,12 @@ def intrinsic_triangulation(mesh: Mesh) -> IntrinsicTriangulation:
 
 
 def _tail(F: IntArray, half_edge: IntArray) -> IntArray:
-    face, corner = np.divmod(half_edge, 3)
-    return np.asarray(F[face, (corner + 1) % 3])
+    # The next of three in a row; by face and corner this takes twice as long.
+    return np.asarray(F.ravel()[half_edge + 1 - 3 * (half_edge % 3 == 2)])
 
 
 def _head(F: IntArray, half_edge: IntArray) -> IntArray:
-    face, corner = np.divmod(half_edge, 3)
-    return np.asarray(F[face, (corner + 2) % 3])
+    return np.asarray(F.ravel()[half_edge - 1 + 3 * (half_edge % 3 == 0)])
 
 
 def _cotangents(l: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: E741

@@ -71,8 +71,9 @@ class Operators:
     longest_distance : float
         Length of a longest shortest path along edges; heat has to last that far.
     triangulation : IntrinsicTriangulation or None
-        The triangles that the operators belong to; None for tetrahedra, and where L is not their cotangent Laplacian:
-        the fitted heat flow takes its weights from them (`fitted_laplacian`).
+        The triangles that the operators belong to; None for tetrahedra, and where distance is not measured along them:
+        their lengths make straight lines from sources, are unfolded, stand for a G that is not made yet, and heat is
+        fitted to them (`fitted_laplacian`). L, M and G may be others.
     surface : IntrinsicTriangulation or None
         Triangles of the surface itself, each once, where `triangulation` is its tufted cover and goes over it twice.
         Paths are to be unfolded in these: on the cover a path over an edge of five faces goes on in one of them only.
@@ -82,8 +83,8 @@ class Operators:
     is_surface : bool
         Whether the domain has two dimensions; tetrahedra have three.
     chords : (n, n) csc_matrix or None
-        How far apart the vertices are that an entry of L couples, in the pattern of L, where there is no
-        `triangulation` to say so; None where that is not known.
+        How far apart the vertices are that an entry of L couples, symmetric, where the edges of `triangulation` do not
+        say so; None where they do, and where that is not known.
     """
 
     L: sp.csc_matrix
@@ -120,7 +121,7 @@ class Operators:
 
     @property
     def has_lengths(self) -> bool:
-        """Whether the lengths of what L couples are known, see `fitted_laplacian`."""
+        """Whether the lengths of what L couples are known, so that heat is fitted to them (`fitted_laplacian`)."""
         return self.triangulation is not None or self.chords is not None
 
     @property

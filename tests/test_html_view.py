@@ -186,13 +186,17 @@ def browser(chromium: Browser) -> Iterator[Browser]:
 
 
 def assert_agree(found: np.ndarray, expected: np.ndarray) -> None:
-    """The same fixed point, though Python's sweep does not pass on changes below 3e-4 and the page's all above 1e-7."""
+    """The same, but for single vertices that depend on which of two is visited first, in heat's order or Dijkstra's.
+
+    Python's sweep does not pass on changes below 3e-4 either, and the page's all above 1e-7.
+    """
     np.testing.assert_array_equal(np.isfinite(found), np.isfinite(expected))
     away = np.isfinite(expected) & (expected > 0)
     np.testing.assert_array_equal(found[expected == 0], 0)
     relative = np.abs(found[away] / expected[away] - 1)
-    assert relative.max() < 1e-3
-    assert relative.mean() < 3e-5
+    assert relative.mean() < 1e-4
+    assert np.percentile(relative, 99) < 1e-3
+    assert relative.max() < 1e-2
 
 
 def colour_at(image: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -113,6 +113,23 @@ def test_a_source_that_begins_too_late_is_overtaken(method):
     assert (labels == 0).all()
 
 
+@pytest.mark.parametrize("slope", [-0.6, 0.0, 0.28])
+def test_a_straight_front_goes_on_straight(slope):
+    """Sources along the left side of a square that begin as a front comes in at an angle.
+
+    Seen from behind its end, next to which vertices have the distance from the last source, by a hundredth of h.
+    """
+    mesh = shapes.grid(20)
+    x, y, _ = mesh.V.T
+    left = np.flatnonzero(x == 0)
+    rise = np.sqrt(1 - slope**2)
+    truth = rise * x + slope * (y if slope > 0 else y - 1)
+    error = np.abs(refinement(mesh).sweep(truth, left, offsets=truth[left]) - truth)
+    has_come_in = np.abs(y - x * slope / rise - 0.5) <= 0.5
+    assert has_come_in.sum() > 250
+    assert error[has_come_in].mean() < (0.01 / 20 if slope else 1e-12)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_no_label_where_no_source_is_reached(method):
     grid = shapes.grid(4)

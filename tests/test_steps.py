@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import perturbed
 
-from heat_igl import Mesh, shapes, steps
-from heat_igl.operators import operators, tufted_operators
+from heat_igl import HeatMethodSolver, Mesh, PolygonMesh, polygon_operators, shapes, steps
+from heat_igl.operators import Operators, operators, tufted_operators
 from heat_igl.speed import speed_operators
 from heat_igl.steps import Descent, HeatFlow, PoissonProblem, damping, diffuse, fitted_laplacian, integrate, normalize
 
@@ -176,6 +178,17 @@ def test_without_numba_there_is_the_matrix_form(disk, monkeypatch):
     assert (Descent(disk, 0.02).divergence(u) == expected).all()
 
 
+def test_a_gradient_exchanged_by_hand_is_used(disk):
+    """Of a surface on which the way along the first axis is half as long, which the triangles do not know."""
+    shorter = sp.kron(np.diag([2, 1]), sp.eye_array(len(disk.weights)))
+    other = replace(disk, gradient=(shorter @ disk.G).tocsc())
+    u = diffuse(disk, np.eye(disk.n)[:, [3, 90]], 0.02)
+    expected = other.D @ normalize(other, u)
+    assert abs(expected - disk.D @ normalize(disk, u)).max() > 0.1 * abs(expected).max()
+    found = Descent(other).divergence(u)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * abs(expected).max())
+
+
 def test_fitted_laplacian_of_equal_edges_is_right_in_the_mean_over_a_circle():
     """Around the middle of a regular hexagon waves exp(x / sqrt(t)) solve (1 - t Laplace) u = 0, on average over x."""
     hexagon = shapes.disk(1)
@@ -190,8 +203,7 @@ def test_fitted_laplacian_of_equal_edges_is_right_in_the_mean_over_a_circle():
 
 def test_fitted_laplacian_is_a_laplacian():
     """Symmetric, rows sum to 0, no negative weight even on slivers; that of short edges is L."""
-    stretched = perturbed(shapes.icosphere(3), 0.3)
-    stretched = Mesh(stretched.V * [1.0, 0.6, 0.1], stretched.F)
+    stretched = squeezed_sphere()
     for domain in (operators(stretched), operators(stretched, "cotan"), tufted_operators(shapes.book(3, 4))):
         h = domain.mean_edge_length
         for t in (1e-8 * h**2, h**2, 1e3 * h**2):
@@ -203,6 +215,133 @@ def test_fitted_laplacian_is_a_laplacian():
     assert abs(fitted_laplacian(domain, 1e12) - domain.L).max() < 1e-9
     with pytest.raises(ValueError, match="fitted to the lengths of edges, which this domain does not have"):
         fitted_laplacian(operators(shapes.box(2)), 1.0)
+
+
+def squeezed_sphere() -> Mesh:
+    sphere = perturbed(shapes.icosphere(3), 0.3)
+    return Mesh(sphere.V * [1.0, 0.6, 0.1], sphere.F)
+
+
+def edges_by_pair(domain: Operators) -> dict[tuple[int, int], list[tuple[float, float]]]:
+    """Cotangent weight and length of each edge of the triangulation, by the two vertices that it joins."""
+    triangulation = domain.triangulation
+    l2 = triangulation.l**2
+    # Half the cotangent opposite each side, by the law of cosines; a face counts by its area in the domain.
+    half = (l2.sum(axis=1, keepdims=True) - 2 * l2) * (domain.weights / (8 * triangulation.areas**2))[:, None]
+    found: dict[tuple[int, int], list[tuple[float, float]]] = {}
+    for h in triangulation.edges:
+        twin = triangulation.twin[h]
+        a, b = sorted((int(triangulation.tail(h)), int(triangulation.head(h))))
+        weight = half.flat[h] + (half.flat[twin] if twin >= 0 else 0)
+        found.setdefault((a, b), []).append((weight, triangulation.l.flat[h]))
+    return found
+
+
+def fit_of(length: float, t: float) -> float:
+    """I0(x) - 1 is the mean of cosh(x cos) - 1 = 2 sinh(x cos / 2)^2 over a circle."""
+    x = length / np.sqrt(t) * np.cos(np.linspace(0, 2 * np.pi, 200, endpoint=False))
+    return length**2 / (4 * t) / np.mean(2 * np.sinh(x / 2) ** 2)
+
+
+@pytest.mark.parametrize("t_coef", [0.3, 1.0, 20.0])
+def test_fitted_laplacian_takes_each_edge_by_its_own_length(t_coef):
+    """Flipped edges, edges of negative weight, and the cover, which has each edge of the sphere twice."""
+    for domain, flipped, per_pair in (
+        (operators(squeezed_sphere()), True, 1),
+        (operators(squeezed_sphere(), "cotan"), False, 1),
+        (tufted_operators(perturbed(shapes.icosphere(2))), False, 2),
+    ):
+        assert (domain.triangulation.n_flips > 20) == flipped
+        t = t_coef * domain.mean_edge_length**2
+        found = fitted_laplacian(domain, t)
+        assert np.array_equal(found.indices, domain.L.indices)  # so that one order of elimination does for both
+        of_pair = edges_by_pair(domain)
+        pairs = np.array(list(of_pair))
+        assert {len(edges) for edges in of_pair.values()} == {per_pair}
+        expected = np.array([sum(max(w, 0) * fit_of(length, t) for w, length in edges) for edges in of_pair.values()])
+        np.testing.assert_allclose(
+            np.asarray(found[pairs[:, 0], pairs[:, 1]])[0], expected, rtol=1e-12, atol=1e-12 * expected.max()
+        )
+
+
+def test_fitted_laplacian_of_polygons_goes_by_the_distances_within_each():
+    grid = perturbed(shapes.grid(6), 0.3)
+    k = np.arange(42)[np.arange(42) % 7 < 6][:36]
+    domain = polygon_operators(PolygonMesh(grid.V, np.stack([k, k + 1, k + 8, k + 7], axis=1)))
+    t = 0.5 * domain.mean_edge_length**2
+    L, found = domain.L.tocoo(), fitted_laplacian(domain, t)
+    assert L.nnz > 7 * domain.n  # diagonals too
+    for i, j, weight in zip(L.row, L.col, L.data, strict=True):
+        if i != j:
+            expected = max(weight, 0) * fit_of(np.linalg.norm(grid.V[i] - grid.V[j]), t)
+            assert found[i, j] == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+def test_several_edges_between_two_vertices_go_by_the_shortest():
+    grid = shapes.grid(6)
+    domain = tufted_operators(Mesh(grid.V @ [[1, 0, 0], [1.5, 0.3, 0], [0, 0, 1]], grid.F))
+    t = 0.5 * domain.mean_edge_length**2
+    found, of_pair = fitted_laplacian(domain, t), edges_by_pair(domain)
+    assert sum(a == b for a, b in of_pair) > 0  # edges from a vertex to itself
+    uneven = {
+        pair: edges for pair, edges in of_pair.items() if np.ptp([length for _, length in edges]) > 0.1 * edges[0][1]
+    }
+    assert len(uneven) >= 10
+    for pair, edges in of_pair.items():
+        if pair[0] != pair[1]:
+            expected = domain.L[pair] * fit_of(min(length for _, length in edges), t)
+            assert found[pair] == pytest.approx(expected, rel=1e-9, abs=1e-12)
+            # Edge by edge, the longer ones have less; they do not weigh much.
+            one_by_one = sum(w * fit_of(length, t) for w, length in edges)
+            assert one_by_one - 1e-12 <= found[pair] <= 1.1 * one_by_one + 1e-12
+
+
+def test_a_laplacian_that_was_exchanged_is_the_one_that_is_fitted():
+    domain = operators(squeezed_sphere())
+    t = 0.5 * domain.mean_edge_length**2
+    fitted = fitted_laplacian(domain, t)
+    random = sp.triu(domain.L, 1, format="csc")
+    random.data = np.random.default_rng(0).uniform(0.5, 2, random.nnz)
+    random = random + random.T
+    off_diagonal = domain.L - sp.diags(domain.L.diagonal())
+    exchanged = domain.L.multiply(random).tocsc()
+    exchanged -= sp.diags(np.asarray(exchanged.sum(axis=0))[0])
+    found = fitted_laplacian(replace(domain, L=exchanged.tocsc()), t)
+    for i, j in zip(*off_diagonal.nonzero(), strict=True):
+        assert found[i, j] == pytest.approx(random[i, j] * fitted[i, j], rel=1e-12)
+    assert abs(found.sum(axis=1)).max() <= 1e-12 * abs(found).max()
+
+
+def test_twice_the_laplacian():
+    domain = operators(squeezed_sphere())
+    t = 0.5 * domain.mean_edge_length**2
+    b = dirac(domain.n, 7)
+    heat = HeatFlow(domain, t, fitted=True).solve(b)
+    both = replace(domain, L=2 * domain.L, M=2 * domain.M)
+    np.testing.assert_allclose(HeatFlow(both, t, fitted=True).solve(b), heat, rtol=1e-13)
+    # The surface counted twice, as a cover does.
+    found = HeatMethodSolver.from_operators(replace(both, weights=2 * domain.weights)).distance(7)
+    np.testing.assert_allclose(found, HeatMethodSolver.from_operators(domain).distance(7), rtol=1e-12, atol=1e-14)
+    # Alone it makes all edges shorter by sqrt(2), and with these lengths it is the flow of 2 t.
+    edges = domain.triangulation.edges
+    ends = domain.triangulation.tail(edges), domain.triangulation.head(edges)
+    lengths = sp.csc_matrix((domain.triangulation.l.ravel()[edges], ends), shape=domain.L.shape)
+    shorter = replace(domain, L=2 * domain.L, chords=lengths.maximum(lengths.T) / np.sqrt(2))
+    expected = HeatFlow(domain, 2 * t, fitted=True).solve(b)
+    np.testing.assert_allclose(HeatFlow(shorter, t, fitted=True).solve(b), expected, rtol=1e-11)
+
+
+def test_what_an_exchanged_laplacian_couples_needs_a_length():
+    domain = operators(shapes.grid(4))
+    t = 0.5 * domain.mean_edge_length**2
+    summed = domain.L + domain.L
+    assert summed.nnz < domain.L.nnz  # without the zeros of the diagonals
+    assert abs(fitted_laplacian(replace(domain, L=summed), t) - 2 * fitted_laplacian(domain, t)).max() == 0
+    further = 0.1 * sp.csc_matrix(([1.0, 1.0, -1.0, -1.0], ([3, 20, 3, 20], [20, 3, 3, 20])), shape=domain.L.shape)
+    with pytest.raises(ValueError, match=r"L\[20, 3\] couples vertices whose distance is not known \(2 entries do\)"):
+        fitted_laplacian(replace(domain, L=domain.L + further), t)
+    away = fitted_laplacian(replace(domain, L=domain.L - further), t)  # negative: left out in any case
+    assert abs(away - fitted_laplacian(domain, t)).max() == 0
 
 
 def test_a_fitted_front_falls_by_its_length_whatever_the_edges():

@@ -1,16 +1,35 @@
-"""Kernel of the sweep: distance by unfolding one triangle at a time, in a given order."""
+"""Kernel of the sweep: distance by unfolding two triangles at a time, in a given order.
+
+Seen from a vertex v, a source lies behind the side ab of one of its triangles, where circles about a and b meet. The
+triangle beyond ab has the third corner w, which is nearer to the source and so knows better where it is.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
-from heat_igl.fans import ALONG, BASE, HEIGHT, LENGTH, NEIGHBOUR, NEXT_SPOKE, PER_BASE, Tables, inline, jit
+from heat_igl.fans import (
+    ALONG,
+    BASE,
+    BEYOND,
+    BEYOND_ALONG,
+    BEYOND_DEPTH,
+    HEIGHT,
+    LENGTH,
+    NEIGHBOUR,
+    NEXT_NEIGHBOUR,
+    NEXT_SPOKE,
+    Tables,
+    inline,
+    jit,
+)
 from heat_igl.memory_access import prefetch, uncounted
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["sweep"]
+__all__ = ["FRONT", "sweep"]
 
 # Changes by less than this are not passed on: on a curved surface the sweep is wrong by ten times as much anyway.
 _NEGLIGIBLE = 3e-4
@@ -19,23 +38,74 @@ _ROUNDING = 1e-12
 # Visits per vertex up to which the sweep goes back at once, and after which it gives up. Heat's order takes 1.1 in all,
 # a random one 3 to 5.
 _GO_BACK, _GIVE_UP = 10, 50
+# Part of an edge by which a source has to lie beyond it: circles about its ends, nearly touching, lose digits.
+_CLOSE = 1e-3
+# The label of source 0 where its distance comes as a straight front; those of others lie below.
+FRONT = -2
 # Numbers in a table that a processor keeps in its own cache.
 _CACHED = 1 << 17
 
 
 @inline
-def _across(da: float, db: float, along: float, height: float, base: float, per_base: float) -> float:
+def _spokes(t: Tables, v: int) -> Any:
+    """The spokes of v. Unsigned: numbers that may count from the end cost two instructions more at each use."""
+    return range(np.uint64(t.first[v]), np.uint64(t.first[v + 1]))
+
+
+@inline
+def _across(da: float, db: float, along: float, height: float, base: float) -> float:
     """Squared distance from v of the source that is at distances da and db from the ends of the side opposite v.
 
     ``inf`` unless the straight line between them crosses that side. Without branches, which at random cost more than
     the arithmetic.
     """
-    x = 0.5 * ((da - db) * (da + db) * per_base + base)
+    x = 0.5 * ((da - db) * (da + db) / base + base)
     y_squared = da * da - x * x
     y = math.sqrt(max(y_squared, 0.0))
     crossing = x * height + along * y  # times y + height
     squared = (along - x) ** 2 + (height + y) ** 2
     return squared if (y_squared >= 0) & (crossing >= 0) & (crossing <= (y + height) * base) else np.inf
+
+
+@inline
+def _across_straight(da: float, db: float, along: float, height: float, base: float) -> float:
+    """Distance at v of a straight front that is at distances da and db at the ends of the side opposite v.
+
+    ``inf`` unless the straight line in which it comes to v crosses that side.
+    """
+    slope = (db - da) / base
+    rise_squared = 1.0 - slope * slope
+    rise = math.sqrt(max(rise_squared, 0.0))
+    foot = along * rise - height * slope  # times rise
+    return da + slope * along + rise * height if (foot >= 0) & (foot <= rise * base) else np.inf
+
+
+@inline
+def _across_two(
+    da: float, db: float, dw: float, along: float, height: float, base: float, wx: float, wy: float
+) -> float:
+    """Squared distance from v of the source behind ab, as the corner w beyond ab and one of a and b know it.
+
+    w lies at (wx, -wy). The line to the source as a and b know it leaves the farther triangle between w and p, one of
+    them; it is drawn anew to where circles about p and w meet. If that is on the other side of w, the path bends at w.
+    ``inf`` if a and b know better: the source lies in the farther triangle, or hidden by p.
+    """
+    x = 0.5 * ((da - db) * (da + db) / base + base)
+    y = math.sqrt(max(da * da - x * x, 0.0))
+    ux, uy = along - wx, height + wy
+    is_right = ux * (y + height) < uy * (along - x)
+    sign, px, dp = (1.0, 0.0, da) if is_right else (-1.0, base, db)
+    ex = wx - px
+    square = ex * ex + wy * wy
+    if not sign * (y * ex - (x - px) * wy) > _CLOSE * square:
+        return np.inf
+    s = 0.5 * ((dp - dw) * (dp + dw) / square + 1.0)
+    h = sign * math.sqrt(max(dp * dp / square - s * s, 0.0))
+    sx, sy = along - px - s * ex + h * wy, height + s * wy + h * ex
+    if sign * (ux * sy - uy * sx) > 0:
+        bent = math.sqrt(ux * ux + uy * uy) + dw
+        return bent * bent
+    return sx * sx + sy * sy if sign * ((along - px) * sy - height * sx) >= 0 else np.inf
 
 
 @inline
@@ -54,32 +124,41 @@ def _beyond_side(base: float, along: float, height: float, side: float, db: floa
     return sx * sx + sy * sy if sy >= 0 and along * sy <= height * sx else np.inf
 
 
-@jit
-def _mark_dependents(
-    v: int, t: Tables, d: FloatArray, begin: float, rank: AnyArray, is_stale: AnyArray, kept: AnyArray
-) -> int:
-    """Mark the neighbours that a smaller d[v] can improve; return the lowest rank among them, or n.
+@inline
+def _mark_farther(v: int, t: Tables, d: FloatArray, rank: AnyArray, is_stale: AnyArray) -> int:
+    """Mark the farther neighbours, which a smaller d[v] can improve; return the lowest rank among them, or n.
 
-    They are the farther ones, and a nearer one whose path may cross the edge between v and a vertex that is nearer
-    still. That takes an angle there whose cosine is below L / (2 d), L the length of the spoke and d counted from
-    `begin`, where the source begins. What is still to come is stale anyway.
+    Those still to come are stale anyway.
     """
     lowest = len(rank)
-    for k in range(t.first[v], t.first[v + 1]):
-        k_left = t.spoke_id[k, NEXT_SPOKE]
-        a, b = t.spoke_id[k, NEIGHBOUR], t.spoke_id[k_left, NEIGHBOUR]
-        if is_stale[a] and is_stale[b]:
-            continue
+    for k in _spokes(t, v):
+        a = np.uint32(t.spoke_id[k, NEIGHBOUR])
+        if (d[v] < d[a]) & (is_stale[a] ^ True):
+            is_stale[a] = True
+            lowest = min(lowest, rank[a])
+    return lowest
+
+
+@jit
+def _mark_nearer(
+    v: int, t: Tables, d: FloatArray, begin: float, rank: AnyArray, is_stale: AnyArray, kept: AnyArray
+) -> int:
+    """Mark the nearer neighbours that a smaller d[v] can improve; return the lowest rank among them, or n.
+
+    The path of such a one crosses the edge between v and a vertex that is nearer still. That takes an angle there whose
+    cosine is below L / (2 d), L the length of the spoke and d counted from `begin`, where the source begins.
+    """
+    lowest = len(rank)
+    for k in _spokes(t, v):
+        a, b = np.uint32(t.spoke_id[k, NEIGHBOUR]), np.uint32(t.spoke_id[k, NEXT_NEIGHBOUR])
         dv, da, db = d[v] - begin, d[a] - begin, d[b] - begin
         base, along, height = t.spoke[k, BASE], t.spoke[k, ALONG], t.spoke[k, HEIGHT]
-        right, left = t.spoke[k, LENGTH], t.spoke[k_left, LENGTH]
-        if not is_stale[a] and (
-            dv < da
-            or (
-                db < da
-                and 2.0 * da * along < right * right
-                and _beyond_side(base, along, height, left, db, dv) < da * da * kept[a]
-            )
+        right, left = t.spoke[k, LENGTH], t.spoke[t.spoke_id[k, NEXT_SPOKE], LENGTH]
+        if (
+            not is_stale[a]
+            and db < da
+            and 2.0 * da * along < right * right
+            and _beyond_side(base, along, height, left, db, dv) < da * da * kept[a]
         ):
             is_stale[a] = True
             lowest = min(lowest, rank[a])
@@ -101,27 +180,39 @@ def _read_ahead(order: IntArray, i: int, t: Tables, d: FloatArray) -> None:
         prefetch(t.first, order[i + 3])
     if i + 1 < len(order):
         v = order[i + 1]
-        for k in range(t.first[v], t.first[v + 1]):
+        for k in _spokes(t, v):
             prefetch(t.spoke, k)
     if i < len(order):
         v = order[i]
-        for k in range(t.first[v], t.first[v + 1]):
+        for k in _spokes(t, v):
             prefetch(d, t.spoke_id[k, NEIGHBOUR])
 
 
+@inline
+def _source(label: int) -> int:
+    """The source of a label, which is `FRONT` minus the source where the distance came with a straight front."""
+    return label if label >= -1 else FRONT - label
+
+
 @jit
-def sweep(order: IntArray, t: Tables, d: FloatArray, label: IntArray | None, offset: FloatArray) -> float:
+def sweep(
+    order: IntArray, t: Tables, d: FloatArray, label: IntArray | None, offset: FloatArray, is_stale: AnyArray
+) -> float:
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, in the given order.
 
     Where a vertex turns out to be nearer than one that came before it, the sweep goes back to that one at once, before
-    what is wrong there spreads. Returns the number of visits per vertex. Where given, `label` (n,) is handed on with
-    the distance, and ``offset[label]`` is the distance at which the source of that label begins.
+    what is wrong there spreads. Returns the number of visits per vertex. Vertices that are not in `is_stale` (n,) bool
+    are visited only if what they depend on changes.
+
+    `label` (n,), needed where there is more than one source, is handed on with the distance: the source that it is
+    measured from, -1 where none is reached; ``offset[label]`` is the distance at which that source begins. Circles
+    about the ends of a side meet in a source if both ends are measured from it. Between ends of different sources a
+    straight front comes in; what it reaches is labelled ``-2 - label``, and hands on straight fronts.
     """
     n = len(order)
     rank = np.empty(n, np.int32)
     for i in range(n):
         rank[order[i]] = i
-    is_stale = np.ones(n, np.bool_)
     kept = np.where(t.is_flat, 1 - _ROUNDING, 1 - _NEGLIGIBLE)
     n_visits, i, again = 0, 0, n
     order, t, d = uncounted((order, t, d))
@@ -140,42 +231,57 @@ def sweep(order: IntArray, t: Tables, d: FloatArray, label: IntArray | None, off
         n_visits += 1
         old = best = d[v]
         across = np.inf
-        along_edge = beyond = v  # where the best of either kind comes from
-        for k in range(t.first[v], t.first[v + 1]):
-            a, b = t.spoke_id[k, NEIGHBOUR], t.spoke_id[t.spoke_id[k, NEXT_SPOKE], NEIGHBOUR]
+        spoke, along_edge = np.uint64(0), np.uint32(v)  # where the best of either kind comes from
+        for k in _spokes(t, v):
+            a, b = np.uint32(t.spoke_id[k, NEIGHBOUR]), np.uint32(t.spoke_id[k, NEXT_NEIGHBOUR])
             da, db = d[a], d[b]
             if da + t.spoke[k, LENGTH] < best:
                 best, along_edge = da + t.spoke[k, LENGTH], a
             if not min(da, db) < best:
                 continue
-            begin = 0.0
-            if label is not None:
-                if not max(da, db) < np.inf or offset[label[a]] != offset[label[b]]:
-                    continue
-                begin = offset[label[a]]
-            along, height, base, per_base = (
-                t.spoke[k, ALONG],
-                t.spoke[k, HEIGHT],
-                t.spoke[k, BASE],
-                t.spoke[k, PER_BASE],
-            )
-            squared = _across(da - begin, db - begin, along, height, base, per_base)
+            along, height, base = t.spoke[k, ALONG], t.spoke[k, HEIGHT], t.spoke[k, BASE]
             if label is None:
-                across = min(across, squared)
-            elif begin + math.sqrt(squared) < across:
-                across, beyond = begin + math.sqrt(squared), a if da < db else b
-        if label is None:
-            across = math.sqrt(across)
-        giver = beyond if across < best else along_edge
-        best = min(best, across)
+                squared = _across(da, db, along, height, base)
+            elif label[a] == label[b] and label[a] >= 0:
+                begin = offset[label[a]]
+                squared = (begin + math.sqrt(_across(da - begin, db - begin, along, height, base))) ** 2
+            else:
+                squared = _across_straight(da, db, along, height, base) ** 2
+            spoke = k if squared < across else spoke
+            across = min(across, squared)
+        across = math.sqrt(across)
+        source = -1
+        if label is not None:
+            source = label[along_edge]
+        if across < best:
+            a, b = np.uint32(t.spoke_id[spoke, NEIGHBOUR]), np.uint32(t.spoke_id[spoke, NEXT_NEIGHBOUR])
+            w = t.spoke_id[spoke, BEYOND]
+            begin, is_of_one = 0.0, True
+            if label is not None:
+                is_of_one = label[a] == label[b] and label[a] >= 0
+                begin = offset[label[a]] if is_of_one else 0.0
+            if is_of_one and w >= 0 and d[w] < across and (label is None or label[w] == label[a]):
+                along, height, base = t.spoke[spoke, ALONG], t.spoke[spoke, HEIGHT], t.spoke[spoke, BASE]
+                wx, wy = t.spoke[spoke, BEYOND_ALONG], t.spoke[spoke, BEYOND_DEPTH]
+                squared = _across_two(d[a] - begin, d[b] - begin, d[w] - begin, along, height, base, wx, wy)
+                if squared < np.inf:
+                    across = begin + math.sqrt(squared)
+            if across < best:
+                best = across
+                if label is not None:
+                    source = _source(label[a] if d[a] < d[b] else label[b])
+                    source = source if is_of_one else FRONT - source
         if best < old:
             d[v] = best
             begin = 0.0
             if label is not None:
-                label[v] = label[giver]
-                begin = offset[label[v]]
+                label[v] = source
+                begin = offset[_source(source)]
             if best < old * kept[v]:
-                back = _mark_dependents(v, t, d, begin, rank, is_stale, kept)
+                back = _mark_farther(v, t, d, rank, is_stale)
+                # With curvature around, what this finds is less than the sweep's error.
+                if t.is_flat[v]:
+                    back = min(back, _mark_nearer(v, t, d, begin, rank, is_stale, kept))
                 if back < i:
                     if n_visits < _GO_BACK * n:
                         i = back

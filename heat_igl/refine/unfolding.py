@@ -30,6 +30,7 @@ from heat_igl.fans import (
     LENGTH,
     MANY,
     NEIGHBOUR,
+    NEXT_NEIGHBOUR,
     NEXT_SPOKE,
     TO_LEFT,
     TO_RIGHT,
@@ -48,7 +49,7 @@ DISTANCE, OFFSET, REACH, ANGLE, FAN, TOTAL = 0, 1, 2, 3, 4, 5
 # Bends by less than this are rounding.
 _STRAIGHT = 1e-9
 # How much more may be lost on a part of a path, in proportion, than on the whole.
-_SHARE = 7.0
+_SHARE = 1.5
 # In place of an angle, for a path that cannot be pulled tight.
 _REAL_BEND = 100.0
 # A vertex without a fan has no direction: sources, and vertices not yet visited.
@@ -184,7 +185,7 @@ def _over_many(k: int, t: Tables, state: FloatArray, found: FloatArray) -> None:
     Which face it comes from, the ends of the edge know: if both see one point in a straight line, at the distances and
     at an angle that belong together in a plane, the leaf in which they see it is flat as far as that point.
     """
-    a, b = t.spoke_id[k, NEIGHBOUR], t.spoke_id[t.spoke_id[k, NEXT_SPOKE], NEIGHBOUR]
+    a, b = t.spoke_id[k, NEIGHBOUR], t.spoke_id[k, NEXT_NEIGHBOUR]
     ra, rb, begin = state[a, REACH], state[b, REACH], state[a, OFFSET]
     if not (0.0 < ra < np.inf and 0.0 < rb < np.inf):
         return
@@ -357,7 +358,7 @@ def _walk(
     k_left = t.spoke_id[k, NEXT_SPOKE]
     i, i_left = k - t.first[v], k_left - t.first[v]
     base = t.spoke[k, BASE]
-    right, left = t.spoke_id[k, NEIGHBOUR], t.spoke_id[k_left, NEIGHBOUR]
+    right, left = t.spoke_id[k, NEIGHBOUR], t.spoke_id[k, NEXT_NEIGHBOUR]
     ax, ay = -t.spoke[k, ALONG], -t.spoke[k, HEIGHT]
     bx, by = ax + base, ay
     first_x, first_y = ax, ay
@@ -491,7 +492,7 @@ def _search(
         corner = t.turn_id[k, CORNER]
         if corner < 0:
             continue
-        a, b = t.spoke_id[k, NEIGHBOUR], t.spoke_id[t.spoke_id[k, NEXT_SPOKE], NEIGHBOUR]
+        a, b = t.spoke_id[k, NEIGHBOUR], t.spoke_id[k, NEXT_NEIGHBOUR]
         base = t.spoke[k, BASE]
         ax, ay = -t.spoke[k, ALONG], -t.spoke[k, HEIGHT]
         bx, by = ax + base, ay

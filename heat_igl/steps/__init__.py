@@ -314,7 +314,8 @@ class Descent:
 
         full_rate = np.zeros(len(operators.weights)) if t is None else _lowest_full_rate(operators, t, fitted)
         full_rate[operators.boundary_faces] = 0.0
-        if triangulation is None:
+        # A matrix given for G may be another than the triangles'.
+        if triangulation is None or not callable(operators.gradient):
             self._full_rate = full_rate
             _ = operators.gradient_rows
         else:

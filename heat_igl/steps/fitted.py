@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from math import factorial
+
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.operators import Operators
 from heat_igl.typing import FloatArray, IntArray
 
@@ -24,62 +25,74 @@ def fitted_laplacian(domain: Operators, t: float) -> sp.csc_matrix:
     Parameters
     ----------
     domain : Operators
-        One whose lengths are known (`Operators.has_lengths`).
+        One whose lengths are known (`Operators.has_lengths`): by its `chords`, or else by its `triangulation`.
     t : float
         Time step, a squared length.
 
     Returns
     -------
     (n, n) csc_matrix
-        Symmetric, negative semidefinite, rows sum to 0; no entry off the diagonal is negative.
+        Symmetric, negative semidefinite, rows sum to 0; no entry off the diagonal is negative. In the pattern of L.
 
     Raises
     ------
     ValueError
-        If the lengths are not known.
+        If the lengths are not known, or not that of an entry of L.
+
+    Notes
+    -----
+    The weights are those of L and the lengths those of the edges, and they have to agree: t is a squared length in the
+    metric of L and M. Twice L and twice M are the same metric. Twice L alone is that of edges shorter by sqrt(2): in
+    M - t L it counts like 2 t, so heat falls like exp(-d / sqrt(2 t)) over short edges, but long ones would still be
+    fitted at t. Give `Operators.chords` for such an L, or keep L and pass 2 t.
     """
-    n = domain.n
-    if domain.triangulation is not None:
-        rows, columns, weight, length = _edge_weights(domain.triangulation, domain.weights)
-    elif domain.chords is not None:
-        above = sp.triu(domain.L, 1, format="coo")
-        rows, columns, weight = above.row, above.col, above.data
-        length = sp.triu(domain.chords, 1, format="coo").data
-    else:
+    L, n = domain.L, domain.n
+    i, j, length = _lengths(domain)
+    fit = _fit(length / np.sqrt(t))
+    # Entry 0 takes what L does not couple.
+    entry = sp.csc_matrix((np.arange(1, L.nnz + 1, dtype=L.indices.dtype), L.indices, L.indptr), shape=L.shape)
+    factor = np.zeros(L.nnz + 1)
+    for rows, columns in ((i, j), (j, i)):
+        # L has one entry for all edges between the same two vertices. The largest factor is that of the shortest: heat
+        # arrives along it first, and it has most of the weight, which is the length of the dual edge over its own.
+        np.maximum.at(factor, np.asarray(entry[rows, columns]).ravel(), fit)
+    column = np.repeat(np.arange(n), np.diff(L.indptr))
+    on_diagonal = np.flatnonzero(L.indices == column)
+    weight = np.maximum(L.data, 0.0)
+    weight[on_diagonal] = 0
+    unknown = (weight > 0) & (factor[1:] == 0)
+    if unknown.any():
+        first = int(np.argmax(unknown))
+        raise ValueError(
+            f"L[{L.indices[first]}, {column[first]}] couples vertices whose distance is not known "
+            f"({int(unknown.sum())} entries do): give chords for all that L couples, or do not fit (magnitude='unit')"
+        )
+    weight *= factor[1:]
+    weight[on_diagonal] = -np.bincount(column, weight, n)[column[on_diagonal]]
+    return sp.csc_matrix((weight, L.indices, L.indptr), shape=L.shape)
+
+
+def _lengths(domain: Operators) -> tuple[IntArray, IntArray, FloatArray]:
+    """Both ends and length of each edge."""
+    if domain.chords is not None:
+        above = sp.triu(domain.chords, 1, format="coo")
+        return above.row, above.col, above.data
+    triangulation = domain.triangulation
+    if triangulation is None:
         raise ValueError("weights are fitted to the lengths of edges, which this domain does not have")
-    weight = np.maximum(weight, 0.0) * _fit(length / np.sqrt(t))
-    total = np.bincount(rows, weight, n) + np.bincount(columns, weight, n)
-    everyone = np.arange(n)
-    entries = np.concatenate([weight, weight, -total])
-    return sp.csc_matrix(
-        (entries, (np.concatenate([rows, columns, everyone]), np.concatenate([columns, rows, everyone]))), shape=(n, n)
-    )
-
-
-def _edge_weights(
-    triangulation: IntrinsicTriangulation, areas_counted: FloatArray
-) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
-    """Both ends, cotangent weight and length of each edge; triangles count by the area that they have in the domain."""
-    square, areas = triangulation.l**2, triangulation.areas
-    scale = areas_counted / (8 * areas**2)
-    half_cotangents = (square[:, 0] + square[:, 1] + square[:, 2])[:, None] - 2 * square
-    half_cotangents *= scale[:, None]
-    half_cotangents = half_cotangents.ravel()
-    edges, twin = triangulation.edges, triangulation.twin[triangulation.edges]
-    weight = half_cotangents[edges] + np.where(twin >= 0, half_cotangents[twin], 0.0)
-    return triangulation.tail(edges), triangulation.head(edges), weight, triangulation.l.ravel()[edges]
+    edges = triangulation.edges
+    return triangulation.tail(edges), triangulation.head(edges), triangulation.l.ravel()[edges]
 
 
 def _fit(x: FloatArray) -> FloatArray:
     """(x^2 / 4) / (I0(x) - 1)."""
     # I0 is the sum of y^k / (k!)^2, and 13 terms give it to 1e-12 up to x = 4; beyond, nothing cancels.
     y = np.minimum(x, 4.0) ** 2 / 4
-    share = np.ones_like(x)
-    for k in range(13, 1, -1):
-        share *= y
-        share /= k * k
-        share += 1
-    fitted = 1 / share
+    over_y = np.zeros_like(x)
+    for k in range(13, 0, -1):
+        over_y *= y
+        over_y += 1 / factorial(k) ** 2
+    fitted = 1 / over_y
     far = x > 4
     # exp(-600) is as good as no heat, and leaves the weight a number.
     beyond = np.minimum(x[far], 600.0)
