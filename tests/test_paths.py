@@ -141,6 +141,10 @@ def test_an_edge_of_four_faces_in_a_head():
         assert_on_surface(mesh, paths)
         error.append(lengths(mesh, paths) / longest[targets] - 1)
     assert np.quantile(np.concatenate(error), 0.99) < 1e-2
+    # From a distance that says nothing, they arrive all the same.
+    source = int(sources[2])
+    level = shortest_paths(mesh, np.zeros(mesh.n_vertices), among, source)
+    assert all((path.positions(mesh)[-1] == mesh.V[source]).all() for path in level)
 
 
 def test_paths_on_a_plane_are_straight_lines():

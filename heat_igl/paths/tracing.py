@@ -720,11 +720,13 @@ def _path(
     start_vertex, first, f = v, face, face
     is_free = v >= 0  # still at a vertex, and in no face in particular
     floor = math.inf  # descent goes on below this
-    left = _value(s, d, face, x)  # of the length, when aiming
+    most = left = _value(s, d, face, x)  # of the length, when aiming
     length = 0.0
     steps = 0
     while True:
         steps += 1
+        if aims and (steps > max_steps or left < -most):
+            return math.inf  # a distance that says nothing may lead around in circles
         if steps > max_steps:
             floor = -math.inf
         goal, i, other = -1, -1, -1
