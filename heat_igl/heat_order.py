@@ -101,16 +101,16 @@ class HeatOrder:
         return distance
 
     def _known(self, emission: Emission, points: SourcePoints, earliest: FloatArray) -> Known | None:
-        """What straight lines from points and curves reach."""
+        """What straight lines from points reach."""
         near = emission.near.at(emission.guides)
         if not len(near.vertex):
             return None
-        # A curve has many sources of one label.
+        # A curve has many sources of one label, and which of them a line comes from is not known.
         label = np.concatenate([emission.sources.vertex_label, points.label])
         which, first, count = np.unique(label, return_index=True, return_counts=True)
         at = np.searchsorted(which, near.label)
-        distance = near.value - earliest[self._domain.components[near.vertex]]
-        return Known(near.vertex, distance, first[at], count[at] > 1)
+        near, source = near.at(count[at] == 1), first[at][count[at] == 1]
+        return Known(near.vertex, near.value - earliest[self._domain.components[near.vertex]], source)
 
     def _points(self, emission: Emission) -> SourcePoints:
         points, segments = emission.sources.points, emission.sources.segments

@@ -19,7 +19,7 @@ from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intri
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.surface_points import SurfacePoints
-from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from heat_igl.fans import Tables
@@ -54,14 +54,11 @@ class Known(NamedTuple):
         Length of a path to each; another way may be shorter.
     source : (e,) int64
         The source that it comes from, as `Refinement.sweep` labels them.
-    is_front : (e,) bool
-        Whether that source is one of many in a row, whose distances come as a straight front.
     """
 
     vertex: IntArray
     distance: FloatArray
     source: IntArray
-    is_front: BoolArray
 
 
 class Refinement:
@@ -152,11 +149,8 @@ class Refinement:
             row = self._number[np.concatenate([known.vertex + self.n * sheet for sheet in range(self._n_sheets)])]
             distance[row], is_stale[row] = np.tile(known.distance, self._n_sheets), False
             if label is not None:
-                given = np.where(known.is_front, sweeping.FRONT - known.source, known.source)
-                label[row] = np.tile(given, self._n_sheets)
+                label[row] = np.tile(known.source, self._n_sheets)
         sweeping.sweep(self._order(key), self._tables, distance[:n], label, starts.offset, is_stale)
-        if label is not None:
-            label = np.where(label <= sweeping.FRONT, sweeping.FRONT - label, label)
         return self._on_base(distance, label, labels)
 
     def unfold(

@@ -29,7 +29,7 @@ from heat_igl.fans import (
 from heat_igl.memory_access import prefetch, uncounted
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["FRONT", "sweep"]
+__all__ = ["sweep"]
 
 # Changes by less than this are not passed on: on a curved surface the sweep is wrong by ten times as much anyway.
 _NEGLIGIBLE = 3e-4
@@ -40,8 +40,6 @@ _ROUNDING = 1e-12
 _GO_BACK, _GIVE_UP = 10, 50
 # Part of an edge by which a source has to lie beyond it: circles about its ends, nearly touching, lose digits.
 _CLOSE = 1e-3
-# The label of source 0 where its distance comes as a straight front; those of others lie below.
-FRONT = -2
 # Numbers in a table that a processor keeps in its own cache.
 _CACHED = 1 << 17
 
@@ -78,6 +76,14 @@ def _across_straight(da: float, db: float, along: float, height: float, base: fl
     rise = math.sqrt(max(rise_squared, 0.0))
     foot = along * rise - height * slope  # times rise
     return da + slope * along + rise * height if (foot >= 0) & (foot <= rise * base) else np.inf
+
+
+@inline
+def _comes_nearer_to_a(da: float, db: float, along: float, height: float, base: float) -> bool:
+    """Whether a straight front comes to v across the side ab nearer to a than to b."""
+    slope = (db - da) / base
+    rise = math.sqrt(max(1.0 - slope * slope, 0.0))
+    return along * rise - height * slope < 0.5 * rise * base
 
 
 @inline
@@ -188,12 +194,6 @@ def _read_ahead(order: IntArray, i: int, t: Tables, d: FloatArray) -> None:
             prefetch(d, t.spoke_id[k, NEIGHBOUR])
 
 
-@inline
-def _source(label: int) -> int:
-    """The source of a label, which is `FRONT` minus the source where the distance came with a straight front."""
-    return label if label >= -1 else FRONT - label
-
-
 @jit
 def sweep(
     order: IntArray, t: Tables, d: FloatArray, label: IntArray | None, offset: FloatArray, is_stale: AnyArray
@@ -207,7 +207,7 @@ def sweep(
     `label` (n,), needed where there is more than one source, is handed on with the distance: the source that it is
     measured from, -1 where none is reached; ``offset[label]`` is the distance at which that source begins. Circles
     about the ends of a side meet in a source if both ends are measured from it. Between ends of different sources a
-    straight front comes in; what it reaches is labelled ``-2 - label``, and hands on straight fronts.
+    straight front comes in, from the source of the end that it passes nearer to.
     """
     n = len(order)
     rank = np.empty(n, np.int32)
@@ -242,7 +242,7 @@ def sweep(
             along, height, base = t.spoke[k, ALONG], t.spoke[k, HEIGHT], t.spoke[k, BASE]
             if label is None:
                 squared = _across(da, db, along, height, base)
-            elif label[a] == label[b] and label[a] >= 0:
+            elif label[a] == label[b]:
                 begin = offset[label[a]]
                 squared = (begin + math.sqrt(_across(da - begin, db - begin, along, height, base))) ** 2
             else:
@@ -250,33 +250,32 @@ def sweep(
             spoke = k if squared < across else spoke
             across = min(across, squared)
         across = math.sqrt(across)
-        source = -1
+        nearest = source = -1
         if label is not None:
-            source = label[along_edge]
+            nearest = label[along_edge]
         if across < best:
             a, b = np.uint32(t.spoke_id[spoke, NEIGHBOUR]), np.uint32(t.spoke_id[spoke, NEXT_NEIGHBOUR])
             w = t.spoke_id[spoke, BEYOND]
+            along, height, base = t.spoke[spoke, ALONG], t.spoke[spoke, HEIGHT], t.spoke[spoke, BASE]
             begin, is_of_one = 0.0, True
             if label is not None:
-                is_of_one = label[a] == label[b] and label[a] >= 0
-                begin = offset[label[a]] if is_of_one else 0.0
-            if is_of_one and w >= 0 and d[w] < across and (label is None or label[w] == label[a]):
-                along, height, base = t.spoke[spoke, ALONG], t.spoke[spoke, HEIGHT], t.spoke[spoke, BASE]
+                source, is_of_one = label[a], label[a] == label[b]
+                begin = offset[source]
+                if not is_of_one and not _comes_nearer_to_a(d[a], d[b], along, height, base):
+                    source = label[b]
+            if is_of_one and w >= 0 and d[w] < across and (label is None or label[w] == source):
                 wx, wy = t.spoke[spoke, BEYOND_ALONG], t.spoke[spoke, BEYOND_DEPTH]
                 squared = _across_two(d[a] - begin, d[b] - begin, d[w] - begin, along, height, base, wx, wy)
                 if squared < np.inf:
                     across = begin + math.sqrt(squared)
             if across < best:
-                best = across
-                if label is not None:
-                    source = _source(label[a] if d[a] < d[b] else label[b])
-                    source = source if is_of_one else FRONT - source
+                best, nearest = across, source
         if best < old:
             d[v] = best
             begin = 0.0
             if label is not None:
-                label[v] = source
-                begin = offset[_source(source)]
+                label[v] = nearest
+                begin = offset[nearest]
             if best < old * kept[v]:
                 back = _mark_farther(v, t, d, rank, is_stale)
                 # With curvature around, what this finds is less than the sweep's error.

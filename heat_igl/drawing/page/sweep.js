@@ -7,8 +7,6 @@
 const NEGLIGIBLE = 1e-7;
 // Part of an edge by which a source lies beyond it, so that circles about its ends cross at an angle.
 const CLOSE = 1e-3;
-// In place of a source.
-const MIXED = -1;
 // Visits per vertex up to which the sweep goes back at once, and after which it gives up.
 const GO_BACK = 10, GIVE_UP = 50;
 
@@ -120,8 +118,8 @@ function sweepDistance(tables, sources) {
   const order = edgeOrder(tables, sources), rank = new Int32Array(n);
   for (let i = 0; i < n; i++) rank[order[i]] = i;
   const d = new Float64Array(n).fill(Infinity), isStale = new Uint8Array(n).fill(1);
-  // The source that a vertex gets its distance from, or MIXED where that came across an edge whose ends have different ones.
-  const label = new Int32Array(n).fill(MIXED);
+  // The source that the distance of a vertex is measured from.
+  const label = new Int32Array(n).fill(-1);
   for (const s of sources) [d[s], label[s]] = [0, s];
   let lowest = n;
   const mark = (v) => { if (!isStale[v]) { isStale[v] = 1; lowest = Math.min(lowest, rank[v]); } };
@@ -137,15 +135,15 @@ function sweepDistance(tables, sources) {
     isStale[v] = 0;
     visits++;
     const old = d[v];
-    let best = old, giver = label[v], across = Infinity, row = -1, sourceX = 0, sourceY = 0;
+    let best = old, giver = label[v], across = Infinity, row = -1, nearest = -1, sourceX = 0, sourceY = 0;
     for (let k = first[v]; k < first[v + 1]; k++) {
       const a = ends[3 * k], b = ends[3 * k + 1], da = d[a], db = d[b], at = 7 * k, base = shape[at + 2];
       if (da + shape[at + 3] < best) [best, giver] = [da + shape[at + 3], label[a]];
       if (db + shape[at + 4] < best) [best, giver] = [db + shape[at + 4], label[b]];
       if ((da >= best && db >= best) || da === Infinity || db === Infinity) continue;
       const px = shape[at], py = shape[at + 1];
-      let length = Infinity, x = 0, y = 0;
-      if (label[a] === label[b] && label[a] !== MIXED) {
+      let length = Infinity, x = 0, y = 0, source = label[a];
+      if (label[a] === label[b]) {
         // The source in units of the edge ab: x along it, y behind it.
         x = 0.5 * ((da - db) * (da + db) / (base * base) + 1);
         const ySquared = da * da / (base * base) - x * x;
@@ -153,19 +151,19 @@ function sweepDistance(tables, sources) {
         const crossing = x * py + px * y;
         if (ySquared >= 0 && crossing >= 0 && crossing <= y + py) length = base * Math.hypot(px - x, py + y);
       } else {
-        // A straight front.
+        // Between different sources a straight front comes in, from that of the end it passes nearer to.
         const slope = (db - da) / base, rise = Math.sqrt(Math.max(1 - slope * slope, 0)), foot = px * rise - py * slope;
         if (foot >= 0 && foot <= rise) length = da + base * (slope * px + rise * py);
+        if (foot >= 0.5 * rise) source = label[b];
       }
-      if (length < across) [across, row, sourceX, sourceY] = [length, k, x, y];
+      if (length < across) [across, row, nearest, sourceX, sourceY] = [length, k, source, x, y];
     }
     if (across < best) {
       const [a, b, w] = ends.subarray(3 * row, 3 * row + 3), [px, py, base, , , wx, wy] = shape.subarray(7 * row, 7 * row + 7);
-      const isFromOne = label[a] === label[b] && label[a] !== MIXED;
-      if (isFromOne && w >= 0 && d[w] < across && label[w] === label[a]) {
+      if (w >= 0 && d[w] < across && label[a] === label[b] && label[w] === label[a]) {
         across = base * acrossTwo(px, py, sourceX, sourceY, d[a] / base, d[b] / base, d[w] / base, wx, wy);
       }
-      if (across < best) [best, giver] = [across, isFromOne ? label[a] : MIXED];
+      if (across < best) [best, giver] = [across, nearest];
     }
     if (!(best < old)) continue;
     [d[v], label[v]] = [best, giver];
