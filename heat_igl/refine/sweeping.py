@@ -31,12 +31,12 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["sweep"]
 
-# Changes by less than this are not passed on: on a curved surface the sweep is wrong by ten times as much anyway.
+# Changes by less than this are not passed on: on a curved surface the sweep is wrong by more anyway.
 _NEGLIGIBLE = 3e-4
 # In a flat domain it is exact, provided that all changes are passed on.
 _ROUNDING = 1e-12
 # Visits per vertex up to which the sweep goes back at once, and after which it gives up. Heat's order takes 1.1 in all,
-# a random one 3 to 5.
+# a random one 20 to 40.
 _GO_BACK, _GIVE_UP = 10, 50
 # Part of an edge by which a source has to lie beyond it: circles about its ends, nearly touching, lose digits.
 _CLOSE = 1e-3
