@@ -702,6 +702,60 @@ def _share(place: FloatArray, p: FloatArray, q: FloatArray) -> float:
 
 
 @jit
+def _side_of(x: FloatArray) -> int:
+    """The side that a point of a face lies on, -1 inside."""
+    on = -1
+    for c in range(3):
+        if x[c] == 0.0:
+            on = c
+    return on
+
+
+@jit
+def _lowest_vertex(s: Surface, d: FloatArray, f: int, x: FloatArray) -> int:
+    """Of the vertices of face f, or of the side that point x lies on, the one of the smallest distance."""
+    c = -1
+    for corner in range(3):
+        if x[corner] > 0.0 and (c < 0 or d[s.F[f, corner]] < d[s.F[f, c]]):
+            c = corner
+    return int(s.F[f, c])
+
+
+@jit
+def _way_on(
+    s: Surface, d: FloatArray, goals: Goals, f: int, x: FloatArray, aims: bool, left: float, is_first: bool,
+    out: FloatArray,
+) -> tuple[int, int, int]:  # fmt: skip
+    """The face in which the way goes on from a point of face f, the half-edge that enters it, and the source in it.
+
+    Each is -1 if there is none. When aiming, `out` is where the way leaves the face.
+    """
+    rate, moved = np.empty(3), np.empty(3)
+    # The steeper the descent the better, and the less a way misses what is left of the length.
+    goal, best, enter_by = -1, -math.inf if aims else 0.0, -1
+    on = _side_of(x)
+    if on < 0:
+        i, _ = _source_in(s, d, goals, f, x, False)
+        better = -_aim(s, d, f, x, left, math.inf, out) if aims else _descent(s, d, f, rate)
+        return f if i >= 0 or better > best else -1, -1, i
+    h = 3 * f + on
+    for k in range(s.first_side[s.edge[h]], s.first_side[s.edge[h] + 1]):
+        g = s.side[k]
+        _moved(s, h, g, x, moved)
+        i, _ = _source_in(s, d, goals, g // 3, moved, False)
+        if i >= 0:
+            return g // 3, g, i
+        if aims:
+            # Straight on is not back.
+            better = -_aim(s, d, g // 3, moved, left, -best, out) if g != h or is_first else best
+        else:
+            better = _descent(s, d, g // 3, rate)
+        if better > best and (aims or rate[g % 3] > 0.0):
+            best, goal, enter_by = better, g // 3, g
+    return goal, enter_by, -1
+
+
+@jit
 def _path(
     s: Surface, d: FloatArray, goals: Goals, face: int, target: FloatArray, max_steps: int, aims: bool,
     faces: list[int], points: list[float],
@@ -778,49 +832,19 @@ def _path(
             x[:] = out
             v = -1
         # At a point of face f that is no vertex: on one of its sides, or (at the start) inside.
-        on = -1
-        for c in range(3):
-            if x[c] == 0.0:
-                on = c
-        # The steeper the descent the better, and the less a way misses what is left of the length.
-        goal, best, enter_by = -1, -math.inf if aims else 0.0, -1
-        if on < 0:
-            i, _ = _source_in(s, d, goals, f, x, False)
-            better = -_aim(s, d, f, x, left, math.inf, out) if aims else _descent(s, d, f, rate)
-            if i >= 0 or better > best:
-                goal = f
-        else:
-            h = 3 * f + on
-            i = -1
-            for k in range(s.first_side[s.edge[h]], s.first_side[s.edge[h] + 1]):
-                g = s.side[k]
-                _moved(s, h, g, x, moved)
-                found, _ = _source_in(s, d, goals, g // 3, moved, False)
-                if found >= 0:
-                    i, goal, enter_by = found, g // 3, g
-                    break
-                if aims:
-                    # Straight on is not back.
-                    better = -_aim(s, d, g // 3, moved, left, -best, out) if g != h or steps == 1 else best
-                else:
-                    better = _descent(s, d, g // 3, rate)
-                if better > best and (aims or rate[g % 3] > 0.0):
-                    best, goal, enter_by = better, g // 3, g
-            if goal >= 0 and enter_by != h:
-                _moved(s, h, enter_by, x, moved)
-                x[:] = moved
-                f = goal
-                _push(leave, enter, h, enter_by)
+        goal, enter_by, i = _way_on(s, d, goals, f, x, aims, left, steps == 1, out)
+        h = 3 * f + _side_of(x)
+        if enter_by >= 0 and enter_by != h:
+            _moved(s, h, enter_by, x, moved)
+            x[:] = moved
+            f = goal
+            _push(leave, enter, h, enter_by)
         if i >= 0:
             length += _straighten(s, first, start_vertex, start, leave, enter, -1, goals.inside[i], faces, points)
             return float(length + goals.offset[i])
         if goal < 0:
-            # Level, or a valley along the side: on to the lowest vertex.
-            c = -1
-            for corner in range(3):
-                if x[corner] > 0.0 and (c < 0 or d[s.F[f, corner]] < d[s.F[f, c]]):
-                    c = corner
-            v = s.F[f, c]
+            # Level, or a valley along the side.
+            v = _lowest_vertex(s, d, f, x)
             continue
         if aims:
             left -= _apart(s, f, x, out)
