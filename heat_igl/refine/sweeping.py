@@ -194,6 +194,31 @@ def _read_ahead(order: IntArray, i: int, t: Tables, d: FloatArray) -> None:
             prefetch(d, t.spoke_id[k, NEIGHBOUR])
 
 
+@inline
+def _seen_from_beyond(
+    k: Any, t: Tables, d: FloatArray, label: IntArray | None, offset: FloatArray, across: float
+) -> tuple[float, int]:
+    """Distance across the triangle left of spoke k, `across` by its own corners, and by the one beyond; and from where.
+
+    Where the corners are not measured from the same source the distance stays. The source is -1 without labels.
+    """
+    a, b = np.uint32(t.spoke_id[k, NEIGHBOUR]), np.uint32(t.spoke_id[k, NEXT_NEIGHBOUR])
+    w = t.spoke_id[k, BEYOND]
+    along, height, base = t.spoke[k, ALONG], t.spoke[k, HEIGHT], t.spoke[k, BASE]
+    source, begin, is_of_one = -1, 0.0, True
+    if label is not None:
+        source, is_of_one = label[a], label[a] == label[b]
+        begin = offset[source]
+        if not is_of_one and not _comes_nearer_to_a(d[a], d[b], along, height, base):
+            source = label[b]
+    if is_of_one and w >= 0 and d[w] < across and (label is None or label[w] == source):
+        wx, wy = t.spoke[k, BEYOND_ALONG], t.spoke[k, BEYOND_DEPTH]
+        squared = _across_two(d[a] - begin, d[b] - begin, d[w] - begin, along, height, base, wx, wy)
+        if squared < np.inf:
+            across = begin + math.sqrt(squared)
+    return across, source
+
+
 @jit
 def sweep(
     order: IntArray, t: Tables, d: FloatArray, label: IntArray | None, offset: FloatArray, is_stale: AnyArray
@@ -250,24 +275,9 @@ def sweep(
             spoke = k if squared < across else spoke
             across = min(across, squared)
         across = math.sqrt(across)
-        nearest = source = -1
-        if label is not None:
-            nearest = label[along_edge]
+        nearest = -1 if label is None else label[along_edge]
         if across < best:
-            a, b = np.uint32(t.spoke_id[spoke, NEIGHBOUR]), np.uint32(t.spoke_id[spoke, NEXT_NEIGHBOUR])
-            w = t.spoke_id[spoke, BEYOND]
-            along, height, base = t.spoke[spoke, ALONG], t.spoke[spoke, HEIGHT], t.spoke[spoke, BASE]
-            begin, is_of_one = 0.0, True
-            if label is not None:
-                source, is_of_one = label[a], label[a] == label[b]
-                begin = offset[source]
-                if not is_of_one and not _comes_nearer_to_a(d[a], d[b], along, height, base):
-                    source = label[b]
-            if is_of_one and w >= 0 and d[w] < across and (label is None or label[w] == source):
-                wx, wy = t.spoke[spoke, BEYOND_ALONG], t.spoke[spoke, BEYOND_DEPTH]
-                squared = _across_two(d[a] - begin, d[b] - begin, d[w] - begin, along, height, base, wx, wy)
-                if squared < np.inf:
-                    across = begin + math.sqrt(squared)
+            across, source = _seen_from_beyond(spoke, t, d, label, offset, across)
             if across < best:
                 best, nearest = across, source
         if best < old:
