@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from heat_igl import sampling, shapes
-from heat_igl.curve_files import write_curves
+from heat_igl.curves import enclosed_areas, isolines, offset_curves, shortest_paths, sublevel_areas
 from heat_igl.errors import (
     AccuracyWarning,
     BatchError,
@@ -14,15 +14,29 @@ from heat_igl.errors import (
     ReferenceSolverError,
     SourceError,
 )
-from heat_igl.heat_method import HeatMethodSolver, heat_method_distance
-from heat_igl.images import ImageDomain, image_domain
-from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_mesh
-from heat_igl.isolines import enclosed_areas, isolines, offset_curves, sublevel_areas
-from heat_igl.mesh import Mesh, MeshReport
-from heat_igl.paths import shortest_paths
-from heat_igl.polygons import PolygonMesh, polygon_operators
-from heat_igl.projection import ClosestPoints, closest_points, curve_on, edge_curve
-from heat_igl.refine import Refinement, unfolded_distance
+from heat_igl.heat_method import (
+    Diagnostics,
+    HeatMethodSolver,
+    HeatSolution,
+    LabelledDistance,
+    heat_method_distance,
+)
+from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_curves, write_mesh
+from heat_igl.mesh import (
+    ClosestPoints,
+    ImageDomain,
+    Mesh,
+    MeshReport,
+    PolygonMesh,
+    SurfaceCurve,
+    SurfacePoints,
+    closest_points,
+    curve_on,
+    edge_curve,
+    image_domain,
+    split_long_edges,
+)
+from heat_igl.operators import Operators, polygon_operators, speed_operators
 from heat_igl.sampling import (
     VoronoiCells,
     diameter,
@@ -33,16 +47,13 @@ from heat_igl.sampling import (
     geodesic_centre,
     voronoi_cells,
 )
-from heat_igl.solution import Diagnostics, HeatSolution
 from heat_igl.sources import OffsetSources
-from heat_igl.speed import speed_operators
-from heat_igl.subdivision import split_long_edges
-from heat_igl.surface_points import SurfaceCurve, SurfacePoints
+from heat_igl.unfolding import Refinement, unfolded_distance
 
 if TYPE_CHECKING:
-    from heat_igl import baselines, closed_forms, cluster, metrics, reference
-    from heat_igl.validation import validate
-    from heat_igl.validation.report import ValidationReport, ValidationRow
+    from heat_igl import baselines, cluster, reference
+    from heat_igl.drawing import plots
+    from heat_igl.validation import ValidationReport, ValidationRow, closed_forms, metrics, validate
 
 __all__ = [
     "AccuracyWarning",
@@ -53,11 +64,13 @@ __all__ = [
     "HeatMethodSolver",
     "HeatSolution",
     "ImageDomain",
+    "LabelledDistance",
     "Mesh",
     "MeshError",
     "MeshReport",
     "MissingExtraError",
     "OffsetSources",
+    "Operators",
     "PolygonMesh",
     "ReferenceSolverError",
     "Refinement",
@@ -85,6 +98,7 @@ __all__ = [
     "isolines",
     "metrics",
     "offset_curves",
+    "plots",
     "polygon_operators",
     "read_attributes",
     "read_mesh",
@@ -105,14 +119,15 @@ __all__ = [
 
 __version__ = "0.1.0"
 
-# What a distance does without is loaded on first use: the name, and the module that it is, or is in.
-_LATER = {
+# Loaded on first use, since a distance does without: attribute -> the submodule that it is, or is in.
+_LAZY = {
     "ValidationReport": "validation.report",
     "ValidationRow": "validation.report",
     "baselines": "baselines",
-    "closed_forms": "closed_forms",
+    "closed_forms": "validation.closed_forms",
     "cluster": "cluster",
-    "metrics": "metrics",
+    "metrics": "validation.metrics",
+    "plots": "drawing.plots",
     "reference": "reference",
     "validate": "validation",
 }
@@ -120,10 +135,10 @@ _LATER = {
 if not TYPE_CHECKING:  # else any misspelt name would pass for one of these
 
     def __getattr__(name: str) -> Any:
-        if name not in _LATER:
+        if name not in _LAZY:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        module = import_module(f"{__name__}.{_LATER[name]}")
-        found = globals()[name] = module if _LATER[name] == name else getattr(module, name)
+        module = import_module(f"{__name__}.{_LAZY[name]}")
+        found = globals()[name] = module if _LAZY[name].rpartition(".")[2] == name else getattr(module, name)
         return found
 
 

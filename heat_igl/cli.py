@@ -24,8 +24,7 @@ from rich.progress import Progress
 from rich.text import Text
 
 import heat_igl
-from heat_igl.curve_files import CURVE_SUFFIXES
-from heat_igl.drawing.picture import PAGE_SUFFIXES, PICTURE_SUFFIXES, Picture, replace_file
+from heat_igl.drawing.output import PAGE_SUFFIXES, PICTURE_SUFFIXES, Picture, replace_file
 from heat_igl.errors import (
     AccuracyWarning,
     BatchError,
@@ -35,17 +34,16 @@ from heat_igl.errors import (
     ReferenceSolverError,
     SourceError,
 )
-from heat_igl.factorization import Backend
 from heat_igl.heat_method import HeatMethodSolver, Magnitude
-from heat_igl.io import read_mesh, write_mesh
-from heat_igl.mesh import Mesh
+from heat_igl.io import CURVE_SUFFIXES, read_mesh, write_mesh
+from heat_igl.linear import Backend
+from heat_igl.mesh import Mesh, closest_points
 from heat_igl.operators import Laplacian
-from heat_igl.projection import closest_points
 from heat_igl.reference.guarded import TIMEOUT
-from heat_igl.refine import Refine
 from heat_igl.sources import vertex_sources
 from heat_igl.steps import Boundary
 from heat_igl.typing import FloatArray
+from heat_igl.unfolding import Refine
 from heat_igl.validation import METHODS, draw_sources
 
 __all__ = ["app", "run"]
@@ -334,7 +332,7 @@ def view(
     html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
 ) -> None:
     """A window in which a click moves the source and the distance follows; where there is no display, a page."""
-    from heat_igl.viewer import Exploration, Options, Window, display_problem
+    from heat_igl.drawing.viewer import Exploration, Options, Window, display_problem
 
     loaded = read_mesh(mesh)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
@@ -354,7 +352,7 @@ def view(
         else:
             window.run()
             return
-    from heat_igl.plots import write_html
+    from heat_igl.drawing.plots import write_html
 
     kind = f"unfolded in heat order (refine = {refine})" if refine else "the heat method"
     write_html(
@@ -476,7 +474,7 @@ def _require(package: str, purpose: str, extra: str) -> None:
 def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, picture: Path | None) -> list[Path]:
     drawn = None
     if picture is not None:
-        from heat_igl.plots import plot
+        from heat_igl.drawing.plots import plot
 
         # Drawn before anything is written, since it is what may still fail.
         with Console(stderr=True).status("drawing"):

@@ -13,8 +13,8 @@ from heat_igl.errors import MissingExtraError, ReferenceSolverError
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
-from heat_igl.refine import Refine
 from heat_igl.typing import FloatArray
+from heat_igl.unfolding import Refine
 
 __all__ = ["demonstrate", "sample_mesh"]
 
@@ -116,7 +116,7 @@ def _error(distance: FloatArray, exact: FloatArray) -> str:
 
 
 def _drawn(path: Path, mesh: Mesh, phi: FloatArray) -> tuple[str, str]:
-    from heat_igl.plots import picture
+    from heat_igl.drawing.plots import picture
 
     try:
         picture(path, mesh, phi, sources=_SOURCE)

@@ -11,12 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heat_igl import connectivity
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat_method import HeatMethodSolver
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, SurfacePoints, connectivity
 from heat_igl.sources import vertex_sources
-from heat_igl.surface_points import SurfacePoints
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = [

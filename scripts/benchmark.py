@@ -37,7 +37,7 @@ from scipy.spatial import ConvexHull
 from heat_igl import HeatMethodSolver, Mesh, MissingExtraError, ReferenceSolverError, reference, shapes
 from heat_igl.demo import sample_mesh
 from heat_igl.io import read_mesh
-from heat_igl.peak_memory import PeakMemory
+from heat_igl.runtime import PeakMemory
 
 from environment import environment
 

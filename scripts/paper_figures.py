@@ -31,8 +31,8 @@ from scipy.optimize import curve_fit
 
 import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, baselines, shapes
+from heat_igl.drawing.plots import Picture, plot
 from heat_igl.operators import operators
-from heat_igl.plots import Picture, plot
 from heat_igl.steps import diffuse, integrate, normalize
 
 from environment import environment

@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from heat_igl import HeatMethodSolver
-from heat_igl.plots import plot
+from heat_igl.drawing.plots import plot
 
 import paper_figures
 

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
 from heat_igl import Mesh
-from heat_igl.connectivity import duplicate_faces
+from heat_igl.mesh.connectivity import duplicate_faces
 
 # Arcs of a graph, 24 bytes each and a few times that while they are put together.
 LARGEST_GRAPH = 4e7

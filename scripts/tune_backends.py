@@ -27,7 +27,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from heat_igl import Mesh, read_mesh
-from heat_igl.factorization import analyse
+from heat_igl.linear import analyse
 from heat_igl.operators import Operators, operators
 from heat_igl.steps import Descent, HeatFlow, PoissonProblem
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from conftest import perturbed
 
-from heat_igl import HeatMethodSolver, Mesh, MeshError, MissingExtraError, SourceError, blocks, shapes
+from heat_igl import HeatMethodSolver, Mesh, MeshError, MissingExtraError, SourceError, shapes
 from heat_igl.operators import operators
-from heat_igl.peak_memory import PeakMemory
+from heat_igl.runtime import PeakMemory, blocks
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from heat_igl import (
     reference,
     shapes,
 )
-from heat_igl.bounds import edge_paths
+from heat_igl.reference import edge_paths
 from heat_igl.steps import fitted_laplacian
 
 

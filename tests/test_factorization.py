@@ -9,9 +9,10 @@ import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from heat_igl import FactorizationError, MissingExtraError, factorization, processors, shapes
-from heat_igl.factorization import analyse, factorize
+from heat_igl import FactorizationError, MissingExtraError, shapes
+from heat_igl.linear import analyse, backends, factorize
 from heat_igl.operators import operators
+from heat_igl.runtime import threads
 
 
 @pytest.fixture(params=["scipy", "multifrontal"])
@@ -73,7 +74,7 @@ def test_unknown_backend(heat_matrix):
 
 
 def test_missing_backend_names_the_extra(heat_matrix, monkeypatch):
-    monkeypatch.setattr(factorization.importlib.util, "find_spec", lambda _: None)
+    monkeypatch.setattr(backends.importlib.util, "find_spec", lambda _: None)
     with pytest.raises(MissingExtraError, match=r'pip install "heat-igl\[fast\]"'):
         factorize(heat_matrix, "multifrontal")
     assert factorize(heat_matrix, "auto").backend == "scipy"
@@ -155,7 +156,7 @@ def test_dissection_keeps_fill_low():
 
 def test_the_order_does_not_depend_on_threads():
     pytest.importorskip("numba")
-    from heat_igl.factorization.dissection import dissect
+    from heat_igl.linear.dissection import dissect
 
     L = operators(shapes.icosphere(6)).L
     with ThreadPoolExecutor(3) as workers:
@@ -211,7 +212,7 @@ def test_pieces_have_no_neighbours_but_above(many_pieces):
 def test_one_thread_starts_no_other(many_pieces, monkeypatch):
     A, factor = many_pieces
     x = np.random.default_rng(0).random(A.shape[0])
-    monkeypatch.setattr("heat_igl.processors.ThreadPoolExecutor", None)
+    monkeypatch.setattr("heat_igl.runtime.threads.ThreadPoolExecutor", None)
     monkeypatch.setenv("HEAT_IGL_NUM_THREADS", "1")
     np.testing.assert_allclose(factor.solve(A @ x), x, rtol=1e-9)
 
@@ -222,12 +223,12 @@ def test_threads_divide_the_processors(monkeypatch):
     monkeypatch.setattr("os.cpu_count", lambda: 8)
 
     def inside() -> tuple[int, int]:
-        with processors.pool(3) as workers:
-            return processors.n_threads(), workers.submit(processors.n_threads).result()
+        with threads.pool(3) as workers:
+            return threads.n_threads(), workers.submit(threads.n_threads).result()
 
-    with processors.pool(2) as workers:
+    with threads.pool(2) as workers:
         assert workers.submit(inside).result() == (4, 1)
-    assert processors.n_threads() == 8
+    assert threads.n_threads() == 8
 
 
 def test_unsorted_indices(heat_matrix, backend):

@@ -17,8 +17,8 @@ from conftest import shared_path
 
 import heat_igl
 from heat_igl import shapes
+from heat_igl.drawing.plots import Page, page, write_html
 from heat_igl.drawing.scene import LINE_INK, UNREACHABLE, colours
-from heat_igl.plots import Page, page, write_html
 
 read_image = pytest.importorskip("matplotlib.image").imread
 

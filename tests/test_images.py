@@ -7,7 +7,7 @@ import pytest
 
 import heat_igl
 from heat_igl import image_domain
-from heat_igl.metrics import relative_error
+from heat_igl.validation import relative_error
 
 
 def test_every_pixel_has_its_area_and_its_place():

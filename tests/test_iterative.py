@@ -8,8 +8,8 @@ import scipy.sparse as sp
 from conftest import perturbed, shared_path
 
 import heat_igl
-from heat_igl import FactorizationError, HeatMethodSolver, Mesh, factorization, shapes
-from heat_igl.factorization import iterative
+from heat_igl import FactorizationError, HeatMethodSolver, Mesh, shapes
+from heat_igl.linear import backends, iterative
 from heat_igl.operators import operators
 
 pytest.importorskip("numba")
@@ -104,7 +104,7 @@ def test_chosen_where_factors_would_not_fit(monkeypatch):
     assert HeatMethodSolver(mesh).diagnostics.backend != "iterative"
     monkeypatch.setattr(iterative, "available_memory", lambda: 0.99 * estimate)
     assert HeatMethodSolver(mesh).diagnostics.backend == "iterative"
-    monkeypatch.setattr(factorization, "has_iterative", lambda: False)
+    monkeypatch.setattr(backends, "has_iterative", lambda: False)
     assert HeatMethodSolver(mesh).diagnostics.backend != "iterative"
 
 
@@ -112,7 +112,7 @@ def test_estimate_bounds_what_the_factors_hold():
     """One to four times the entries of the multifrontal factor: what is held while it is made comes on top."""
     for mesh in (shapes.torus(200, 200), perturbed(shapes.box(16))):
         A = heat_matrix(mesh)
-        held = factorization.factorize(A, "multifrontal").n_bytes
+        held = backends.factorize(A, "multifrontal").n_bytes
         assert 1 < iterative.factor_bytes(A.shape[0], A.nnz) / held < 4
 
 

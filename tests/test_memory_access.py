@@ -7,8 +7,8 @@ import pytest
 
 pytest.importorskip("numba")
 
-from heat_igl.fans import jit
-from heat_igl.memory_access import prefetch, uncounted
+from heat_igl.intrinsic.fans import jit
+from heat_igl.runtime.prefetch import prefetch, uncounted
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import heat_igl
-from heat_igl import Mesh, MeshError, connectivity
+from heat_igl import Mesh, MeshError
+from heat_igl.mesh import connectivity
 
 TETRAHEDRON_V = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 TETRAHEDRON_F = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])

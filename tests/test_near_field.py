@@ -10,8 +10,7 @@ from conftest import perturbed
 
 from heat_igl import Mesh, SurfaceCurve, SurfacePoints, curve_on, reference, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
-from heat_igl.near_field import NearField, Seeds
-from heat_igl.sources import Sources, source_set
+from heat_igl.sources import NearField, Seeds, Sources, source_set
 
 
 def seeds(mesh: Mesh, sources: Sources, radius: float) -> Seeds:

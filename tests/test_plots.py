@@ -12,9 +12,9 @@ import pytest
 import heat_igl
 from heat_igl import plots, shapes
 from heat_igl.drawing import raster
+from heat_igl.drawing.plots import Picture, picture, plot, plot_field
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, colours
 from heat_igl.drawing.surface_image import LINE
-from heat_igl.plots import Picture, picture, plot, plot_field
 
 matplotlib = pytest.importorskip("matplotlib")
 

@@ -11,8 +11,9 @@ from conftest import shared_path
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.metrics import relative_error
-from heat_igl.polygons import PolygonMesh, polygon_operators, triangle_fans
+from heat_igl.mesh import PolygonMesh, triangle_fans
+from heat_igl.operators import polygon_operators
+from heat_igl.validation import relative_error
 
 
 def quads(n: int) -> PolygonMesh:

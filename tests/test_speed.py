@@ -11,9 +11,9 @@ from conftest import perturbed
 import heat_igl
 from heat_igl import shapes, speed_operators
 from heat_igl.mesh import Mesh
-from heat_igl.metrics import relative_error
 from heat_igl.operators import operators
 from heat_igl.typing import FloatArray
+from heat_igl.validation import relative_error
 
 
 def flat(mesh: Mesh, seed: int = 0) -> Mesh:

@@ -10,8 +10,7 @@ import scipy.sparse as sp
 from conftest import perturbed
 
 from heat_igl import HeatMethodSolver, Mesh, PolygonMesh, polygon_operators, shapes, steps
-from heat_igl.operators import Operators, operators, tufted_operators
-from heat_igl.speed import speed_operators
+from heat_igl.operators import Operators, operators, speed_operators, tufted_operators
 from heat_igl.steps import Descent, HeatFlow, PoissonProblem, damping, diffuse, fitted_laplacian, integrate, normalize
 
 

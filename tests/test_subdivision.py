@@ -5,8 +5,8 @@ import pytest
 from conftest import perturbed
 
 from heat_igl import HeatMethodSolver, Mesh, MeshError, shapes
-from heat_igl.connectivity import boundary_loops
-from heat_igl.subdivision import split_long_edges
+from heat_igl.mesh import split_long_edges
+from heat_igl.mesh.connectivity import boundary_loops
 
 from steiner import graph_distance
 

@@ -9,10 +9,9 @@ from conftest import perturbed, shared_path
 
 import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, shapes
-from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
+from heat_igl.intrinsic import has_nonmanifold_edges, intrinsic_delaunay, intrinsic_triangulation, tufted_cover
+from heat_igl.mesh import split_long_edges
 from heat_igl.operators import Operators, cotan_operators, intrinsic_operators, operators, tufted_operators
-from heat_igl.subdivision import split_long_edges
-from heat_igl.tufted import has_nonmanifold_edges, tufted_cover
 
 from steiner import graph_distance, steiner_distance
 

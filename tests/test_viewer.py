@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import shapes, viewer
-from heat_igl.viewer import Exploration, Options
+from heat_igl import shapes
+from heat_igl.drawing import viewer
+from heat_igl.drawing.viewer import Exploration, Options
 
 
 @pytest.fixture
@@ -129,7 +130,7 @@ import polyscope.imgui
 from Xlib import X, display
 from Xlib.ext import xtest
 from heat_igl import shapes
-from heat_igl.viewer import Exploration, Window
+from heat_igl.drawing.viewer import Exploration, Window
 
 mesh = shapes.icosphere(3)
 now = Exploration(mesh, 100)

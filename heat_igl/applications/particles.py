@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from heat_igl.errors import MeshError, MissingExtraError, SourceError
 from heat_igl.heat_method import HeatMethodSolver
-from heat_igl.images import ImageDomain, image_domain
+from heat_igl.mesh import ImageDomain, image_domain
 from heat_igl.sampling import diameter
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, IntArray
 

@@ -7,8 +7,7 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 import scipy.sparse.linalg as spl
 
-from heat_igl import connectivity
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, connectivity
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray
 

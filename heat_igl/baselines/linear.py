@@ -13,8 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import AccuracyWarning
-from heat_igl.factorization import factorize
 from heat_igl.heat_method import smallest_time_step
+from heat_igl.linear import factorize
 from heat_igl.mesh import RANGE_LIMIT, Mesh
 from heat_igl.operators import Operators, operators
 from heat_igl.sources import Sources, vertex_sources

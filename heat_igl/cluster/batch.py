@@ -17,9 +17,9 @@ from heat_igl.cluster.report import BatchReport, rows
 from heat_igl.cluster.store import Store
 from heat_igl.cluster.worker import TOPIC, Outcome, Task, begin, carry_on, release
 from heat_igl.errors import BatchError, MissingExtraError
-from heat_igl.processors import n_threads
-from heat_igl.refine import Refine
+from heat_igl.runtime import n_threads
 from heat_igl.sources import Sources
+from heat_igl.unfolding import Refine
 
 __all__ = ["connected", "distances"]
 

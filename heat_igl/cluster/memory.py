@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from heat_igl.factorization.iterative import factor_bytes
+from heat_igl.linear.iterative import factor_bytes
 from heat_igl.mesh import Mesh
 
 __all__ = ["PROCESS_MEMORY", "physical_memory", "solver_memory"]

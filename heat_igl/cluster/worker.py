@@ -28,7 +28,7 @@ from heat_igl.errors import AccuracyWarning, BatchError
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.io import read_mesh
 from heat_igl.mesh import Mesh
-from heat_igl.peak_memory import release_free_memory
+from heat_igl.runtime import release_free_memory
 from heat_igl.sampling import farthest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import IntArray

@@ -1,8 +1,8 @@
 """An interactive view as one HTML file: no server, no network, no library.
 
 The surface is drawn with WebGL; a click moves the source, and the page computes the distance anew, by the sweep of
-`heat_igl.refine.sweeping` written a second time for browsers (page/sweep.js). Needs the extra ``view`` for the colours
-only.
+`heat_igl.unfolding.sweeping` written a second time for browsers (page/sweep.js). Needs the extra ``view`` for the
+colours only.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from heat_igl.drawing.picture import PAGE_SUFFIXES, replace_file
+from heat_igl.drawing.output import PAGE_SUFFIXES, replace_file
 from heat_igl.drawing.scene import DISTANCE_LABEL, LINE_INK, STRIPE_INK, Style, check_style, colours, scene
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.mesh import Mesh

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.polygons import triangle_fans, which_repeat_a_vertex
+from heat_igl.mesh import triangle_fans, which_repeat_a_vertex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["Cells", "Contents", "check", "integers", "select"]

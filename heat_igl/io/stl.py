@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from heat_igl.connectivity import unique_rows
 from heat_igl.errors import MeshError
 from heat_igl.io.contents import Cells, Contents
 from heat_igl.io.text import Text, format_rows
 from heat_igl.mesh import Mesh
+from heat_igl.mesh.connectivity import unique_rows
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["read", "write"]

@@ -27,7 +27,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from heat_igl.errors import ReferenceSolverError
-from heat_igl.peak_memory import PeakMemory, release_free_memory, resident_memory
+from heat_igl.runtime import PeakMemory, release_free_memory, resident_memory
 from heat_igl.typing import AnyArray
 
 __all__ = ["MEMORY", "TIMEOUT", "GuardedProcess", "Reply", "call", "close"]

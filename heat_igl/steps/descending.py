@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.fans import jit
-from heat_igl.flip_history import apex
+from heat_igl.intrinsic import apex
+from heat_igl.intrinsic.fans import jit
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["Triangles", "descent", "descent_on_triangles", "triangles"]

@@ -15,7 +15,7 @@ from heat_igl import reference
 from heat_igl.errors import AccuracyWarning, ReferenceSolverError
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.mesh import Mesh
-from heat_igl.peak_memory import PeakMemory
+from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["METHODS", "Counter", "Method", "Prepare", "Progress", "Run", "Solver", "named", "run"]

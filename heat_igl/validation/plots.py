@@ -13,8 +13,8 @@ from heat_igl.drawing.scene import Scene, colours, scene
 from heat_igl.drawing.surface_image import fitted, mark_dots, surface_image
 from heat_igl.errors import MissingExtraError
 from heat_igl.mesh import Mesh
-from heat_igl.metrics import relative_error
 from heat_igl.typing import FloatArray
+from heat_igl.validation.metrics import relative_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

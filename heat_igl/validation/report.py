@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from heat_igl.mesh import Mesh
-from heat_igl.metrics import BoundViolations, ErrorSummary
 from heat_igl.typing import FloatArray, IntArray
+from heat_igl.validation.metrics import BoundViolations, ErrorSummary
 from heat_igl.validation.plots import error_figure
 
 if TYPE_CHECKING:

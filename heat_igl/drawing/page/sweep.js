@@ -1,4 +1,4 @@
-// Distance by unfolding two triangles at a time, in the order of Dijkstra's algorithm: what heat_igl/refine/sweeping.py does in
+// Distance by unfolding two triangles at a time, in the order of Dijkstra's algorithm: what heat_igl/unfolding/sweeping.py does in
 // the order of the heat. It needs triangles by their corners and edge lengths; two that alone share both ends of an edge
 // are taken to be glued there.
 "use strict";

@@ -1,0 +1,12 @@
+"""Curves that a distance gives: isolines and what they enclose, shortest paths."""
+
+from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas
+from heat_igl.curves.paths import shortest_paths
+
+__all__ = [
+    "enclosed_areas",
+    "isolines",
+    "offset_curves",
+    "shortest_paths",
+    "sublevel_areas",
+]

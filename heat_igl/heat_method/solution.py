@@ -1,0 +1,101 @@
+"""What a solver answers with: a frozen result and its diagnostics, in place of printed status."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from heat_igl.typing import FloatArray, IntArray
+
+__all__ = ["Diagnostics", "HeatSolution", "LabelledDistance"]
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """What a solver did, and what it rests on.
+
+    Attributes
+    ----------
+    t : float
+        Time step used, a squared length.
+    t_requested : float
+        What was asked for: `t`, or ``t_coef * h**2``.
+    mean_edge_length : float
+        h, of the triangulation that was solved on.
+    edges_across : float
+        Longest shortest path along edges, in units of h.
+    n_flips : int
+        Edges flipped to make the triangulation intrinsic Delaunay.
+    lengthening : float
+        What was added to every edge length because of degenerate triangles; 0 on other meshes.
+    backend : str
+        What holds the factors.
+    factor_nonzeros, factor_bytes : int
+        Entries of all factors, and the memory that a query reads twice, indices included.
+    seconds_operators, seconds_analysis, seconds_factorization : float
+        Wall-clock time of the stages of the constructor: operators; order of elimination, which begins beside them, as
+        far as it takes longer; factors.
+    """
+
+    t: float
+    t_requested: float
+    mean_edge_length: float
+    edges_across: float
+    n_flips: int
+    lengthening: float
+    backend: str
+    factor_nonzeros: int
+    factor_bytes: int
+    seconds_operators: float
+    seconds_analysis: float
+    seconds_factorization: float
+
+    @property
+    def t_raised(self) -> bool:
+        """Whether t was raised to keep the heat inside the double range."""
+        return self.t > self.t_requested
+
+
+class LabelledDistance(NamedTuple):
+    """Distance and the source that it is measured from.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        As `HeatMethodSolver.distance` returns it.
+    labels : (n,) int64
+        The nearest source of each vertex; -1 where none reaches, or none within the cutoff.
+    """
+
+    distance: FloatArray
+    labels: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class HeatSolution:
+    """All three steps of one answer.
+
+    Attributes
+    ----------
+    heat : (n,) float64
+        u of step 1 for a unit of heat on each source (of a region of sources: on those at its rim), per area. Where it
+        falls below 1e-308 it reads 0; the steps themselves run on a multiple that does not.
+    direction : (m, d) float64
+        Unit vectors X of step 2, per face of the triangulation that was solved on, d = 3 components in space or
+        d = 2 in the face's own frame (`intrinsic_gradient`); 0 where no heat arrives.
+    magnitude : (m,) float64
+        Length that X was given for step 3: 1, or `damping` where heat arrives from several sides.
+    distance : (n,) float64
+        As `HeatMethodSolver.distance` returns it.
+    t : float
+        Time step.
+    diagnostics : Diagnostics
+        The solver's.
+    """
+
+    heat: FloatArray
+    direction: FloatArray
+    magnitude: FloatArray
+    distance: FloatArray
+    t: float
+    diagnostics: Diagnostics

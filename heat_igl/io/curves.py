@@ -1,0 +1,156 @@
+"""Curves on a surface to files that drawing programs read: OBJ lines, SVG and DXF."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from heat_igl.errors import MissingExtraError
+from heat_igl.io.files import replacing
+from heat_igl.io.text import format_rows
+from heat_igl.mesh import Mesh, SurfaceCurve
+from heat_igl.typing import ArrayLike, FloatArray
+
+__all__ = ["CURVE_SUFFIXES", "write_curves"]
+
+# A mesh is flat when no vertex is farther than this off its plane, as a fraction of its extent.
+_FLAT = 1e-9
+# Width of a line in an SVG file, as a fraction of the drawing's larger side.
+_LINE = 1 / 500
+
+Curves = Sequence[SurfaceCurve] | Mapping[str, Sequence[SurfaceCurve]]
+_Lines = dict[str, list[tuple[FloatArray, bool]]]
+
+
+def write_curves(
+    path: str | os.PathLike[str], mesh: Mesh, curves: Curves, *, projection: ArrayLike | None = None
+) -> None:
+    """Write curves on a mesh to a file.
+
+    Parameters
+    ----------
+    path : path-like
+        The extension names the format: .obj (a polyline ``l`` for each curve), .svg (a drawing in the plane) or .dxf
+        (three-dimensional polylines). An existing file is replaced once the new one is complete.
+    mesh : Mesh
+        The triangles that the curves lie on.
+    curves : sequence of SurfaceCurve, or mapping of str to such
+        For instance isolines or paths. Names make groups (OBJ, SVG) or layers (DXF).
+    projection : (2, 3) array_like, optional
+        For .svg: how a position becomes x and y, y upwards. By default positions in the plane of a flat mesh, at their
+        true lengths: x and y themselves where that plane is one of equal z.
+
+    Raises
+    ------
+    ValueError
+        If the extension is unknown, the mesh is not flat and no projection is given, or a projection makes no sense.
+    MeshError
+        If the file cannot be written.
+    SourceError
+        If a curve lies on faces that the mesh has not.
+    MissingExtraError
+        For .dxf without ezdxf.
+
+    Notes
+    -----
+    Coordinates are in the mesh's unit and in double precision in every format. In SVG, whose y runs downwards, they are
+    turned upside down, and a line is a 500th of the drawing wide.
+    """
+    target = Path(os.fspath(path))
+    write = _FORMATS.get(target.suffix.lower())
+    if write is None:
+        raise ValueError(f"{target}: curves go to {', '.join(CURVE_SUFFIXES)} files, not '{target.suffix}'")
+    if projection is not None and write is not _write_svg:
+        raise ValueError(f"{target}: projection is for .svg files; this format holds positions in space")
+    groups = curves if isinstance(curves, Mapping) else {"": curves}
+    lines = {name: [(curve.positions(mesh), curve.is_closed) for curve in group] for name, group in groups.items()}
+    if write is _write_svg:
+        matrix = _plane(mesh, target) if projection is None else _checked_projection(projection)
+        lines = {name: [(P @ matrix.T, closed) for P, closed in group] for name, group in lines.items()}
+    with replacing(target) as temporary:
+        write(temporary, lines)
+
+
+def _checked_projection(projection: ArrayLike) -> FloatArray:
+    matrix = np.asarray(projection, np.float64)
+    if matrix.shape != (2, 3) or not np.isfinite(matrix).all():
+        raise ValueError(f"projection must be a finite array of shape (2, 3), not {projection!r}")
+    return matrix
+
+
+def _plane(mesh: Mesh, path: Path) -> FloatArray:
+    """Directions of x and y in the plane of a flat mesh, (2, 3)."""
+    used = mesh.V[mesh.referenced]
+    extent = float(np.linalg.norm(np.ptp(used, axis=0)))
+    if np.ptp(used[:, 2]) <= _FLAT * extent:
+        return np.eye(2, 3)
+    axes = np.linalg.svd(used - used.mean(axis=0), full_matrices=False)[2]
+    off = float(np.abs((used - used.mean(axis=0)) @ axes[2]).max())
+    if off > _FLAT * extent:
+        raise ValueError(
+            f"{path}: a drawing needs a flat mesh, and this one reaches {off:.3g} off its plane: pass a projection, or "
+            "write .obj or .dxf"
+        )
+    return np.asarray(axes[:2])
+
+
+def _write_obj(path: Path, lines: _Lines) -> None:
+    text = ["# curves, a polyline each\n"]
+    n = 1
+    for name, group in lines.items():
+        if name:
+            text.append(f"g {name.replace(' ', '_')}\n")
+        for P, is_closed in group:
+            points = P[:-1] if is_closed else P
+            number = np.append(np.arange(n, n + len(points)), n) if is_closed else np.arange(n, n + len(points))
+            text.append(format_rows("v %r %r %r\n", points))
+            text.append(f"l {' '.join(map(str, number.tolist()))}\n")
+            n += len(points)
+    path.write_text("".join(text), encoding="utf8")
+
+
+def _write_svg(path: Path, lines: _Lines) -> None:
+    from xml.sax.saxutils import quoteattr  # which loads a web client
+
+    points = np.concatenate([P for group in lines.values() for P, _ in group] or [np.zeros((1, 2))])
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 2 * _LINE * max(float((high - low).max()), np.finfo(float).tiny)
+    x, y = low - margin
+    width, height = high - low + 2 * margin
+    text = [
+        '<?xml version="1.0" encoding="UTF-8"?>\n',
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{x:.17g} {-y - height:.17g} {width:.17g} {height:.17g}">\n',
+        f'<g fill="none" stroke="black" stroke-linejoin="round" stroke-width="{margin / 2:.6g}">\n',
+    ]
+    for name, group in lines.items():
+        text.append(f"<g id={quoteattr(name)}>\n" if name else "<g>\n")
+        for P, is_closed in group:
+            drawn = P[:-1] if is_closed else P
+            element = "polygon" if is_closed else "polyline"
+            text.append(f'<{element} points="{" ".join(f"{x!r},{-y!r}" for x, y in drawn.tolist())}"/>\n')
+        text.append("</g>\n")
+    text.append("</g>\n</svg>\n")
+    path.write_text("".join(text), encoding="utf8")
+
+
+def _write_dxf(path: Path, lines: _Lines) -> None:
+    try:
+        from ezdxf.filemanagement import new
+    except ImportError:
+        raise MissingExtraError.of("a .dxf file", "ezdxf", "io") from None
+    document = new("R2010")
+    space = document.modelspace()
+    for name, group in lines.items():
+        layer = name or "0"
+        if layer not in document.layers:
+            document.layers.add(layer)
+        for P, is_closed in group:
+            space.add_polyline3d((P[:-1] if is_closed else P).tolist(), close=is_closed, dxfattribs={"layer": layer})
+    document.saveas(path)
+
+
+_FORMATS: dict[str, Callable[[Path, _Lines], None]] = {".obj": _write_obj, ".svg": _write_svg, ".dxf": _write_dxf}
+CURVE_SUFFIXES = tuple(_FORMATS)

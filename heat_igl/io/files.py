@@ -1,0 +1,285 @@
+"""Mesh files: OFF, OBJ, PLY, STL, MESH, MSH and VTU, by extension.
+
+Every way in which a file can be wrong is a `MeshError` that names the file, the place and the remedy; nothing is
+allocated on the word of a header before the size of the file confirms it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import secrets
+import shutil
+import stat
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.io import medit, msh, obj, off, ply, stl, vtu
+from heat_igl.io.contents import Contents
+from heat_igl.mesh import Mesh, PolygonMesh
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray
+
+__all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "read_polygon_mesh", "replacing", "write_mesh"]
+
+
+class _Format(NamedTuple):
+    read: Callable[[Path, bytes], Contents]
+    write: Callable[[Path, Mesh, dict[str, FloatArray]], None]
+    tetrahedra: bool
+    attributes: bool
+
+
+_FORMATS = {
+    ".off": _Format(off.read, off.write, tetrahedra=False, attributes=False),
+    ".obj": _Format(obj.read, obj.write, tetrahedra=False, attributes=False),
+    ".ply": _Format(ply.read, ply.write, tetrahedra=False, attributes=True),
+    ".stl": _Format(stl.read, stl.write, tetrahedra=False, attributes=False),
+    ".mesh": _Format(medit.read, medit.write, tetrahedra=True, attributes=False),
+    ".msh": _Format(msh.read, msh.write, tetrahedra=True, attributes=False),
+    ".vtu": _Format(vtu.read, vtu.write, tetrahedra=True, attributes=True),
+}
+
+MESH_SUFFIXES = tuple(_FORMATS)
+
+_ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
+
+
+def read_mesh(path: str | os.PathLike[str]) -> Mesh:
+    """Read a triangle or tetrahedral mesh from a file.
+
+    Parameters
+    ----------
+    path : path-like
+        The extension, in any case, names the format: .off, .obj, .ply, .stl, .mesh, .msh or .vtu.
+
+    Returns
+    -------
+    Mesh
+        Vertices in the file's order, also those that no face uses (STL: in the order of their first use). A
+        file with tetrahedra yields those, and not the triangles of their boundary.
+
+    Raises
+    ------
+    MeshError
+        If the file does not exist, cannot be read, is damaged, or holds no mesh; also for a missing file, so that
+        one class covers everything that can be wrong with a mesh. The operating system's error is its cause.
+    MissingExtraError
+        For .vtu without meshio.
+
+    Notes
+    -----
+    Polygons are split into the fan of triangles around their first corner, which suits convex, roughly planar ones;
+    `read_polygon_mesh` keeps them.
+    STL has no shared vertices: equal positions are merged, and triangles that collapse by it are dropped. Materials,
+    normals, texture coordinates, colours and line elements are left out. Formats that neither count their lines
+    nor mark their end (OBJ) cannot show that they were cut between two lines.
+
+    Examples
+    --------
+    >>> mesh = read_mesh("bunny.obj")  # doctest: +SKIP
+    """
+    path, contents = _load(path)
+    return _mesh(path, contents)
+
+
+def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
+    """Read a mesh from a file with its polygons as they are.
+
+    Parameters
+    ----------
+    path : path-like
+        As for `read_mesh`.
+
+    Returns
+    -------
+    PolygonMesh
+        With the vertices that `read_mesh` gives.
+
+    Raises
+    ------
+    MeshError
+        As `read_mesh`; also if the file holds tetrahedra.
+    MissingExtraError
+        For .vtu without meshio.
+    """
+    path, contents = _load(path)
+    cells = contents.cells
+    if cells.tetrahedra:
+        raise MeshError(f"{path}: the file holds tetrahedra, not polygons: read it with read_mesh")
+    try:
+        return PolygonMesh(contents.V, np.split(cells.corners, np.cumsum(cells.degree)[:-1]))
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
+
+
+def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
+    """Read the vertex attributes of a PLY or VTU file.
+
+    Parameters
+    ----------
+    path : path-like
+        A file that holds a valid mesh.
+
+    Returns
+    -------
+    dict of str to (n,) or (n, k) array
+        In the type that the file stores; arrays from `write_mesh` come back as the same double precision numbers,
+        bit for bit.
+
+    Raises
+    ------
+    MeshError
+        As `read_mesh`, and for formats without attributes.
+    """
+    path = _checked(path)
+    if not _FORMATS[path.suffix.lower()].attributes:
+        raise MeshError(f"{path}: this format holds no vertex attributes; {_those_with('attributes')} do")
+    path, contents = _load(path)
+    _mesh(path, contents)
+    return contents.attributes
+
+
+def write_mesh(path: str | os.PathLike[str], mesh: Mesh, /, **attributes: ArrayLike) -> None:
+    """Write a mesh, with attributes per vertex, to a file.
+
+    Parameters
+    ----------
+    path : path-like
+        The extension names the format, as for `read_mesh`. An existing file is replaced, but only once the new one is
+        complete: a failed write leaves the old file as it was, and nothing half-written.
+    mesh : Mesh
+        Triangles, or (.mesh, .msh, .vtu) tetrahedra.
+    **attributes : (n,) or (n, k) array_like of real numbers
+        Arrays per vertex, stored in double precision in .ply and .vtu files, infinite values included. PLY spreads
+        an array (n, k) over properties ``name_0``, ``name_1``, ...; `read_attributes` puts it together again.
+
+    Raises
+    ------
+    MeshError
+        If the format cannot hold the mesh or the attributes, an attribute has the wrong shape or type, or the file
+        cannot be written.
+    MissingExtraError
+        For .vtu without meshio.
+
+    Notes
+    -----
+    Coordinates read back exactly the same: text formats write the shortest decimal number that does. STL is written as
+    text, since binary STL is single precision; it loses the order of the vertices and those without a face.
+
+    Examples
+    --------
+    >>> write_mesh("bunny.ply", mesh, distance=phi)  # doctest: +SKIP
+    """
+    path = _checked(path)
+    form = _FORMATS[path.suffix.lower()]
+    if not isinstance(mesh, Mesh):
+        raise MeshError(f"mesh must be a heat_igl.Mesh, not {type(mesh).__name__}: pass Mesh(V, F)")
+    if mesh.is_tetrahedral and not form.tetrahedra:
+        raise MeshError(f"{path}: this format holds no tetrahedra; {_those_with('tetrahedra')} do")
+    if attributes and not form.attributes:
+        raise MeshError(
+            f"{path}: this format holds no vertex attributes ({', '.join(attributes)}); {_those_with('attributes')} do"
+        )
+    arrays = _arrays(attributes, mesh.n_vertices)
+    with replacing(path) as temporary:
+        form.write(temporary, mesh, arrays)
+
+
+def _those_with(capability: str) -> str:
+    names = [suffix for suffix, form in _FORMATS.items() if getattr(form, capability)]
+    return ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def _checked(path: str | os.PathLike[str]) -> Path:
+    try:
+        found = Path(os.fspath(path))
+    except TypeError:
+        raise MeshError(f"path must be a string or a path, not {type(path).__name__}") from None
+    try:
+        printable = b"\0" not in os.fsencode(found)
+    except UnicodeEncodeError:
+        printable = False
+    if not printable:
+        raise MeshError(f"{str(path)!r} cannot be a path: it holds characters that no file name may have")
+    if found.suffix.lower() not in _FORMATS:
+        if found.is_dir():
+            raise MeshError(f"{found} is a directory: name a mesh file in it")
+        raise MeshError(f"{found}: unknown extension '{found.suffix}'; the formats are {', '.join(_FORMATS)}")
+    return found
+
+
+def _load(path: str | os.PathLike[str]) -> tuple[Path, Contents]:
+    path = _checked(path)
+    try:
+        mode = path.stat().st_mode
+        # A pipe or a device might never end.
+        if not stat.S_ISREG(mode):
+            kind = "a directory" if stat.S_ISDIR(mode) else "not a regular file"
+            raise MeshError(f"{path} is {kind}: pass the path of a mesh file")
+        data = path.read_bytes()
+    except FileNotFoundError as error:
+        raise MeshError(f"{path}: no such file (looked in {path.absolute().parent})") from error
+    except OSError as error:
+        raise MeshError(f"{path} cannot be read: {error.strerror or error}") from error
+    return path, _FORMATS[path.suffix.lower()].read(path, data)
+
+
+def _mesh(path: Path, contents: Contents) -> Mesh:
+    try:
+        return Mesh(contents.V, contents.F)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
+
+
+def _arrays(attributes: Mapping[str, ArrayLike], n: int) -> dict[str, FloatArray]:
+    found = {}
+    for name, values in attributes.items():
+        if not _ATTRIBUTE_NAME.fullmatch(name) or name in ("x", "y", "z"):
+            raise MeshError(f"{name!r} cannot name an attribute: use letters, digits and _, and not x, y or z")
+        try:
+            array = np.asarray(values)
+        except ValueError as error:
+            raise MeshError(f"{name} must be an array of shape ({n},) or ({n}, k): {error}") from None
+        if array.dtype.kind not in "biuf" or array.dtype.itemsize > 8:
+            raise MeshError(f"{name} must hold real numbers that fit double precision, not {array.dtype}")
+        if array.ndim not in (1, 2) or len(array) != n or not array.size:
+            raise MeshError(
+                f"{name} must have shape ({n},) or ({n}, k), a value for each vertex, but it has shape {array.shape}"
+            )
+        stored = array.astype(np.float64)
+        if array.dtype.kind in "iu" and (np.abs(stored) > 2.0**53).any():
+            raise MeshError(f"{name} holds integers beyond 2**53, which double precision cannot store exactly")
+        found[name] = stored
+    return found
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary file beside `path`, which takes its place when the block ends well.
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be written.
+    """
+    try:
+        # Through symbolic links, which should go on pointing where they do.
+        target = Path(os.path.realpath(path))
+        temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(4)}{target.suffix}")
+        if target.exists() and not target.is_file():
+            raise MeshError(f"{path} is not a regular file: it cannot be replaced")
+        try:
+            yield temporary
+            if target.exists():
+                shutil.copymode(target, temporary)
+            temporary.replace(target)
+        finally:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise MeshError(f"{path} cannot be written: {error.strerror or error}") from error

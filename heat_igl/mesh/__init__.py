@@ -1,0 +1,28 @@
+"""What distance is measured on: meshes of triangles, tetrahedra and polygons, images, and points and curves on them."""
+
+from heat_igl.mesh.mesh import DELAUNAY_TOLERANCE, RANGE_LIMIT, Mesh, MeshReport, checked_positions
+from heat_igl.mesh.pixels import ImageDomain, image_domain
+from heat_igl.mesh.polygons import PolygonMesh, triangle_fans, which_repeat_a_vertex
+from heat_igl.mesh.projection import ClosestPoints, closest_points, curve_on, edge_curve
+from heat_igl.mesh.subdivision import split_long_edges
+from heat_igl.mesh.surface_points import SurfaceCurve, SurfacePoints
+
+__all__ = [
+    "ClosestPoints",
+    "DELAUNAY_TOLERANCE",
+    "ImageDomain",
+    "Mesh",
+    "MeshReport",
+    "PolygonMesh",
+    "RANGE_LIMIT",
+    "SurfaceCurve",
+    "SurfacePoints",
+    "checked_positions",
+    "closest_points",
+    "curve_on",
+    "edge_curve",
+    "image_domain",
+    "split_long_edges",
+    "triangle_fans",
+    "which_repeat_a_vertex",
+]

@@ -1,0 +1,118 @@
+"""The operators of polygon meshes: Bunge, Herholz, Kazhdan and Botsch (2020)."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+import scipy.sparse as sp
+
+from heat_igl.errors import MeshError
+from heat_igl.mesh import PolygonMesh, connectivity
+from heat_igl.operators.triangles import Operators
+from heat_igl.typing import BoolArray, FloatArray, IntArray
+
+__all__ = ["polygon_operators"]
+
+
+def polygon_operators(mesh: PolygonMesh) -> Operators:
+    """The operators of a polygon mesh, for `HeatMethodSolver.from_operators`.
+
+    Each polygon gets a virtual vertex, the affine combination of its corners with the least sum of squared areas of the
+    triangles between it and the rim. P, which gives it that combination of the values at the corners, takes the usual
+    operators on these triangles back to the vertices of the mesh: L = P^T L' P, M the lumped P^T M' P, and G = G' P
+    with a row block for each triangle, so that L = D G holds (Bunge et al. 2020, section 3).
+
+    Parameters
+    ----------
+    mesh : PolygonMesh
+        n vertices.
+
+    Returns
+    -------
+    Operators
+        With n vertices, the faces those triangles, d = 3. h is the mean distance between two vertices of one polygon,
+        which is what L couples: edges alone are too short for hexagons. No `triangulation`, since its vertices are not
+        those of the mesh: nothing to refine by unfolding.
+
+    Raises
+    ------
+    MeshError
+        If a polygon has no area, or one so concave that its virtual vertex leaves a vertex of the mesh without mass.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from heat_igl import HeatMethodSolver, PolygonMesh, polygon_operators
+    >>> hexagon = [[np.cos(a), np.sin(a), 0.0] for a in np.arange(6) * np.pi / 3]
+    >>> mesh = PolygonMesh([*hexagon, [1.75, 3**0.5 / 2, 0]], [[0, 1, 2, 3, 4, 5], [0, 6, 1]])
+    >>> distance = HeatMethodSolver.from_operators(polygon_operators(mesh)).distance(3)
+    >>> int(distance.argmax())
+    6
+    """
+    corners, following, m = mesh.corners, mesh.following, mesh.n_faces
+    owner = np.repeat(np.arange(m), mesh.degree)
+    sides = np.linalg.norm(mesh.V[corners] - mesh.V[following], axis=1)
+    first, _, n_polygons = connectivity.unique_rows(
+        np.sort(np.stack([corners, following], axis=1), axis=1), mesh.n_vertices
+    )
+    h = _mean_distance(mesh, owner)
+    unit = 2.0 ** round(np.log2(h))  # see `cotan_operators`
+    V = mesh.V / unit
+    L, M, P = igl.cotmatrix(V, corners, np.concatenate([[0], np.cumsum(mesh.degree)]))
+    refined = P @ V
+    F = np.stack([corners, following, mesh.n_vertices + owner], axis=1)
+    areas = igl.doublearea(refined, F) / 2 if np.isfinite(refined).all() else np.zeros(len(F))
+    _check_areas(mesh, areas, owner, sides / unit)
+    boundary = np.zeros(mesh.n_vertices, bool)
+    outer = first[n_polygons == 1]
+    boundary[corners[outer]] = boundary[following[outer]] = True
+    triangles = mesh.triangles
+    _check_mass(M.diagonal(), triangles.referenced)
+    graph = sp.csr_array((sides[first], (corners[first], following[first])), shape=(mesh.n_vertices, mesh.n_vertices))
+    begin = np.cumsum(mesh.degree) - mesh.degree
+    return Operators(
+        L=L,
+        M=M * unit**2,
+        gradient=(igl.grad(refined, F) @ P).tocsc() / unit,
+        weights=areas * unit**2,
+        face_sizes=np.repeat(np.maximum.reduceat(sides, begin), mesh.degree),
+        mean_edge_length=h,
+        components=triangles.components,
+        boundary=boundary,
+        referenced=triangles.referenced,
+        longest_distance=connectivity.longest_path(graph, triangles.components),
+        chords=_chords(mesh.V, L),
+    )
+
+
+def _chords(V: FloatArray, L: sp.csc_matrix) -> sp.csc_matrix:
+    """Distances in space (n, n) of the vertices that L couples: all pairs of a polygon."""
+    columns = np.repeat(np.arange(L.shape[1]), np.diff(L.indptr))
+    return sp.csc_matrix((np.linalg.norm(V[L.indices] - V[columns], axis=1), L.indices, L.indptr), shape=L.shape)
+
+
+def _mean_distance(mesh: PolygonMesh, owner: IntArray) -> float:
+    """Mean distance between two vertices of one polygon, each pair counted once."""
+    size = (mesh.n_vertices, mesh.n_faces)
+    incidence = sp.csr_array((np.ones(len(owner), np.int8), (mesh.corners, owner)), shape=size)
+    pairs = sp.triu(incidence @ incidence.T, 1).tocoo()
+    return float(np.linalg.norm(mesh.V[pairs.row] - mesh.V[pairs.col], axis=1).mean())
+
+
+def _check_areas(mesh: PolygonMesh, areas: FloatArray, owner: IntArray, sides: FloatArray) -> None:
+    """Areas and sides are in one unit of length."""
+    flat = np.unique(owner[areas <= 1e-12 * sides**2])
+    if len(flat):
+        raise MeshError(
+            f"polygons[{flat[0]}] = {mesh.polygons[flat[0]].tolist()} has no area, or a side that its middle does not "
+            f"see ({len(flat)} of {mesh.n_faces} polygons): remove or split these polygons"
+        )
+
+
+def _check_mass(mass: FloatArray, referenced: BoolArray) -> None:
+    bad = referenced & (mass <= 0)
+    if bad.any():
+        raise MeshError(
+            f"vertex {int(np.argmax(bad))} has no area around it ({int(bad.sum())} vertices have none): polygons there "
+            "are far from convex; split them"
+        )

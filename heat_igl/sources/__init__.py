@@ -1,0 +1,26 @@
+"""What a source is, the right-hand side it gives, and the exact distance near it."""
+
+from heat_igl.sources.near_field import NearField, Seeds
+from heat_igl.sources.specification import (
+    OffsetSources,
+    SourcePoints,
+    Sources,
+    SourceSegments,
+    SourceSet,
+    nearest_first,
+    source_set,
+    vertex_sources,
+)
+
+__all__ = [
+    "NearField",
+    "OffsetSources",
+    "Seeds",
+    "SourcePoints",
+    "SourceSegments",
+    "SourceSet",
+    "Sources",
+    "nearest_first",
+    "source_set",
+    "vertex_sources",
+]

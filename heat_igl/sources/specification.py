@@ -1,0 +1,347 @@
+"""What a source is: where distance begins, and at which value.
+
+`source_set` reads all that a user may pass and returns one clean object, `SourceSet`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from heat_igl.errors import SourceError
+from heat_igl.mesh import SurfaceCurve, SurfacePoints
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+
+__all__ = [
+    "OffsetSources",
+    "SourcePoints",
+    "SourceSegments",
+    "SourceSet",
+    "Sources",
+    "nearest_first",
+    "source_set",
+    "vertex_sources",
+]
+
+_ACCEPTED = "a vertex index, a sequence of vertex indices, or a boolean mask with one entry per vertex"
+# Barycentric coordinates below this are 0: the point lies on the edge, or in the vertex.
+_ON_RIM = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetSources:
+    """Sources at which distance begins at a value of their own.
+
+    Parameters
+    ----------
+    sources : sources
+        Vertices, `SurfacePoints`, a `SurfaceCurve`, or a list of such.
+    offsets : float or (k,) array_like
+        The value at each: one for all, or one for each vertex, point and curve in the order in which they are given.
+
+    Raises
+    ------
+    SourceError
+        If an offset is negative or not finite. That their number fits is checked where the sources are used.
+    """
+
+    sources: Sources
+    offsets: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "offsets", _checked_offsets(self.offsets))
+
+
+_PLACES = (SurfacePoints, SurfaceCurve, OffsetSources)
+# A list may hold several kinds.
+Sources = int | np.integer[Any] | Sequence[Any] | AnyArray | SurfacePoints | SurfaceCurve | OffsetSources
+
+
+@dataclass(frozen=True, eq=False)
+class SourcePoints:
+    """Points (k,) in faces, the label of the source that each belongs to, and the value at which distance begins."""
+
+    faces: IntArray
+    barycentric: FloatArray
+    label: IntArray
+    offset: FloatArray
+
+    def joined(self, other: SourcePoints) -> SourcePoints:
+        """These points and others."""
+        return SourcePoints(
+            np.concatenate([self.faces, other.faces]),
+            np.concatenate([self.barycentric, other.barycentric]),
+            np.concatenate([self.label, other.label]),
+            np.concatenate([self.offset, other.offset]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SourceSegments:
+    """Segments (s,) of curves, as `SourcePoints`."""
+
+    faces: IntArray
+    start: FloatArray
+    end: FloatArray
+    label: IntArray
+    offset: FloatArray
+
+    def ends(self) -> SourcePoints:
+        """Where segments begin and end."""
+        return SourcePoints(
+            np.tile(self.faces, 2),
+            np.concatenate([self.start, self.end]),
+            np.tile(self.label, 2),
+            np.tile(self.offset, 2),
+        )
+
+
+_NOWHERE = np.empty(0, np.int64)
+_NO_POINTS = SourcePoints(_NOWHERE, np.empty((0, 3)), _NOWHERE, np.empty(0))
+_NO_SEGMENTS = SourceSegments(_NOWHERE, np.empty((0, 3)), np.empty((0, 3)), _NOWHERE, np.empty(0))
+
+
+@dataclass(frozen=True, eq=False)
+class SourceSet:
+    """One set of sources, checked.
+
+    Attributes
+    ----------
+    vertices : (k,) int64
+        Source vertices, ascending, each once.
+    vertex_label, vertex_offset : (k,) int64, (k,) float64
+        Which source a vertex is, and the value at which distance begins there.
+    points, segments
+        Points and curves in faces. The ends of segments are not among the points.
+    n_labels : int
+        How many sources there are, as the user counts them.
+    """
+
+    vertices: IntArray
+    vertex_label: IntArray
+    vertex_offset: FloatArray
+    points: SourcePoints
+    segments: SourceSegments
+    n_labels: int
+
+    @property
+    def on_vertices_alone(self) -> bool:
+        """Whether all sources are vertices."""
+        return not len(self.points.faces) and not len(self.segments.faces)
+
+    @property
+    def offsets(self) -> FloatArray:
+        """The offset of every vertex, point and segment."""
+        if self.on_vertices_alone:
+            return self.vertex_offset
+        return np.concatenate([self.vertex_offset, self.points.offset, self.segments.offset])
+
+
+def source_set(sources: Sources, n: int, F: IntArray | None) -> SourceSet:
+    """All that a user may pass as sources, as one checked object.
+
+    Sources are counted as they are given: the i-th vertex of a sequence, the i-th set entry of a mask, the i-th of
+    `SurfacePoints`, a curve as one; over the entries of a list one after another.
+
+    Parameters
+    ----------
+    sources : sources
+        A vertex index, a sequence of them, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources`, or
+        a list or tuple of such.
+    n : int
+        Number of vertices of the domain.
+    F : (m, 3) int64 or None
+        The triangles that points and curves refer to; None where there are none.
+
+    Raises
+    ------
+    SourceError
+        If there is no source, or one is not on the domain; the message names the first such.
+    """
+    builder = _Builder(n, F)
+    builder.add(sources)
+    return builder.finish()
+
+
+def vertex_sources(sources: Sources, n: int) -> IntArray:
+    """The vertices that `sources` names, ascending, each once.
+
+    Parameters
+    ----------
+    sources : int, sequence of int, or (n,) mask of bool
+        Source vertices; repeated ones count once.
+    n : int
+        Number of vertices of the mesh.
+
+    Returns
+    -------
+    (k,) int64
+        At least one vertex index in ``range(n)``.
+
+    Raises
+    ------
+    SourceError
+        If there is no source, an index is not in ``range(n)``, the mask has the wrong length, or `sources` is not
+        made of integers or booleans.
+    """
+    return np.asarray(np.unique(_named_vertices(sources, n)), dtype=np.int64)
+
+
+def _named_vertices(sources: Sources, n: int) -> IntArray:
+    """The vertices in the order in which they are named."""
+    if isinstance(sources, _PLACES):
+        raise SourceError(f"sources must be {_ACCEPTED} here, not {type(sources).__name__}")
+    try:
+        array = np.atleast_1d(np.asarray(sources))
+    except ValueError:
+        raise SourceError(f"sources must be {_ACCEPTED}, not a ragged sequence") from None
+    if array.ndim != 1:
+        raise SourceError(f"sources must be {_ACCEPTED}, but it has shape {array.shape}")
+    if not len(array):
+        raise SourceError("sources is empty: name at least one vertex")
+    if array.dtype.kind == "b":
+        if len(array) != n:
+            raise SourceError(f"the mask sources has {len(array)} entries, but the mesh has {n} vertices")
+        if not array.any():
+            raise SourceError("the mask sources selects no vertex: set at least one entry")
+        return np.flatnonzero(array)
+    if array.dtype.kind not in "iu":
+        raise SourceError(f"sources must be {_ACCEPTED}, not {_first_of_wrong_type(array)}")
+    outside = (array < 0) | (array >= n)
+    if outside.any():
+        first = int(np.flatnonzero(outside)[0])
+        raise SourceError(
+            f"sources[{first}] = {array[first]} is no vertex ({int(outside.sum())} of {len(array)} are not): the mesh "
+            f"has {n} vertices, so indices run from 0 to {n - 1}"
+        )
+    return np.asarray(array, dtype=np.int64)
+
+
+def _first_of_wrong_type(array: AnyArray) -> str:
+    if array.dtype.kind == "f":
+        return f"floats such as {array[0]}; convert with int()"
+    return f"{array.dtype} such as {array.ravel()[0]!r}"
+
+
+def _checked_offsets(offsets: ArrayLike) -> FloatArray:
+    try:
+        array = np.array(offsets, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SourceError(f"offsets must be real numbers, not {offsets!r}") from None
+    if array.ndim > 1:
+        raise SourceError(f"offsets must be one number or one for each source, not of shape {array.shape}")
+    wrong = ~(np.isfinite(array) & (array >= 0))
+    if wrong.any():
+        first = int(np.flatnonzero(np.atleast_1d(wrong))[0])
+        which = f"offsets[{first}]" if array.ndim else "offsets"
+        raise SourceError(f"{which} = {np.atleast_1d(array)[first]} must be finite and not negative")
+    return array
+
+
+class _Builder:
+    """Collects the parts of a set and counts its sources."""
+
+    def __init__(self, n: int, F: IntArray | None) -> None:
+        self._n, self._F = n, F
+        self._offset = np.empty(0)  # of each source so far
+        self._vertices: list[tuple[IntArray, IntArray]] = []
+        self._points: list[tuple[SurfacePoints, IntArray]] = []
+        self._curves: list[tuple[SurfaceCurve, int]] = []
+
+    def add(self, sources: Sources) -> None:
+        start = len(self._offset)
+        if isinstance(sources, OffsetSources):
+            self.add(sources.sources)
+            k = len(self._offset) - start
+            if sources.offsets.ndim and len(sources.offsets) != k:
+                raise SourceError(
+                    f"offsets has {len(sources.offsets)} entries for {k} sources: give one for each, or one number"
+                )
+            self._offset[start:] += sources.offsets
+        elif isinstance(sources, SurfacePoints):
+            self._check_faces(sources.faces)
+            self._points.append((sources, self._counted(len(sources))))
+        elif isinstance(sources, SurfaceCurve):
+            self._check_faces(sources.faces)
+            self._curves.append((sources, int(self._counted(1)[0])))
+        elif isinstance(sources, Sequence) and any(isinstance(part, _PLACES) for part in sources):
+            for i, part in enumerate(sources):
+                try:
+                    self.add(part)
+                except SourceError as error:
+                    raise SourceError(f"sources[{i}]: {error}") from None
+        else:
+            vertices = _named_vertices(sources, self._n)
+            self._vertices.append((vertices, self._counted(len(vertices))))
+
+    def _counted(self, k: int) -> IntArray:
+        start = len(self._offset)
+        self._offset = np.concatenate([self._offset, np.zeros(k)])
+        return np.arange(start, start + k)
+
+    def _check_faces(self, faces: IntArray) -> None:
+        if self._F is None:
+            raise SourceError("points and curves lie on triangles, and this domain has none: name vertices")
+        outside = (faces < 0) | (faces >= len(self._F))
+        if outside.any():
+            first = int(np.flatnonzero(outside)[0])
+            raise SourceError(f"faces[{first}] = {faces[first]} is no face: indices run from 0 to {len(self._F) - 1}")
+
+    def finish(self) -> SourceSet:
+        points = self._points_in_faces() if self._points else _NO_POINTS
+        vertices, label = _concatenated(self._vertices, (_NOWHERE, _NOWHERE))
+        # A vertex that is named twice is the one with the smallest offset; of equal ones, the first.
+        kept = nearest_first(vertices, self._offset[label], label)
+        label = label[kept]
+        return SourceSet(
+            vertices=vertices[kept],
+            vertex_label=label,
+            vertex_offset=self._offset[label],
+            points=points,
+            segments=self._all_segments() if self._curves else _NO_SEGMENTS,
+            n_labels=len(self._offset),
+        )
+
+    def _points_in_faces(self) -> SourcePoints:
+        """All points but those in a vertex, which are counted among the vertices."""
+        none = (_NOWHERE, np.empty((0, 3)), _NOWHERE)
+        faces, barycentric, label = _concatenated([(p.faces, p.barycentric, label) for p, label in self._points], none)
+        barycentric = on_simplex(barycentric)
+        in_vertex = barycentric.max(axis=1) == 1
+        if self._F is not None and in_vertex.any():
+            corner = barycentric[in_vertex].argmax(axis=1)
+            self._vertices.append((self._F[faces[in_vertex], corner], label[in_vertex]))
+        inside = ~in_vertex
+        label = label[inside]
+        return SourcePoints(faces[inside], barycentric[inside], label, self._offset[label])
+
+    def _all_segments(self) -> SourceSegments:
+        none = (_NOWHERE, np.empty((0, 3)), np.empty((0, 3)), _NOWHERE)
+        faces, start, end, label = _concatenated(
+            [(c.faces, c.start, c.end, np.full(len(c), label)) for c, label in self._curves], none
+        )
+        return SourceSegments(faces, on_simplex(start), on_simplex(end), label, self._offset[label])
+
+
+def nearest_first(vertex: IntArray, value: FloatArray, label: IntArray) -> IntArray:
+    """Where the smallest of the values at each vertex is, of equal ones that of the first label; vertices ascending."""
+    if len(vertex) < 2:
+        return np.arange(len(vertex))
+    order = np.lexsort((label, value, vertex))
+    ordered = vertex[order]
+    first = np.ones(len(order), bool)
+    first[1:] = ordered[1:] != ordered[:-1]
+    return np.asarray(order[first])
+
+
+def on_simplex(barycentric: FloatArray) -> FloatArray:
+    """The same, with what is as good as an edge or a vertex put there."""
+    kept = np.where(barycentric < _ON_RIM, 0.0, barycentric)
+    return np.asarray(kept / kept.sum(axis=1, keepdims=True))
+
+
+def _concatenated(rows: list[tuple[Any, ...]], none: tuple[AnyArray, ...]) -> tuple[AnyArray, ...]:
+    return rows[0] if len(rows) == 1 else tuple(np.concatenate(column) for column in zip(none, *rows, strict=True))

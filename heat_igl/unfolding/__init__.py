@@ -1,0 +1,10 @@
+"""Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
+
+from heat_igl.unfolding.refinement import Known, Refine, Refinement, unfolded_distance
+
+__all__ = [
+    "Known",
+    "Refine",
+    "Refinement",
+    "unfolded_distance",
+]

@@ -1,0 +1,187 @@
+"""One report that says how far each method is from a reference, and what it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from heat_igl.errors import FactorizationError, MeshError, MissingExtraError, ReferenceSolverError, SourceError
+from heat_igl.mesh import Mesh
+from heat_igl.reference import edge_paths, straight_lines
+from heat_igl.reference.guarded import MEMORY, TIMEOUT
+from heat_igl.sources import Sources, vertex_sources
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.validation import metrics
+from heat_igl.validation.methods import METHODS, Counter, Method, Progress, Run, Solver, named, run
+from heat_igl.validation.metrics import BoundViolations
+from heat_igl.validation.report import ValidationReport, ValidationRow
+
+__all__ = ["METHODS", "Method", "Progress", "Solver", "draw_sources", "validate"]
+
+
+def validate(
+    mesh: Mesh,
+    sources: Sources | Sequence[Sources],
+    methods: Sequence[Method] = ("heat", "sweep", "unfold", "meshlab", "igl"),
+    reference: str | ArrayLike | Callable[[Mesh, IntArray], FloatArray] | None = "exact",
+    *,
+    name: str = "mesh",
+    timeout: float = TIMEOUT,
+    memory: float = MEMORY,
+    progress: Progress | None = None,
+) -> ValidationReport:
+    """Compare methods with a reference on one mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles; for tetrahedra, give a `reference` of your own.
+    sources : sources, or sequence of sources
+        One set of sources (an index, a sequence of indices, a mask), or a sequence of several such sets, from each of
+        which a distance is measured: ``[3, 7]`` is one set of two vertices, ``[[3], [7]]`` are two sets of one.
+    methods : sequence of str or (str, callable)
+        Of `METHODS`: "heat", "sweep" and "unfold" are `HeatMethodSolver` without and with ``refine``; "igl" and
+        "potpourri3d" the heat methods of these libraries; "meshlab" and "meshlab_heat" MeshLab's filters; "exact" the
+        polyhedral distance. A method of one's own is a pair of its name and a function from the mesh to an object
+        with a ``distance(sources)``.
+    reference : str, array, callable or None
+        "exact" or another name of `METHODS`; distances (k, n) or (n,); a function of mesh and sources, such as those
+        of `heat_igl.closed_forms`; or None to check only what needs no reference.
+    name : str
+        Of the mesh, for the report.
+    timeout, memory : float
+        Bounds for native solvers, see `heat_igl.reference.exact`.
+    progress : callable, optional
+        Called with the name of what comes next, the number of distances done, and their total.
+
+    Returns
+    -------
+    ValidationReport
+        A method that fails is a row that says why.
+
+    Raises
+    ------
+    ReferenceSolverError, MissingExtraError
+        If the reference itself fails.
+    SourceError
+        If the sources do not name vertices of the mesh.
+    ValueError
+        If a method is unknown, or two have one name; if the reference has the wrong shape.
+    """
+    sets = _source_sets(sources, mesh.n_vertices)
+    chosen = [named(method) for method in methods]
+    if len({label for label, _ in chosen}) < len(chosen):
+        raise ValueError(f"methods must have different names, not {', '.join(label for label, _ in chosen)}")
+    counter = Counter(progress, len(sets) * (len(chosen) + (reference is not None)))
+    bounds = {"timeout": timeout, "memory": memory}
+    label, truths, known = _truths(mesh, sets, reference, bounds, counter)
+    limits = [(straight_lines(mesh, sources), edge_paths(mesh, sources)) for sources in sets]
+    rows, distances = [], {}
+    for method, prepare in chosen:
+        try:
+            if known is not None and method == label:
+                found = known
+                counter.start(len(sets))
+                counter.skip_to_next()
+            else:
+                found = run(mesh, sets, method, prepare, bounds, counter)
+        except (ReferenceSolverError, MissingExtraError, FactorizationError, MeshError) as error:
+            counter.skip_to_next()
+            rows.append(ValidationRow(method, failure=str(error)))
+            continue
+        distances[method] = found.distances
+        rows.append(_row(mesh, sets, method, found, truths, limits))
+    counter.finish()
+    return ValidationReport(name, mesh, label, tuple(sets), tuple(rows), truths, distances)
+
+
+def draw_sources(mesh: Mesh, count: int, seed: int = 0) -> list[list[int]]:
+    """Single sources for `validate`: `count` different vertices of the component with the most faces, by a seed.
+
+    Raises
+    ------
+    SourceError
+        If that component has fewer vertices than `count`, or `count` is not positive.
+    """
+    label = np.bincount(mesh.components[mesh.F[:, 0]]).argmax()
+    candidates = np.flatnonzero(mesh.components == label)
+    if not 1 <= count <= len(candidates):
+        raise SourceError(f"{count} sources cannot be drawn from a component of {len(candidates)} vertices")
+    return [[int(vertex)] for vertex in np.random.default_rng(seed).choice(candidates, count, replace=False)]
+
+
+def _source_sets(sources: Sources | Sequence[Sources], n: int) -> list[IntArray]:
+    several = isinstance(sources, (list, tuple)) and any(np.ndim(entry) > 0 for entry in sources)
+    if not several:
+        return [vertex_sources(sources, n)]
+    return [vertex_sources(entry, n) for entry in sources]  # type: ignore[union-attr]
+
+
+def _truths(
+    mesh: Mesh,
+    sets: list[IntArray],
+    reference: str | ArrayLike | Callable[[Mesh, IntArray], FloatArray] | None,
+    bounds: Mapping[str, float],
+    counter: Counter,
+) -> tuple[str | None, FloatArray | None, Run | None]:
+    """Name and distances of the reference, and its run where it is a method."""
+    if reference is None:
+        return None, None, None
+    if isinstance(reference, str):
+        found = run(mesh, sets, *named(reference), bounds, counter)
+        return reference, found.distances, found
+    counter.start(len(sets))
+    if callable(reference):
+        counter.step("reference")
+        given: AnyArray = np.stack([reference(mesh, sources) for sources in sets])
+        label = getattr(reference, "__name__", "function")
+    else:
+        given, label = np.atleast_2d(np.asarray(reference, dtype=np.float64)), "given distances"
+    counter.skip_to_next()
+    if given.shape != (len(sets), mesh.n_vertices):
+        raise ValueError(f"reference must have shape ({len(sets)}, {mesh.n_vertices}), not {given.shape}")
+    return label, given, None
+
+
+def _row(
+    mesh: Mesh,
+    sets: list[IntArray],
+    label: str,
+    found: Run,
+    truths: FloatArray | None,
+    limits: list[tuple[FloatArray, FloatArray]],
+) -> ValidationRow:
+    residuals = np.stack([metrics.eikonal_residual(mesh, distance) for distance in found.distances])
+    known = np.isfinite(residuals)
+    weights = np.broadcast_to(mesh.measures, residuals.shape)[known]
+    checks = [
+        metrics.bound_violations(mesh, d, sources, pair)
+        for d, sources, pair in zip(found.distances, sets, limits, strict=True)
+    ]
+    asymmetry = triangle = None
+    if len(sets) > 1 and all(len(sources) == 1 for sources in sets):
+        single = np.array([sources[0] for sources in sets])
+        difference, between = metrics.asymmetry(found.distances, single), found.distances[:, single]
+        # Where both ways are 0 or infinite, their difference is 0.
+        mean = np.where(np.isfinite(between + between.T) & (between + between.T > 0), (between + between.T) / 2, 1.0)
+        asymmetry = float(np.abs(difference / mean).max())
+        triangle = metrics.triangle_violations(found.distances, single).largest
+    return ValidationRow(
+        label,
+        found.parameters,
+        errors=None if truths is None else metrics.error_summary(mesh, found.distances, truths, sets),
+        eikonal=float(residuals[known] @ weights / weights.sum()) if len(weights) else None,
+        bounds=BoundViolations(
+            sum(check.n_below for check in checks),
+            sum(check.n_above for check in checks),
+            max(check.largest_below for check in checks),
+            max(check.largest_above for check in checks),
+        ),
+        asymmetry=asymmetry,
+        triangle_excess=triangle,
+        precompute_seconds=found.precompute_seconds,
+        solve_seconds=found.solve_seconds,
+        peak_memory=found.peak_memory,
+        notes=found.notes,
+    )
