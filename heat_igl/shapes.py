@@ -14,7 +14,19 @@ from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["book", "box", "cone", "cylinder", "disk", "flat_torus", "grid", "icosphere", "strip", "torus"]
+__all__ = [
+    "book",
+    "box",
+    "cone",
+    "cylinder",
+    "disk",
+    "flat_torus",
+    "grid",
+    "icosphere",
+    "strip",
+    "torus",
+    "with_slivers",
+]
 
 
 def _at_least(name: str, value: int, least: int) -> int:
@@ -187,3 +199,29 @@ def box(n: int, size: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Mesh:
             path[[0, 1]] = path[[1, 0]]  # positive volume
         tetrahedra.append((cell @ stride)[:, None] + path)
     return Mesh(corner, np.concatenate(tetrahedra))
+
+
+def with_slivers(mesh: Mesh, seed: int) -> Mesh:
+    """The same surface with needles: up to a tenth of the edges split at 1e-4 of their length.
+
+    The edges and their ends are drawn with `seed`. Vertices keep their numbers, and so their distances; those added
+    follow them.
+    """
+    rng = np.random.default_rng(seed)
+    faces_of: list[list[tuple[int, int]]] = [[] for _ in mesh.edges]
+    for f, row in enumerate(mesh.facets.of_face):
+        for c, e in enumerate(row):
+            faces_of[e].append((f, c))
+    alive = np.ones(mesh.n_faces, bool)
+    points, added = [], []
+    for e in rng.permutation(len(mesh.edges))[: len(mesh.edges) // 10]:
+        if not all(alive[f] for f, _ in faces_of[e]):
+            continue
+        i, j = rng.permutation(mesh.edges[e])
+        points.append(mesh.V[i] + 1e-4 * (mesh.V[j] - mesh.V[i]))
+        new = mesh.n_vertices + len(points) - 1
+        for f, c in faces_of[e]:
+            alive[f] = False
+            w, a, b = mesh.F[f, c], mesh.F[f, (c + 1) % 3], mesh.F[f, (c + 2) % 3]
+            added += [[w, a, new], [w, new, b]]
+    return Mesh(np.concatenate([mesh.V, points]), np.concatenate([mesh.F[alive], added]))

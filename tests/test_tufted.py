@@ -12,8 +12,7 @@ from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, shapes
 from heat_igl.intrinsic import has_nonmanifold_edges, intrinsic_delaunay, intrinsic_triangulation, tufted_cover
 from heat_igl.mesh import split_long_edges
 from heat_igl.operators import Operators, cotan_operators, intrinsic_operators, operators, tufted_operators
-
-from steiner import graph_distance, steiner_distance
+from heat_igl.reference.steiner import graph_distance, steiner_distance
 
 
 def fan_of_five(longest: float) -> Mesh:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import json
 import os
 import subprocess
@@ -19,7 +18,7 @@ import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import shared_path
+from conftest import load_script, shared_path
 
 import heat_igl
 from heat_igl import (
@@ -307,13 +306,7 @@ def test_bunny_within_a_minute(bunny: Mesh) -> None:
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    path = Path(__file__).parents[1] / "scripts" / "validate_meshes.py"
-    spec = importlib.util.spec_from_file_location("validate_meshes", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_script("validate_meshes")
 
 
 @pytest.fixture
