@@ -27,12 +27,12 @@ from typing import Any
 import numpy as np
 
 import heat_igl
-from heat_igl import HeatMethodSolver, Mesh, shapes
+from heat_igl import HeatMethodSolver, shapes
 from heat_igl.drawing.plots import Picture, plot
 
 from paper_formulas import Square, mean_error
 from paper_measurements import accuracy, computation_times, polynomial_errors, power_law
-from scaffold import environment, environment_line, option_parser, wheel_mesh, write_json
+from scaffold import environment, environment_line, option_parser, sample, write_json
 
 WIDTH = 3.15  # inches, one column
 FONT = 7.0
@@ -40,15 +40,6 @@ FONT = 7.0
 BLUE, ORANGE, GREEN, BLACK, GREY = "#0072B2", "#D55E00", "#009E73", "#000000", "#777777"
 COW = 2904, 751  # vertices; the one under a hoof that a picture from the side shows
 SIZES, SIZES_QUICK = range(10, 301, 10), range(5, 41, 5)
-
-
-# What is shown.
-
-
-def sample(name: str) -> Mesh:
-    """A mesh of the pymeshlab wheel; a sphere where there is none."""
-    path = wheel_mesh(f"{name}.obj")
-    return shapes.icosphere(4) if path is None else heat_igl.read_mesh(path)
 
 
 # How it is shown.

@@ -16,18 +16,17 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from heat_igl import HeatMethodSolver, read_mesh, shapes
+from heat_igl import HeatMethodSolver
 from heat_igl.drawing.plots import plot
 
-from scaffold import environment, environment_line, option_parser, wheel_mesh
+from scaffold import environment, environment_line, option_parser, sample
 
 SCRIPTS = Path(__file__).resolve().parent
 DOCS = SCRIPTS.parent / "docs" / "images"
 
 
 def bunny(out: Path) -> None:
-    path = wheel_mesh("bunny.obj")
-    mesh = shapes.icosphere(4) if path is None else read_mesh(path)
+    mesh = sample("bunny")
     source = 1234
     plot(mesh, HeatMethodSolver(mesh).distance(source), sources=source).save(out / "bunny.png")
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import heat_igl
-from heat_igl import Mesh
+from heat_igl import Mesh, shapes
 
 PACKAGES = (
     "numpy scipy libigl numba pyamg potpourri3d pygeodesic tvb-gdist pymeshlab meshio matplotlib scikit-fmm "
@@ -151,6 +151,12 @@ def wheel_mesh(name: str) -> Path | None:
     if spec is None or spec.origin is None:
         return None
     return Path(spec.origin).parent / "tests" / "sample_meshes" / name
+
+
+def sample(name: str) -> Mesh:
+    """A sample mesh of the pymeshlab wheel, by its name without ``.obj``; a sphere where there is none."""
+    path = wheel_mesh(f"{name}.obj")
+    return shapes.icosphere(4) if path is None else heat_igl.read_mesh(path)
 
 
 def over_meshes(
