@@ -64,3 +64,14 @@ def cow() -> heat_igl.Mesh:
 @pytest.fixture(scope="session")
 def bunny() -> heat_igl.Mesh:
     return heat_igl.read_mesh(wheel_path("bunny.obj"))
+
+
+@pytest.fixture(scope="session")
+def sphere() -> heat_igl.Mesh:
+    """A sphere without symmetries, of 2562 vertices."""
+    return perturbed(heat_igl.shapes.icosphere(4))
+
+
+@pytest.fixture(scope="session")
+def solver(sphere: heat_igl.Mesh) -> heat_igl.HeatMethodSolver:
+    return heat_igl.HeatMethodSolver(sphere)

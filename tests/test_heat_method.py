@@ -14,16 +14,6 @@ from heat_igl.operators import operators
 from heat_igl.steps import fitted_laplacian, integrate
 
 
-@pytest.fixture(scope="module")
-def sphere() -> Mesh:
-    return perturbed(shapes.icosphere(4))
-
-
-@pytest.fixture(scope="module")
-def solver(sphere) -> HeatMethodSolver:
-    return HeatMethodSolver(sphere)
-
-
 def two_spheres() -> Mesh:
     sphere = perturbed(shapes.icosphere(3))
     return Mesh(np.vstack([sphere.V, sphere.V + 5]), np.vstack([sphere.F, sphere.F + sphere.n_vertices]))
