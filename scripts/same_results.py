@@ -32,7 +32,7 @@ from heat_igl import HeatMethodSolver, Mesh, SurfaceCurve, SurfacePoints, isolin
 
 from scaffold import add_output, add_seed, environment, environment_line, option_parser, publish, table, wheel_mesh
 
-WHEEL = ("airplane.obj", "bone.ply", "bunny10k_textured.obj", "cow.obj", "cube.obj")
+WHEEL = ("airplane.obj", "bone.ply", "bunny.obj", "bunny10k_textured.obj", "cow.obj", "cube.obj")
 SUFFIXES = (".off", ".obj", ".ply", ".mesh")
 Results = dict[str, list[np.ndarray]]
 
@@ -69,6 +69,7 @@ def quantities(mesh: Mesh, seed: int) -> dict[str, Callable[[], Any]]:
     rng = np.random.default_rng(seed)
     usable = np.unique(mesh.F)
     one, *several = (int(v) for v in rng.choice(usable, min(6, len(usable)), replace=False))
+    targets = rng.choice(np.flatnonzero(mesh.referenced & (mesh.components == mesh.components[one])), 6)
     sets = [[int(v)] for v in rng.choice(usable, min(20, len(usable)), replace=False)] + [several]
     kinds: list[Any] = [one, several]
     if not mesh.is_tetrahedral:
@@ -113,7 +114,7 @@ def quantities(mesh: Mesh, seed: int) -> dict[str, Callable[[], Any]]:
             "batch, unfold": lambda: solver(refine="unfold").distances(sets),
             "isolines": lambda: [[curve.positions(mesh) for curve in level] for level in levels()],
             "paths": lambda: [
-                path.positions(mesh) for path in shortest_paths(mesh, solver(refine="unfold"), np.array(several), one)
+                path.positions(mesh) for path in shortest_paths(mesh, solver(refine="unfold"), targets, one)
             ],
         }
     return found

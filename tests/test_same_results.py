@@ -34,10 +34,9 @@ def test_differences_are_relative_to_the_largest_value(old: Any, new: Any, expec
 
 
 def test_the_table_shows_what_differs_and_what_failed() -> None:
+    near = np.array([0, 1, 4 + 4e-9, np.inf])
     old = {"found": {"cow": {"heat": [ONE], "paths": [ONE]}, "cube": {"heat": [ONE]}}, "sizes": {"cow": 4, "cube": 8}}
-    new = {
-        "found": {"cow": {"heat": [ONE], "paths": "MeshError"}, "cube": {"heat": [np.array([0, 1, 4 + 4e-9, np.inf])]}}
-    }
+    new = {"found": {"cow": {"heat": [ONE], "paths": "MeshError"}, "cube": {"heat": [near]}}}
     found = same_results.compared(old, new)
     assert found["largest"] == np.inf
     text = same_results.markdown({"old": "OLD", "new": "NEW", **found})
