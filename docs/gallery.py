@@ -16,7 +16,7 @@ import numpy as np
 import heat_igl
 from heat_igl import shapes
 from heat_igl.demo import sample_mesh
-from heat_igl.drawing.plots import Page, Picture, page, plot, plot_field
+from heat_igl.drawing import Page, Picture, page, plot, plot_field
 
 
 def torus() -> Picture:

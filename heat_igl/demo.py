@@ -116,7 +116,7 @@ def _error(distance: FloatArray, exact: FloatArray) -> str:
 
 
 def _drawn(path: Path, mesh: Mesh, phi: FloatArray) -> tuple[str, str]:
-    from heat_igl.drawing.plots import picture
+    from heat_igl.drawing import picture
 
     try:
         picture(path, mesh, phi, sources=_SOURCE)

@@ -20,9 +20,10 @@ from typing import Any, get_args
 
 import numpy as np
 
-from heat_igl.drawing.output import PAGE_SUFFIXES, replace_file
+from heat_igl.drawing.output import PAGE_SUFFIXES
 from heat_igl.drawing.scene import DISTANCE_LABEL, LINE_INK, STRIPE_INK, Style, check_style, colours, scene
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
+from heat_igl.io import complete_file
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike
@@ -60,7 +61,8 @@ class Page:
         target = Path(path)
         if target.suffix.lower() not in PAGE_SUFFIXES:
             raise ValueError(f"{target} must end in {' or '.join(PAGE_SUFFIXES)} to be a page")
-        replace_file(target, self.html.encode("utf8"))
+        with complete_file(target) as temporary:
+            temporary.write_bytes(self.html.encode("utf8"))
 
     def _repr_html_(self) -> str:
         return _FRAME.format(html.escape(self.html, quote=True))

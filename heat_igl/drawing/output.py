@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import io
 import os
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from heat_igl.io import complete_file
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["DPI", "PAGE_SUFFIXES", "PICTURE_SUFFIXES", "Picture", "replace_file"]
+__all__ = ["DPI", "PAGE_SUFFIXES", "PICTURE_SUFFIXES", "Picture"]
 
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 PAGE_SUFFIXES = (".html", ".htm")
@@ -45,7 +46,8 @@ class Picture:
         suffix = target.suffix.lower()
         if suffix not in PICTURE_SUFFIXES:
             raise ValueError(f"{target} must end in one of {', '.join(PICTURE_SUFFIXES)} to be a picture")
-        replace_file(target, self._rendered(suffix[1:]))
+        with complete_file(target) as temporary:
+            temporary.write_bytes(self._rendered(suffix[1:]))
 
     def _rendered(self, form: str, dpi: float = DPI) -> bytes:
         buffer = io.BytesIO()
@@ -56,29 +58,3 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         return self._rendered("png", dpi=DPI / 2)
-
-
-def replace_file(target: Path, content: bytes) -> None:
-    """Write a file that replaces an existing one only when it is complete.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; then the old one is as it was.
-    """
-    target = Path(os.path.realpath(target))  # through a link, to what it points to
-    descriptor, temporary = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -7,7 +7,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from heat_igl.drawing.raster import default_rotation, isoline_spacing, rotation
+from heat_igl.drawing.camera import default_rotation, rotation
+from heat_igl.drawing.shading import isoline_spacing
 from heat_igl.errors import MissingExtraError
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, source_set

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.drawing.raster import isoline_coverage, rasterize, screen_gradient, shading, stripe_coverage, visible
+from heat_igl.drawing.raster import rasterize, visible
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, UNREACHABLE, Scene, Style
+from heat_igl.drawing.shading import isoline_coverage, screen_gradient, shading, stripe_coverage
 from heat_igl.typing import BoolArray, FloatArray
 
 __all__ = ["LINE", "OVERSAMPLING", "SOURCE", "fitted", "mark_dots", "surface_image"]
@@ -18,7 +19,7 @@ SOURCE = "#e8000b"
 
 
 def fitted(seen: Scene, columns: int, rows: int, margin: float) -> tuple[float, FloatArray]:
-    """Scale and centre, as `heat_igl.drawing.raster.to_pixels` takes them, with which the surface fills an image."""
+    """Scale and centre, as `heat_igl.drawing.camera.to_pixels` takes them, with which the surface fills an image."""
     turned = seen.turned[seen.used, :2]
     low, high = turned.min(axis=0), turned.max(axis=0)
     extent = np.maximum(high - low, 1e-3 * (high - low).max())

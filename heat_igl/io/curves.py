@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl.errors import MissingExtraError
-from heat_igl.io.files import replacing
+from heat_igl.io.atomic import replacing
 from heat_igl.io.text import format_rows
 from heat_igl.mesh import Mesh, SurfaceCurve
 from heat_igl.typing import ArrayLike, FloatArray

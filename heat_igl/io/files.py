@@ -6,13 +6,10 @@ allocated on the word of a header before the size of the file confirms it.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
-import secrets
-import shutil
 import stat
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,11 +17,12 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.io import medit, msh, obj, off, ply, stl, vtu
+from heat_igl.io.atomic import replacing
 from heat_igl.io.contents import Contents
 from heat_igl.mesh import Mesh, PolygonMesh
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "read_polygon_mesh", "replacing", "write_mesh"]
+__all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "read_polygon_mesh", "write_mesh"]
 
 
 class _Format(NamedTuple):
@@ -256,30 +254,3 @@ def _arrays(attributes: Mapping[str, ArrayLike], n: int) -> dict[str, FloatArray
             raise MeshError(f"{name} holds integers beyond 2**53, which double precision cannot store exactly")
         found[name] = stored
     return found
-
-
-@contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path`, which takes its place when the block ends well.
-
-    Raises
-    ------
-    MeshError
-        If the file cannot be written.
-    """
-    try:
-        # Through symbolic links, which should go on pointing where they do.
-        target = Path(os.path.realpath(path))
-        temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(4)}{target.suffix}")
-        if target.exists() and not target.is_file():
-            raise MeshError(f"{path} is not a regular file: it cannot be replaced")
-        try:
-            yield temporary
-            if target.exists():
-                shutil.copymode(target, temporary)
-            temporary.replace(target)
-        finally:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise MeshError(f"{path} cannot be written: {error.strerror or error}") from error
