@@ -1,4 +1,4 @@
-"""The direction from which a picture shows a surface, and the projection to pixels."""
+"""The view direction, and the parallel projection to pixels."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ __all__ = ["default_rotation", "rotation", "to_pixels"]
 
 
 def rotation(azimuth: float, elevation: float) -> FloatArray:
-    """Rows of the (3, 3) result: right, up and towards the viewer, who looks at the origin; y is up.
+    """Rotation to viewer coordinates, (3, 3): the rows point right, up and towards the viewer.
+
+    The viewer looks at the origin, and the y axis points upwards.
 
     Parameters
     ----------
     azimuth, elevation : float
-        Place of the viewer in degrees: azimuth 0 is on the z axis, 90 on the x axis; elevation 90 is above.
+        Direction of the viewer in degrees. Azimuth 0 is the z axis, azimuth 90 the x axis; elevation 90 is above.
     """
     a, e = np.radians([azimuth, elevation])
     right = np.array([np.cos(a), 0.0, -np.sin(a)])
@@ -25,7 +27,11 @@ def rotation(azimuth: float, elevation: float) -> FloatArray:
 
 
 def default_rotation(V: FloatArray, F: IntArray, used: IntArray, marked: IntArray | None) -> FloatArray:
-    """The rotation to look from when the caller does not say."""
+    """The rotation (3, 3) for a picture without a given view.
+
+    A flat mesh is viewed along the normal. Otherwise the best of eight directions is chosen, by the covered area and
+    the share of the vertices `marked` that are visible.
+    """
     _, size, axes = np.linalg.svd(V[used] - V[used].mean(axis=0), full_matrices=False)
     if size[2] <= 1e-6 * size[0]:
         normal = axes[2] * np.sign(axes[2][np.argmax(np.abs(axes[2]))])
@@ -33,7 +39,7 @@ def default_rotation(V: FloatArray, F: IntArray, used: IntArray, marked: IntArra
         above = above - (above @ normal) * normal
         above /= np.linalg.norm(above)
         return np.stack([np.cross(above, normal), above, normal])
-    # Enough triangles to tell how much of the shape a direction shows.
+    # A sample of the triangles suffices to estimate the covered area.
     sample = F[:: 1 + len(F) // 50_000]
     best, best_score = rotation(45.0, 20.0), -1.0
     for azimuth in np.arange(-45.0, 315.0, 45.0):
@@ -48,5 +54,5 @@ def default_rotation(V: FloatArray, F: IntArray, used: IntArray, marked: IntArra
 
 
 def to_pixels(turned: FloatArray, scale: float, centre: FloatArray) -> FloatArray:
-    """Column, row (downwards) and depth."""
+    """Column, row (downwards) and depth (n, 3) of points in viewer coordinates (n, 3)."""
     return np.asarray(turned * [scale, -scale, scale] + [*centre, 0.0])

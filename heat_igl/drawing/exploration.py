@@ -1,4 +1,4 @@
-"""A mesh that is explored: sources and options change, and the distance follows. No window is involved."""
+"""The state behind an interactive view: a mesh, sources, options and the distance. No window is involved."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from heat_igl.unfolding import Refine
 
 __all__ = ["Exploration", "Options"]
 
-# Factored solvers to keep, since going back and forth between two settings is what one does.
+# Number of factored solvers to keep, since users alternate between a few settings.
 _KEPT_SOLVERS = 4
 
 
 @dataclass(frozen=True)
 class Options:
-    """What can be changed in the window, as `HeatMethodSolver` takes it."""
+    """The options of `HeatMethodSolver` that the window can change."""
 
     t_coef: float | None = None
     boundary: Boundary = "neumann"
@@ -33,32 +33,32 @@ class Options:
 
 
 class Exploration:
-    """A mesh, the sources chosen on it and the distance from them, always in step.
+    """A mesh with sources, options and the distance, which is updated after every change.
 
     Parameters
     ----------
     mesh : Mesh
         Triangles or tetrahedra.
     sources : int, sequence of int, or (n,) mask of bool
-        To start with.
+        Initial source vertices.
     options : Options
-        To start with.
+        Initial options.
 
     Attributes
     ----------
     mesh, options
-        As given; `change` changes the options.
+        The mesh, and the current options (see `change`).
     sources : (k,) int64
-        `choose` changes them.
+        The current source vertices (see `choose`).
     distance : (n,) float64
-        From `sources` with `options`.
+        Distance from `sources` with `options`.
     t_coef : float
         The time step in use, in squared mean edge lengths.
     error : (n,) float64 or None
-        Of `distance`, in percent of the exact distance, 0 at the sources and ``inf`` out of reach; None until
-        `compare`, and again after any change.
+        Error of `distance` in percent of the exact distance, 0 at the sources and ``inf`` at unreachable vertices.
+        `compare` computes it; any change resets it to None.
     message : str
-        One line for the user on what was done last, or what went wrong.
+        One line for the user: the result of the last change, or the error.
 
     Raises
     ------
@@ -75,14 +75,14 @@ class Exploration:
         self._solve(self.sources, self.options)
 
     def choose(self, vertex: int, add: bool = False) -> None:
-        """Make `vertex` the source; with `add`, one more source, or none any more if it was one and not the last."""
+        """Make `vertex` the only source. With `add`, add it to the sources, or remove it if it is one of several."""
         chosen = {vertex}
         if add:
             chosen = set(self.sources.tolist()) ^ {vertex} or {vertex}
         self._solve(vertex_sources(sorted(chosen), self.mesh.n_vertices), self.options)
 
     def change(self, **options: Any) -> None:
-        """Change some of the options; what cannot be solved leaves all as it was, and `message` says why."""
+        """Change options. If the solver fails, nothing changes, and `message` gives the reason."""
         changed = replace(self.options, **options)
         try:
             self._solve(self.sources, changed)
@@ -90,7 +90,7 @@ class Exploration:
             self.message = str(error)
 
     def compare(self) -> None:
-        """Find the error against exact distance, which takes seconds; `message` has its mean, or why there is none."""
+        """Compute `error` against exact distance, which takes seconds; `message` gives the mean or the failure."""
         try:
             exact = reference.exact(self.mesh, self.sources)
         except (ReferenceSolverError, MissingExtraError) as problem:
@@ -111,7 +111,7 @@ class Exploration:
             solver = HeatMethodSolver(
                 self.mesh, t_coef=options.t_coef, boundary=options.boundary, refine=options.refine
             )
-        self._solvers[options] = solver  # the last one used comes last
+        self._solvers[options] = solver  # the dictionary is ordered by last use
         while len(self._solvers) > _KEPT_SOLVERS:
             del self._solvers[next(iter(self._solvers))]
         self.distance = solver.distance(sources)

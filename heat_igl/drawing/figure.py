@@ -26,7 +26,7 @@ _CURVE = "#ff4fd8"
 
 
 def lay_out(seen: Scene, lines: list[FloatArray], style: Style, table: Any, label: str, without_value: str) -> Picture:
-    """The figure: surface on the left, colour bar on the right, legend below. Lengths are inches."""
+    """The figure: surface on the left, colour bar on the right, legend below. Lengths are in inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -37,7 +37,7 @@ def lay_out(seen: Scene, lines: list[FloatArray], style: Style, table: Any, labe
     across = _WIDTH - left - right
     tall = float(np.clip(across * extent[1] / extent[0], 1.5, 2.6))
     columns, rows = (round(length * DPI) for length in (across, tall))
-    scale, centre = fitted(seen, columns, rows, 0.07 * DPI)  # a margin for markers at the rim
+    scale, centre = fitted(seen, columns, rows, 0.07 * DPI)  # the margin has room for markers at the rim
     points = to_pixels(turned, scale, centre)
 
     figure = Figure(figsize=(_WIDTH, bottom + tall + top), dpi=DPI / 2, facecolor="white")
@@ -58,7 +58,7 @@ def lay_out(seen: Scene, lines: list[FloatArray], style: Style, table: Any, labe
 
 
 def _draw_curves(axes: Any, lines: list[FloatArray], depth: FloatArray, colour: str) -> None:
-    """Lines through points given in pixels: full where they are seen, dotted where they are behind the surface."""
+    """Draw polylines through points in pixels: visible parts are solid, hidden parts dotted."""
     from matplotlib.collections import LineCollection
 
     runs: dict[bool, list[FloatArray]] = {False: [], True: []}

@@ -1,4 +1,4 @@
-"""A finished picture: shown by notebooks, written as a file that is complete or not there."""
+"""The result of drawing: a picture for notebooks and files."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ __all__ = ["DPI", "PAGE_SUFFIXES", "PICTURE_SUFFIXES", "Picture"]
 
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 PAGE_SUFFIXES = (".html", ".htm")
-DPI = 400  # of raster output: 8 cm become 1260 pixels
+DPI = 400  # resolution of raster output: 1260 pixels for 8 cm
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A finished picture; notebooks show it.
+    """A finished picture, which notebooks display.
 
     Attributes
     ----------
     figure : matplotlib.figure.Figure
-        For changes of one's own; independent of pyplot.
+        The figure, which may be changed. pyplot does not manage it.
     """
 
     figure: Figure
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write PNG, PDF or SVG, by the suffix of `path`; an existing file is replaced only by a complete one.
+        """Write a PNG, PDF or SVG file, according to the suffix. An existing file is replaced only by a complete one.
 
         Raises
         ------
         ValueError
-            If the suffix is another.
+            If the suffix is not .png, .pdf or .svg.
         OSError
             If the file cannot be written.
         """
@@ -51,7 +51,7 @@ class Picture:
 
     def _rendered(self, form: str, dpi: float = DPI) -> bytes:
         buffer = io.BytesIO()
-        # No date inside, so that the same input gives the same bytes.
+        # Without a date, the same input gives the same bytes.
         metadata = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}[form]
         self.figure.savefig(buffer, format=form, dpi=dpi, metadata=metadata)
         return buffer.getvalue()

@@ -1,7 +1,8 @@
-"""Pictures of a distance, or of another field, on a mesh: static ones without a display or OpenGL, and pages to turn.
+"""Static pictures and interactive pages of a distance or another field on a mesh. Needs the extra ``view``.
 
-matplotlib lays out the figure; `heat_igl.drawing` draws the surface, since matplotlib cannot hide what is behind and
-VTK needs OpenGL system libraries that slim machines lack. Needs the extra ``view``.
+Pictures need neither a display nor OpenGL. matplotlib lays out the figure. The surface is rasterized in
+`heat_igl.drawing.raster`: matplotlib does not remove hidden surfaces, and VTK needs OpenGL system libraries, which many
+servers lack.
 """
 
 from __future__ import annotations
@@ -36,44 +37,45 @@ def plot(
     colormap: str = "viridis_r",
     label: str = DISTANCE_LABEL,
 ) -> Picture:
-    """Draw a distance on a mesh: colours, isolines, and where it starts.
+    """Draw a distance on a mesh with colours, isolines and sources.
 
     Parameters
     ----------
     mesh : Mesh
-        Triangles, or tetrahedra, whose surface is drawn.
+        Triangles or tetrahedra; the boundary of tetrahedra is drawn.
     distance : (n,) array_like
-        As a solver returns it; ``inf`` is drawn grey.
+        Distance, as returned by a solver; ``inf`` is drawn grey.
     sources : optional
-        To mark: whatever ``solver.distance`` takes, vertices, points in faces and curves.
+        Sources to mark, as for `HeatMethodSolver.distance`: vertices, points in faces and curves.
     spacing : float, optional
-        Distance between isolines; a round number near a sixteenth of the largest distance by default.
+        Distance between isolines; by default a round number near a sixteenth of the largest distance.
     style : {"lines", "stripes", "plain"}
-        Isolines; light and full stripes in turn, each `spacing` wide, which show kinks and ripples best; or colours
-        alone.
+        "lines" draws isolines. "stripes" draws alternating light and full stripes of width `spacing`, which show kinks
+        and ripples best. "plain" draws colours only.
     curves : sequence of SurfaceCurve
-        Drawn on the surface; thin and dotted where they are behind it.
+        Curves on the mesh; their hidden parts are thin and dotted.
     view : (azimuth, elevation), optional
-        Where the viewer is, in degrees; see `heat_igl.drawing.camera.rotation`. By default a flat mesh is seen face on,
-        and another from the one of eight directions that shows the most of it and of its sources.
+        Direction of the viewer in degrees; see `heat_igl.drawing.camera.rotation`. By default a flat mesh is viewed at
+        right angles, and any other mesh from the one of eight directions that shows the most of the surface and of the
+        sources.
     up : {"x", "y", "z"}
-        The coordinate that points upwards.
+        The coordinate axis that points upwards.
     colormap : str
-        A colour map of matplotlib; the default is perceptually uniform.
+        Name of a matplotlib colour map; the default is perceptually uniform.
     label : str
         Title of the colour bar.
 
     Returns
     -------
     Picture
-        Shown by notebooks; `Picture.save` writes it.
+        Displayed by notebooks; `Picture.save` writes it to a file.
 
     Raises
     ------
     ValueError
-        If `distance` is not one number per vertex, holds NaN or nothing finite, or an option has no meaning.
+        If `distance` does not have shape (n,), contains NaN or no finite value, or an option is invalid.
     SourceError
-        If `sources` does not name vertices, or a curve does not lie on the mesh.
+        If `sources` are invalid, or a curve does not lie on the mesh.
     MissingExtraError
         If matplotlib is not installed.
     """
@@ -95,29 +97,29 @@ def plot_field(
     up: str = "y",
     colormap: str | None = None,
 ) -> Picture:
-    """Draw any number per vertex, such as heat or an error, by colours, with isolines if asked for.
+    """Draw a scalar field on a mesh, such as heat or an error, by colours and optional isolines.
 
     Parameters
     ----------
     values : (n,) array_like
-        ``inf`` is drawn grey.
+        Values at the vertices; ``inf`` is drawn grey.
     label : str
         Title of the colour bar.
     limits : (low, high), optional
-        Values at the ends of the colour bar; what lies beyond takes the colour of the end. By default from the smallest
-        value, or 0 if that is less, to the largest; where there are values of both signs, as far on either side of 0.
+        Values at the ends of the colour bar; values beyond take the colour of the nearer end. By default the range of
+        the values and 0, made symmetric about 0 if there are values of both signs.
     spacing : float, optional
-        Distance between isolines; none by default.
+        Difference between isolines; no isolines by default.
     colormap : str, optional
-        A colour map of matplotlib; by default "RdBu_r", whose middle is white, for limits on both sides of 0, and the
-        perceptually uniform "magma_r" for others.
+        Name of a matplotlib colour map. The default is "RdBu_r", which is white in the middle, for limits on both
+        sides of 0, and the perceptually uniform "magma_r" otherwise.
     mesh, sources, curves, view, up
         As for `plot`.
 
     Returns
     -------
     Picture
-        Shown by notebooks; `Picture.save` writes it.
+        Displayed by notebooks; `Picture.save` writes it to a file.
 
     Raises
     ------
@@ -136,17 +138,17 @@ def plot_field(
 
 
 def picture(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **options: Any) -> None:
-    """Draw `distance` and write it to `path`; options of `plot`, suffixes and errors of `Picture.save` too."""
+    """Draw a distance and write the picture to `path`: `plot` with its options, then `Picture.save`."""
     plot(mesh, distance, **options).save(path)
 
 
 def write_html(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **options: Any) -> None:
-    """Write an interactive page to `path`; options of `page`, errors of `Page.save` too."""
+    """Write an interactive page to `path`: `page` with its options, then `Page.save`."""
     page(mesh, distance, **options).save(path)
 
 
 def _limits(values: ArrayLike) -> tuple[float, float] | None:
-    """Symmetric limits for values of both signs; None leaves it to `scene`, which also says what is wrong."""
+    """Symmetric limits for values of both signs, otherwise None: `scene` then chooses limits and reports errors."""
     finite = np.asarray(values, dtype=np.float64)
     finite = finite[np.isfinite(finite)]
     if not len(finite) or not finite.min() < 0 < finite.max():
@@ -156,5 +158,5 @@ def _limits(values: ArrayLike) -> tuple[float, float] | None:
 
 
 def _lines_in_space(mesh: Mesh, curves: Sequence[SurfaceCurve], seen: Scene) -> list[FloatArray]:
-    """The corners of each curve, in the viewer's coordinates."""
+    """The vertices of each curve (k, 3) in viewer coordinates: right, up and near."""
     return [(curve.positions(mesh) - seen.centre) / seen.unit @ seen.turn.T for curve in curves]

@@ -1,8 +1,8 @@
-"""Which triangle does each pixel of a parallel projection show? A small depth buffer on numpy.
+"""Hidden surface removal by a depth buffer in numpy: the triangle that each pixel of a parallel projection shows.
 
-Matplotlib has no depth buffer, and OpenGL (VTK, pyvista) ends the interpreter on machines without its system libraries,
-as most servers are. Projections are parallel, so that barycentric coordinates on the screen are those on the triangle
-and a linear function is drawn exactly, not per face or per vertex.
+matplotlib has no depth buffer, and OpenGL (VTK, pyvista) ends the interpreter on machines without the OpenGL system
+libraries, such as most servers. In a parallel projection the barycentric coordinates on the screen equal those on the
+triangle, so a piecewise linear function is drawn exactly at every pixel.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["Pixels", "rasterize", "visible", "visible_runs"]
 
-# Candidate pixels handled at once: some 200 MB of temporary arrays.
+# Candidate pixels per chunk, which bounds temporary arrays to about 200 MB.
 _CHUNK = 2_000_000
 
-# Pixels whose centre is outside by this share of the triangle still count, so that none falls between two neighbours.
+# Tolerance on barycentric coordinates, so that no pixel centre falls between two adjacent triangles.
 _SLACK = 1e-9
 
 
 class Pixels(NamedTuple):
-    """The covered pixels, in no particular order.
+    """The covered pixels, in arbitrary order.
 
     Attributes
     ----------
     place : (p,) int64
-        ``row * width + column``.
+        Position of the pixel, ``row * width + column``.
     face : (p,) int64
-        The nearest triangle there.
+        The triangle that is visible at the pixel.
     weights : (p, 3) float64
-        Barycentric coordinates of the pixel's centre in it.
+        Barycentric coordinates of the pixel centre in that triangle.
     depth : (height, width) float64
-        Depth at each pixel, ``-inf`` where nothing is.
+        Depth at each pixel, ``-inf`` at uncovered pixels.
     """
 
     place: IntArray
@@ -45,16 +45,17 @@ class Pixels(NamedTuple):
 
 
 def rasterize(points: FloatArray, F: IntArray, width: int, height: int) -> Pixels:
-    """Draw triangles with hidden surfaces removed.
+    """Rasterize triangles with hidden surface removal.
 
     Parameters
     ----------
     points : (n, 3) float64
-        Column, row and depth of each vertex; pixel (r, c) has its centre at row r, column c; larger depth is nearer.
+        Column, row and depth of each vertex. The centre of pixel (r, c) is at row r and column c; a larger depth is
+        nearer to the viewer.
     F : (m, 3) int64
         Triangles, in either orientation.
     width, height : int
-        Size in pixels; what lies outside is cut off.
+        Size of the image in pixels; triangles are clipped to it.
     """
     corners = points[F]
     x, y, z = (corners[:, :, axis] for axis in range(3))
@@ -79,7 +80,7 @@ def rasterize(points: FloatArray, F: IntArray, width: int, height: int) -> Pixel
         here = z[face, 0] + b * (z[face, 1] - z[face, 0]) + c * (z[face, 2] - z[face, 0])
         nearer = here > depth[pixel]
         face, pixel, here = face[nearer], pixel[nearer], here[nearer]
-        # In ascending order the last one written per pixel is the nearest.
+        # In ascending order of depth the last value written to a pixel is the nearest.
         order = np.argsort(here, kind="stable")
         depth[pixel[order]] = here[order]
         shown[pixel[order]] = face[order]
@@ -95,7 +96,7 @@ def rasterize(points: FloatArray, F: IntArray, width: int, height: int) -> Pixel
 
 
 def _candidates(low: IntArray, high: IntArray) -> Iterator[tuple[IntArray, IntArray, IntArray]]:
-    """The (face, row, column) of every pixel in the box of each face, a chunk of them at a time."""
+    """Yield chunks of (face, row, column) for every pixel in the bounding box of each face."""
     size = np.maximum(high - low + 1, 0)
     count = size[:, 0] * size[:, 1]
     faces = np.flatnonzero(count)
@@ -113,28 +114,28 @@ def _candidates(low: IntArray, high: IntArray) -> Iterator[tuple[IntArray, IntAr
 
 
 def visible(points: FloatArray, depth: FloatArray, vertices: IntArray, tolerance: float) -> BoolArray:
-    """Which vertices are not behind something by more than `tolerance` pixels."""
+    """Mask of the vertices that are at most `tolerance` pixels behind the visible surface."""
     column, row = np.rint(points[vertices, :2]).astype(np.int64).T
     row, column = np.clip(row, 0, depth.shape[0] - 1), np.clip(column, 0, depth.shape[1] - 1)
     return np.asarray(points[vertices, 2] >= depth[row, column] - tolerance)
 
 
 def visible_runs(points: FloatArray, depth: FloatArray, tolerance: float) -> list[tuple[bool, FloatArray]]:
-    """A polyline cut into what is seen and what is behind something by more than `tolerance` pixels.
+    """Split a polyline into visible and hidden pieces.
 
     Parameters
     ----------
     points : (k, 3) float64
-        Column, row and depth of its corners.
+        Column, row and depth of the vertices of the polyline.
     depth : (height, width) float64
-        Of `rasterize`.
+        Depth buffer from `rasterize`.
     tolerance : float
-        In pixels.
+        A point is hidden if it is behind the surface by more than this number of pixels.
 
     Returns
     -------
     list of (bool, (j, 3) float64)
-        Whether it is seen, and the corners of a piece; pieces are told apart to about two pixels.
+        For each piece, whether it is visible, and the vertices. The ends of pieces are accurate to about two pixels.
     """
     if len(points) < 2:
         return []

@@ -1,4 +1,4 @@
-"""The brightness of pixels: contour lines, stripes and the light on the surface."""
+"""Contour lines, stripes and shading of rasterized surfaces."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def isoline_spacing(largest: float) -> float:
 
 
 def screen_gradient(points: FloatArray, F: IntArray, values: FloatArray) -> FloatArray:
-    """Norm (m,) of the change per pixel of a function with `values` (n,) at the vertices; ``inf`` if seen edge on."""
+    """Norm (m,) of the gradient per pixel of the linear function with `values` (n,); ``inf`` for faces seen edge on."""
     corners, f = points[F, :2], values[F]
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     df1, df2 = f[:, 1] - f[:, 0], f[:, 2] - f[:, 0]
@@ -34,23 +34,23 @@ def screen_gradient(points: FloatArray, F: IntArray, values: FloatArray) -> Floa
 def isoline_coverage(
     values: FloatArray, per_pixel: FloatArray, step: float, width: float, at_zero: bool = False
 ) -> FloatArray:
-    """How much of each pixel (p,) a contour line at a multiple of `step` covers, from 0 to 1.
+    """Fraction (p,) of each pixel that is covered by a contour line at a multiple of `step`.
 
-    Lines are `width` pixels wide on the screen, but no wider than a quarter of their distance, so that a surface that
-    turns away does not go black.
+    Lines are `width` pixels wide on the screen, but at most a quarter of the distance between lines; otherwise a
+    surface that is seen at a grazing angle would become black.
 
     Parameters
     ----------
     values : (p,) float64
-        The function at the pixel's centre.
+        Values of the function at the pixel centres.
     per_pixel : (p,) float64
-        Its change per pixel, from `screen_gradient`.
+        Change of the function per pixel, from `screen_gradient`.
     step : float
-        Distance between levels.
+        Difference between levels.
     width : float
-        In pixels.
+        Width of a line in pixels.
     at_zero : bool
-        Whether there is a line at 0; a distance is 0 at its sources, which are marked otherwise.
+        Whether to draw a line at 0. Distances need none, since their sources are marked by dots.
     """
     level = np.rint(values / step)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -62,9 +62,9 @@ def isoline_coverage(
 
 
 def stripe_coverage(values: FloatArray, per_pixel: FloatArray, step: float) -> FloatArray:
-    """How much of each pixel (p,) lies in every second stripe of width `step`, from 0 to 1; the first one is not.
+    """Fraction (p,) of each pixel in the odd stripes [step, 2 step), [3 step, 4 step), ...
 
-    The mean over the values inside the pixel, so that stripes too narrow to be seen become an even tone.
+    The fraction is the mean over the values inside the pixel. Stripes narrower than a pixel blend to an even tone.
 
     Parameters
     ----------
@@ -85,9 +85,9 @@ def stripe_coverage(values: FloatArray, per_pixel: FloatArray, step: float) -> F
 
 
 def shading(points: FloatArray, F: IntArray, pixels: Pixels) -> FloatArray:
-    """A mild brightness factor (p,) that lets the shape be read: light from the upper left, in front.
+    """Brightness factor (p,) of each pixel for a light in front, at the upper left.
 
-    Normals are turned to the viewer, so that faces may be oriented either way, and smoothed over neighbours except
+    Normals point towards the viewer for either orientation of the faces. They are smoothed over adjacent faces except
     across creases.
     """
     a, b, c = (points[F[:, corner]] for corner in range(3))
@@ -104,6 +104,6 @@ def shading(points: FloatArray, F: IntArray, pixels: Pixels) -> FloatArray:
     corners = np.where(crease[:, :, None], own, smooth)
     here = np.einsum("pc,pck->pk", pixels.weights, corners[pixels.face])
     here /= np.maximum(np.linalg.norm(here, axis=1, keepdims=True), 1e-300)
-    # Rows run downwards. A face seen face on has factor 1, so that its colour is that of the colour bar.
+    # Rows run downwards. A face at right angles to the view has factor 1, the colour of the colour bar.
     light = np.array([-0.53, -0.73, 1.0])
     return np.asarray(0.6 + 0.4 * np.clip(here @ light, 0.0, 1.15) ** 0.8)

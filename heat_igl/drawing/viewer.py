@@ -1,4 +1,4 @@
-"""A polyscope window on an `Exploration` (extra ``view``)."""
+"""An interactive window by polyscope (extra ``view``): a click moves the source, and the distance is updated."""
 
 from __future__ import annotations
 
@@ -21,30 +21,30 @@ _REFINEMENTS = ("none", *get_args(Refine))
 
 _T_COEF = (0.1, 100.0)
 
-# Pixels that the mouse may move during a click.
+# Largest movement of the mouse during a click, in pixels.
 _STILL = 4.0
 
 
 def display_problem() -> str | None:
-    """Why no window can be opened here; None where nothing speaks against it."""
-    from importlib.util import find_spec
-
+    """The reason why no window can be opened, or None."""
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         return "there is no display"
-    if find_spec("polyscope") is None:
-        return str(MissingExtraError.of("a window", "polyscope", "view"))
+    try:
+        MissingExtraError.check("a window", "polyscope", "view")
+    except MissingExtraError as error:
+        return str(error)
     return None
 
 
 class Window:
-    """A polyscope window on an `Exploration`; there can be one per process.
+    """A polyscope window that shows an `Exploration`. A process can have one window.
 
     Parameters
     ----------
     exploration : Exploration
-        Changed by what the user does.
+        The state that the window shows and changes.
     title : str
-        Of the window.
+        Title of the window.
 
     Raises
     ------
@@ -57,18 +57,16 @@ class Window:
     _MESH, _SOURCES = "mesh", "sources"
 
     def __init__(self, exploration: Exploration, title: str = "heat-igl") -> None:
-        try:
+        with MissingExtraError.guard("a window", "polyscope", "view"):
             import polyscope
             import polyscope.imgui
-        except ImportError:
-            raise MissingExtraError.of("a window", "polyscope", "view") from None
         self._ps: Any = polyscope
         self._gui: Any = polyscope.imgui
         self.exploration = exploration
         self._shows_error = False
         ps, mesh = self._ps, exploration.mesh
         ps.set_program_name(title)
-        ps.set_use_prefs_file(False)  # no settings left behind in the current directory
+        ps.set_use_prefs_file(False)  # otherwise polyscope writes settings into the current directory
         ps.set_print_prefix("heat-igl: ")
         ps.set_verbosity(0)
         ps.init()
@@ -84,11 +82,11 @@ class Window:
         self._ps.show()
 
     def frame(self) -> None:
-        """What happens once per frame: the controls, and the vertex that was clicked."""
+        """Draw the controls and handle clicks; polyscope calls this once per frame."""
         gui, now = self._gui, self.exploration
         gui.TextUnformatted("Click: source here. Shift and click: one more, or one less.")
         moved, t_coef = gui.SliderFloat("t / h^2", now.t_coef, *_T_COEF, flags=gui.ImGuiSliderFlags_Logarithmic)
-        # Factoring follows when the slider is let go.
+        # The new time step is applied when the slider is released.
         self._t_coef = t_coef if moved else getattr(self, "_t_coef", now.t_coef)
         changes: dict[str, Any] = {}
         if gui.IsItemDeactivatedAfterEdit():
@@ -120,9 +118,9 @@ class Window:
         return choices[int(index)]
 
     def _clicked(self) -> int | None:
-        """The vertex under a mouse button that was pressed and let go in one place.
+        """The vertex that was clicked in this frame, or None.
 
-        Not polyscope's own selection, which a click with Shift does not change, and which opens a panel.
+        The selection of polyscope is not used: a click with Shift does not change it, and it opens a panel.
         """
         gui, ps = self._gui, self._ps
         ps.reset_selection()
@@ -135,7 +133,7 @@ class Window:
         if not hit.is_hit:
             return None
         index = int(hit.structure_data["index"])
-        # A dot hides the vertex that it marks.
+        # A dot covers the vertex of the source.
         return int(self.exploration.sources[index]) if hit.structure_name == self._SOURCES else index
 
     def _show(self) -> None:
@@ -143,7 +141,7 @@ class Window:
         finite = np.isfinite(now.distance)
         largest = float(now.distance[finite].max()) or 1.0
         self._surface.remove_all_quantities()
-        # What is out of reach takes the colour of the farthest; the message says how many vertices that are.
+        # Unreachable vertices take the colour of the farthest; the message counts them.
         self._surface.add_distance_quantity(
             "distance", np.where(finite, now.distance, largest), enabled=not self._shows_error, vminmax=(0.0, largest),
             stripe_size=isoline_spacing(largest), stripe_size_relative=False, cmap="viridis",

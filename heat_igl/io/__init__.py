@@ -1,4 +1,4 @@
-"""Files: meshes in, meshes with attributes out, curves out."""
+"""Files: reading meshes, writing meshes with vertex attributes, and writing curves."""
 
 from heat_igl.io.atomic import complete_file
 from heat_igl.io.curves import CURVE_SUFFIXES, write_curves
