@@ -1,4 +1,4 @@
-"""Geodesic distance on meshes by the heat method, on libigl's operators."""
+"""Geodesic distance on meshes by the heat method, with operators from libigl."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -119,7 +119,7 @@ __all__ = [
 
 __version__ = "0.1.0"
 
-# Loaded on first use, since a distance does without: attribute -> the submodule that it is, or is in.
+# Lazy attribute -> submodule, imported on first use because a distance does not need it.
 _LAZY = {
     "ValidationReport": "validation.report",
     "ValidationRow": "validation.report",
@@ -132,7 +132,7 @@ _LAZY = {
     "validate": "validation",
 }
 
-if not TYPE_CHECKING:  # else any misspelt name would pass for one of these
+if not TYPE_CHECKING:  # type checkers would otherwise accept any misspelt attribute
 
     def __getattr__(name: str) -> Any:
         if name not in _LAZY:

@@ -24,7 +24,7 @@ from rich.progress import Progress
 from rich.text import Text
 
 import heat_igl
-from heat_igl.drawing.output import PAGE_SUFFIXES, PICTURE_SUFFIXES, Picture, replace_file
+from heat_igl.drawing import PAGE_SUFFIXES, PICTURE_SUFFIXES, Picture
 from heat_igl.errors import (
     AccuracyWarning,
     BatchError,
@@ -35,7 +35,7 @@ from heat_igl.errors import (
     SourceError,
 )
 from heat_igl.heat_method import HeatMethodSolver, Magnitude
-from heat_igl.io import CURVE_SUFFIXES, read_mesh, write_mesh
+from heat_igl.io import CURVE_SUFFIXES, complete_file, read_mesh, write_mesh
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, closest_points
 from heat_igl.operators import Laplacian
@@ -311,7 +311,8 @@ def validate(
     if picture is not None:
         Picture(report.plot()).save(picture)
     if json_file is not None:
-        replace_file(json_file, (json.dumps(report.to_dict(), indent=1, allow_nan=False) + "\n").encode("utf8"))
+        with complete_file(json_file) as temporary:
+            temporary.write_bytes((json.dumps(report.to_dict(), indent=1, allow_nan=False) + "\n").encode("utf8"))
     print(report.to_markdown(), end="")
     exceeding = report.exceeding(fail_above) if fail_above is not None else ()
     if exceeding:
@@ -352,7 +353,7 @@ def view(
         else:
             window.run()
             return
-    from heat_igl.drawing.plots import write_html
+    from heat_igl.drawing import write_html
 
     kind = f"unfolded in heat order (refine = {refine})" if refine else "the heat method"
     write_html(
@@ -474,7 +475,7 @@ def _require(package: str, purpose: str, extra: str) -> None:
 def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, picture: Path | None) -> list[Path]:
     drawn = None
     if picture is not None:
-        from heat_igl.drawing.plots import plot
+        from heat_igl.drawing import plot
 
         # Drawn before anything is written, since it is what may still fail.
         with Console(stderr=True).status("drawing"):

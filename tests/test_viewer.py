@@ -15,7 +15,7 @@ import pytest
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.drawing import viewer
+from heat_igl.drawing import exploration, viewer
 from heat_igl.drawing.viewer import Exploration, Options
 
 
@@ -68,7 +68,7 @@ def test_few_solvers_are_kept(sphere: heat_igl.Mesh, monkeypatch: pytest.MonkeyP
         made.append(options["t_coef"])
         return build(*arguments, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(viewer, "HeatMethodSolver", counting)
+    monkeypatch.setattr(exploration, "HeatMethodSolver", counting)
     now = Exploration(sphere, 0)
     for t_coef in (2.0, 1.0, 3.0, 4.0, 1.0, 5.0, 2.0):
         now.change(t_coef=t_coef)

@@ -1,4 +1,4 @@
-"""How work is run: threads, blocks of right-hand sides, memory, compiled kernels."""
+"""Execution: threads, blocks of right-hand sides, memory and compiled kernels."""
 
 from heat_igl.runtime.blocks import (
     WORKING_MEMORY,
