@@ -198,9 +198,9 @@ def test_flat_faces_leave_distances_as_they_are(share, cap):
 @pytest.mark.parametrize("mollification", [1e-8, 1e-11, 1e-12])
 def test_flips_come_to_an_end_on_flat_faces(cow, monkeypatch, mollification):
     """Rounding makes some flips of flat triangles undo each other; with hardly any mollification, for ever."""
-    monkeypatch.setattr(heat_igl.intrinsic, "_MOLLIFICATION", mollification)
+    monkeypatch.setattr(heat_igl.intrinsic.mollification, "_MARGIN", mollification)
     rounds = []
-    flip = heat_igl.intrinsic._Flips.flip
+    flip = heat_igl.intrinsic.delaunay._Flips.flip
 
     def counted(self, half_edge):
         rounds.append(len(half_edge))
@@ -208,7 +208,7 @@ def test_flips_come_to_an_end_on_flat_faces(cow, monkeypatch, mollification):
             pytest.fail("flips do not end")
         return flip(self, half_edge)
 
-    monkeypatch.setattr(heat_igl.intrinsic._Flips, "flip", counted)
+    monkeypatch.setattr(heat_igl.intrinsic.delaunay._Flips, "flip", counted)
     found = delaunay(with_flat_faces(cow, 0.0, True))
     assert found.n_flips > 1000
     assert found.areas.sum() == pytest.approx(cow.measures.sum(), rel=1e-6)

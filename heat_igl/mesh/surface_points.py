@@ -12,12 +12,12 @@ from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["ON_SIDE", "ON_SIDE_COMPUTED", "SurfaceCurve", "SurfacePoints", "require_triangles"]
 
-# A point lies on a side of its face if its barycentric coordinate is below this. For given coordinates: numbers of order
-# 1, rounded by some 1e-16 in each operation; 1e-12 allows for thousands of these.
+# A point lies on a side of its face if its barycentric coordinate is below this. For given coordinates: numbers of
+# order 1, rounded by some 1e-16 in each operation; 1e-12 allows for thousands of these.
 ON_SIDE = 1e-12
-# The same for coordinates computed from positions or lengths. A position at the distance R from the origin is rounded by
-# 1e-16 R, and that is 1e-9 of the height of a face as small as 1e-7 R. A user may have computed coordinates like that,
-# so they may also be negative, or miss a sum of 1, by this much.
+# The same for coordinates computed from positions or lengths. A position at the distance R from the origin is rounded
+# by 1e-16 R, and that is 1e-9 of the height of a face as small as 1e-7 R. A user may have computed coordinates like
+# that, so they may also be negative, or miss a sum of 1, by this much.
 ON_SIDE_COMPUTED = 1e-9
 
 
