@@ -1,5 +1,6 @@
 """Triangulations known by edge lengths: flips and their history, mollification, the tufted cover, fans of angles."""
 
+from heat_igl.intrinsic.adjacency import Adjacency
 from heat_igl.intrinsic.delaunay import intrinsic_delaunay
 from heat_igl.intrinsic.gluing import from_edge_lengths, intrinsic_triangulation, oriented
 from heat_igl.intrinsic.gradient import intrinsic_gradient
@@ -10,6 +11,7 @@ from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.intrinsic.tufted import has_nonmanifold_edges, tufted_cover
 
 __all__ = [
+    "Adjacency",
     "Flipped",
     "IntrinsicTriangulation",
     "Merged",

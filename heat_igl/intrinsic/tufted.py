@@ -13,8 +13,7 @@ import numpy as np
 
 from heat_igl.intrinsic.mollification import mollify
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
-from heat_igl.mesh import Mesh
-from heat_igl.mesh.grouping import next_in_run
+from heat_igl.mesh import Mesh, grouping
 from heat_igl.typing import FloatArray
 
 __all__ = ["has_nonmanifold_edges", "tufted_cover"]
@@ -59,7 +58,7 @@ def tufted_cover(mesh: Mesh) -> IntrinsicTriangulation:
     counterclockwise, clockwise = np.where(along, front, back), np.where(along, back, front)
 
     order = np.lexsort((_angles(mesh), edge))
-    following = next_in_run(order, mesh.facets.n_faces)
+    following = grouping.next_in_run(order, mesh.facets.n_faces)
     a, b = counterclockwise[order], clockwise[following]
     twin = np.empty(2 * F.size, np.int64)
     twin[a], twin[b] = b, a
