@@ -216,8 +216,8 @@ def _curves(mesh: Mesh, values: FloatArray, level: float) -> list[SurfaceCurve]:
     for i, point in ((0, start), (1, end)):
         point[rows, found.apex] = 1 - found.toward[:, i]
         point[rows, (found.apex + 1 + i) % 3] = found.toward[:, i]
-    # A segment runs from the edge between the apex and the next corner to the edge between the apex and the corner after
-    # that, each opposite the third corner: the apex is on the left.
+    # A segment runs from the edge between the apex and the next corner to the edge between the apex and the corner
+    # after that, each opposite the third corner: the apex is on the left.
     ends = np.stack([mesh.facets.of_face[found.faces, (found.apex + 2 - i) % 3] for i in (0, 1)], axis=1)
     turned = ~found.is_below
     start[turned], end[turned] = end[turned], start[turned]

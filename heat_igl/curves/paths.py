@@ -24,8 +24,8 @@ __all__ = ["shortest_paths"]
 
 # Edges are at least this long, in mean edge lengths: the kernel divides by lengths.
 _SHORTEST = 1e-12
-# A path passes a source vertex whose distance is below the offset of the source by more than this share, the rounding of
-# refined distances: the vertex is nearer to another source.
+# A path passes a source vertex whose distance is below the offset of the source by more than this share, the rounding
+# of refined distances: the vertex is nearer to another source.
 _SAME_DISTANCE = 1e-9
 
 

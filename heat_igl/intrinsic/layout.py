@@ -46,8 +46,9 @@ def lay_out(l: FloatArray) -> FloatArray:  # noqa: E741
 def corner_angles(l: FloatArray) -> FloatArray:  # noqa: E741
     """Angle (k, 3) at each corner of triangles with edge lengths `l` (k, 3), opposite the corners.
 
-    By the formula for half the angle, ``tan^2 = (s - b)(s - c) / (s (s - a))`` with s half the perimeter: it keeps its
-    digits for needles and caps, while the arccosine of the cosine rule loses half of them near 0 and pi.
+    From half the angle, ``tan^2 = (s - b)(s - c) / (s (s - a))`` with s half the perimeter. The error is that of a
+    change of the lengths by some 1e-16 of the longest; the arccosine of the cosine rule loses half the digits of a
+    small angle.
     """
     beside = np.roll(l, -1, axis=1), np.roll(l, 1, axis=1)
     half = l.sum(axis=1, keepdims=True) / 2
