@@ -1,6 +1,6 @@
 """Generated domains, most with a known distance, for tests, benchmarks and notebooks.
 
-Every function returns a `Mesh`, but for `flat_torus`, which fits into no space and is given by its edge lengths.
+Every function returns a `Mesh`, except `flat_torus`: its triangles are known by their edge lengths only.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ def _at_least(name: str, value: int, least: int) -> int:
 
 
 def _lattice_faces(rows: int, columns: int, wrap_rows: bool = False, wrap_columns: bool = False) -> IntArray:
-    """Triangles of a lattice of vertices ``row * columns + column``; the diagonal joins (0, 1) to (1, 0).
+    """Triangles of a lattice of vertices ``row * columns + column``; the diagonal of a cell joins (0, 1) to (1, 0).
 
-    A lattice that wraps has a row (column) of cells between its last and its first row (column) of vertices.
+    A lattice that wraps has a row (column) of cells between the last and the first row (column) of vertices.
     """
     i = np.arange(rows if wrap_rows else rows - 1)[:, None]
     j = np.arange(columns if wrap_columns else columns - 1)[None, :]
@@ -51,10 +51,10 @@ def _lattice_faces(rows: int, columns: int, wrap_rows: bool = False, wrap_column
 
 
 def grid(n: int) -> Mesh:
-    """The unit square with n by n cells, step 1 / n, the mesh of the paper's section 4.2.
+    """The unit square with n by n cells of side 1 / n, the mesh of the paper's section 4.2.
 
-    Vertex ``row * (n + 1) + column`` lies at (column / n, row / n, 0); diagonals run as in the paper, from (0, 1) to
-    (1, 0) of each cell. Distance is Euclidean.
+    Vertex ``row * (n + 1) + column`` lies at (column / n, row / n, 0). Diagonals run from (0, 1) to (1, 0) of each
+    cell, as in the paper. Distance is Euclidean.
     """
     n = _at_least("n", n, 1)
     y, x = np.divmod(np.arange((n + 1) ** 2), n + 1)
@@ -74,7 +74,7 @@ def strip(length: int, width: int) -> Mesh:
 
 
 def disk(n: int) -> Mesh:
-    """The unit disk by n rings of triangles around vertex 0, ring k with 6 k vertices. Distance is Euclidean."""
+    """The unit disk: n rings of triangles around vertex 0, ring k with 6 k vertices. Distance is Euclidean."""
     n = _at_least("n", n, 1)
     points: list[FloatArray] = [np.zeros((1, 2))]
     faces: list[IntArray] = []
@@ -84,7 +84,7 @@ def disk(n: int) -> Mesh:
         points.append(k / n * np.stack([np.cos(angle), np.sin(angle)], axis=1))
         outer = inner[-1] + 1 + np.arange(6 * k)
         sector, step = np.divmod(np.arange(6 * k), k)
-        # Each of the six sectors has k outer edges, and k - 1 inner ones between which the zigzag runs.
+        # Each of the six sectors has k outer edges and k - 1 inner edges, with a zigzag between them.
         below = inner[(sector * (k - 1) + step) % len(inner)]
         faces.append(np.stack([below, outer, np.roll(outer, -1)], axis=1))
         zigzag = step < k - 1
@@ -97,10 +97,10 @@ def disk(n: int) -> Mesh:
 
 
 def icosphere(subdivisions: int) -> Mesh:
-    """The unit sphere by subdividing an icosahedron, 10 * 4^subdivisions + 2 vertices.
+    """The unit sphere by subdivision of an icosahedron, with 10 * 4^subdivisions + 2 vertices.
 
     Distance on the sphere between positions p and q is the angle arccos(p . q); distance on the polyhedron is shorter
-    by the order of h^2. Vertices 0 and 3 of the icosahedron need not be antipodes, but every vertex has its antipode.
+    by the order of h^2. For every vertex, the antipode is a vertex too.
     """
     V, F = igl.icosahedron()
     for _ in range(_at_least("subdivisions", subdivisions, 0)):
@@ -112,7 +112,7 @@ def icosphere(subdivisions: int) -> Mesh:
 def cylinder(around: int, along: int, length: float = 2 * np.pi) -> Mesh:
     """An open cylinder of radius 1 about the z axis, `around` vertices per ring, `along` cells in its `length`.
 
-    Vertex ``ring * around + k`` lies at the angle 2 pi k / around. Rolled out, distance is Euclidean.
+    Vertex ``ring * around + k`` lies at the angle 2 pi k / around. Distance is Euclidean on the unrolled cylinder.
     """
     around, along = _at_least("around", around, 3), _at_least("along", along, 1)
     ring, k = np.divmod(np.arange(around * (along + 1)), around)
@@ -122,11 +122,11 @@ def cylinder(around: int, along: int, length: float = 2 * np.pi) -> Mesh:
 
 
 def book(pages: int, n: int) -> Mesh:
-    """Unit squares of n by n cells, one per page, that share an edge: the spine, on the z axis from 0 to 1.
+    """Unit squares of n by n cells, the pages, that share an edge, the spine, on the z axis from 0 to 1.
 
     Vertex ``column * (n + 1) + row`` of page 0 lies at the height row / n and the distance column / n from the spine;
-    the other pages follow with their columns from 1 to n. More than two faces meet at the spine of three pages or
-    more. Any two pages unfold to a rectangle: with r the distance from the spine and z the height, distance is
+    the other pages follow with columns 1 to n. With three pages or more, more than two faces meet at the spine. Any two
+    pages unfold to a rectangle: with r the distance from the spine and z the height, distance is
     ``hypot(r - r', z - z')`` on one page and ``hypot(r + r', z - z')`` between two.
     """
     pages, n = _at_least("pages", pages, 1), _at_least("n", n, 1)
@@ -140,10 +140,11 @@ def book(pages: int, n: int) -> Mesh:
 
 
 def cone(around: int, along: int, half_angle: float = np.pi / 6) -> Mesh:
-    """A cone of slant height 1 with its apex, vertex 0, at the origin, opening upwards about the z axis.
+    """A cone about the z axis, of slant height 1, with the apex, vertex 0, at the origin, open at the top.
 
-    Vertex ``1 + ring * around + k`` lies at the slant height (ring + 1) / along and the angle 2 pi k / around. Rolled
-    out, the cone is a sector of the angle 2 pi sin(half_angle), in which distance is Euclidean or goes by the apex.
+    Vertex ``1 + ring * around + k`` lies at the slant height (ring + 1) / along and the angle 2 pi k / around. The
+    unrolled cone is a sector of the angle 2 pi sin(half_angle). Distance is Euclidean in the sector, or the sum of the
+    slant heights if the shortest path passes the apex.
     """
     around, along = _at_least("around", around, 3), _at_least("along", along, 1)
     ring, k = np.divmod(np.arange(around * along), around)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 import scipy.sparse.linalg as spl
 
 from heat_igl.mesh import Mesh, connectivity
@@ -41,9 +40,7 @@ def graph_distance(mesh: Mesh, sources: Sources, *, count_edges: bool = False) -
         If the sources are not vertices of the mesh.
     """
     chosen = vertex_sources(sources, mesh.n_vertices)
-    graph = connectivity.shortest_edge_graph(mesh.edges, mesh.edge_lengths, mesh.n_vertices)
-    found = csgraph.dijkstra(graph, directed=False, indices=chosen, unweighted=count_edges, min_only=True)
-    return np.asarray(found, np.float64)
+    return connectivity.edge_distance(mesh.edge_graph, chosen, count_edges=count_edges)
 
 
 def graph_limit(A: sp.spmatrix, sources: Sources, log_t: float) -> FloatArray:
@@ -88,7 +85,7 @@ def graph_limit(A: sp.spmatrix, sources: Sources, log_t: float) -> FloatArray:
     chosen = vertex_sources(sources, matrix.shape[0])
     matrix.data[np.abs(matrix.data) <= _ROUNDING * np.abs(matrix.data).max(initial=0.0)] = 0.0
     matrix.eliminate_zeros()
-    edges = csgraph.dijkstra(abs(matrix), directed=False, indices=chosen, unweighted=True, min_only=True)
+    edges = connectivity.edge_distance(abs(matrix), chosen, count_edges=True)
     reached = np.flatnonzero(np.isfinite(edges))
     graph = sp.coo_array(matrix[reached][:, reached])
     n = edges[reached]

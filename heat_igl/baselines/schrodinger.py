@@ -15,7 +15,7 @@ from heat_igl.baselines.grids import grid_sources, grid_spacing
 from heat_igl.baselines.linear import domain_of, fallen_from_sources, log_step, reached_from, time_step
 from heat_igl.errors import MeshError
 from heat_igl.heat_method import smallest_time_step
-from heat_igl.intrinsic import IntrinsicTriangulation
+from heat_igl.intrinsic import IntrinsicTriangulation, corner_angles
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Operators
 from heat_igl.sources import Sources, vertex_sources
@@ -98,9 +98,7 @@ def schrodinger(
 
 def _total_angles(triangulation: IntrinsicTriangulation) -> FloatArray:
     """The sum (n,) of the angles around each vertex: 2 pi inside a plane, pi on a straight boundary."""
-    square = triangulation.l**2
-    product = triangulation.l[:, [1, 2, 0]] * triangulation.l[:, [2, 0, 1]]
-    angle = np.arccos(np.clip((square.sum(axis=1, keepdims=True) - 2 * square) / (2 * product), -1, 1))
+    angle = corner_angles(triangulation.l)
     return np.asarray(
         np.bincount(triangulation.F.ravel(), weights=angle.ravel(), minlength=triangulation.n), np.float64
     )
