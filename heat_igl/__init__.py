@@ -37,6 +37,7 @@ from heat_igl.mesh import (
     split_long_edges,
 )
 from heat_igl.operators import Operators, polygon_operators, speed_operators
+from heat_igl.runtime.aliases import alias_modules
 from heat_igl.sampling import (
     VoronoiCells,
     diameter,
@@ -131,6 +132,24 @@ _LAZY = {
     "reference": "reference",
     "validate": "validation",
 }
+
+# Modules that users import by these names: earlier name -> the module in its room.
+_EARLIER_NAMES = {
+    "closed_forms": "validation.closed_forms",
+    "factorization": "linear",
+    "metrics": "validation.metrics",
+    "paths": "curves.paths",
+    "plots": "drawing.plots",
+    "polygons": "mesh.polygons",
+    "projection": "mesh.projection",
+    "refine": "unfolding",
+    "solution": "heat_method.solution",
+    "speed": "operators.speed",
+    "subdivision": "mesh.subdivision",
+    "surface_points": "mesh.surface_points",
+    "viewer": "drawing.viewer",
+}
+alias_modules({f"{__name__}.{name}": f"{__name__}.{target}" for name, target in _EARLIER_NAMES.items()})
 
 if not TYPE_CHECKING:  # type checkers would otherwise accept any misspelt attribute
 

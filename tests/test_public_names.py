@@ -99,17 +99,16 @@ plots.picture(path, mesh, distance)
 """.strip().splitlines()
 
 # The statements of README, guide and notebooks.
-moved = pytest.mark.xfail(strict=True, reason="the module has moved, and its old name is not importable")
 STATEMENTS = [
     "from heat_igl.applications import EdgeSearch, particle_length, reconstruct, skeleton, zones_of_influence",
     "from heat_igl.baselines import graph_distance",
     "from heat_igl.demo import sample_mesh",
-    pytest.param("from heat_igl.factorization import factorize", marks=moved),
+    "from heat_igl.factorization import factorize",
     "from heat_igl.heat_method import HeatMethodSolver",
     "from heat_igl.io import read_mesh",
     "from heat_igl.mesh import Mesh",
     "from heat_igl.operators import Operators, operators",
-    pytest.param("from heat_igl.plots import Page, Picture, page, plot, plot_field", marks=moved),
+    "from heat_igl.plots import Page, Picture, page, plot, plot_field",
     "from heat_igl.steps import damping, diffuse, fitted_laplacian, integrate, normalize",
     "from heat_igl.validation import draw_sources",
 ]
