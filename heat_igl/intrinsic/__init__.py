@@ -1,5 +1,6 @@
 """Triangulations known by edge lengths: flips and their history, mollification, the tufted cover, fans of angles."""
 
+from heat_igl.intrinsic.double_cover import double_cover
 from heat_igl.intrinsic.history import Flipped, Merged, Turned, apex
 from heat_igl.intrinsic.triangulation import (
     IntrinsicTriangulation,
@@ -18,6 +19,7 @@ __all__ = [
     "Merged",
     "Turned",
     "apex",
+    "double_cover",
     "from_edge_lengths",
     "has_nonmanifold_edges",
     "intrinsic_delaunay",

@@ -16,13 +16,10 @@ import scipy.sparse as sp
 
 from heat_igl.errors import MeshError
 from heat_igl.mesh import connectivity
+from heat_igl.runtime import RANGE_LIMIT
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["DELAUNAY_TOLERANCE", "RANGE_LIMIT", "Mesh", "MeshReport", "checked_positions"]
-
-# How many lengths sqrt(t) the heat survives in double precision: values run from 1e290 (the rest is left for the
-# gradient's 1 / length) down to 1e-300, 590 decades or 1358 e-foldings, less a margin for the first step away.
-RANGE_LIMIT = 1300.0
 
 # An edge is flipped when the cotangents opposite it sum to less than this. Cocircular corners (every quad of a grid, a
 # cylinder or a torus) sum to zero up to rounding; flipping those would change nothing but the bits, and a larger
