@@ -27,7 +27,7 @@ from scipy.spatial import ConvexHull
 from heat_igl import Mesh, read_mesh
 from heat_igl.linear import analyse
 from heat_igl.operators import Operators, operators
-from heat_igl.steps import Descent, HeatFlow, PoissonProblem
+from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem
 
 from measuring import bandwidth, seconds_of
 from scaffold import add_seed, environment, option_parser, publish, table
@@ -59,7 +59,7 @@ def run(domain: Operators, backend: str) -> dict[str, float]:
         b[np.arange(k) * (n // k), np.arange(k)] = 1e290
         row[name] = seconds_of(lambda b=b: poisson.solve(heat.solve(b))) / k
     u = heat.solve(b[:, :1])
-    descent = Descent(domain, t)
+    descent = NormalizedDivergence(domain, t)
     row["kernel"] = seconds_of(lambda: descent.divergence(u))
     factors = [*heat.factors, poisson.factor]
     row["nonzeros"] = sum(factor.nonzeros for factor in factors)

@@ -35,7 +35,7 @@ from heat_igl import (
     validation,
 )
 from heat_igl.operators import Operators, operators
-from heat_igl.steps import Descent
+from heat_igl.steps import NormalizedDivergence
 from heat_igl.validation import draw_sources
 from heat_igl.validation.plots import error_figure
 
@@ -67,9 +67,9 @@ def test_threshold_catches_broken_heat_steps(mesh: Mesh, percent: float) -> None
 
 
 def test_threshold_catches_a_field_that_points_to_the_source(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, right = shapes.grid(20), Descent.divergence
+    mesh, right = shapes.grid(20), NormalizedDivergence.divergence
     assert not validate(mesh, 0, ["heat"]).exceeding(3.5)
-    monkeypatch.setattr(Descent, "divergence", lambda self, u: -right(self, u))
+    monkeypatch.setattr(NormalizedDivergence, "divergence", lambda self, u: -right(self, u))
     assert validate(mesh, 0, ["heat"]).exceeding(3.5)
 
 

@@ -15,17 +15,16 @@ import scipy.sparse as sp
 from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method import smallest_time_step
 from heat_igl.linear import factorize
-from heat_igl.mesh import RANGE_LIMIT, Mesh
+from heat_igl.mesh import Mesh
 from heat_igl.operators import Operators, operators
+from heat_igl.runtime import LOWEST_HEAT as _LOWEST_HEAT
+from heat_igl.runtime import RANGE_LIMIT
+from heat_igl.runtime import SOURCE_HEAT as _SOURCE_HEAT
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.steps import HeatFlow
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["boundary_problem", "log_heat_kernel", "varadhan"]
-
-# Heat at a source, and the smallest heat with full precision, as in `heat_method`.
-_SOURCE_HEAT = 1e290
-_LOWEST_HEAT = 1e-300
 
 # Largest number of matrix-vector products for the heat kernel. Clean meshes need 1000 to 30 000; one sliver can
 # require 1e9.

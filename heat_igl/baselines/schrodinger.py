@@ -84,10 +84,10 @@ def schrodinger(
     length = float(np.sqrt(t))
     if green == "exponential":
         return np.asarray(length * fallen_from_sources(log_step(domain, chosen, t), domain, chosen))
-    if domain.triangulation is None:
+    if domain.surface is None:
         raise MeshError("green='bessel' is for triangles, and the domain has none: pass green='exponential'")
     share = np.zeros(domain.n)
-    share[chosen] = _total_angles(domain.triangulation)[chosen] / (2 * np.pi)
+    share[chosen] = _total_angles(domain.surface.triangulation)[chosen] / (2 * np.pi)
     log_phi = log_step(domain, chosen, t, share)
     distance = np.full(domain.n, np.inf)
     reached = reached_from(domain, chosen)

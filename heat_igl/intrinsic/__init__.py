@@ -2,6 +2,7 @@
 
 from heat_igl.intrinsic.adjacency import Adjacency
 from heat_igl.intrinsic.delaunay import intrinsic_delaunay
+from heat_igl.intrinsic.double_cover import double_cover
 from heat_igl.intrinsic.gluing import from_edge_lengths, intrinsic_triangulation, oriented
 from heat_igl.intrinsic.gradient import intrinsic_gradient
 from heat_igl.intrinsic.history import Flipped, Merged, Turned
@@ -18,6 +19,7 @@ __all__ = [
     "Turned",
     "apex",
     "corner_angles",
+    "double_cover",
     "from_edge_lengths",
     "has_nonmanifold_edges",
     "intrinsic_delaunay",

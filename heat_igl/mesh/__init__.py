@@ -4,7 +4,7 @@ from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
 from heat_igl.mesh.polygons import PolygonMesh, triangle_fans, which_repeat_a_vertex
 from heat_igl.mesh.projection import ClosestPoints, closest_points
-from heat_igl.mesh.report import DELAUNAY_TOLERANCE, RANGE_LIMIT, MeshReport
+from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
 from heat_igl.mesh.subdivision import split_long_edges
 from heat_igl.mesh.surface_curves import curve_on, edge_curve
 from heat_igl.mesh.surface_points import ON_SIDE, ON_SIDE_COMPUTED, SurfaceCurve, SurfacePoints
@@ -18,7 +18,6 @@ __all__ = [
     "ON_SIDE",
     "ON_SIDE_COMPUTED",
     "PolygonMesh",
-    "RANGE_LIMIT",
     "SurfaceCurve",
     "SurfacePoints",
     "checked_faces",

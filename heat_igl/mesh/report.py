@@ -10,17 +10,13 @@ import igl
 import numpy as np
 
 from heat_igl.mesh import connectivity
+from heat_igl.runtime import RANGE_LIMIT
 from heat_igl.typing import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from heat_igl.mesh.mesh import Mesh
 
-__all__ = ["DELAUNAY_TOLERANCE", "RANGE_LIMIT", "MeshReport", "mesh_report"]
-
-# Number of lengths sqrt(t) after which heat underflows in double precision: values fall from 1e290 (the gradient's
-# 1 / length needs the rest of the range) to 1e-300, by 590 decades or 1358 e-foldings, less a margin for the first
-# edge.
-RANGE_LIMIT = 1300.0
+__all__ = ["DELAUNAY_TOLERANCE", "MeshReport", "mesh_report"]
 
 # An edge is flipped when the two cotangents opposite it sum to less than this. The cotangents of cocircular corners
 # (every quad of a grid, a cylinder or a torus) sum to zero up to rounding; flipping such an edge would improve nothing.

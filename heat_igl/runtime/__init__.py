@@ -1,4 +1,4 @@
-"""Execution: threads, blocks of right-hand sides, memory and compiled kernels."""
+"""Execution: threads, blocks of right-hand sides, memory, compiled kernels, the range of doubles, warnings."""
 
 from heat_igl.runtime.blocks import (
     WORKING_MEMORY,
@@ -9,14 +9,23 @@ from heat_igl.runtime.blocks import (
     progress_bar,
     row_writer,
 )
+from heat_igl.runtime.extras import compiled_kernels_for
+from heat_igl.runtime.heat_range import LARGEST_EXPONENT, LOWEST_HEAT, RANGE_LIMIT, SOURCE_HEAT
 from heat_igl.runtime.memory import PeakMemory, release_free_memory, resident_memory
 from heat_igl.runtime.threads import n_threads, pool, side_by_side
+from heat_igl.runtime.warn import held_warnings, warn_caller
 
 __all__ = [
+    "LARGEST_EXPONENT",
+    "LOWEST_HEAT",
     "PeakMemory",
+    "RANGE_LIMIT",
+    "SOURCE_HEAT",
     "WORKING_MEMORY",
     "block_size",
+    "compiled_kernels_for",
     "float_type",
+    "held_warnings",
     "in_blocks",
     "in_order",
     "n_threads",
@@ -26,4 +35,5 @@ __all__ = [
     "resident_memory",
     "row_writer",
     "side_by_side",
+    "warn_caller",
 ]
