@@ -23,6 +23,7 @@ __all__ = [
     "flat_torus",
     "grid",
     "icosphere",
+    "lattice_faces",
     "strip",
     "torus",
     "with_slivers",
@@ -35,7 +36,7 @@ def _at_least(name: str, value: int, least: int) -> int:
     return int(value)
 
 
-def _lattice_faces(rows: int, columns: int, wrap_rows: bool = False, wrap_columns: bool = False) -> IntArray:
+def lattice_faces(rows: int, columns: int, wrap_rows: bool = False, wrap_columns: bool = False) -> IntArray:
     """Triangles of a lattice of vertices ``row * columns + column``; the diagonal of a cell joins (0, 1) to (1, 0).
 
     A lattice that wraps has a row (column) of cells between the last and the first row (column) of vertices.
@@ -59,7 +60,7 @@ def grid(n: int) -> Mesh:
     n = _at_least("n", n, 1)
     y, x = np.divmod(np.arange((n + 1) ** 2), n + 1)
     V = np.stack([x / n, y / n, np.zeros(len(x))], axis=1)
-    return Mesh(V, _lattice_faces(n + 1, n + 1))
+    return Mesh(V, lattice_faces(n + 1, n + 1))
 
 
 def strip(length: int, width: int) -> Mesh:
@@ -70,7 +71,7 @@ def strip(length: int, width: int) -> Mesh:
     length, width = _at_least("length", length, 1), _at_least("width", width, 1)
     y, x = np.divmod(np.arange((width + 1) * (length + 1)), length + 1)
     V = np.stack([x, y, np.zeros(len(x))], axis=1)
-    return Mesh(V, _lattice_faces(width + 1, length + 1))
+    return Mesh(V, lattice_faces(width + 1, length + 1))
 
 
 def disk(n: int) -> Mesh:
@@ -118,7 +119,7 @@ def cylinder(around: int, along: int, length: float = 2 * np.pi) -> Mesh:
     ring, k = np.divmod(np.arange(around * (along + 1)), around)
     angle = 2 * np.pi * k / around
     V = np.stack([np.cos(angle), np.sin(angle), ring * (length / along)], axis=1)
-    return Mesh(V, _lattice_faces(along + 1, around, wrap_columns=True))
+    return Mesh(V, lattice_faces(along + 1, around, wrap_columns=True))
 
 
 def book(pages: int, n: int) -> Mesh:
@@ -134,7 +135,7 @@ def book(pages: int, n: int) -> Mesh:
     turned = 2 * np.pi * np.arange(pages)[:, None] / pages
     x, y = np.cos(turned) * column / n, np.sin(turned) * column / n
     V = np.stack([x, y, np.broadcast_to(row / n, x.shape)], axis=2)
-    lattice, later = _lattice_faces(n + 1, n + 1), np.arange(pages)[:, None, None] * n * (n + 1)
+    lattice, later = lattice_faces(n + 1, n + 1), np.arange(pages)[:, None, None] * n * (n + 1)
     F = np.where(lattice <= n, lattice, lattice + later)
     return Mesh(np.concatenate([V[0], V[1:, n + 1 :].reshape(-1, 3)]), F.reshape(-1, 3))
 
@@ -153,7 +154,7 @@ def cone(around: int, along: int, half_angle: float = np.pi / 6) -> Mesh:
     V = np.stack([radius * np.cos(angle), radius * np.sin(angle), slant * np.cos(half_angle)], axis=1)
     first = np.arange(around)
     tip = np.stack([np.zeros(around, np.int64), 1 + first, 1 + (first + 1) % around], axis=1)
-    side = 1 + _lattice_faces(along, around, wrap_columns=True)[:, ::-1] if along > 1 else np.empty((0, 3), np.int64)
+    side = 1 + lattice_faces(along, around, wrap_columns=True)[:, ::-1] if along > 1 else np.empty((0, 3), np.int64)
     return Mesh(np.concatenate([np.zeros((1, 3)), V]), np.concatenate([tip, side]))
 
 
@@ -164,7 +165,7 @@ def torus(around: int, along: int, tube: float = 0.4) -> Mesh:
     theta, psi = 2 * np.pi * i / along, 2 * np.pi * j / around
     radius = 1 + tube * np.cos(psi)
     V = np.stack([radius * np.cos(theta), radius * np.sin(theta), tube * np.sin(psi)], axis=1)
-    return Mesh(V, _lattice_faces(along, around, wrap_rows=True, wrap_columns=True)[:, ::-1])
+    return Mesh(V, lattice_faces(along, around, wrap_rows=True, wrap_columns=True)[:, ::-1])
 
 
 def flat_torus(n: int) -> IntrinsicTriangulation:
@@ -173,7 +174,7 @@ def flat_torus(n: int) -> IntrinsicTriangulation:
     Vertex ``row * n + column`` lies at (column / n, row / n). Distance is Euclidean, modulo 1 in each coordinate.
     """
     n = _at_least("n", n, 3)
-    F = _lattice_faces(n, n, wrap_rows=True, wrap_columns=True)
+    F = lattice_faces(n, n, wrap_rows=True, wrap_columns=True)
     lower = np.array([np.sqrt(2), 1, 1]) / n  # opposite the corners (0, 0), (0, 1), (1, 0) of a cell
     upper = np.array([1, np.sqrt(2), 1]) / n  # opposite (0, 1), (1, 1), (1, 0)
     lengths = np.concatenate([np.tile(lower, (n * n, 1)), np.tile(upper, (n * n, 1))])
