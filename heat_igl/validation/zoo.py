@@ -1,4 +1,4 @@
-"""Shapes to try a default on: smooth, CAD, scattered points, terrain, hulls, voxels, mazes, slivers, several components.
+"""Shapes to try a default on: smooth, CAD, scattered points, terrain, hulls, voxels, mazes, slivers, components.
 
 A default that is chosen on some meshes is measured on others. A third of these shapes is held out: nothing in the
 package may be tuned on them (`Shape.held_out`).
