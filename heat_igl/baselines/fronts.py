@@ -32,7 +32,7 @@ def fast_marching(mesh: Mesh, sources: Sources) -> FloatArray:
     Returns
     -------
     (n,) float64
-        Distance in the unit of the mesh; 0 at the sources, ``inf`` at unreachable vertices.
+        Distance as computed by potpourri3d, but 0 at the sources and ``inf`` at unreachable vertices.
 
     Raises
     ------
@@ -126,24 +126,18 @@ def fast_sweeping(sources: ArrayLike, spacing: ArrayLike = 1.0, *, domain: Array
 
     Parameters
     ----------
-    sources : (n_0, ..., n_d) array_like of bool
-        Marks the points from which distance is measured.
-    spacing : float or (d,) array_like
-        Step of the grid along each axis.
-    domain : (n_0, ..., n_d) array_like of bool, optional
-        The points that paths may use; all points by default.
+    sources, spacing, domain
+        As for `fast_marching_grid`.
 
     Returns
     -------
     (n_0, ..., n_d) float64
-        Distance; ``inf`` outside the domain and at unreachable points.
+        Distance, as from `fast_marching_grid`.
 
     Raises
     ------
-    SourceError
-        If there is no source, one lies outside the domain, or `sources` is not boolean.
-    ValueError
-        If `spacing` or `domain` is invalid.
+    SourceError, ValueError
+        As for `fast_marching_grid`.
 
     Notes
     -----

@@ -110,17 +110,15 @@ def boundary_problem(mesh: Mesh | Operators, sources: Sources, *, t: float | Non
 
     Parameters
     ----------
-    mesh : Mesh or Operators
-        The domain.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
+    mesh, sources
+        As for `varadhan`.
     t : float, optional
         Time, a squared length; h^2 by default. It is raised if v would underflow before it crosses the domain.
 
     Returns
     -------
     (n,) float64
-        Distance in the unit of the mesh; 0 at the sources, ``inf`` at unreachable vertices.
+        Distance, as from `varadhan`.
 
     Raises
     ------
