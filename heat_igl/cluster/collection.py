@@ -16,6 +16,9 @@ from heat_igl.io import MESH_SUFFIXES
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, vertex_sources
 
+# Names that a zarr group cannot have: they stand for the store itself, the folder above it, or its metadata.
+_RESERVED_NAMES = ("", ".", "..", "zarr.json")
+
 __all__ = ["Item", "MeshLike", "SourcePlan", "folder", "items", "read_source_sets"]
 
 MeshLike = str | os.PathLike[str] | Mesh | tuple[Any, Any]
@@ -57,7 +60,7 @@ def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike]) -> Iterator[Item]
     Raises
     ------
     ValueError
-        If two files of a sequence have one name.
+        If two files of a sequence have one name, or a name is that of no group.
     """
     if isinstance(meshes, Mapping):
         pairs = list(meshes.items())
@@ -70,6 +73,8 @@ def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike]) -> Iterator[Item]
     for name, mesh in pairs:
         if name in seen:
             raise ValueError(f"two meshes are called {name!r}: pass a dictionary from names to meshes")
+        if name in _RESERVED_NAMES:
+            raise ValueError(f"a mesh cannot be called {name!r} in a store: choose another name")
         seen.add(name)
         label = os.fspath(mesh) if isinstance(mesh, str | os.PathLike) else name
         # A name may hold what separates zarr's groups.
