@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import shutil
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -140,41 +141,44 @@ class Store:
             "source_vertex": np.concatenate(source_sets),
             "source_row": np.repeat(np.arange(k), [len(one) for one in source_sets]),
         }
+        zarr, path = _zarr(), self.path / name
         # Not compressed: zstd saves an eighth of the space and doubles the time to write.
-        codecs = {"filters": None, "compressors": [_zarr().codecs.Crc32cCodec()]}
+        settings = {"zarr_format": 3, "compressors": [zarr.codecs.Crc32cCodec()], "overwrite": True}
         with _writing(self.path):
             earlier = self._group(name)
             if earlier is not None:
                 # A crash while the files are deleted must not leave a group that calls itself done.
                 earlier.attrs.put({})
-            group = self._root.create_group(name, overwrite=True)
+            shutil.rmtree(path, ignore_errors=True)
             for label, entries in sources.items():
-                array = group.create_array(
-                    label,
+                # By its own path: through the group, zarr would look at the metadata of all groups above it.
+                array = zarr.create_array(
+                    path / label,
                     shape=entries.shape,
                     chunks=entries.shape,
                     dtype="int64",
                     fill_value=-1,
                     dimension_names=("source_entry",),
-                    **codecs,
+                    **settings,
                 )
                 array[:] = entries
-            group.create_array(
-                "distance",
+            distance = zarr.create_array(
+                path / "distance",
                 shape=(k, n),
                 chunks=(min(rows_per_block(n), k), min(n, _COLUMNS)),
                 dtype=dtype,
                 fill_value=np.nan,
                 dimension_names=("source", "vertex"),
-                **codecs,
+                **settings,
             )
-            # Last, since a mesh without these attributes counts as not begun.
-            group.update_attributes({**attributes, "status": "running"})
-        return self.group(name)
+            # Last, since without it the mesh counts as not begun.
+            group = zarr.create_group(path, zarr_format=3, attributes={**attributes, "status": "running"})
+        return MeshGroup(self, name, group, distance)
 
     def group(self, name: str) -> MeshGroup:
         """The group of a mesh that was begun."""
-        return MeshGroup(self, name, self._root[name])
+        group = self._root[name]
+        return MeshGroup(self, name, group, group["distance"])
 
     def _group(self, name: str) -> Any:
         """The zarr group of a mesh; None if there is none, or its metadata are damaged."""
@@ -196,11 +200,11 @@ class MeshGroup:
         Number of source sets and of vertices.
     """
 
-    def __init__(self, store: Store, name: str, group: Any) -> None:
+    def __init__(self, store: Store, name: str, group: Any, distance: Any) -> None:
         self._store = store
         self._name = name
         self._group = group
-        self._distance = group["distance"]
+        self._distance = distance
         self.n_rows, self.n_columns = self._distance.shape
         self._height, self._width = self._distance.chunks
         self._n_blocks = -(-self.n_rows // self._height)

@@ -122,7 +122,7 @@ def _begin(task: Task, store: Store) -> Outcome:
         return Outcome(name)
     with _SOLVERS.solver(mesh, fingerprint, task.solver_options) as solver:
         identity = {"fingerprint": fingerprint, "t": solver.t, "backend": solver.diagnostics.backend}
-        group, source_sets = _continued(name, store, identity) or _new(task, store, mesh, solver, identity)
+        group, source_sets = _continued(name, store, known, identity) or _new(task, store, mesh, solver, identity)
         spans = _spans(group)
         _send("begun", task, blocks=sum(map(len, spans)))
         if spans:
@@ -142,9 +142,10 @@ def _resume(task: Task, store: Store) -> Outcome:
     return Outcome(task.item.name)
 
 
-def _continued(name: str, store: Store, identity: Mapping[str, Any]) -> tuple[MeshGroup, list[IntArray]] | None:
+def _continued(
+    name: str, store: Store, known: Mapping[str, Any], identity: Mapping[str, Any]
+) -> tuple[MeshGroup, list[IntArray]] | None:
     """The group that an earlier batch made of the same mesh by the same solver, with its sources; None without one."""
-    known = store.attributes(name)
     if any(known.get(key) != value for key, value in identity.items()):
         return None
     try:
