@@ -8,8 +8,7 @@ import numpy as np
 
 from heat_igl.errors import FactorizationError, MeshError, MissingExtraError, ReferenceSolverError, SourceError
 from heat_igl.mesh import Mesh
-from heat_igl.reference import edge_paths, straight_lines
-from heat_igl.reference.guarded import MEMORY, TIMEOUT
+from heat_igl.reference import MEMORY, TIMEOUT, edge_paths, straight_lines
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.validation import metrics
