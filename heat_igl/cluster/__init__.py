@@ -1,4 +1,4 @@
-"""Distances on many meshes, on one machine or many, by Dask and into a zarr store (extra ``cluster``)."""
+"""Distances on many meshes, by Dask on one machine or several, into a zarr store (extra ``cluster``)."""
 
 from heat_igl.cluster.batch import distances
 from heat_igl.cluster.collection import folder, read_source_sets

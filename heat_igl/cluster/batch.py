@@ -41,7 +41,7 @@ def distances(
     progress: bool = False,
     **options: Any,
 ) -> BatchReport:
-    """Distances on many meshes, by the workers of a Dask cluster, into a zarr store.
+    """Distances on many meshes, found by the workers of a Dask cluster and written to a zarr store.
 
     Parameters
     ----------
@@ -54,20 +54,20 @@ def distances(
         Directory that the client and all workers can write to. If it holds some of these distances already, only the
         others are found.
     client : distributed.Client, optional
-        A cluster. By default one on this machine, of a process with one thread for every processor.
+        Client of a cluster. By default one on this machine, with a process of one thread for every processor.
     refine : {"sweep", "unfold"}, optional
         See `HeatMethodSolver`.
     dtype : {"float32", "float64"}
-        What the distances are rounded to.
+        Type to which the distances are rounded.
     progress : bool
         Show on standard error how many meshes and blocks are done (extra ``cli``).
     **options
-        More for `HeatMethodSolver`: t_coef, t, laplacian, boundary, magnitude, backend.
+        Further options of `HeatMethodSolver`: t_coef, t, laplacian, boundary, magnitude, backend.
 
     Returns
     -------
     BatchReport
-        A row for each of `meshes`. One that could not be read, validated or factored is a row with the reason.
+        A row for each mesh; for one that could not be read, validated or factored, with the reason.
 
     Raises
     ------
@@ -81,8 +81,8 @@ def distances(
     Notes
     -----
     The group of a mesh holds ``distance`` (source, vertex), ``source_vertex`` with ``source_row``, the row that starts
-    at each, and as attributes t, versions, checksums and the mesh's report. The bits are those of
-    ``solver.distances(...).astype(dtype)``, in whatever order and however often the batch is interrupted.
+    at each, and as attributes t, versions, a checksum and the mesh's report. With the same versions on the same kind of
+    processor, the bits are those of ``solver.distances(...).astype(dtype)``, however often the batch is interrupted.
     """
     if dtype not in ("float32", "float64"):
         raise ValueError(f"dtype must be 'float32' or 'float64', not {dtype!r}")
