@@ -198,24 +198,27 @@ def killed_at(crash: int):
         yield written
 
 
-def begin_fan(store: Path) -> None:
+def begin_fan(store: Path, attributes) -> None:
     made = Store(store, {"sources": "0 4", "dtype": "float32", "solver": {"refine": None}})
-    made.begin("fan", [np.array([0]), np.array([4])], 7, "float32", {})
+    made.begin("fan", [np.array([0]), np.array([4])], 7, "float32", attributes)
 
 
 def test_a_group_that_a_crash_left_half_made_is_made_anew(client, tmp_path):
     """Wherever it happened: nothing counts before all is there."""
     store = tmp_path / "store"
     whole = cluster.distances({"fan": FAN}, [0, 4], tmp_path / "whole", client=client)
+    attributes = Store(tmp_path / "whole").attributes("fan")
     with killed_at(1000) as written:
-        begin_fan(store)
+        begin_fan(store, attributes)
     n_files = len(written)
+    shutil.rmtree(store)
     assert n_files >= 7  # metadata of two groups and three arrays, two chunks
     for crash in range(n_files):
         shutil.rmtree(store, ignore_errors=True)
         with killed_at(crash) as written:
-            begin_fan(store)
+            begin_fan(store, attributes)
         assert len(written) == crash
+        assert not (store / "fan" / "zarr.json").exists()
         assert cluster.distances({"fan": FAN}, [0, 4], store, client=client).rows == whole.rows
         np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["distance"][:], expected(FAN, [0, 4]))
 

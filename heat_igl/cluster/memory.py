@@ -25,14 +25,14 @@ def solver_memory(mesh: Mesh) -> int:
 
 
 def memory_for_solvers() -> int:
-    """Bytes that the solvers of this worker may take together: its limit less what the process takes without them."""
+    """Bytes that the solvers of this worker may take together: the limit of its memory, less the memory of the process without them."""
     from distributed import get_worker
 
     try:
         limit = get_worker().memory_manager.memory_limit
     except ValueError:  # not on a worker
         limit = None
-    # A tenth is left for what the estimate misses.
+    # A tenth is left for errors of the estimate.
     return int(0.9 * (limit or physical_memory())) - PROCESS_MEMORY
 
 

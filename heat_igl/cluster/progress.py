@@ -1,4 +1,4 @@
-"""The progress of a batch on the client's side: what workers report goes into the log and onto progress bars."""
+"""The progress of a batch on the client's side: the reports of workers go into the log and onto progress bars."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Watch:
     n_meshes : int
         Meshes of the batch.
     bar : rich.progress.Progress or None
-        Where to show the counts.
+        The bars that show the counts.
     """
 
     def __init__(self, n_meshes: int, bar: Any) -> None:
@@ -37,7 +37,7 @@ class Watch:
         self._blocks = bar.add_task("blocks", total=None) if bar else None
 
     def event(self, event: tuple[float, Mapping[str, Any]]) -> None:
-        """Note one report of a worker: a time, and what happened."""
+        """Note one report of a worker: a time, and the facts of an event."""
         _, facts = event
         mesh = facts["mesh"]
         if facts["kind"] == "begun":

@@ -28,7 +28,7 @@ _MOST_ROWS = 64
 _ENTRIES = 2**22
 # Longest row of one chunk.
 _COLUMNS = 2**20
-# Format 2 differs in two points: no checksum on the sources, and zeros instead of NaN where a chunk is padded.
+# Format 2 differs in two points: no checksum on the sources, and zeros instead of NaN as padding of the last chunks.
 _FORMAT = 3
 _READABLE_FORMATS = (2, 3)
 # The crc32c codec appends its checksum to the chunk (zarr specification, version 3).
@@ -267,7 +267,7 @@ class MeshGroup:
 
 @contextlib.contextmanager
 def _writing(path: Path) -> Iterator[None]:
-    """Turn what the system says of a failed write into the error of the batch, with the remedy."""
+    """Turn an error of the system during a write into the error of the batch, with the remedy."""
     try:
         yield
     except OSError as error:

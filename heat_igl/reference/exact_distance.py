@@ -35,7 +35,7 @@ def exact(
     Returns
     -------
     (n,) float64
-        In the mesh's unit; ``inf`` where no source can be reached.
+        In the mesh's unit; ``inf`` if no source can be reached.
 
     Raises
     ------

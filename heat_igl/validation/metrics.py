@@ -115,7 +115,7 @@ def relative_error(distance: ArrayLike, truth: ArrayLike) -> FloatArray:
     Returns
     -------
     (n,) or (k, n) float64
-        NaN where the truth is 0 or infinite; ``inf`` where only the distance is not finite.
+        NaN if the truth is 0 or infinite; ``inf`` if only the distance is not finite.
 
     Raises
     ------
