@@ -249,6 +249,7 @@ def test_a_group_that_cannot_be_read_is_made_anew(client, tmp_path, file, is_los
     path = store / "fan" / file
     path.unlink() if is_lost else path.write_bytes(b"half of it")
     assert cluster.distances({"fan": FAN}, [0, 4], store, client=client) == whole
+    np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["source_vertex"][:], [0, 4])
     np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["distance"][:], expected(FAN, [0, 4]))
 
 

@@ -25,7 +25,7 @@ def solver_memory(mesh: Mesh) -> int:
 
 
 def memory_for_solvers() -> int:
-    """Bytes that the solvers of this worker may take together: the limit of its memory, less the memory of the process without them."""
+    """Bytes that the solvers of this worker may take together: its memory limit, less `PROCESS_MEMORY`."""
     from distributed import get_worker
 
     try:
