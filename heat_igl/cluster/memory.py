@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+from heat_igl.cluster.store import rows_per_block
 from heat_igl.linear.iterative import factor_bytes
 from heat_igl.mesh import Mesh
 
@@ -14,14 +15,17 @@ PROCESS_MEMORY = 230 * 2**20
 # The mesh, its operators and one block of right-hand sides, measured on spheres of 10k to 164k vertices.
 _BYTES_PER_VERTEX = 500
 _BYTES_PER_FACE = 500
+# Zarr copies a block to append its checksum. In double precision; measured in single precision, 4.
+_BYTES_PER_WRITTEN_VALUE = 8
 
 
 def solver_memory(mesh: Mesh) -> int:
-    """Bytes that a solver on `mesh` and one block of queries take at most."""
+    """Bytes that a solver on `mesh` and one block of queries take at most, including writing the block."""
     n, m = mesh.n_vertices, mesh.n_faces
     # Edges by Euler's formula, up to a few for boundaries and handles.
     n_edges = n + m
-    return int(2 * factor_bytes(n, n + 2 * n_edges) + _BYTES_PER_VERTEX * n + _BYTES_PER_FACE * m)
+    block = _BYTES_PER_WRITTEN_VALUE * rows_per_block(n) * n
+    return int(2 * factor_bytes(n, n + 2 * n_edges) + _BYTES_PER_VERTEX * n + _BYTES_PER_FACE * m + block)
 
 
 def memory_for_solvers() -> int:
