@@ -26,7 +26,6 @@ dask
 distributed
 ezdxf
 gdist
-google_crc32c
 matplotlib
 meshio
 numba

@@ -162,7 +162,7 @@ def test_infinite_errors_reach_json_as_text() -> None:
 
 
 def test_a_method_that_fails_is_a_row_that_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reference.solvers, "find_spec", lambda name: None if name == "pymeshlab" else object())
+    monkeypatch.setattr(reference.measurement, "find_spec", lambda name: None if name == "pymeshlab" else object())
     mesh = shapes.grid(5)
     steps: list[int] = []
     report = validate(mesh, [[0], [7]], ["meshlab", "heat"], progress=lambda *step: steps.append(step[1]))

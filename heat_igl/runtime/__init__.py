@@ -7,6 +7,7 @@ from heat_igl.runtime.blocks import (
     in_blocks,
     in_order,
     progress_bar,
+    rich_progress,
     row_writer,
 )
 from heat_igl.runtime.extras import compiled_kernels_for
@@ -33,6 +34,7 @@ __all__ = [
     "progress_bar",
     "release_free_memory",
     "resident_memory",
+    "rich_progress",
     "row_writer",
     "side_by_side",
     "warn_caller",

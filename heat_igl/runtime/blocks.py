@@ -132,13 +132,24 @@ def progress_bar(description: str, total: int, shown: bool = True) -> Iterator[C
     if not shown:
         yield lambda _: None
         return
+    with rich_progress() as bar:
+        task = bar.add_task(description, total=total)
+        yield lambda n_rows: bar.advance(task, n_rows)
+
+
+def rich_progress() -> Any:
+    """Progress bars of rich on standard error, without tasks yet; a context manager.
+
+    Raises
+    ------
+    MissingExtraError
+        If rich is not installed.
+    """
     with MissingExtraError.guard("progress=True", "rich", "cli"):
         from rich.console import Console
         from rich.progress import MofNCompleteColumn, Progress
     columns = (*Progress.get_default_columns(), MofNCompleteColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(description, total=total)
-        yield lambda n_rows: bar.advance(task, n_rows)
+    return Progress(*columns, console=Console(stderr=True))
 
 
 def row_writer(out: Any) -> Callable[[AnyArray], None]:
