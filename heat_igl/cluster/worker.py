@@ -25,7 +25,7 @@ from heat_igl.cluster.collection import Item, SourcePlan
 from heat_igl.cluster.memory import PROCESS_MEMORY, physical_memory, solver_memory
 from heat_igl.cluster.store import MeshGroup, Store
 from heat_igl.errors import AccuracyWarning, BatchError
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat_method import HeatMethodSolver, SolverOptions
 from heat_igl.io import read_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.runtime import release_free_memory
@@ -51,7 +51,7 @@ class Task:
     store: Path
     plan: SourcePlan
     dtype: str
-    solver_options: dict[str, Any]
+    solver_options: SolverOptions
     blocks: tuple[int, ...] = ()
 
 
@@ -246,7 +246,7 @@ class _Shelf:
         try:
             with place.lock:
                 if place.solver is None:
-                    place.solver = HeatMethodSolver(mesh, **task.solver_options)
+                    place.solver = HeatMethodSolver.from_options(mesh, task.solver_options)
             yield place.solver
         finally:
             with self._changed:

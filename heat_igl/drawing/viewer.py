@@ -9,7 +9,7 @@ import os
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
@@ -17,14 +17,14 @@ import numpy as np
 from heat_igl import reference
 from heat_igl.drawing.raster import isoline_spacing
 from heat_igl.errors import FactorizationError, MissingExtraError, ReferenceSolverError
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat_method import HeatMethodSolver, SolverOptions
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.steps import Boundary
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding import Refine
 
-__all__ = ["Exploration", "Options", "Window", "display_problem"]
+__all__ = ["Exploration", "Window", "display_problem"]
 
 # Factored solvers to keep, since going back and forth between two settings is what one does.
 _KEPT_SOLVERS = 4
@@ -32,15 +32,6 @@ _REFINEMENTS = ("none", *get_args(Refine))
 _T_COEF = (0.1, 100.0)
 # Pixels that the mouse may move during a click.
 _STILL = 4.0
-
-
-@dataclass(frozen=True)
-class Options:
-    """What can be changed in the window, as `HeatMethodSolver` takes it."""
-
-    t_coef: float | None = None
-    boundary: Boundary = "neumann"
-    refine: Refine | None = None
 
 
 class Exploration:
@@ -52,7 +43,7 @@ class Exploration:
         Triangles or tetrahedra.
     sources : int, sequence of int, or (n,) mask of bool
         To start with.
-    options : Options
+    options : SolverOptions
         To start with.
 
     Attributes
@@ -77,12 +68,12 @@ class Exploration:
         As for `HeatMethodSolver`.
     """
 
-    def __init__(self, mesh: Mesh, sources: Sources = 0, options: Options | None = None) -> None:
+    def __init__(self, mesh: Mesh, sources: Sources = 0, options: SolverOptions | None = None) -> None:
         self.mesh = mesh
-        self.options = options or Options()
+        self.options = options or SolverOptions()
         self.sources: IntArray = vertex_sources(sources, mesh.n_vertices)
         self.error: FloatArray | None = None
-        self._solvers: dict[Options, HeatMethodSolver] = {}
+        self._solvers: dict[SolverOptions, HeatMethodSolver] = {}
         self._solve(self.sources, self.options)
 
     def choose(self, vertex: int, add: bool = False) -> None:
@@ -94,9 +85,8 @@ class Exploration:
 
     def change(self, **options: Any) -> None:
         """Change some of the options; what cannot be solved leaves all as it was, and `message` says why."""
-        changed = replace(self.options, **options)
         try:
-            self._solve(self.sources, changed)
+            self._solve(self.sources, replace(self.options, **options))
         except (ValueError, FactorizationError, MissingExtraError) as error:
             self.message = str(error)
 
@@ -114,14 +104,12 @@ class Exploration:
         mean, largest = (float(of(np.abs(error[away]), initial=0.0)) for of in (np.sum, np.max))
         self.message = f"error {mean / max(int(away.sum()), 1):.3g} % in the mean, {largest:.3g} % at most"
 
-    def _solve(self, sources: IntArray, options: Options) -> None:
+    def _solve(self, sources: IntArray, options: SolverOptions) -> None:
         start = time.perf_counter()
         solver = self._solvers.pop(options, None)
         is_new = solver is None
         if solver is None:
-            solver = HeatMethodSolver(
-                self.mesh, t_coef=options.t_coef, boundary=options.boundary, refine=options.refine
-            )
+            solver = HeatMethodSolver.from_options(self.mesh, options)
         self._solvers[options] = solver  # the last one used comes last
         while len(self._solvers) > _KEPT_SOLVERS:
             del self._solvers[next(iter(self._solvers))]
