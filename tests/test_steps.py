@@ -251,6 +251,27 @@ def fit_of(length: float, t: float) -> float:
     return length**2 / (4 * t) / np.mean(2 * np.sinh(x / 2) ** 2)
 
 
+class Unseen:
+    """Stands for the triangles of a domain, which no step may look at."""
+
+    def __getattribute__(self, name):
+        raise AssertionError(f"a step looks at surface.{name}")
+
+
+@pytest.mark.parametrize("fitted", [False, True])
+def test_steps_see_matrices_and_lengths_but_no_surface(fitted):
+    seen = operators(squeezed_sphere())
+    t = 0.5 * seen.mean_edge_length**2
+    results = []
+    for domain in (seen, replace(seen, surface=Unseen())):
+        u = HeatFlow(domain, t, fitted=fitted).solve(dirac(domain.n, 7))
+        divergence = NormalizedDivergence(domain, t, fitted=fitted).divergence(u[:, None])
+        X = normalize(domain, u, fitted) * np.tile(damping(domain, u, t, fitted=fitted), domain.dimension)
+        results.append((u, divergence, PoissonProblem(domain).solve(divergence), integrate(domain, X)))
+    for of_seen, of_unseen in zip(*results, strict=True):
+        np.testing.assert_array_equal(of_seen, of_unseen)
+
+
 @pytest.mark.parametrize("t_coef", [0.3, 1.0, 20.0])
 def test_fitted_laplacian_takes_each_edge_by_its_own_length(t_coef):
     """Flipped edges, edges of negative weight, and the cover, which has each edge of the sphere twice."""

@@ -309,7 +309,7 @@ def test_no_poisson_problem_is_factored(bumpy, monkeypatch):
     def forbidden(*_: object) -> None:
         raise AssertionError("a Poisson problem was set up")
 
-    monkeypatch.setattr("heat_igl.heat_method.solver.PoissonProblem", forbidden)
+    monkeypatch.setattr("heat_igl.heat_method.parts.PoissonProblem", forbidden)
     assert HeatMethodSolver(bumpy, refine="unfold").distance(0).max() > 1
     with pytest.raises(AssertionError, match="Poisson"):
         HeatMethodSolver(bumpy)

@@ -34,7 +34,7 @@ from heat_igl.errors import (
     ReferenceSolverError,
     SourceError,
 )
-from heat_igl.heat_method import HeatMethodSolver, Magnitude
+from heat_igl.heat_method import HeatMethodSolver, Magnitude, SolverOptions
 from heat_igl.io import CURVE_SUFFIXES, complete_file, read_mesh, write_mesh
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, closest_points
@@ -217,14 +217,16 @@ def distance(
         gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap))]
     _check_outputs(loaded, output, picture)
     with Console(stderr=True).status("factoring"):
-        options: dict[str, Any] = {
-            "laplacian": laplacian,
-            "boundary": boundary,
-            "magnitude": magnitude,
-            "refine": refine,
-            "backend": backend,
-        }
-        solver = HeatMethodSolver(loaded, t_coef=t_coef, t=t, **options)
+        options = SolverOptions(
+            t_coef,
+            t,
+            cast(Laplacian, laplacian),
+            cast(Boundary, boundary),
+            cast(Magnitude, magnitude),
+            cast(Refine | None, refine),
+            cast(Backend, backend),
+        )
+        solver = HeatMethodSolver.from_options(loaded, options)
     start = time.perf_counter()
     phi = solver.distance(sources, cutoff=cutoff)
     seconds = time.perf_counter() - start
@@ -333,17 +335,17 @@ def view(
     html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
 ) -> None:
     """A window in which a click moves the source and the distance follows; where there is no display, a page."""
-    from heat_igl.drawing.viewer import Exploration, Options, Window, display_problem
+    from heat_igl.drawing.viewer import Exploration, Window, display_problem
 
     loaded = read_mesh(mesh)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
-    chosen: dict[str, Any] = {"boundary": boundary, "refine": refine}
+    options = SolverOptions(t_coef, boundary=cast(Boundary, boundary), refine=cast(Refine | None, refine))
     target = html or Path(f"{mesh.stem}-view.html")
     problem = None if html else display_problem()
     if html or problem:
         _check_page(target)
     with Console(stderr=True).status("factoring"):
-        shown = Exploration(loaded, sources, Options(t_coef=t_coef, **chosen))
+        shown = Exploration(loaded, sources, options)
     if html is None and problem is None:
         try:
             window = Window(shown, title=f"heat-igl: {mesh.name}")

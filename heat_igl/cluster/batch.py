@@ -17,6 +17,7 @@ from heat_igl.cluster.report import BatchReport, rows
 from heat_igl.cluster.store import Store
 from heat_igl.cluster.worker import Outcome, Task, begin, release, resume
 from heat_igl.errors import BatchError
+from heat_igl.heat_method import SolverOptions
 from heat_igl.sources import Sources
 from heat_igl.unfolding import Refine
 
@@ -87,8 +88,8 @@ def distances(
     if dtype not in ("float32", "float64"):
         raise ValueError(f"dtype must be 'float32' or 'float64', not {dtype!r}")
     plan = SourcePlan.of(sources)
-    solver_options = {"refine": refine, **options}
-    opened = Store(store, {"sources": str(plan), "dtype": dtype, "solver": solver_options})
+    solver_options = SolverOptions(refine=refine, **options)
+    opened = Store(store, {"sources": str(plan), "dtype": dtype, "solver": {"refine": refine, **options}})
     tasks = [Task(item, opened.path.resolve(), plan, dtype, solver_options) for item in items(meshes)]
     with ExitStack() as stack:
         client = stack.enter_context(connected()) if client is None else client

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
 
 from heat_igl.cluster.memory import memory_for_solvers, solver_memory
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat_method import HeatMethodSolver, SolverOptions
 from heat_igl.mesh import Mesh
 from heat_igl.runtime import release_free_memory
 
@@ -38,7 +37,7 @@ class SolverCache:
         self._highest = 0
 
     @contextmanager
-    def solver(self, mesh: Mesh, fingerprint: str, options: Mapping[str, Any]) -> Iterator[HeatMethodSolver]:
+    def solver(self, mesh: Mesh, fingerprint: str, options: SolverOptions) -> Iterator[HeatMethodSolver]:
         """The solver of `mesh`, whose arrays have this fingerprint; made if it is not there.
 
         Waits until the memory that it is estimated to take is free.
@@ -53,7 +52,7 @@ class SolverCache:
         try:
             with entry.lock:
                 if entry.solver is None:
-                    entry.solver = HeatMethodSolver(mesh, **options)
+                    entry.solver = HeatMethodSolver.from_options(mesh, options)
             yield entry.solver
         finally:
             with self._changed:

@@ -23,7 +23,7 @@ from heat_igl.cluster.collection import Item, SourcePlan
 from heat_igl.cluster.solver_cache import SolverCache
 from heat_igl.cluster.store import MeshGroup, Store
 from heat_igl.errors import AccuracyWarning, BatchError
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat_method import HeatMethodSolver, SolverOptions
 from heat_igl.io import read_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.sampling import farthest_points
@@ -50,7 +50,7 @@ class Task:
     store: Path
     plan: SourcePlan
     dtype: str
-    solver_options: dict[str, Any]
+    solver_options: SolverOptions
     blocks: tuple[int, ...] = ()
 
 

@@ -3,33 +3,22 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from heat_igl import reference
 from heat_igl.errors import FactorizationError, MissingExtraError, ReferenceSolverError
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat_method import HeatMethodSolver, SolverOptions
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, vertex_sources
-from heat_igl.steps import Boundary
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.unfolding import Refine
 
-__all__ = ["Exploration", "Options"]
+__all__ = ["Exploration"]
 
 # Number of factored solvers to keep, since users alternate between a few settings.
 _KEPT_SOLVERS = 4
-
-
-@dataclass(frozen=True)
-class Options:
-    """The options of `HeatMethodSolver` that the window can change."""
-
-    t_coef: float | None = None
-    boundary: Boundary = "neumann"
-    refine: Refine | None = None
 
 
 class Exploration:
@@ -41,7 +30,7 @@ class Exploration:
         Triangles or tetrahedra.
     sources : int, sequence of int, or (n,) mask of bool
         Initial source vertices.
-    options : Options
+    options : SolverOptions
         Initial options.
 
     Attributes
@@ -66,12 +55,12 @@ class Exploration:
         As for `HeatMethodSolver`.
     """
 
-    def __init__(self, mesh: Mesh, sources: Sources = 0, options: Options | None = None) -> None:
+    def __init__(self, mesh: Mesh, sources: Sources = 0, options: SolverOptions | None = None) -> None:
         self.mesh = mesh
-        self.options = options or Options()
+        self.options = options or SolverOptions()
         self.sources: IntArray = vertex_sources(sources, mesh.n_vertices)
         self.error: FloatArray | None = None
-        self._solvers: dict[Options, HeatMethodSolver] = {}
+        self._solvers: dict[SolverOptions, HeatMethodSolver] = {}
         self._solve(self.sources, self.options)
 
     def choose(self, vertex: int, add: bool = False) -> None:
@@ -83,9 +72,8 @@ class Exploration:
 
     def change(self, **options: Any) -> None:
         """Change options. If the solver fails, nothing changes, and `message` gives the reason."""
-        changed = replace(self.options, **options)
         try:
-            self._solve(self.sources, changed)
+            self._solve(self.sources, replace(self.options, **options))
         except (ValueError, FactorizationError, MissingExtraError) as error:
             self.message = str(error)
 
@@ -103,14 +91,12 @@ class Exploration:
         mean, largest = (float(of(np.abs(error[away]), initial=0.0)) for of in (np.sum, np.max))
         self.message = f"error {mean / max(int(away.sum()), 1):.3g} % in the mean, {largest:.3g} % at most"
 
-    def _solve(self, sources: IntArray, options: Options) -> None:
+    def _solve(self, sources: IntArray, options: SolverOptions) -> None:
         start = time.perf_counter()
         solver = self._solvers.pop(options, None)
         is_new = solver is None
         if solver is None:
-            solver = HeatMethodSolver(
-                self.mesh, t_coef=options.t_coef, boundary=options.boundary, refine=options.refine
-            )
+            solver = HeatMethodSolver.from_options(self.mesh, options)
         self._solvers[options] = solver  # the dictionary is ordered by last use
         while len(self._solvers) > _KEPT_SOLVERS:
             del self._solvers[next(iter(self._solvers))]

@@ -9,13 +9,13 @@ from typing import Any, get_args
 
 import numpy as np
 
-from heat_igl.drawing.exploration import Exploration, Options
+from heat_igl.drawing.exploration import Exploration
 from heat_igl.drawing.shading import isoline_spacing
 from heat_igl.errors import MissingExtraError
 from heat_igl.steps import Boundary
 from heat_igl.unfolding import Refine
 
-__all__ = ["Exploration", "Options", "Window", "display_problem"]
+__all__ = ["Exploration", "Window", "display_problem"]
 
 _REFINEMENTS = ("none", *get_args(Refine))
 

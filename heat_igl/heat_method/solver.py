@@ -3,39 +3,25 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from concurrent.futures import Future
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
-from heat_igl.heat_method.integration import Integration, damped_field
+from heat_igl.heat_method.integration import damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
+from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
-from heat_igl.heat_method.time_step import time_step
-from heat_igl.linear import Analysis, Backend
+from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh
-from heat_igl.operators import Laplacian, Operators, edge_length_operators, operators
-from heat_igl.runtime import in_order, n_threads, pool
-from heat_igl.sources import SourceAssembler, Sources, SourceSet, SourceTerm, right_hand_side, source_set
-from heat_igl.steps import Boundary, HeatFlow, NormalizedDivergence, PoissonProblem, analysis
+from heat_igl.operators import Laplacian, Operators, edge_length_operators
+from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
+from heat_igl.steps import Boundary
 from heat_igl.typing import ArrayLike, FloatArray
 from heat_igl.unfolding import Refine, UnfoldingSolver
 
 __all__ = ["HeatMethodSolver", "heat_method_distance"]
-
-
-@dataclass(frozen=True)
-class _Prepared:
-    """What is known before anything is factored, and the seconds that it took."""
-
-    seconds_operators: float = 0.0
-    seconds_analysis: float = 0.0
-    analysis: Analysis | None = None
 
 
 class HeatMethodSolver(BatchedSolver):
@@ -93,8 +79,7 @@ class HeatMethodSolver(BatchedSolver):
     """
 
     _mesh: Mesh | None = None
-    _heat_flow: HeatFlow
-    _options: SolverOptions
+    _parts: SolverParts
 
     def __init__(
         self,
@@ -110,14 +95,13 @@ class HeatMethodSolver(BatchedSolver):
         backend: Backend = "auto",
     ) -> None:
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, refine, backend)
-        self._set_up_mesh(_as_mesh(mesh, F), options)
+        self._mesh = _as_mesh(mesh, F)
+        self._parts = prepare_mesh(self._mesh, options)
 
     @classmethod
     def from_options(cls, mesh: Mesh, options: SolverOptions) -> HeatMethodSolver:
         """A solver on `mesh` with options that were put together before."""
-        solver = cls.__new__(cls)
-        solver._set_up_mesh(mesh, options)
-        return solver
+        return cls._of(prepare_mesh(mesh, options), mesh)
 
     @classmethod
     def from_operators(
@@ -132,10 +116,8 @@ class HeatMethodSolver(BatchedSolver):
         backend: Backend = "auto",
     ) -> HeatMethodSolver:
         """A solver on any domain that has operators; parameters as for the class."""
-        solver = cls.__new__(cls)
         options = SolverOptions(t_coef, t, "intrinsic-delaunay", boundary, magnitude, refine, backend)
-        solver._set_up(domain, options, _Prepared())
-        return solver
+        return cls._of(prepare(domain, options))
 
     @classmethod
     def from_edge_lengths(
@@ -175,9 +157,7 @@ class HeatMethodSolver(BatchedSolver):
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, refine, backend)
         start = time.perf_counter()
         domain = edge_length_operators(F, lengths, n, laplacian)
-        solver = cls.__new__(cls)
-        solver._set_up(domain, options, _Prepared(time.perf_counter() - start))
-        return solver
+        return cls._of(prepare(domain, options, seconds_operators=time.perf_counter() - start))
 
     def with_vertices(self, V: ArrayLike) -> HeatMethodSolver:
         """A new solver after the vertices have moved; this one stays as it is.
@@ -205,95 +185,38 @@ class HeatMethodSolver(BatchedSolver):
             raise ValueError(
                 "this solver was made from operators and has no vertices to move: use from_operators again"
             )
-        solver = HeatMethodSolver.__new__(HeatMethodSolver)
-        solver._set_up_mesh(self._mesh.with_vertices(V), self._options, self._analysis)
+        moved = self._mesh.with_vertices(V)
+        return HeatMethodSolver._of(prepare_mesh(moved, self._parts.options, self._parts.analysis), moved)
+
+    @classmethod
+    def _of(cls, parts: SolverParts, mesh: Mesh | None = None) -> HeatMethodSolver:
+        solver = cls.__new__(cls)
+        solver._mesh, solver._parts = mesh, parts
         return solver
-
-    def _set_up_mesh(self, mesh: Mesh, options: SolverOptions, known: Analysis | None = None) -> None:
-        """Assemble the operators of `mesh`, with the order of elimination beside them, then as `_set_up`."""
-        self._mesh = mesh
-        start = time.perf_counter()
-        begun: list[Future[Analysis]] = []
-        with pool(1) as beside:
-
-            def analyse(L: sp.csc_matrix) -> None:
-                begun.append(beside.submit(analysis, L, options.backend))
-
-            # The order of elimination takes a third of the time and needs no more than the pattern of L.
-            domain = operators(mesh, options.laplacian, analyse if known is None and n_threads() > 1 else None)
-            seconds = time.perf_counter() - start
-            known = begun[0].result() if begun else known
-        waited = time.perf_counter() - start - seconds
-        self._set_up(domain, options, _Prepared(seconds, waited, known))
-
-    def _set_up(self, domain: Operators, options: SolverOptions, prepared: _Prepared) -> None:
-        """Resolve the options on `domain`, then factor what they ask for."""
-        start = time.perf_counter()
-        self._operators, self._options = domain, options
-        damped = options.damps(domain)
-        fitted = self._fitted = damped and domain.lengths is not None
-        step, requested = time_step(options, domain, fitted)
-        self._t_damping = step if damped else None
-        known = self._analysis = analysis(domain.L, options.backend, prepared.analysis)
-        analysed = time.perf_counter()
-        makers: list[Callable[[], Any]] = [
-            lambda: HeatFlow(domain, step, options.boundary, options.backend, known, fitted)
-        ]
-        if options.refine is None:
-            makers.append(lambda: PoissonProblem(domain, options.backend, known))
-        # Both matrices at once: the backends run without the interpreter's lock.
-        self._heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
-        factored = time.perf_counter()
-        self._assembler = SourceAssembler(domain, step, plain=not damped, unfolds=options.refine is not None)
-        self._given_faces = None if domain.surface is None else domain.surface.given_faces
-        self._from_heat: Integration | UnfoldingSolver
-        if options.refine is not None:
-            self._from_heat = UnfoldingSolver(domain, options.refine)
-        else:
-            divergence = NormalizedDivergence(domain, self._t_damping, known.order, fitted)
-            self._from_heat = Integration(
-                domain, self._heat_flow, divergence, poisson[0], self._t_damping, fitted, self._assembler.edges
-            )
-        triangulation = None if domain.surface is None else domain.surface.triangulation
-        factors = self._heat_flow.factors + [problem.factor for problem in poisson]
-        self._diagnostics = Diagnostics(
-            t=step,
-            t_requested=requested,
-            mean_edge_length=domain.mean_edge_length,
-            edges_across=domain.longest_distance / domain.mean_edge_length,
-            n_flips=triangulation.n_flips if triangulation else 0,
-            lengthening=triangulation.lengthening if triangulation else 0.0,
-            backend=self._heat_flow.backend,
-            seconds_operators=prepared.seconds_operators,
-            factor_nonzeros=sum(factor.nonzeros for factor in factors),
-            factor_bytes=sum(factor.n_bytes for factor in factors),
-            seconds_analysis=prepared.seconds_analysis + analysed - start,
-            seconds_factorization=factored - analysed,
-        )
 
     @property
     def operators(self) -> Operators:
         """L, M, G and D of the triangulation that is solved on."""
-        return self._operators
+        return self._parts.operators
 
     @property
     def t(self) -> float:
         """The time step in use, a squared length."""
-        return self._diagnostics.t
+        return self.diagnostics.t
 
     @property
     def diagnostics(self) -> Diagnostics:
         """What the solver did and rests on."""
-        return self._diagnostics
+        return self._parts.diagnostics
 
     @property
     def n_vertices(self) -> int:
         """Length of a distance array."""
-        return self._operators.n
+        return self.operators.n
 
     @property
     def _n_faces(self) -> int:
-        return len(self._operators.weights)
+        return len(self.operators.weights)
 
     def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
         """Distance from the nearest source.
@@ -328,7 +251,7 @@ class HeatMethodSolver(BatchedSolver):
         return np.asarray(cut_off(self._distances([self._source_set(sources)])[0], beyond))
 
     def _source_set(self, sources: Sources) -> SourceSet:
-        return source_set(sources, self.n_vertices, self._given_faces)
+        return source_set(sources, self.n_vertices, self._parts.given_faces)
 
     def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
         """Distances (k, n) from k sets of sources: the method from end to end."""
@@ -338,22 +261,23 @@ class HeatMethodSolver(BatchedSolver):
 
     def _source_terms(self, source_sets: list[SourceSet]) -> list[SourceTerm]:
         """Initial heat of each set, and what is known near it."""
-        terms = [self._assembler.term(sources) for sources in source_sets]
-        if isinstance(self._from_heat, UnfoldingSolver):
+        terms = [self._parts.assembler.term(sources) for sources in source_sets]
+        if isinstance(self._parts.last_steps, UnfoldingSolver):
             return terms
-        return [drop_overtaken(term, self._heat_flow, self.n_vertices) for term in terms]
+        return [drop_overtaken(term, self._parts.heat_flow, self.n_vertices) for term in terms]
 
     def _heat(self, terms: list[SourceTerm]) -> FloatArray:
         """Heat (n, k) after the time step: step 1."""
-        return self._heat_flow.solve(right_hand_side(self.n_vertices, terms))
+        return self._parts.heat_flow.solve(right_hand_side(self.n_vertices, terms))
 
     def _distances_from_heat(self, terms: list[SourceTerm], u: FloatArray) -> FloatArray:
         """Distances (k, n) from heat (n, k): steps 2 and 3, or unfolding in the order of the heat."""
-        if isinstance(self._from_heat, UnfoldingSolver):
-            return self._from_heat.distances(terms, u)
-        divergence = self._from_heat.divergence(terms, u)
-        phi = self._from_heat.poisson.solve(divergence)
-        return self._from_heat.pin_levels(terms, phi, u)
+        last_steps = self._parts.last_steps
+        if isinstance(last_steps, UnfoldingSolver):
+            return last_steps.distances(terms, u)
+        divergence = last_steps.divergence(terms, u)
+        phi = last_steps.poisson.solve(divergence)
+        return last_steps.pin_levels(terms, phi, u)
 
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
         """Distance, and which source is nearest: a geodesic Voronoi diagram.
@@ -373,11 +297,11 @@ class HeatMethodSolver(BatchedSolver):
         beyond = checked_cutoff(cutoff)
         terms = self._source_terms([self._source_set(sources)])
         u = self._heat(terms)
-        if isinstance(self._from_heat, UnfoldingSolver):
-            distance, labels = self._from_heat.labelled(terms[0], u[:, 0])
+        if isinstance(self._parts.last_steps, UnfoldingSolver):
+            distance, labels = self._parts.last_steps.labelled(terms[0], u[:, 0])
         else:
             distance = self._distances_from_heat(terms, u)[0]
-            labels = warmest_sources(terms[0], self._heat_flow, self.n_vertices)
+            labels = warmest_sources(terms[0], self._parts.heat_flow, self.n_vertices)
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
@@ -386,12 +310,12 @@ class HeatMethodSolver(BatchedSolver):
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
         terms = self._source_terms([self._source_set(sources)])
         u = self._heat(terms)
-        X, magnitude = damped_field(self._operators, terms, u, self._t_damping, self._fitted)
+        X, magnitude = damped_field(self.operators, terms, u, self._parts.t_damping, self._parts.fitted)
         with np.errstate(under="ignore"):
-            heat = u[:, 0] / terms[0].unit / self._heat_flow.mean_mass
+            heat = u[:, 0] / terms[0].unit / self._parts.heat_flow.mean_mass
         return HeatSolution(
             heat=heat,
-            direction=np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T),
+            direction=np.ascontiguousarray(X[:, 0].reshape(self.operators.dimension, -1).T),
             magnitude=np.ascontiguousarray(magnitude[:, 0]),
             distance=self._distances_from_heat(terms, u)[0],
             t=self.t,

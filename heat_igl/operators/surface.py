@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
 from heat_igl.typing import IntArray
@@ -33,7 +34,7 @@ class Surface:
         """The triangles to unfold paths in: on the cover a path over an edge of five faces goes on in one face only."""
         return self.triangulation if self.uncovered is None else self.uncovered
 
-    @property
+    @cached_property
     def given_faces(self) -> IntArray | None:
         """Vertices (m, 3) of the triangles that points and curves refer to; None without `faces`."""
         if self.faces is None:

@@ -650,7 +650,7 @@ def _two_spheres(ratio: float) -> Mesh:
 def _part_and_plate() -> Mesh:
     """A small torus beside a square of two triangles, a thousand times larger."""
     return _joined(
-        torus(16, 32), Mesh([[0, 0, -1], [1e3, 0, -1], [1e3, 1e3, -1], [0, 1e3, -1]], [[0, 1, 2], [0, 2, 3]])
+        torus(16, 32), Mesh(np.array([[0, 0, -1], [1e3, 0, -1], [1e3, 1e3, -1], [0, 1e3, -1]]), [[0, 1, 2], [0, 2, 3]])
     )
 
 
@@ -664,7 +664,7 @@ def _triangle() -> Mesh:
 
 @_shape("small", held_out=True)
 def _needle() -> Mesh:
-    return Mesh([[0, 0, 0], [1, 0, 0], [0.5, 1e-4, 0], [0.5, -1e-4, 0]], [[0, 1, 2], [1, 0, 3]])
+    return Mesh(np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-4, 0], [0.5, -1e-4, 0]]), [[0, 1, 2], [1, 0, 3]])
 
 
 @_shape("small")
