@@ -19,6 +19,7 @@ from heat_igl.heat_method import (
     HeatMethodSolver,
     HeatSolution,
     LabelledDistance,
+    geodesic_distance,
     heat_method_distance,
 )
 from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_curves, write_mesh
@@ -97,6 +98,7 @@ __all__ = [
     "farthest_cells",
     "farthest_points",
     "geodesic_centre",
+    "geodesic_distance",
     "heat_method_distance",
     "image_domain",
     "isolines",

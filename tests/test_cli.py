@@ -161,7 +161,7 @@ def test_without_typer_one_line_names_the_extra(tmp_path: Path) -> None:
         [sys.executable, "-c", code], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
     )
     assert done.returncode == 1
-    assert_one_line(done.stderr, 'pip install "heat-igl[cli]"')
+    assert_one_line(done.stderr, "pip install typer rich")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")

@@ -366,4 +366,6 @@ def test_missing_numba_names_the_extra():
         "except heat_igl.MissingExtraError as error:\n    print(error)"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout.strip() == 'refinement needs numba: pip install "heat-igl[fast]"'
+    assert result.stdout.strip() == (
+        "refinement needs numba: pip install numba (or install heat-igl with its extra 'fast')"
+    )

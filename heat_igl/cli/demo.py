@@ -49,9 +49,7 @@ def demonstrate(out: Path) -> list[tuple[str, str]]:
     ply, png = out / f"{name}.ply", out / f"{name}.png"
     rows: _Rows = []
     if path is None:
-        rows.append(
-            ("note", 'no bunny, since pymeshlab is missing (pip install "heat-igl[validate]"); taking a sphere')
-        )
+        rows.append(("note", "no bunny, since pymeshlab is missing (pip install pymeshlab); taking a sphere"))
     start = time.perf_counter()
     mesh = read_mesh(path) if path else shapes.icosphere(5)
     rows.append((name, f"{mesh.n_vertices} vertices, {mesh.n_faces} triangles ({_since(start)} to read or make)"))

@@ -14,11 +14,11 @@ from heat_igl.sources.near_field import NearField, Seeds
 from heat_igl.sources.specification import SourceSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["SourceAssembler", "SourceTerm", "right_hand_side", "take_shorter"]
+__all__ = ["NEAR_RADIUS", "SourceAssembler", "SourceTerm", "right_hand_side", "take_shorter"]
 
 # How far around points and curves distance is taken from straight lines, in mean edge lengths. Mean error on the bunny
 # and the cow from 5 points inside faces: RADIUS_MEASUREMENT
-_RADIUS = 6.0
+NEAR_RADIUS = 6.0
 # A curve gives as much heat per so many mean edge lengths as a point does: a point's heat falls on the way like that of
 # a curve of about this length, so that both are equally warm a few edges away.
 _EDGES_PER_POINT = 4.0
@@ -218,7 +218,7 @@ class SourceAssembler:
                 return _NONE, _NONE
         vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         points = sources.points.joined(sources.segments.ends())
-        return self._faces.seeds(points, sources.segments, _RADIUS * self._domain.mean_edge_length, vertices)
+        return self._faces.seeds(points, sources.segments, NEAR_RADIUS * self._domain.mean_edge_length, vertices)
 
     def _initial_heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""

@@ -12,24 +12,20 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import MeshError
 from heat_igl.intrinsic import (
     IntrinsicTriangulation,
     double_cover,
-    intrinsic_delaunay,
-    intrinsic_triangulation,
     oriented,
 )
-from heat_igl.mesh import Mesh, SurfacePoints, connectivity
+from heat_igl.mesh import SurfacePoints
 from heat_igl.runtime import compiled_kernels_for
-from heat_igl.sources import Sources, vertex_sources
-from heat_igl.typing import ArrayLike, FloatArray, IntArray
+from heat_igl.typing import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from heat_igl.intrinsic.fans import Tables
     from heat_igl.unfolding.unfolding import Points
 
-__all__ = ["Known", "Refine", "Refinement", "unfolded_distance"]
+__all__ = ["Known", "Refine", "Refinement"]
 
 Refine = Literal["sweep", "unfold"]
 
@@ -321,42 +317,3 @@ def _kernels() -> tuple[ModuleType, ModuleType, ModuleType]:
         from heat_igl.intrinsic import fans
         from heat_igl.unfolding import sweeping, unfolding
     return fans, sweeping, unfolding
-
-
-def unfolded_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, tolerance: float = _TOLERANCE) -> FloatArray:
-    """Near-exact geodesic distance without a factorization: strip unfolding in the order of Dijkstra's algorithm.
-
-    For one or two queries on a mesh; from the third on, ``HeatMethodSolver(mesh, refine="unfold")`` is faster.
-
-    Parameters
-    ----------
-    V : (n, 3) array_like
-        Vertex positions.
-    F : (m, 3) array_like
-        Triangles.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
-    tolerance : float
-        See `Refinement.unfold`.
-
-    Returns
-    -------
-    (n,) float64
-        In the unit of V: 0 at the sources, ``inf`` at vertices that no source reaches. Every value is the length of a
-        path on the surface.
-
-    Raises
-    ------
-    MeshError
-        If the mesh cannot be used, or is tetrahedral.
-    SourceError
-        If `sources` does not name vertices.
-    MissingExtraError
-        If numba is not installed.
-    """
-    mesh = Mesh(V, F)
-    if mesh.is_tetrahedral:
-        raise MeshError("unfolding needs triangles, but F has 4 columns")
-    chosen = vertex_sources(sources, mesh.n_vertices)
-    refinement = Refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-    return refinement.unfold(connectivity.edge_distance(mesh.edge_graph, chosen), chosen, tolerance)
