@@ -24,8 +24,8 @@ _RADIUS = 6.0
 # So many mean edge lengths of a curve give as much heat as a point, so that both are equally warm some edges away. What
 # matters is the order of magnitude: from 1 to 16, errors from a point and a curve change by less than 0.06 points.
 _EDGES_PER_POINT = 4.0
-# A curve is integrated by points at most so many mean edge lengths apart. Hat functions vary over one edge, and a quarter
-# of it changes errors by less than 0.001 points against a sixteenth.
+# A curve is integrated by points at most so many mean edge lengths apart. Hat functions vary over one edge; with a
+# sixteenth of it, errors change by less than 0.001 points.
 _SPACING = 0.25
 _NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
 
