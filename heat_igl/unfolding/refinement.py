@@ -1,8 +1,8 @@
 """Near-exact distance by planar unfolding, in an order that heat (or Dijkstra) gives for nothing.
 
 A vertex gets its distance from neighbours that are nearer to the source, by laying triangles out in the plane: two at a
-time (`Refinement.sweep`), or a strip of them, followed until the path is straight (`Refinement.unfold`). What heat is
-needed for is the order alone; no Poisson problem is solved. docs/refinement.md derives the update.
+time (`Refinement.sweep`), or a strip of them, followed until the path is straight (`Refinement.unfold`). Heat
+gives the order alone; no Poisson problem is solved. docs/refinement.md derives the update.
 """
 
 from __future__ import annotations
@@ -12,30 +12,22 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import MeshError
-from heat_igl.intrinsic import (
-    IntrinsicTriangulation,
-    double_cover,
-    intrinsic_delaunay,
-    intrinsic_triangulation,
-    oriented,
-)
-from heat_igl.mesh import Mesh, SurfacePoints, connectivity
+from heat_igl.intrinsic import IntrinsicTriangulation, double_cover, oriented
+from heat_igl.mesh import SurfacePoints
 from heat_igl.runtime import compiled_kernels_for
-from heat_igl.sources import Sources, vertex_sources
-from heat_igl.typing import ArrayLike, FloatArray, IntArray
+from heat_igl.typing import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from heat_igl.intrinsic.fans import Tables
     from heat_igl.unfolding.unfolding import Points
 
-__all__ = ["Known", "Refine", "Refinement", "unfolded_distance"]
+__all__ = ["TOLERANCE", "Known", "Refine", "Refinement"]
 
 Refine = Literal["sweep", "unfold"]
 
 # Relative gain below which a path is not straightened further. What is lost adds up to 0.0003 to 0.003 % on average; 0
 # loses nothing and takes up to twice the time.
-_TOLERANCE = 4e-5
+TOLERANCE = 4e-5
 # The search starts at vertices that fall short of what a neighbour promised by this many tolerances: by more than the
 # paths that the promise rests on may have been cut short.
 _SHORTFALL = 15.0
@@ -161,7 +153,7 @@ class Refinement:
         self,
         key: FloatArray,
         sources: IntArray,
-        tolerance: float = _TOLERANCE,
+        tolerance: float = TOLERANCE,
         offsets: FloatArray | None = None,
         points: SurfacePoints | None = None,
         point_offsets: FloatArray | None = None,
@@ -321,42 +313,3 @@ def _kernels() -> tuple[ModuleType, ModuleType, ModuleType]:
         from heat_igl.intrinsic import fans
         from heat_igl.unfolding import sweeping, unfolding
     return fans, sweeping, unfolding
-
-
-def unfolded_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, tolerance: float = _TOLERANCE) -> FloatArray:
-    """Near-exact geodesic distance without a factorization: strip unfolding in the order of Dijkstra's algorithm.
-
-    For one or two queries on a mesh; from the third on, ``HeatMethodSolver(mesh, refine="unfold")`` is faster.
-
-    Parameters
-    ----------
-    V : (n, 3) array_like
-        Vertex positions.
-    F : (m, 3) array_like
-        Triangles.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
-    tolerance : float
-        See `Refinement.unfold`.
-
-    Returns
-    -------
-    (n,) float64
-        In the unit of V: 0 at the sources, ``inf`` at vertices that no source reaches. Every value is the length of a
-        path on the surface.
-
-    Raises
-    ------
-    MeshError
-        If the mesh cannot be used, or is tetrahedral.
-    SourceError
-        If `sources` does not name vertices.
-    MissingExtraError
-        If numba is not installed.
-    """
-    mesh = Mesh(V, F)
-    if mesh.is_tetrahedral:
-        raise MeshError("unfolding needs triangles, but F has 4 columns")
-    chosen = vertex_sources(sources, mesh.n_vertices)
-    refinement = Refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-    return refinement.unfold(connectivity.edge_distance(mesh.edge_graph, chosen), chosen, tolerance)
