@@ -2,6 +2,7 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.panels import entries, in_panel, numbers
 
 __all__ = ["Substitution"]
@@ -104,10 +105,14 @@ def _forward_one(
         if _all_zero(own, columns):
             continue
         column: entries = cython.address(f.L[f.first_entry[b]])  # from its diagonal on
+        ahead: cython.p_char = cython.cast(cython.p_char, column) - AHEAD
         for i in range(left):
             below[i] = 0.0
         for j in range(columns):
             y: cython.double = own[j]
+            for i in range(0, 8 * (columns - j + left), 64):
+                prefetch(ahead - i)
+            ahead -= 8 * (columns - j + left)
             for i in range(1, columns - j):
                 own[j + i] -= column[i] * y
             column += columns - j
