@@ -24,11 +24,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent / "packaging"))
 from build_backend import has_compiler
 
 KERNELS = Path("heat_igl/kernels")
-# Where the sources are copied to that are compiled, and where Cython writes C.
-COPIES, C_FILES = Path("build/kernels"), Path("build/cython")
 # Kernels index without checks: callers pass arrays whose sizes they have checked. HEAT_IGL_CHECKED=1 compiles the
 # checks in, for the tests that look for indices out of range.
 CHECKED = os.environ.get("HEAT_IGL_CHECKED") == "1"
+# Where the sources are copied to that are compiled, and where Cython writes C.
+BUILD = Path("build/checked" if CHECKED else "build")
+COPIES, C_FILES = BUILD / "kernels", BUILD / "cython"
 DIRECTIVES = {
     "language_level": 3,
     "boundscheck": CHECKED,
@@ -36,6 +37,7 @@ DIRECTIVES = {
     "initializedcheck": CHECKED,
     "cdivision": True,
     "freethreading_compatible": True,
+    "show_performance_hints": not CHECKED,
 }
 # Kernels that are compiled once more for each set of wide vectors; `heat_igl.kernels` chooses among them at run time.
 # Only here may sums be taken in any order and products fused.

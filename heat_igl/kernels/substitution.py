@@ -5,7 +5,9 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.panels import entries, in_panel, numbers
 
-__all__ = ["Substitution"]
+__all__ = ["Substitution", "width"]
+
+width = WIDTH
 
 
 @cython.cclass
