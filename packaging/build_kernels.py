@@ -1,8 +1,8 @@
 """From heat_igl/kernels to extensions: every module there is Cython in pure Python mode.
 
-A few kernels are compiled once more for each set of wide vectors that the processor may have; `heat_igl.kernels` chooses
-among them at run time. ``HEAT_IGL_CHECKED=1`` makes a build that checks every index and raises, for tests: the usual one
-indexes without checks, as callers pass arrays whose sizes they have checked.
+A few kernels are compiled once more for each set of wide vectors that the processor may have; `heat_igl.kernels`
+chooses among them at run time. ``HEAT_IGL_CHECKED=1`` makes a build that checks every index and raises, for tests: the
+usual one indexes without checks, as callers pass arrays whose sizes they have checked.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ DIRECTIVES = {
     "freethreading_compatible": True,
     "show_performance_hints": not CHECKED,
 }
-# Kernels of long loops over numbers, for which vectors pay. Only here may sums be taken in any order and products fused.
+# Kernels of long loops over numbers, for which vectors pay. Only here may sums be taken in any order, products fused.
 WIDE = ("multifrontal", "substitution")
 VECTORS = {"avx2": "-mavx2 -mfma", "avx512": "-mavx512f -mavx512dq -mavx512vl -mfma -mprefer-vector-width=512"}
 VECTORS_MSVC = {"avx2": "/arch:AVX2", "avx512": "/arch:AVX512"}

@@ -2,8 +2,8 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.panels import entries, in_panel, numbers
+from cython.cimports.heat_igl.kernels.prefetch import prefetch
 
 __all__ = ["Substitution", "width"]
 
@@ -35,7 +35,10 @@ class Substitution:
     def __init__(self, fronts, L):
         self.L = L
         self.start, self.first_row, self.rows, self.first_entry = (
-            fronts.start, fronts.first_row, fronts.rows, fronts.first_entry
+            fronts.start,
+            fronts.first_row,
+            fronts.rows,
+            fronts.first_entry,
         )
         self.pieces, self.piece_end = fronts.pieces, fronts.piece_end
         self.own_rows, self.above = fronts.own_rows, fronts.above

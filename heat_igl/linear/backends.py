@@ -10,6 +10,7 @@ scikit-sparse are GPL; MKL's PARDISO is proprietary and for one kind of processo
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal, get_args
 
 import scipy.sparse as sp
@@ -24,7 +25,7 @@ __all__ = ["Backend", "analyse", "factorize"]
 
 Backend = Literal["auto", "scipy", "multifrontal", "iterative"]
 
-_ANALYSES: dict[str, type[Analysis]] = {
+_ANALYSES: dict[str, Callable[[sp.csc_matrix], Analysis]] = {
     "scipy": SuperLUAnalysis,
     "multifrontal": MultifrontalAnalysis,
     "iterative": IterativeAnalysis,
