@@ -208,16 +208,36 @@ def _eliminate_columns(panel: numbers, columns: cython.Py_ssize_t, size: cython.
 
     Pivots stay on the diagonal. Taking their roots, as in Cholesky's form, would round once more.
     """
-    i: cython.Py_ssize_t
-    j: cython.Py_ssize_t
-    for j in range(columns):
+    j: cython.Py_ssize_t = 0
+    while j < columns:
         column: numbers = panel + in_panel(j, j, size)
-        _subtract(column, size - j, panel, size, j, j, j)
-        pivot: cython.double = column[0]
-        if not pivot > 0.0:
+        if j + 1 == columns:
+            _subtract(column, size - j, panel, size, j, j, 0, j)
+            return _divide(column, size - j)
+        following: numbers = column + (size - j)
+        _subtract(column, 1, panel, size, j, j, 0, j)
+        _subtract_two(column + 1, following, size - j - 1, panel, size, j + 1, j, j)
+        if not _divide(column, size - j):
             return False
-        for i in range(1, size - j):
-            column[i] /= pivot
+        _subtract(following, size - j - 1, panel, size, j + 1, j + 1, j, j + 1)
+        if not _divide(following, size - j - 1):
+            return False
+        j += 2
+    return True
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _divide(column: numbers, n: cython.Py_ssize_t) -> cython.bint:
+    """Divide a column by the pivot on top of it; false if that is not positive."""
+    i: cython.Py_ssize_t
+    pivot: cython.double = column[0]
+    if not pivot > 0.0:
+        return False
+    for i in range(1, n):
+        column[i] /= pivot
     return True
 
 
@@ -230,13 +250,20 @@ def _subtract_from_update(
 ) -> cython.void:
     """Subtract what the eliminated columns of a front take from its other rows."""
     j: cython.Py_ssize_t
+    top: cython.Py_ssize_t
     size: cython.Py_ssize_t = columns + left
     low: cython.Py_ssize_t = 0
     while low < left:
         high: cython.Py_ssize_t = min(low + ROWS, left)
-        for j in range(high):
-            top: cython.Py_ssize_t = max(j, low)
-            _subtract(update + j * left + top, high - top, panel, size, columns + top, columns + j, columns)
+        for j in range(0, high - 1, 2):
+            # The entry above the second column's diagonal is written too, and never read.
+            top = max(j, low)
+            column: numbers = update + j * left + top
+            _subtract_two(column, column + left, high - top, panel, size, columns + top, columns + j, columns)
+        if high % 2:
+            top = max(high - 1, low)
+            column = update + (high - 1) * left + top
+            _subtract(column, high - top, panel, size, columns + top, columns + high - 1, 0, columns)
         low = high
 
 
@@ -250,12 +277,13 @@ def _subtract(
     size: cython.Py_ssize_t,
     row: cython.Py_ssize_t,
     factor_row: cython.Py_ssize_t,
+    first: cython.Py_ssize_t,
     count: cython.Py_ssize_t,
 ) -> cython.void:
-    """Subtract from c the first `count` columns of a front, from `row` on, as much as eliminates `factor_row`."""
+    """Subtract from c the columns `first` to `count` of a front, from `row` on, as much as eliminates `factor_row`."""
     i: cython.Py_ssize_t
     k: cython.Py_ssize_t
-    t: cython.Py_ssize_t = 0
+    t: cython.Py_ssize_t = first
     f: cython.double[8]
     while t + 8 <= count:
         for k in range(8):
@@ -279,3 +307,47 @@ def _subtract(
         for i in range(length):
             c[i] -= column[i] * factor_t
         t += 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _subtract_two(
+    c: numbers,
+    d: numbers,
+    length: cython.Py_ssize_t,
+    panel: entries,
+    size: cython.Py_ssize_t,
+    row: cython.Py_ssize_t,
+    factor_row: cython.Py_ssize_t,
+    count: cython.Py_ssize_t,
+) -> cython.void:
+    """As `_subtract`, from c for `factor_row` and from d for the row after it: the columns are read once for both."""
+    i: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    t: cython.Py_ssize_t = 0
+    f: cython.double[8]
+    g: cython.double[8]
+    while t + 8 <= count:
+        for k in range(8):
+            pivot: cython.double = panel[in_panel(t + k, t + k, size)]
+            f[k] = panel[in_panel(t + k, factor_row, size)] * pivot
+            g[k] = panel[in_panel(t + k, factor_row + 1, size)] * pivot
+        a0: entries = panel + in_panel(t, row, size)
+        a1: entries = panel + in_panel(t + 1, row, size)
+        a2: entries = panel + in_panel(t + 2, row, size)
+        a3: entries = panel + in_panel(t + 3, row, size)
+        a4: entries = panel + in_panel(t + 4, row, size)
+        a5: entries = panel + in_panel(t + 5, row, size)
+        a6: entries = panel + in_panel(t + 6, row, size)
+        a7: entries = panel + in_panel(t + 7, row, size)
+        for i in range(length):
+            c[i] -= ((a0[i] * f[0] + a1[i] * f[1]) + (a2[i] * f[2] + a3[i] * f[3])) + (
+                (a4[i] * f[4] + a5[i] * f[5]) + (a6[i] * f[6] + a7[i] * f[7])
+            )
+            d[i] -= ((a0[i] * g[0] + a1[i] * g[1]) + (a2[i] * g[2] + a3[i] * g[3])) + (
+                (a4[i] * g[4] + a5[i] * g[5]) + (a6[i] * g[6] + a7[i] * g[7])
+            )
+        t += 8
+    _subtract(c, length, panel, size, row, factor_row, t, count)
+    _subtract(d, length, panel, size, row, factor_row + 1, t, count)
