@@ -12,7 +12,6 @@ from heat_igl import FactorizationError, HeatMethodSolver, Mesh, shapes
 from heat_igl.linear import backends, iterative
 from heat_igl.operators import operators
 
-pytest.importorskip("numba")
 pytest.importorskip("pyamg")
 
 
@@ -40,6 +39,31 @@ def test_relaxation_of_both_signs_is_the_difference():
     A = heat_matrix(shapes.icosphere(3))
     x = np.random.default_rng(0).standard_normal(A.shape[0])
     np.testing.assert_allclose(iterative.Relaxation(A).solve(A @ x), x, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("n_columns", [1, 3])
+def test_relaxation_of_nothing_is_nothing(n_columns):
+    """No entry of the right-hand side is positive, so there is no first level of unknowns."""
+    A = heat_matrix(shapes.icosphere(1))
+    b = np.zeros((42, n_columns))
+    b[:, 1:] = 1.0
+    x = iterative.Relaxation(A).solve(b)
+    assert (x[:, 0] == 0).all()
+    np.testing.assert_allclose(A @ x, b, rtol=1e-9)
+
+
+def test_relaxation_where_nothing_has_a_neighbour():
+    A = sp.diags([2.0, 4.0, 8.0]).tocsc()
+    assert iterative.Relaxation(A).solve(np.array([0.0, 1.0, 2.0])).tolist() == [0.0, 0.25, 0.25]
+
+
+def test_a_source_in_the_corner_of_a_grid():
+    """Half of the step with the mean of both boundary conditions has the source on a held vertex: nothing to solve."""
+    mesh = shapes.grid(100)
+    direct, by_iteration = (
+        HeatMethodSolver(mesh, backend=backend, boundary="average").distance(0) for backend in ("scipy", "iterative")
+    )
+    np.testing.assert_allclose(by_iteration, direct, rtol=0, atol=1e-9 * direct.max())
 
 
 def test_multigrid_solves():

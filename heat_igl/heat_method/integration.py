@@ -13,8 +13,9 @@ from heat_igl.typing import FloatArray
 
 __all__ = ["Integration", "damped_field"]
 
-# A straight line from a source that is longer than the integrated distance by more than this share of it leads around
-# something, and not to the nearest source: the integrated distance is hardly ever wrong by so much.
+# A straight line that is longer than the integrated distance by more than this share of it comes from a source that is
+# not the nearest: integrated distance is wrong by less, by 1 to 4 % in the mean. It decides on the far corners of faces
+# much larger than the mean alone; from 0 to 1, errors on the cow, the fandisk and the camel's head are the same.
 _HEAT_ERROR = 0.2
 
 

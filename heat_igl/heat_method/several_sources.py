@@ -12,10 +12,10 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["drop_overtaken", "warmest_sources"]
 
-# A source is overtaken if heat there is so many times what it would be if all began as late as this one. Heat from a
-# source that comes first by x is exp(x / sqrt(t)) times as much, less a factor of about 4 for spreading over the few
-# edges between: 5 times in all for x = 2 edges at t = h^2 / 2. Up to there both sources give the same distance to
-# within the error of the method.
+# A source is overtaken if heat there is more than so many times what it would be if all began as late as this one. A
+# front that has come before the source by a time x, as long as its way of x, is exp(x / sqrt(t)) times as warm as one
+# that comes with it: 5 times after 1.1 mean edge lengths at the default t = h^2 / 2, and 2 or so since heat also falls
+# as it spreads. Up to there the distance from either source is the same to within the error of the method.
 _OVERTAKEN = 5.0
 # Right-hand sides of labels solved together, as in a block of distances: more read the factors no more quickly.
 _BLOCK = 8

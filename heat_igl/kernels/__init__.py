@@ -2,3 +2,37 @@
 
 A kernel checks nothing that it is given: the modules that call it pass contiguous arrays of the stated types and sizes.
 """
+
+from __future__ import annotations
+
+from importlib.machinery import EXTENSION_SUFFIXES
+from importlib.util import find_spec
+from pathlib import Path
+
+__all__ = ["builds"]
+
+
+def _require_extensions() -> None:
+    """Refuse to go on where the sources lie without what is compiled from them, such as in a fresh checkout.
+
+    Python would import the sources instead, and run them slowly or not at all.
+    """
+    here = Path(__file__).parent
+    compiled = {path.name.partition(".")[0] for path in here.iterdir() if path.name.endswith(tuple(EXTENSION_SUFFIXES))}
+    missing = sorted({path.stem for path in here.glob("*.py")} - compiled - {"__init__"})
+    if missing:
+        raise ImportError(
+            f"heat_igl is imported from {here.parent}, where {len(missing)} of its kernels are not compiled "
+            f"({missing[0]}): run `pip install -e .` in {here.parent.parent}, or start Python in another folder"
+        )
+
+
+_require_extensions()
+
+
+def builds(name: str) -> list[str]:
+    """The modules that a kernel was compiled to and this processor can run, those with the widest vectors first."""
+    from heat_igl.kernels.processor import vectors
+
+    modules = [f"heat_igl.kernels.{name}_{one}" if one else f"heat_igl.kernels.{name}" for one in vectors()]
+    return [module for module in modules if find_spec(module) is not None]

@@ -13,13 +13,13 @@ import importlib.util
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import FactorizationError, MissingExtraError
+from heat_igl.kernels.relaxation import relax
 from heat_igl.runtime import n_threads
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -55,6 +55,9 @@ class IterativeAnalysis:
     backend = "iterative"
     order: IntArray | None = None
 
+    def __init__(self, pattern: sp.csc_matrix | None = None) -> None:
+        pass
+
     def fits(self, A: sp.csc_matrix) -> bool:  # noqa: ARG002 - any will do
         """Whether the analysis may be used for A: always."""
         return True
@@ -74,11 +77,6 @@ class Relaxation:
         positive entries off the diagonal such as obtuse angles at a boundary bring.
     free : (n,) bool, optional
         Rows and columns to keep; the solution is 0 on the others.
-
-    Raises
-    ------
-    MissingExtraError
-        If numba is not installed.
     """
 
     backend = "iterative"
@@ -88,7 +86,6 @@ class Relaxation:
         self._arguments = A, free
         self._part = _Part(A, free)
         self.n_bytes = self._part.n_bytes
-        self._kernel = _kernel()
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Solve A x = b for one right-hand side (n,) or several (n, k); columns run on all processors.
@@ -107,7 +104,14 @@ class Relaxation:
 
     def _rising(self, b: FloatArray) -> FloatArray:
         A = self._part.matrix  # symmetric: its columns are its rows
-        x, sweeps = self._kernel.relax(A.indptr, A.indices, A.data, b, _TOLERANCE, _MOST_SWEEPS)
+        x, sweeps = relax(
+            A.indptr.astype(np.int32, copy=False),
+            A.indices.astype(np.int32, copy=False),
+            A.data.astype(np.float64, copy=False),
+            b.astype(np.float64, copy=False),
+            _TOLERANCE,
+            _MOST_SWEEPS,
+        )
         if sweeps < 0 or (x < 0).any():
             raise FactorizationError(
                 f"relaxation failed ({'no end' if sweeps < 0 else 'negative heat'}): edges with negative weights let "
@@ -216,7 +220,7 @@ def iterative(A: sp.csc_matrix, free: BoolArray | None = None) -> Relaxation | M
     FactorizationError
         If A has a diagonal entry that is not positive.
     MissingExtraError
-        If a library is missing.
+        If pyamg is needed and missing.
     """
     kept = np.ones(A.shape[0], bool) if free is None else free
     diagonal = A.diagonal()[kept]
@@ -227,8 +231,8 @@ def iterative(A: sp.csc_matrix, free: BoolArray | None = None) -> Relaxation | M
 
 
 def has_iterative() -> bool:
-    """Whether the libraries that `iterative` needs are installed."""
-    return all(importlib.util.find_spec(name) is not None for name in ("numba", "pyamg"))
+    """Whether the library that `iterative` needs is installed."""
+    return importlib.util.find_spec("pyamg") is not None
 
 
 def factors_fit(A: sp.csc_matrix) -> bool:
@@ -260,14 +264,3 @@ def available_memory() -> float:
         return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
         return float("inf")
-
-
-def _kernel() -> ModuleType:
-    """The compiled kernel, loaded when it is first needed."""
-    try:
-        from heat_igl.linear import relaxation
-    except ImportError as error:
-        if error.name is None or not error.name.startswith(("numba", "llvmlite")):
-            raise
-        raise MissingExtraError.of('backend="iterative"', "numba", "fast") from None
-    return relaxation

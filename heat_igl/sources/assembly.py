@@ -16,13 +16,16 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["NEAR_RADIUS", "SourceAssembler", "SourceTerm", "right_hand_side", "take_shorter"]
 
-# How far around points and curves distance is taken from straight lines, in mean edge lengths. Mean error on the bunny
-# and the cow from 5 points inside faces: RADIUS_MEASUREMENT
+# How far around points and curves distance is taken from straight lines, in mean edge lengths: the cost grows with the
+# square. Mean error from points inside faces of the cow, the fandisk and the camel's head: 1.63, 0.75 and 0.77 % at 2;
+# 1.46, 0.72 and 0.72 % at 6; 1.62, 0.66 and 0.66 % at 12. From a curve 2.56, 3.86 and 4.26 %; 1.86, 2.79 and 3.29 %;
+# 1.53, 1.73 and 2.37 %.
 NEAR_RADIUS = 6.0
-# A curve gives as much heat per so many mean edge lengths as a point does: a point's heat falls on the way like that of
-# a curve of about this length, so that both are equally warm a few edges away.
+# So many mean edge lengths of a curve give as much heat as a point, so that both are equally warm some edges away. What
+# matters is the order of magnitude: from 1 to 16, errors from a point and a curve change by less than 0.06 points.
 _EDGES_PER_POINT = 4.0
-# A curve is integrated by points at most so many mean edge lengths apart: hat functions vary over one edge.
+# A curve is integrated by points at most so many mean edge lengths apart. Hat functions vary over one edge; with a
+# sixteenth of it, errors change by less than 0.001 points.
 _SPACING = 0.25
 _NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
 

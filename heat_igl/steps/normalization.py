@@ -84,13 +84,18 @@ def damping(
         Factor of X on each face, between 0 and 1; 1 on faces with a corner on the boundary, where an insulated
         boundary turns the front into its own mirror image, or where u is not positive.
     """
+    return _share_of_rate(operators, u, _lowest_full_rate(operators, t, fitted, full_rate))
+
+
+def _share_of_rate(operators: Operators, u: FloatArray, full_rate: FloatArray) -> FloatArray:
+    """|grad log u| over `full_rate` (m,), 1 where it is more, on the boundary, and where u is not positive."""
     with np.errstate(divide="ignore", invalid="ignore"):
         gradient = operators.gradient_rows @ np.log(u)
         components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
         rate = np.sqrt(np.einsum("k...,k...->...", components, components))
-    factor = (rate.T / _lowest_full_rate(operators, t, fitted, full_rate)).T
-    factor[operators.boundary_faces] = 1
-    return np.asarray(np.where(factor < 1, factor, 1.0))
+    share = (rate.T / full_rate).T
+    share[operators.boundary_faces] = 1
+    return np.asarray(np.where(share < 1, share, 1.0))
 
 
 def _lowest_full_rate(operators: Operators, t: float, fitted: bool, full_rate: float | None = None) -> FloatArray:
@@ -108,10 +113,10 @@ def _front_rate(operators: Operators, t: float) -> FloatArray:
 
 
 class NormalizedDivergence:
-    """The right-hand side of step 3: the divergence of the field X of step 2, which is not stored.
+    """The right-hand side of step 3: the divergence of the field X of step 2.
 
     The same as ``D @ (damping(...) * normalize(...))`` to rounding. For triangles there is a compiled kernel, one pass
-    over the faces, where numba is installed; its tables are made once.
+    over the faces that stores no field, where numba is installed; its tables are made once.
 
     Parameters
     ----------
@@ -130,19 +135,22 @@ class NormalizedDivergence:
         self, operators: Operators, t: float | None = None, order: IntArray | None = None, fitted: bool = False
     ) -> None:
         self._arguments = operators, t, order, fitted
+        self._full_rate: FloatArray | None = None
         self._kernel: Triangles | None = None
+        full_rate = None if t is None else _lowest_full_rate(operators, t, fitted)
         if isinstance(operators.gradient, TriangleElements) and importlib.util.find_spec("numba") is not None:
             from heat_igl.steps import descending
 
-            full_rate = np.zeros(len(operators.weights)) if t is None else _lowest_full_rate(operators, t, fitted)
+            full_rate = np.zeros(len(operators.weights)) if full_rate is None else full_rate
             full_rate[operators.boundary_faces] = 0.0
             self._kernel = descending.triangles(operators.gradient, operators.weights, full_rate, order)
         else:
+            self._full_rate = full_rate
             _ = operators.D  # made on first use otherwise, in the middle of the first query
 
     def divergence(self, u: FloatArray) -> FloatArray:
         """Integrated divergence (n, k) for heat (n, k)."""
-        operators, t, _, fitted = self._arguments
+        operators, _, _, fitted = self._arguments
         if self._kernel is not None:
             from heat_igl.steps.descending import normalized_divergence
 
@@ -151,8 +159,8 @@ class NormalizedDivergence:
         # One column at a time: the field of all takes more memory than the caches hold.
         for column, of_column in zip(np.ascontiguousarray(u.T), divergence.T, strict=True):
             X = normalize(operators, column, fitted)
-            if t is not None:
-                X *= np.tile(damping(operators, column, t, fitted=fitted), operators.dimension)
+            if self._full_rate is not None:
+                X *= np.tile(_share_of_rate(operators, column, self._full_rate), operators.dimension)
             of_column[:] = operators.D @ X
         return divergence
 

@@ -14,7 +14,7 @@ from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators import Surface, unfolding_surface
 from heat_igl.sources import NEAR_RADIUS, NearField, Seeds, SourcePoints, Sources, SourceSet, source_set
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
-from heat_igl.unfolding.refinement import Refine
+from heat_igl.unfolding.refinement import TOLERANCE, Refine
 from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = ["distance_from_scratch", "unfolded_distance"]
@@ -29,7 +29,7 @@ def unfolded_distance(V: MeshLike, F: Sources, /, *, tolerance: float = ...) -> 
 @overload
 def unfolded_distance(V: MeshLike, F: ArrayLike | None, sources: Sources, *, tolerance: float = ...) -> FloatArray: ...
 def unfolded_distance(
-    V: MeshLike, F: ArrayLike | Sources | None = None, sources: Sources | None = None, *, tolerance: float = 4e-5
+    V: MeshLike, F: ArrayLike | Sources | None = None, sources: Sources | None = None, *, tolerance: float = TOLERANCE
 ) -> FloatArray:
     """Near-exact geodesic distance without a factorization: strip unfolding in the order of Dijkstra's algorithm.
 

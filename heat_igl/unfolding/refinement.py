@@ -1,8 +1,8 @@
 """Near-exact distance by planar unfolding, in an order that heat (or Dijkstra) gives for nothing.
 
 A vertex gets its distance from neighbours that are nearer to the source, by laying triangles out in the plane: two at a
-time (`Refinement.sweep`), or a strip of them, followed until the path is straight (`Refinement.unfold`). What heat is
-needed for is the order alone; no Poisson problem is solved. docs/refinement.md derives the update.
+time (`Refinement.sweep`), or a strip of them, followed until the path is straight (`Refinement.unfold`). Heat
+gives the order alone; no Poisson problem is solved. docs/refinement.md derives the update.
 """
 
 from __future__ import annotations
@@ -12,11 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from heat_igl.intrinsic import (
-    IntrinsicTriangulation,
-    double_cover,
-    oriented,
-)
+from heat_igl.intrinsic import IntrinsicTriangulation, double_cover, oriented
 from heat_igl.mesh import SurfacePoints
 from heat_igl.runtime import compiled_kernels_for
 from heat_igl.typing import FloatArray, IntArray
@@ -25,13 +21,13 @@ if TYPE_CHECKING:
     from heat_igl.intrinsic.fans import Tables
     from heat_igl.unfolding.unfolding import Points
 
-__all__ = ["Known", "Refine", "Refinement"]
+__all__ = ["TOLERANCE", "Known", "Refine", "Refinement"]
 
 Refine = Literal["sweep", "unfold"]
 
 # Relative gain below which a path is not straightened further. What is lost adds up to 0.0003 to 0.003 % on average; 0
 # loses nothing and takes up to twice the time.
-_TOLERANCE = 4e-5
+TOLERANCE = 4e-5
 # The search starts at vertices that fall short of what a neighbour promised by this many tolerances: by more than the
 # paths that the promise rests on may have been cut short.
 _SHORTFALL = 15.0
@@ -157,7 +153,7 @@ class Refinement:
         self,
         key: FloatArray,
         sources: IntArray,
-        tolerance: float = _TOLERANCE,
+        tolerance: float = TOLERANCE,
         offsets: FloatArray | None = None,
         points: SurfacePoints | None = None,
         point_offsets: FloatArray | None = None,

@@ -1,0 +1,7 @@
+cdef enum:
+    # Columns of the numbers of a face; `heat_igl.steps.descending.Triangles` says what they are.
+    PER_BASE = 0
+    FOOT = 1
+    PER_HEIGHT = 2
+    AREA = 3
+    PER_RATE = 4

@@ -1,0 +1,11 @@
+"""What the processor at hand can do."""
+
+import cython  # noqa: F401 - makes this a module of Cython's pure Python mode
+from cython.cimports.heat_igl.kernels.processor import wide_vectors
+
+__all__ = ["vectors"]
+
+
+def vectors():
+    """Names of the sets of wide vectors that kernels may use here, widest first, then "" for none."""
+    return ["avx512", "avx2", ""][2 - wide_vectors() :]

@@ -1,0 +1,157 @@
+"""Symbolic factorization: where the fronts of a multifrontal factor have entries, and how their tree is cut up."""
+
+import cython
+import numpy as np
+
+__all__ = ["front_rows", "tree_pieces"]
+
+
+def front_rows(
+    ends: cython.const[cython.int][::1],
+    neighbours: cython.const[cython.int][::1],
+    order: cython.const[cython.int][::1],
+    place: cython.const[cython.int][::1],
+    start: cython.const[cython.longlong][::1],
+    parent: cython.const[cython.longlong][::1],
+):
+    """The rows of every front: neighbours of its columns, and rows of its children, that are eliminated later.
+
+    Returns first_row (k + 1,) int64 and rows int32, ascending within each front.
+    """
+    n: cython.Py_ssize_t = order.shape[0]
+    k: cython.Py_ssize_t = parent.shape[0]
+    first = np.zeros(k + 1, np.int64)
+    first_row: cython.longlong[::1] = first
+    found = np.empty(4 * n + 16, np.int32)
+    room: cython.int[::1] = found
+    # The children of each front found so far, as linked lists.
+    child: cython.longlong[::1] = np.full(k, -1, np.int64)
+    sibling: cython.longlong[::1] = np.full(k, -1, np.int64)
+    seen_by: cython.longlong[::1] = np.full(n, -1, np.int64)
+    b: cython.Py_ssize_t
+    for b in range(k):
+        if first_row[b] + n > room.shape[0]:
+            found = np.concatenate([found, np.empty(len(found) + n, np.int32)])
+            room = found
+        with cython.nogil:
+            first_row[b + 1] = _rows_of_front(
+                b, ends, neighbours, order, place, start, first_row, room, child, sibling, seen_by
+            )
+            if parent[b] >= 0:
+                sibling[b] = child[parent[b]]
+                child[parent[b]] = b
+    ordered = np.empty(first_row[k], np.int32)
+    _sort_rows(first_row, room, np.zeros(n + 1, np.int64), np.empty_like(ordered), first[:k].copy(), ordered)
+    return first, ordered
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _rows_of_front(
+    b: cython.Py_ssize_t,
+    ends: cython.const[cython.int][::1],
+    neighbours: cython.const[cython.int][::1],
+    order: cython.const[cython.int][::1],
+    place: cython.const[cython.int][::1],
+    start: cython.const[cython.longlong][::1],
+    first_row: cython.longlong[::1],
+    rows: cython.int[::1],
+    child: cython.longlong[::1],
+    sibling: cython.longlong[::1],
+    seen_by: cython.longlong[::1],
+) -> cython.Py_ssize_t:
+    """Append the rows of front b, in no order, after those of the fronts before it; return where they end."""
+    i: cython.Py_ssize_t
+    p: cython.Py_ssize_t
+    row: cython.int
+    count: cython.Py_ssize_t = first_row[b]
+    end: cython.Py_ssize_t = start[b + 1]
+    for i in range(start[b], end):
+        v: cython.Py_ssize_t = order[i]
+        for p in range(ends[v], ends[v + 1]):
+            row = place[neighbours[p]]
+            if row >= end and seen_by[row] != b:
+                seen_by[row] = b
+                rows[count] = row
+                count += 1
+    c: cython.Py_ssize_t = child[b]
+    while c >= 0:
+        for p in range(first_row[c], first_row[c + 1]):
+            row = rows[p]
+            if row >= end and seen_by[row] != b:
+                seen_by[row] = b
+                rows[count] = row
+                count += 1
+        c = sibling[c]
+    return count
+
+
+@cython.cfunc
+@cython.exceptval(check=False)
+def _sort_rows(
+    first_row: cython.const[cython.longlong][::1],
+    rows: cython.const[cython.int][::1],
+    first_front: cython.longlong[::1],
+    fronts: cython.int[::1],
+    filled: cython.longlong[::1],
+    ordered: cython.int[::1],
+) -> cython.void:
+    """Sort the rows of each front: list the fronts of each row, then deal the rows out to them in ascending order."""
+    b: cython.Py_ssize_t
+    p: cython.Py_ssize_t
+    row: cython.Py_ssize_t
+    k: cython.Py_ssize_t = first_row.shape[0] - 1
+    n: cython.Py_ssize_t = first_front.shape[0] - 1
+    with cython.nogil:
+        for p in range(first_row[k]):
+            first_front[rows[p] + 1] += 1
+        for row in range(n):
+            first_front[row + 1] += first_front[row]
+        for b in range(k):
+            for p in range(first_row[b], first_row[b + 1]):
+                fronts[first_front[rows[p]]] = b
+                first_front[rows[p]] += 1
+        # Each entry has moved on to where the next row's fronts begin.
+        p = 0
+        for row in range(n):
+            while p < first_front[row]:
+                ordered[filled[fronts[p]]] = row
+                filled[fronts[p]] += 1
+                p += 1
+
+
+def tree_pieces(
+    parent: cython.const[cython.longlong][::1],
+    entries: cython.const[cython.longlong][::1],
+    most: cython.double,
+):
+    """Cut a tree of fronts into subtrees of at most `most` entries, small ones together.
+
+    Returns the number of pieces, and that of each front (k,) int64; what is above them all is numbered as one more.
+    """
+    k: cython.Py_ssize_t = parent.shape[0]
+    number = np.full(k, -1, np.int64)
+    piece: cython.longlong[::1] = number
+    below: cython.longlong[::1] = np.array(entries)
+    b: cython.Py_ssize_t
+    count: cython.Py_ssize_t = 0
+    held: cython.longlong = 0
+    for b in range(k):
+        if parent[b] >= 0:
+            below[parent[b]] += below[b]
+    for b in range(k - 1, -1, -1):
+        if below[b] > most:
+            continue
+        if parent[b] >= 0 and piece[parent[b]] >= 0:
+            piece[b] = piece[parent[b]]
+            continue
+        held += below[b]
+        if count == 0 or held > most:
+            count += 1
+            held = below[b]
+        piece[b] = count - 1
+    for b in range(k):
+        if piece[b] < 0:
+            piece[b] = count
+    return count, number

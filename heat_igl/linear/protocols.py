@@ -1,0 +1,86 @@
+"""What a linear solver is: an analysis of a pattern, and a factorization of a matrix; what holds for all of them."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from heat_igl.errors import FactorizationError
+from heat_igl.typing import BoolArray, FloatArray, IntArray
+
+__all__ = ["Analysis", "Factorization", "check_finite", "check_probe"]
+
+
+class Factorization(Protocol):
+    """A factored principal submatrix of a matrix A (n, n).
+
+    Attributes
+    ----------
+    backend : str
+        What holds the factor.
+    nonzeros : int
+        Entries of the factor.
+    n_bytes : int
+        Memory that a solve reads twice: entries and their indices.
+    """
+
+    backend: str
+    nonzeros: int
+    n_bytes: int
+
+    def solve(self, b: FloatArray) -> FloatArray:
+        """Solve A x = b on the free vertices for one right-hand side (n,) or several (n, k); 0 on the others."""
+        ...
+
+
+class Analysis(Protocol):
+    """What the pattern of a matrix alone determines: an order of elimination, and where the factor has entries.
+
+    Attributes
+    ----------
+    backend : str
+        What factors the matrices.
+    order : (n,) int32, optional
+        ``order[i]`` is eliminated as the i-th; neighbours mostly are near each other in it. None if that is not known.
+    """
+
+    backend: str
+    order: IntArray | None
+
+    def fits(self, A: sp.csc_matrix) -> bool:
+        """Whether A has the pattern that was analysed."""
+        ...
+
+    def factorize(self, A: sp.csc_matrix, free: BoolArray | None = None) -> Factorization:
+        """Factor `A`, or its principal submatrix on the vertices that are `free`; errors as for the function."""
+        ...
+
+
+def check_finite(A: sp.csc_matrix) -> None:
+    """Raise a `FactorizationError` if an entry of A is not finite."""
+    if not np.isfinite(A.data).all():
+        raise FactorizationError(
+            f"{int((~np.isfinite(A.data)).sum())} entries of the matrix are not finite: the mesh has degenerate faces"
+        )
+
+
+def check_probe(
+    factorization: Factorization, A: sp.csc_matrix, free: BoolArray | None, indefinite: bool = False
+) -> None:
+    """Solve for ones, which a singular matrix does not survive, and for noise if A may be indefinite.
+
+    Raises
+    ------
+    FactorizationError
+        If A turns out not to be positive definite.
+    """
+    n = A.shape[0]
+    ones = np.ones(n) if free is None else free.astype(np.float64)
+    broken = not np.abs(factorization.solve(A @ ones) - ones).max() < 0.1
+    if indefinite and not broken:
+        noise = np.random.default_rng(0).standard_normal(n) * ones
+        broken = not noise @ factorization.solve(noise) > 0
+    if broken:
+        raise FactorizationError(f"the matrix ({n} rows) is singular or not positive definite")

@@ -1,0 +1,149 @@
+"""From heat_igl/kernels to extensions: every module there is Cython in pure Python mode.
+
+A few kernels are compiled once more for each set of wide vectors that the processor may have; `heat_igl.kernels`
+chooses among them at run time. ``HEAT_IGL_CHECKED=1`` makes a build that checks every index and raises, for tests: the
+usual one indexes without checks, as callers pass arrays whose sizes they have checked.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+from build_backend import has_compiler
+from setuptools import Extension
+from setuptools.command.build_ext import build_ext
+from setuptools.errors import CompileError
+
+__all__ = ["BuildKernels", "extensions"]
+
+KERNELS = Path("heat_igl/kernels")
+CHECKED = os.environ.get("HEAT_IGL_CHECKED") == "1"
+# Where the sources are copied to that are compiled, and where Cython writes C.
+BUILD = Path("build/checked" if CHECKED else "build/kernels")
+COPIES, C_FILES = BUILD / "python", BUILD / "c"
+# What all kernels need to take arrays is compiled once.
+SHARED = "_memoryviews"
+DIRECTIVES = {
+    "language_level": 3,
+    "boundscheck": CHECKED,
+    "wraparound": False,
+    "initializedcheck": CHECKED,
+    "cdivision": True,
+    "freethreading_compatible": True,
+    "show_performance_hints": not CHECKED,
+}
+# Kernels of long loops over numbers, for which vectors pay. Only here may sums be taken in any order, products fused.
+WIDE = ("multifrontal", "substitution")
+VECTORS = {"avx2": "-mavx2 -mfma", "avx512": "-mavx512f -mavx512dq -mavx512vl -mfma -mprefer-vector-width=512"}
+VECTORS_MSVC = {"avx2": "/arch:AVX2", "avx512": "/arch:AVX512"}
+# The same bits on every processor: no fused multiplications. Square roots set no errno, so they are one instruction.
+OPTIONS = "-O3 -g0 -fno-math-errno -fno-trapping-math -ffp-contract=off -Wno-unused-function -Wno-sign-compare"
+ANY_ORDER = "-fassociative-math -fno-signed-zeros -ffp-contract=fast"
+OPTIONS_MSVC = "/O2 /fp:precise"
+
+NO_COMPILER = (
+    "heat_igl: compiling needs a C compiler: install one (Debian: apt-get install gcc; macOS: xcode-select --install; "
+    "Windows: Visual Studio Build Tools), or `pip install ziglang`, which brings one"
+)
+NO_HEADERS = (
+    "heat_igl: compiling needs the headers of this Python ({0} is missing): install them (Debian: apt-get install "
+    "python3-dev), or take another Python"
+)
+
+
+def extensions() -> list[Extension]:
+    """The extensions to build; their sources are still Python."""
+    processor = platform.machine().lower()
+    vectors = list(VECTORS) if processor in ("x86_64", "amd64") else []
+    found = [Extension(_module(SHARED), [])]
+    for path in sorted(KERNELS.glob("*.py")):
+        if path.stem != "__init__":
+            names = [path.stem, *(f"{path.stem}_{one}" for one in vectors if path.stem in WIDE)]
+            found += [Extension(_module(name), [path.as_posix()]) for name in names]
+    return found
+
+
+def _module(name: str) -> str:
+    return f"{'.'.join(KERNELS.parts)}.{name}"
+
+
+class BuildKernels(build_ext):
+    """`build_ext` that translates the kernels to C first."""
+
+    def run(self) -> None:
+        """Choose the compiler before setuptools does."""
+        headers = Path(sysconfig.get_path("include"), "Python.h")
+        if not headers.exists():
+            raise CompileError(NO_HEADERS.format(headers))
+        if not has_compiler():
+            if find_spec("ziglang") is None:
+                raise CompileError(NO_COMPILER)
+            # The compiler in the ziglang wheel, for any processor of this kind: by default it takes the one at hand.
+            zig = f"{sys.executable} -m ziglang cc -mcpu=baseline -Wno-unused-command-line-argument"
+            os.environ["CC"] = zig
+            os.environ["LDSHARED"] = f"{zig} -shared"
+        super().run()
+
+    def build_extensions(self) -> None:
+        """Translate and compile all kernels, several at once."""
+        self.parallel = self.parallel or os.cpu_count() or 1
+        _copy_sources()
+        super().build_extensions()
+
+    def build_extension(self, extension: Extension) -> None:
+        """Translate and compile one kernel."""
+        name = extension.name.rpartition(".")[2]
+        extension.sources = [_translated(name).as_posix()]
+        kernel, _, vectors = name.partition("_")
+        if self.compiler.compiler_type == "msvc":
+            options = f"{OPTIONS_MSVC} {VECTORS_MSVC.get(vectors, '')}"
+        else:
+            options = f"{OPTIONS} {ANY_ORDER if kernel in WIDE else ''} {VECTORS.get(vectors, '')}"
+        extension.extra_compile_args = options.split()
+        super().build_extension(extension)
+
+
+def _copies() -> Iterator[tuple[Path, Path]]:
+    """Each source of a kernel, and a copy of it for each module that is made of it."""
+    for path in (KERNELS.parent / "__init__.py", *sorted(KERNELS.glob("*.p*"))):
+        suffixes = ["", *(f"_{name}" for name in VECTORS if path.stem in WIDE)]
+        for suffix in suffixes:
+            yield path, COPIES / path.with_stem(path.stem + suffix)
+
+
+def _copy_sources() -> None:
+    (COPIES / KERNELS).mkdir(parents=True, exist_ok=True)
+    for path, copy in _copies():
+        text = path.read_text(encoding="utf8")
+        if CHECKED:
+            # What a function raises that is declared to raise nothing would be printed and forgotten.
+            text = re.sub(r"^@cython\.exceptval\(check=False\)\n| noexcept\b", "", text, flags=re.MULTILINE)
+        if not copy.exists() or copy.read_text(encoding="utf8") != text:
+            copy.write_text(text, encoding="utf8")
+
+
+def _translated(name: str) -> Path:
+    """The C file of a module, written anew where the source or any declaration is newer."""
+    source, into = COPIES / KERNELS / f"{name}.py", C_FILES / f"{name}.c"
+    read = [Path(__file__), *(COPIES / KERNELS).glob("*.pxd"), *([source] if name != SHARED else [])]
+    if into.exists() and into.stat().st_mtime > max(path.stat().st_mtime for path in read):
+        return into
+    into.parent.mkdir(parents=True, exist_ok=True)
+    command = [sys.executable, "-m", "cython", "--module-name", _module(name)]
+    if name == SHARED:
+        command += ["--generate-shared", str(into.resolve())]
+    else:
+        command += [f"--directive={key}={value}" for key, value in DIRECTIVES.items()]
+        command += ["--shared", _module(SHARED), "-o", str(into.resolve()), str(source.relative_to(COPIES))]
+    run = subprocess.run(command, cwd=COPIES, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if run.returncode:
+        raise CompileError(f"heat_igl: Cython cannot translate {name}:\n{run.stdout}")
+    return into

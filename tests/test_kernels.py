@@ -1,0 +1,111 @@
+"""Compiled kernels on their own: against numpy and scipy, on random input, in every build that this processor runs."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from heat_igl import kernels, shapes
+from heat_igl.kernels import relaxation
+from heat_igl.kernels.ordering import ascending
+from heat_igl.linear import factorize, multifrontal, substitution
+from heat_igl.linear.dissection import dissect
+from heat_igl.operators import operators
+
+
+def random_m_matrix(n: int, n_edges: int, seed: int) -> sp.csc_matrix:
+    """A graph with multiple components as a rule, and an excess on the diagonal of every row."""
+    rng = np.random.default_rng(seed)
+    ends = rng.integers(n, size=(2, n_edges))
+    W = sp.coo_matrix((rng.random(n_edges) + 0.1, ends), shape=(n, n)).tocsc()
+    W = W + W.T
+    W.setdiag(0)
+    return (sp.diags(np.asarray(W.sum(axis=0)).ravel() + 0.5) - W).tocsc()
+
+
+@settings(deadline=None, max_examples=60)
+@given(n=st.integers(1, 400), density=st.floats(0, 4), seed=st.integers(0, 2**32 - 1))
+def test_any_graph_is_dissected_factored_and_solved(n, density, seed):
+    A = random_m_matrix(n, int(density * n), seed)
+    tree = dissect(A.indptr, A.indices)
+    assert (np.sort(tree.order) == np.arange(n)).all()
+    assert ((tree.parent == -1) | (tree.parent > np.arange(len(tree.parent)))).all()
+    free = np.random.default_rng(seed).random(n) < 0.8
+    x = np.where(free[:, None], np.random.default_rng(seed).standard_normal((n, 11)), 0)
+    found = multifrontal.MultifrontalAnalysis(A).factorize(A, free).solve(A @ x)
+    np.testing.assert_allclose(found, x, rtol=0, atol=1e-9)
+
+
+@settings(deadline=None, max_examples=60)
+@given(n=st.integers(1, 300), density=st.floats(0, 4), n_sources=st.integers(0, 5), seed=st.integers(0, 2**32 - 1))
+def test_relaxation_solves_what_the_right_hand_side_reaches(n, density, n_sources, seed):
+    A = random_m_matrix(n, int(density * n), seed)
+    b = np.zeros(n)
+    b[np.random.default_rng(seed).integers(n, size=n_sources)] = 1.0
+    x, n_sweeps = relaxation.relax(A.indptr, A.indices, A.data, b, 1e-13, 100_000)
+    assert n_sweeps >= 0
+    np.testing.assert_allclose(A @ x, b, rtol=0, atol=1e-9)
+    assert (x >= 0).all()
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.floats(-1e300, 1e300) | st.sampled_from([np.inf, 0.0, -0.0]), max_size=300))
+def test_ascending_sorts_up_to_the_bits_it_looks_at(keys):
+    keys = np.array(keys, np.float64)
+    order = ascending(keys)
+    assert (np.sort(order) == np.arange(len(keys))).all()
+    low, high = keys[order][:-1], keys[order][1:]
+    assert ((low <= high + 1e-6 * np.abs(high)) | (np.abs(low) < 1e-300)).all()
+
+
+def test_every_build_solves_alike(monkeypatch):
+    """Wider vectors round sums in another order; each build gives the same bits again and again."""
+    domain = operators(shapes.icosphere(4))
+    A = (domain.M - domain.mean_edge_length**2 * domain.L).tocsc()
+    b = np.random.default_rng(0).standard_normal((A.shape[0], 9))
+    solutions = []
+    pairs = zip(kernels.builds("multifrontal"), kernels.builds("substitution"), strict=True)
+    for of_factor, of_solve in pairs:
+        monkeypatch.setattr(multifrontal, "_kernel", import_module(of_factor))
+        monkeypatch.setattr(substitution, "_kernel", import_module(of_solve))
+        one, again = (factorize(A, "multifrontal").solve(b) for _ in range(2))
+        assert (one == again).all()
+        np.testing.assert_allclose(A @ one, b, rtol=0, atol=1e-13)
+        solutions.append(one)
+    assert kernels.builds("multifrontal")[-1] == "heat_igl.kernels.multifrontal"
+    for other in solutions[1:]:
+        np.testing.assert_allclose(other, solutions[0], rtol=0, atol=1e-12 * np.abs(solutions[0]).max())
+
+
+def test_sources_alone_are_refused(tmp_path):
+    """A checkout that was not installed: Python would run the sources, which are valid Python."""
+    folder = Path(kernels.__file__).parent
+    package = tmp_path / "heat_igl"
+    shutil.copytree(folder, package / "kernels", ignore=shutil.ignore_patterns("*.so", "*.pyd", "__pycache__"))
+    (package / "__init__.py").touch()
+    run = subprocess.run(
+        [sys.executable, "-c", "import heat_igl.kernels"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 1
+    assert f"run `pip install -e .` in {tmp_path}" in run.stderr
+
+
+@pytest.mark.skipif(os.environ.get("HEAT_IGL_CHECKED") != "1", reason="the usual build does not check indices")
+def test_the_checked_build_raises():
+    """A neighbour that there is not, met in a function that is declared to raise nothing."""
+    A = random_m_matrix(20, 40, 0)
+    A.indices[3] = 1000
+    with pytest.raises(IndexError, match="Out of bounds"):
+        relaxation.relax(A.indptr, A.indices, A.data, np.ones(20), 1e-13, 100)
+    with pytest.raises(IndexError, match="Out of bounds"):
+        dissect(A.indptr, A.indices)
