@@ -65,7 +65,7 @@ def warn_of_large_step(options: SolverOptions, domain: Operators) -> None:
         name, value = ("t", options.t) if options.t is not None else ("t_coef", options.t_coef)
         warn_caller(
             f"{name} = {value:.4g} is very large: heat spreads over sqrt(t) = {np.sqrt(step):.4g}, more than the "
-            f"longest distance on the mesh, {domain.longest_distance:.4g}, and distances are smoothed by as much; t_coef "
-            "from 0.5 to 10 is usual, and t is a squared length",
+            f"longest distance on the mesh, {domain.longest_distance:.4g}, and distances are smoothed by as much; "
+            "t_coef from 0.5 to 10 is usual, and t is a squared length",
             AccuracyWarning,
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import numpy as np
 
 from heat_igl.heat_method import HeatMethodSolver
@@ -45,7 +47,7 @@ def farthest_points(solver: HeatMethodSolver | MeshLike, k: int, *, start: Array
 def farthest_cells(solver: HeatMethodSolver | MeshLike, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
     """The Voronoi cells of `farthest_points`, for one query more; arguments and errors as there."""
     solver = as_solver(solver)
-    first = vertex_sources(start, solver.n_vertices, "start")
+    first = vertex_sources(cast(Any, start), solver.n_vertices, "start")
     referenced = solver.operators.referenced
     used = referenced.copy()
     used[first] = True

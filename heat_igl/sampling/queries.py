@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any, cast
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def checked_vertices(name: str, vertices: ArrayLike, n: int, distinct: bool = Tr
     SourceError
         If an entry is no vertex, or comes twice though it should not.
     """
-    named = named_vertices(vertices, n, name)
+    named = named_vertices(cast(Any, vertices), n, name)
     values, counts = np.unique(named, return_counts=True)
     if distinct and len(values) < len(named):
         raise SourceError(f"{name} must be distinct, but vertex {values[counts > 1][0]} is there twice")

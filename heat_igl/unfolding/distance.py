@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,9 +28,7 @@ _SPACING = 1.0
 def unfolded_distance(V: MeshLike, F: Sources, /, *, tolerance: float = ...) -> FloatArray: ...
 @overload
 def unfolded_distance(V: MeshLike, F: ArrayLike | None, sources: Sources, *, tolerance: float = ...) -> FloatArray: ...
-def unfolded_distance(
-    V: MeshLike, F: ArrayLike | Sources | None = None, sources: Sources | None = None, *, tolerance: float = TOLERANCE
-) -> FloatArray:
+def unfolded_distance(V: MeshLike, F: Any = None, sources: Any = None, *, tolerance: float = TOLERANCE) -> FloatArray:
     """Near-exact geodesic distance without a factorization: strip unfolding in the order of Dijkstra's algorithm.
 
     Called with positions, faces and sources, or with a mesh and sources. For one or two queries on a mesh; from the
@@ -63,7 +61,7 @@ def unfolded_distance(
         If numba is not installed.
     """
     if sources is None:
-        F, sources = None, F  # type: ignore[assignment]
+        F, sources = None, F
     return distance_from_scratch(as_simplices(V, F), sources, "unfold", tolerance)
 
 
@@ -87,7 +85,7 @@ def distance_from_scratch(mesh: Mesh, sources: Sources, refine: Refine, toleranc
     domain = _Domain(mesh, unfolding_surface(mesh))
     lines = _Lines(chosen, *_straight_lines(domain, chosen))
     solver = UnfoldingSolver(domain, refine, tolerance)
-    return solver.distances([lines], -_along_edges(domain, chosen)[:, None])[0]
+    return np.asarray(solver.distances([lines], -_along_edges(domain, chosen)[:, None])[0])
 
 
 @dataclass(frozen=True, eq=False)
