@@ -1,4 +1,4 @@
-"""The command line ``heat-igl``: the package's words, one line per error, no half-written files; and its demonstration.
+"""The command line ``heat-igl`` and its demonstration: the package's words, one line per error, no half-written files.
 
 Typer and rich (extra ``cli``) are loaded by `run`, and `heat_igl.demo` is there without them.
 """

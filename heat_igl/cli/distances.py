@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -14,7 +15,7 @@ import heat_igl
 from heat_igl.cli.options import MeshArgument, choice, position, positive
 from heat_igl.cli.output import check_curves, check_outputs, print_rows
 from heat_igl.errors import SourceError
-from heat_igl.heat_method import HeatMethodSolver, Magnitude, SolverOptions
+from heat_igl.heat_method import DistanceMethod, HeatMethodSolver, Magnitude, SolverOptions, geodesic_distance
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, closest_points
@@ -36,18 +37,22 @@ def distance(
     at: Annotated[
         list[str] | None, typer.Option(metavar="X,Y,Z", help="Source at the closest point of the surface; repeatable.")
     ] = None,
+    method: Annotated[
+        str | None,
+        choice(DistanceMethod, "Default: unfold, near-exact; heat on tetrahedra and with one of the options of heat."),
+    ] = None,
     cutoff: Annotated[float | None, typer.Option(help="Distances beyond this are inf.", callback=positive)] = None,
     output: Annotated[Path | None, typer.Option(help="PLY or VTU file for mesh and distance.")] = None,
     picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for a picture.")] = None,
     t_coef: Annotated[
-        float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=positive)
+        float | None, typer.Option(help="Heat: time step in squared mean edge lengths.", callback=positive)
     ] = None,
-    t: Annotated[float | None, typer.Option(help="Time step, a squared length.", callback=positive)] = None,
-    laplacian: Annotated[str, choice(Laplacian, "Triangulation to solve on.")] = "intrinsic-delaunay",
-    boundary: Annotated[str, choice(Boundary, "What heat does at the boundary.")] = "neumann",
-    magnitude: Annotated[str, choice(Magnitude, "Length of the field that is integrated.")] = "auto",
-    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
-    backend: Annotated[str, choice(Backend, "Linear solver.")] = "auto",
+    t: Annotated[float | None, typer.Option(help="Heat: time step, a squared length.", callback=positive)] = None,
+    laplacian: Annotated[str, choice(Laplacian, "Heat: triangulation to solve on.")] = "intrinsic-delaunay",
+    boundary: Annotated[str, choice(Boundary, "Heat: what heat does at the boundary.")] = "neumann",
+    magnitude: Annotated[str, choice(Magnitude, "Heat: length of the field that is integrated.")] = "auto",
+    refine: Annotated[str | None, choice(Refine, "Heat: unfold triangles in its order, near-exact.")] = None,
+    backend: Annotated[str, choice(Backend, "Heat: linear solver.")] = "auto",
 ) -> None:
     """Distance from one or more sources: vertices, or points of the surface."""
     loaded = read_mesh(mesh)
@@ -61,22 +66,55 @@ def distance(
         sources = points if vertices is None else [vertices, points]
         gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap))]
     check_outputs(loaded, output, picture)
-    with Console(stderr=True).status("factoring"):
-        options = SolverOptions(
-            t_coef,
-            t,
-            cast(Laplacian, laplacian),
-            cast(Boundary, boundary),
-            cast(Magnitude, magnitude),
-            cast(Refine | None, refine),
-            cast(Backend, backend),
-        )
-        solver = HeatMethodSolver.from_options(loaded, options)
-    start = time.perf_counter()
-    phi = solver.distance(sources, cutoff=cutoff)
-    seconds = time.perf_counter() - start
+    options = SolverOptions(
+        t_coef,
+        t,
+        cast(Laplacian, laplacian),
+        cast(Boundary, boundary),
+        cast(Magnitude, magnitude),
+        cast(Refine | None, refine),
+        cast(Backend, backend),
+    )
+    chosen = _method(method, options, loaded)
+    with Console(stderr=True).status("measuring"):
+        phi, about = _measured(loaded, sources, chosen, options, cutoff)
     written = _write(loaded, phi, vertices, output, picture)
-    print_rows([*_summary(mesh, loaded, phi, solver, seconds), *gaps, *(("wrote", str(path)) for path in written)])
+    rows = [*_summary(mesh, loaded, phi), ("method", chosen), *about, *gaps]
+    print_rows([*rows, *(("wrote", str(path)) for path in written)])
+
+
+def _method(method: str | None, options: SolverOptions, mesh: Mesh) -> DistanceMethod:
+    """The method that is meant: options of the heat method ask for it, and tetrahedra leave no other."""
+    given = [field.name for field in fields(options) if getattr(options, field.name) != field.default]
+    if method not in (None, "heat") and given:
+        raise ValueError(
+            f"--{given[0].replace('_', '-')} is an option of the heat method, but --method is {method}: leave one of "
+            "them away"
+        )
+    if method is None:
+        method = "heat" if given or mesh.is_tetrahedral else "unfold"
+    return cast(DistanceMethod, method)
+
+
+def _measured(
+    mesh: Mesh, sources: Any, method: DistanceMethod, options: SolverOptions, cutoff: float | None
+) -> tuple[FloatArray, list[tuple[str, str]]]:
+    """The distance, and what there is to say about how it was found."""
+    start = time.perf_counter()
+    if method != "heat":
+        phi = geodesic_distance(mesh, sources, method=method, cutoff=cutoff)
+        return phi, [("seconds", f"{time.perf_counter() - start:.3f}")]
+    solver = HeatMethodSolver.from_options(mesh, options)
+    start = time.perf_counter()
+    phi = solver.distance(sources, cutoff)
+    seconds = time.perf_counter() - start
+    found = solver.diagnostics
+    raised = " (raised, so that heat crosses the mesh in double precision)" if found.t_raised else ""
+    return phi, [
+        ("time step", f"{found.t:.6g}{raised}"),
+        ("flipped edges", str(found.n_flips)),
+        ("seconds", f"{found.seconds_operators + found.seconds_factorization:.3f} once, {seconds:.3f} per distance"),
+    ]
 
 
 def isolines(
@@ -138,25 +176,17 @@ def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, pictu
     return [path for path in (output, picture) if path is not None]
 
 
-def _summary(
-    path: Path, mesh: Mesh, phi: FloatArray, solver: HeatMethodSolver, seconds: float
-) -> list[tuple[str, str]]:
-    found = solver.diagnostics
+def _summary(path: Path, mesh: Mesh, phi: FloatArray) -> list[tuple[str, str]]:
     finite = np.isfinite(phi)
     farthest = int(np.argmax(np.where(finite, phi, -1.0)))
     kind = "tetrahedra" if mesh.is_tetrahedral else "triangles"
-    raised = " (raised, so that heat crosses the mesh in double precision)" if found.t_raised else ""
     rows = [
         ("mesh", f"{path}: {mesh.n_vertices} vertices, {mesh.n_faces} {kind}"),
         ("farthest", f"{phi[farthest]:.6g} at vertex {farthest}"),
-        ("mean", f"{phi[finite].mean():.6g}"),
-        ("time step", f"{found.t:.6g}{raised}"),
-        ("flipped edges", str(found.n_flips)),
-        ("seconds", f"{found.seconds_operators + found.seconds_factorization:.3f} once, {seconds:.3f} per distance"),
     ]
     if not finite.all():
-        rows.insert(2, ("unreachable", f"{int((~finite).sum())} vertices"))
-    return rows
+        rows.append(("unreachable", f"{int((~finite).sum())} vertices"))
+    return [*rows, ("mean", f"{phi[finite].mean():.6g}")]
 
 
 COMMANDS = (distance, isolines, path)
