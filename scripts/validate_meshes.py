@@ -95,6 +95,9 @@ def table(found: Sequence[dict[str, Any]], methods: Sequence[str], settings: dic
         start = Path(record["file"]).stem, str(record.get("n_vertices", "-"))
         if "failure" in record:
             failures.append(f"- {record['file']}: {record['failure']}")
+        failed = record.get("report", {}).get("reference_failure")
+        if failed:
+            failures.append(f"- {record['file']}, reference {settings['reference']}: {failed}")
         rows = {row["method"]: row for row in record.get("report", {}).get("rows", ())}
         failures += [f"- {record['file']}, {m}: {row['failure']}" for m, row in rows.items() if row["failure"]]
         means = [mean_error(record, method) for method in methods]

@@ -466,8 +466,9 @@ def write_cases() -> Iterator[Case]:
     yield write("colliding names", "w.ply", surface, "two properties named a_0", a=np.ones((4, 2)), a_0=phi)
     yield write("unknown extension", "w.xyz", surface, "unknown extension '.xyz'")
     yield write("missing folder", "missing/w.off", surface, "w.off cannot be written: No such file")
-    for bad in (None, (V4, TRIANGLES), V4):
-        yield write(f"mesh {type(bad).__name__}", "w.off", bad, "mesh must be a heat_igl.Mesh, not")
+    yield write("mesh NoneType", "w.off", None, "mesh is of type NoneType, which is not understood: pass a Mesh")
+    yield write("mesh ndarray", "w.off", V4, "faces F are missing")
+    yield write("mesh tuple", "w.off", (V4, TRIANGLES))
 
     def over_directory(directory: Path) -> None:
         (directory / "d.off").mkdir()

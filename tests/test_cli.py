@@ -14,7 +14,7 @@ import pytest
 
 import heat_igl
 from heat_igl import cli, demo, drawing, io, reference, shapes
-from heat_igl.cli import distances
+from heat_igl.cli import comparison, distances
 
 ENVIRONMENT = {
     **os.environ,
@@ -349,6 +349,6 @@ def test_a_fault_of_the_package_is_not_hidden(sphere: Path, monkeypatch: pytest.
     def broken(_: object) -> None:
         raise TypeError("a bug")
 
-    monkeypatch.setattr(cli, "read_mesh", broken)
+    monkeypatch.setattr(comparison, "read_mesh", broken)
     with pytest.raises(TypeError, match="a bug"):
         cli.run(["info", str(sphere)])

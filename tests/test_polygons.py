@@ -241,3 +241,81 @@ def test_tetrahedra_are_no_polygons(tmp_path):
     heat_igl.write_mesh(path, shapes.box(1))
     with pytest.raises(heat_igl.MeshError, match="the file holds tetrahedra, not polygons"):
         heat_igl.read_polygon_mesh(path)
+
+
+L_SHAPE = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0.0]])
+COMB = np.array([[x, y, 0.0] for x, y in [(0, 0), (7, 0), (7, 3), (6, 3), (6, 1), (5, 1), (5, 3), (4, 3), (4, 1), (3, 1),
+                                          (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)]])  # fmt: skip
+STAR = np.array([[(1 + i % 2) * np.cos(i * np.pi / 5), (1 + i % 2) * np.sin(i * np.pi / 5), 0] for i in range(10)])
+SLIT = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [2, 4, 0], [2, 1, 0], [2, 4, 0], [0, 4, 0.0]])
+
+
+def turned(V: np.ndarray) -> np.ndarray:
+    """In another plane, far from the origin, in another unit."""
+    axes = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    return 1e-3 * (V @ axes) + [5, -7, 2]
+
+
+@pytest.mark.parametrize("V", [L_SHAPE, COMB, STAR, SLIT], ids=["L", "comb", "star", "slit"])
+@pytest.mark.parametrize("place", [lambda V: V, turned])
+@pytest.mark.parametrize("reverse", [False, True])
+def test_triangles_of_concave_polygons_cover_them_once(V, place, reverse):
+    flat, d = V[:, :2], len(V)
+    following = np.roll(flat, -1, axis=0)
+    area = abs((flat[:, 0] * following[:, 1] - flat[:, 1] * following[:, 0]).sum()) / 2
+    for first in range(d):
+        order = np.roll(np.arange(d), first)[:: -1 if reverse else 1]
+        triangles = PolygonMesh(place(V), [order]).triangles
+        assert triangles.n_faces == d - 2
+        unit = 1 if place(V) is V else 1e-6
+        assert triangles.measures.sum() == pytest.approx(unit * area, rel=1e-9)
+        # Each side of the polygon is that of one triangle, each diagonal of two, in opposite directions.
+        directed = triangles.F[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).tolist()
+        assert len({tuple(edge) for edge in directed}) == len(directed)
+        rim = {(int(a), int(b)) for a, b in zip(order, np.roll(order, -1), strict=True)}
+        assert rim <= {tuple(edge) for edge in directed}
+
+
+def test_polygons_that_a_fan_fits_keep_it():
+    V, polygons = np.concatenate([L_SHAPE, L_SHAPE + [5, 0, 0]]), [range(6), [9, 10, 11, 6, 7, 8]]
+    mesh = PolygonMesh(V, polygons)
+    # The fan around the first corner of the L fits, and so does that around its inner corner.
+    assert mesh.triangles.F[:, 0].tolist() == [0, 0, 0, 0, 9, 9, 9, 9]
+    box = PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]], [[0, 1, 2, 3], [1, 4, 2]])
+    assert box.triangles.F.tolist() == [[0, 1, 2], [0, 2, 3], [1, 4, 2]]
+
+
+def test_distance_around_the_inner_corner_of_an_l():
+    mesh = PolygonMesh(L_SHAPE, [[1, 2, 3, 4, 5, 0]])  # whose fan around vertex 1 covers what is outside
+    distance = heat_igl.geodesic_distance(mesh, 2)
+    np.testing.assert_allclose(distance[[3, 4, 0]], [1, 2, np.sqrt(5)], atol=1e-9)
+
+
+def test_concave_polygons_of_files(tmp_path):
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in L_SHAPE.tolist())
+    (tmp_path / "l.obj").write_text(text + "f 2 3 4 5 6 1\n")
+    mesh = heat_igl.read_mesh(tmp_path / "l.obj")
+    assert mesh.measures.sum() == pytest.approx(3)
+    assert heat_igl.read_polygon_mesh(tmp_path / "l.obj").degree.tolist() == [6]
+    (tmp_path / "crossed.obj").write_text(text + "f 1 2 3\nf 1 3 2 6 4 5\n")
+    for read in (heat_igl.read_mesh, heat_igl.read_polygon_mesh):
+        with pytest.raises(heat_igl.MeshError, match=r"crossed.obj: .*1.*: sides of this polygon cross each other"):
+            read(tmp_path / "crossed.obj")
+
+
+@pytest.mark.parametrize(
+    ("V", "order"),
+    [
+        ([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [0, 2, 1, 3]),
+        ([[0, 0, 0], [3, 0, 0], [1, 1, 0], [0, 1, 0]], [0, 2, 1, 3]),
+        (STAR[1::2], [0, 2, 4, 1, 3]),
+        (L_SHAPE, [0, 2, 1, 5, 3, 4]),
+    ],
+)
+def test_polygons_that_cross_themselves_are_refused(V, order):
+    V = np.concatenate([V, np.asarray(V) + [9, 0, 0]])
+    polygons = [[0, 1, 2], order] if len(order) > 3 else [order]
+    with pytest.raises(heat_igl.MeshError, match=r"polygons\[1\] = \[\d.*\]: sides of this polygon cross each other"):
+        PolygonMesh(V, polygons)
+    with pytest.raises(heat_igl.MeshError, match="cross each other"):
+        PolygonMesh(turned(V), polygons)

@@ -26,7 +26,6 @@ from heat_igl import (
     HeatMethodSolver,
     Mesh,
     MissingExtraError,
-    ReferenceSolverError,
     SourceError,
     closed_forms,
     reference,
@@ -209,18 +208,52 @@ def test_warnings_about_accuracy_are_notes_and_others_pass() -> None:
         validate(mesh, 0, [("old", Old)])
 
 
-def test_a_reference_that_fails_is_an_error() -> None:
-    fin = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]], [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
-    with pytest.raises(ReferenceSolverError, match="more than two triangles"):
-        validate(fin, 0, ["heat"])
-    report = validate(fin, 0, ["heat"], reference=None)
+TOUCHING = Mesh(  # two tetrahedra's surfaces, with one vertex in common
+    [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]],
+    [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3], [0, 5, 4], [0, 4, 6], [0, 6, 5], [4, 5, 6]],
+)
+
+
+def test_without_a_reference_the_rest_of_the_report_stands() -> None:
+    report = validate(TOUCHING, 1, ["heat", "unfold", "exact"])
+    assert report.failure is not None
+    assert "two surfaces touch in a point" in report.failure
+    assert (report.reference, report.truths) == ("exact", None)
+    for row in report.rows[:2]:
+        assert row.errors is None
+        assert row.failure is None
+        assert row.bounds is not None
+        assert row.solve_seconds is not None
+    assert report.rows[2].failure == report.failure
+    text = report.to_markdown()
+    assert "no errors, since exact failed" in text
+    assert f"- reference exact: {report.failure}" in text
+    assert report.to_dict()["reference_failure"] == report.failure
+    assert report.exceeding(50) == report.rows
+    with pytest.raises(ValueError, match="no errors to draw: at 1 vertices connected with the sources two surfaces"):
+        report.plot()
+    assert validate(shapes.grid(3), 0, ["heat"]).failure is None
+
+
+def test_no_reference() -> None:
+    report = validate(TOUCHING, 1, ["heat"], reference=None)
     assert report.reference is None
     assert report.rows[0].errors is None
     assert report.rows[0].bounds is not None
     assert report.exceeding(50) == report.rows
     assert "no reference" in report.to_markdown()
-    with pytest.raises(ValueError, match="no errors to draw"):
+    with pytest.raises(ValueError, match="no errors to draw: the report has no reference"):
         report.plot()
+
+
+def test_the_command_prints_what_stands_without_a_reference(folder: Path) -> None:
+    done = command(folder, "fin.off", "--methods", "heat", "--picture", "errors.png")
+    assert done.returncode == 0, done.stderr
+    assert "no errors, since exact failed" in done.stdout
+    assert "more than two triangles" in done.stdout
+    assert done.stderr.startswith("heat-igl: no picture of errors: ")
+    assert not (folder / "meshes" / "errors.png").exists()
+    assert command(folder, "fin.off", "--methods", "heat", "--fail-above", "5").returncode == 1
 
 
 def test_references_of_ones_own() -> None:
@@ -290,7 +323,7 @@ def test_a_figure_without_matplotlib_names_the_extra(monkeypatch: pytest.MonkeyP
     report = validate(shapes.grid(4), 0, ["heat"])
     assert report.plot().axes
     monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
-    with pytest.raises(MissingExtraError, match=r'matplotlib: pip install "heat-igl\[view\]"'):
+    with pytest.raises(MissingExtraError, match="needs matplotlib: pip install matplotlib"):
         report.plot()
 
 
@@ -336,8 +369,9 @@ def test_script_validates_a_folder(script: ModuleType, folder: Path) -> None:
     status, found, table = run(script, folder)
     assert status == 0
     assert [record["file"] for record in found] == ["disk.off", "fin.off", "grid.off", "noise.off"]
-    assert ["report" in record for record in found] == [True, False, True, False]
-    assert "more than two triangles" in found[1]["failure"]
+    assert ["report" in record for record in found] == [True, True, True, False]
+    assert "more than two triangles" in found[1]["report"]["reference_failure"]
+    assert "- fin.off, reference exact: 1 edges connected with the sources belong to more than two" in table
     assert found[3]["failure"]
     assert str(folder) not in json.dumps(found)
     assert found[0]["environment"]["numpy"] == np.__version__
@@ -438,7 +472,6 @@ def test_command_exits_with_one_above_the_threshold(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["fin.off"], "more than two triangles"),
         (["noise.off"], "noise.off"),
         (["disk.off", "--methods", "heat,magic"], "'magic' is unknown"),
         (["disk.off", "--sources", "1000"], "1000 sources cannot be drawn"),

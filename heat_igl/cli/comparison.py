@@ -57,7 +57,9 @@ def validate(
             timeout=timeout,
             progress=lambda label, done, total: bar.update(task, description=label, completed=done, total=total),
         )  # fmt: skip
-    if picture is not None:
+    if picture is not None and report.truths is None:
+        say(f"no picture of errors: {report.failure or 'there is no reference'}")
+    elif picture is not None:
         Picture(report.plot()).save(picture)
     if json_file is not None:
         with complete_file(json_file) as temporary:

@@ -15,6 +15,9 @@ __all__ = ["triangulated", "triangle_fans"]
 # Twice the area of a triangle is rounded by some 1e-16 of the square of its polygon's extent; below this share of it a
 # triangle has no orientation.
 _ROUNDING = 1e-12
+# Distance from a plane, as a share of the extent, up to which a polygon that crosses itself in the plane is refused. A
+# polygon with a vector area below this share of its squared extent is laid into its best plane.
+_NEARLY_PLANAR = 1e-2
 
 
 def triangle_fans(corners: IntArray, degree: IntArray) -> IntArray:
@@ -46,12 +49,13 @@ def triangulated(V: FloatArray, corners: IntArray, degree: IntArray, shown: Call
     (sum of (degree - 2), 3) int64
         The fan of each polygon around its first corner. Where a triangle of the fan is turned over, or the fan goes
         around its corner more than once, the polygon is concave, and its ears are clipped instead (Meisters 1975), in
-        the plane that its vector area is normal to.
+        the plane that its vector area is normal to. A polygon that is far from planar and crosses itself there keeps
+        its fan.
 
     Raises
     ------
     MeshError
-        If two sides of such a polygon cross each other; the message names the first.
+        If two sides of a nearly planar polygon cross each other; the message names the first.
     """
     F = triangle_fans(corners, degree)
     if (degree == 3).all():
@@ -60,7 +64,10 @@ def triangulated(V: FloatArray, corners: IntArray, degree: IntArray, shown: Call
     end, end_of_fan = np.cumsum(degree), np.cumsum(degree - 2)
     for i in np.flatnonzero(wrong).tolist():
         polygon = corners[end[i] - degree[i] : end[i]]
-        found = _ears(_flattened(V[polygon]))
+        flat, height = _flattened(V[polygon])
+        found = _ears(flat)
+        if found is None and height > _NEARLY_PLANAR:
+            continue  # what crosses seen from one side may well not do so in space
         if found is None:
             raise MeshError(
                 f"{shown(i)}: sides of this polygon cross each other, so it has no inside: give its corners in order "
@@ -90,7 +97,8 @@ def _without_fan(V: FloatArray, F: IntArray, corners: IntArray, degree: IntArray
     one, other = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
     cross = np.cross(one, other)
     turn = np.einsum("kx,kx->k", cross, normal[owner] / np.where(area > 0, area, 1)[owner, None])
-    room = _ROUNDING * squared
+    # Positions far from the origin are rounded more coarsely than the extent of the polygon says.
+    room = _ROUNDING * squared + np.sqrt(squared) * np.finfo(float).eps * 4 * np.abs(V).max()
     folded = turn < -room[owner]
     # Without a vector area there is no normal to compare with: the polygon has no area, or crosses itself.
     folded |= (area <= room)[owner] & (np.linalg.norm(cross, axis=1) > room[owner])
@@ -99,17 +107,30 @@ def _without_fan(V: FloatArray, F: IntArray, corners: IntArray, degree: IntArray
     return np.asarray((np.bincount(owner, folded, len(degree)) > 0) | around)
 
 
-def _flattened(P: FloatArray) -> FloatArray:
-    """Corners (d, 2) in the plane normal to the vector area, or in the best plane if that is 0; counter-clockwise."""
+def _flattened(P: FloatArray) -> tuple[FloatArray, float]:
+    """Corners (d, 2) in a plane, counter-clockwise, and the largest distance from it as a share of the extent.
+
+    The plane is normal to the vector area, or, where that is small, the best one.
+    """
     following = np.roll(P, -1, axis=0)
     normal = np.cross(P - P[0], following - P[0]).sum(axis=0)
     extent = P - P.mean(axis=0)
-    if np.linalg.norm(normal) <= _ROUNDING * float((extent**2).sum(axis=1).max()):
-        return np.asarray(extent @ np.linalg.svd(extent, full_matrices=False)[2][:2].T)
-    normal /= np.linalg.norm(normal)
-    across = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    across /= np.linalg.norm(across)
-    return np.asarray(extent @ np.stack([across, np.cross(normal, across)], axis=1))
+    if np.linalg.norm(normal) <= _NEARLY_PLANAR * float((extent**2).sum(axis=1).max()):
+        axes = np.linalg.svd(extent)[2]
+        axes[1] *= 1 if _signed_area(extent @ axes[:2].T) >= 0 else -1
+    else:
+        normal /= np.linalg.norm(normal)
+        across = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+        across /= np.linalg.norm(across)
+        axes = np.stack([across, np.cross(normal, across), normal])
+    height = np.abs(extent @ axes[2]).max() / np.linalg.norm(extent, axis=1).max()
+    return extent @ axes[:2].T, float(height)
+
+
+def _signed_area(p: FloatArray) -> float:
+    """Twice the signed area of a polygon (d, 2)."""
+    following = np.roll(p, -1, axis=0)
+    return float((p[:, 0] * following[:, 1] - p[:, 1] * following[:, 0]).sum())
 
 
 def _area(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:

@@ -46,9 +46,9 @@ def checked_vertices(name: str, vertices: ArrayLike, n: int, distinct: bool = Tr
 
 
 def as_solver(solver: HeatMethodSolver | MeshLike) -> HeatMethodSolver:
-    """The solver itself, or a near-exact one on a mesh; on tetrahedra, which cannot be unfolded, by heat."""
-    if isinstance(solver, HeatMethodSolver):
-        return solver
+    """The solver itself, or what is asked like one; on a mesh a near-exact one, by heat on tetrahedra."""
+    if hasattr(solver, "distance") and hasattr(solver, "n_vertices"):
+        return cast(HeatMethodSolver, solver)
     mesh = as_simplices(solver)
     return HeatMethodSolver(mesh, refine=None if mesh.is_tetrahedral else "unfold")
 

@@ -1,0 +1,139 @@
+"""Messages name the argument and the remedy; results say what they are in one line."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomllib
+
+import heat_igl
+from heat_igl import (
+    HeatMethodSolver,
+    MissingExtraError,
+    SourceError,
+    SurfaceCurve,
+    SurfacePoints,
+    farthest_points,
+    geodesic_distance,
+    shapes,
+    shortest_paths,
+    voronoi_cells,
+)
+
+MESH = shapes.icosphere(2)
+SOLVER = HeatMethodSolver(MESH)
+PHI = SOLVER.distance(0)
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda: shortest_paths(MESH, PHI, 162), r"targets\[0\] = 162 is no vertex"),
+        (lambda: shortest_paths(MESH, PHI, [3, -1]), r"targets\[1\] = -1 is no vertex"),
+        (lambda: shortest_paths(MESH, PHI, []), "targets is empty"),
+        (lambda: shortest_paths(MESH, PHI, np.ones(3, bool)), "the mask targets has 3 entries"),
+        (lambda: shortest_paths(MESH, PHI, SurfacePoints([999], [1, 0, 0])), r"targets: faces\[0\] = 999 is no face"),
+        (lambda: shortest_paths(MESH, PHI, 4, [162]), r"sources\[0\] = 162 is no vertex"),
+        (lambda: shortest_paths(MESH, None, 4), "sources are missing: name them"),
+        (lambda: farthest_points(SOLVER, 3, start=162), r"start\[0\] = 162 is no vertex"),
+        (lambda: farthest_points(MESH, 3, start=[0.5]), "start must be a vertex index.* not floats such as 0.5"),
+        (lambda: voronoi_cells(SOLVER, [1, 162]), r"sites\[1\] = 162 is no vertex"),
+        (lambda: heat_igl.distance_matrix(SOLVER, [162]), r"indices\[0\] = 162 is no vertex"),
+        (lambda: heat_igl.diameter(SOLVER, start=162), r"start\[0\] = 162 is no vertex"),
+        (lambda: heat_igl.geodesic_centre(MESH, SOLVER, [162]), r"points\[0\] = 162 is no vertex"),
+    ],
+)
+def test_errors_name_the_argument_of_the_offender(ask, message):
+    with pytest.raises(SourceError, match=f"^{message}"):
+        ask()
+
+
+@pytest.mark.parametrize("positions", [[0.0, 0.0, 1.0], [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]])
+def test_positions_as_sources_are_told_of_closest_points(positions):
+    for ask in (SOLVER.distance, lambda sources: geodesic_distance(MESH, sources)):
+        with pytest.raises(SourceError, match=r"closest_points\(mesh, sources\).points"):
+            ask(positions)
+    assert geodesic_distance(MESH, heat_igl.closest_points(MESH, positions).points).min() < 0.1
+    with pytest.raises(SourceError, match=r"closest_points\(mesh, targets\).points"):
+        shortest_paths(MESH, PHI, positions)
+
+
+@pytest.mark.parametrize("option", ["t", "t_coef"])
+@pytest.mark.parametrize("value", ["1", True, None.__class__, [1.0], np.nan, 1j])
+def test_steps_are_numbers(option, value):
+    with pytest.raises(ValueError, match=f"{option} must be a positive number, not "):
+        HeatMethodSolver(MESH, **{option: value})
+    HeatMethodSolver(MESH, **{option: np.float32(0.5)})
+
+
+def test_usual_steps_are_not_warned_about():
+    for t_coef in (0.1, 1, 10, 100):
+        HeatMethodSolver(MESH, t_coef=t_coef)
+    HeatMethodSolver(heat_igl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), t_coef=1)
+
+
+def test_what_results_are_fits_a_line():
+    path, cells = shortest_paths(MESH, PHI, [40], 0)[0], voronoi_cells(SOLVER, [1, 5, 9])
+    loop = heat_igl.isolines(MESH, PHI, 1.0)[0][0]
+    for found, text in (
+        (SOLVER, f"HeatMethodSolver(162 vertices, t={SOLVER.t:.4g}, backend={SOLVER.diagnostics.backend!r})"),
+        (path, f"SurfaceCurve({len(path)} segments, open)"),
+        (loop, f"SurfaceCurve({len(loop)} segments, closed)"),
+        (SurfacePoints([1, 2], np.eye(3)[:2]), "SurfacePoints(2 points)"),
+        (cells, "VoronoiCells(3 cells, 162 vertices)"),
+    ):
+        assert repr(found) == text
+        assert len(text) < 100
+    assert "refine='unfold'" in repr(HeatMethodSolver(MESH, refine="unfold"))
+    lost = voronoi_cells(HeatMethodSolver(heat_igl.Mesh(np.concatenate([MESH.V, [[9, 9, 9]]]), MESH.F)), [1])
+    assert repr(lost) == "VoronoiCells(1 cells, 163 vertices, 1 unreached)"
+
+
+def test_curves_are_written_from_lists_of_any_depth(tmp_path):
+    levels = heat_igl.isolines(MESH, PHI, [0.5, 1, 1.5])
+    flat = [curve for level in levels for curve in level]
+    written = {}
+    for name, curves in {"nested": levels, "flat": flat, "deep": [levels[:1], [[levels[1:]]]], "one": flat[0]}.items():
+        heat_igl.write_curves(tmp_path / f"{name}.obj", MESH, curves)
+        written[name] = (tmp_path / f"{name}.obj").read_text()
+    assert written["nested"] == written["flat"] == written["deep"]
+    assert written["flat"].count("\nl ") == len(flat)
+    assert written["one"].count("\nl ") == 1
+    heat_igl.write_curves(tmp_path / "named.obj", MESH, {"near": levels[:1], "far": levels[2]})
+    assert "g near" in (tmp_path / "named.obj").read_text()
+    for curves, message in (
+        ([levels, [3]], r"curves\[1\]\[0\] must be a SurfaceCurve or a list of such, not int"),
+        ({"a": PHI}, r"curves\['a'\] must be a SurfaceCurve or a list of such, not ndarray"),
+    ):
+        with pytest.raises(TypeError, match=message):
+            heat_igl.write_curves(tmp_path / "wrong.obj", MESH, curves)
+    assert not (tmp_path / "wrong.obj").exists()
+
+
+def test_a_missing_library_is_named_by_its_own_name():
+    message = str(MissingExtraError.of("a picture", "matplotlib", "view"))
+    assert message == "a picture needs matplotlib: pip install matplotlib (or install heat-igl with its extra 'view')"
+    assert "pip install typer rich (" in str(MissingExtraError.of("it", "typer and rich", "cli"))
+
+
+def test_extras_and_libraries_in_messages_are_those_of_the_project():
+    root = Path(heat_igl.__file__).parents[1]
+    if not (root / "pyproject.toml").exists():
+        pytest.skip("the project's files are not beside the package")
+    extras = tomllib.loads((root / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    calls = re.findall(
+        r"MissingExtraError\.(?:of|guard|check)\(\s*f?(?:\"[^\"]*\"|'[^']*'),\s*[\"']([^\"']+)[\"'],\s*[\"'](\w+)[\"']",
+        "\n".join(path.read_text() for path in (root / "heat_igl").rglob("*.py")),
+    )
+    assert len(calls) > 10
+    for packages, extra in {call for call in calls if call[0] != "numba"}:
+        held = {re.split(r"[<>=\[;]", requirement)[0].strip().lower() for requirement in extras[extra]}
+        assert set(packages.split(" and ")) <= held, (packages, extra)
+
+
+def test_curves_without_points_are_refused():
+    with pytest.raises(SourceError, match="faces must be one face index or more"):
+        SurfaceCurve([], [], [])
