@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import cli, demo, io, plots, reference, shapes
+from heat_igl import cli, demo, drawing, io, reference, shapes
 
 ENVIRONMENT = {
     **os.environ,
@@ -289,7 +289,7 @@ def test_a_failure_while_drawing_leaves_old_files_alone(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device", "out.png")
 
-    monkeypatch.setattr(plots, "plot", full)
+    monkeypatch.setattr(drawing, "plot", full)
     output = sphere.with_name("out.ply")
     output.write_text("old")
     picture = sphere.with_name("out.png")

@@ -1,24 +1,24 @@
-// Distance by unfolding two triangles at a time, in the order of Dijkstra's algorithm: what heat_igl/unfolding/sweeping.py does in
-// the order of the heat. It needs triangles by their corners and edge lengths; two that alone share both ends of an edge
-// are taken to be glued there.
+// Distance by unfolding two triangles at a time: the algorithm of heat_igl/unfolding/sweeping.py, in the order of Dijkstra's
+// algorithm instead of the heat. The input is the corners and the edge lengths of triangles. Two triangles are glued at an edge
+// if no other triangle has both ends of the edge.
 "use strict";
 
-// Changes by less than this are not passed on: lengths come in single precision.
+// Smaller changes are not propagated, since lengths have single precision.
 const NEGLIGIBLE = 1e-7;
-// Part of an edge by which a source lies beyond it, so that circles about its ends cross at an angle.
+// Smallest distance of a source from an edge, in edge lengths, such that circles about the ends intersect at an angle.
 const CLOSE = 1e-3;
-// Visits per vertex up to which the sweep goes back at once, and after which it gives up.
+// Visits per vertex up to which vertices are visited again at once, and after which the sweep stops.
 const GO_BACK = 10, GIVE_UP = 50;
 
-// Where the third corner of a triangle lies over its side ab, along it and in height, in units of the side.
+// Position of the third corner of a triangle relative to the side ab: along ab and height, in units of ab.
 function apex(base, toA, toB) {
-  // Heron's formula as a product of differences keeps the digits of slivers.
+  // Heron's formula as a product of differences is accurate for slivers.
   const half = 0.5 * (base + toA + toB);
   const product = Math.max(half * (half - base) * (half - toA) * (half - toB), 0);
   return [0.5 * ((toA - toB) * (toA + toB) / (base * base) + 1), 2 * Math.sqrt(product) / (base * base)];
 }
 
-// For each corner, the corner opposite the same edge in the one other triangle there; -1 if there is none, or more.
+// For each corner, the opposite corner in the other triangle at the same edge; -1 if there is no or more than one such triangle.
 function glued(n, F) {
   const across = new Map(), twin = new Int32Array(F.length).fill(-1);
   for (let h = 0; h < F.length; h++) {
@@ -32,15 +32,15 @@ function glued(n, F) {
   return twin;
 }
 
-// n vertices; F[3 f + c] the corners of face f, lengths[3 f + c] the edge opposite corner c.
+// n is the number of vertices, F[3 f + c] corner c of face f, lengths[3 f + c] the length of the edge opposite to corner c.
 function sweepTables(n, F, lengths) {
   const first = new Int32Array(n + 1);
   for (let h = 0; h < F.length; h++) first[F[h] + 1]++;
   for (let v = 0; v < n; v++) first[v + 1] += first[v];
   const next = first.slice(0, n), twin = glued(n, F);
-  // One row per triangle around a vertex: the other corners a and b, and the one beyond the edge ab (or -1); the vertex
-  // over that edge, along it and to its side in units of the edge; the edge; the ways to a and to b; the corner beyond
-  // it, along it and on its other side.
+  // One row per triangle around a vertex: the other corners a and b, and the opposite corner w across the edge ab (or -1); the
+  // position of the vertex along ab and at right angles to ab, in units of ab; the length of ab; the lengths of the edges to a
+  // and b; the position of w along ab and at right angles to ab, on the other side.
   const ends = new Int32Array(3 * F.length), shape = new Float64Array(7 * F.length);
   for (let h = 0; h < F.length; h++) {
     const f = h - h % 3, p = f + (h + 1) % 3, q = f + (h + 2) % 3;
@@ -55,7 +55,7 @@ function sweepTables(n, F, lengths) {
   return { n, first, ends, shape };
 }
 
-// Vertices in ascending order of their distance along edges; those out of reach come last.
+// Vertices in ascending order of the distance along edges; unreachable vertices are last.
 function edgeOrder(tables, sources) {
   const { n, first, ends, shape } = tables;
   const d = new Float64Array(n).fill(Infinity), isDone = new Uint8Array(n), order = new Int32Array(n);
@@ -97,9 +97,9 @@ function edgeOrder(tables, sources) {
   return order;
 }
 
-// Distance from v at (px, py) of the source at (x, -y) as a = (0, 0) and b = (1, 0) see it, but by what the corner w beyond
-// the edge ab at (wx, -wy) knows of it: through the edge between w and a or b, or bent at w. As it is, if the source lies
-// in front of that edge. All in units of ab.
+// Distance of v at (px, py) from the source, whose position (x, -y) follows from a = (0, 0) and b = (1, 0), corrected by the
+// distance of the corner w at (wx, -wy) across the edge ab: through the edge between w and a or b, or with a bend at w. It is
+// not corrected if the source lies in front of that edge. All lengths are in units of ab.
 function acrossTwo(px, py, x, y, da, db, dw, wx, wy) {
   const ux = px - wx, uy = py + wy, isRight = ux * (y + py) < uy * (px - x);
   const sign = isRight ? 1 : -1, end = isRight ? 0 : 1, dp = isRight ? da : db, ex = wx - end, square = ex * ex + wy * wy;
@@ -112,13 +112,13 @@ function acrossTwo(px, py, x, y, da, db, dw, wx, wy) {
   return sign * ((px - end) * sy - py * sx) >= 0 ? Math.hypot(sx, sy) : direct;
 }
 
-// Distance from the sources, Infinity where they do not reach.
+// Distance from the sources; Infinity at unreachable vertices.
 function sweepDistance(tables, sources) {
   const { n, first, ends, shape } = tables;
   const order = edgeOrder(tables, sources), rank = new Int32Array(n);
   for (let i = 0; i < n; i++) rank[order[i]] = i;
   const d = new Float64Array(n).fill(Infinity), isStale = new Uint8Array(n).fill(1);
-  // The source that the distance of a vertex is measured from.
+  // The source of the distance of each vertex.
   const label = new Int32Array(n).fill(-1);
   for (const s of sources) [d[s], label[s]] = [0, s];
   let lowest = n;
@@ -144,14 +144,14 @@ function sweepDistance(tables, sources) {
       const px = shape[at], py = shape[at + 1];
       let length = Infinity, x = 0, y = 0, source = label[a];
       if (label[a] === label[b]) {
-        // The source in units of the edge ab: x along it, y behind it.
+        // The position of the source in units of the edge ab: x along ab, y on the other side.
         x = 0.5 * ((da - db) * (da + db) / (base * base) + 1);
         const ySquared = da * da / (base * base) - x * x;
         y = Math.sqrt(Math.max(ySquared, 0));
         const crossing = x * py + px * y;
         if (ySquared >= 0 && crossing >= 0 && crossing <= y + py) length = base * Math.hypot(px - x, py + y);
       } else {
-        // Between different sources a straight front comes in, from that of the end it passes nearer to.
+        // Between different sources the front is straight; the source is that of the nearer end.
         const slope = (db - da) / base, rise = Math.sqrt(Math.max(1 - slope * slope, 0)), foot = px * rise - py * slope;
         if (foot >= 0 && foot <= rise) length = da + base * (slope * px + rise * py);
         if (foot >= 0.5 * rise) source = label[b];
@@ -168,14 +168,14 @@ function sweepDistance(tables, sources) {
     if (!(best < old)) continue;
     [d[v], label[v]] = [best, giver];
     if (best >= old * (1 - NEGLIGIBLE)) continue;
-    // Farther neighbours depend on v, and nearer ones whose way can cross an edge that ends in v.
+    // Farther neighbours depend on v, and nearer ones if the path can cross an edge that ends in v.
     lowest = n;
     for (let k = first[v]; k < first[v + 1]; k++) {
       const a = ends[3 * k], b = ends[3 * k + 1], at = 7 * k, along = shape[at] * shape[at + 2];
       if (best < d[a] || 2 * d[a] * along < shape[at + 3] ** 2) mark(a);
       if (best < d[b] || 2 * d[b] * (shape[at + 2] - along) < shape[at + 4] ** 2) mark(b);
     }
-    // Back to those that came too early, at once, before what is wrong there spreads.
+    // Vertices that were visited too early are visited again at once, before wrong values spread.
     if (lowest < i) {
       if (visits < GO_BACK * n) i = lowest;
       else again = Math.min(again, lowest);

@@ -1,4 +1,4 @@
-// The surface in WebGL: colours, isolines and stripes per pixel; turn, zoom, pan; a click picks a vertex.
+// The surface in WebGL: colours, isolines and stripes per pixel; rotation, zoom and translation; picking of vertices.
 "use strict";
 
 (async () => {
@@ -19,7 +19,7 @@
     const bytes = new Uint8Array(await new Response(stream).arrayBuffer()), arrays = {};
     let start = 0;
     for (const [name, kind, size] of meta.arrays) {
-      // First bytes of all numbers, then all second bytes, ...: that packs better.
+      // Bytes are grouped by significance, which compresses better.
       const whole = new Uint8Array(4 * size);
       for (let i = 0; i < size; i++) for (let b = 0; b < 4; b++) whole[4 * i + b] = bytes[start + b * size + i];
       arrays[name] = new (kind === "float" ? Float32Array : Int32Array)(whole.buffer);
@@ -141,7 +141,7 @@
     gl.texParameteri(gl.TEXTURE_2D, gl["TEXTURE_" + key], gl[to]);
   gl.enable(gl.DEPTH_TEST);
 
-  // ---- the field that is shown
+  // ---- the displayed field
 
   const scale = { low: 0, high: 1, spacing: 1 };
 
@@ -223,7 +223,7 @@
   function rotate(dx, dy) {
     const angle = Math.hypot(dx, dy);
     if (!angle) return;
-    // About the axis in the screen across the motion, so that what is in front follows it.
+    // The axis lies in the screen, at right angles to the motion: the front of the surface follows the pointer.
     const [x, y] = [dy / angle, dx / angle], c = Math.cos(angle), s = Math.sin(angle), t = 1 - c;
     const R = [[t * x * x + c, t * x * y, s * y], [t * x * y, t * y * y + c, -s * x], [-s * y, s * x, c]];
     const centre = [-pan[0], -pan[1], 0];
@@ -286,12 +286,12 @@
 
   // ---- picking
 
-  // Where a vertex is on the canvas, in pixels of the page, and how near.
+  // Position of a vertex on the canvas, in pixels of the page, and depth.
   function onCanvas(v) {
     const at = turn.map((row) => row[0] * V[3 * v] + row[1] * V[3 * v + 1] + row[2] * V[3 * v + 2]), s = pixelsPerUnit();
     return [canvas.clientWidth / 2 + s * (at[0] + pan[0]), canvas.clientHeight / 2 - s * (at[1] + pan[1]), at[2]];
   }
-  // The vertex next to what is seen at (x, y) on the canvas, -1 where there is no surface.
+  // The vertex nearest to the visible point at (x, y) on the canvas, or -1 outside the surface.
   function pick(x, y) {
     const at = new Float64Array(3 * n);
     for (let v = 0; v < n; v++) at.set(onCanvas(v), 3 * v);
@@ -397,7 +397,7 @@
   byId("pick-label").hidden = !sweepFaces;
   start();
 
-  // For other scripts in the page: all in the mesh's unit.
+  // For other scripts in the page; lengths are in the unit of the mesh.
   window.heatIgl = {
     distance: () => Array.from(values, (x) => x * meta.unit),
     sources: () => sources.slice(),
