@@ -38,7 +38,7 @@ def search(q: Query, v: cython.int) -> cython.void:
         view: View = cone.view
         a: cython.int = cone.a
         b: cython.int = cone.b
-        first = cython.address(q.t.spoke[cone.spoke])
+        first = cython.address(q.t.spoke[view.spoke])
         while steps < q.max_steps:
             steps += 1
             step = cython.address(q.t.step[view.h])
@@ -49,7 +49,7 @@ def search(q: Query, v: cython.int) -> cython.void:
             wx: cython.double = view.bx + step.x * ux - step.y * uy
             wy: cython.double = view.by + step.x * uy + step.y * ux
             if has_points:
-                arrive(q, view, cone.spoke, wx, wy)
+                arrive(q, view, wx, wy)
             if view.rx * wy - view.ry * wx <= 0.0:
                 a, view.ax, view.ay, view.h = step.vertex, wx, wy, step.to_left
                 continue
@@ -68,7 +68,7 @@ def search(q: Query, v: cython.int) -> cython.void:
                 if max(turned.right, turned.left) < -STRAIGHT:
                     bend = REAL_BEND
                 distance: cython.double = sqrt(wx * wx + wy * wy) + w.distance
-                take(q, distance, step.vertex, wx, wy, bend, cone.spoke, -first.along, -first.height)
+                take(q, distance, step.vertex, wx, wy, bend, view.spoke, -first.along, -first.height)
                 if w.fan == NO_FAN:
                     break
             # Between a and w, with w as the left limit; and between w and b.
@@ -82,11 +82,11 @@ def search(q: Query, v: cython.int) -> cython.void:
                 break
             if right <= left:
                 if left < limit:
-                    top = _push(q, top, left, view, step.vertex, b, cone.spoke)
+                    top = _push(q, top, left, view, step.vertex, b)
                 b, view = step.vertex, side
             else:
                 if right < limit:
-                    top = _push(q, top, right, side, a, step.vertex, cone.spoke)
+                    top = _push(q, top, right, side, a, step.vertex)
                 a = step.vertex
 
 
@@ -101,7 +101,7 @@ def _first_cones(q: Query, v: cython.int) -> cython.int:
     k: cython.int
     view: View
     for k in range(q.t.first[v], q.t.first[v + 1]):
-        view.h = q.t.turn[k].corner
+        view.h, view.spoke = q.t.turn[k].corner, k
         if view.h < 0:
             continue
         spoke = cython.address(q.t.spoke[k])
@@ -112,7 +112,7 @@ def _first_cones(q: Query, v: cython.int) -> cython.int:
             view, q.walk[spoke.neighbour].distance, q.walk[spoke.next_neighbour].distance
         )
         if forecast < q.found.distance:
-            top = _push(q, top, forecast, view, spoke.neighbour, spoke.next_neighbour, k)
+            top = _push(q, top, forecast, view, spoke.neighbour, spoke.next_neighbour)
     for i in range(1, top):
         for j in range(i, 0, -1):
             if not q.cone[j].forecast > q.cone[j - 1].forecast:
@@ -134,13 +134,12 @@ def _push(
     view: View,
     a: cython.int,
     b: cython.int,
-    spoke: cython.int,
 ) -> cython.int:
     """Put a cone on the stack unless that is full; returns its new height."""
     if top == q.cone.shape[0]:
         return top
     cone = cython.address(q.cone[top])
-    cone.view, cone.forecast, cone.a, cone.b, cone.spoke = view, forecast, a, b, spoke
+    cone.view, cone.forecast, cone.a, cone.b = view, forecast, a, b
     return top + 1
 
 

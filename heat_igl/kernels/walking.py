@@ -78,7 +78,7 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
     first_y: cython.double = -spoke.height
     view.ax, view.ay = first_x, first_y
     view.bx, view.by = first_x + spoke.base, first_y
-    view.h = q.t.turn[k].corner
+    view.h, view.spoke = q.t.turn[k].corner, k
     view.rx, view.ry, view.lx, view.ly = view.ax, view.ay, view.bx, view.by
     right_advice = cython.address(q.advice[k - q.t.first[v]])
     left_advice = cython.address(q.advice[spoke.next - q.t.first[v]])
@@ -108,7 +108,7 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
         uy: cython.double = view.ay - view.by
         wx: cython.double = view.bx + step.x * ux - step.y * uy
         wy: cython.double = view.by + step.x * uy + step.y * ux
-        if has_points and arrive(q, view, k, wx, wy):
+        if has_points and arrive(q, view, wx, wy):
             break
         # Outside the cone there is nothing to decide.
         if view.rx * wy - view.ry * wx <= 0.0:

@@ -44,16 +44,17 @@ cdef enum:
     SAYS_LEFT = 1
     NOT_VISITED = 2
 
-# What v, in the origin, sees through the half-edge h from a (right) to b (left): the cone between R and L.
+# What v, in the origin, sees over its `spoke` and through the half-edge h from a (right) to b (left): the cone between
+# R and L.
 cdef struct View:
     double ax, ay, bx, by, rx, ry, lx, ly
-    int h
+    int h, spoke
 
-# A part of a search: its view, the vertices a and b, v's spoke, and the shortest that a path through it may be.
+# A part of a search: its view, the shortest that a path through it may be, and the vertices a and b.
 cdef struct Cone:
     View view
     double forecast
-    int a, b, spoke
+    int a, b
 
 # By how much less than pi a path turns on the right and on the left side of a vertex.
 cdef struct Savings:
@@ -72,7 +73,7 @@ cdef class Query:
     cdef Cone[::1] cone
 
 
-cdef bint arrive(Query q, View view, int spoke, double wx, double wy) noexcept nogil
+cdef bint arrive(Query q, View view, double wx, double wy) noexcept nogil
 
 
 # Note the path of length `distance` if it is the shortest so far.

@@ -11,8 +11,8 @@ __all__ = ["Query"]
 # Cones that may wait in a search.
 _MAX_CONES = 256
 _ADVICE = np.dtype([("saving", "f8"), ("promise", "f8"), ("side", "i4")], align=True)
-_VIEW = np.dtype([(name, "f8") for name in ("ax", "ay", "bx", "by", "rx", "ry", "lx", "ly")] + [("h", "i4")], align=True)
-_CONE = np.dtype([("view", _VIEW), ("forecast", "f8"), ("a", "i4"), ("b", "i4"), ("spoke", "i4")], align=True)
+_VIEW = np.dtype([(name, "f8") for name in ("ax", "ay", "bx", "by", "rx", "ry", "lx", "ly")] + [("h", "i4"), ("spoke", "i4")])
+_CONE = np.dtype([("view", _VIEW), ("forecast", "f8"), ("a", "i4"), ("b", "i4")])
 
 
 @cython.final
@@ -45,7 +45,7 @@ class Query:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def arrive(q: Query, view: View, spoke: cython.int, wx: cython.double, wy: cython.double) -> cython.bint:
+def arrive(q: Query, view: View, wx: cython.double, wy: cython.double) -> cython.bint:
     """Note the straight paths to the sources inside the face behind a view; whether one is the shortest so far.
 
     That face is a, w, b; only what lies in the cone is seen in a straight line.
@@ -57,7 +57,7 @@ def arrive(q: Query, view: View, spoke: cython.int, wx: cython.double, wy: cytho
     at_a: cython.int = (right_of_w + 1) % 3
     entry: cython.int = q.first_inside[right_of_w // 3]
     arrived: cython.bint = False
-    first = cython.address(q.t.spoke[spoke])
+    first = cython.address(q.t.spoke[view.spoke])
     while entry >= 0:
         point = cython.address(q.inside[entry])
         a: cython.double = point.barycentric[at_a]
@@ -69,7 +69,7 @@ def arrive(q: Query, view: View, spoke: cython.int, wx: cython.double, wy: cytho
         distance: cython.double = q.walk[point.row].distance + sqrt(x * x + y * y)
         is_seen: cython.bint = view.rx * y - view.ry * x >= -slack and x * view.ly - y * view.lx >= -slack
         if is_seen and distance < q.found.distance:
-            take(q, distance, point.row, x, y, REAL_BEND, spoke, -first.along, -first.height)
+            take(q, distance, point.row, x, y, REAL_BEND, view.spoke, -first.along, -first.height)
             arrived = True
         entry = point.following
     return arrived
