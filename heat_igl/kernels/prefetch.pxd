@@ -1,7 +1,8 @@
 cdef extern from *:
     """
     #if defined(__GNUC__) || defined(__clang__)
-    #define HEAT_IGL_PREFETCH(address) __builtin_prefetch(address)
+    // The empty statement keeps GCC from dropping calls of functions that do nothing but prefetch.
+    #define HEAT_IGL_PREFETCH(address) do { __asm__ volatile (""); __builtin_prefetch(address); } while (0)
     #else
     #define HEAT_IGL_PREFETCH(address) ((void) 0)
     #endif
