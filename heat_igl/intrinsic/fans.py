@@ -15,7 +15,7 @@ import numpy as np
 from heat_igl.kernels import half_edges
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["Tables", "breadth_first", "tables"]
+__all__ = ["Tables", "aligned", "breadth_first", "tables"]
 
 
 def _record(lengths: str, numbers: str) -> np.dtype[np.void]:
@@ -89,7 +89,7 @@ def tables(F: IntArray, l: FloatArray, twin: IntArray, n: int) -> Tables:  # noq
     Faces and half-edges as `breadth_first` returns them.
     """
     first = half_edges.first_spokes(F, twin, n)
-    spoke, turn, step = _aligned(first[-1], _SPOKE), np.zeros(first[-1], _TURN), np.zeros(F.size, _STEP)
+    spoke, turn, step = aligned(first[-1], _SPOKE), aligned(first[-1], _TURN), aligned(F.size, _STEP)
     total = half_edges.fill(F, l, twin, first, spoke, turn, step)
     is_flat = np.ones(n, bool)
     used = np.flatnonzero(np.diff(first))
@@ -98,7 +98,7 @@ def tables(F: IntArray, l: FloatArray, twin: IntArray, n: int) -> Tables:  # noq
     return Tables(first, spoke, turn, step, total, is_flat)
 
 
-def _aligned(n: int, record: np.dtype[np.void]) -> AnyArray:
+def aligned(n: int, record: np.dtype[np.void]) -> AnyArray:
     """Structures of zeros whose first address is a multiple of a cache line, 64 bytes."""
     room = np.zeros(n * record.itemsize + 64, np.uint8)
     start = -room.ctypes.data % 64

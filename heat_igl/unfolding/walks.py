@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.intrinsic.fans import Tables
+from heat_igl.intrinsic.fans import Tables, aligned
 from heat_igl.kernels import sweeping, unfolding, walks
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -16,7 +16,8 @@ __all__ = ["INSIDE", "WALK", "Points", "sweep", "unfold", "unknown", "views"]
 # that is away in a straight line, `reach`; the direction in which it lies, `angle` in the `fan` of the vertex (-1: none,
 # at a source), whose angles sum to `total` (negative: open); the `label` of the source that the path ends at.
 WALK = np.dtype(
-    [(name, "f8") for name in ("distance", "offset", "reach", "angle", "total")] + [("fan", "i4"), ("label", "i4")]
+    [(name, "f8") for name in ("distance", "offset", "reach", "angle", "total")]
+    + [("fan", "i4"), ("label", "i4"), ("spare", "f8", 2)]
 )
 # A source inside a face: the next one in the same face, `following` (-1 after the last), and the `row` of the walks
 # that stands for it.
@@ -40,7 +41,7 @@ class Points(NamedTuple):
 
 def unknown(n: int) -> AnyArray:
     """Walks (n,) of vertices that no path is known of."""
-    walk = np.zeros(n, WALK)
+    walk = aligned(n, WALK)
     walk["distance"], walk["fan"], walk["label"] = np.inf, -1, -1
     return walk
 
