@@ -24,8 +24,8 @@ def _record(lengths: str, numbers: str) -> np.dtype[np.void]:
 
 
 _SPOKE = _record("length along height base beyond_along beyond_depth", "neighbour next_neighbour beyond next")
-_TURN = _record("here there", "fan_here fan_there corner is_crowded")
-_STEP = _record("x y angle", "vertex to_right to_left fan")
+_TURN = _record("here there", "fan_here fan_there corner across")
+_STEP = np.dtype([*_record("x y direction angle", "vertex fan to_right to_left").descr, ("spare", "f8", 2)])
 
 
 class Tables(NamedTuple):
@@ -45,12 +45,12 @@ class Tables(NamedTuple):
     turn : (s,) structures
         Direction of the spoke at v, `here`, and of the same edge at the neighbour, `there` (angles in their fans). v's
         fan, `fan_here`; the neighbour's, `fan_there`; the half-edge opposite v in the triangle to the left, `corner`,
-        -1 if none; whether more than two faces meet at that half-edge, `is_crowded`.
+        -1 if none; the half-edge `across` that one, -1 if none, -2 if more than one.
     step : (3 m,) structures
-        For a half-edge that is crossed, where the far vertex lies, `x` and `y` in units of the half-edge on the other
-        side; the direction `angle` of the edge from the far vertex to the right end (seen in the walk: to b) in the far
-        vertex's fan. The far `vertex` (-1 on the boundary); the half-edge to leave by when passing right of it,
-        `to_right`, and when passing left of it, `to_left`; its `fan`.
+        For a half-edge through which a triangle is entered, where the far `vertex` lies, `x` and `y` in units of the
+        half-edge; in its `fan` the `direction` of the edge to the right end of the half-edge (seen in the walk: to b),
+        and the `angle` of the corner. The half-edge to enter the next triangle by when passing right of it, `to_right`,
+        and when passing left of it, `to_left`; -1 on the boundary, -2 where more than two faces meet.
     total : (k,) float64
         Sum of the angles of each fan, negative for a fan that is open.
     is_flat : (n,) bool
@@ -63,6 +63,10 @@ class Tables(NamedTuple):
     step: AnyArray
     total: FloatArray
     is_flat: BoolArray
+
+    def across(self, faces: IntArray, corners: IntArray) -> IntArray:
+        """Half-edges (k,) on the other side of those opposite the corners of faces (k,); negative if there are none."""
+        return np.asarray(self.step["to_right"][3 * faces + (corners + 2) % 3].astype(np.int64))
 
 
 def breadth_first(

@@ -1,23 +1,18 @@
 # The structures that walks over a triangulation read; what their fields mean stands in heat_igl/intrinsic/fans.py.
 
-# One line of the processor's cache.
+# Spokes and steps are one line of the processor's cache, turns half of one.
 cdef struct Spoke:
     double length, along, height, base, beyond_along, beyond_depth
     int neighbour, next_neighbour, beyond, next
 
 cdef struct Turn:
     double here, there
-    int fan_here, fan_there, corner, is_crowded
+    int fan_here, fan_there, corner, across
 
 cdef struct Step:
-    double x, y, angle
-    int vertex, to_right, to_left, fan
-
-# A half-edge and the corner opposite to it: the apex over the half-edge in units of the half-edge; the angle of the
-# corner, the direction of the first of its two sides in its fan, that fan (-1: not known yet), and its vertex.
-cdef struct Corner:
-    double x, y, angle, direction
-    int fan, vertex
+    double x, y, direction, angle
+    int vertex, fan, to_right, to_left
+    double spare[2]
 
 
 cdef class HalfEdges:

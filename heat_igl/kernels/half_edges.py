@@ -2,13 +2,10 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.half_edges import Corner, Spoke, Step, Turn, following, preceding
+from cython.cimports.heat_igl.kernels.half_edges import Spoke, Step, Turn, following, preceding
 from cython.cimports.libc.math import NAN, atan2, sqrt
 
 __all__ = ["HalfEdges", "breadth_first", "fill", "first_spokes"]
-
-_CORNER = np.dtype([(name, "f8") for name in ("x", "y", "angle", "direction")] + [("fan", "i4"), ("vertex", "i4")])
-
 
 @cython.final
 @cython.cclass
@@ -51,17 +48,14 @@ def fill(
     step: Step[::1],
 ):
     """Fill the tables; returns the total angle (k,) of each fan."""
-    count: cython.int = twin.shape[0]
-    corner: Corner[::1] = np.empty(count, _CORNER)
-    total_array = np.empty(count)
+    total_array = np.empty(twin.shape[0])
     total: cython.double[::1] = total_array
     end: cython.int[::1] = np.array(first)
     n_fans: cython.int
     with cython.nogil:
-        _shapes(F, l, corner)
-        n_fans = _fans(twin, corner, total, end, spoke, turn)
-        _fill_spokes(l, twin, corner, spoke, turn)
-        _fill_steps(twin, corner, step)
+        _shapes(F, l, twin, step)
+        n_fans = _fans(twin, step, total, end, spoke, turn)
+        _fill_spokes(l, twin, step, spoke, turn)
     return total_array[:n_fans].copy()
 
 
@@ -69,9 +63,12 @@ def fill(
 @cython.nogil
 @cython.exceptval(check=False)
 def _shapes(
-    F: cython.const[cython.int][:, ::1], l: cython.const[cython.double][:, ::1], corner: Corner[::1]  # noqa: E741
+    F: cython.const[cython.int][:, ::1],
+    l: cython.const[cython.double][:, ::1],  # noqa: E741
+    twin: cython.const[cython.int][::1],
+    step: Step[::1],
 ) -> cython.void:
-    """Apex over each half-edge in units of the half-edge, and the angle at each corner."""
+    """What a step knows of its own triangle and of the next half-edges."""
     f: cython.Py_ssize_t
     c: cython.int
     for f in range(F.shape[0]):
@@ -82,14 +79,15 @@ def _shapes(
             # Heron's formula as a product of differences: a height from right^2 - x^2 loses the digits of slivers.
             half: cython.double = 0.5 * (base + right + left)
             product: cython.double = max(half * (half - base) * (half - right) * (half - left), 0.0)
-            here = cython.address(corner[3 * f + c])
+            here = cython.address(step[3 * f + c])
             here.x = 0.5 * ((right - left) * (right + left) / (base * base) + 1.0)
             here.y = 2.0 * sqrt(product) / (base * base)
             here.angle = 2.0 * atan2(
                 sqrt(max((half - right) * (half - left), 0.0)), sqrt(max(half * (half - base), 0.0))
             )
             here.vertex = F[f, c]
-            here.fan = -1
+            here.fan = -1  # not known yet
+            here.to_right, here.to_left = twin[3 * f + (c + 1) % 3], twin[3 * f + (c + 2) % 3]
 
 
 @cython.cfunc
@@ -97,7 +95,7 @@ def _shapes(
 @cython.exceptval(check=False)
 def _fans(
     twin: cython.const[cython.int][::1],
-    corner: Corner[::1],
+    step: Step[::1],
     total: cython.double[::1],
     end: cython.int[::1],
     spoke: Spoke[::1],
@@ -109,7 +107,7 @@ def _fans(
     t: cython.int
     n_fans: cython.int = 0
     for h in range(twin.shape[0]):
-        if corner[h].fan >= 0:
+        if step[h].fan >= 0:
             continue
         start: cython.int = h
         is_open: cython.bint = False
@@ -121,20 +119,20 @@ def _fans(
             start = preceding(t)
             if start == h:
                 break
-        v: cython.int = corner[h].vertex
+        v: cython.int = step[h].vertex
         row: cython.int = end[v]
         first: cython.int = row
         angle: cython.double = 0.0
         k = start
         while True:  # counter-clockwise
-            corner[k].fan = n_fans
-            corner[k].direction = angle
+            step[k].fan = n_fans
+            step[k].direction = angle
             turn[row].here = angle
             turn[row].fan_here = n_fans
             turn[row].corner = k
             spoke[row].next = row + 1
             row += 1
-            angle += corner[k].angle
+            angle += step[k].angle
             t = twin[following(k)]
             if t < 0:
                 break
@@ -161,7 +159,7 @@ def _fans(
 def _fill_spokes(
     l: cython.const[cython.double][:, ::1],  # noqa: E741
     twin: cython.const[cython.int][::1],
-    corner: Corner[::1],
+    step: Step[::1],
     spoke: Spoke[::1],
     turn: Turn[::1],
 ) -> cython.void:
@@ -174,43 +172,27 @@ def _fill_spokes(
         r = cython.address(turn[k])
         s.beyond = -1
         if r.corner < 0:  # past the end of the fan of the spoke before
-            neighbour = cython.address(corner[preceding(h)])
+            neighbour = cython.address(step[preceding(h)])
             s.length = l[following(h) // 3, following(h) % 3]
             s.height = NAN
             s.neighbour = s.next_neighbour = neighbour.vertex
-            r.there, r.fan_there = neighbour.direction, neighbour.fan
+            r.there, r.fan_there, r.across = neighbour.direction, neighbour.fan, -1
             continue
         h = r.corner
         # The corners at the neighbours right and left of corner h; the spoke is the side opposite the left one.
-        right = cython.address(corner[following(h)])
-        left = cython.address(corner[preceding(h)])
+        right = cython.address(step[following(h)])
+        left = cython.address(step[preceding(h)])
         base: cython.double = l[h // 3, h % 3]
         s.length, s.base = l[h // 3, preceding(h) % 3], base
-        s.along, s.height = corner[h].x * base, corner[h].y * base
+        s.along, s.height = step[h].x * base, step[h].y * base
         s.neighbour, s.next_neighbour = right.vertex, left.vertex
         r.there, r.fan_there = right.direction + right.angle, right.fan
         t = twin[h]
-        r.is_crowded = t < -1
+        r.across = t
         if t >= 0:
             # Seen from beyond, the side runs the other way.
-            s.beyond_along, s.beyond_depth = (1.0 - corner[t].x) * base, corner[t].y * base
-            s.beyond = corner[t].vertex
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _fill_steps(twin: cython.const[cython.int][::1], corner: Corner[::1], step: Step[::1]) -> cython.void:
-    h: cython.Py_ssize_t
-    t: cython.int
-    for h in range(twin.shape[0]):
-        s = cython.address(step[h])
-        t = twin[h]
-        if t < 0:
-            s.vertex = -1
-            continue
-        s.x, s.y, s.angle = corner[t].x, corner[t].y, corner[t].direction
-        s.vertex, s.to_right, s.to_left, s.fan = corner[t].vertex, following(t), preceding(t), corner[t].fan
+            s.beyond_along, s.beyond_depth = (1.0 - step[t].x) * base, step[t].y * base
+            s.beyond = step[t].vertex
 
 
 def breadth_first(

@@ -41,9 +41,9 @@ def search(q: Query, v: cython.int) -> cython.void:
         first = cython.address(q.t.spoke[view.spoke])
         while steps < q.max_steps:
             steps += 1
-            step = cython.address(q.t.step[view.h])
-            if step.vertex < 0:
+            if view.h < 0:
                 break
+            step = cython.address(q.t.step[view.h])
             ux: cython.double = view.ax - view.bx
             uy: cython.double = view.ay - view.by
             wx: cython.double = view.bx + step.x * ux - step.y * uy
@@ -63,7 +63,7 @@ def search(q: Query, v: cython.int) -> cython.void:
                     back: cython.double = atan2(
                         wx * view.by - wy * view.bx, wx * (wx - view.bx) + wy * (wy - view.by)
                     )
-                    turned = savings(step.angle + back, w)
+                    turned = savings(step.direction + back, w)
                 bend: cython.double = turned.left if turned.left >= turned.right else -turned.right
                 if max(turned.right, turned.left) < -STRAIGHT:
                     bend = REAL_BEND
@@ -101,9 +101,9 @@ def _first_cones(q: Query, v: cython.int) -> cython.int:
     k: cython.int
     view: View
     for k in range(q.t.first[v], q.t.first[v + 1]):
-        view.h, view.spoke = q.t.turn[k].corner, k
-        if view.h < 0:
+        if q.t.turn[k].corner < 0:
             continue
+        view.h, view.spoke = q.t.turn[k].across, k
         spoke = cython.address(q.t.spoke[k])
         view.ax, view.ay = -spoke.along, -spoke.height
         view.bx, view.by = view.ax + spoke.base, view.ay

@@ -98,7 +98,7 @@ def _read_ahead(q: Query, order: cython.const[cython.int][::1], i: cython.Py_ssi
         v = order[i + 1]
         for k in range(q.t.first[v], q.t.first[v + 1]):
             prefetch(cython.address(q.walk[q.t.spoke[k].neighbour]))
-            prefetch(cython.address(q.t.step[max(q.t.turn[k].corner, 0)]))
+            prefetch(cython.address(q.t.step[max(q.t.turn[k].across, 0)]))
 
 
 @cython.cfunc
@@ -119,7 +119,7 @@ def _visit(q: Query, v: cython.int, may_wait: cython.bint) -> cython.int:
             turn = cython.address(q.t.turn[k])
             if turn.corner < 0:
                 continue
-            if turn.is_crowded:
+            if turn.across < -1:
                 cross_crowded(q, k)
             # A way in lies where one neighbour says left and the next one right (or is not known yet).
             right = cython.address(q.advice[k - first])

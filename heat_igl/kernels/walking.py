@@ -78,7 +78,7 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
     first_y: cython.double = -spoke.height
     view.ax, view.ay = first_x, first_y
     view.bx, view.by = first_x + spoke.base, first_y
-    view.h, view.spoke = q.t.turn[k].corner, k
+    view.h, view.spoke = q.t.turn[k].across, k
     view.rx, view.ry, view.lx, view.ly = view.ax, view.ay, view.bx, view.by
     right_advice = cython.address(q.advice[k - q.t.first[v]])
     left_advice = cython.address(q.advice[spoke.next - q.t.first[v]])
@@ -97,13 +97,11 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
     far: cython.double = 4.0 * q.found.distance * q.found.distance
     wait_for: cython.int = -1
     turned: Savings
-    while True:
+    while view.h >= 0:
         step = cython.address(q.t.step[view.h])
-        if step.vertex < 0:
-            break
         # Where the walk goes next is known late, but both ways are known now.
-        prefetch(cython.address(q.t.step[step.to_right]))
-        prefetch(cython.address(q.t.step[step.to_left]))
+        prefetch(cython.address(q.t.step[max(step.to_right, 0)]))
+        prefetch(cython.address(q.t.step[max(step.to_left, 0)]))
         ux: cython.double = view.ax - view.bx
         uy: cython.double = view.ay - view.by
         wx: cython.double = view.bx + step.x * ux - step.y * uy
@@ -127,7 +125,7 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
             turned.right = turned.left = -1.0
             if w.fan == step.fan:
                 back: cython.double = atan2(wx * view.by - wy * view.bx, squared - (view.bx * wx + view.by * wy))
-                turned = savings(step.angle + back, w)
+                turned = savings(step.direction + back, w)
             most: cython.double = max(turned.right, turned.left)
             if most < STRAIGHT:
                 # A source, a real bend, or straight on along a path that is known: the walk is over.

@@ -46,8 +46,8 @@ cdef enum:
     SAYS_LEFT = 1
     NOT_VISITED = 2
 
-# What v, in the origin, sees over its `spoke` and through the half-edge h from a (right) to b (left): the cone between
-# R and L.
+# What v, in the origin, sees over its `spoke` and through an edge from a (right) to b (left): the cone between R and L,
+# and the half-edge h beyond that edge, negative if there is none.
 cdef struct View:
     double ax, ay, bx, by, rx, ry, lx, ly
     int h, spoke

@@ -51,11 +51,10 @@ def arrive(q: Query, view: View, wx: cython.double, wy: cython.double) -> cython
     That face is a, w, b; only what lies in the cone is seen in a straight line.
     """
     # From w, its face runs first to b and then to a.
-    right_of_w: cython.int = q.t.step[view.h].to_right
-    at_b: cython.int = right_of_w % 3
-    at_w: cython.int = (right_of_w + 2) % 3
-    at_a: cython.int = (right_of_w + 1) % 3
-    entry: cython.int = q.first_inside[right_of_w // 3]
+    at_w: cython.int = view.h % 3
+    at_b: cython.int = (at_w + 1) % 3
+    at_a: cython.int = (at_w + 2) % 3
+    entry: cython.int = q.first_inside[view.h // 3]
     arrived: cython.bint = False
     first = cython.address(q.t.spoke[view.spoke])
     while entry >= 0:

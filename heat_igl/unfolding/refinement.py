@@ -247,9 +247,10 @@ class Refinement:
         faces = self._face[faces]
         # A point on a side also lies in the face beyond it.
         i, c = np.nonzero(barycentric < _ON_SIDE)
-        beyond = self._tables.step[3 * faces[i] + c]
-        there = np.flatnonzero(beyond["vertex"] >= 0)
-        i, c, following = i[there], c[there], beyond["to_right"][there].astype(np.int64)
+        beyond = self._tables.across(faces[i], c)
+        there = np.flatnonzero(beyond >= 0)
+        i, c, beyond = i[there], c[there], beyond[there]
+        following = beyond - beyond % 3 + (beyond + 1) % 3
         other = np.zeros((len(i), 3))
         # Its corner after the far one is at the end, as seen from here, of the side that starts after corner c.
         other[np.arange(len(i)), following % 3] = barycentric[i, (c + 2) % 3]
