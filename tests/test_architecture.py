@@ -17,6 +17,7 @@ PACKAGE = Path(heat_igl.__file__).parent
 ORDER = """
 typing
 errors
+kernels
 runtime
 mesh
 intrinsic

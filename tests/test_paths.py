@@ -30,8 +30,6 @@ from heat_igl import (
     shortest_paths,
 )
 
-pytest.importorskip("numba")
-
 
 def lengths(mesh, paths):
     return np.array([path.lengths(mesh).sum() for path in paths])

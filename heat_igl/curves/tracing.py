@@ -2,8 +2,8 @@
 
 The way is the steepest descent, or, where the path becomes too long, found by aiming at what the distance says ahead.
 A path is first a *strip*: a sequence of crossings, each from a half-edge of one face to a half-edge of the next on the
-same edge. Laid out in the plane the strip is a polygon, in which a funnel finds the shortest path; where that bends at a
-vertex which can be passed another way, the strip is led there.
+same edge. Laid out in the plane the strip is a polygon, in which a funnel finds the shortest path; where that bends at
+a vertex which can be passed another way, the strip is led there.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ class Surface(NamedTuple):
     """
 
     triangle: AnyArray
-    first_side: IntArray
-    side: IntArray
-    first_corner: IntArray
-    corner: IntArray
+    first_side: AnyArray
+    side: AnyArray
+    first_corner: AnyArray
+    corner: AnyArray
 
 
 class Goals(NamedTuple):
@@ -57,9 +57,9 @@ class Goals(NamedTuple):
     """
 
     is_source: BoolArray
-    first_inside: IntArray
+    first_inside: AnyArray
     inside: AnyArray
-    escape: IntArray
+    escape: AnyArray
 
 
 def surface(F: IntArray, l: FloatArray, angle: FloatArray, edge: IntArray, n: int, n_edges: int) -> Surface:  # noqa: E741
@@ -69,7 +69,7 @@ def surface(F: IntArray, l: FloatArray, angle: FloatArray, edge: IntArray, n: in
     return Surface(triangle, *_grouped(edge.ravel(), n_edges), *_grouped(F.ravel(), n))
 
 
-def _grouped(group: IntArray, n: int) -> tuple[IntArray, IntArray]:
+def _grouped(group: IntArray, n: int) -> tuple[AnyArray, AnyArray]:
     """Members of n groups, group after group: the first of each (n + 1,), and all (k,)."""
     first = np.concatenate([[0], np.cumsum(np.bincount(group, minlength=n))])
     return first.astype(np.int32), np.argsort(group, kind="stable").astype(np.int32)

@@ -57,7 +57,7 @@ class Tables(NamedTuple):
         Whether a vertex, or its first fan, has no curvature; true on the boundary.
     """
 
-    first: IntArray
+    first: AnyArray
     spoke: AnyArray
     turn: AnyArray
     step: AnyArray
@@ -74,7 +74,7 @@ def breadth_first(
     l: FloatArray,  # noqa: E741
     twin: IntArray,
     n: int,
-) -> tuple[IntArray, IntArray, IntArray, FloatArray, IntArray]:
+) -> tuple[AnyArray, AnyArray, AnyArray, FloatArray, AnyArray]:
     """Vertices and faces numbered in the order in which a front over glued faces meets them.
 
     Returns the new number of each vertex (n,) and of each face (m,), and F, l and twin by the new numbers, all integers
@@ -87,7 +87,7 @@ def breadth_first(
     return number, face, new_F, new_l, new_twin
 
 
-def tables(F: IntArray, l: FloatArray, twin: IntArray, n: int) -> Tables:  # noqa: E741
+def tables(F: AnyArray, l: FloatArray, twin: AnyArray, n: int) -> Tables:  # noqa: E741
     """The tables of m oriented triangles on n vertices; `twin` is -1 on the boundary, -2 where more than two meet.
 
     Faces and half-edges as `breadth_first` returns them.
@@ -111,12 +111,12 @@ def aligned(n: int, record: np.dtype[np.void]) -> AnyArray:
 
 def __getattr__(name: str) -> Any:
     # For the kernels that are not yet compiled with the package.
+    if name not in ("Function", "inline", "jit"):
+        raise AttributeError(name)
     import numba
 
     if name == "jit":
         return lambda function: numba.njit(nogil=True, cache=True, error_model="numpy")(function)
     if name == "inline":
         return lambda function: numba.njit(nogil=True, inline="always", error_model="numpy")(function)
-    if name == "Function":
-        return TypeVar("Function", bound=Callable[..., Any])
-    raise AttributeError(name)
+    return TypeVar("Function", bound=Callable[..., Any])

@@ -32,7 +32,8 @@ def steepest(s: Surface, f: cython.int) -> Descent:
     found.rate[0] = (d1 - d0) * dot01 + (d2 - d0) * dot20
     found.rate[1] = (d0 - d1) * dot01 + (d2 - d1) * dot12
     found.rate[2] = (d0 - d2) * dot20 + (d1 - d2) * dot12
-    squared: cython.double = (d0 - d1) * (d0 - d1) * dot01 + (d1 - d2) * (d1 - d2) * dot12 + (d2 - d0) * (d2 - d0) * dot20
+    squared: cython.double = (d0 - d1) * (d0 - d1) * dot01 + (d1 - d2) * (d1 - d2) * dot12
+    squared += (d2 - d0) * (d2 - d0) * dot20
     found.slope = sqrt(max(squared, 0.0) / (4.0 * area)) if area > 0.0 else 0.0
     return found
 

@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.funnels import Bend, Corners, Gate, Layout, weighted
+from cython.cimports.heat_igl.kernels.funnels import Corners, weighted
 from cython.cimports.heat_igl.kernels.strips import Strip
 from cython.cimports.heat_igl.kernels.surfaces import Place, Surface, corner_of
 from cython.cimports.libc.math import hypot, sqrt
@@ -28,7 +28,9 @@ class Layout:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def lay_out(self, s: Surface, face: cython.int, start: cython.pointer[cython.const[Place]], strip: Strip) -> cython.int:
+    def lay_out(
+        self, s: Surface, face: cython.int, start: cython.pointer[cython.const[Place]], strip: Strip
+    ) -> cython.int:
         """Lay out the strip that begins in a face, for paths from `start` there."""
         if strip.count > self.gate.shape[0]:
             with cython.gil:

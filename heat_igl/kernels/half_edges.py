@@ -7,6 +7,7 @@ from cython.cimports.libc.math import NAN, atan2, sqrt
 
 __all__ = ["HalfEdges", "breadth_first", "fill", "first_spokes"]
 
+
 @cython.final
 @cython.cclass
 class HalfEdges:

@@ -60,9 +60,7 @@ def search(q: Query, v: cython.int) -> cython.void:
             if w.distance < INFINITY:
                 turned.right = turned.left = -1.0
                 if w.fan == step.fan:
-                    back: cython.double = atan2(
-                        wx * view.by - wy * view.bx, wx * (wx - view.bx) + wy * (wy - view.by)
-                    )
+                    back: cython.double = atan2(wx * view.by - wy * view.bx, wx * (wx - view.bx) + wy * (wy - view.by))
                     turned = savings(step.direction + back, w)
                 bend: cython.double = turned.left if turned.left >= turned.right else -turned.right
                 if max(turned.right, turned.left) < -STRAIGHT:

@@ -8,9 +8,9 @@ way is the other side.
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.funnels import Layout, weighted
-from cython.cimports.heat_igl.kernels.straightening import MOST_SLIDES, NEARLY_STRAIGHT, Course, Segment
+from cython.cimports.heat_igl.kernels.straightening import MOST_SLIDES, NEARLY_STRAIGHT
 from cython.cimports.heat_igl.kernels.strips import Detour, Sides, Strip
-from cython.cimports.heat_igl.kernels.surfaces import Place, Surface, at_corner, corner_of, moved
+from cython.cimports.heat_igl.kernels.surfaces import Place, at_corner, corner_of, moved
 from cython.cimports.libc.math import INFINITY, M_PI, atan2, fabs
 
 __all__ = ["Course"]
@@ -108,7 +108,7 @@ class Course:
     def _pull(
         self, end: cython.pointer[Place], ends_on: cython.pointer[cython.const[Place]], slides: cython.bint
     ) -> cython.int:
-        """Lay out the strip and find the shortest path to `end`, or, if it slides, to the nearest point of a segment."""
+        """Lay out the strip and find the shortest path to `end`, or, if that slides, to the nearest on a segment."""
         self.layout.lay_out(self.s, self.face, cython.address(self.start), self.strip)
         self.layout.pull_tight(weighted(end, self.layout.last.x), weighted(end, self.layout.last.y))
         c: cython.int
@@ -167,7 +167,7 @@ class Course:
     @cython.nogil
     @cython.exceptval(check=False)
     def _shorter_way(self, i: cython.int) -> cython.int:
-        """How many crossings ``detour.way`` has another way around the i-th bend that is shorter; -1 if there is none."""
+        """Find a shorter way around the i-th bend; returns its number of crossings in ``detour.way``, -1 if none."""
         bend = cython.address(self.layout.bend[i])
         first = cython.address(self.layout.gate[bend.first])
         last = cython.address(self.layout.gate[bend.last])

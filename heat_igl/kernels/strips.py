@@ -7,7 +7,7 @@ that are oriented alike.
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.strips import Around, Crossing, Detour, Sides, Strip, Tip
+from cython.cimports.heat_igl.kernels.strips import Sides
 from cython.cimports.heat_igl.kernels.surfaces import Surface, corner_of, other_side
 
 __all__ = ["Detour", "Strip"]
@@ -79,7 +79,7 @@ class Detour:
         after: Sides,
         limit: cython.double,
     ) -> cython.int:
-        """Crossings of the shortest way around v from the face of half-edge h to face `goal`, or one with vertex `other`.
+        """The shortest way around v from the face of half-edge h to face `goal`, or to one with vertex `other`.
 
         Its length is the sum of the angles at v: in the first face `before`, of h; in the last face `after`, of
         half-edge `end`; and those of the faces between. Returns how many crossings, in `way`; -1 if there is no way, or

@@ -286,7 +286,6 @@ class _Tracer:
         best: Nearest
         best.goal, best.face, best.distance = -1, f, INFINITY
         i: cython.int
-        c: cython.int
         if self.first_inside[f] == self.first_inside[f + 1]:
             return best
         for i in range(self.first_inside[f], self.first_inside[f + 1]):

@@ -17,8 +17,19 @@ from cython.cimports.libc.math import INFINITY, atan2, cos, sin, sqrt
 __all__ = ["unfold", "views"]
 
 
-def unfold(order: cython.const[cython.int][::1], q: Query, max_passes: cython.int):
-    """Pass over the vertices `order` (n,) until nothing is stale."""
+def unfold(
+    order: cython.const[cython.int][::1],
+    tables,
+    walk,
+    first_inside,
+    inside,
+    tolerance: cython.double,
+    shortfall: cython.double,
+    max_steps: cython.int,
+    max_passes: cython.int,
+):
+    """Pass over the vertices `order` (n,) until nothing is stale; see `heat_igl.unfolding.walks.unfold`."""
+    q = Query(tables, walk, first_inside, inside, tolerance, shortfall, max_steps)
     v: cython.int
     n: cython.int = q.t.first.shape[0] - 1
     is_stale: cython.uchar[::1] = np.empty(n, np.uint8)

@@ -2,16 +2,16 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.walks import REAL_BEND, View, Walk, take
-from cython.cimports.libc.math import sqrt
 from cython.cimports.heat_igl.kernels.half_edges import HalfEdges
+from cython.cimports.heat_igl.kernels.walks import REAL_BEND, View, take
+from cython.cimports.libc.math import sqrt
 
 __all__ = ["Query"]
 
 # Cones that may wait in a search.
 _MAX_CONES = 256
 _ADVICE = np.dtype([("saving", "f8"), ("promise", "f8"), ("side", "i4")], align=True)
-_VIEW = np.dtype([(name, "f8") for name in ("ax", "ay", "bx", "by", "rx", "ry", "lx", "ly")] + [("h", "i4"), ("spoke", "i4")])
+_VIEW = np.dtype([(name, "f8") for name in "ax ay bx by rx ry lx ly".split()] + [("h", "i4"), ("spoke", "i4")])
 _CONE = np.dtype([("view", _VIEW), ("forecast", "f8"), ("a", "i4"), ("b", "i4")])
 
 
@@ -26,10 +26,8 @@ class Query:
         The triangulation.
     walk : (n + p,) structures
         What is known of n vertices and p sources inside faces; changed in place.
-    first_inside : (m,) int32
-        First source inside each face, -1 if it has none; of length 0 if no face has.
-    inside : (e,) structures
-        Sources inside faces.
+    first_inside, inside
+        Those of `heat_igl.unfolding.walks.Points`; of length 0 if there are none.
     tolerance, shortfall, max_steps
         As `heat_igl.unfolding.walks.unfold` has them.
     """

@@ -196,7 +196,7 @@ class Refinement:
         )
         return self._on_base(walk["distance"], walk["label"], labels)
 
-    def _order(self, key: FloatArray) -> IntArray:
+    def _order(self, key: FloatArray) -> AnyArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
         on_sheets = np.tile(key, self._n_sheets) if self._n_sheets > 1 else np.ascontiguousarray(key)
         return np.asarray(self._number[ascending(on_sheets)])
@@ -261,7 +261,7 @@ class Refinement:
             np.concatenate([point, point[i]]),
         )
 
-    def _on_base(self, distance: FloatArray, label: IntArray | None, labels: IntArray | None) -> FloatArray:
+    def _on_base(self, distance: FloatArray, label: AnyArray | None, labels: IntArray | None) -> FloatArray:
         on_sheets = distance[self._number].reshape(self._n_sheets, -1)
         if self._n_sheets == 1:
             if labels is not None and label is not None:
@@ -276,7 +276,7 @@ class Refinement:
 class _Starts(NamedTuple):
     """Rows of the walks that are known and these, (k,) each, the nearest last; then by label where it begins."""
 
-    row: IntArray
+    row: AnyArray
     walk: AnyArray
     offset: FloatArray
     n_points: int = 0
@@ -284,7 +284,7 @@ class _Starts(NamedTuple):
 
 
 def _ascending(
-    row: IntArray, walk: AnyArray, offset: FloatArray, n_points: int = 0, points: Points | None = None
+    row: AnyArray, walk: AnyArray, offset: FloatArray, n_points: int = 0, points: Points | None = None
 ) -> _Starts:
     """Far ones first, so that of several for one vertex the nearest is written last."""
     order = np.argsort(-walk["distance"], kind="stable")

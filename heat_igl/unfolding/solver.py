@@ -35,8 +35,6 @@ class HeatOrder:
     ------
     ValueError
         If the domain has no triangles.
-    MissingExtraError
-        If numba is not installed.
     """
 
     def __init__(self, domain: Operators, refine: Refine) -> None:

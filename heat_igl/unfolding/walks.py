@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.intrinsic.fans import Tables, aligned
-from heat_igl.kernels import sweeping, unfolding, walks
+from heat_igl.kernels import sweeping, unfolding
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["INSIDE", "WALK", "Points", "sweep", "unfold", "unknown", "views"]
 
 # What is known of the path of a vertex: its `distance`; the distance of the last bend (or source), `offset`; how far
-# that is away in a straight line, `reach`; the direction in which it lies, `angle` in the `fan` of the vertex (-1: none,
-# at a source), whose angles sum to `total` (negative: open); the `label` of the source that the path ends at.
+# that is away in a straight line, `reach`; the direction in which it lies, `angle` in the `fan` of the vertex (-1:
+# none, at a source), whose angles sum to `total` (negative: open); the `label` of the source that the path ends at.
 WALK = np.dtype(
     [(name, "f8") for name in ("distance", "offset", "reach", "angle", "total")]
     + [("fan", "i4"), ("label", "i4"), ("spare", "f8", 2)]
@@ -35,7 +35,7 @@ class Points(NamedTuple):
         The entries.
     """
 
-    first: IntArray
+    first: AnyArray
     inside: AnyArray
 
 
@@ -47,7 +47,7 @@ def unknown(n: int) -> AnyArray:
 
 
 def sweep(
-    order: IntArray, t: Tables, d: FloatArray, label: IntArray | None, offset: FloatArray, is_stale: AnyArray
+    order: AnyArray, t: Tables, d: FloatArray, label: AnyArray | None, offset: FloatArray, is_stale: AnyArray
 ) -> float:
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex; returns the visits per vertex.
 
@@ -71,7 +71,7 @@ def sweep(
 
 
 def unfold(
-    order: IntArray,
+    order: AnyArray,
     t: Tables,
     walk: AnyArray,
     points: Points | None,
@@ -104,10 +104,10 @@ def unfold(
         Passes over vertices that a later one may have improved.
     """
     first, inside = (np.empty(0, np.int32), np.empty(0, INSIDE)) if points is None else points
-    unfolding.unfold(order, walks.Query(t, walk, first, inside, tolerance, shortfall, max_steps), max_passes)
+    unfolding.unfold(order, t, walk, first, inside, tolerance, shortfall, max_steps, max_passes)
 
 
-def views(faces: IntArray, barycentric: FloatArray, F: IntArray, t: Tables) -> tuple[IntArray, AnyArray]:
+def views(faces: IntArray, barycentric: FloatArray, F: AnyArray, t: Tables) -> tuple[AnyArray, AnyArray]:
     """How the corners (3 k,) of faces see points in them: their vertices, and their walks to a source of distance 0."""
     vertex, walk = np.empty(3 * len(faces), np.int32), np.zeros(3 * len(faces), WALK)
     unfolding.views(faces.astype(np.int64), np.ascontiguousarray(barycentric), F, t, vertex, walk)
