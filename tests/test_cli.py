@@ -87,7 +87,6 @@ def test_distance_from_positions_in_space(sphere: Path) -> None:
 
 
 def test_refined_distance_is_that_of_the_library(sphere: Path) -> None:
-    pytest.importorskip("numba")
     done = command("distance", sphere, "--source", 12, "--refine", "unfold", "--output", "out.ply", cwd=sphere.parent)
     assert done.returncode == 0, done.stderr
     written = io.read_attributes(sphere.parent / "out.ply")["distance"]

@@ -40,8 +40,6 @@ def unfolded_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, tolerance
         If the mesh cannot be used, or is tetrahedral.
     SourceError
         If `sources` does not name vertices.
-    MissingExtraError
-        If numba is not installed.
     """
     mesh = Mesh(V, F)
     if mesh.is_tetrahedral:

@@ -36,8 +36,6 @@ class UnfoldingSolver:
     ------
     ValueError
         If the domain has no triangles.
-    MissingExtraError
-        If numba is not installed.
     """
 
     def __init__(self, domain: Operators, refine: Refine) -> None:
