@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from heat_igl import sampling, shapes
+from heat_igl import sampling
 from heat_igl.curves import enclosed_areas, isolines, offset_curves, shortest_paths, sublevel_areas
 from heat_igl.errors import (
     AccuracyWarning,
@@ -19,6 +19,7 @@ from heat_igl.heat_method import (
     HeatMethodSolver,
     HeatSolution,
     LabelledDistance,
+    geodesic_distance,
     heat_method_distance,
 )
 from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_curves, write_mesh
@@ -30,6 +31,7 @@ from heat_igl.mesh import (
     PolygonMesh,
     SurfaceCurve,
     SurfacePoints,
+    as_mesh,
     closest_points,
     curve_on,
     edge_curve,
@@ -54,7 +56,8 @@ from heat_igl.unfolding import Refinement, unfolded_distance
 if TYPE_CHECKING:
     from heat_igl import baselines, cluster, reference
     from heat_igl.drawing import plots
-    from heat_igl.validation import ValidationReport, ValidationRow, closed_forms, metrics, validate
+    from heat_igl.validation import ValidationReport, ValidationRow, closed_forms, metrics, shapes, validate
+    from heat_igl.validation.samples import sample_mesh
 
 __all__ = [
     "AccuracyWarning",
@@ -81,6 +84,7 @@ __all__ = [
     "ValidationReport",
     "ValidationRow",
     "VoronoiCells",
+    "as_mesh",
     "baselines",
     "closed_forms",
     "closest_points",
@@ -94,6 +98,7 @@ __all__ = [
     "farthest_cells",
     "farthest_points",
     "geodesic_centre",
+    "geodesic_distance",
     "heat_method_distance",
     "image_domain",
     "isolines",
@@ -105,6 +110,7 @@ __all__ = [
     "read_mesh",
     "read_polygon_mesh",
     "reference",
+    "sample_mesh",
     "sampling",
     "shapes",
     "shortest_paths",
@@ -130,12 +136,15 @@ _LAZY = {
     "metrics": "validation.metrics",
     "plots": "drawing.plots",
     "reference": "reference",
+    "sample_mesh": "validation.samples",
+    "shapes": "validation.shapes",
     "validate": "validation",
 }
 
 # Modules that users import by these names: earlier name -> the module in its room.
 _EARLIER_NAMES = {
     "closed_forms": "validation.closed_forms",
+    "demo": "cli.demo",
     "factorization": "linear",
     "metrics": "validation.metrics",
     "paths": "curves.paths",
@@ -143,6 +152,7 @@ _EARLIER_NAMES = {
     "polygons": "mesh.polygons",
     "projection": "mesh.projection",
     "refine": "unfolding",
+    "shapes": "validation.shapes",
     "solution": "heat_method.solution",
     "speed": "operators.speed",
     "subdivision": "mesh.subdivision",

@@ -42,8 +42,12 @@ class MissingExtraError(ImportError):
 
     @classmethod
     def of(cls, purpose: str, package: str, extra: str) -> MissingExtraError:
-        """The error that says: `purpose` needs `package`, which the extra `extra` installs."""
-        return cls(f'{purpose} needs {package}: pip install "heat-igl[{extra}]"')
+        """The error that says: `purpose` needs `package`, which the extra `extra` installs too.
+
+        Several packages are joined by "and".
+        """
+        names = package.replace(" and ", " ")
+        return cls(f"{purpose} needs {package}: pip install {names} (or install heat-igl with its extra '{extra}')")
 
     @classmethod
     @contextmanager

@@ -13,6 +13,7 @@ import pytest
 
 import heat_igl
 from heat_igl import cli, demo, drawing, io, reference, shapes
+from heat_igl.cli import distances
 
 ENVIRONMENT = {
     **os.environ,
@@ -63,7 +64,7 @@ def test_distance_writes_what_the_library_returns_and_a_picture(sphere: Path) ->
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     written = io.read_attributes(sphere.parent / "out.ply")["distance"]
-    np.testing.assert_array_equal(written, heat_igl.HeatMethodSolver(shapes.icosphere(2)).distance([12, 40]))
+    np.testing.assert_array_equal(written, heat_igl.geodesic_distance(shapes.icosphere(2), [12, 40]))
     assert written[[12, 40]].tolist() == [0, 0]
     assert (sphere.parent / "out.png").read_bytes().startswith(b"\x89PNG")
     assert f"{written.max():.6g} at vertex {written.argmax()}" in done.stdout
@@ -76,7 +77,7 @@ def test_distance_from_positions_in_space(sphere: Path) -> None:
     assert done.returncode == 0, done.stderr
     mesh = shapes.icosphere(2)
     points, gap = heat_igl.closest_points(mesh, [0.3, -2, 0.1])
-    expected = heat_igl.HeatMethodSolver(mesh).distance([12, points], cutoff=0.5)
+    expected = heat_igl.geodesic_distance(mesh, [12, points], cutoff=0.5)
     np.testing.assert_array_equal(io.read_attributes(sphere.parent / "out.ply")["distance"], expected)
     assert np.isinf(expected).any()
     assert f"{gap[0]:.6g}" in done.stdout
@@ -159,17 +160,17 @@ def test_without_typer_one_line_names_the_extra(tmp_path: Path) -> None:
         [sys.executable, "-c", code], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
     )
     assert done.returncode == 1
-    assert_one_line(done.stderr, 'pip install "heat-igl[cli]"')
+    assert_one_line(done.stderr, "pip install typer rich")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
 def test_interrupt(tmp_path: Path) -> None:
     code = (
         # A process started in the background inherits that interrupts are ignored; a user's is not.
-        "import signal, sys, time; from heat_igl import cli\n"
+        "import signal, sys, time; from heat_igl import cli; from heat_igl.cli import comparison\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def read_mesh(path):\n    print('ready', flush=True)\n    time.sleep(60)\n"
-        "cli.read_mesh = read_mesh; sys.exit(cli.run(['info', 'a.off']))"
+        "comparison.read_mesh = read_mesh; sys.exit(cli.run(['info', 'a.off']))"
     )
     with subprocess.Popen(
         [sys.executable, "-c", code], cwd=tmp_path, env=ENVIRONMENT, stdout=-1, stderr=-1, text=True
@@ -222,6 +223,17 @@ def test_unreachable_vertices_are_counted(two_spheres: Path, capsys: pytest.Capt
     )
 
 
+@pytest.mark.parametrize("method", ["unfold", "sweep", "heat"])
+def test_the_method_is_that_of_the_front_door(
+    sphere: Path, capsys: pytest.CaptureFixture[str], method: heat_igl.heat_method.DistanceMethod
+) -> None:
+    output = sphere.with_name("out.ply")
+    assert cli.run(["distance", str(sphere), "--source=3", f"--output={output}", f"--method={method}"]) == 0
+    expected = heat_igl.geodesic_distance(sphere, 3, method=method)
+    np.testing.assert_array_equal(io.read_attributes(output)["distance"], expected)
+    assert ["method", method] in [line.split() for line in capsys.readouterr().out.splitlines()]
+
+
 def test_options_reach_the_solver(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = sphere.with_name("out.ply")
     options = {"t_coef": 7.0, "laplacian": "cotan", "boundary": "dirichlet", "magnitude": "damped", "backend": "scipy"}
@@ -247,6 +259,8 @@ def test_a_warning_of_the_package_is_one_line(sphere: Path, capsys: pytest.Captu
         (["--laplacian=graph"], 2, ("graph", "intrinsic-delaunay, cotan")),
         (["--boundary=hot"], 2, ("hot", "neumann, dirichlet, average")),
         (["--magnitude=long"], 2, ("long", "auto, unit, damped")),
+        (["--method=guess"], 2, ("--method", "'guess' is not one of unfold, sweep, heat, exact")),
+        (["--method=unfold", "--t-coef=2"], 1, ("--t-coef is an option of the heat method", "--method is unfold")),
         (["--backend=abacus"], 2, ("abacus", "auto, scipy, multifrontal")),
         (["--output=out.obj"], 1, ("out.obj", ".ply or .vtu")),
         (["--picture=out.gif"], 1, ("out.gif", ".png, .pdf, .svg")),
@@ -264,7 +278,8 @@ def test_a_bad_option_stops_before_anything_is_solved(
 ) -> None:
     monkeypatch.chdir(sphere.parent)
     Path("folder.png").mkdir()
-    monkeypatch.setattr(cli, "HeatMethodSolver", lambda *_, **__: pytest.fail("solved before it checked"))
+    for name in ("HeatMethodSolver", "geodesic_distance"):
+        monkeypatch.setattr(distances, name, lambda *_, **__: pytest.fail("solved before it checked"))
     assert cli.run(["distance", str(sphere), "--source", "0", *arguments]) == status
     assert_one_line(capsys.readouterr().err, *words)
     assert files(sphere.parent) == {"sphere.off", "folder.png"}

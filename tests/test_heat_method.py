@@ -272,9 +272,9 @@ def test_tetrahedra():
 
 
 def test_mesh_and_faces_are_not_mixed(sphere):
-    with pytest.raises(TypeError, match="pass a Mesh alone"):
+    with pytest.raises(MeshError, match="pass a mesh alone"):
         HeatMethodSolver(sphere, sphere.F)
-    with pytest.raises(TypeError, match="faces F are missing"):
+    with pytest.raises(MeshError, match="faces F are missing"):
         HeatMethodSolver(sphere.V)
     with pytest.raises(MeshError, match="F is empty"):
         HeatMethodSolver(sphere.V, [])

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from heat_igl import Mesh, MeshError, PolygonMesh, shapes, write_mesh
-from heat_igl.io import as_mesh
+from heat_igl import Mesh, MeshError, PolygonMesh, as_mesh, shapes, write_mesh
 
 SPHERE = shapes.icosphere(1)
 SQUARES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 0, 0], [2, 1, 0.0]])

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from conftest import perturbed
 
-from heat_igl import HeatMethodSolver, cli, shapes
+from heat_igl import HeatMethodSolver, shapes
+from heat_igl.cli import distances
 from heat_igl.heat_method import SolverOptions
 from heat_igl.operators import operators
 
@@ -22,7 +23,7 @@ FIELDS = {field.name: field.default for field in dataclasses.fields(SolverOption
         (HeatMethodSolver, {"mesh", "F"}),
         (HeatMethodSolver.from_operators, {"domain"}),
         (HeatMethodSolver.from_edge_lengths, {"F", "lengths", "n"}),
-        (cli.distance, {"mesh", "source", "at", "cutoff", "output", "picture"}),
+        (distances.distance, {"mesh", "source", "at", "method", "cutoff", "output", "picture"}),
     ],
 )
 def test_options_have_the_same_names_and_defaults_everywhere(make, others):

@@ -11,7 +11,8 @@ from conftest import shared_path
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.mesh import PolygonMesh, triangle_fans
+from heat_igl.mesh import PolygonMesh
+from heat_igl.mesh.triangulation import triangle_fans
 from heat_igl.operators import polygon_operators
 from heat_igl.validation import relative_error
 

@@ -17,11 +17,12 @@ import heat_igl
 EXPORTED = """
 AccuracyWarning BatchError ClosestPoints Diagnostics FactorizationError HeatMethodSolver HeatSolution ImageDomain
 LabelledDistance Mesh MeshError MeshReport MissingExtraError OffsetSources Operators PolygonMesh ReferenceSolverError
-Refinement SourceError SurfaceCurve SurfacePoints ValidationReport ValidationRow VoronoiCells baselines closed_forms
-closest_points cluster curve_on diameter distance_matrix dual_triangulation edge_curve enclosed_areas farthest_cells
-farthest_points geodesic_centre heat_method_distance image_domain isolines metrics offset_curves plots polygon_operators
-read_attributes read_mesh read_polygon_mesh reference sampling shapes shortest_paths speed_operators split_long_edges
-sublevel_areas unfolded_distance validate voronoi_cells write_curves write_mesh
+Refinement SourceError SurfaceCurve SurfacePoints ValidationReport ValidationRow VoronoiCells as_mesh baselines
+closed_forms closest_points cluster curve_on diameter distance_matrix dual_triangulation edge_curve enclosed_areas
+farthest_cells farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain isolines metrics
+offset_curves plots polygon_operators read_attributes read_mesh read_polygon_mesh reference sample_mesh sampling shapes
+shortest_paths speed_operators split_long_edges sublevel_areas unfolded_distance validate voronoi_cells write_curves
+write_mesh
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they
@@ -40,13 +41,16 @@ read_polygon_mesh(path)
 write_mesh(path, mesh)
 write_curves(path, mesh, curves, *, projection=None)
 heat_method_distance(V, F, sources)
-unfolded_distance(V, F, sources, *, tolerance=4e-05)
+unfolded_distance(V, F=None, sources=None, *, tolerance=4e-05)
+geodesic_distance(mesh, sources, *, method='unfold', cutoff=None)
+as_mesh(mesh, F=None)
+sample_mesh()
 HeatMethodSolver(mesh, F=None, *, t_coef=None, t=None, laplacian='intrinsic-delaunay', boundary='neumann',\
  magnitude='auto', refine=None, backend='auto')
 HeatMethodSolver.from_operators(domain, *, t_coef=None, t=None, boundary='neumann', magnitude='auto', refine=None,\
  backend='auto')
 HeatMethodSolver.with_vertices(self, V)
-HeatMethodSolver.distance(self, sources, *, cutoff=None)
+HeatMethodSolver.distance(self, sources, cutoff=None)
 HeatMethodSolver.distances(self, source_sets, out=None, progress=False, dtype=None, *, cutoff=None)
 HeatMethodSolver.voronoi(self, sources, *, cutoff=None)
 HeatMethodSolver.solve(self, sources)

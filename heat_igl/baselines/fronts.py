@@ -12,19 +12,19 @@ import numpy as np
 
 from heat_igl.baselines.grids import grid_domain, grid_sources, grid_spacing
 from heat_igl.errors import MeshError, MissingExtraError
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["fast_marching", "fast_marching_grid", "fast_sweeping"]
 
 
-def fast_marching(mesh: Mesh, sources: Sources) -> FloatArray:
+def fast_marching(mesh: MeshLike, sources: Sources) -> FloatArray:
     """Fast marching on a triangle mesh (Kimmel and Sethian 1998), by potpourri3d.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         A manifold triangle mesh, with or without boundary.
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices.
@@ -43,6 +43,7 @@ def fast_marching(mesh: Mesh, sources: Sources) -> FloatArray:
     MissingExtraError
         If potpourri3d is not installed.
     """
+    mesh = as_simplices(mesh)
     chosen = vertex_sources(sources, mesh.n_vertices)
     if mesh.is_tetrahedral:
         raise MeshError("fast marching works on triangles, and the mesh holds tetrahedra")

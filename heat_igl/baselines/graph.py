@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from heat_igl.mesh import Mesh, connectivity
+from heat_igl.mesh import MeshLike, as_simplices, connectivity
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray
 
@@ -17,12 +17,12 @@ __all__ = ["graph_distance", "graph_limit"]
 _ROUNDING = 1e-12
 
 
-def graph_distance(mesh: Mesh, sources: Sources, *, count_edges: bool = False) -> FloatArray:
+def graph_distance(mesh: MeshLike, sources: Sources, *, count_edges: bool = False) -> FloatArray:
     """Length of the shortest path along edges by Dijkstra's algorithm, an upper bound of geodesic distance.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles or tetrahedra.
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices.
@@ -39,6 +39,7 @@ def graph_distance(mesh: Mesh, sources: Sources, *, count_edges: bool = False) -
     SourceError
         If the sources are not vertices of the mesh.
     """
+    mesh = as_simplices(mesh)
     chosen = vertex_sources(sources, mesh.n_vertices)
     return connectivity.edge_distance(mesh.edge_graph, chosen, count_edges=count_edges)
 

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method import smallest_time_step
 from heat_igl.linear import factorize
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.operators import Operators, operators
 from heat_igl.runtime import LOWEST_HEAT as _LOWEST_HEAT
 from heat_igl.runtime import RANGE_LIMIT
@@ -249,9 +249,9 @@ def _poisson_mean(P: sp.csr_matrix, u: FloatArray, expected: float, reached: Boo
     return total
 
 
-def domain_of(mesh: Mesh | Operators) -> Operators:
+def domain_of(mesh: MeshLike | Operators) -> Operators:
     """The operators of a mesh on the intrinsic Delaunay triangulation; given operators are returned unchanged."""
-    return operators(mesh) if isinstance(mesh, Mesh) else mesh
+    return mesh if isinstance(mesh, Operators) else operators(as_simplices(mesh))
 
 
 def time_step(t: float | None, default: float, smallest: float, name: str = "t") -> float:

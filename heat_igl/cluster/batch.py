@@ -10,7 +10,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from heat_igl.cluster.collection import MeshLike, SourcePlan, items
+from heat_igl.cluster.collection import SourcePlan, items
 from heat_igl.cluster.connection import connected, dask_modules
 from heat_igl.cluster.progress import Watch, watched
 from heat_igl.cluster.report import BatchReport, rows
@@ -18,6 +18,7 @@ from heat_igl.cluster.store import Store
 from heat_igl.cluster.worker import Outcome, Task, begin, release, resume
 from heat_igl.errors import BatchError
 from heat_igl.heat_method import SolverOptions
+from heat_igl.mesh import MeshLike
 from heat_igl.sources import Sources
 from heat_igl.unfolding import Refine
 

@@ -11,17 +11,15 @@ from urllib.parse import quote
 
 import numpy as np
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import MeshError, SourceError
 from heat_igl.io import MESH_SUFFIXES
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.sources import Sources, vertex_sources
 
 # Names that a zarr group cannot have: they stand for the store itself, the folder above it, or its metadata.
 _RESERVED_NAMES = ("", ".", "..", "zarr.json")
 
-__all__ = ["Item", "MeshLike", "SourcePlan", "folder", "items", "read_source_sets"]
-
-MeshLike = str | os.PathLike[str] | Mesh | tuple[Any, Any]
+__all__ = ["Item", "SourcePlan", "folder", "items", "read_source_sets"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +76,19 @@ def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike]) -> Iterator[Item]
         seen.add(name)
         label = os.fspath(mesh) if isinstance(mesh, str | os.PathLike) else name
         # A name may hold the separator of zarr's groups.
-        yield Item(quote(name, safe=" ()[]"), label, Path(mesh) if isinstance(mesh, str | os.PathLike) else mesh)
+        yield Item(quote(name, safe=" ()[]"), label, _held(mesh, label))
+
+
+def _held(mesh: MeshLike, label: str) -> Path | Mesh | tuple[Any, Any]:
+    """What a task carries: a path, a mesh, or arrays, which are checked where they are used."""
+    if isinstance(mesh, str | os.PathLike):
+        return Path(mesh)
+    if isinstance(mesh, Mesh) or (isinstance(mesh, tuple) and len(mesh) == 2):
+        return mesh
+    try:
+        return as_simplices(mesh)
+    except MeshError as error:
+        raise MeshError(f"{label}: {error}") from None
 
 
 @dataclass(frozen=True)

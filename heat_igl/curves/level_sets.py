@@ -15,19 +15,19 @@ import scipy.sparse.csgraph as csgraph
 
 from heat_igl.errors import MeshError
 from heat_igl.heat_method import HeatMethodSolver
-from heat_igl.mesh import Mesh, SurfaceCurve
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["enclosed_areas", "isolines", "offset_curves", "sublevel_areas"]
 
 
-def isolines(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> list[list[SurfaceCurve]]:
+def isolines(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> list[list[SurfaceCurve]]:
     """The curves of constant value, for values linear in each triangle.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles.
     values : (n,) array_like
         A value per vertex, for instance a distance. Faces with an infinite value are ignored.
@@ -54,16 +54,17 @@ def isolines(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> list[list[Surf
     vertex at the level like any other point, and there is no curve around a minimum or maximum at the level.
     This is the convention of libigl's ``isolines``. The lengths of a curve are ``curve.lengths(mesh)``.
     """
+    mesh = as_simplices(mesh)
     checked, wanted = _checked(mesh, values, levels)
     return [_curves(mesh, checked, level) for level in wanted]
 
 
-def offset_curves(mesh: Mesh, solver: HeatMethodSolver, sources: Sources, radius: float) -> list[SurfaceCurve]:
+def offset_curves(mesh: MeshLike, solver: HeatMethodSolver, sources: Sources, radius: float) -> list[SurfaceCurve]:
     """The curves at distance `radius` from `sources` on the surface.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         The triangles that `solver` was made for.
     solver : HeatMethodSolver
         With ``refine="unfold"`` the only error left is that of linear interpolation in each triangle.
@@ -82,6 +83,7 @@ def offset_curves(mesh: Mesh, solver: HeatMethodSolver, sources: Sources, radius
     ValueError
         If `radius` is not a positive number, or the solver belongs to another mesh.
     """
+    mesh = as_simplices(mesh)
     if not (np.isfinite(radius) and radius > 0):
         raise ValueError(f"radius must be a positive number, not {radius!r}")
     if solver.n_vertices != mesh.n_vertices:
@@ -91,7 +93,7 @@ def offset_curves(mesh: Mesh, solver: HeatMethodSolver, sources: Sources, radius
     return isolines(mesh, solver.distance(sources), radius)[0]
 
 
-def sublevel_areas(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> FloatArray:
+def sublevel_areas(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> FloatArray:
     """Area of ``{values < level}`` for each level, for values linear in each triangle.
 
     Parameters
@@ -104,11 +106,12 @@ def sublevel_areas(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> FloatArr
     (k,) float64
         Squared units of the mesh; exact to rounding.
     """
+    mesh = as_simplices(mesh)
     checked, wanted = _checked(mesh, values, levels)
     return np.array([_areas_below(mesh, checked, level).sum() for level in wanted])
 
 
-def enclosed_areas(mesh: Mesh, values: ArrayLike, level: float) -> FloatArray:
+def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArray:
     """Area of the region below the level that each of its curves borders.
 
     Parameters
@@ -122,6 +125,7 @@ def enclosed_areas(mesh: Mesh, values: ArrayLike, level: float) -> FloatArray:
         For each curve of ``isolines(mesh, values, level)[0]``, the area of the connected part of ``{values < level}``
         on the left of the curve. Curves that bound the same part, such as the two of an annulus, have the same value.
     """
+    mesh = as_simplices(mesh)
     checked, wanted = _checked(mesh, values, level)
     if len(wanted) != 1:
         raise ValueError(f"level must be one number, not {len(wanted)}")

@@ -9,10 +9,10 @@ import scipy.sparse.csgraph as csgraph
 
 from heat_igl.curves import tracing
 from heat_igl.errors import MeshError, SourceError
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
 from heat_igl.intrinsic import corner_angles
-from heat_igl.mesh import ON_SIDE, Mesh, SurfaceCurve, SurfacePoints
-from heat_igl.sources import Sources, source_set, vertex_sources
+from heat_igl.mesh import ON_SIDE, Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
+from heat_igl.sources import Sources, named_vertices, source_set
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["shortest_paths"]
@@ -25,8 +25,8 @@ _SAME_DISTANCE = 1e-9
 
 
 def shortest_paths(
-    mesh: Mesh,
-    distance: ArrayLike | HeatMethodSolver,
+    mesh: MeshLike,
+    distance: ArrayLike | HeatMethodSolver | None,
     targets: Sources,
     sources: Sources | None = None,
 ) -> list[SurfaceCurve]:
@@ -34,12 +34,12 @@ def shortest_paths(
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles.
-    distance : (n,) array_like or HeatMethodSolver
-        Distance from the sources, or a solver to compute it. It decides which way around the surface a path takes: the
-        more accurate the distance (``refine="unfold"``), the more often this is the shortest way. A second path is
-        traced if the first is longer than the distance by a thousandth.
+    distance : (n,) array_like, HeatMethodSolver or None
+        Distance from the sources, or a solver to compute it; None for `geodesic_distance`. It decides which way around
+        the surface a path takes: the more accurate the distance (``refine="unfold"``), the more often this is the
+        shortest way. A second path is traced if the first is longer than the distance by a thousandth.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints
         Start of each path: vertices, in the order given and with repetitions, or points on faces.
     sources : optional
@@ -77,6 +77,7 @@ def shortest_paths(
     the source as the distances at the ends of an edge place it in the plane of the face, whichever agrees best with the
     distance left. The shorter of the two paths is returned.
     """
+    mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")
     values = _values(mesh, distance, sources)
@@ -96,11 +97,15 @@ def shortest_paths(
     return [SurfaceCurve(faces[part], points[part, 0], points[part, 1]) for part in parts]
 
 
-def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver, sources: Sources | None) -> FloatArray:
+def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver | None, sources: Sources | None) -> FloatArray:
     if isinstance(distance, HeatMethodSolver):
         if sources is None:
             raise SourceError("a solver needs sources: name them, or pass a distance in its place")
         distance = distance.distance(sources)
+    elif distance is None:
+        if sources is None:
+            raise SourceError("sources are missing: name them, or pass a distance that is 0 at them")
+        distance = geodesic_distance(mesh, sources)
     array: AnyArray = np.asarray(distance)
     if array.dtype.kind not in "iuf" or array.shape != (mesh.n_vertices,):
         raise ValueError(
@@ -119,11 +124,12 @@ def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver, sources: Sources
 def _points(name: str, mesh: Mesh, points: Sources) -> tuple[IntArray, FloatArray]:
     """Faces and barycentric coordinates of points, or of vertices in the order given."""
     if isinstance(points, SurfacePoints):
-        points.positions(mesh)  # which checks the faces
+        try:
+            points.positions(mesh)  # which checks the faces
+        except SourceError as error:
+            raise SourceError(f"{name}: {error}") from None
         return points.faces, _snapped(points.barycentric)
-    vertex_sources(points, mesh.n_vertices)  # which checks the vertices
-    vertex: AnyArray = np.atleast_1d(np.asarray(points))
-    vertex = np.flatnonzero(vertex) if vertex.dtype.kind == "b" else vertex.astype(np.int64)
+    vertex = named_vertices(points, mesh.n_vertices, name)
     corner_at = np.full(mesh.n_vertices, -1)
     corner_at[mesh.F.ravel()] = np.arange(mesh.F.size)
     corner = corner_at[vertex]

@@ -11,7 +11,7 @@ import numpy as np
 from heat_igl import reference
 from heat_igl.errors import FactorizationError, MissingExtraError, ReferenceSolverError
 from heat_igl.heat_method import HeatMethodSolver, SolverOptions
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray, IntArray
 
@@ -55,10 +55,10 @@ class Exploration:
         As for `HeatMethodSolver`.
     """
 
-    def __init__(self, mesh: Mesh, sources: Sources = 0, options: SolverOptions | None = None) -> None:
-        self.mesh = mesh
+    def __init__(self, mesh: MeshLike, sources: Sources = 0, options: SolverOptions | None = None) -> None:
+        self.mesh = as_simplices(mesh)
         self.options = options or SolverOptions()
-        self.sources: IntArray = vertex_sources(sources, mesh.n_vertices)
+        self.sources: IntArray = vertex_sources(sources, self.mesh.n_vertices)
         self.error: FloatArray | None = None
         self._solvers: dict[SolverOptions, HeatMethodSolver] = {}
         self._solve(self.sources, self.options)

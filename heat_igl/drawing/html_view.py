@@ -23,7 +23,7 @@ from heat_igl.drawing.output import PAGE_SUFFIXES
 from heat_igl.drawing.scene import DISTANCE_LABEL, LINE_INK, STRIPE_INK, Style, check_style, colours, scene
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.io import complete_file
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike
 
@@ -68,7 +68,7 @@ class Page:
 
 
 def page(
-    mesh: Mesh,
+    mesh: MeshLike,
     distance: ArrayLike,
     *,
     sources: Sources | None = None,
@@ -109,6 +109,7 @@ def page(
     ValueError, SourceError, MissingExtraError
         As for `heat_igl.drawing.plot`.
     """
+    mesh = as_simplices(mesh)
     check_style(style)
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
     table = colours(colormap)(np.linspace(0, 1, 256))

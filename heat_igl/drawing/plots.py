@@ -17,7 +17,7 @@ from heat_igl.drawing.figure import lay_out
 from heat_igl.drawing.html_view import Page, page
 from heat_igl.drawing.output import Picture
 from heat_igl.drawing.scene import DISTANCE_LABEL, Scene, Style, check_style, colours, scene
-from heat_igl.mesh import Mesh, SurfaceCurve
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import ArrayLike, FloatArray
 
@@ -25,7 +25,7 @@ __all__ = ["Page", "Picture", "page", "picture", "plot", "plot_field", "write_ht
 
 
 def plot(
-    mesh: Mesh,
+    mesh: MeshLike,
     distance: ArrayLike,
     *,
     sources: Sources | None = None,
@@ -41,7 +41,7 @@ def plot(
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles or tetrahedra; the boundary of tetrahedra is drawn.
     distance : (n,) array_like
         Distance, as returned by a solver; ``inf`` is drawn grey.
@@ -79,13 +79,14 @@ def plot(
     MissingExtraError
         If matplotlib is not installed.
     """
+    mesh = as_simplices(mesh)
     check_style(style)
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
     return lay_out(seen, _lines_in_space(mesh, curves, seen), style, colours(colormap), label, "unreachable")
 
 
 def plot_field(
-    mesh: Mesh,
+    mesh: MeshLike,
     values: ArrayLike,
     *,
     label: str,
@@ -126,6 +127,7 @@ def plot_field(
     ValueError, SourceError, MissingExtraError
         As for `plot`.
     """
+    mesh = as_simplices(mesh)
     if limits is None:
         limits = _limits(values)
     has_signs = limits is not None and limits[0] < 0 < limits[1]

@@ -1,5 +1,6 @@
 """`HeatMethodSolver`: the steps put together, factored once, asked many times."""
 
+from heat_igl.heat_method.front_door import DistanceMethod, geodesic_distance
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.heat_method.solver import HeatMethodSolver, heat_method_distance
@@ -7,11 +8,13 @@ from heat_igl.heat_method.time_step import smallest_time_step
 
 __all__ = [
     "Diagnostics",
+    "DistanceMethod",
     "HeatMethodSolver",
     "HeatSolution",
     "LabelledDistance",
     "Magnitude",
     "SolverOptions",
+    "geodesic_distance",
     "heat_method_distance",
     "smallest_time_step",
 ]

@@ -171,8 +171,14 @@ class BatchedSolver(ABC):
 
 
 def checked_cutoff(value: float | None) -> float | None:
-    """The cutoff as a float; None for none."""
-    return None if value is None else positive("cutoff", value)
+    """The cutoff as a float; None for none, which infinity is too.
+
+    Raises
+    ------
+    ValueError
+        If it is not a positive number.
+    """
+    return None if value is None or value == np.inf else positive("cutoff", value)
 
 
 def cut_off(distances: FloatArray, cutoff: float | None) -> FloatArray:

@@ -63,10 +63,9 @@ class SolverOptions:
 
 def positive(name: str, value: float) -> float:
     """`value` as a float; a ValueError that calls it `name` if it is not a positive number."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = np.nan
+    # Text that looks like a number is a mistake upstream, and so is a truth value.
+    is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    number = float(value) if is_number else np.nan
     if not (np.isfinite(number) and number > 0):
         raise ValueError(f"{name} must be a positive number, not {value!r}")
     return number

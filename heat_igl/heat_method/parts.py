@@ -13,17 +13,17 @@ import scipy.sparse as sp
 from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.solution import Diagnostics
-from heat_igl.heat_method.time_step import time_step
+from heat_igl.heat_method.time_step import time_step, warn_of_large_step
 from heat_igl.linear import Analysis
-from heat_igl.mesh import Mesh
-from heat_igl.operators import Operators, operators
+from heat_igl.mesh import Mesh, PolygonMesh
+from heat_igl.operators import Operators, operators, polygon_operators
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
 from heat_igl.typing import IntArray
 from heat_igl.unfolding import UnfoldingSolver
 
-__all__ = ["SolverParts", "prepare", "prepare_mesh"]
+__all__ = ["SolverParts", "prepare", "prepare_mesh", "prepare_polygons"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +85,18 @@ def prepare_mesh(mesh: Mesh, options: SolverOptions, known: Analysis | None = No
     return prepare(domain, options, known, seconds, waited)
 
 
+def prepare_polygons(mesh: PolygonMesh, options: SolverOptions) -> SolverParts:
+    """The parts of a solver on polygons; there is one Laplacian on them, so an option for it is refused."""
+    if options.laplacian != "intrinsic-delaunay":
+        raise ValueError(
+            f"laplacian={options.laplacian!r} chooses a triangulation, but the mesh holds polygons: leave it away, "
+            "or pass mesh.triangles"
+        )
+    start = time.perf_counter()
+    domain = polygon_operators(mesh)
+    return prepare(domain, options, seconds_operators=time.perf_counter() - start)
+
+
 def prepare(
     domain: Operators,
     options: SolverOptions,
@@ -109,6 +121,7 @@ def prepare(
     damped = options.damps(domain)
     fitted = damped and domain.lengths is not None
     step, requested = time_step(options, domain, fitted)
+    warn_of_large_step(options, domain)
     t_damping = step if damped else None
     found = analysis(domain.L, options.backend, known)
     analysed = time.perf_counter()

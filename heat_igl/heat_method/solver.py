@@ -10,11 +10,11 @@ import numpy as np
 from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
 from heat_igl.heat_method.integration import damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
-from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh
+from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators
 from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
 from heat_igl.steps import Boundary
@@ -29,8 +29,9 @@ class HeatMethodSolver(BatchedSolver):
 
     Parameters
     ----------
-    mesh : Mesh or (n, 3) array_like
-        A mesh, or the positions V of one whose faces are `F`.
+    mesh : mesh or (n, 3) array_like
+        Whatever `as_mesh` takes, or the positions V of a mesh whose faces are `F`. Polygons are solved on with
+        `polygon_operators`, and with `refine` on their triangles.
     F : (m, 3) or (m, 4) array_like, optional
         Faces, when `mesh` is V.
     t_coef : float, optional
@@ -70,7 +71,7 @@ class HeatMethodSolver(BatchedSolver):
     Warns
     -----
     AccuracyWarning
-        If an explicit `t` had to be raised for the heat to cross the mesh.
+        If an explicit `t` had to be raised for the heat to cross the mesh, or is so large that heat is nearly level.
 
     Notes
     -----
@@ -83,7 +84,7 @@ class HeatMethodSolver(BatchedSolver):
 
     def __init__(
         self,
-        mesh: Mesh | ArrayLike,
+        mesh: MeshLike,
         F: ArrayLike | None = None,
         *,
         t_coef: float | None = None,
@@ -95,13 +96,14 @@ class HeatMethodSolver(BatchedSolver):
         backend: Backend = "auto",
     ) -> None:
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, refine, backend)
-        self._mesh = _as_mesh(mesh, F)
-        self._parts = prepare_mesh(self._mesh, options)
+        self._set_up(as_mesh(mesh, F), options)
 
     @classmethod
-    def from_options(cls, mesh: Mesh, options: SolverOptions) -> HeatMethodSolver:
+    def from_options(cls, mesh: MeshLike, options: SolverOptions) -> HeatMethodSolver:
         """A solver on `mesh` with options that were put together before."""
-        return cls._of(prepare_mesh(mesh, options), mesh)
+        solver = cls.__new__(cls)
+        solver._set_up(as_mesh(mesh), options)
+        return solver
 
     @classmethod
     def from_operators(
@@ -188,11 +190,25 @@ class HeatMethodSolver(BatchedSolver):
         moved = self._mesh.with_vertices(V)
         return HeatMethodSolver._of(prepare_mesh(moved, self._parts.options, self._parts.analysis), moved)
 
+    def _set_up(self, mesh: Mesh | PolygonMesh, options: SolverOptions) -> None:
+        if isinstance(mesh, Mesh):
+            self._mesh, self._parts = mesh, prepare_mesh(mesh, options)
+        elif options.refine is not None:
+            self._mesh, self._parts = mesh.triangles, prepare_mesh(mesh.triangles, options)
+        else:
+            self._mesh, self._parts = None, prepare_polygons(mesh, options)
+
     @classmethod
     def _of(cls, parts: SolverParts, mesh: Mesh | None = None) -> HeatMethodSolver:
         solver = cls.__new__(cls)
         solver._mesh, solver._parts = mesh, parts
         return solver
+
+    def __repr__(self) -> str:
+        options = self._parts.options
+        refined = "" if options.refine is None else f", refine={options.refine!r}"
+        backend = self.diagnostics.backend
+        return f"HeatMethodSolver({self.n_vertices} vertices, t={self.t:.4g}{refined}, backend={backend!r})"
 
     @property
     def operators(self) -> Operators:
@@ -218,7 +234,7 @@ class HeatMethodSolver(BatchedSolver):
     def _n_faces(self) -> int:
         return len(self.operators.weights)
 
-    def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
+    def distance(self, sources: Sources, cutoff: float | None = None) -> FloatArray:
         """Distance from the nearest source.
 
         Parameters
@@ -321,16 +337,6 @@ class HeatMethodSolver(BatchedSolver):
             t=self.t,
             diagnostics=self.diagnostics,
         )
-
-
-def _as_mesh(mesh: Mesh | ArrayLike, F: ArrayLike | None) -> Mesh:
-    if isinstance(mesh, Mesh):
-        if F is not None:
-            raise TypeError("pass a Mesh alone, or positions V and faces F")
-        return mesh
-    if F is None:
-        raise TypeError("faces F are missing: pass a Mesh, or positions V and faces F")
-    return Mesh(mesh, F)
 
 
 def heat_method_distance(V: ArrayLike, F: ArrayLike, sources: Sources, **options: Any) -> FloatArray:

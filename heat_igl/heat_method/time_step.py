@@ -9,7 +9,7 @@ from heat_igl.heat_method.options import SolverOptions
 from heat_igl.operators import Operators
 from heat_igl.runtime import LARGEST_EXPONENT, RANGE_LIMIT, warn_caller
 
-__all__ = ["smallest_time_step", "time_step"]
+__all__ = ["smallest_time_step", "time_step", "warn_of_large_step"]
 
 # Between two aims, see the tables of docs/heat_path.md: on scans the error falls further with t, on a regular grid of
 # squares, where heat prefers diagonals, it grows.
@@ -50,3 +50,22 @@ def smallest_time_step(domain: Operators, fitted: bool = False) -> float:
     h = domain.mean_edge_length
     per_edge = RANGE_LIMIT / (domain.longest_distance / h)
     return h**2 / (2 * (float(np.cosh(per_edge)) - 1)) if per_edge < LARGEST_EXPONENT else 0.0
+
+
+def warn_of_large_step(options: SolverOptions, domain: Operators) -> None:
+    """Warn where the step that was asked for is so large that heat is nearly level over the whole domain.
+
+    Heat falls like exp(-d / sqrt(t)). With sqrt(t) above the longest distance it falls by less than a factor of e
+    altogether, and distances follow the shape of the domain more than the way to the source.
+    """
+    step = options.t
+    if step is None and options.t_coef is not None:
+        step = options.t_coef * domain.mean_edge_length**2
+    if step is not None and np.sqrt(step) > domain.longest_distance:
+        name, value = ("t", options.t) if options.t is not None else ("t_coef", options.t_coef)
+        warn_caller(
+            f"{name} = {value:.4g} is very large: heat spreads over sqrt(t) = {np.sqrt(step):.4g}, more than the "
+            f"longest distance on the mesh, {domain.longest_distance:.4g}, and distances are smoothed by as much; "
+            "t_coef from 0.5 to 10 is usual, and t is a squared length",
+            AccuracyWarning,
+        )

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.mesh import triangle_fans, which_repeat_a_vertex
+from heat_igl.mesh import triangulated, which_repeat_a_vertex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["Cells", "Contents", "check", "integers", "select"]
@@ -42,13 +42,10 @@ class Contents(NamedTuple):
 
     @property
     def F(self) -> IntArray:
-        """Triangles (m, 3) or tetrahedra (m, 4); a polygon becomes the fan of triangles around its first corner.
-
-        The fan is correct for convex, roughly planar polygons. Other polygons should be triangulated before saving.
-        """
+        """Triangles (m, 3) or tetrahedra (m, 4); polygons are cut into triangles as by `triangulated`."""
         if self.cells.tetrahedra:
             return self.cells.corners.reshape(-1, 4)
-        return triangle_fans(self.cells.corners, self.cells.degree)
+        return triangulated(self.V, self.cells.corners, self.cells.degree, lambda i: f"face {i} (counted from 0)")
 
 
 def integers(values: FloatArray, where: Callable[[int], str], what: str = "index") -> IntArray:

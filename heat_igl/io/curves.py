@@ -11,7 +11,7 @@ import numpy as np
 from heat_igl.errors import MissingExtraError
 from heat_igl.io.atomic import replacing
 from heat_igl.io.text import format_rows
-from heat_igl.mesh import Mesh, SurfaceCurve
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["CURVE_SUFFIXES", "write_curves"]
@@ -21,12 +21,14 @@ _FLAT = 1e-9
 # Width of a line in an SVG file, as a fraction of the larger side of the drawing.
 _LINE = 1 / 500
 
-Curves = Sequence[SurfaceCurve] | Mapping[str, Sequence[SurfaceCurve]]
+# A curve, or curves in lists of any depth.
+NestedCurves = SurfaceCurve | Sequence["NestedCurves"]
+Curves = NestedCurves | Mapping[str, NestedCurves]
 _Lines = dict[str, list[tuple[FloatArray, bool]]]
 
 
 def write_curves(
-    path: str | os.PathLike[str], mesh: Mesh, curves: Curves, *, projection: ArrayLike | None = None
+    path: str | os.PathLike[str], mesh: MeshLike, curves: Curves, *, projection: ArrayLike | None = None
 ) -> None:
     """Write curves on a mesh to a file.
 
@@ -35,10 +37,11 @@ def write_curves(
     path : path-like
         The extension selects the format: .obj (a polyline ``l`` for each curve), .svg (a drawing in the plane) or .dxf
         (three-dimensional polylines). An existing file is replaced only when the new one is complete.
-    mesh : Mesh
+    mesh : mesh
         Triangles on which the curves lie.
-    curves : sequence of SurfaceCurve, or mapping of str to such
-        For instance isolines or paths. The keys of a mapping become groups (OBJ, SVG) or layers (DXF).
+    curves : SurfaceCurve, sequence of such of any depth, or mapping of str to such
+        For instance paths, or isolines as `isolines` returns them, a list for each level. The keys of a mapping become
+        groups (OBJ, SVG) or layers (DXF).
     projection : (2, 3) array_like, optional
         For .svg: the matrix that maps a position to x and y, with y upwards. By default the mesh must be flat and is
         drawn in the plane of the mesh with true lengths; if z is constant, x and y are used unchanged.
@@ -49,6 +52,8 @@ def write_curves(
         If the extension is unknown, the projection is invalid, or an .svg file needs one because the mesh is not flat.
     MeshError
         If the file cannot be written.
+    TypeError
+        If `curves` holds anything else.
     SourceError
         If a curve lies on faces outside the mesh.
     MissingExtraError
@@ -59,6 +64,7 @@ def write_curves(
     Coordinates are in the unit of the mesh and in double precision. SVG files contain -y, since y points downwards in
     SVG, and the width of a line is 1/500 of the drawing.
     """
+    mesh = as_simplices(mesh)
     target = Path(os.fspath(path))
     write = _FORMATS.get(target.suffix.lower())
     if write is None:
@@ -66,12 +72,27 @@ def write_curves(
     if projection is not None and write is not _write_svg:
         raise ValueError(f"{target}: projection is for .svg files; this format holds positions in space")
     groups = curves if isinstance(curves, Mapping) else {"": curves}
-    lines = {name: [(curve.positions(mesh), curve.is_closed) for curve in group] for name, group in groups.items()}
+    lines = {
+        name: [
+            (curve.positions(mesh), curve.is_closed)
+            for curve in _flat(group, f"curves[{name!r}]" if name else "curves")
+        ]
+        for name, group in groups.items()
+    }
     if write is _write_svg:
         matrix = _plane(mesh, target) if projection is None else _checked_projection(projection)
         lines = {name: [(P @ matrix.T, closed) for P, closed in group] for name, group in lines.items()}
     with replacing(target) as temporary:
         write(temporary, lines)
+
+
+def _flat(curves: NestedCurves, place: str) -> list[SurfaceCurve]:
+    """The curves of nested lists, one after the other; `place` names the list for errors."""
+    if isinstance(curves, SurfaceCurve):
+        return [curves]
+    if isinstance(curves, str) or not isinstance(curves, Sequence):
+        raise TypeError(f"{place} must be a SurfaceCurve or a list of such, not {type(curves).__name__}")
+    return [curve for i, part in enumerate(curves) for curve in _flat(part, f"{place}[{i}]")]
 
 
 def _checked_projection(projection: ArrayLike) -> FloatArray:

@@ -19,7 +19,7 @@ from heat_igl.errors import MeshError
 from heat_igl.io import medit, msh, obj, off, ply, stl, vtu
 from heat_igl.io.atomic import replacing
 from heat_igl.io.contents import Contents
-from heat_igl.mesh import Mesh, PolygonMesh
+from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_simplices, read_paths_with
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "read_polygon_mesh", "write_mesh"]
@@ -71,8 +71,8 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
 
     Notes
     -----
-    A polygon is split into the fan of triangles around the first corner, which is correct for convex, roughly planar
-    polygons; `read_polygon_mesh` keeps polygons. STL has no shared vertices: equal positions are merged, and triangles
+    A polygon is split into the fan of triangles around the first corner, a concave one by clipping its ears;
+    `read_polygon_mesh` keeps polygons. STL has no shared vertices: equal positions are merged, and triangles
     that collapse by this are removed. Materials, normals, texture coordinates, colours and line elements are ignored.
     OBJ has neither counts nor an end mark, so a file that is truncated between two lines cannot be detected.
 
@@ -82,6 +82,9 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     """
     path, contents = _load(path)
     return _mesh(path, contents)
+
+
+read_paths_with(read_mesh)
 
 
 def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
@@ -140,7 +143,7 @@ def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
     return contents.attributes
 
 
-def write_mesh(path: str | os.PathLike[str], mesh: Mesh, /, **attributes: ArrayLike) -> None:
+def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, /, **attributes: ArrayLike) -> None:
     """Write a mesh, with attributes per vertex, to a file.
 
     Parameters
@@ -148,8 +151,8 @@ def write_mesh(path: str | os.PathLike[str], mesh: Mesh, /, **attributes: ArrayL
     path : path-like
         The extension selects the format, as for `read_mesh`. An existing file is replaced only when the new one is
         complete; a failed write leaves the old file unchanged and no partial file.
-    mesh : Mesh
-        Triangles, or (.mesh, .msh, .vtu) tetrahedra.
+    mesh : mesh
+        Triangles, or (.mesh, .msh, .vtu) tetrahedra, as `as_mesh` takes them; polygons are written as triangles.
     **attributes : (n,) or (n, k) array_like of real numbers
         Arrays per vertex, stored in .ply and .vtu files in double precision, including infinite values. In PLY an array
         (n, k) becomes properties ``name_0``, ``name_1``, ..., which `read_attributes` combines again.
@@ -174,8 +177,7 @@ def write_mesh(path: str | os.PathLike[str], mesh: Mesh, /, **attributes: ArrayL
     """
     path = _checked(path)
     form = _FORMATS[path.suffix.lower()]
-    if not isinstance(mesh, Mesh):
-        raise MeshError(f"mesh must be a heat_igl.Mesh, not {type(mesh).__name__}: pass Mesh(V, F)")
+    mesh = as_simplices(mesh)
     if mesh.is_tetrahedral and not form.tetrahedra:
         raise MeshError(f"{path}: this format holds no tetrahedra; {_those_with('tetrahedra')} do")
     if attributes and not form.attributes:

@@ -10,6 +10,7 @@ lock.
 from __future__ import annotations
 
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,8 @@ __all__ = ["Dissection", "dissect"]
 # others are done in one go.
 _LARGE = 3000
 _SHARE = 1 / 64
+# Small components are dissected together, so many vertices at a time.
+_TOGETHER = 256
 
 
 class Dissection(NamedTuple):
@@ -79,7 +82,10 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
             for first, end, up in rest.tolist()
         ]
 
-    pieces = [(kernel.subgraph(ends, neighbours, order[:inner]), 0, inner, inner if inner < n else -1)]
+    pieces = [
+        (graph, low, high, inner if inner < n else -1)
+        for graph, low, high in _apart(*kernel.subgraph(ends, neighbours, order[:inner]))
+    ]
     running: set[Future[list[Any]]] = set()
     while pieces or running:
         if workers is None:
@@ -91,3 +97,21 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
     start = np.flatnonzero(is_start)
     number = np.cumsum(is_start, dtype=np.int64) - 1
     return Dissection(order, np.append(start, n), np.where(parent[start] < 0, -1, number[parent[start]]))
+
+
+def _apart(ends: IntArray, neighbours: IntArray) -> list[tuple[tuple[IntArray, IntArray], int, int]]:
+    """Parts of a graph in breadth-first order that no edge joins, each with its first vertex and its end.
+
+    A part is looked through again for each component that is split off from it, so there are no more than `_TOGETHER`
+    vertices before its last component.
+    """
+    n = len(ends) - 1
+    vertex = np.repeat(np.arange(n), np.diff(ends))
+    # All vertices but the first of their component have a neighbour before them.
+    root = np.flatnonzero(np.bincount(vertex[neighbours < vertex], minlength=n) == 0)
+    first = root[np.unique(root // _TOGETHER, return_index=True)[1]]
+    parts = []
+    for low, high in pairwise([*first.tolist(), n]):
+        inside = slice(ends[low], ends[high])
+        parts.append(((ends[low : high + 1] - ends[low], neighbours[inside] - np.int32(low)), low, high))
+    return parts

@@ -1,32 +1,38 @@
 """What distance is measured on: meshes of triangles, tetrahedra and polygons, images, and points and curves on them."""
 
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
+from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with
 from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
-from heat_igl.mesh.polygons import PolygonMesh, triangle_fans, which_repeat_a_vertex
+from heat_igl.mesh.polygons import PolygonMesh, which_repeat_a_vertex
 from heat_igl.mesh.projection import ClosestPoints, closest_points
 from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
 from heat_igl.mesh.subdivision import split_long_edges
 from heat_igl.mesh.surface_curves import curve_on, edge_curve
 from heat_igl.mesh.surface_points import ON_SIDE, ON_SIDE_COMPUTED, SurfaceCurve, SurfacePoints
+from heat_igl.mesh.triangulation import triangulated
 
 __all__ = [
     "ClosestPoints",
     "DELAUNAY_TOLERANCE",
     "ImageDomain",
     "Mesh",
+    "MeshLike",
     "MeshReport",
     "ON_SIDE",
     "ON_SIDE_COMPUTED",
     "PolygonMesh",
     "SurfaceCurve",
     "SurfacePoints",
+    "as_mesh",
+    "as_simplices",
     "checked_faces",
     "checked_positions",
     "closest_points",
     "curve_on",
     "edge_curve",
     "image_domain",
+    "read_paths_with",
     "split_long_edges",
-    "triangle_fans",
+    "triangulated",
     "which_repeat_a_vertex",
 ]

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from heat_igl.errors import MeshError
 from heat_igl.mesh import connectivity
+from heat_igl.mesh.quadrilaterals import first_quadrilateral
 from heat_igl.mesh.report import MeshReport, mesh_report
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -127,7 +128,8 @@ class Mesh:
     ------
     MeshError
         If an array has the wrong shape or type or is empty, if a position is not finite, an index is out of range or a
-        face repeats a vertex. The message names the first offender and counts them.
+        face repeats a vertex. The message names the first offender and counts them. Also if faces of four vertices are
+        quadrilaterals rather than tetrahedra, which `PolygonMesh` takes.
 
     Notes
     -----
@@ -143,6 +145,12 @@ class Mesh:
         faces = checked_faces(F, len(positions))
         faces.setflags(write=False)
         self._hold(positions, faces)
+        quadrilateral = first_quadrilateral(positions, faces) if faces.shape[1] == 4 else None
+        if quadrilateral is not None:
+            raise MeshError(
+                f"F has 4 columns, which stands for tetrahedra, but F[{quadrilateral}] = "
+                f"{faces[quadrilateral].tolist()} is a quadrilateral: pass PolygonMesh(V, F), or triangles"
+            )
 
     def _hold(self, positions: FloatArray, faces: IntArray) -> None:
         is_used = np.zeros(len(positions), bool)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.mesh.grouping import next_in_run
 from heat_igl.mesh.mesh import Mesh, checked_positions
+from heat_igl.mesh.triangulation import triangulated
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["PolygonMesh", "triangle_fans", "which_repeat_a_vertex"]
+__all__ = ["PolygonMesh", "which_repeat_a_vertex"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,17 +37,20 @@ class PolygonMesh:
     degree : (m,) int64
         Number of corners of each polygon.
     triangles : Mesh
-        The same vertices, each polygon cut into the fan of triangles around its first corner.
+        The same vertices. Each polygon is cut into the fan of triangles around its first corner, or, where it is
+        concave and the fan would leave it, by clipping its ears.
 
     Raises
     ------
     MeshError
-        As for `Mesh`; also if a polygon has fewer than three corners. The message names the first offender.
+        As for `Mesh`; also if a polygon has fewer than three corners, or its sides cross each other. The message names
+        the first offender.
 
     Notes
     -----
     Polygons need be neither planar nor convex, but the virtual vertex inside (see `polygon_operators`) should see every
-    corner. Corners on a straight side, as a polygon has beside smaller neighbours, are fine.
+    corner; `triangles` need no such vertex. Corners on a straight side, as a polygon has beside smaller neighbours, are
+    fine.
     """
 
     V: FloatArray
@@ -59,7 +64,7 @@ class PolygonMesh:
         _check(corners, degree, len(positions))
         for array in (corners, degree):
             array.setflags(write=False)
-        triangles = Mesh(positions, triangle_fans(corners, degree))
+        triangles = Mesh(positions, triangulated(positions, corners, degree, partial(_shown, corners, degree)))
         object.__setattr__(self, "V", triangles.V)
         object.__setattr__(self, "corners", corners)
         object.__setattr__(self, "degree", degree)
@@ -92,16 +97,6 @@ class PolygonMesh:
         return next_in_run(self.corners, self.degree)
 
 
-def triangle_fans(corners: IntArray, degree: IntArray) -> IntArray:
-    """Triangles (sum of (degree - 2), 3): each polygon as a fan around its first corner."""
-    if (degree == 3).all():
-        return corners.reshape(-1, 3)
-    begin = np.repeat(np.cumsum(degree) - degree, degree)
-    position = np.arange(len(corners))
-    second = position[(position > begin) & (position < begin + np.repeat(degree, degree) - 1)]
-    return np.stack([corners[begin[second]], corners[second], corners[second + 1]], axis=1)
-
-
 def which_repeat_a_vertex(corners: IntArray, degree: IntArray) -> BoolArray:
     """Mask (m,) of the polygons in which a vertex occurs twice."""
     if len(degree) and (degree == degree[0]).all():
@@ -131,11 +126,13 @@ def _flattened(polygons: Sequence[Sequence[int] | IntArray] | IntArray) -> tuple
     return np.concatenate(rows).astype(np.int64), np.array([len(row) for row in rows])
 
 
-def _check(corners: IntArray, degree: IntArray, n: int) -> None:
-    def shown(i: int) -> str:
-        begin = int(degree[:i].sum())
-        return f"polygons[{i}] = {corners[begin : begin + degree[i]].tolist()}"
+def _shown(corners: IntArray, degree: IntArray, i: int) -> str:
+    begin = int(degree[:i].sum())
+    return f"polygons[{i}] = {corners[begin : begin + degree[i]].tolist()}"
 
+
+def _check(corners: IntArray, degree: IntArray, n: int) -> None:
+    shown = partial(_shown, corners, degree)
     short = degree < 3
     if short.any():
         raise MeshError(

@@ -9,6 +9,7 @@ import numpy as np
 
 from heat_igl.errors import SourceError
 from heat_igl.mesh.mesh import Mesh
+from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import ON_SIDE_COMPUTED, SurfacePoints, require_triangles
 from heat_igl.typing import ArrayLike, FloatArray
 
@@ -33,12 +34,12 @@ class ClosestPoints(NamedTuple):
     gap: FloatArray
 
 
-def closest_points(mesh: Mesh, positions: ArrayLike) -> ClosestPoints:
+def closest_points(mesh: MeshLike, positions: ArrayLike) -> ClosestPoints:
     """The closest points of a triangle mesh to positions in space.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles.
     positions : (k, 3) or (3,) array_like
         Positions in the mesh's unit.
@@ -53,6 +54,7 @@ def closest_points(mesh: Mesh, positions: ArrayLike) -> ClosestPoints:
     SourceError
         If positions have the wrong shape or are not finite, or the mesh is tetrahedral.
     """
+    mesh = as_simplices(mesh)
     return Projector(mesh).project(checked_points(positions))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.mesh.mesh import Mesh
+from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["split_long_edges"]
@@ -20,12 +21,12 @@ __all__ = ["split_long_edges"]
 _MOST_PIECES = 1e8
 
 
-def split_long_edges(mesh: Mesh, longest: float | None = None) -> Mesh:
+def split_long_edges(mesh: MeshLike, longest: float | None = None) -> Mesh:
     """Halve edges until none is longer than `longest`; the surface stays as it is.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles, manifold or not.
     longest : float, optional
         In the mesh's unit; ``mesh.edge_lengths.mean()`` by default. On meshes with triangles of very different size,
@@ -49,6 +50,7 @@ def split_long_edges(mesh: Mesh, longest: float | None = None) -> Mesh:
     All faces at an edge share the new vertex, so they stay joined. Triangles next to a split edge get worse; the
     intrinsic Delaunay triangulation on which the solver works does not.
     """
+    mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("split_long_edges wants triangles, and F holds tetrahedra")
     longest = float(mesh.edge_lengths.mean()) if longest is None else longest

@@ -9,6 +9,7 @@ import numpy as np
 from heat_igl.errors import SourceError
 from heat_igl.mesh.grouping import Groups, enumerate_runs, group_by_label
 from heat_igl.mesh.mesh import Mesh
+from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.mesh.projection import Projector, checked_points
 from heat_igl.mesh.surface_points import SurfaceCurve, require_triangles
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -35,12 +36,14 @@ class _Piece(NamedTuple):
     end: FloatArray
 
 
-def curve_on(mesh: Mesh, positions: ArrayLike, *, closed: bool = False, tolerance: float | None = None) -> SurfaceCurve:
+def curve_on(
+    mesh: MeshLike, positions: ArrayLike, *, closed: bool = False, tolerance: float | None = None
+) -> SurfaceCurve:
     """Project a polyline in space onto a triangle mesh.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles.
     positions : (k, 3) array_like
         Corners of the polyline, in the mesh's unit. Each straight line between two corners is sampled at steps of at
@@ -62,6 +65,7 @@ def curve_on(mesh: Mesh, positions: ArrayLike, *, closed: bool = False, toleranc
         If the polyline is farther from the surface than `tolerance`, or the closest points jump from one part of it to
         another; if there are fewer than two different corners, or a position is not finite.
     """
+    mesh = as_simplices(mesh)
     corners = checked_points(positions)
     if len(corners) < 2:
         raise SourceError(f"positions must be two corners of a curve or more, not {len(corners)}")
@@ -84,12 +88,12 @@ def curve_on(mesh: Mesh, positions: ArrayLike, *, closed: bool = False, toleranc
     return SurfaceCurve(faces, start, end, is_closed=closed)
 
 
-def edge_curve(mesh: Mesh, vertices: ArrayLike, *, closed: bool = False) -> SurfaceCurve:
+def edge_curve(mesh: MeshLike, vertices: ArrayLike, *, closed: bool = False) -> SurfaceCurve:
     """The curve along edges of a triangle mesh from vertex to vertex.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles.
     vertices : (k,) array_like of int
         Each joined with the next by an edge.
@@ -101,6 +105,7 @@ def edge_curve(mesh: Mesh, vertices: ArrayLike, *, closed: bool = False) -> Surf
     SourceError
         If no edge joins a vertex with the next; the message names the first such pair.
     """
+    mesh = as_simplices(mesh)
     require_triangles(mesh)
     path = np.atleast_1d(np.asarray(vertices))
     if path.ndim != 1 or path.dtype.kind not in "iu" or len(path) < 2:

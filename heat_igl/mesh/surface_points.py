@@ -8,6 +8,7 @@ import numpy as np
 
 from heat_igl.errors import SourceError
 from heat_igl.mesh.mesh import Mesh
+from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["ON_SIDE", "ON_SIDE_COMPUTED", "SurfaceCurve", "SurfacePoints", "require_triangles"]
@@ -21,7 +22,7 @@ ON_SIDE = 1e-12
 ON_SIDE_COMPUTED = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SurfacePoints:
     """Points on a triangle mesh.
 
@@ -50,7 +51,10 @@ class SurfacePoints:
     def __len__(self) -> int:
         return len(self.faces)
 
-    def positions(self, mesh: Mesh) -> FloatArray:
+    def __repr__(self) -> str:
+        return f"SurfacePoints({len(self)} points)"
+
+    def positions(self, mesh: MeshLike) -> FloatArray:
         """Positions (k, 3) of the points in space.
 
         Raises
@@ -61,7 +65,7 @@ class SurfacePoints:
         return _in_space(mesh, self.faces, self.barycentric)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SurfaceCurve:
     """A polyline on a triangle mesh, each of its straight segments inside one face.
 
@@ -95,12 +99,15 @@ class SurfaceCurve:
     def __len__(self) -> int:
         return len(self.faces)
 
-    def positions(self, mesh: Mesh) -> FloatArray:
+    def __repr__(self) -> str:
+        return f"SurfaceCurve({len(self)} segments, {'closed' if self.is_closed else 'open'})"
+
+    def positions(self, mesh: MeshLike) -> FloatArray:
         """Positions (s + 1, 3) of the polyline's corners; on a closed curve the last is the first again."""
         first = _in_space(mesh, self.faces[:1], self.start[:1])
         return np.concatenate([first, _in_space(mesh, self.faces, self.end)])
 
-    def lengths(self, mesh: Mesh) -> FloatArray:
+    def lengths(self, mesh: MeshLike) -> FloatArray:
         """Length of each segment, (s,)."""
         return np.asarray(np.linalg.norm(np.diff(self.positions(mesh), axis=0), axis=1))
 
@@ -137,7 +144,8 @@ def require_triangles(mesh: Mesh) -> None:
         raise SourceError("points on faces need triangles, but the mesh is tetrahedral")
 
 
-def _in_space(mesh: Mesh, faces: IntArray, barycentric: FloatArray) -> FloatArray:
+def _in_space(mesh: MeshLike, faces: IntArray, barycentric: FloatArray) -> FloatArray:
+    mesh = as_simplices(mesh)
     require_triangles(mesh)
     outside = (faces < 0) | (faces >= mesh.n_faces)
     if outside.any():

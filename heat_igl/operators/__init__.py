@@ -7,7 +7,7 @@ from heat_igl.operators.polygons import polygon_operators
 from heat_igl.operators.simplices import cotan_operators
 from heat_igl.operators.speed import speed_operators
 from heat_igl.operators.surface import Surface
-from heat_igl.operators.triangles import operators, tufted_operators
+from heat_igl.operators.triangles import operators, tufted_operators, unfolding_surface
 
 __all__ = [
     "EdgeLengths",
@@ -24,4 +24,5 @@ __all__ = [
     "polygon_operators",
     "speed_operators",
     "tufted_operators",
+    "unfolding_surface",
 ]

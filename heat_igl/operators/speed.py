@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation
-from heat_igl.mesh import Mesh, connectivity
+from heat_igl.mesh import MeshLike, as_simplices, connectivity
 from heat_igl.operators.intrinsic import intrinsic_operators
 from heat_igl.operators.matrices import Operators, laplacian_of_gradient
 from heat_igl.operators.simplices import cotan_operators
@@ -18,7 +18,7 @@ from heat_igl.typing import ArrayLike, FloatArray, IntArray
 __all__ = ["speed_operators"]
 
 
-def speed_operators(mesh: Mesh, speed: ArrayLike) -> Operators:
+def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     """The operators of a mesh on which one travels at a speed of its own in each face.
 
     Distance is then the time T of the fastest way, |grad T| = 1 / speed: Fermat's principle, and Snell's law where the
@@ -31,7 +31,7 @@ def speed_operators(mesh: Mesh, speed: ArrayLike) -> Operators:
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles or tetrahedra.
     speed : (m,) array_like
         Length per unit of time on each face, positive.
@@ -55,6 +55,7 @@ def speed_operators(mesh: Mesh, speed: ArrayLike) -> Operators:
     h, and with it the time step, is a mean over the mesh. Where speed varies smoothly over a regular mesh, t_coef = 4
     gives smaller errors than 1: edges that are long in time, the slow ones, otherwise leave an error of direction.
     """
+    mesh = as_simplices(mesh)
     s = _checked(speed, mesh.n_faces)
     if mesh.is_tetrahedral:
         domain, F = cotan_operators(mesh), mesh.F

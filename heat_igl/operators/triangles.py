@@ -19,7 +19,7 @@ from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check
 from heat_igl.operators.simplices import cotan_operators, surface_operators
 from heat_igl.operators.surface import Surface
 
-__all__ = ["operators", "tufted_operators"]
+__all__ = ["operators", "tufted_operators", "unfolding_surface"]
 
 
 def operators(
@@ -94,6 +94,15 @@ def tufted_operators(
         boundary=mesh.boundary,
         surface=Surface(triangulation, faces, uncovered=intrinsic_delaunay(faces)),
     )
+
+
+def unfolding_surface(mesh: Mesh) -> Surface:
+    """The triangles of a triangle mesh in which paths are unfolded, as `operators` has them, without any operator."""
+    history: tuple[Merged, ...] = ()
+    if has_nonmanifold_edges(mesh):
+        mesh, history = _without_duplicates(mesh)
+    faces = replace(intrinsic_triangulation(mesh), history=history)
+    return Surface(intrinsic_delaunay(faces), faces)
 
 
 def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Merged, ...]]:

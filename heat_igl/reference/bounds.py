@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.mesh import Mesh, connectivity
+from heat_igl.mesh import MeshLike, as_simplices, connectivity
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray
 
 __all__ = ["edge_paths", "straight_lines"]
 
 
-def straight_lines(mesh: Mesh, sources: Sources) -> FloatArray:
+def straight_lines(mesh: MeshLike, sources: Sources) -> FloatArray:
     """Length (n,) of the straight line from each vertex to the nearest source, never above the geodesic distance."""
+    mesh = as_simplices(mesh)
     from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
 
     seeds = vertex_sources(sources, mesh.n_vertices)
@@ -20,9 +21,10 @@ def straight_lines(mesh: Mesh, sources: Sources) -> FloatArray:
     return np.asarray(distance, dtype=np.float64)
 
 
-def edge_paths(mesh: Mesh, sources: Sources) -> FloatArray:
+def edge_paths(mesh: MeshLike, sources: Sources) -> FloatArray:
     """Length (n,) of the shortest path along edges from each vertex to the sources (Dijkstra 1959).
 
     Never below the geodesic distance; ``inf`` at vertices that no path joins with a source.
     """
+    mesh = as_simplices(mesh)
     return connectivity.edge_distance(mesh.edge_graph, vertex_sources(sources, mesh.n_vertices))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.reference import guarded
 from heat_igl.reference.checks import require_between_bounds, require_finite, require_manifold
 from heat_igl.reference.guarded import MEMORY, TIMEOUT
@@ -81,7 +81,7 @@ def exact_solver() -> str:
 
 
 def measured(
-    solver: str, mesh: Mesh, sources: Sources, *, timeout: float = TIMEOUT, memory: float = MEMORY, **options: Any
+    solver: str, mesh: MeshLike, sources: Sources, *, timeout: float = TIMEOUT, memory: float = MEMORY, **options: Any
 ) -> Measured:
     """Distance by a named native solver, with its cost in time and memory.
 
@@ -105,6 +105,7 @@ def measured(
     SourceError, ReferenceSolverError, MissingExtraError
         As for `exact`.
     """
+    mesh = as_simplices(mesh)
     if solver == "exact":
         solver = exact_solver()
     chosen = _SOLVERS.get(solver)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.reference.guarded import MEMORY, TIMEOUT
 from heat_igl.reference.measurement import measured
 from heat_igl.sources import Sources
@@ -21,12 +21,13 @@ def meshlab(mesh: Mesh, sources: Sources, *, timeout: float = TIMEOUT, memory: f
     return measured("meshlab", mesh, sources, timeout=timeout, memory=memory).distance
 
 
-def meshlab_border(mesh: Mesh, *, timeout: float = TIMEOUT, memory: float = MEMORY) -> FloatArray:
+def meshlab_border(mesh: MeshLike, *, timeout: float = TIMEOUT, memory: float = MEMORY) -> FloatArray:
     """MeshLab's distance to the boundary (n,), through pymeshlab; ``inf`` on components without boundary.
 
     The sources are all boundary vertices, each with a front of its own; where fronts of different sources meet, it
     falls back to lengths of edges. Compare with ``exact(mesh, mesh.boundary)``. Errors are those of `meshlab`.
     """
+    mesh = as_simplices(mesh)
     return measured("meshlab_border", mesh, mesh.boundary, timeout=timeout, memory=memory).distance
 
 

@@ -8,24 +8,24 @@ import numpy as np
 
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat_method import HeatMethodSolver
-from heat_igl.mesh import Mesh, SurfacePoints
-from heat_igl.sampling.queries import checked_vertices, distance_rows
+from heat_igl.mesh import MeshLike, SurfacePoints, as_simplices
+from heat_igl.sampling.queries import as_solver, checked_vertices, distance_rows
 from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["geodesic_centre"]
 
 
 def geodesic_centre(
-    mesh: Mesh, solver: HeatMethodSolver, points: ArrayLike, weights: ArrayLike | None = None
+    mesh: MeshLike, solver: HeatMethodSolver | MeshLike, points: ArrayLike, weights: ArrayLike | None = None
 ) -> SurfacePoints:
     """The point with the least sum of squared distances to `points`: their Frechet mean (a Karcher mean).
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles.
-    solver : HeatMethodSolver
-        Of the same mesh.
+    solver : HeatMethodSolver or mesh
+        Of the same mesh, or that mesh, for a near-exact solver.
     points : (k,) array_like of int, or (n,) mask of bool
         Vertices; one that comes twice counts twice.
     weights : (k,) array_like, optional
@@ -53,6 +53,8 @@ def geodesic_centre(
     theorem, x barycentric). The minimum of this is found on every face in closed form. The result is exact on flat
     surfaces; on others, curvature inside one face is neglected.
     """
+    solver = as_solver(solver)
+    mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("a point in a face needs triangles, but F has 4 columns")
     if mesh.n_vertices != solver.n_vertices:

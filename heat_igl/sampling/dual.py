@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.mesh import Mesh, connectivity
+from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.sampling.voronoi import VoronoiCells
 from heat_igl.typing import IntArray
 
 __all__ = ["dual_triangulation"]
 
 
-def dual_triangulation(mesh: Mesh, cells: VoronoiCells) -> Mesh:
+def dual_triangulation(mesh: MeshLike, cells: VoronoiCells) -> Mesh:
     """The triangulation dual to Voronoi cells: a vertex for each cell, a triangle for each point of three cells.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles.
     cells : VoronoiCells
         Voronoi cells of the same mesh.
@@ -41,6 +41,7 @@ def dual_triangulation(mesh: Mesh, cells: VoronoiCells) -> Mesh:
     result has the triangles that an odd number of faces are mapped to. So a zigzag border between cells, or an island
     in a cell, changes nothing, and the boundary of the mesh is mapped to the boundary of the result.
     """
+    mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("a dual triangulation needs triangles, but F has 4 columns")
     if len(cells.labels) != mesh.n_vertices:

@@ -5,19 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.heat_method import HeatMethodSolver
-from heat_igl.sampling.queries import checked_vertices, distance_rows
+from heat_igl.mesh import MeshLike
+from heat_igl.sampling.queries import as_solver, checked_vertices, distance_rows
 from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["diameter", "distance_matrix"]
 
 
-def diameter(solver: HeatMethodSolver, *, start: int = 0, rounds: int = 10) -> tuple[float, int, int]:
+def diameter(solver: HeatMethodSolver | MeshLike, *, start: int = 0, rounds: int = 10) -> tuple[float, int, int]:
     """Two vertices that are far apart, found by repeatedly moving to the farthest vertex.
 
     Parameters
     ----------
-    solver : HeatMethodSolver
-        Of any domain.
+    solver : HeatMethodSolver or mesh
+        Of any domain, or whatever `as_mesh` takes, for a near-exact solver.
     start : int
         Vertex whose component is measured.
     rounds : int
@@ -38,6 +39,7 @@ def diameter(solver: HeatMethodSolver, *, start: int = 0, rounds: int = 10) -> t
     ValueError
         If `rounds` is not a positive integer.
     """
+    solver = as_solver(solver)
     if not isinstance(rounds, int | np.integer) or rounds < 1:
         raise ValueError(f"rounds must be a positive integer, not {rounds!r}")
     here = int(checked_vertices("start", start, solver.n_vertices)[0])
@@ -52,13 +54,13 @@ def diameter(solver: HeatMethodSolver, *, start: int = 0, rounds: int = 10) -> t
     return best
 
 
-def distance_matrix(solver: HeatMethodSolver, indices: ArrayLike | None = None) -> FloatArray:
+def distance_matrix(solver: HeatMethodSolver | MeshLike, indices: ArrayLike | None = None) -> FloatArray:
     """Distances between all pairs of vertices, or of some.
 
     Parameters
     ----------
-    solver : HeatMethodSolver
-        Of any domain with n vertices; asked k times.
+    solver : HeatMethodSolver or mesh
+        Of any domain, or whatever `as_mesh` takes, for a near-exact solver with n vertices; asked k times.
     indices : (k,) array_like of int, or (n,) mask of bool, optional
         Distinct vertices; all n if not given, which takes 8 n^2 bytes.
 
@@ -73,6 +75,7 @@ def distance_matrix(solver: HeatMethodSolver, indices: ArrayLike | None = None) 
     SourceError
         If an entry of `indices` is no vertex, or comes twice.
     """
+    solver = as_solver(solver)
     chosen = (
         np.arange(solver.n_vertices) if indices is None else checked_vertices("indices", indices, solver.n_vertices)
     )

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import numpy as np
 
 from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.mesh import MeshLike
+from heat_igl.sampling.queries import as_solver
 from heat_igl.sampling.voronoi import VoronoiCells, claim_nearer
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import ArrayLike, IntArray
@@ -12,13 +16,13 @@ from heat_igl.typing import ArrayLike, IntArray
 __all__ = ["farthest_cells", "farthest_points"]
 
 
-def farthest_points(solver: HeatMethodSolver, k: int, *, start: ArrayLike = 0) -> IntArray:
+def farthest_points(solver: HeatMethodSolver | MeshLike, k: int, *, start: ArrayLike = 0) -> IntArray:
     """`k` vertices, each as far as possible from those before (Gonzalez 1985; Moenning and Dodgson 2003).
 
     Parameters
     ----------
-    solver : HeatMethodSolver
-        Of any domain; asked k - 1 times.
+    solver : HeatMethodSolver or mesh
+        Of any domain, or whatever `as_mesh` takes, for a near-exact solver; asked k - 1 times.
     k : int
         Number of vertices.
     start : int, sequence of int, or (n,) mask of bool
@@ -40,9 +44,10 @@ def farthest_points(solver: HeatMethodSolver, k: int, *, start: ArrayLike = 0) -
     return farthest_cells(solver, k, start=start).sites
 
 
-def farthest_cells(solver: HeatMethodSolver, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
+def farthest_cells(solver: HeatMethodSolver | MeshLike, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
     """The Voronoi cells of `farthest_points`, for one query more; arguments and errors as there."""
-    first = vertex_sources(np.asarray(start), solver.n_vertices)
+    solver = as_solver(solver)
+    first = vertex_sources(cast(Any, start), solver.n_vertices, "start")
     referenced = solver.operators.referenced
     used = referenced.copy()
     used[first] = True

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any, cast
 
 import numpy as np
 
 from heat_igl.errors import SourceError
 from heat_igl.heat_method import HeatMethodSolver
-from heat_igl.sources import vertex_sources
+from heat_igl.mesh import MeshLike, as_simplices
+from heat_igl.sources import named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
-__all__ = ["checked_vertices", "distance_rows"]
+__all__ = ["as_solver", "checked_vertices", "distance_rows"]
 
 # Rows of distances in memory at a time.
 _BLOCK = 8
@@ -36,17 +38,19 @@ def checked_vertices(name: str, vertices: ArrayLike, n: int, distinct: bool = Tr
     SourceError
         If an entry is no vertex, or comes twice though it should not.
     """
-    array: AnyArray = np.atleast_1d(np.asarray(vertices))
-    if array.dtype.kind == "b":
-        return vertex_sources(array, n)
-    try:
-        sorted_once = vertex_sources(array, n)
-    except SourceError as error:
-        raise SourceError(f"{name}: {error}") from None
-    if distinct and len(sorted_once) < len(array):
-        values, counts = np.unique(array, return_counts=True)
+    named = named_vertices(cast(Any, vertices), n, name)
+    values, counts = np.unique(named, return_counts=True)
+    if distinct and len(values) < len(named):
         raise SourceError(f"{name} must be distinct, but vertex {values[counts > 1][0]} is there twice")
-    return array.astype(np.int64)
+    return named
+
+
+def as_solver(solver: HeatMethodSolver | MeshLike) -> HeatMethodSolver:
+    """The solver itself, or a near-exact one on a mesh; on tetrahedra, which cannot be unfolded, by heat."""
+    if isinstance(solver, HeatMethodSolver):
+        return solver
+    mesh = as_simplices(solver)
+    return HeatMethodSolver(mesh, refine=None if mesh.is_tetrahedral else "unfold")
 
 
 def distance_rows(solver: HeatMethodSolver, vertices: IntArray) -> Iterator[AnyArray]:

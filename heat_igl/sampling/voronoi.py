@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from heat_igl.heat_method import HeatMethodSolver
-from heat_igl.sampling.queries import checked_vertices, distance_rows
+from heat_igl.mesh import MeshLike
+from heat_igl.sampling.queries import as_solver, checked_vertices, distance_rows
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["VoronoiCells", "claim_nearer", "voronoi_cells"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class VoronoiCells:
     """The geodesic Voronoi diagram of some vertices, the sites: every vertex belongs to the nearest site.
 
@@ -32,14 +33,20 @@ class VoronoiCells:
     labels: IntArray
     distance: FloatArray
 
+    def __repr__(self) -> str:
+        lost = int((self.labels < 0).sum())
+        return (
+            f"VoronoiCells({len(self.sites)} cells, {len(self.labels)} vertices{f', {lost} unreached' if lost else ''})"
+        )
 
-def voronoi_cells(solver: HeatMethodSolver, sites: ArrayLike) -> VoronoiCells:
+
+def voronoi_cells(solver: HeatMethodSolver | MeshLike, sites: ArrayLike) -> VoronoiCells:
     """The geodesic Voronoi diagram of given vertices, by one query for each site.
 
     Parameters
     ----------
-    solver : HeatMethodSolver
-        Of any domain.
+    solver : HeatMethodSolver or mesh
+        Of any domain, or whatever `as_mesh` takes, for a near-exact solver.
     sites : (k,) array_like of int
         Distinct vertices.
 
@@ -53,6 +60,7 @@ def voronoi_cells(solver: HeatMethodSolver, sites: ArrayLike) -> VoronoiCells:
     SourceError
         If an entry of `sites` is no vertex, or comes twice.
     """
+    solver = as_solver(solver)
     chosen = checked_vertices("sites", sites, solver.n_vertices)
     labels = np.full(solver.n_vertices, -1)
     distance = np.full(solver.n_vertices, np.inf)

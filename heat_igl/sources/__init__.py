@@ -1,6 +1,6 @@
 """What a source is, the right-hand side it gives, and the exact distance near it."""
 
-from heat_igl.sources.assembly import SourceAssembler, SourceTerm, right_hand_side, take_shorter
+from heat_igl.sources.assembly import NEAR_RADIUS, SourceAssembler, SourceTerm, right_hand_side, take_shorter
 from heat_igl.sources.near_field import NearField, Seeds
 from heat_igl.sources.specification import (
     OffsetSources,
@@ -8,12 +8,14 @@ from heat_igl.sources.specification import (
     Sources,
     SourceSegments,
     SourceSet,
+    named_vertices,
     nearest_first,
     source_set,
     vertex_sources,
 )
 
 __all__ = [
+    "NEAR_RADIUS",
     "NearField",
     "OffsetSources",
     "Seeds",
@@ -23,6 +25,7 @@ __all__ = [
     "SourceSet",
     "SourceTerm",
     "Sources",
+    "named_vertices",
     "nearest_first",
     "right_hand_side",
     "source_set",

@@ -14,13 +14,13 @@ from heat_igl.sources.near_field import NearField, Seeds
 from heat_igl.sources.specification import SourceSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["SourceAssembler", "SourceTerm", "right_hand_side", "take_shorter"]
+__all__ = ["NEAR_RADIUS", "SourceAssembler", "SourceTerm", "right_hand_side", "take_shorter"]
 
 # How far around points and curves distance is taken from straight lines, in mean edge lengths: the cost grows with the
 # square. Mean error from points inside faces of the cow, the fandisk and the camel's head: 1.63, 0.75 and 0.77 % at 2;
 # 1.46, 0.72 and 0.72 % at 6; 1.62, 0.66 and 0.66 % at 12. From a curve 2.56, 3.86 and 4.26 %; 1.86, 2.79 and 3.29 %;
 # 1.53, 1.73 and 2.37 %.
-_RADIUS = 6.0
+NEAR_RADIUS = 6.0
 # So many mean edge lengths of a curve give as much heat as a point, so that both are equally warm some edges away. What
 # matters is the order of magnitude: from 1 to 16, errors from a point and a curve change by less than 0.06 points.
 _EDGES_PER_POINT = 4.0
@@ -221,7 +221,7 @@ class SourceAssembler:
                 return _NONE, _NONE
         vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         points = sources.points.joined(sources.segments.ends())
-        return self._faces.seeds(points, sources.segments, _RADIUS * self._domain.mean_edge_length, vertices)
+        return self._faces.seeds(points, sources.segments, NEAR_RADIUS * self._domain.mean_edge_length, vertices)
 
     def _initial_heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""

@@ -21,6 +21,7 @@ __all__ = [
     "SourceSegments",
     "SourceSet",
     "Sources",
+    "named_vertices",
     "nearest_first",
     "source_set",
     "vertex_sources",
@@ -166,7 +167,7 @@ def source_set(sources: Sources, n: int, F: IntArray | None) -> SourceSet:
     return builder.finish()
 
 
-def vertex_sources(sources: Sources, n: int) -> IntArray:
+def vertex_sources(sources: Sources, n: int, name: str = "sources") -> IntArray:
     """The vertices that `sources` names, ascending, each once.
 
     Parameters
@@ -175,6 +176,8 @@ def vertex_sources(sources: Sources, n: int) -> IntArray:
         Source vertices; repeated ones count once.
     n : int
         Number of vertices of the mesh.
+    name : str
+        Name of the argument, for errors.
 
     Returns
     -------
@@ -187,34 +190,39 @@ def vertex_sources(sources: Sources, n: int) -> IntArray:
         If there is no source, an index is not in ``range(n)``, the mask has the wrong length, or `sources` is not
         made of integers or booleans.
     """
-    return np.asarray(np.unique(_named_vertices(sources, n)), dtype=np.int64)
+    return np.asarray(np.unique(named_vertices(sources, n, name)), dtype=np.int64)
 
 
-def _named_vertices(sources: Sources, n: int) -> IntArray:
-    """The vertices in the order in which they are named."""
+def named_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
+    """The vertices that `sources` names, in the order in which they are named; arguments as for `vertex_sources`."""
     if isinstance(sources, _PLACES):
-        raise SourceError(f"sources must be {_ACCEPTED} here, not {type(sources).__name__}")
+        raise SourceError(f"{name} must be {_ACCEPTED} here, not {type(sources).__name__}")
     try:
         array = np.atleast_1d(np.asarray(sources))
     except ValueError:
-        raise SourceError(f"sources must be {_ACCEPTED}, not a ragged sequence") from None
+        raise SourceError(f"{name} must be {_ACCEPTED}, not a ragged sequence") from None
+    if array.dtype.kind == "f" and array.ndim <= 2 and array.shape[-1] == 3:
+        raise SourceError(
+            f"{name} holds floats of shape {array.shape}: for vertices, convert with astype(int); for positions in "
+            f"space, pass the nearest places of the surface, closest_points(mesh, {name}).points"
+        )
     if array.ndim != 1:
-        raise SourceError(f"sources must be {_ACCEPTED}, but it has shape {array.shape}")
+        raise SourceError(f"{name} must be {_ACCEPTED}, but it has shape {array.shape}")
     if not len(array):
-        raise SourceError("sources is empty: name at least one vertex")
+        raise SourceError(f"{name} is empty: name at least one vertex")
     if array.dtype.kind == "b":
         if len(array) != n:
-            raise SourceError(f"the mask sources has {len(array)} entries, but the mesh has {n} vertices")
+            raise SourceError(f"the mask {name} has {len(array)} entries, but the mesh has {n} vertices")
         if not array.any():
-            raise SourceError("the mask sources selects no vertex: set at least one entry")
+            raise SourceError(f"the mask {name} selects no vertex: set at least one entry")
         return np.flatnonzero(array)
     if array.dtype.kind not in "iu":
-        raise SourceError(f"sources must be {_ACCEPTED}, not {_first_of_wrong_type(array)}")
+        raise SourceError(f"{name} must be {_ACCEPTED}, not {_first_of_wrong_type(array)}")
     outside = (array < 0) | (array >= n)
     if outside.any():
         first = int(np.flatnonzero(outside)[0])
         raise SourceError(
-            f"sources[{first}] = {array[first]} is no vertex ({int(outside.sum())} of {len(array)} are not): the mesh "
+            f"{name}[{first}] = {array[first]} is no vertex ({int(outside.sum())} of {len(array)} are not): the mesh "
             f"has {n} vertices, so indices run from 0 to {n - 1}"
         )
     return np.asarray(array, dtype=np.int64)
@@ -274,7 +282,7 @@ class _Builder:
                 except SourceError as error:
                     raise SourceError(f"sources[{i}]: {error}") from None
         else:
-            vertices = _named_vertices(sources, self._n)
+            vertices = named_vertices(sources, self._n)
             self._vertices.append((vertices, self._counted(len(vertices))))
 
     def _counted(self, k: int) -> IntArray:

@@ -1,49 +1,172 @@
-"""Near-exact distance for one query, without a factorization: strips unfolded in the order of Dijkstra's algorithm."""
+"""Near-exact distance without a factorization: unfolding in the order of Dijkstra's algorithm."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, overload
+
+import numpy as np
+import scipy.sparse as sp
+
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
-from heat_igl.mesh import Mesh, connectivity
-from heat_igl.sources import Sources, vertex_sources
-from heat_igl.typing import ArrayLike, FloatArray
-from heat_igl.unfolding.refinement import TOLERANCE, Refinement
+from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
+from heat_igl.operators import Surface, unfolding_surface
+from heat_igl.sources import NEAR_RADIUS, NearField, Seeds, SourcePoints, Sources, SourceSet, source_set
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.unfolding.refinement import TOLERANCE, Refine
+from heat_igl.unfolding.solver import UnfoldingSolver
 
-__all__ = ["unfolded_distance"]
+__all__ = ["distance_from_scratch", "unfolded_distance"]
+
+_NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
+# For the order of the vertices, curves are points at most so many mean edge lengths apart.
+_SPACING = 1.0
 
 
-def unfolded_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, tolerance: float = TOLERANCE) -> FloatArray:
+@overload
+def unfolded_distance(V: MeshLike, F: Sources, /, *, tolerance: float = ...) -> FloatArray: ...
+@overload
+def unfolded_distance(V: MeshLike, F: ArrayLike | None, sources: Sources, *, tolerance: float = ...) -> FloatArray: ...
+def unfolded_distance(V: MeshLike, F: Any = None, sources: Any = None, *, tolerance: float = TOLERANCE) -> FloatArray:
     """Near-exact geodesic distance without a factorization: strip unfolding in the order of Dijkstra's algorithm.
 
-    For one or two queries on a mesh; from the third on, ``HeatMethodSolver(mesh, refine="unfold")`` is faster.
+    Called with positions, faces and sources, or with a mesh and sources. For one or two queries on a mesh; from the
+    third on, ``HeatMethodSolver(mesh, refine="unfold")`` is faster.
 
     Parameters
     ----------
-    V : (n, 3) array_like
-        Vertex positions.
+    V : mesh or (n, 3) array_like
+        Whatever `as_mesh` takes, or vertex positions.
     F : (m, 3) array_like
-        Triangles.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
+        Triangles, when `V` holds positions.
+    sources : sources
+        As for `HeatMethodSolver.distance`.
     tolerance : float
         See `Refinement.unfold`.
 
     Returns
     -------
     (n,) float64
-        In the unit of V: 0 at the sources, ``inf`` at vertices that no source reaches. Every value is the length of a
-        path on the surface.
+        In the unit of V: 0 at the sources, ``inf`` at vertices that no source reaches. From source vertices, every
+        value is the length of a path on the surface.
 
     Raises
     ------
     MeshError
         If the mesh cannot be used, or is tetrahedral.
     SourceError
-        If `sources` does not name vertices.
+        If `sources` does not name places on the mesh.
     """
-    mesh = Mesh(V, F)
+    if sources is None:
+        F, sources = None, F
+    return distance_from_scratch(as_simplices(V, F), sources, "unfold", tolerance)
+
+
+def distance_from_scratch(mesh: Mesh, sources: Sources, refine: Refine, tolerance: float | None = None) -> FloatArray:
+    """Distance (n,) from one set of sources by unfolding triangles in the order of Dijkstra's algorithm.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles.
+    sources : sources
+        As for `HeatMethodSolver.distance`.
+    refine : {"sweep", "unfold"}
+        Which update, see `Refinement`.
+    tolerance : float, optional
+        See `Refinement.unfold`.
+    """
     if mesh.is_tetrahedral:
-        raise MeshError("unfolding needs triangles, but F has 4 columns")
-    chosen = vertex_sources(sources, mesh.n_vertices)
-    refinement = Refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-    return refinement.unfold(connectivity.edge_distance(mesh.edge_graph, chosen), chosen, tolerance)
+        raise MeshError('unfolding needs triangles, and the mesh holds tetrahedra: take method="heat" or a solver')
+    chosen = source_set(sources, mesh.n_vertices, mesh.F)
+    domain = _Domain(mesh, unfolding_surface(mesh))
+    lines = _Lines(chosen, *_straight_lines(domain, chosen))
+    solver = UnfoldingSolver(domain, refine, tolerance)
+    return np.asarray(solver.distances([lines], -_along_edges(domain, chosen)[:, None])[0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Domain:
+    """A mesh as `UnfoldingSolver` takes it."""
+
+    mesh: Mesh
+    surface: Surface
+
+    @property
+    def components(self) -> IntArray:
+        return self.mesh.components
+
+    @cached_property
+    def n_components(self) -> int:
+        return int(self.components.max()) + 1
+
+    @cached_property
+    def mean_edge_length(self) -> float:
+        return float(self.mesh.edge_lengths.mean())
+
+    @cached_property
+    def near_field(self) -> NearField:
+        assert self.surface.faces is not None
+        return NearField(self.surface.faces)
+
+    def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
+        return np.asarray(of_component[self.components])
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """A set of sources as `UnfoldingSolver` takes it."""
+
+    sources: SourceSet
+    near_seen: Seeds
+    far: Seeds
+
+
+def _straight_lines(domain: _Domain, sources: SourceSet) -> tuple[Seeds, Seeds]:
+    """Straight lines from points and curves, to vertices that are no sources; see `NearField.seeds`."""
+    if sources.on_vertices_alone:
+        return _NONE, _NONE
+    rim = _rim(domain.mesh, sources.vertices)
+    vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
+    points = sources.points.joined(sources.segments.ends())
+    radius = NEAR_RADIUS * domain.mean_edge_length
+    near, far = domain.near_field.seeds(points, sources.segments, radius, vertices)
+    return near.at(~np.isin(near.vertex, sources.vertices)), far
+
+
+def _rim(mesh: Mesh, vertices: IntArray) -> BoolArray:
+    """Which of the source vertices have a neighbour that is none."""
+    is_source = np.zeros(mesh.n_vertices, bool)
+    is_source[vertices] = True
+    at_rim = np.zeros(mesh.n_vertices, bool)
+    at_rim[mesh.edges[is_source[mesh.edges].sum(axis=1) == 1]] = True
+    return np.asarray(at_rim[vertices])
+
+
+def _along_edges(domain: _Domain, sources: SourceSet) -> FloatArray:
+    """Length (n,) of the shortest path along edges from the sources, whose points reach the corners of their faces."""
+    mesh = domain.mesh
+    if sources.on_vertices_alone and not sources.vertex_offset.any():
+        return connectivity.edge_distance(mesh.edge_graph, sources.vertices)
+    n = mesh.n_vertices
+    begin = np.full(n, np.inf)
+    np.minimum.at(begin, sources.vertices, sources.vertex_offset)
+    points = sources.points
+    if len(sources.segments.faces):
+        samples, _ = domain.near_field.samples(sources.segments, _SPACING * domain.mean_edge_length)
+        points = points.joined(samples).joined(sources.segments.ends())
+    np.minimum.at(begin, mesh.F[points.faces], _to_corners(mesh, points))
+    # Dijkstra's algorithm starts at one more vertex, which is as far from the others as distance begins there.
+    start = np.flatnonzero(np.isfinite(begin))
+    rows, columns = np.concatenate([mesh.edges.T, [np.full(len(start), n), start]], axis=1)
+    lengths = np.concatenate([mesh.edge_lengths, begin[start]])
+    graph = sp.csr_array((lengths, (rows, columns)), shape=(n + 1, n + 1))
+    return connectivity.edge_distance(graph, np.array([n]))[:n]
+
+
+def _to_corners(mesh: Mesh, points: SourcePoints) -> FloatArray:
+    """The value (p, 3) at each corner of the points' faces, by the straight lines inside the faces."""
+    corners = mesh.V[mesh.F[points.faces]]
+    places = np.einsum("pc,pcx->px", points.barycentric, corners)
+    return np.asarray(points.offset[:, None] + np.linalg.norm(corners - places[:, None], axis=2))

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Sequence
+from functools import cached_property, partial
+from typing import Protocol
 
 import numpy as np
 
 from heat_igl.mesh import SurfacePoints
-from heat_igl.operators import Operators
-from heat_igl.sources import NearField, SourcePoints, SourceTerm, take_shorter
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.operators import Surface
+from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSet, take_shorter
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 
-__all__ = ["UnfoldingSolver"]
+__all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
 
 # Curves are unfolded from as points, at most so many mean edge lengths s apart. At a distance d that is wrong by the
 # fraction (s / d)^2 / 8 at most: by 0.005 % beyond the 6 edges within which straight lines from the curve itself count.
@@ -22,15 +24,56 @@ _SPACING = 0.125
 _SWEEP_ERROR = 0.01
 
 
+class UnfoldingDomain(Protocol):
+    """What unfolding takes of a domain; `Operators` is one."""
+
+    @property
+    def surface(self) -> Surface | None:
+        """The triangles."""
+
+    @property
+    def components(self) -> IntArray:
+        """Component label (n,) of each vertex."""
+
+    @property
+    def n_components(self) -> int:
+        """Number of components."""
+
+    @property
+    def mean_edge_length(self) -> float:
+        """H."""
+
+    def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
+        """The value (n,) of each vertex's component."""
+
+
+class UnfoldingTerm(Protocol):
+    """A set of sources, and the straight lines from its points and curves; `SourceTerm` is one."""
+
+    @property
+    def sources(self) -> SourceSet:
+        """The sources."""
+
+    @property
+    def near_seen(self) -> Seeds:
+        """Vertices near points and curves, at the lengths of straight lines."""
+
+    @property
+    def far(self) -> Seeds:
+        """Corners of the sources' own faces that are farther away."""
+
+
 class UnfoldingSolver:
     """`Refinement` of a domain, asked by sets of sources and their heat.
 
     Parameters
     ----------
-    domain : Operators
+    domain : UnfoldingDomain
         Triangles.
     refine : {"sweep", "unfold"}
         Which update.
+    tolerance : float, optional
+        As for `Refinement.unfold`, with its default.
 
     Raises
     ------
@@ -38,31 +81,38 @@ class UnfoldingSolver:
         If the domain has no triangles.
     """
 
-    def __init__(self, domain: Operators, refine: Refine) -> None:
+    def __init__(self, domain: UnfoldingDomain, refine: Refine, tolerance: float | None = None) -> None:
         surface = domain.surface
         if surface is None:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
         self._refinement = Refinement(surface.unfolding)
+        self._unfold = self._refinement.unfold
+        if tolerance is not None:
+            self._unfold = partial(self._refinement.unfold, tolerance=tolerance)
         self._sweeps = refine == "sweep"
         self._error = _SWEEP_ERROR if self._sweeps else 0.0
-        self._faces = None if surface.faces is None else NearField(surface.faces)
+        self._surface = surface
         self._domain = domain
         self._given_faces = np.empty((0, 3), np.int64) if surface.given_faces is None else surface.given_faces
         self._spacing = _SPACING * domain.mean_edge_length
 
-    def distances(self, terms: list[SourceTerm], u: FloatArray) -> FloatArray:
+    @cached_property
+    def _faces(self) -> NearField | None:
+        return None if self._surface.faces is None else NearField(self._surface.faces)
+
+    def distances(self, terms: Sequence[UnfoldingTerm], u: FloatArray) -> FloatArray:
         """Distances (k, n) for heat (n, k).
 
         Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
         """
         return np.stack([self._distance(term, one) for term, one in zip(terms, u.T, strict=True)])
 
-    def labelled(self, term: SourceTerm, u: FloatArray) -> tuple[FloatArray, IntArray]:
+    def labelled(self, term: UnfoldingTerm, u: FloatArray) -> tuple[FloatArray, IntArray]:
         """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 where none is reached."""
         labels = np.empty(len(u), np.int64)
         return self._distance(term, u, labels), labels
 
-    def _distance(self, term: SourceTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
+    def _distance(self, term: UnfoldingTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
         sources, points, components = term.sources, self._points(term), self._domain.components
         places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
         # Tolerances are relative to the distance: what all have in common is added afterwards.
@@ -73,7 +123,7 @@ class UnfoldingSolver:
         np.minimum.at(earliest, component, offset)
         late = offset - earliest[component]
         k = len(sources.vertices)
-        unfolded = self._refinement.unfold
+        unfolded = self._unfold
         if self._sweeps:
             unfolded = partial(self._refinement.sweep, known=self._known(term, points, earliest))
         distance = unfolded(
@@ -97,7 +147,7 @@ class UnfoldingSolver:
                 labels[seeds.vertex[taken]] = seeds.label[taken]
         return distance
 
-    def _known(self, term: SourceTerm, points: SourcePoints, earliest: FloatArray) -> Known | None:
+    def _known(self, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray) -> Known | None:
         """What straight lines from points reach."""
         near = term.near_seen
         if not len(near.vertex):
@@ -109,8 +159,8 @@ class UnfoldingSolver:
         near, source = near.at(count[at] == 1), first[at][count[at] == 1]
         return Known(near.vertex, near.value - earliest[self._domain.components[near.vertex]], source)
 
-    def _points(self, term: SourceTerm) -> SourcePoints:
+    def _points(self, term: UnfoldingTerm) -> SourcePoints:
         points, segments = term.sources.points, term.sources.segments
-        if self._faces is None or not len(segments.faces):
+        if not len(segments.faces) or self._faces is None:
             return points
         return points.joined(self._faces.samples(segments, self._spacing)[0]).joined(segments.ends())

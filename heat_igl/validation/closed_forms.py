@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from heat_igl.errors import ReferenceSolverError
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import ArrayLike, FloatArray
 
@@ -22,12 +22,12 @@ __all__ = ["cone", "convex_solid", "cylinder", "flat_torus", "plane", "sphere"]
 _TOLERANCE = 1e-6
 
 
-def plane(mesh: Mesh, sources: Sources) -> FloatArray:
+def plane(mesh: MeshLike, sources: Sources) -> FloatArray:
     """Length of the straight line, the distance in a convex planar domain.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles that fill one convex piece of a plane, in any position.
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices.
@@ -43,6 +43,7 @@ def plane(mesh: Mesh, sources: Sources) -> FloatArray:
     SourceError
         If the sources name no vertex of the mesh.
     """
+    mesh = as_simplices(mesh)
     used = mesh.V[mesh.referenced]
     centred = used - used.mean(axis=0)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
@@ -53,23 +54,24 @@ def plane(mesh: Mesh, sources: Sources) -> FloatArray:
     return _nearest(mesh, sources, lambda source: np.linalg.norm(mesh.V - mesh.V[source], axis=1))
 
 
-def convex_solid(mesh: Mesh, sources: Sources) -> FloatArray:
+def convex_solid(mesh: MeshLike, sources: Sources) -> FloatArray:
     """Length of the straight line, the distance in a convex solid of tetrahedra.
 
     Parameters, result and errors are those of `plane`, for tetrahedra.
     """
+    mesh = as_simplices(mesh)
     if not mesh.is_tetrahedral:
         raise ReferenceSolverError("the mesh holds no tetrahedra: use reference.exact on a surface")
     _require_convex(mesh.V[mesh.referenced], float(mesh.measures.sum()))
     return _nearest(mesh, sources, lambda source: np.linalg.norm(mesh.V - mesh.V[source], axis=1))
 
 
-def sphere(mesh: Mesh, sources: Sources, *, center: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
+def sphere(mesh: MeshLike, sources: Sources, *, center: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
     """Length of the great circle arc on the sphere around `center` whose radius is that of the vertices.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Vertices on a sphere.
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices.
@@ -87,6 +89,7 @@ def sphere(mesh: Mesh, sources: Sources, *, center: ArrayLike = (0.0, 0.0, 0.0))
     SourceError
         If the sources name no vertex of the mesh.
     """
+    mesh = as_simplices(mesh)
     P = mesh.V - np.asarray(center, dtype=np.float64)
     radius = _common("distance from the center", np.linalg.norm(P[mesh.referenced], axis=1))
 
@@ -98,11 +101,12 @@ def sphere(mesh: Mesh, sources: Sources, *, center: ArrayLike = (0.0, 0.0, 0.0))
     return _nearest(mesh, sources, arcs)
 
 
-def cylinder(mesh: Mesh, sources: Sources) -> FloatArray:
+def cylinder(mesh: MeshLike, sources: Sources) -> FloatArray:
     """Length of the shortest helix on the side of a cylinder around the z axis, without caps.
 
     The radius is that of the vertices. Parameters, result and errors are those of `sphere`.
     """
+    mesh = as_simplices(mesh)
     radius = _common("distance from the z axis", np.linalg.norm(mesh.V[mesh.referenced, :2], axis=1))
     angle = np.arctan2(mesh.V[:, 1], mesh.V[:, 0])
     return _nearest(
@@ -112,12 +116,12 @@ def cylinder(mesh: Mesh, sources: Sources) -> FloatArray:
     )
 
 
-def cone(mesh: Mesh, sources: Sources, *, apex: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
+def cone(mesh: MeshLike, sources: Sources, *, apex: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
     """Length of the straight line on the unrolled side of a circular cone around an axis parallel to z, without base.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Vertices on a cone, up to and including its apex: around a hole at the tip, paths would be longer.
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices.
@@ -135,6 +139,7 @@ def cone(mesh: Mesh, sources: Sources, *, apex: ArrayLike = (0.0, 0.0, 0.0)) -> 
     SourceError
         If the sources name no vertex of the mesh.
     """
+    mesh = as_simplices(mesh)
     P = mesh.V - np.asarray(apex, dtype=np.float64)
     slant = np.linalg.norm(P, axis=1)
     away = mesh.referenced & (slant > _TOLERANCE * slant.max())

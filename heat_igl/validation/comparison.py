@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from heat_igl.errors import FactorizationError, MeshError, MissingExtraError, ReferenceSolverError, SourceError
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.reference import MEMORY, TIMEOUT, edge_paths, straight_lines
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -20,7 +20,7 @@ __all__ = ["METHODS", "Method", "Progress", "Solver", "draw_sources", "validate"
 
 
 def validate(
-    mesh: Mesh,
+    mesh: MeshLike,
     sources: Sources | Sequence[Sources],
     methods: Sequence[Method] = ("heat", "sweep", "unfold", "meshlab", "igl"),
     reference: str | ArrayLike | Callable[[Mesh, IntArray], FloatArray] | None = "exact",
@@ -34,7 +34,7 @@ def validate(
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles; for tetrahedra, give a `reference` of your own.
     sources : sources, or sequence of sources
         One set of sources (an index, a sequence of indices, a mask), or a sequence of sets, with one distance for each:
@@ -62,20 +62,28 @@ def validate(
 
     Raises
     ------
-    ReferenceSolverError, MissingExtraError
-        If the reference itself fails.
+    MissingExtraError
+        If the reference needs a library that is not installed. A reference that fails on this mesh only leaves the
+        errors empty: `ValidationReport.failure` has the reason.
     SourceError
         If the sources do not name vertices of the mesh.
     ValueError
         If a method is unknown, or two have one name; if the reference has the wrong shape.
     """
+    mesh = as_simplices(mesh)
     sets = _source_sets(sources, mesh.n_vertices)
     chosen = [resolved(method) for method in methods]
     if len({label for label, _ in chosen}) < len(chosen):
         raise ValueError(f"methods must have different names, not {', '.join(label for label, _ in chosen)}")
     counter = Counter(progress, len(sets) * (len(chosen) + (reference is not None)))
     bounds = {"timeout": timeout, "memory": memory}
-    label, truths, known = _truths(mesh, sets, reference, bounds, counter)
+    failure = None
+    try:
+        label, truths, known = _truths(mesh, sets, reference, bounds, counter)
+    except ReferenceSolverError as error:
+        # The rest of the report needs no reference.
+        label, truths, known, failure = str(reference), None, None, str(error)
+        counter.end_method()
     limits = [(straight_lines(mesh, sources), edge_paths(mesh, sources)) for sources in sets]
     rows, distances = [], {}
     for method, prepare in chosen:
@@ -84,6 +92,8 @@ def validate(
                 found = known
                 counter.begin_method(len(sets))
                 counter.end_method()
+            elif failure is not None and method == label:
+                raise ReferenceSolverError(failure)
             else:
                 found = run(mesh, sets, method, prepare, bounds, counter)
         except (ReferenceSolverError, MissingExtraError, FactorizationError, MeshError) as error:
@@ -93,10 +103,10 @@ def validate(
         distances[method] = found.distances
         rows.append(_row(mesh, sets, method, found, truths, limits))
     counter.finish()
-    return ValidationReport(name, mesh, label, tuple(sets), tuple(rows), truths, distances)
+    return ValidationReport(name, mesh, label, tuple(sets), tuple(rows), truths, distances, failure)
 
 
-def draw_sources(mesh: Mesh, count: int, seed: int = 0) -> list[list[int]]:
+def draw_sources(mesh: MeshLike, count: int, seed: int = 0) -> list[list[int]]:
     """Single sources for `validate`: `count` random vertices of the component with the most faces, all different.
 
     Raises
@@ -104,6 +114,7 @@ def draw_sources(mesh: Mesh, count: int, seed: int = 0) -> list[list[int]]:
     SourceError
         If that component has fewer vertices than `count`, or `count` is not positive.
     """
+    mesh = as_simplices(mesh)
     label = np.bincount(mesh.components[mesh.F[:, 0]]).argmax()
     candidates = np.flatnonzero(mesh.components == label)
     if not 1 <= count <= len(candidates):

@@ -13,7 +13,7 @@ from typing import Any
 import igl
 import numpy as np
 
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.reference import edge_paths, straight_lines
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
@@ -129,12 +129,14 @@ def relative_error(distance: ArrayLike, truth: ArrayLike) -> FloatArray:
     return error
 
 
-def error_summary(mesh: Mesh, distances: ArrayLike, truths: ArrayLike, source_sets: Sequence[Sources]) -> ErrorSummary:
+def error_summary(
+    mesh: MeshLike, distances: ArrayLike, truths: ArrayLike, source_sets: Sequence[Sources]
+) -> ErrorSummary:
     """All error norms of some distances.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Gives the areas and neighbours of vertices.
     distances, truths : (k, n) array_like
         One row per set of sources.
@@ -152,6 +154,7 @@ def error_summary(mesh: Mesh, distances: ArrayLike, truths: ArrayLike, source_se
     SourceError
         If an entry does not name vertices of the mesh.
     """
+    mesh = as_simplices(mesh)
     d, x = _same_shape(distances, truths)
     if d.shape != (len(source_sets), mesh.n_vertices):
         raise ValueError(
@@ -177,12 +180,12 @@ def error_summary(mesh: Mesh, distances: ArrayLike, truths: ArrayLike, source_se
     )
 
 
-def eikonal_residual(mesh: Mesh, distance: ArrayLike) -> FloatArray:
+def eikonal_residual(mesh: MeshLike, distance: ArrayLike) -> FloatArray:
     """Residual of the eikonal equation |grad d| = 1 on each face: | |grad d| - 1 |.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles or tetrahedra.
     distance : (n,) array_like
         In the mesh's unit.
@@ -193,6 +196,7 @@ def eikonal_residual(mesh: Mesh, distance: ArrayLike) -> FloatArray:
         NaN on faces that are degenerate or not reached. It does not vanish at the sources and across the cut locus for
         any discrete distance, so its mean tends to 0 with the edge length, and its maximum does not.
     """
+    mesh = as_simplices(mesh)
     d = np.asarray(distance, dtype=np.float64)
     reached = np.isfinite(d)[mesh.F].all(axis=1) & (mesh.measures > 0)
     gradient = igl.grad(mesh.V, mesh.F[reached]) @ _finite(d)
@@ -238,13 +242,13 @@ def triangle_violations(distances: ArrayLike, sources: ArrayLike) -> TriangleVio
 
 
 def bound_violations(
-    mesh: Mesh, distance: ArrayLike, sources: Sources, limits: tuple[FloatArray, FloatArray] | None = None
+    mesh: MeshLike, distance: ArrayLike, sources: Sources, limits: tuple[FloatArray, FloatArray] | None = None
 ) -> BoundViolations:
     """Check a distance against the straight line from below and paths along edges from above.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : mesh
         Triangles or tetrahedra.
     distance : (n,) array_like
         In the mesh's unit; vertices at which it is not finite are left out.
@@ -257,6 +261,7 @@ def bound_violations(
     -------
     BoundViolations
     """
+    mesh = as_simplices(mesh)
     d = np.asarray(distance, dtype=np.float64)
     lower, upper = limits or (straight_lines(mesh, sources), edge_paths(mesh, sources))
     inside = np.isfinite(d) & np.isfinite(upper) & (upper > 0)

@@ -106,6 +106,8 @@ class ValidationReport:
         Distances of the reference.
     distances : dict of str to (k, n) float64
         Distances of each method that did not fail.
+    failure : str or None
+        The reason why the reference failed, which leaves the errors of all rows empty; None if it did not.
     """
 
     name: str
@@ -115,6 +117,7 @@ class ValidationReport:
     rows: tuple[ValidationRow, ...]
     truths: FloatArray | None = field(repr=False)
     distances: Mapping[str, FloatArray] = field(repr=False)
+    failure: str | None = None
 
     def exceeding(self, percent: float) -> tuple[ValidationRow, ...]:
         """The rows that do not prove a mean relative error of at most `percent`.
@@ -136,6 +139,7 @@ class ValidationReport:
             "n_vertices": self.mesh.n_vertices,
             "n_faces": self.mesh.n_faces,
             "reference": self.reference,
+            "reference_failure": self.failure,
             "sources": [sources.tolist() for sources in self.source_sets],
             "rows": [row.to_dict() for row in self.rows],
         }
@@ -143,6 +147,8 @@ class ValidationReport:
     def to_markdown(self) -> str:
         """A table with one line per method, errors in percent, and below it why a method failed or warned."""
         against = f"errors against {self.reference}" if self.reference else "no reference"
+        if self.failure is not None:
+            against = f"no errors, since {self.reference} failed"
         lines = [
             f"**{self.name}**: {self.mesh.n_vertices} vertices, {self.mesh.n_faces} faces, "
             f"{len(self.source_sets)} {'set' if len(self.source_sets) == 1 else 'sets'} of sources, {against}",
@@ -151,7 +157,8 @@ class ValidationReport:
             "|---" + "|---:" * (len(_COLUMNS) - 1) + "|",
         ]
         lines += ["| " + " | ".join(_cells(row)) + " |" for row in self.rows]
-        said = [(row.method, text) for row in self.rows for text in (row.failure, *row.notes) if text]
+        said = [] if self.failure is None else [(f"reference {self.reference}", self.failure)]
+        said += [(row.method, text) for row in self.rows for text in (row.failure, *row.notes) if text]
         remarks = ["", *(f"- {method}: {text}" for method, text in said)] if said else []
         return "\n".join([*lines, *remarks]) + "\n"
 
@@ -176,7 +183,8 @@ class ValidationReport:
             If there is no reference, or nothing to draw.
         """
         if self.truths is None or not self.distances:
-            raise ValueError("there are no errors to draw: the report has no reference, or every method failed")
+            reason = self.failure or "the report has no reference, or every method failed"
+            raise ValueError(f"there are no errors to draw: {reason}")
         title = f"{self.name}: relative error against {self.reference}"
         distances = {method: rows[case] for method, rows in self.distances.items()}
         return error_figure(title, self.mesh, self.truths[case], distances)

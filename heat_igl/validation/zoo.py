@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from heat_igl.mesh import Mesh
-from heat_igl.shapes import book, cone, cylinder, disk, grid, icosphere, lattice_faces, strip, torus
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.validation.shapes import book, cone, cylinder, disk, grid, icosphere, lattice_faces, strip, torus
 
 __all__ = ["SHAPES", "Shape"]
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import importlib.util
 import time
 from pathlib import Path
 
 import numpy as np
 
-from heat_igl import reference, shapes
+from heat_igl import reference
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
+from heat_igl.validation import shapes
+from heat_igl.validation.samples import bunny_path
 
 __all__ = ["demonstrate", "sample_mesh"]
 
@@ -22,13 +23,8 @@ _Rows = list[tuple[str, str]]
 
 
 def sample_mesh() -> Path | None:
-    """Path of the bunny in the pymeshlab wheel, or None without pymeshlab. pymeshlab is not imported."""
-    found = importlib.util.find_spec("pymeshlab")
-    for folder in (found.submodule_search_locations or []) if found else []:
-        for path in (Path(folder, "tests/sample_meshes/bunny.obj"), Path(folder, "sample_meshes/bunny.obj")):
-            if path.is_file():
-                return path
-    return None
+    """Path of the bunny in the pymeshlab wheel, or None without pymeshlab: `heat_igl.sample_mesh` gives a mesh."""
+    return bunny_path()
 
 
 def demonstrate(out: Path) -> list[tuple[str, str]]:
@@ -51,9 +47,7 @@ def demonstrate(out: Path) -> list[tuple[str, str]]:
     ply, png = out / f"{name}.ply", out / f"{name}.png"
     rows: _Rows = []
     if path is None:
-        rows.append(
-            ("note", 'no bunny, since pymeshlab is missing (pip install "heat-igl[validate]"); taking a sphere')
-        )
+        rows.append(("note", "no bunny, since pymeshlab is missing (pip install pymeshlab); taking a sphere"))
     start = time.perf_counter()
     mesh = read_mesh(path) if path else shapes.icosphere(5)
     rows.append((name, f"{mesh.n_vertices} vertices, {mesh.n_faces} triangles ({_since(start)} to read or make)"))

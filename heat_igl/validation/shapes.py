@@ -15,6 +15,7 @@ from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = [
+    "blob",
     "book",
     "box",
     "cone",
@@ -108,6 +109,16 @@ def icosphere(subdivisions: int) -> Mesh:
         V, F = igl.upsample(V, F)
         V /= np.linalg.norm(V, axis=1, keepdims=True)
     return Mesh(V / np.linalg.norm(V, axis=1, keepdims=True), F)
+
+
+def blob(subdivisions: int) -> Mesh:
+    """A smooth closed surface with bumps and hollows: `icosphere` with each vertex moved along its direction.
+
+    The radius in a direction (x, y, z) is 1 + 0.3 (sin 4x cos 3y + sin 3z).
+    """
+    sphere = icosphere(subdivisions)
+    x, y, z = sphere.V.T
+    return sphere.with_vertices((1 + 0.3 * (np.sin(4 * x) * np.cos(3 * y) + np.sin(3 * z)))[:, None] * sphere.V)
 
 
 def cylinder(around: int, along: int, length: float = 2 * np.pi) -> Mesh:

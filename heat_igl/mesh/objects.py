@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io.files import read_mesh
-from heat_igl.mesh import Mesh, PolygonMesh
+from heat_igl.mesh.mesh import Mesh
+from heat_igl.mesh.polygons import PolygonMesh
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
-__all__ = ["MeshLike", "as_mesh"]
+__all__ = ["MeshLike", "as_mesh", "as_simplices", "read_paths_with"]
 
 MeshLike = Any
 """`Mesh`, `PolygonMesh`, a pair (V, F), a path, or a mesh of another library, see `as_mesh`."""
@@ -24,6 +24,14 @@ _UNDERSTOOD = (
 )
 # Cells by the names of meshio and by the numbers of VTK.
 _TRIANGLES, _QUADS, _POLYGONS, _TETRAHEDRA = ("triangle", 5), ("quad", 9), ("polygon", 7), ("tetra", 10)
+
+
+_readers: list[Callable[[str | os.PathLike[str]], Mesh]] = []
+
+
+def read_paths_with(reader: Callable[[str | os.PathLike[str]], Mesh]) -> None:
+    """Let `as_mesh` read paths with `reader`: files are the business of a room above this one."""
+    _readers[:] = [reader]
 
 
 def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh:
@@ -61,16 +69,25 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh:
     if isinstance(mesh, (Mesh, PolygonMesh)):
         return mesh
     if isinstance(mesh, (str, os.PathLike)):
-        return read_mesh(mesh)
+        return _readers[0](mesh)
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
         return Mesh(*mesh)
     if isinstance(mesh, np.ndarray):
-        raise MeshError("faces F are missing: pass a mesh, or positions V and faces F")
+        raise MeshError("faces F are missing: pass a mesh, positions V and faces F, or a pair (V, F)")
     for convert in _CONVERSIONS:
         found = convert(mesh)
         if found is not None:
             return found
     raise MeshError(f"mesh is {_named(mesh)}, which is not understood: pass {_UNDERSTOOD}")
+
+
+def as_simplices(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh:
+    """A mesh of any library as triangles or tetrahedra: `as_mesh`, with polygons cut into their triangles.
+
+    The vertices are those of `as_mesh`. Arguments and errors are those of `as_mesh`, too.
+    """
+    found = as_mesh(mesh, F)
+    return found.triangles if isinstance(found, PolygonMesh) else found
 
 
 def _named(mesh: object) -> str:

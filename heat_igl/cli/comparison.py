@@ -1,0 +1,73 @@
+"""Commands that judge: the report of a mesh, and the validation of methods on it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+
+import heat_igl
+from heat_igl.cli.options import MeshArgument, positive
+from heat_igl.cli.output import check_outputs, check_writable, print_rows, say
+from heat_igl.drawing.output import Picture
+from heat_igl.io import complete_file, read_mesh
+from heat_igl.reference.guarded import TIMEOUT
+from heat_igl.validation import METHODS, draw_sources
+
+__all__ = ["COMMANDS"]
+
+_DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
+
+
+def info(mesh: MeshArgument) -> None:
+    """Describe a mesh: sizes, defects, and properties that affect distances."""
+    print_rows(read_mesh(mesh).report().rows())
+
+
+def validate(
+    mesh: MeshArgument,
+    sources: Annotated[int, typer.Option(min=1, help="Single source vertices, one distance from each.")] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="For drawing them.")] = 0,
+    methods: Annotated[str, typer.Option(help=f"Separated by commas: {', '.join(METHODS)}.")] = _DEFAULT_METHODS,
+    reference: Annotated[str, typer.Option(help="Method to measure errors against.")] = "exact",
+    timeout: Annotated[float, typer.Option(help="Seconds for one native solve.", callback=positive)] = TIMEOUT,
+    json_file: Annotated[Path | None, typer.Option("--json", help="JSON file for the report.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for errors on the surface.")] = None,
+    fail_above: Annotated[
+        float | None,
+        typer.Option(metavar="PERCENT", help="Exit with 1 if a mean error is larger.", callback=positive),
+    ] = None,
+) -> None:
+    """Errors of methods against a reference, with time and memory."""
+    loaded = read_mesh(mesh)
+    drawn_sources = draw_sources(loaded, sources, seed)
+    check_outputs(loaded, None, picture)
+    if json_file is not None:
+        check_writable(json_file)
+    console = Console(stderr=True)
+    # Without a terminal there is no bar, not even the empty line after a finished one.
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=None)
+        report = heat_igl.validate(
+            loaded, drawn_sources, [name.strip() for name in methods.split(",")], reference, name=mesh.stem,
+            timeout=timeout,
+            progress=lambda label, done, total: bar.update(task, description=label, completed=done, total=total),
+        )  # fmt: skip
+    if picture is not None:
+        Picture(report.plot()).save(picture)
+    if json_file is not None:
+        with complete_file(json_file) as temporary:
+            temporary.write_bytes((json.dumps(report.to_dict(), indent=1, allow_nan=False) + "\n").encode("utf8"))
+    print(report.to_markdown(), end="")
+    exceeding = report.exceeding(fail_above) if fail_above is not None else ()
+    if exceeding:
+        names = ", ".join(row.method for row in exceeding)
+        say(f"no mean error of at most {fail_above:g} % for {names}")
+        raise typer.Exit(1)
+
+
+COMMANDS = (info, validate)

@@ -1,0 +1,192 @@
+"""Commands that measure: a distance, its isolines, a shortest path."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import fields
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import numpy as np
+import typer
+from rich.console import Console
+
+import heat_igl
+from heat_igl.cli.options import MeshArgument, choice, position, positive
+from heat_igl.cli.output import check_curves, check_outputs, print_rows
+from heat_igl.errors import SourceError
+from heat_igl.heat_method import DistanceMethod, HeatMethodSolver, Magnitude, SolverOptions, geodesic_distance
+from heat_igl.io import read_mesh, write_mesh
+from heat_igl.linear import Backend
+from heat_igl.mesh import Mesh, closest_points
+from heat_igl.operators import Laplacian
+from heat_igl.sources import vertex_sources
+from heat_igl.steps import Boundary
+from heat_igl.typing import FloatArray
+from heat_igl.unfolding import Refine
+
+__all__ = ["COMMANDS"]
+
+# Largest number of isolines; a larger number indicates a wrong spacing.
+_MOST_LINES = 10000
+
+
+def distance(
+    mesh: MeshArgument,
+    source: Annotated[list[int] | None, typer.Option(help="Source vertex, counted from 0; repeat for several.")] = None,
+    at: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y,Z", help="Source at the closest point of the surface; repeatable.")
+    ] = None,
+    method: Annotated[
+        str | None,
+        choice(DistanceMethod, "Default: unfold, near-exact; heat on tetrahedra and with one of the options of heat."),
+    ] = None,
+    cutoff: Annotated[float | None, typer.Option(help="Distances beyond this are inf.", callback=positive)] = None,
+    output: Annotated[Path | None, typer.Option(help="PLY or VTU file for mesh and distance.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for a picture.")] = None,
+    t_coef: Annotated[
+        float | None, typer.Option(help="Heat: time step in squared mean edge lengths.", callback=positive)
+    ] = None,
+    t: Annotated[float | None, typer.Option(help="Heat: time step, a squared length.", callback=positive)] = None,
+    laplacian: Annotated[str, choice(Laplacian, "Heat: triangulation to solve on.")] = "intrinsic-delaunay",
+    boundary: Annotated[str, choice(Boundary, "Heat: what heat does at the boundary.")] = "neumann",
+    magnitude: Annotated[str, choice(Magnitude, "Heat: length of the field that is integrated.")] = "auto",
+    refine: Annotated[str | None, choice(Refine, "Heat: unfold triangles in its order, near-exact.")] = None,
+    backend: Annotated[str, choice(Backend, "Heat: linear solver.")] = "auto",
+) -> None:
+    """Distance from one or more sources: vertices, or points of the surface."""
+    loaded = read_mesh(mesh)
+    if not source and not at:
+        raise SourceError("no source: name vertices with --source, or positions with --at x,y,z")
+    vertices = vertex_sources(np.array(source), loaded.n_vertices) if source else None
+    sources: Any = vertices
+    gaps: list[tuple[str, str]] = []
+    if at:
+        points, gap = closest_points(loaded, [position(text) for text in at])
+        sources = points if vertices is None else [vertices, points]
+        gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap))]
+    check_outputs(loaded, output, picture)
+    options = SolverOptions(
+        t_coef,
+        t,
+        cast(Laplacian, laplacian),
+        cast(Boundary, boundary),
+        cast(Magnitude, magnitude),
+        cast(Refine | None, refine),
+        cast(Backend, backend),
+    )
+    chosen = _method(method, options, loaded)
+    with Console(stderr=True).status("measuring"):
+        phi, about = _measured(loaded, sources, chosen, options, cutoff)
+    written = _write(loaded, phi, vertices, output, picture)
+    rows = [*_summary(mesh, loaded, phi), ("method", chosen), *about, *gaps]
+    print_rows([*rows, *(("wrote", str(path)) for path in written)])
+
+
+def _method(method: str | None, options: SolverOptions, mesh: Mesh) -> DistanceMethod:
+    """The method that is meant: options of the heat method ask for it, and tetrahedra leave no other."""
+    given = [field.name for field in fields(options) if getattr(options, field.name) != field.default]
+    if method not in (None, "heat") and given:
+        raise ValueError(
+            f"--{given[0].replace('_', '-')} is an option of the heat method, but --method is {method}: leave one of "
+            "them away"
+        )
+    if method is None:
+        method = "heat" if given or mesh.is_tetrahedral else "unfold"
+    return cast(DistanceMethod, method)
+
+
+def _measured(
+    mesh: Mesh, sources: Any, method: DistanceMethod, options: SolverOptions, cutoff: float | None
+) -> tuple[FloatArray, list[tuple[str, str]]]:
+    """The distance, and what there is to say about how it was found."""
+    start = time.perf_counter()
+    if method != "heat":
+        phi = geodesic_distance(mesh, sources, method=method, cutoff=cutoff)
+        return phi, [("seconds", f"{time.perf_counter() - start:.3f}")]
+    solver = HeatMethodSolver.from_options(mesh, options)
+    start = time.perf_counter()
+    phi = solver.distance(sources, cutoff)
+    seconds = time.perf_counter() - start
+    found = solver.diagnostics
+    raised = " (raised, so that heat crosses the mesh in double precision)" if found.t_raised else ""
+    return phi, [
+        ("time step", f"{found.t:.6g}{raised}"),
+        ("flipped edges", str(found.n_flips)),
+        ("seconds", f"{found.seconds_operators + found.seconds_factorization:.3f} once, {seconds:.3f} per distance"),
+    ]
+
+
+def isolines(
+    mesh: MeshArgument,
+    source: Annotated[list[int], typer.Option(help="Source vertex, counted from 0; repeat for several.")],
+    spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=positive)],
+    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the lines.")],
+    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+) -> None:
+    """Curves of equal distance from one or more source vertices."""
+    loaded = read_mesh(mesh)
+    sources = vertex_sources(np.array(source), loaded.n_vertices)
+    check_curves(output)
+    phi = HeatMethodSolver(loaded, refine=cast(Refine | None, refine)).distance(sources)
+    farthest = float(phi[np.isfinite(phi)].max())
+    if farthest < spacing:
+        raise ValueError(f"--spacing {spacing:g} makes no line: the farthest vertex is at {farthest:.3g}")
+    if farthest > _MOST_LINES * spacing:
+        raise ValueError(
+            f"--spacing {spacing:g} makes over {_MOST_LINES} lines up to {farthest:.3g}: choose a larger one"
+        )
+    levels = spacing * np.arange(1, int(farthest / spacing) + 1)
+    curves = heat_igl.isolines(loaded, phi, levels)
+    heat_igl.write_curves(output, loaded, {f"{level:g}": each for level, each in zip(levels, curves, strict=True)})
+    rows = [("farthest", f"{farthest:.6g}"), ("lines", f"{sum(map(len, curves))} at {len(levels)} distances")]
+    print_rows([*rows, ("wrote", str(output))])
+
+
+def path(
+    mesh: MeshArgument,
+    start: Annotated[int, typer.Option("--from", help="Vertex where the path begins, counted from 0.")],
+    end: Annotated[int, typer.Option("--to", help="Vertex where it ends.")],
+    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the path.")],
+) -> None:
+    """A locally shortest path between two vertices."""
+    loaded = read_mesh(mesh)
+    for option, vertex in (("--from", start), ("--to", end)):
+        if not 0 <= vertex < loaded.n_vertices:
+            raise SourceError(f"{option} {vertex} is no vertex: the mesh has {loaded.n_vertices}, counted from 0")
+    check_curves(output)
+    found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), start, end)
+    heat_igl.write_curves(output, loaded, found)
+    length = float(found[0].lengths(loaded).sum())
+    print_rows([("length", f"{length:.6g}"), ("segments", str(len(found[0]))), ("wrote", str(output))])
+
+
+def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, picture: Path | None) -> list[Path]:
+    drawn = None
+    if picture is not None:
+        from heat_igl.drawing import plot
+
+        # Drawing comes before writing, since it may still fail.
+        with Console(stderr=True).status("drawing"):
+            drawn = plot(mesh, phi, sources=sources)
+    if output is not None:
+        write_mesh(output, mesh, distance=phi)
+    if drawn is not None and picture is not None:
+        drawn.save(picture)
+    return [path for path in (output, picture) if path is not None]
+
+
+def _summary(path: Path, mesh: Mesh, phi: FloatArray) -> list[tuple[str, str]]:
+    finite = np.isfinite(phi)
+    farthest = int(np.argmax(np.where(finite, phi, -1.0)))
+    kind = "tetrahedra" if mesh.is_tetrahedral else "triangles"
+    rows = [
+        ("mesh", f"{path}: {mesh.n_vertices} vertices, {mesh.n_faces} {kind}"),
+        ("farthest", f"{phi[farthest]:.6g} at vertex {farthest}"),
+    ]
+    if not finite.all():
+        rows.append(("unreachable", f"{int((~finite).sum())} vertices"))
+    return [*rows, ("mean", f"{phi[finite].mean():.6g}")]
+
+
+COMMANDS = (distance, isolines, path)

@@ -1,0 +1,49 @@
+"""Types of arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, get_args
+
+import numpy as np
+import typer
+
+from heat_igl.errors import SourceError
+
+__all__ = ["MeshArgument", "choice", "one_of", "position", "positive"]
+
+MeshArgument = Annotated[Path, typer.Argument(metavar="MESH", help="OFF, OBJ, PLY, STL, MESH, MSH or VTU file.")]
+
+
+def one_of(choices: tuple[str, ...]) -> Callable[[str | None], str | None]:
+    """A check that an option is one of `choices`."""
+
+    def check(value: str | None) -> str | None:
+        if value is not None and value not in choices:
+            raise typer.BadParameter(f"{value!r} is not one of {', '.join(choices)}")
+        return value
+
+    return check
+
+
+def positive(value: float | None) -> float | None:
+    """Check that an option is a positive number."""
+    if value is not None and not (np.isfinite(value) and value > 0):
+        raise typer.BadParameter(f"{value:g} is not a positive number")
+    return value
+
+
+def choice(kind: Any, text: str) -> Any:
+    """An option that takes one of the values of a Literal type; `text` is its help."""
+    choices = get_args(kind)
+    return typer.Option(help=text, metavar="|".join(choices), callback=one_of(choices))
+
+
+def position(text: str) -> list[float]:
+    """The three coordinates in the value of ``--at``."""
+    try:
+        x, y, z = (float(number) for number in text.split(","))
+    except ValueError:
+        raise SourceError(f"--at {text}: three numbers separated by commas are expected, such as 0.5,0,1.25") from None
+    return [x, y, z]

@@ -1,0 +1,76 @@
+"""Commands that show: a window or page, and the demonstration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, cast
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from heat_igl.cli.demo import demonstrate
+from heat_igl.cli.options import MeshArgument, choice, positive
+from heat_igl.cli.output import check_page, check_writable, print_rows, say
+from heat_igl.heat_method import SolverOptions
+from heat_igl.io import read_mesh
+from heat_igl.sources import vertex_sources
+from heat_igl.steps import Boundary
+from heat_igl.unfolding import Refine
+
+__all__ = ["COMMANDS"]
+
+
+def view(
+    mesh: MeshArgument,
+    source: Annotated[list[int] | None, typer.Option(help="Source vertex to start with; repeat for several.")] = None,
+    t_coef: Annotated[
+        float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=positive)
+    ] = None,
+    boundary: Annotated[str, choice(Boundary, "What heat does at the boundary.")] = "neumann",
+    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
+) -> None:
+    """A window in which a click moves the source and the distance follows; where there is no display, a page."""
+    from heat_igl.drawing.viewer import Exploration, Window, display_problem
+
+    loaded = read_mesh(mesh)
+    sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
+    options = SolverOptions(t_coef, boundary=cast(Boundary, boundary), refine=cast(Refine | None, refine))
+    target = html or Path(f"{mesh.stem}-view.html")
+    problem = None if html else display_problem()
+    if html or problem:
+        check_page(target)
+    with Console(stderr=True).status("factoring"):
+        shown = Exploration(loaded, sources, options)
+    if html is None and problem is None:
+        try:
+            window = Window(shown, title=f"heat-igl: {mesh.name}")
+        except RuntimeError as error:
+            problem = str(error)
+            check_page(target)
+        else:
+            window.run()
+            return
+    from heat_igl.drawing import write_html
+
+    kind = f"unfolded in heat order (refine = {refine})" if refine else "the heat method"
+    write_html(
+        target, loaded, shown.distance, sources=sources, title=mesh.name,
+        method=f"Distance by {kind}, t = {shown.t_coef:.3g} h^2, boundary {boundary}.",
+    )  # fmt: skip
+    if problem:
+        say(f"no window: {problem}")
+    print_rows([("mesh", f"{mesh}: {loaded.n_vertices} vertices"), ("wrote", f"{target} (open it in a browser)")])
+
+
+def demo(
+    out: Annotated[Path, typer.Option(help="Directory for the results; made if missing.")] = Path("heat-igl-demo"),
+) -> None:
+    """Distance on a real mesh, with errors against exact distance, files and a picture."""
+    out.mkdir(parents=True, exist_ok=True)
+    check_writable(out / "demo.png")
+    print_rows(demonstrate(out))
+
+
+COMMANDS = (view, demo)

@@ -1,0 +1,103 @@
+"""`geodesic_distance`: one question about one mesh, answered near-exactly unless asked otherwise."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Literal, get_args
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.heat_method.batches import checked_cutoff, cut_off
+from heat_igl.heat_method.solver import HeatMethodSolver
+from heat_igl.mesh import Mesh, MeshLike, as_mesh, as_simplices
+from heat_igl.sources import Sources
+from heat_igl.typing import FloatArray
+from heat_igl.unfolding import distance_from_scratch
+
+__all__ = ["DistanceMethod", "geodesic_distance"]
+
+DistanceMethod = Literal["unfold", "sweep", "heat", "exact"]
+
+# The module of exact windows, and its function of V, F and source vertices.
+_EXACT = "heat_igl.unfolding.exact", "exact_distance"
+
+
+def geodesic_distance(
+    mesh: MeshLike, sources: Sources, *, method: DistanceMethod = "unfold", cutoff: float | None = None
+) -> FloatArray:
+    """Geodesic distance from the nearest source, from scratch.
+
+    For one or two questions about a mesh. From the third on, keep a `HeatMethodSolver`: with ``refine="unfold"`` it
+    gives the same accuracy, and it is asked many times.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Whatever `as_mesh` takes: `Mesh`, `PolygonMesh`, a pair (V, F), a path, or a mesh of trimesh, pyvista, open3d,
+        meshio and others.
+    sources : sources
+        A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources` where
+        distance begins at other values than 0, or a list of such. Faces of points on polygons are counted as those of
+        ``PolygonMesh.triangles``.
+    method : {"unfold", "sweep", "heat", "exact"}
+        "unfold" follows straight lines through strips of triangles: near-exact, see `unfolded_distance`. "sweep"
+        unfolds two triangles at a time. Both go through the vertices in the order of Dijkstra's algorithm; polygons are
+        cut into triangles. "heat" is `HeatMethodSolver` with its defaults, the only one for tetrahedra; on polygons it
+        takes `polygon_operators`. "exact" is the polyhedral distance.
+    cutoff : float, optional
+        Distances beyond this are ``inf``.
+
+    Returns
+    -------
+    (n,) float64
+        In the mesh's unit: 0 at source vertices (their offset where they have one, unless another source is nearer),
+        ``inf`` at vertices that no source reaches, never negative or NaN.
+
+    Raises
+    ------
+    MeshError
+        If the mesh cannot be used or is not understood, or `method` needs triangles and it holds tetrahedra.
+    SourceError
+        If `sources` does not describe places on the mesh.
+    ValueError
+        If there is no such `method`, or `cutoff` is not positive.
+
+    Warns
+    -----
+    AccuracyWarning
+        As for `HeatMethodSolver`, with ``method="heat"``.
+
+    Examples
+    --------
+    >>> from heat_igl import geodesic_distance
+    >>> V = [[0, 0, 0], [3, 0, 0], [3, 4, 0], [0, 4, 0]]
+    >>> F = [[0, 1, 3], [1, 2, 3]]
+    >>> geodesic_distance((V, F), 0).tolist()
+    [0.0, 3.0, 5.0, 4.0]
+    """
+    if method not in get_args(DistanceMethod):
+        raise ValueError(f"method must be one of {', '.join(map(repr, get_args(DistanceMethod)))}, not {method!r}")
+    beyond = checked_cutoff(cutoff)
+    if method == "heat":
+        return HeatMethodSolver(as_mesh(mesh)).distance(sources, beyond)
+    triangles = as_simplices(mesh)
+    if triangles.is_tetrahedral:
+        raise MeshError(f'method={method!r} needs triangles, and the mesh holds tetrahedra: take method="heat"')
+    if method == "exact":
+        return _exact(triangles, sources, beyond)
+    return np.asarray(cut_off(distance_from_scratch(triangles, sources, method), beyond))
+
+
+def _exact(mesh: Mesh, sources: Sources, cutoff: float | None) -> FloatArray:
+    module, name = _EXACT
+    if find_spec(module) is None:
+        raise ValueError(
+            'method="exact" is not part of this version: take method="unfold", or heat_igl.reference.exact, which '
+            "calls other libraries"
+        )
+    distance: FloatArray = getattr(import_module(module), name)(
+        mesh.V, mesh.F, sources, cutoff=np.inf if cutoff is None else cutoff
+    )
+    return distance

@@ -1,0 +1,165 @@
+"""Polygons in space cut into triangles: fans around the first corner, or ears where a fan does not fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.mesh.grouping import enumerate_runs, next_in_run
+from heat_igl.typing import BoolArray, FloatArray, IntArray
+
+__all__ = ["triangulated", "triangle_fans"]
+
+# Twice the area of a triangle is rounded by some 1e-16 of the square of its polygon's extent; below this share of it a
+# triangle has no orientation.
+_ROUNDING = 1e-12
+
+
+def triangle_fans(corners: IntArray, degree: IntArray) -> IntArray:
+    """Triangles (sum of (degree - 2), 3): each polygon as a fan around its first corner."""
+    if (degree == 3).all():
+        return corners.reshape(-1, 3)
+    begin = np.repeat(np.cumsum(degree) - degree, degree)
+    position = np.arange(len(corners))
+    second = position[(position > begin) & (position < begin + np.repeat(degree, degree) - 1)]
+    return np.stack([corners[begin[second]], corners[second], corners[second + 1]], axis=1)
+
+
+def triangulated(V: FloatArray, corners: IntArray, degree: IntArray, shown: Callable[[int], str]) -> IntArray:
+    """Triangles of polygons, in the order of the polygons.
+
+    Parameters
+    ----------
+    V : (n, 3) float64
+        Positions.
+    corners : (sum of degree,) int64
+        Vertices of the polygons, one polygon after the other.
+    degree : (m,) int64
+        Number of corners of each polygon, at least three.
+    shown : callable
+        The name of the i-th polygon, for errors.
+
+    Returns
+    -------
+    (sum of (degree - 2), 3) int64
+        The fan of each polygon around its first corner. Where a triangle of the fan is turned over, or the fan goes
+        around its corner more than once, the polygon is concave, and its ears are clipped instead (Meisters 1975), in
+        the plane that its vector area is normal to.
+
+    Raises
+    ------
+    MeshError
+        If two sides of such a polygon cross each other; the message names the first.
+    """
+    F = triangle_fans(corners, degree)
+    if (degree == 3).all():
+        return F
+    wrong = _without_fan(V, F, corners, degree)
+    end, end_of_fan = np.cumsum(degree), np.cumsum(degree - 2)
+    for i in np.flatnonzero(wrong).tolist():
+        polygon = corners[end[i] - degree[i] : end[i]]
+        found = _ears(_flattened(V[polygon]))
+        if found is None:
+            raise MeshError(
+                f"{shown(i)}: sides of this polygon cross each other, so it has no inside: give its corners in order "
+                "around it, or split it"
+            )
+        F[end_of_fan[i] - degree[i] + 2 : end_of_fan[i]] = polygon[found]
+    return F
+
+
+def _vector_areas(V: FloatArray, corners: IntArray, degree: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Twice the vector area (m, 3) of each polygon, and the square (m,) of its extent."""
+    begin = np.cumsum(degree) - degree
+    following = next_in_run(corners, degree)
+    origin = np.repeat(V[corners[begin]], degree, axis=0)
+    one, other = V[corners] - origin, V[following] - origin
+    return (
+        np.add.reduceat(np.cross(one, other), begin),
+        np.maximum.reduceat(np.einsum("kx,kx->k", one, one), begin),
+    )
+
+
+def _without_fan(V: FloatArray, F: IntArray, corners: IntArray, degree: IntArray) -> BoolArray:
+    """Mask (m,) of the polygons whose fan, triangles `F`, folds over itself."""
+    normal, squared = _vector_areas(V, corners, degree)
+    area = np.linalg.norm(normal, axis=1)
+    owner, _ = enumerate_runs(degree - 2)
+    one, other = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
+    cross = np.cross(one, other)
+    turn = np.einsum("kx,kx->k", cross, normal[owner] / np.where(area > 0, area, 1)[owner, None])
+    room = _ROUNDING * squared
+    folded = turn < -room[owner]
+    # Without a vector area there is no normal to compare with: the polygon has no area, or crosses itself.
+    folded |= (area <= room)[owner] & (np.linalg.norm(cross, axis=1) > room[owner])
+    angle = np.arctan2(np.linalg.norm(cross, axis=1), np.einsum("kx,kx->k", one, other))
+    around = np.bincount(owner, angle, len(degree)) >= 2 * np.pi
+    return np.asarray((np.bincount(owner, folded, len(degree)) > 0) | around)
+
+
+def _flattened(P: FloatArray) -> FloatArray:
+    """Corners (d, 2) in the plane normal to the vector area, or in the best plane if that is 0; counter-clockwise."""
+    following = np.roll(P, -1, axis=0)
+    normal = np.cross(P - P[0], following - P[0]).sum(axis=0)
+    extent = P - P.mean(axis=0)
+    if np.linalg.norm(normal) <= _ROUNDING * float((extent**2).sum(axis=1).max()):
+        return np.asarray(extent @ np.linalg.svd(extent, full_matrices=False)[2][:2].T)
+    normal /= np.linalg.norm(normal)
+    across = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    across /= np.linalg.norm(across)
+    return np.asarray(extent @ np.stack([across, np.cross(normal, across)], axis=1))
+
+
+def _area(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """Twice the signed area of triangles in the plane."""
+    one, other = b - a, c - a
+    return np.asarray(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
+
+
+def _crosses_itself(p: FloatArray) -> bool:
+    """Whether two sides of a polygon (d, 2) cross each other in their inside."""
+    a, b = p, np.roll(p, -1, axis=0)
+    room = _ROUNDING * float(np.ptp(p, axis=0).max()) ** 2
+    side = np.stack([_area(a[:, None], b[:, None], q[None]) for q in (a, b)])
+    apart = (side[0] > room) & (side[1] < -room) | (side[0] < -room) & (side[1] > room)
+    return bool((apart & apart.T).any())
+
+
+def _ears(p: FloatArray) -> IntArray | None:
+    """Triangles (d - 2, 3) of a simple polygon (d, 2), counter-clockwise; None if it is not simple.
+
+    Of the ears at hand, the one with the largest ratio of area to squared lengths is clipped first.
+    """
+    if _crosses_itself(p):
+        return None
+    room = _ROUNDING * float(np.ptp(p, axis=0).max()) ** 2
+    left = list(range(len(p)))
+    triangles = []
+    while len(left) > 3:
+        q = p[left]
+        before, after = np.roll(q, 1, axis=0), np.roll(q, -1, axis=0)
+        area = _area(before, q, after)
+        is_ear = area > room
+        for k in np.flatnonzero(is_ear).tolist():
+            corners = before[k], q[k], after[k]
+            inside = np.ones(len(q), bool)
+            for a, b in zip(corners, (*corners[1:], corners[0]), strict=True):
+                inside &= _area(a, b, q) >= -room
+            # Other corners in the same place are those of a slit, which an ear may touch.
+            for corner in corners:
+                inside &= (q != corner).any(axis=1)
+            is_ear[k] = not inside.any()
+        if not is_ear.any():
+            # What is left has no area: corners on a line.
+            is_ear = np.abs(area) <= room
+            if not is_ear.any():
+                return None
+        lengths = ((q - before) ** 2 + (after - q) ** 2 + (before - after) ** 2).sum(axis=1)
+        k = int(np.argmax(np.where(is_ear, area / np.maximum(lengths, np.finfo(float).tiny), -np.inf)))
+        triangles.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
+        del left[k]
+    triangles.append(left)
+    found = np.array(triangles)
+    return found if (_area(*(p[found[:, c]] for c in range(3))) >= -room).all() else None

@@ -1,0 +1,33 @@
+"""A mesh that everybody has."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+from heat_igl.mesh import Mesh, as_simplices
+from heat_igl.validation import shapes
+
+__all__ = ["bunny_path", "sample_mesh"]
+
+
+def bunny_path() -> Path | None:
+    """Path of the bunny in the pymeshlab wheel, or None without pymeshlab. pymeshlab is not imported."""
+    found = importlib.util.find_spec("pymeshlab")
+    for folder in (found.submodule_search_locations or []) if found else []:
+        for path in (Path(folder, "tests/sample_meshes/bunny.obj"), Path(folder, "sample_meshes/bunny.obj")):
+            if path.is_file():
+                return path
+    return None
+
+
+def sample_mesh() -> Mesh:
+    """A closed surface to try things on: the Stanford bunny, or without pymeshlab, which ships it, a generated shape.
+
+    Returns
+    -------
+    Mesh
+        Connected triangles, over 2500 vertices; without pymeshlab `shapes.blob`.
+    """
+    path = bunny_path()
+    return shapes.blob(4) if path is None else as_simplices(path)

@@ -1,0 +1,270 @@
+"""`geodesic_distance`, and `as_mesh` in front of everything that takes a mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import flat_perturbed, load_script, perturbed
+
+import heat_igl
+from heat_igl import (
+    AccuracyWarning,
+    HeatMethodSolver,
+    Mesh,
+    MeshError,
+    OffsetSources,
+    PolygonMesh,
+    SourceError,
+    SurfacePoints,
+    closest_points,
+    edge_curve,
+    geodesic_distance,
+    reference,
+    shapes,
+    unfolded_distance,
+)
+
+SQUARE = flat_perturbed(shapes.grid(12))
+TORUS = perturbed(shapes.torus(20, 30))
+INSIDE = SurfacePoints([17, 250], [[0.2, 0.5, 0.3], [0.6, 0.3, 0.1]])
+
+
+def lines(mesh: Mesh, *places: tuple[Any, float]) -> np.ndarray:
+    """Distance in a convex part of the plane, from positions and where distance begins at each."""
+    return np.min([offset + np.linalg.norm(mesh.V - place, axis=1) for place, offset in places], axis=0)
+
+
+def in_the_plane() -> dict[str, tuple[Any, np.ndarray]]:
+    V, n = SQUARE.V, SQUARE.n_vertices
+    mask = np.zeros(n, bool)
+    mask[[3, 80]] = True
+    first, second = INSIDE.positions(SQUARE)
+    two = lines(SQUARE, (V[3], 0), (V[80], 0))
+    return {
+        "a vertex": (0, lines(SQUARE, (V[0], 0))),
+        "vertices": ([3, 80], two),
+        "a mask": (mask, two),
+        "points": (INSIDE, lines(SQUARE, (first, 0), (second, 0))),
+        "offsets at vertices": (OffsetSources([3, 80], [0.1, 0.3]), lines(SQUARE, (V[3], 0.1), (V[80], 0.3))),
+        "offsets at points": (OffsetSources(INSIDE, [0.2, 0]), lines(SQUARE, (first, 0.2), (second, 0))),
+        "a list": ([7, INSIDE], lines(SQUARE, (V[7], 0), (first, 0), (second, 0))),
+        "a curve": (edge_curve(SQUARE, np.arange(13)), V[:, 1]),  # the lower side
+    }
+
+
+@pytest.mark.parametrize("name", in_the_plane())
+@pytest.mark.parametrize("method", ["unfold", "sweep", "heat"])
+def test_distance_in_the_plane(name: str, method: Any) -> None:
+    sources, truth = in_the_plane()[name]
+    found = geodesic_distance(SQUARE, sources, method=method)
+    assert found.dtype == np.float64
+    allowed = {"unfold": 2e-3, "sweep": 0.02, "heat": 0.1}[method]
+    assert np.abs(found - truth).max() < allowed * truth.max()
+    if method == "unfold":
+        assert (found - truth).min() > -1e-9
+
+
+def test_methods_are_the_solvers() -> None:
+    np.testing.assert_array_equal(geodesic_distance(TORUS, 5, method="heat"), HeatMethodSolver(TORUS).distance(5))
+    np.testing.assert_array_equal(geodesic_distance(TORUS, 5), unfolded_distance(TORUS.V, TORUS.F, 5))
+    np.testing.assert_array_equal(geodesic_distance(TORUS, 5), geodesic_distance(TORUS, 5, method="unfold"))
+    by_heat = HeatMethodSolver(TORUS, refine="unfold").distance(5)
+    np.testing.assert_allclose(geodesic_distance(TORUS, 5), by_heat, atol=1e-3 * by_heat.max())
+
+
+def test_near_exact_by_default() -> None:
+    exact = reference.exact(TORUS, 5)
+    away = exact > 0
+    relative = geodesic_distance(TORUS, 5)[away] / exact[away] - 1
+    assert relative.min() > -1e-9
+    assert relative.mean() < 1e-4
+    assert (geodesic_distance(TORUS, 5, method="heat")[away] / exact[away] - 1).__abs__().mean() > 1e-3
+
+
+def test_beyond_the_cutoff_is_infinity() -> None:
+    whole = geodesic_distance(TORUS, 5)
+    for method in ("unfold", "sweep", "heat"):
+        whole = geodesic_distance(TORUS, 5, method=method)
+        near = geodesic_distance(TORUS, 5, method=method, cutoff=1)
+        np.testing.assert_array_equal(near, np.where(whole > 1, np.inf, whole))
+        np.testing.assert_array_equal(geodesic_distance(TORUS, 5, method=method, cutoff=np.inf), whole)
+    assert HeatMethodSolver(TORUS).distance(5, np.inf).max() < np.inf
+    assert np.isinf(HeatMethodSolver(TORUS).distance(5, 1.0)).any()
+
+
+def test_components_that_no_source_reaches() -> None:
+    two = Mesh(np.concatenate([SQUARE.V, SQUARE.V + 3]), np.concatenate([SQUARE.F, SQUARE.F + SQUARE.n_vertices]))
+    for sources in (0, INSIDE):
+        found = geodesic_distance(two, sources)
+        np.testing.assert_array_equal(np.isinf(found), np.arange(two.n_vertices) >= SQUARE.n_vertices)
+
+
+def test_polygons_and_tetrahedra() -> None:
+    x, y = np.meshgrid(np.arange(6.0), np.arange(5.0))
+    V = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+    corner = np.arange(4)[:, None] * 6 + np.arange(5)
+    quads = np.stack([corner, corner + 1, corner + 7, corner + 6], axis=-1).reshape(-1, 4)
+    mesh = PolygonMesh(V, quads)
+    truth = np.hypot(*V[:, :2].T)
+    np.testing.assert_allclose(geodesic_distance(mesh, 0), truth, atol=1e-9)
+    np.testing.assert_allclose(HeatMethodSolver(mesh, refine="unfold").distance(0), truth, atol=1e-9)
+    by_heat = heat_igl.HeatMethodSolver.from_operators(heat_igl.polygon_operators(mesh)).distance(0)
+    np.testing.assert_array_equal(geodesic_distance(mesh, 0, method="heat"), by_heat)
+    np.testing.assert_array_equal(HeatMethodSolver(mesh).distance(0), by_heat)
+    with pytest.raises(ValueError, match="laplacian='cotan' chooses a triangulation, but the mesh holds polygons"):
+        HeatMethodSolver(mesh, laplacian="cotan")
+
+    box = shapes.box(2)
+    np.testing.assert_array_equal(geodesic_distance(box, 0, method="heat"), HeatMethodSolver(box).distance(0))
+    for method in ("unfold", "sweep", "exact"):
+        with pytest.raises(MeshError, match=f"method='{method}' needs triangles.*take method=\"heat\""):
+            geodesic_distance(box, 0, method=method)
+
+
+def test_exact_windows_are_taken_where_they_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    front_door = heat_igl.heat_method.front_door
+    monkeypatch.setattr(front_door, "find_spec", lambda _: None)
+    with pytest.raises(ValueError, match='method="exact" is not part of this version.*method="unfold"'):
+        geodesic_distance(TORUS, 5, method="exact")
+    monkeypatch.setattr(front_door, "find_spec", lambda _: object())
+    module = SimpleNamespace(exact_distance=lambda V, F, sources, cutoff: np.full(len(V), cutoff) + sources)
+    monkeypatch.setattr(front_door, "import_module", lambda _: module)
+    assert geodesic_distance(TORUS, 5, method="exact", cutoff=2)[0] == 7
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"method": "guess"}, ValueError, "method must be one of 'unfold', 'sweep', 'heat', 'exact', not 'guess'"),
+        ({"cutoff": -1}, ValueError, "cutoff must be a positive number, not -1"),
+        ({"cutoff": "1"}, ValueError, "cutoff must be a positive number, not '1'"),
+        ({"sources": 10**6}, SourceError, r"sources\[0\] = 1000000 is no vertex"),
+        ({"mesh": 3}, MeshError, "mesh is of type int, which is not understood: pass a Mesh or PolygonMesh, a pair"),
+        ({"mesh": TORUS.V}, MeshError, r"faces F are missing: .* or a pair \(V, F\)"),
+    ],
+)
+def test_what_cannot_be_asked(arguments: dict[str, Any], error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        geodesic_distance(**{"mesh": TORUS, "sources": 0, **arguments})
+
+
+def test_unfolded_distance_takes_a_mesh_or_arrays() -> None:
+    expected = unfolded_distance(TORUS.V, TORUS.F, [2, 9])
+    for arguments in ((TORUS, [2, 9]), (TORUS, None, [2, 9]), ((TORUS.V, TORUS.F), [2, 9])):
+        np.testing.assert_array_equal(unfolded_distance(*arguments), expected)
+    np.testing.assert_array_equal(unfolded_distance(TORUS, sources=[2, 9]), expected)
+    np.testing.assert_array_equal(unfolded_distance(V=TORUS.V, F=TORUS.F, sources=[2, 9]), expected)
+
+
+def test_faces_that_are_there_twice_count_once() -> None:
+    twice = Mesh(TORUS.V, np.concatenate([TORUS.F, TORUS.F[100:400, [1, 2, 0]]]))
+    for method in ("unfold", "sweep"):
+        expected = geodesic_distance(TORUS, 5, method=method)
+        np.testing.assert_allclose(geodesic_distance(twice, 5, method=method), expected, atol=1e-9)
+    solver = HeatMethodSolver(twice, refine="unfold")
+    np.testing.assert_allclose(unfolded_distance(twice, 5), solver.distance(5), atol=1e-3 * expected.max())
+    # Faces of points are counted in the mesh as it is given.
+    there = SurfacePoints([TORUS.n_faces + 3], [[0.2, 0.3, 0.5]])
+    here = SurfacePoints([103], [[0.5, 0.2, 0.3]])
+    np.testing.assert_allclose(there.positions(twice), here.positions(TORUS))
+    np.testing.assert_allclose(geodesic_distance(twice, there), geodesic_distance(TORUS, here), atol=1e-9)
+
+
+OTHERS = SimpleNamespace(vertices=TORUS.V, faces=TORUS.F)
+PHI = TORUS.V[:, 0] + 3
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda mesh: HeatMethodSolver(mesh).distance(3),
+        lambda mesh: geodesic_distance(mesh, 3),
+        lambda mesh: unfolded_distance(mesh, 3),
+        lambda mesh: heat_igl.farthest_points(mesh, 4),
+        lambda mesh: heat_igl.farthest_cells(mesh, 4).labels,
+        lambda mesh: heat_igl.voronoi_cells(mesh, [3, 9]).distance,
+        lambda mesh: heat_igl.distance_matrix(mesh, [3, 9]),
+        lambda mesh: heat_igl.diameter(mesh, rounds=2)[0],
+        lambda mesh: heat_igl.geodesic_centre(mesh, mesh, [3, 9, 40]).barycentric,
+        lambda mesh: heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(mesh, 40)).F,
+        lambda mesh: heat_igl.shortest_paths(mesh, None, [40], 3)[0].lengths(mesh),
+        lambda mesh: heat_igl.isolines(mesh, PHI, 3.1)[0][0].positions(mesh),
+        lambda mesh: heat_igl.sublevel_areas(mesh, PHI, [3.1]),
+        lambda mesh: heat_igl.enclosed_areas(mesh, PHI, 3.1),
+        lambda mesh: heat_igl.offset_curves(mesh, HeatMethodSolver(mesh), 3, 0.5)[0].lengths(mesh),
+        lambda mesh: closest_points(mesh, [[1, 2, 3]]).gap,
+        lambda mesh: edge_curve(mesh, TORUS.F[0, :2]).positions(mesh),
+        lambda mesh: heat_igl.curve_on(mesh, TORUS.V[TORUS.F[0]]).positions(mesh),
+        lambda mesh: heat_igl.split_long_edges(mesh, 0.2).V,
+        lambda mesh: heat_igl.speed_operators(mesh, np.ones(TORUS.n_faces)).weights,
+        lambda mesh: reference.exact(mesh, 3),
+        lambda mesh: reference.straight_lines(mesh, 3),
+        lambda mesh: reference.edge_paths(mesh, 3),
+        lambda mesh: heat_igl.baselines.graph_distance(mesh, 3),
+        lambda mesh: heat_igl.baselines.varadhan(mesh, 3),
+        lambda mesh: heat_igl.metrics.eikonal_residual(mesh, PHI),
+        lambda mesh: heat_igl.validation.draw_sources(mesh, 3),
+        lambda mesh: heat_igl.validate(mesh, 3, ["heat"], None).distances["heat"],
+    ],
+)
+def test_every_mesh_is_taken(ask: Any) -> None:
+    expected = ask(TORUS)
+    for mesh in (OTHERS, (TORUS.V.tolist(), TORUS.F.tolist())):
+        np.testing.assert_array_equal(ask(mesh), expected)
+
+
+def test_files_and_pictures_of_other_meshes(tmp_path: Path) -> None:
+    heat_igl.write_mesh(tmp_path / "a.ply", OTHERS, distance=PHI)
+    heat_igl.write_mesh(tmp_path / "b.ply", TORUS, distance=PHI)
+    assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
+    np.testing.assert_array_equal(geodesic_distance(tmp_path / "a.ply", 3), geodesic_distance(TORUS, 3))
+    curves = heat_igl.isolines(OTHERS, PHI, [3.1, 3.2])
+    heat_igl.write_curves(tmp_path / "a.obj", OTHERS, curves)
+    heat_igl.write_curves(tmp_path / "b.obj", TORUS, [curve for level in curves for curve in level])
+    assert (tmp_path / "a.obj").read_bytes() == (tmp_path / "b.obj").read_bytes()
+    pytest.importorskip("matplotlib")
+    heat_igl.plots.picture(tmp_path / "a.png", OTHERS, PHI)
+    heat_igl.plots.write_html(tmp_path / "a.html", OTHERS, PHI)
+    assert {path.name for path in tmp_path.iterdir()} >= {"a.png", "a.html"}
+
+
+def test_a_batch_takes_other_meshes_too() -> None:
+    from heat_igl.cluster import collection
+
+    (item,) = collection.items([OTHERS])
+    np.testing.assert_array_equal(item.mesh.V, TORUS.V)
+    with pytest.raises(MeshError, match="000001: mesh is of type int, which is not understood"):
+        list(collection.items([OTHERS, 3]))
+
+
+def test_a_mesh_that_everybody_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = heat_igl.sample_mesh()
+    assert mesh.n_vertices > 2500
+    assert not mesh.is_tetrahedral
+    monkeypatch.setattr(heat_igl.validation.samples, "bunny_path", lambda: None)
+    blob = heat_igl.sample_mesh()
+    np.testing.assert_array_equal(blob.V, shapes.blob(4).V)
+    report = blob.report()
+    assert (report.n_components, report.euler_characteristic, report.n_boundary_loops) == (1, 2, 0)
+    assert not len(report.nonmanifold_vertices)
+    assert np.isfinite(geodesic_distance(blob, 1234)).all()
+
+
+@pytest.mark.parametrize(("kind", "unused"), [("unused", True), ("components", False)])
+def test_the_work_for_unused_vertices_and_components_is_linear(kind: str, unused: bool) -> None:
+    """What is looked at while an order of elimination is found, counted: at most so many times each vertex."""
+    from heat_igl.linear import dissection
+
+    work = load_script("scaling_table").dissection_work
+    for n in (10_000, 100_000, 1_000_000):
+        assert work(n, unused) <= dissection._TOGETHER * n, kind
+
+
+def test_large_steps_are_warned_about() -> None:
+    for options in ({"t": 1e4}, {"t_coef": 1e6}):
+        with pytest.warns(AccuracyWarning, match=f"{next(iter(options))} = 1e.* is very large: heat spreads over"):
+            HeatMethodSolver(TORUS, **options)
