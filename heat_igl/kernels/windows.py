@@ -604,6 +604,8 @@ def _settle(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.int:
     n_steps: cython.int
     if low >= high:
         return 4 if w.stop <= u.start else 0
+    if high - low < 0.2 * (u.stop - u.start) and high - low < 0.2 * (w.stop - w.start):
+        return 0
     difference = u.offset - w.offset
     if difference == 0.0:
         # |x - u|^2 - |x - w|^2 = b - a x

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation
-from heat_igl.kernels import windows
-from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, mollify
+from heat_igl.kernels import gluing, windows
+from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -26,6 +26,8 @@ __all__ = ["ExactSolution", "ExactSurface", "exact_distance"]
 _TOLERANCE = 1e-11
 # A point whose barycentric coordinate is below this lies on the side of its face.
 _ON_SIDE = 1e-13
+# A last bound on the work; meshes measured so far take less than one flip per face.
+_MOST_FLIPS_PER_FACE = 100
 _NO_VERTICES = np.empty(0, np.int64)
 
 
@@ -115,34 +117,67 @@ class ExactSurface:
     """
 
     def __init__(self, triangulation: IntrinsicTriangulation) -> None:
-        self.n = triangulation.n
-        self._triangulation = triangulation
-        F, twin = triangulation.F, triangulation.twin
-        m = len(F)
-        if 3 * m + self.n >= 2**30:
-            raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
-        # By a power of two, so that no digit changes and no square leaves the range of doubles.
-        self._exponent = int(np.frexp(triangulation.l.mean())[1])
-        vertex = F.ravel().astype(np.int32)
-        length = np.ldexp(triangulation.l.ravel(), -self._exponent)
-        self._surface = _Surface(
-            vertex,
-            length,
-            twin.astype(np.int32),
-            triangulation.aligned.astype(np.uint8),
+        self._triangulation: IntrinsicTriangulation | None = triangulation
+        exponent = _exponent(triangulation.l)
+        self._prepare(
+            triangulation.F.ravel().astype(np.int32),
+            triangulation.twin.astype(np.int32),
             _rings(triangulation),
+            triangulation.aligned.astype(np.uint8),
+            np.ldexp(triangulation.l.ravel(), -exponent),
+            triangulation.n,
+            exponent,
+        )
+
+    @classmethod
+    def _of_mesh(cls, mesh: Mesh, start: int) -> ExactSurface:
+        """The surface of a mesh that is asked once, for distances from vertices: no point can be located on it.
+
+        The triangulation is intrinsic Delaunay, but nothing says which edges were flipped; near vertex `start` comes
+        first in memory.
+        """
+        extent = _exponent(np.ptp(mesh.V[mesh.F[:, 0]], axis=0))
+        vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, np.ldexp(1.0, -extent))
+        if n_across:
+            return cls(intrinsic_delaunay(intrinsic_triangulation(mesh)))
+        length += mollify(length.reshape(-1, 3))
+        gluing.flip(vertex, twin, ring, length, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * mesh.n_faces)
+        exponent = _exponent(length)
+        surface = object.__new__(cls)
+        surface._triangulation = None
+        first_face = int(np.argmax(vertex == start)) // 3
+        surface._prepare(
+            vertex, twin, ring, aligned, np.ldexp(length, -exponent), mesh.n_vertices, exponent + extent, first_face
+        )
+        return surface
+
+    def _prepare(
+        self,
+        vertex: AnyArray,
+        twin: AnyArray,
+        ring: AnyArray,
+        aligned: AnyArray,
+        length: FloatArray,
+        n: int,
+        exponent: int,
+        first_face: int = 0,
+    ) -> None:
+        """Number vertices and faces anew, and derive what the kernel reads; lengths are in units of 2^exponent."""
+        m = len(vertex) // 3
+        if 3 * m + n >= 2**30:
+            raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
+        self.n, self._exponent = n, exponent
+        *tables, self._number, self._face = gluing.breadth_first(vertex, twin, ring, aligned, length, n, first_face)
+        derived = (
             np.empty(m),
             np.empty(3 * m),
-            np.full(self.n, -1, np.int32),
+            np.full(n, -1, np.int32),
             np.empty(3 * m, np.int32),
-            np.zeros(self.n, np.uint8),
-            False,
+            np.zeros(n, np.uint8),
         )
-        s = self._surface
-        is_delaunay = windows.shapes(
-            s.vertex, s.length, s.twin, s.double_area, s.bulge, s.corner_of_vertex, s.next_corner, s.kind
-        )
-        self._surface = s._replace(is_delaunay=is_delaunay)
+        vertex, twin, ring, aligned, length = tables
+        is_delaunay = windows.shapes(vertex, length, twin, *derived)
+        self._surface = _Surface(vertex, length, twin, aligned, ring, *derived, is_delaunay)
 
     def solve(
         self,
@@ -202,7 +237,7 @@ class ExactSurface:
         ends_early = goals is not None
         done = windows.search(
             *surface,
-            vertices.astype(np.int32),
+            self._number[vertices],
             begin,
             inside.faces,
             np.ascontiguousarray(inside.barycentric).ravel(),
@@ -215,7 +250,7 @@ class ExactSurface:
             crossing,
             np.empty(n, np.int32),
             np.full(len(surface.vertex), -1, np.int32),
-            np.asarray(goals, np.int32) if goals is not None else np.empty(0, np.int32),
+            self._number[_NO_VERTICES if goals is None else goals],
             first,
             following,
             place.faces,
@@ -232,34 +267,40 @@ class ExactSurface:
         )
         if not done:
             raise MemoryError("the windows of the exact distance do not fit into memory")
-        all_labels = np.concatenate([label, inside_label, [-1]])
-        target_labels = np.where(target_root >= 0, labels[target_root], -1)
-        distance, crossing, target_distance, target_crossing = (
-            np.ldexp(a, self._exponent) for a in (distance, crossing, target_distance, target_crossing)
-        )
+        within = distance <= np.ldexp(cutoff, -self._exponent)
+        target_within = target_distance <= np.ldexp(cutoff, -self._exponent)
         which = self._nearest_of(place, target_distance, 0 if targets is None else len(targets))
-        # Copies of a source point on a side are one point.
-        origin = np.concatenate([np.arange(n), n + inside.point, [-1]])
-        far = distance > cutoff
-        distance[far] = np.inf
-        root[far] = labels[:n][far] = entered[far] = -1
-        late = target_distance > cutoff
-        target_distance[late] = np.inf
-        target_root[late] = target_labels[late] = target_entered[late] = -1
+        all_labels = np.concatenate([label, inside_label, [-1]])
         return ExactSolution(
-            distance,
-            all_labels[labels[:n]],
-            origin[root],
-            entered.astype(np.int64),
-            crossing,
-            target_distance[which],
-            all_labels[target_labels[which]],
-            origin[target_root[which]],
-            target_entered[which].astype(np.int64),
-            target_crossing[which],
+            self._lengths(distance, within)[self._number],
+            all_labels[np.where(within, labels[:n], -1)[self._number]],
+            self._origins(root, within, inside)[self._number],
+            self._half_edges(entered, within)[self._number],
+            np.ldexp(crossing, self._exponent)[self._number],
+            self._lengths(target_distance, target_within)[which],
+            all_labels[np.where(target_within, labels[target_root], -1)[which]],
+            self._origins(target_root, target_within, inside)[which],
+            self._half_edges(target_entered, target_within)[which],
+            np.ldexp(target_crossing, self._exponent)[which],
             int(statistics[1]),
             int(statistics[2]),
         )
+
+    def _lengths(self, distance: FloatArray, within: BoolArray) -> FloatArray:
+        """Distances in the unit of the mesh, ``inf`` beyond the cutoff."""
+        return np.where(within, np.ldexp(distance, self._exponent), np.inf)
+
+    def _origins(self, root: AnyArray, within: BoolArray, inside: _Points) -> IntArray:
+        """Roots by the caller's numbers; copies of a source point on a side are one point."""
+        old = np.empty(self.n + len(inside.faces) + 1, np.int64)
+        old[self._number] = np.arange(self.n)
+        old[self.n : -1], old[-1] = self.n + inside.point, -1
+        return old[np.where(within, root, -1)]
+
+    def _half_edges(self, entered: AnyArray, within: BoolArray) -> IntArray:
+        """Half-edges by the caller's numbers."""
+        old = 3 * self._face[entered // 3].astype(np.int64) + entered % 3
+        return np.where(within & (entered >= 0), old, -1)
 
     def _starts(
         self,
@@ -279,7 +320,10 @@ class ExactSurface:
         late = late[place.point]
         at_corner = (place.barycentric == 0).sum(axis=1) == 2
         corner = place.barycentric[at_corner].argmax(axis=1)
-        vertices = np.concatenate([sources, self._triangulation.F[place.faces[at_corner], corner]])
+        named = np.empty(self.n, np.int64)
+        named[self._number] = np.arange(self.n)
+        at_corners = named[self._surface.vertex[3 * place.faces[at_corner] + corner]]
+        vertices = np.concatenate([sources, at_corners]).astype(np.int64)
         rest = _Points(*(a[~at_corner] for a in place))
         return (
             vertices,
@@ -294,31 +338,33 @@ class ExactSurface:
         """Points in the triangles; those on a side in each triangle there."""
         if points is None:
             return _Points(np.empty(0, np.int32), np.empty((0, 3)), _NO_VERTICES)
+        if self._triangulation is None:
+            raise ValueError("this surface was made for distances from vertices: make it from a triangulation")
         faces, barycentric = self._triangulation.locate(points.faces, points.barycentric)
+        new_face = np.empty(len(self._face), np.int64)
+        new_face[self._face] = np.arange(len(self._face))
+        faces = new_face[faces]
         barycentric = np.where(barycentric < _ON_SIDE, 0.0, barycentric)
         barycentric /= barycentric.sum(axis=1, keepdims=True)
         point = np.arange(len(faces))
         rows = [(faces, barycentric, point)]
-        twin, aligned = self._triangulation.twin, self._triangulation.aligned
-        i, c = np.nonzero((barycentric == 0) & ((barycentric == 0).sum(axis=1) == 1)[:, None])
-        here = 3 * faces[i] + c
-        start = here
+        on_side = (barycentric == 0) & ((barycentric == 0).sum(axis=1) == 1)[:, None]
+        i, c = np.nonzero(on_side)
+        start = here = 3 * faces[i] + c
+        s = self._surface
         while len(here):
             # To the next triangle at the side: the other one, or the next of many, until all have been met.
-            there = np.where(twin[here] >= 0, twin[here], np.where(twin[here] == -2, self._surface.ring[here], start))
+            there = np.where(s.twin[here] >= 0, s.twin[here], s.ring[here]).astype(np.int64)
             go_on = there != start
-            i, c, start, there, here = i[go_on], c[go_on], start[go_on], there[go_on], here[go_on]
-            same_way = np.where(
-                twin[start] >= 0,
-                ~aligned[start],
-                self._triangulation.tail(start) == self._triangulation.tail(there),
-            )
+            i, c, start, here = i[go_on], c[go_on], start[go_on], there[go_on]
+            is_glued = s.twin[start] >= 0
+            same_way = s.vertex[_following(start)] == s.vertex[_following(here)]
+            same_way = np.where(is_glued, s.aligned[start] == 0, same_way)
             tail, head = barycentric[i, (c + 1) % 3], barycentric[i, (c + 2) % 3]
             other, k = np.zeros((len(i), 3)), np.arange(len(i))
-            other[k, (there % 3 + 1) % 3] = np.where(same_way, tail, head)
-            other[k, (there % 3 + 2) % 3] = np.where(same_way, head, tail)
-            rows.append((there // 3, other, point[i]))
-            here = there
+            other[k, (here + 1) % 3] = np.where(same_way, tail, head)
+            other[k, (here + 2) % 3] = np.where(same_way, head, tail)
+            rows.append((here // 3, other, point[i]))
         faces, barycentric, point = (np.concatenate(column) for column in zip(*rows, strict=True))
         return _Points(faces.astype(np.int32), barycentric, point)
 
@@ -346,6 +392,16 @@ class ExactSurface:
         which = np.empty(n_points, np.int64)
         which[place.point[order]] = order
         return which
+
+
+def _following(half_edge: IntArray) -> IntArray:
+    """The next half-edge of the same face."""
+    return half_edge + 1 - 3 * (half_edge % 3 == 2)
+
+
+def _exponent(lengths: FloatArray) -> int:
+    """The power of two by which lengths are divided: no digit changes, and no square leaves the range of doubles."""
+    return int(np.frexp(lengths.mean())[1])
 
 
 def _rings(triangulation: IntrinsicTriangulation) -> AnyArray:
@@ -396,5 +452,4 @@ def exact_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, cutoff: floa
     if mesh.is_tetrahedral:
         raise MeshError("exact distance needs triangles, but F has 4 columns")
     chosen = vertex_sources(sources, mesh.n_vertices)
-    surface = ExactSurface(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-    return surface.solve(chosen, cutoff=cutoff).distance
+    return ExactSurface._of_mesh(mesh, int(chosen[0])).solve(chosen, cutoff=cutoff).distance
