@@ -96,7 +96,9 @@ cdef extern from *:
     #define SHADOW_MARGIN 1e-9
     #define NARROW 1e-14
     #define NEAR 1e-7
+    #define SAME 2e-14
     """
     double SHADOW_MARGIN
     double NARROW
     double NEAR
+    double SAME

@@ -786,6 +786,17 @@ def _trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.
             continue
         if j < k:
             memmove(windows + (j + 1), windows + j, (k - j) * cython.sizeof(Window))
+        elif j > 0 and fabs(windows[j - 1].x - w.x) <= SAME * (fabs(w.x) + w.depth):
+            # Two halves that passed a flat vertex are one again.
+            if (
+                windows[j - 1].root == w.root
+                and windows[j - 1].offset == w.offset
+                and fabs(windows[j - 1].depth - w.depth) <= SAME * (fabs(w.x) + w.depth)
+                and windows[j - 1].start <= w.start <= windows[j - 1].stop + narrow
+            ):
+                if w.stop > windows[j - 1].stop:
+                    windows[j - 1].stop = w.stop
+                continue
         windows[j] = w
         k += 1
     return k
