@@ -76,7 +76,7 @@ cdef struct Search:
     Window* to_right
     int n_out
     bint failed
-    long long n_windows, n_lists_done, n_emissions, n_live, most_live
+    long long n_windows, n_lists_done
     double tolerance
 
 cdef enum Kind:

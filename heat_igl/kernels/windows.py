@@ -1,4 +1,21 @@
-"""Exact polyhedral distance by windows (draft)."""
+"""Exact distance by windows: continuous Dijkstra over the faces of an intrinsic triangulation.
+
+A *window* is the part of a half-edge that straight lines from one root cross, all through the same faces; the root laid
+out in the plane before the half-edge gives the distance of every point of the window (Mitchell, Mount, Papadimitriou
+1987). Windows that enter a face over the same side wait there in one list and cross the face together, as in Qin et al.
+2016. What is different here is the order. The square of the key of a list is the power of the root with respect to the
+circle around the face that is entered next. On a Delaunay triangulation that power grows along every straight line from
+the root, it is no larger than the square of the distance of any vertex ahead, and it sorts the faces from front to back.
+So a list is nearly always complete when its turn comes, a face is crossed once from each side, and no vertex can come
+nearer than the key. On other triangulations the key is the distance of the nearest point of the windows.
+
+Before a list crosses its face, windows lose what is nearer over an end of the side (Xin and Wang 2009), what another
+window of the list reaches sooner, and what would cross a shorter way to the corner ahead. A vertex gets windows of its
+own where shortest paths can bend: where the angles around it exceed 2 pi, into the directions beyond a straight angle
+on both sides; at the boundary; and where faces are not one fan, into all faces.
+
+Half-edge ``3 f + c`` is the side of face f opposite its corner c; the corner carries the same number.
+"""
 
 import cython
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
@@ -18,6 +35,23 @@ def shapes(
     next_corner: cython.int[::1],
     kind: cython.uchar[::1],
 ) -> bool:
+    """Fill what `search` reads of a surface, and say whether it is intrinsic Delaunay.
+
+    Parameters
+    ----------
+    vertex, length, twin : (3 m,)
+        Vertex of each corner, length of each half-edge, and the half-edge glued to it: -1 on the boundary, -2 where more
+        than two faces meet.
+    double_area : (m,)
+        Takes twice the area of each face.
+    bulge : (3 m,)
+        Takes the length of each half-edge times the cotangent of the angle opposite: the circle around the face has the
+        power ``x (x - length) + y (y + bulge)`` at the point (x, -y) of the frame of the half-edge.
+    corner_of_vertex, next_corner : (n,), (3 m,)
+        Take the corners of each vertex as linked lists that end with -1; the first must come full of -1.
+    kind : (n,)
+        Takes JOINS at the ends of edges of more than two faces; the rest must come as UNKNOWN.
+    """
     m: cython.int = double_area.shape[0]
     f: cython.int
     h: cython.int
@@ -27,13 +61,13 @@ def shapes(
     b: cython.double
     d: cython.double
     area: cython.double
-    worst: cython.double = 0.0
-    sum_: cython.double
+    is_delaunay: cython.bint = True
     with cython.nogil:
         for f in range(m):
             h = 3 * f
             a, b, d = length[h], length[h + 1], length[h + 2]
-            area = _double_area(a, b, d)
+            # A needle without height would have no circle.
+            area = _double_area(a, b, d) + 1e-20 * a * a
             double_area[f] = area
             bulge[h] = a * (b * b + d * d - a * a) / (2.0 * area)
             bulge[h + 1] = b * (a * a + d * d - b * b) / (2.0 * area)
@@ -43,15 +77,12 @@ def shapes(
                 next_corner[h + c] = corner_of_vertex[v]
                 corner_of_vertex[v] = h + c
         for h in range(3 * m):
-            if twin[h] > h:
-                sum_ = (bulge[h] + bulge[twin[h]]) / length[h]
-                if sum_ < worst:
-                    worst = sum_
+            if twin[h] > h and bulge[h] + bulge[twin[h]] < -1e-6 * length[h]:
+                is_delaunay = False
             elif twin[h] == -2:
-                kind[vertex[_next(h)]] = JOINS
-                kind[vertex[_previous(h)]] = JOINS
-                worst = -1.0
-    return worst > -1e-6
+                kind[vertex[_next(h)]] = kind[vertex[_previous(h)]] = JOINS
+                is_delaunay = False
+    return is_delaunay
 
 
 @cython.cfunc
@@ -59,7 +90,7 @@ def shapes(
 @cython.nogil
 @cython.exceptval(check=False)
 def _double_area(a: cython.double, b: cython.double, c: cython.double) -> cython.double:
-    """Twice the area of a triangle by its sides: Heron's formula as a product of differences."""
+    """Twice the area of a triangle by its sides: Heron's formula as a product of differences, which needles need."""
     s: cython.double = 0.5 * (a + b + c)
     product: cython.double = s * (s - a) * (s - b) * (s - c)
     return 2.0 * sqrt(product) if product > 0.0 else 0.0
@@ -86,17 +117,15 @@ def _previous(h: cython.int) -> cython.int:
 @cython.nogil
 @cython.exceptval(check=False)
 def _third(k: cython.int, side: cython.int) -> cython.int:
-    """The half-edge of a face that is neither k nor side."""
+    """The half-edge of the face that is neither of two others."""
     return 9 * (k // 3) + 3 - k - side
-
-
-# ---- the queue
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cython.void:
+    """Add to the queue, a binary heap."""
     i: cython.int
     above: cython.int
     if s.n_heap == s.n_all_heap:
@@ -124,6 +153,7 @@ def _push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cy
 @cython.nogil
 @cython.exceptval(check=False)
 def _pop(s: cython.pointer(Search)) -> Entry:
+    """Take the entry with the smallest key."""
     top: Entry = s.heap[0]
     last: Entry
     i: cython.int = 0
@@ -144,90 +174,82 @@ def _pop(s: cython.pointer(Search)) -> Entry:
     return top
 
 
-# ---- vertices
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _beyond(s: cython.pointer(Search), k: cython.int, side: cython.int) -> cython.int:
+    """The corner of the same vertex beyond a side of corner k; -1 where there is not just one face."""
+    t: cython.int = s.twin[side]
+    is_tail: cython.bint = side == _previous(k)
+    if t < 0:
+        return -1
+    if s.aligned[side]:
+        is_tail = not is_tail
+    return _next(t) if is_tail else _previous(t)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Ray)) -> cython.void:
+    """Turn a direction by the angle of corner k, which has the side `side`."""
+    p: cython.double = s.length[side]
+    q: cython.double = s.length[_third(k, side)]
+    scale: cython.double = 0.5 / (p * q)
+    cosine: cython.double = (p * p + q * q - s.length[k] * s.length[k]) * scale
+    sine: cython.double = 2.0 * s.double_area[k // 3] * scale
+    ray.cosine, ray.sine = ray.cosine * cosine - ray.sine * sine, ray.cosine * sine + ray.sine * cosine
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
-    """Walk around v; whether its faces are one fan, and whether the angles exceed 2 pi."""
+    """Walk around v: whether its faces are one fan, and whether the angles exceed 2 pi."""
     start: cython.int = s.corner_of_vertex[v]
     k: cython.int = start
-    side: cython.int
-    t: cython.int
-    e: cython.int
+    side: cython.int = _previous(start)
+    beyond: cython.int
     n_corners: cython.int = 0
     n_seen: cython.int = 0
-    n_turns: cython.int = 0
-    is_tail: cython.bint
-    is_open: cython.bint = False
-    re: cython.double = 1.0
-    im: cython.double = 0.0
-    c: cython.double
-    d: cython.double
-    w: cython.double
-    p: cython.double
-    q: cython.double
-    norm: cython.double
+    n_half_turns: cython.int = 0
+    was_below: cython.bint
+    ray: Ray
     while k >= 0:
         n_corners += 1
         k = s.next_corner[k]
     k = start
-    side = _previous(k)  # v is its tail
-    is_tail = True
+    ray.cosine, ray.sine = 1.0, 0.0
     while n_seen < n_corners:
         n_seen += 1
-        e = _third(k, side)
-        # the angle at k
-        p = s.length[side]
-        q = s.length[e]
-        w = 0.5 / (p * q)
-        c = (p * p + q * q - s.length[k] * s.length[k]) * w
-        d = 2.0 * s.double_area[k // 3] * w
-        norm = re * c - im * d
-        d = re * d + im * c
-        re = norm
-        if (d < 0.0) != (im < 0.0):
-            n_turns += 1
-        im = d
-        # over side e to the next face
-        is_tail = e == _previous(k)
-        t = s.twin[e]
-        if t < 0:
-            is_open = True
+        was_below = ray.sine < 0.0
+        _turn(s, k, side, cython.address(ray))
+        if was_below != (ray.sine < 0.0):
+            n_half_turns += 1
+        side = _third(k, side)
+        beyond = _beyond(s, k, side)
+        if beyond < 0:
             break
-        if s.aligned[e]:
-            is_tail = not is_tail
-        k = _next(t) if is_tail else _previous(t)
-        side = t
+        k = beyond
+        side = s.twin[side]
         if k == start:
-            break
-    if is_open:
-        # the other way, only counting
-        k = start
-        side = _next(start)
-        e = side
-        is_tail = False
-        while True:
-            t = s.twin[e]
-            if t < 0:
-                break
-            if s.aligned[e]:
-                is_tail = not is_tail
-            k = _next(t) if is_tail else _previous(t)
-            n_seen += 1
-            e = _third(k, t)
-            is_tail = e == _previous(k)
-        return ENDS if n_seen == n_corners else JOINS
-    if n_seen != n_corners:
-        return JOINS
-    # n_turns counts how often the direction crossed the axis: at pi, at 2 pi, ...
-    if n_turns >= 3:
-        return BENDS
-    if n_turns == 2 and (im > 1e-8 or re < 0.0):
-        return BENDS
-    return PASSED
+            if n_seen < n_corners:
+                return JOINS
+            # Less than 1e-8 above 2 pi is flat: what a path loses there is the square of it.
+            if n_half_turns < 2 or (n_half_turns == 2 and ray.cosine > 0.0 and ray.sine < 1e-8):
+                return PASSED
+            return BENDS
+    # An open fan: to its other end.
+    k = start
+    side = _next(start)
+    while n_seen < n_corners:
+        k = _beyond(s, k, side)
+        if k < 0:
+            return JOINS
+        n_seen += 1
+        side = _third(k, s.twin[side])
+    return ENDS
 
 
 @cython.cfunc
@@ -241,6 +263,7 @@ def _relax(
     entered: cython.int,
     crossing: cython.double,
 ) -> cython.void:
+    """Take a distance of v if it is shorter than the one known."""
     if distance >= s.distance[v]:
         return
     if s.distance[v] == INFINITY:
@@ -289,61 +312,34 @@ def _emit(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _emit_corner(s: cython.pointer(Search), k: cython.int, root: cython.int, offset: cython.double) -> cython.void:
-    _relax(s, s.vertex[_next(k)], offset + s.length[_previous(k)], root, _next(k), s.length[_next(k)])
-    _relax(s, s.vertex[_previous(k)], offset + s.length[_next(k)], root, _previous(k), 0.0)
-    _emit(s, k, 0.0, s.length[k], root, offset)
-
+def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset: cython.double) -> cython.void:
+    """Distances along the two sides of corner k from its vertex v."""
+    _relax(s, s.vertex[_next(k)], offset + s.length[_previous(k)], v, _next(k), s.length[_next(k)])
+    _relax(s, s.vertex[_previous(k)], offset + s.length[_next(k)], v, _previous(k), 0.0)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _turn_to_straight(
-    s: cython.pointer(Search),
-    k: cython.int,
-    e: cython.int,
-    re: cython.double,
-    im: cython.double,
-    out: cython.pointer(Ray),
-) -> cython.bint:
-    """From corner k over its side e, turned by (re, im) so far, to the corner that holds angle pi; whether there is one."""
-    t: cython.int
-    is_tail: cython.bint
-    n_steps: cython.int = 0
-    p: cython.double
-    q: cython.double
-    w: cython.double
-    c: cython.double
-    d: cython.double
-    x: cython.double
-    y: cython.double
-    while n_steps < 1000000:
-        n_steps += 1
-        t = s.twin[e]
-        if t < 0:
+def _straighten(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Ray)) -> cython.bint:
+    """Go on over a side of corner k until the direction has turned by pi; whether the fan reaches that far.
+
+    `ray` takes the corner that holds the direction, the side over which it was entered, and the angle between them.
+    """
+    cosine: cython.double
+    sine: cython.double
+    while True:
+        k = _beyond(s, k, side)
+        if k < 0:
             return False
-        is_tail = e == _previous(k)
-        if s.aligned[e]:
-            is_tail = not is_tail
-        k = _next(t) if is_tail else _previous(t)
-        e = _third(k, t)
-        p = s.length[t]
-        q = s.length[e]
-        w = 0.5 / (p * q)
-        c = (p * p + q * q - s.length[k] * s.length[k]) * w
-        d = 2.0 * s.double_area[k // 3] * w
-        x = re * c - im * d
-        y = re * d + im * c
-        if y < 0.0:
-            out.corner = k
-            out.side = t
-            out.cosine = -re
-            out.sine = im
+        side = s.twin[side]
+        cosine, sine = ray.cosine, ray.sine
+        _turn(s, k, side, ray)
+        if ray.sine < 0.0:
+            ray.corner, ray.side = k, side
+            ray.cosine, ray.sine = -cosine, sine
             return True
-        re = x
-        im = y
-    return False
+        side = _third(k, side)
 
 
 @cython.cfunc
@@ -367,30 +363,22 @@ def _reach(s: cython.pointer(Search), ray: cython.pointer(Ray)) -> cython.double
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _fill(s: cython.pointer(Search), v: cython.int, first: cython.pointer(Ray), last: cython.pointer(Ray)) -> cython.void:
-    """Windows from v between two rays, or from the first ray to the boundary."""
+def _fill(
+    s: cython.pointer(Search), v: cython.int, first: cython.pointer(Ray), last: cython.pointer(Ray)
+) -> cython.void:
+    """Windows from v between two rays, or, without a second one, from the first ray to the boundary."""
     k: cython.int = first.corner
     side: cython.int = first.side
-    e: cython.int
-    t: cython.int
-    is_tail: cython.bint
-    near: cython.double
+    near: cython.double = _reach(s, first) - SHADOW_MARGIN * s.length[k]
     far: cython.double
     length: cython.double
     offset: cython.double = s.distance[v]
-    n_steps: cython.int = 0
-    while n_steps < 1000000:
-        e = _third(k, side)
+    while k >= 0:
         length = s.length[k]
-        near = 0.0
         far = length
-        if n_steps == 0:
-            near = _reach(s, first) - SHADOW_MARGIN * length
         if last != cython.NULL and k == last.corner:
             far = length - _reach(s, last) + SHADOW_MARGIN * length
-        n_steps += 1
-        _relax(s, s.vertex[_next(k)], offset + s.length[_previous(k)], v, _next(k), s.length[_next(k)])
-        _relax(s, s.vertex[_previous(k)], offset + s.length[_next(k)], v, _previous(k), 0.0)
+        _reach_ends(s, k, v, offset)
         if near < far:
             if side == _previous(k):
                 _emit(s, k, near, far, v, offset)
@@ -398,14 +386,10 @@ def _fill(s: cython.pointer(Search), v: cython.int, first: cython.pointer(Ray), 
                 _emit(s, k, length - far, length - near, v, offset)
         if last != cython.NULL and k == last.corner:
             return
-        t = s.twin[e]
-        if t < 0:
-            return
-        is_tail = e == _previous(k)
-        if s.aligned[e]:
-            is_tail = not is_tail
-        k = _next(t) if is_tail else _previous(t)
-        side = t
+        near = 0.0
+        side = _third(k, side)
+        k = _beyond(s, k, side)
+        side = s.twin[side]
 
 
 @cython.cfunc
@@ -416,50 +400,43 @@ def _shed(s: cython.pointer(Search), v: cython.int) -> cython.void:
     k: cython.int
     h: cython.int = s.entered[v]
     length: cython.double
+    right_length: cython.double
+    left_length: cython.double
     x: cython.double
     y: cython.double
-    at: cython.double
-    dot: cython.double
-    cross: cython.double
+    at: cython.double = s.crossing[v]
     norm: cython.double
     left: Ray
     right: Ray
     has_left: cython.bint
     has_right: cython.bint
     s.emitted[v] = s.distance[v]
-    s.n_emissions += 1
     if h < 0 or s.kind[v] == JOINS:
         k = s.corner_of_vertex[v]
         while k >= 0:
-            _emit_corner(s, k, v, s.distance[v])
+            _reach_ends(s, k, v, s.distance[v])
+            _emit(s, k, 0.0, s.length[k], v, s.distance[v])
             k = s.next_corner[k]
         return
-    # From the apex of h: the direction back to where the path crosses h, and its angles to the two sides.
-    length = s.length[h]
-    at = s.crossing[v]
-    right_side: cython.double = s.length[_next(h)]
-    left_side: cython.double = s.length[_previous(h)]
-    x = 0.5 * (length + (left_side - right_side) * (left_side + right_side) / length)
+    # From the apex of h: the angles between the way back, to where the path crosses h, and the two sides.
+    length, left_length, right_length = s.length[h], s.length[_previous(h)], s.length[_next(h)]
+    x = 0.5 * (length + (left_length - right_length) * (left_length + right_length) / length)
     y = s.double_area[h // 3] / length
     norm = sqrt((at - x) * (at - x) + y * y)
-    dot = (x * (x - at) + y * y) / (norm * left_side)
-    cross = y * at / (norm * left_side)
-    has_left = _turn_to_straight(s, h, _previous(h), dot, cross, cython.address(left))
-    dot = ((length - x) * (at - x) + y * y) / (norm * right_side)
-    cross = y * (length - at) / (norm * right_side)
-    has_right = _turn_to_straight(s, h, _next(h), dot, cross, cython.address(right))
-    if has_left and has_right:
-        # Around a closed fan both rays bound one shadow; in an open one there are two, each up to the boundary.
-        _fill(s, v, cython.address(left), cython.address(right))
-        if s.kind[v] == ENDS:
-            _fill(s, v, cython.address(right), cython.NULL)
-    elif has_left:
+    left.cosine, left.sine = (x * (x - at) + y * y) / (norm * left_length), y * at / (norm * left_length)
+    right.cosine = ((length - x) * (at - x) + y * y) / (norm * right_length)
+    right.sine = y * (length - at) / (norm * right_length)
+    has_left = _straighten(s, h, _previous(h), cython.address(left))
+    has_right = _straighten(s, h, _next(h), cython.address(right))
+    # Around a closed fan both rays bound one shadow; in an open one there are two, each up to the boundary.
+    if s.kind[v] == BENDS:
+        if has_left and has_right:
+            _fill(s, v, cython.address(left), cython.address(right))
+        return
+    if has_left:
         _fill(s, v, cython.address(left), cython.NULL)
-    elif has_right:
+    if has_right:
         _fill(s, v, cython.address(right), cython.NULL)
-
-
-# ---- lists
 
 
 @cython.cfunc
@@ -509,9 +486,6 @@ def _append(
         to = one.windows + one.count
     one.count += n
     s.n_windows += n
-    s.n_live += n
-    if s.n_live > s.most_live:
-        s.most_live = s.n_live
     if mirrored:
         for i in range(n):
             to[i] = run[n - 1 - i]
@@ -546,6 +520,7 @@ def _append(
 @cython.nogil
 @cython.exceptval(check=False)
 def _free_list(s: cython.pointer(Search)) -> cython.int:
+    """A list that is not in use, with the room that it had before; -1 without memory."""
     place: cython.int = s.free_list
     more: cython.pointer(List)
     if place >= 0:
@@ -849,7 +824,6 @@ def _cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     out: cython.pointer(Window)
     w: cython.pointer(Window)
     apex: cython.int = s.vertex[h]
-    s.n_live -= n
     s.slot[h] = -1
     s.n_lists_done += 1
     n = _trim(s, windows, n, h)
@@ -960,6 +934,7 @@ def _cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def _more_room(s: cython.pointer(Search), n: cython.int) -> cython.void:
+    """Room for n windows on each side of an apex."""
     s.n_out = 2 * n
     free(s.to_left)
     free(s.to_right)
@@ -1122,6 +1097,7 @@ def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
 @cython.nogil
 @cython.exceptval(check=False)
 def _run(s: cython.pointer(Search), cutoff: cython.double) -> cython.void:
+    """Carry lists, and let vertices and points shed windows, in ascending order of their keys."""
     entry: Entry
     v: cython.int
     j: cython.int
@@ -1237,7 +1213,7 @@ def search(
     s.n_all_lists, s.n_all_heap, s.n_out = 256, 1024, 256
     s.free_list = -1
     s.failed = False
-    s.n_windows = s.n_lists_done = s.n_emissions = s.n_live = s.most_live = 0
+    s.n_windows = s.n_lists_done = 0
     with cython.nogil:
         s.lists = cython.cast(cython.pointer(List), malloc(s.n_all_lists * cython.sizeof(List)))
         s.heap = cython.cast(cython.pointer(Entry), malloc(s.n_all_heap * cython.sizeof(Entry)))
@@ -1273,6 +1249,4 @@ def search(
     statistics[0] = s.n_touched
     statistics[1] = s.n_windows
     statistics[2] = s.n_lists_done
-    statistics[3] = s.n_emissions
-    statistics[4] = s.most_live
     return not s.failed
