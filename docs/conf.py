@@ -28,11 +28,11 @@ extensions = [
     "sphinxcontrib.bibtex",
 ]
 html_theme = "furo"
-html_extra_path = ["_parts/pages"]  # pages to turn, as they are
+html_extra_path = ["_parts/pages"]  # interactive pages, copied unchanged
 templates_path = ["_templates"]
 exclude_patterns = ["_build", "_parts"]
 nitpicky = False
-default_role = "py:obj"  # what docstrings put between single backticks
+default_role = "py:obj"  # for names between single backticks in docstrings
 
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
@@ -40,25 +40,25 @@ bibtex_bibfiles = ["literature.bib"]
 bibtex_default_style = "plain"
 bibtex_reference_style = "author_year"
 numpydoc_show_class_members = False
-autodoc_typehints = "none"  # the docstrings say it, with shapes
+autodoc_typehints = "none"  # the docstrings give types and shapes
 autosummary_generate = True
 autosummary_generate_overwrite = True
 
 
 def _public_names() -> str:
-    """A line for each name of the package: what it is, and where it is described."""
+    """One line per public name of the package: a link and the summary."""
     lines = []
     for name in heat_igl.__all__:
         thing = getattr(heat_igl, name)
         target = thing.__name__ if inspect.ismodule(thing) else f"{thing.__module__}.{thing.__qualname__}"
         summary = (inspect.getdoc(thing) or "").split("\n\n")[0].replace("\n", " ")
-        # reStructuredText's literals, in Markdown's.
+        # Literals of reStructuredText become literals of Markdown.
         lines.append(f"{{py:obj}}`heat_igl.{name} <{target}>`\n: {summary.replace('``', '`')}\n")
     return "\n".join(lines)
 
 
 def _write_parts(*_: object) -> None:
-    """What is made at each build: the list of names, and the pictures of the gallery."""
+    """Write the list of public names and the pictures of the gallery."""
     parts = HERE / "_parts"
     parts.mkdir(exist_ok=True)
     (parts / "names.md").write_text(_public_names(), encoding="utf8")
@@ -77,7 +77,20 @@ def _skip_aliases(app, what, name, obj, skip, options) -> bool | None:
     return True if isinstance(obj, types.GenericAlias) else None
 
 
+def _resolve_room_names(app, env, node, contnode):
+    """Link a name that a package hands on, such as heat_igl.io.read_mesh, to the module that defines it."""
+    module, _, name = node.get("reftarget", "").rpartition(".")
+    try:
+        found = getattr(importlib.import_module(module), name)
+        target = f"{found.__module__}.{found.__qualname__}"
+    except (ImportError, AttributeError, ValueError):
+        return None
+    python = env.get_domain("py")
+    return python.resolve_xref(env, node["refdoc"], app.builder, "obj", target, node, contnode)
+
+
 def setup(app) -> None:
+    app.connect("missing-reference", _resolve_room_names)
     app.connect("config-inited", _write_parts)
     app.connect("autodoc-skip-member", _skip_aliases)
     app.connect("autodoc-process-docstring", _escape_bars, priority=900)  # after numpydoc

@@ -1,7 +1,6 @@
-"""Pictures for the documentation, from generated shapes and from a mesh that the pymeshlab wheel ships.
+"""Pictures for the documentation, from generated shapes and from a mesh of the pymeshlab wheel.
 
-``python docs/gallery.py --out DIR`` writes the pictures, a page to turn, and gallery.md, which shows all of it with the
-code that made it.
+``python docs/gallery.py --out DIR`` writes the pictures, an interactive page, and gallery.md with pictures and code.
 """
 
 from __future__ import annotations
@@ -16,11 +15,11 @@ import numpy as np
 import heat_igl
 from heat_igl import shapes
 from heat_igl.demo import sample_mesh
-from heat_igl.drawing.plots import Page, Picture, page, plot, plot_field
+from heat_igl.drawing import Page, Picture, page, plot, plot_field
 
 
 def torus() -> Picture:
-    """Stripes of equal distance from one vertex: their kinks are where fronts meet."""
+    """Stripes of equal distance from one vertex, with kinks at the cut locus."""
     mesh = shapes.torus(160, 80)
     phi = heat_igl.HeatMethodSolver(mesh).distance(0)
     return plot(mesh, phi, sources=0, style="stripes", view=(30, 50))
@@ -36,14 +35,14 @@ def bunny() -> Picture:
 
 
 def heat() -> Picture:
-    """What step 1 leaves: heat falls by the same factor over each length."""
+    """The heat after step 1, which decays exponentially with distance."""
     mesh = shapes.disk(40)
     solution = heat_igl.HeatMethodSolver(mesh).solve(0)
     return plot_field(mesh, np.log10(solution.heat), spacing=5, label="log10 of heat", sources=0, colormap="magma")
 
 
 def error() -> Picture:
-    """The error of the heat method on a sphere: too short where fronts meet, opposite the source."""
+    """The error of the heat method on a sphere: distance is too short at the antipode of the source."""
     mesh = shapes.icosphere(5)
     source = int(np.argmax(mesh.V[:, 2]))
     phi = heat_igl.HeatMethodSolver(mesh).distance(source)
@@ -53,14 +52,14 @@ def error() -> Picture:
 
 
 def book() -> Picture:
-    """Five pages that share an edge: paths go over the spine from one to another."""
+    """Five pages that share an edge, which shortest paths cross."""
     mesh = shapes.book(5, 24)
     phi = heat_igl.HeatMethodSolver(mesh).distance(40)
     return plot(mesh, phi, sources=40, view=(35, 35))
 
 
 def asked() -> Page:
-    """A page to turn and to ask: a click moves the source."""
+    """An interactive page: a click moves the source."""
     mesh = shapes.torus(100, 50)
     phi = heat_igl.HeatMethodSolver(mesh).distance(0)
     return page(mesh, phi, sources=0, view=(30, 50), title="Distance on a torus", method="Distance by the heat method.")
@@ -89,7 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _body(entry: Callable[[], object]) -> str:
-    """The lines of a function, without its head and docstring."""
+    """The lines of a function without signature and docstring."""
     lines = inspect.getsource(entry).splitlines(keepends=True)[2:]
     return "".join(line[4:].removeprefix("return ") for line in lines)
 

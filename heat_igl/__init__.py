@@ -1,4 +1,4 @@
-"""Geodesic distance on meshes by the heat method, on libigl's operators."""
+"""Geodesic distance on meshes by the heat method, with operators from libigl."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -37,6 +37,7 @@ from heat_igl.mesh import (
     split_long_edges,
 )
 from heat_igl.operators import Operators, polygon_operators, speed_operators
+from heat_igl.runtime.aliases import alias_modules
 from heat_igl.sampling import (
     VoronoiCells,
     diameter,
@@ -119,7 +120,7 @@ __all__ = [
 
 __version__ = "0.1.0"
 
-# Loaded on first use, since a distance does without: attribute -> the submodule that it is, or is in.
+# Lazy attribute -> submodule, imported on first use because a distance does not need it.
 _LAZY = {
     "ValidationReport": "validation.report",
     "ValidationRow": "validation.report",
@@ -132,7 +133,25 @@ _LAZY = {
     "validate": "validation",
 }
 
-if not TYPE_CHECKING:  # else any misspelt name would pass for one of these
+# Modules that users import by these names: earlier name -> the module in its room.
+_EARLIER_NAMES = {
+    "closed_forms": "validation.closed_forms",
+    "factorization": "linear",
+    "metrics": "validation.metrics",
+    "paths": "curves.paths",
+    "plots": "drawing.plots",
+    "polygons": "mesh.polygons",
+    "projection": "mesh.projection",
+    "refine": "unfolding",
+    "solution": "heat_method.solution",
+    "speed": "operators.speed",
+    "subdivision": "mesh.subdivision",
+    "surface_points": "mesh.surface_points",
+    "viewer": "drawing.viewer",
+}
+alias_modules({f"{__name__}.{name}": f"{__name__}.{target}" for name, target in _EARLIER_NAMES.items()})
+
+if not TYPE_CHECKING:  # type checkers would otherwise accept any misspelt attribute
 
     def __getattr__(name: str) -> Any:
         if name not in _LAZY:

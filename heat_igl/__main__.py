@@ -10,11 +10,11 @@ __all__ = ["main"]
 
 
 def main() -> int:
-    """Run the command line on the arguments of the process and return its exit status."""
+    """Run the command line on ``sys.argv`` and return the exit status."""
     try:
         from heat_igl import cli
     except ImportError as error:
-        # Anything else that cannot be imported is a fault of the installation, which a traceback shows best.
+        # Any other import error is a fault of the installation; the traceback identifies it.
         if (error.name or "").split(".")[0] not in ("typer", "rich", "click"):
             raise
         print(f"heat-igl: {MissingExtraError.of('the command line', 'typer and rich', 'cli')}", file=sys.stderr)

@@ -1,6 +1,6 @@
-"""The command line: the package's words, one line per error, no half-written files.
+"""The command line: commands with the names of the library, one line per error, no partial files.
 
-Imported by `heat_igl.__main__` only; needs the extra ``cli``.
+Only `heat_igl.__main__` imports this module, which needs the extra ``cli``.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from rich.progress import Progress
 from rich.text import Text
 
 import heat_igl
-from heat_igl.drawing.output import PAGE_SUFFIXES, PICTURE_SUFFIXES, Picture, replace_file
+from heat_igl.drawing import PAGE_SUFFIXES, PICTURE_SUFFIXES, Picture
 from heat_igl.errors import (
     AccuracyWarning,
     BatchError,
@@ -34,8 +34,8 @@ from heat_igl.errors import (
     ReferenceSolverError,
     SourceError,
 )
-from heat_igl.heat_method import HeatMethodSolver, Magnitude
-from heat_igl.io import CURVE_SUFFIXES, read_mesh, write_mesh
+from heat_igl.heat_method import HeatMethodSolver, Magnitude, SolverOptions
+from heat_igl.io import CURVE_SUFFIXES, complete_file, read_mesh, write_mesh
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, closest_points
 from heat_igl.operators import Laplacian
@@ -48,10 +48,10 @@ from heat_igl.validation import METHODS, draw_sources
 
 __all__ = ["app", "run"]
 
-# What a user can cause; anything else is a fault of the package and shows its traceback.
+# Errors that a user can cause. Any other exception is a fault of the package and shows a traceback.
 _EXPECTED = (OSError, ValueError, BatchError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
 
-# More isolines than this are a mistaken spacing.
+# Largest number of isolines; a larger number indicates a wrong spacing.
 _MOST_LINES = 10000
 
 _DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
@@ -68,7 +68,7 @@ def run(arguments: Sequence[str]) -> int:
     """Run one command and return the exit status: 0, 1 for errors, 2 for wrong usage, 130 when interrupted."""
     command = typer.main.get_command(app)
     try:
-        # Not command.main, whose own handling of errors and of Ctrl-C differs between versions of typer.
+        # command.main is not used: the handling of errors and of Ctrl-C differs between versions of typer.
         with (
             _warnings_on_one_line(),
             command.make_context("heat-igl", list(arguments) or ["--help"]) as context,
@@ -81,14 +81,14 @@ def run(arguments: Sequence[str]) -> int:
         _say("interrupted")
         return 130
     except BrokenPipeError:
-        # Whoever read the output has left. Python flushes once more at exit, which must not complain.
+        # The reader of the output is gone. Python flushes again at exit, which must not raise an error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except _EXPECTED as error:
         _say(_one_line(error))
         return 1
     except Exception as error:
-        # typer's usage errors have no public class in common over its versions.
+        # Usage errors have no common public class over the versions of typer.
         message = getattr(error, "format_message", None)
         if message is None:
             raise
@@ -123,25 +123,25 @@ def _warnings_on_one_line() -> Iterator[None]:
 def _print_rows(rows: Sequence[tuple[str, str]]) -> None:
     """Print names and values as two columns."""
     width = max(len(name) for name, _ in rows)
-    console = Console(highlight=False, soft_wrap=True)  # a line is a line, also in a pipe
+    console = Console(highlight=False, soft_wrap=True)  # no wrapping, so that pipes receive one line per row
     for name, value in rows:
         console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {value}"))
 
 
 def _check_writable(path: Path) -> None:
-    """Make sure that a file can be written to `path`, before any work is done for it.
+    """Check that a file can be written to `path`, before it is computed.
 
     Raises
     ------
     OSError
-        If it cannot.
+        If the file cannot be written.
     """
     if path.is_dir():
         raise IsADirectoryError(f"{path} is a directory: name a file in it")
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path} cannot be written: there is no directory {path.parent}")
     try:
-        # Permissions alone do not tell: the file system may be read-only.
+        # Permissions do not suffice: the file system may be read-only.
         with tempfile.TemporaryFile(dir=path.parent):
             pass
     except OSError as error:
@@ -180,7 +180,7 @@ def _version(version: Annotated[bool, typer.Option("--version", help="Print the 
 
 @app.command()
 def info(mesh: MeshArgument) -> None:
-    """Describe a mesh: sizes, defects, and what bears on distances."""
+    """Describe a mesh: sizes, defects, and properties that affect distances."""
     _print_rows(read_mesh(mesh).report().rows())
 
 
@@ -217,14 +217,16 @@ def distance(
         gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap))]
     _check_outputs(loaded, output, picture)
     with Console(stderr=True).status("factoring"):
-        options: dict[str, Any] = {
-            "laplacian": laplacian,
-            "boundary": boundary,
-            "magnitude": magnitude,
-            "refine": refine,
-            "backend": backend,
-        }
-        solver = HeatMethodSolver(loaded, t_coef=t_coef, t=t, **options)
+        options = SolverOptions(
+            t_coef,
+            t,
+            cast(Laplacian, laplacian),
+            cast(Boundary, boundary),
+            cast(Magnitude, magnitude),
+            cast(Refine | None, refine),
+            cast(Backend, backend),
+        )
+        solver = HeatMethodSolver.from_options(loaded, options)
     start = time.perf_counter()
     phi = solver.distance(sources, cutoff=cutoff)
     seconds = time.perf_counter() - start
@@ -293,14 +295,14 @@ def validate(
         typer.Option(metavar="PERCENT", help="Exit with 1 if a mean error is larger.", callback=_positive),
     ] = None,
 ) -> None:
-    """How far each method is from a reference, and what it costs."""
+    """Errors of methods against a reference, with time and memory."""
     loaded = read_mesh(mesh)
     drawn_sources = draw_sources(loaded, sources, seed)
     _check_outputs(loaded, None, picture)
     if json_file is not None:
         _check_writable(json_file)
     console = Console(stderr=True)
-    # Where nobody watches, not even the empty line that a finished bar leaves.
+    # Without a terminal there is no bar, not even the empty line after a finished one.
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=None)
         report = heat_igl.validate(
@@ -311,7 +313,8 @@ def validate(
     if picture is not None:
         Picture(report.plot()).save(picture)
     if json_file is not None:
-        replace_file(json_file, (json.dumps(report.to_dict(), indent=1, allow_nan=False) + "\n").encode("utf8"))
+        with complete_file(json_file) as temporary:
+            temporary.write_bytes((json.dumps(report.to_dict(), indent=1, allow_nan=False) + "\n").encode("utf8"))
     print(report.to_markdown(), end="")
     exceeding = report.exceeding(fail_above) if fail_above is not None else ()
     if exceeding:
@@ -332,17 +335,17 @@ def view(
     html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
 ) -> None:
     """A window in which a click moves the source and the distance follows; where there is no display, a page."""
-    from heat_igl.drawing.viewer import Exploration, Options, Window, display_problem
+    from heat_igl.drawing.viewer import Exploration, Window, display_problem
 
     loaded = read_mesh(mesh)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
-    chosen: dict[str, Any] = {"boundary": boundary, "refine": refine}
+    options = SolverOptions(t_coef, boundary=cast(Boundary, boundary), refine=cast(Refine | None, refine))
     target = html or Path(f"{mesh.stem}-view.html")
     problem = None if html else display_problem()
     if html or problem:
         _check_page(target)
     with Console(stderr=True).status("factoring"):
-        shown = Exploration(loaded, sources, Options(t_coef=t_coef, **chosen))
+        shown = Exploration(loaded, sources, options)
     if html is None and problem is None:
         try:
             window = Window(shown, title=f"heat-igl: {mesh.name}")
@@ -352,7 +355,7 @@ def view(
         else:
             window.run()
             return
-    from heat_igl.drawing.plots import write_html
+    from heat_igl.drawing import write_html
 
     kind = f"unfolded in heat order (refine = {refine})" if refine else "the heat method"
     write_html(
@@ -367,7 +370,7 @@ def view(
 def _check_page(path: Path) -> None:
     if path.suffix.lower() not in PAGE_SUFFIXES:
         raise ValueError(f"--html {path}: pages go to {' or '.join(PAGE_SUFFIXES)} files")
-    _require("matplotlib", "a page", "view")
+    MissingExtraError.check("a page", "matplotlib", "view")
     _check_writable(path)
 
 
@@ -375,7 +378,7 @@ def _check_page(path: Path) -> None:
 def demo(
     out: Annotated[Path, typer.Option(help="Directory for the results; made if missing.")] = Path("heat-igl-demo"),
 ) -> None:
-    """The whole job on a real mesh: distance, error against exact, files, picture."""
+    """Distance on a real mesh, with errors against exact distance, files and a picture."""
     from heat_igl.demo import demonstrate
 
     out.mkdir(parents=True, exist_ok=True)
@@ -397,7 +400,7 @@ def batch(
     log: Annotated[Path | None, typer.Option(help="File for a log of meshes and blocks.")] = None,
     dashboard: Annotated[bool, typer.Option(help="Serve Dask's dashboard (needs bokeh).")] = False,
 ) -> None:
-    """Distances on every mesh of a folder, into a store, on all processors or a cluster; resumes where it stopped."""
+    """Distances on every mesh of a folder, written to a store; resumes if it was interrupted."""
     from heat_igl import cluster
 
     meshes = cluster.folder(folder)
@@ -414,8 +417,8 @@ def batch(
 
 @contextmanager
 def _logged(path: Path | None) -> Iterator[None]:
-    """Write what the batch logs to a file; what Dask logs about lost connections is told in one line at the end."""
-    for name in ("distributed", "distributed.client", "tornado.application", "asyncio"):  # each has a level of its own
+    """Write the log of the batch to a file. Messages of Dask about lost connections are suppressed."""
+    for name in ("distributed", "distributed.client", "tornado.application", "asyncio"):  # each has a separate level
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     if path is None:
         yield
@@ -447,12 +450,12 @@ def _check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> Non
             kind = "tetrahedra with distances" if mesh.is_tetrahedral else "distances"
             raise MeshError(f"--output {output}: {kind} go to {' or '.join(accepted)} files")
         if output.suffix.lower() == ".vtu":
-            _require("meshio", "a .vtu file", "io")
+            MissingExtraError.check("a .vtu file", "meshio", "io")
         _check_writable(output)
     if picture is not None:
         if picture.suffix.lower() not in PICTURE_SUFFIXES:
             raise ValueError(f"--picture {picture}: pictures go to {', '.join(PICTURE_SUFFIXES)} files")
-        _require("matplotlib", "a picture", "view")
+        MissingExtraError.check("a picture", "matplotlib", "view")
         _check_writable(picture)
 
 
@@ -460,23 +463,16 @@ def _check_curves(output: Path) -> None:
     if output.suffix.lower() not in CURVE_SUFFIXES:
         raise ValueError(f"--output {output}: curves go to {', '.join(CURVE_SUFFIXES)} files")
     if output.suffix.lower() == ".dxf":
-        _require("ezdxf", "a .dxf file", "io")
+        MissingExtraError.check("a .dxf file", "ezdxf", "io")
     _check_writable(output)
-
-
-def _require(package: str, purpose: str, extra: str) -> None:
-    from importlib.util import find_spec
-
-    if find_spec(package) is None:
-        raise MissingExtraError.of(purpose, package, extra)
 
 
 def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, picture: Path | None) -> list[Path]:
     drawn = None
     if picture is not None:
-        from heat_igl.drawing.plots import plot
+        from heat_igl.drawing import plot
 
-        # Drawn before anything is written, since it is what may still fail.
+        # Drawing comes before writing, since it may still fail.
         with Console(stderr=True).status("drawing"):
             drawn = plot(mesh, phi, sources=sources)
     if output is not None:

@@ -1,4 +1,4 @@
-"""The demonstration of the command line: the whole job on one mesh, checked against exact distances."""
+"""The command ``heat-igl demo``: distance on one mesh, compared with exact distance, with files and a picture."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from heat_igl.unfolding import Refine
 
 __all__ = ["demonstrate", "sample_mesh"]
 
-_SOURCE = 1234  # on the bunny's haunch, where a picture shows most of the way
+_SOURCE = 1234  # on the bunny's haunch: most of the surface is visible from its side
 _Rows = list[tuple[str, str]]
 
 
 def sample_mesh() -> Path | None:
-    """The bunny that the pymeshlab wheel ships; None where there is none. Does not import pymeshlab."""
+    """Path of the bunny in the pymeshlab wheel, or None without pymeshlab. pymeshlab is not imported."""
     found = importlib.util.find_spec("pymeshlab")
     for folder in (found.submodule_search_locations or []) if found else []:
         for path in (Path(folder, "tests/sample_meshes/bunny.obj"), Path(folder, "sample_meshes/bunny.obj")):
@@ -33,17 +33,19 @@ def sample_mesh() -> Path | None:
 
 
 def demonstrate(out: Path) -> list[tuple[str, str]]:
-    """Distance on the bunny (a sphere where pymeshlab is missing), compared with exact, as PLY and PNG in `out`.
+    """Compute distance on the bunny, compare it with exact distance, and write a PLY and a PNG file.
+
+    Without pymeshlab, which ships the bunny, the mesh is a sphere.
 
     Parameters
     ----------
     out : Path
-        An existing directory.
+        An existing directory for the files.
 
     Returns
     -------
     list of (name, value)
-        What happened, to be printed.
+        Rows for printing: timings, errors and paths.
     """
     path = sample_mesh()
     name = "bunny" if path else "sphere"
@@ -90,7 +92,7 @@ def _since(start: float) -> str:
 
 
 def _compared(mesh: Mesh, phi: FloatArray, unfolded: FloatArray | None) -> _Rows:
-    """Errors of the heat method, of the unfolding and of MeshLab's front against exact, or why there are none."""
+    """Rows with the errors of the heat method, the unfolding and MeshLab, or the reason for leaving them out."""
     try:
         start = time.perf_counter()
         exact = reference.exact(mesh, _SOURCE)
@@ -116,7 +118,7 @@ def _error(distance: FloatArray, exact: FloatArray) -> str:
 
 
 def _drawn(path: Path, mesh: Mesh, phi: FloatArray) -> tuple[str, str]:
-    from heat_igl.drawing.plots import picture
+    from heat_igl.drawing import picture
 
     try:
         picture(path, mesh, phi, sources=_SOURCE)

@@ -1,6 +1,10 @@
-"""What can go wrong, one class per remedy."""
+"""Errors and warnings, one class per remedy."""
 
 from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 __all__ = [
     "AccuracyWarning",
@@ -18,29 +22,44 @@ class MeshError(ValueError):
 
 
 class SourceError(ValueError):
-    """A set of sources does not describe a place on the mesh."""
+    """The sources are not vertices, points or curves of the mesh."""
 
 
 class FactorizationError(RuntimeError):
-    """A matrix that should be symmetric positive definite could not be factored."""
+    """A matrix cannot be factored, since it is not symmetric positive definite."""
 
 
 class ReferenceSolverError(RuntimeError):
-    """A reference solver crashed, hung, or returned something that is not a distance."""
+    """A reference solver crashed, exceeded its time limit, or returned values that cannot be distances."""
 
 
 class BatchError(RuntimeError):
-    """A batch had to stop before it was done; what is finished stays, and the same call goes on from there."""
+    """A batch stopped early. Finished blocks are kept, and the same call resumes the batch."""
 
 
 class MissingExtraError(ImportError):
-    """An optional dependency is needed; the message names the extra that installs it."""
+    """An optional library is not installed; the message names the extra that installs it."""
 
     @classmethod
     def of(cls, purpose: str, package: str, extra: str) -> MissingExtraError:
-        """The error for `purpose`, which needs `package` from the extra `extra`."""
+        """The error that says: `purpose` needs `package`, which the extra `extra` installs."""
         return cls(f'{purpose} needs {package}: pip install "heat-igl[{extra}]"')
+
+    @classmethod
+    @contextmanager
+    def guard(cls, purpose: str, package: str, extra: str) -> Iterator[None]:
+        """A context for the import of an optional library. It raises this error if the import fails."""
+        try:
+            yield
+        except ImportError:
+            raise cls.of(purpose, package, extra) from None
+
+    @classmethod
+    def check(cls, purpose: str, package: str, extra: str) -> None:
+        """Raise this error if the module `package` is not installed. The module is not imported."""
+        if importlib.util.find_spec(package) is None:
+            raise cls.of(purpose, package, extra)
 
 
 class AccuracyWarning(UserWarning):
-    """A result is finite and usable, but less accurate than usual, and why."""
+    """A result is usable but less accurate than usual; the message gives the reason."""

@@ -1,6 +1,6 @@
 """Generated domains, most with a known distance, for tests, benchmarks and notebooks.
 
-Every function returns a `Mesh`, but for `flat_torus`, which fits into no space and is given by its edge lengths.
+Every function returns a `Mesh`, except `flat_torus`: its triangles are known by their edge lengths only.
 """
 
 from __future__ import annotations
@@ -14,7 +14,20 @@ from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["book", "box", "cone", "cylinder", "disk", "flat_torus", "grid", "icosphere", "strip", "torus"]
+__all__ = [
+    "book",
+    "box",
+    "cone",
+    "cylinder",
+    "disk",
+    "flat_torus",
+    "grid",
+    "icosphere",
+    "lattice_faces",
+    "strip",
+    "torus",
+    "with_slivers",
+]
 
 
 def _at_least(name: str, value: int, least: int) -> int:
@@ -23,10 +36,10 @@ def _at_least(name: str, value: int, least: int) -> int:
     return int(value)
 
 
-def _lattice_faces(rows: int, columns: int, wrap_rows: bool = False, wrap_columns: bool = False) -> IntArray:
-    """Triangles of a lattice of vertices ``row * columns + column``; the diagonal joins (0, 1) to (1, 0).
+def lattice_faces(rows: int, columns: int, wrap_rows: bool = False, wrap_columns: bool = False) -> IntArray:
+    """Triangles of a lattice of vertices ``row * columns + column``; the diagonal of a cell joins (0, 1) to (1, 0).
 
-    A lattice that wraps has a row (column) of cells between its last and its first row (column) of vertices.
+    A lattice that wraps has a row (column) of cells between the last and the first row (column) of vertices.
     """
     i = np.arange(rows if wrap_rows else rows - 1)[:, None]
     j = np.arange(columns if wrap_columns else columns - 1)[None, :]
@@ -39,15 +52,15 @@ def _lattice_faces(rows: int, columns: int, wrap_rows: bool = False, wrap_column
 
 
 def grid(n: int) -> Mesh:
-    """The unit square with n by n cells, step 1 / n, the mesh of the paper's section 4.2.
+    """The unit square with n by n cells of side 1 / n, the mesh of the paper's section 4.2.
 
-    Vertex ``row * (n + 1) + column`` lies at (column / n, row / n, 0); diagonals run as in the paper, from (0, 1) to
-    (1, 0) of each cell. Distance is Euclidean.
+    Vertex ``row * (n + 1) + column`` lies at (column / n, row / n, 0). Diagonals run from (0, 1) to (1, 0) of each
+    cell, as in the paper. Distance is Euclidean.
     """
     n = _at_least("n", n, 1)
     y, x = np.divmod(np.arange((n + 1) ** 2), n + 1)
     V = np.stack([x / n, y / n, np.zeros(len(x))], axis=1)
-    return Mesh(V, _lattice_faces(n + 1, n + 1))
+    return Mesh(V, lattice_faces(n + 1, n + 1))
 
 
 def strip(length: int, width: int) -> Mesh:
@@ -58,11 +71,11 @@ def strip(length: int, width: int) -> Mesh:
     length, width = _at_least("length", length, 1), _at_least("width", width, 1)
     y, x = np.divmod(np.arange((width + 1) * (length + 1)), length + 1)
     V = np.stack([x, y, np.zeros(len(x))], axis=1)
-    return Mesh(V, _lattice_faces(width + 1, length + 1))
+    return Mesh(V, lattice_faces(width + 1, length + 1))
 
 
 def disk(n: int) -> Mesh:
-    """The unit disk by n rings of triangles around vertex 0, ring k with 6 k vertices. Distance is Euclidean."""
+    """The unit disk: n rings of triangles around vertex 0, ring k with 6 k vertices. Distance is Euclidean."""
     n = _at_least("n", n, 1)
     points: list[FloatArray] = [np.zeros((1, 2))]
     faces: list[IntArray] = []
@@ -72,7 +85,7 @@ def disk(n: int) -> Mesh:
         points.append(k / n * np.stack([np.cos(angle), np.sin(angle)], axis=1))
         outer = inner[-1] + 1 + np.arange(6 * k)
         sector, step = np.divmod(np.arange(6 * k), k)
-        # Each of the six sectors has k outer edges, and k - 1 inner ones between which the zigzag runs.
+        # Each of the six sectors has k outer edges and k - 1 inner edges, with a zigzag between them.
         below = inner[(sector * (k - 1) + step) % len(inner)]
         faces.append(np.stack([below, outer, np.roll(outer, -1)], axis=1))
         zigzag = step < k - 1
@@ -85,10 +98,10 @@ def disk(n: int) -> Mesh:
 
 
 def icosphere(subdivisions: int) -> Mesh:
-    """The unit sphere by subdividing an icosahedron, 10 * 4^subdivisions + 2 vertices.
+    """The unit sphere by subdivision of an icosahedron, with 10 * 4^subdivisions + 2 vertices.
 
     Distance on the sphere between positions p and q is the angle arccos(p . q); distance on the polyhedron is shorter
-    by the order of h^2. Vertices 0 and 3 of the icosahedron need not be antipodes, but every vertex has its antipode.
+    by the order of h^2. For every vertex, the antipode is a vertex too.
     """
     V, F = igl.icosahedron()
     for _ in range(_at_least("subdivisions", subdivisions, 0)):
@@ -100,21 +113,21 @@ def icosphere(subdivisions: int) -> Mesh:
 def cylinder(around: int, along: int, length: float = 2 * np.pi) -> Mesh:
     """An open cylinder of radius 1 about the z axis, `around` vertices per ring, `along` cells in its `length`.
 
-    Vertex ``ring * around + k`` lies at the angle 2 pi k / around. Rolled out, distance is Euclidean.
+    Vertex ``ring * around + k`` lies at the angle 2 pi k / around. Distance is Euclidean on the unrolled cylinder.
     """
     around, along = _at_least("around", around, 3), _at_least("along", along, 1)
     ring, k = np.divmod(np.arange(around * (along + 1)), around)
     angle = 2 * np.pi * k / around
     V = np.stack([np.cos(angle), np.sin(angle), ring * (length / along)], axis=1)
-    return Mesh(V, _lattice_faces(along + 1, around, wrap_columns=True))
+    return Mesh(V, lattice_faces(along + 1, around, wrap_columns=True))
 
 
 def book(pages: int, n: int) -> Mesh:
-    """Unit squares of n by n cells, one per page, that share an edge: the spine, on the z axis from 0 to 1.
+    """Unit squares of n by n cells, the pages, that share an edge, the spine, on the z axis from 0 to 1.
 
     Vertex ``column * (n + 1) + row`` of page 0 lies at the height row / n and the distance column / n from the spine;
-    the other pages follow with their columns from 1 to n. More than two faces meet at the spine of three pages or
-    more. Any two pages unfold to a rectangle: with r the distance from the spine and z the height, distance is
+    the other pages follow with columns 1 to n. With three pages or more, more than two faces meet at the spine. Any two
+    pages unfold to a rectangle: with r the distance from the spine and z the height, distance is
     ``hypot(r - r', z - z')`` on one page and ``hypot(r + r', z - z')`` between two.
     """
     pages, n = _at_least("pages", pages, 1), _at_least("n", n, 1)
@@ -122,16 +135,17 @@ def book(pages: int, n: int) -> Mesh:
     turned = 2 * np.pi * np.arange(pages)[:, None] / pages
     x, y = np.cos(turned) * column / n, np.sin(turned) * column / n
     V = np.stack([x, y, np.broadcast_to(row / n, x.shape)], axis=2)
-    lattice, later = _lattice_faces(n + 1, n + 1), np.arange(pages)[:, None, None] * n * (n + 1)
+    lattice, later = lattice_faces(n + 1, n + 1), np.arange(pages)[:, None, None] * n * (n + 1)
     F = np.where(lattice <= n, lattice, lattice + later)
     return Mesh(np.concatenate([V[0], V[1:, n + 1 :].reshape(-1, 3)]), F.reshape(-1, 3))
 
 
 def cone(around: int, along: int, half_angle: float = np.pi / 6) -> Mesh:
-    """A cone of slant height 1 with its apex, vertex 0, at the origin, opening upwards about the z axis.
+    """A cone about the z axis, of slant height 1, with the apex, vertex 0, at the origin, open at the top.
 
-    Vertex ``1 + ring * around + k`` lies at the slant height (ring + 1) / along and the angle 2 pi k / around. Rolled
-    out, the cone is a sector of the angle 2 pi sin(half_angle), in which distance is Euclidean or goes by the apex.
+    Vertex ``1 + ring * around + k`` lies at the slant height (ring + 1) / along and the angle 2 pi k / around. The
+    unrolled cone is a sector of the angle 2 pi sin(half_angle). Distance is Euclidean in the sector, or the sum of the
+    slant heights if the shortest path passes the apex.
     """
     around, along = _at_least("around", around, 3), _at_least("along", along, 1)
     ring, k = np.divmod(np.arange(around * along), around)
@@ -140,7 +154,7 @@ def cone(around: int, along: int, half_angle: float = np.pi / 6) -> Mesh:
     V = np.stack([radius * np.cos(angle), radius * np.sin(angle), slant * np.cos(half_angle)], axis=1)
     first = np.arange(around)
     tip = np.stack([np.zeros(around, np.int64), 1 + first, 1 + (first + 1) % around], axis=1)
-    side = 1 + _lattice_faces(along, around, wrap_columns=True)[:, ::-1] if along > 1 else np.empty((0, 3), np.int64)
+    side = 1 + lattice_faces(along, around, wrap_columns=True)[:, ::-1] if along > 1 else np.empty((0, 3), np.int64)
     return Mesh(np.concatenate([np.zeros((1, 3)), V]), np.concatenate([tip, side]))
 
 
@@ -151,7 +165,7 @@ def torus(around: int, along: int, tube: float = 0.4) -> Mesh:
     theta, psi = 2 * np.pi * i / along, 2 * np.pi * j / around
     radius = 1 + tube * np.cos(psi)
     V = np.stack([radius * np.cos(theta), radius * np.sin(theta), tube * np.sin(psi)], axis=1)
-    return Mesh(V, _lattice_faces(along, around, wrap_rows=True, wrap_columns=True)[:, ::-1])
+    return Mesh(V, lattice_faces(along, around, wrap_rows=True, wrap_columns=True)[:, ::-1])
 
 
 def flat_torus(n: int) -> IntrinsicTriangulation:
@@ -160,7 +174,7 @@ def flat_torus(n: int) -> IntrinsicTriangulation:
     Vertex ``row * n + column`` lies at (column / n, row / n). Distance is Euclidean, modulo 1 in each coordinate.
     """
     n = _at_least("n", n, 3)
-    F = _lattice_faces(n, n, wrap_rows=True, wrap_columns=True)
+    F = lattice_faces(n, n, wrap_rows=True, wrap_columns=True)
     lower = np.array([np.sqrt(2), 1, 1]) / n  # opposite the corners (0, 0), (0, 1), (1, 0) of a cell
     upper = np.array([1, np.sqrt(2), 1]) / n  # opposite (0, 1), (1, 1), (1, 0)
     lengths = np.concatenate([np.tile(lower, (n * n, 1)), np.tile(upper, (n * n, 1))])
@@ -187,3 +201,29 @@ def box(n: int, size: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Mesh:
             path[[0, 1]] = path[[1, 0]]  # positive volume
         tetrahedra.append((cell @ stride)[:, None] + path)
     return Mesh(corner, np.concatenate(tetrahedra))
+
+
+def with_slivers(mesh: Mesh, seed: int) -> Mesh:
+    """The same surface with needles: up to a tenth of the edges split at 1e-4 of their length.
+
+    The edges and their ends are drawn with `seed`. Vertices keep their numbers, and so their distances; those added
+    follow them.
+    """
+    rng = np.random.default_rng(seed)
+    faces_of: list[list[tuple[int, int]]] = [[] for _ in mesh.edges]
+    for f, row in enumerate(mesh.facets.of_face):
+        for c, e in enumerate(row):
+            faces_of[e].append((f, c))
+    alive = np.ones(mesh.n_faces, bool)
+    points, added = [], []
+    for e in rng.permutation(len(mesh.edges))[: len(mesh.edges) // 10]:
+        if not all(alive[f] for f, _ in faces_of[e]):
+            continue
+        i, j = rng.permutation(mesh.edges[e])
+        points.append(mesh.V[i] + 1e-4 * (mesh.V[j] - mesh.V[i]))
+        new = mesh.n_vertices + len(points) - 1
+        for f, c in faces_of[e]:
+            alive[f] = False
+            w, a, b = mesh.F[f, c], mesh.F[f, (c + 1) % 3], mesh.F[f, (c + 2) % 3]
+            added += [[w, a, new], [w, new, b]]
+    return Mesh(np.concatenate([mesh.V, points]), np.concatenate([mesh.F[alive], added]))

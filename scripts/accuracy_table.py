@@ -11,11 +11,7 @@ them for the next run.
 
 from __future__ import annotations
 
-import argparse
-import hashlib
-import json
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -25,9 +21,9 @@ import numpy as np
 import heat_igl
 from heat_igl.typing import FloatArray
 
-from environment import environment
+from measuring import Query, drawn_sources, errors, exact_distance, potpourri3d, seconds_of
+from scaffold import add_json, environment, option_parser, publish, table
 
-Query = Callable[[int], FloatArray]
 Row = dict[str, Any]
 
 
@@ -37,12 +33,6 @@ def ours(refine: str | None) -> Callable[[heat_igl.Mesh], Query]:
 
 def without_factorization(mesh: heat_igl.Mesh) -> Query:
     return lambda source: heat_igl.unfolded_distance(mesh.V, mesh.F, source)
-
-
-def potpourri(mesh: heat_igl.Mesh) -> Query:
-    import potpourri3d
-
-    return potpourri3d.MeshHeatMethodDistanceSolver(mesh.V, mesh.F).compute_distance
 
 
 def front(mesh: heat_igl.Mesh) -> Query:
@@ -65,7 +55,7 @@ def front(mesh: heat_igl.Mesh) -> Query:
 
 
 METHODS: dict[str, Callable[[heat_igl.Mesh], Query]] = {
-    "potpourri3d": potpourri,
+    "potpourri3d": potpourri3d,
     "MeshLab front": front,
     "heat": ours(None),
     "sweep": ours("sweep"),
@@ -74,47 +64,15 @@ METHODS: dict[str, Callable[[heat_igl.Mesh], Query]] = {
 }
 
 
-def exact_distance(mesh: heat_igl.Mesh, source: int, cache: Path | None) -> tuple[FloatArray, float]:
-    """Exact distance, and the seconds it took when it was computed."""
-    key = hashlib.sha256(mesh.V.tobytes() + mesh.F.tobytes() + bytes([0]) + str(source).encode()).hexdigest()[:24]
-    kept = cache / f"{key}.npz" if cache else None
-    if kept and kept.exists():
-        with np.load(kept) as data:
-            return data["distance"], float(data["seconds"])
-    import pygeodesic.geodesic
-
-    start = time.perf_counter()
-    algorithm = pygeodesic.geodesic.PyGeodesicAlgorithmExact(mesh.V, mesh.F)
-    distance = np.asarray(algorithm.geodesicDistances(np.array([source]))[0])
-    seconds = time.perf_counter() - start
-    if kept:
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        np.savez(kept, distance=distance, seconds=seconds)
-    return distance, seconds
-
-
-def errors(distance: FloatArray, exact: FloatArray) -> tuple[float, float, float]:
-    """Mean and 99th percentile of the relative error, and the largest error in largest distances; in percent."""
-    there = np.isfinite(exact) & (exact > 0)
-    off = np.abs(distance[there] - exact[there])
-    relative = 100 * off / exact[there]
-    return float(relative.mean()), float(np.percentile(relative, 99)), float(100 * off.max() / exact[there].max())
-
-
 def fastest(query: Query, source: int, repeats: int) -> tuple[FloatArray, float]:
     """The distance, and the least time after one call that warms up: the one that others disturbed least."""
     distance = query(source)
-    seconds = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        query(source)
-        seconds.append(time.perf_counter() - start)
-    return distance, min(seconds)
+    return distance, min(seconds_of(lambda: query(source)) for _ in range(repeats))
 
 
 def measure(path: str, names: list[str], seeds: int, repeats: int, cache: Path | None) -> list[Row]:
     mesh = heat_igl.read_mesh(path)
-    sources = [int(np.random.default_rng(seed).choice(np.unique(mesh.F))) for seed in range(seeds)]
+    sources = drawn_sources(mesh, range(seeds))
     exact = [exact_distance(mesh, source, cache) for source in sources]
     rows = []
     for name in names:
@@ -142,18 +100,22 @@ def measure(path: str, names: list[str], seeds: int, repeats: int, cache: Path |
 
 def markdown(rows: list[Row]) -> str:
     front_time = {row["mesh"]: row["milliseconds"] for row in rows if row["method"] == "MeshLab front"}
-    lines = [
-        "| mesh | vertices | method | mean % | 99th % | worst % | ms | of front | of exact |",
-        "|---|---:|---|---:|---:|---:|---:|---:|---:|",
-    ]
-    for row in rows:
-        relative = f"{row['milliseconds'] / front_time[row['mesh']]:.2f}" if row["mesh"] in front_time else "-"
-        lines.append(
-            f"| {row['mesh']} | {row['vertices']} | {row['method']} | {row['mean']:.4f} | {row['p99']:.3f} "
-            f"| {row['worst']:.2f} | {row['milliseconds']:.1f} | {relative} "
-            f"| {row['milliseconds'] / row['exact_milliseconds']:.4f} |"
+    cells = [
+        (
+            row["mesh"],
+            f"{row['vertices']}",
+            row["method"],
+            f"{row['mean']:.4f}",
+            f"{row['p99']:.3f}",
+            f"{row['worst']:.2f}",
+            f"{row['milliseconds']:.1f}",
+            f"{row['milliseconds'] / front_time[row['mesh']]:.2f}" if row["mesh"] in front_time else "-",
+            f"{row['milliseconds'] / row['exact_milliseconds']:.4f}",
         )
-    return "\n".join([*lines, "", *summary(rows)])
+        for row in rows
+    ]
+    head = "mesh | vertices | method | mean % | 99th % | worst % | ms | of front | of exact".split(" | ")
+    return "\n".join([*table(head, cells, (0, 2)), "", *summary(rows)])
 
 
 def summary(rows: list[Row]) -> list[str]:
@@ -173,22 +135,19 @@ def summary(rows: list[Row]) -> list[str]:
 
 
 def main(argv: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("meshes", nargs="+")
     parser.add_argument("--seeds", type=int, default=3, help="sources per mesh, one per seed")
     parser.add_argument("--repeats", type=int, default=5, help="timed calls per source")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=list(METHODS))
     parser.add_argument("--exact-cache", type=Path, help="directory that keeps exact distances")
-    parser.add_argument("--json", type=Path, help="where to write the rows")
+    add_json(parser)
     options = parser.parse_args(argv)
-    print("environment:", ", ".join(f"{name} {version}" for name, version in environment().items()), flush=True)
     rows: list[Row] = []
     for path in options.meshes:
         rows += measure(path, options.methods, options.seeds, options.repeats, options.exact_cache)
         print(f"{Path(path).stem} done", file=sys.stderr, flush=True)
-    print(markdown(rows))
-    if options.json:
-        options.json.write_text(json.dumps({"environment": environment(), "rows": rows}, indent=1) + "\n")
+    publish({"environment": environment(), "rows": rows}, markdown(rows), json_file=options.json)
     return 0
 
 

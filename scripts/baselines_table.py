@@ -10,22 +10,20 @@ wheel (extra ``validate``; left out where it is missing). Fast marching needs th
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
-import json
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import heat_igl
-from heat_igl import Mesh, MissingExtraError, baselines, reference, shapes
+from heat_igl import Mesh, MissingExtraError, baselines, closed_forms, reference, shapes
 from heat_igl.operators import Operators, operators
 
-from environment import environment
+from measuring import mean_error
+from scaffold import add_output, add_seed, environment, option_parser, publish, table, wheel_mesh
 
 Truth = Callable[[Mesh, int], np.ndarray]
 
@@ -47,46 +45,21 @@ GRID_METHODS: dict[str, Callable[[np.ndarray, float], np.ndarray]] = {
 }
 
 
-def straight_line(mesh: Mesh, source: int) -> np.ndarray:
-    return np.linalg.norm(mesh.V - mesh.V[source], axis=1)
-
-
-def great_circle(mesh: Mesh, source: int) -> np.ndarray:
-    return np.arccos(np.clip(mesh.V @ mesh.V[source], -1, 1))
-
-
-def helix(mesh: Mesh, source: int) -> np.ndarray:
-    angle = np.arctan2(mesh.V[:, 1], mesh.V[:, 0])
-    turn = np.abs((angle - angle[source] + np.pi) % (2 * np.pi) - np.pi)
-    return np.hypot(turn, mesh.V[:, 2] - mesh.V[source, 2])
-
-
-def polyhedral(mesh: Mesh, source: int) -> np.ndarray:
-    return reference.exact(mesh, source)
-
-
 def meshes(quick: bool) -> Iterator[tuple[str, Mesh, Truth]]:
     """Name, mesh and truth of each test case."""
     k = 1 if quick else 2
-    yield "square", shapes.grid(24 * k), straight_line
-    yield "disk", shapes.disk(16 * k), straight_line
-    yield "sphere", shapes.icosphere(2 + k), great_circle
-    yield "cylinder", shapes.cylinder(40 * k, 40 * k), helix
+    yield "square", shapes.grid(24 * k), closed_forms.plane
+    yield "disk", shapes.disk(16 * k), closed_forms.plane
+    yield "sphere", shapes.icosphere(2 + k), closed_forms.sphere
+    yield "cylinder", shapes.cylinder(40 * k, 40 * k), closed_forms.cylinder
     if quick:
         return
-    spec = importlib.util.find_spec("pymeshlab")
-    if spec is None or spec.origin is None or importlib.util.find_spec("pygeodesic") is None:
-        print('cow and bunny are left out: pip install "heat-igl[validate]"', file=sys.stderr)
-        return
     for name in ("cow", "bunny"):
-        path = Path(spec.origin).parent / "tests" / "sample_meshes" / f"{name}.obj"
-        yield name, heat_igl.read_mesh(path), polyhedral
-
-
-def mean_error(distance: np.ndarray, truth: np.ndarray) -> float:
-    """Mean of |d - truth| / truth over the vertices off the source, as a fraction."""
-    away = np.isfinite(truth) & (truth > 0)
-    return float(np.mean(np.abs(distance[away] - truth[away]) / truth[away]))
+        path = wheel_mesh(f"{name}.obj")
+        if path is None or importlib.util.find_spec("pygeodesic") is None:
+            print(f'{name} is left out: pip install "heat-igl[validate]"', file=sys.stderr)
+        else:
+            yield name, heat_igl.read_mesh(path), reference.exact
 
 
 def mesh_rows(cases: Iterator[tuple[str, Mesh, Truth]], n_sources: int, seed: int) -> list[dict[str, Any]]:
@@ -145,15 +118,15 @@ def limit_rows(subdivisions: int) -> list[dict[str, Any]]:
     return rows
 
 
-def table(rows: Sequence[dict[str, Any]]) -> list[str]:
+def methods_by_case(rows: Sequence[dict[str, Any]]) -> list[str]:
     """Methods down, cases across: mean error in percent, and seconds per set of sources."""
     cases = list(dict.fromkeys(row["case"] for row in rows))
-    lines = ["| method | " + " | ".join(cases) + " |", "|---|" + "---:|" * len(cases)]
+    lines = []
     for method in dict.fromkeys(row["method"] for row in rows):
         found = {row["case"]: row for row in rows if row["method"] == method}
         cells = [f"{100 * np.mean(found[case]['error']):.3g} ({found[case]['seconds']:.2g} s)" for case in cases]
-        lines.append(f"| {method} | " + " | ".join(cells) + " |")
-    return lines
+        lines.append((method, *cells))
+    return table(["method", *cases], lines)
 
 
 def markdown(result: dict[str, Any]) -> str:
@@ -163,27 +136,25 @@ def markdown(result: dict[str, Any]) -> str:
         "",
         "On meshes, one source at a time:",
         "",
-        *table(result["meshes"]),
+        *methods_by_case(result["meshes"]),
         "",
         "On grids, from all sources at once:",
         "",
-        *table(result["grids"]),
+        *methods_by_case(result["grids"]),
         "",
         "Theorem 3.1: largest relative difference of log u_t / log t from the number of edges, on a sphere.",
         "",
-        "| t | difference |",
-        "|---|---:|",
-        *(f"| {row['t']} | {100 * row['largest']:.3g} % |" for row in result["theorem 3.1"]),
+        *table(["t", "difference"], [(row["t"], f"{100 * row['largest']:.3g} %") for row in result["theorem 3.1"]]),
     ]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("--sources", type=int, default=3, help="sources per case (default 3)")
-    parser.add_argument("--seed", type=int, default=0, help="of the generator that draws them (default 0)")
+    add_seed(parser)
     parser.add_argument("--quick", action="store_true", help="coarse generated shapes alone")
-    parser.add_argument("--output", type=Path, help="directory for baselines.json and baselines.md")
+    add_output(parser, "baselines")
     arguments = parser.parse_args(argv)
     result = {
         "sources": arguments.sources,
@@ -193,12 +164,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "grids": grid_rows((32, 64) if arguments.quick else (64, 128, 256), arguments.sources, arguments.seed),
         "theorem 3.1": limit_rows(2 if arguments.quick else 3),
     }
-    text = markdown(result)
-    print(text, end="")
-    if arguments.output is not None:
-        arguments.output.mkdir(parents=True, exist_ok=True)
-        (arguments.output / "baselines.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf8")
-        (arguments.output / "baselines.md").write_text(text, encoding="utf8")
+    publish(result, markdown(result), folder=arguments.output, name="baselines")
     return 0
 
 

@@ -39,7 +39,8 @@ from heat_igl.demo import sample_mesh
 from heat_igl.io import read_mesh
 from heat_igl.runtime import PeakMemory
 
-from environment import environment
+from measuring import bandwidth
+from scaffold import add_seed, environment, option_parser, page, publish, table, write_parts
 
 HEAT = ("heat_igl", "potpourri3d", "libigl heat")
 SINGLE = ("MeshLab's front", "pygeodesic")  # nothing of a query is left for the next
@@ -332,17 +333,6 @@ def accuracy(methods: Sequence[str], large: bool) -> list[dict[str, Any]]:
     return rows
 
 
-def bandwidth(size: int = 2**28, repetitions: int = 7) -> float:
-    """Bytes read and written per second by one thread that copies a large array; the best of some repetitions."""
-    source, target = np.ones(size // 8), np.zeros(size // 8)
-    best = np.inf
-    for _ in range(repetitions):
-        start = time.perf_counter()
-        np.copyto(target, source)
-        best = min(best, time.perf_counter() - start)
-    return 2 * size / best
-
-
 def import_seconds(repetitions: int = 7) -> dict[str, float]:
     """Median seconds of a new interpreter that imports heat_igl, and of one that imports what it is built on."""
     statements = {
@@ -449,21 +439,18 @@ def huge_mesh(n: int, path: Path | None) -> tuple[Mesh, Mesh | None]:
 # The report.
 
 
-def _row(cells: Sequence[tuple[Any, str]]) -> str:
-    return f"| {' | '.join('-' if value is None else format(value, digits) for value, digits in cells)} |"
-
-
 def _table(head: str, rows: Sequence[Sequence[tuple[Any, str]]]) -> list[str]:
-    names = head.split(" | ")
-    rule = ["---" if i == 0 else "--:" for i in range(len(names))]
-    return [f"| {head} |", f"|{'|'.join(rule)}|", *(_row(row) for row in rows)]
+    cells = [["-" if value is None else format(value, digits) for value, digits in row] for row in rows]
+    return table(head.split(" | "), cells)
 
 
 def markdown(result: dict[str, Any]) -> str:
     """The whole result."""
-    parts = [", ".join(f"{name} {value}" for name, value in result["environment"].items())]
-    parts += [part for name, part in tables(result).items() if part]
-    return "\n\n".join(parts) + "\n"
+    return page(result, _all_tables(result))
+
+
+def _all_tables(result: dict[str, Any]) -> str:
+    return "\n\n".join(part for part in tables(result).values() if part)
 
 
 def tables(result: dict[str, Any]) -> dict[str, str]:
@@ -559,16 +546,6 @@ def _huge_table(row: dict[str, Any]) -> list[str]:
     return _table(head, [[*cells, (memory, ".1f"), (row["mean_error"], ".3f"), (row["max_error"], ".3f")]])
 
 
-def fill_in(page: str, parts: dict[str, str]) -> str:
-    """`page` with what stands between ``<!-- name -->`` and ``<!-- /name -->`` replaced by the part of that name."""
-    for name, text in parts.items():
-        first, last = f"<!-- {name} -->", f"<!-- /{name} -->"
-        if first in page:
-            before, rest = page.split(first, 1)
-            page = f"{before}{first}\n{text}\n{last}{rest.split(last, 1)[1]}"
-    return page
-
-
 def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
     """A log-log picture of each quantity over the number of vertices, with the fitted exponents in the legend."""
     from matplotlib.figure import Figure
@@ -595,11 +572,11 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
 
 
 def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("--size", type=int, action="append", help="number of vertices; may be repeated")
     parser.add_argument("--mesh", type=Path, action="append", help="real mesh; may be repeated; default: the bunny")
     parser.add_argument("--runs", type=int, default=5, help="most paired runs per mesh; large ones get fewer")
-    parser.add_argument("--seed", type=int, default=0)
+    add_seed(parser)
     parser.add_argument(
         "--quick", action="store_true", help="10k and 30k vertices, at most 2 runs, single queries at 10k only"
     )
@@ -652,11 +629,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     else:
         result |= _measured(arguments)
         draw(result["timings"], arguments.out / "benchmark.png")
-    (arguments.out / f"{name}.json").write_text(json.dumps(result, indent=2) + "\n")
-    (arguments.out / f"{name}.md").write_text(markdown(result))
+    publish(result, _all_tables(result), folder=arguments.out, name=name)
     if arguments.docs:
-        arguments.docs.write_text(fill_in(arguments.docs.read_text(), tables(result)))
-    print(markdown(result))
+        write_parts(arguments.docs, tables(result))
     return 0
 
 

@@ -13,7 +13,6 @@ extra ``cluster``.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shutil
 import statistics
@@ -27,12 +26,11 @@ from typing import Any
 
 import igl
 import numpy as np
-from benchmark import fill_in
 
 from heat_igl import HeatMethodSolver, Mesh, cluster, read_mesh, shapes, write_mesh
 from heat_igl.cluster.memory import PROCESS_MEMORY, solver_memory
 
-from environment import environment
+from scaffold import environment, option_parser, publish, table, write_parts
 
 SOURCES = 64
 MEMORY_SIZES = (3, 5, 6, 7)  # subdivisions of the icosphere
@@ -169,31 +167,31 @@ def rates(count: int, real: Path | None, repeats: int) -> dict[str, Any]:
 
 def markdown(result: dict[str, Any]) -> str:
     rate = result["rates"]
+    memory_cells = [
+        (
+            row["mesh"],
+            f"{row['vertices']}",
+            row["refine"] or "",
+            *(f"{row[name] / 2**20:.0f}" for name in ("peak", "stated")),
+            f"{row['ratio']:.2f}",
+        )
+        for row in result["memory"]
+    ]
     lines = [
-        ", ".join(f"{name} {value}" for name, value in result["environment"].items()),
-        "",
         f"{rate['meshes']} meshes x {SOURCES} sources, medians of {len(rate['seconds']['loop'])} turns:",
         "",
-        "| | seconds |",
-        "|---|--:|",
-        *(f"| {name} | {statistics.median(seconds):.1f} |" for name, seconds in rate["seconds"].items()),
+        *table(["", "seconds"], [(name, f"{statistics.median(s):.1f}") for name, s in rate["seconds"].items()]),
         "",
         f"Two workers are {rate['rate_of_two']:.2f} times as fast as one. One worker takes "
         f"{100 * rate['overhead']:+.1f} % more time than the loop. Same bits: {'yes' if rate['same_bits'] else 'NO'}.",
         "",
-        "| mesh | vertices | refine | peak memory, MiB | stated, MiB | ratio |",
-        "|---|--:|---|--:|--:|--:|",
-        *(
-            f"| {row['mesh']} | {row['vertices']} | {row['refine'] or ''} | {row['peak'] / 2**20:.0f} "
-            f"| {row['stated'] / 2**20:.0f} | {row['ratio']:.2f} |"
-            for row in result["memory"]
-        ),
+        *table("mesh | vertices | refine | peak memory, MiB | stated, MiB | ratio".split(" | "), memory_cells, (0, 2)),
     ]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("--meshes", type=int, default=200)
     parser.add_argument("--add", type=Path, metavar="FOLDER", help="real meshes")
     parser.add_argument("--repeats", type=int, default=3)
@@ -212,13 +210,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         "rates": rates(arguments.meshes, arguments.add, arguments.repeats),
         "memory": [memory(*each, refine) for each in memory_meshes(arguments.add) for refine in (None, "sweep")],
     }
-    (arguments.out / "cluster_table.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf8")
-    text = markdown(result)
-    (arguments.out / "cluster_table.md").write_text(text, encoding="utf8")
-    print(text)
+    page = publish(result, markdown(result), folder=arguments.out, name="cluster_table")
     if arguments.docs:
-        page = arguments.docs.read_text(encoding="utf8")
-        arguments.docs.write_text(fill_in(page, {"rates and memory": text}), encoding="utf8")
+        write_parts(arguments.docs, {"rates and memory": page})
     return 0
 
 

@@ -9,21 +9,20 @@ over the meshes, and that relative to potpourri3d's default, in the mean and at 
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from heat_igl import HeatMethodSolver, Mesh, read_mesh, reference
+from heat_igl import HeatMethodSolver, Mesh, reference
 from heat_igl.operators import operators
 from heat_igl.steps import HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.typing import FloatArray
 from heat_igl.validation import draw_sources
 
-from environment import environment
+from measuring import mean_error
+from scaffold import add_json, add_seed, environment, option_parser, over_meshes, publish, table
 
 Distance = Callable[[int], FloatArray]
 
@@ -97,45 +96,37 @@ def mean_errors(mesh: Mesh, n_sources: int, seed: int) -> dict[str, float]:
     found = {}
     for name, prepare in VARIANTS.items():
         distance = prepare(mesh)
-        errors = []
-        for source, truth in zip(sources, exact, strict=True):
-            far = np.isfinite(truth) & (truth > 0)
-            errors.append(100 * float((np.abs(distance(source) - truth)[far] / truth[far]).mean()))
-        found[name] = float(np.mean(errors))
+        errors = [mean_error(distance(source), truth) for source, truth in zip(sources, exact, strict=True)]
+        found[name] = 100 * float(np.mean(errors))
     return found
 
 
 def markdown(rows: dict[str, dict[str, float]]) -> str:
     names = list(rows)
-    lines = [
-        f"| % | {' | '.join(names)} | geometric mean | of potpourri3d | at worst |",
-        "|---" * (len(names) + 4) + "|",
-    ]
+    lines = []
     peer = np.array([rows[name]["potpourri3d"] for name in names])
     for variant in VARIANTS:
         errors = np.array([rows[name][variant] for name in names])
         ratio = errors / peer
         cells = [f"{error:.2f}" for error in errors]
         cells += [f"{np.exp(np.log(errors).mean()):.3f}", f"{np.exp(np.log(ratio).mean()):.3f}", f"{ratio.max():.3f}"]
-        lines.append(f"| {variant} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        lines.append((variant, *cells))
+    return "\n".join(table(["%", *names, "geometric mean", "of potpourri3d", "at worst"], lines))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("meshes", nargs="+", type=Path)
     parser.add_argument("--sources", type=int, default=3, help="per mesh (default 3)")
-    parser.add_argument("--seed", type=int, default=0, help="of the generator that draws them (default 0)")
-    parser.add_argument("--json", type=Path)
+    add_seed(parser)
+    add_json(parser)
     arguments = parser.parse_args(argv)
-    rows = {}
-    for path in arguments.meshes:
-        rows[path.stem] = mean_errors(read_mesh(path), arguments.sources, arguments.seed)
-        print(f"{path.stem}: {rows[path.stem]['default']:.2f} %", file=sys.stderr, flush=True)
-    print(markdown(rows))
-    if arguments.json is not None:
-        text = json.dumps({"environment": environment(), "mean error in %": rows}, indent=1)
-        arguments.json.write_text(text + "\n", encoding="utf8")
+    rows = over_meshes(
+        arguments.meshes,
+        lambda mesh: mean_errors(mesh, arguments.sources, arguments.seed),
+        lambda row: f"{row['default']:.2f} %",
+    )
+    publish({"environment": environment(), "mean error in %": rows}, markdown(rows), json_file=arguments.json)
     return 0
 
 

@@ -10,11 +10,8 @@ has them. Nothing is drawn at random. Times depend on the machine; the rest does
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import igl
@@ -25,9 +22,9 @@ import scipy.sparse.linalg as spl
 from heat_igl import HeatMethodSolver, Mesh, baselines, shapes
 from heat_igl.operators import operators
 
-from environment import environment
-from paper_figures import accuracy, computation_times, power_law
 from paper_formulas import Square, distance, mean_error
+from paper_measurements import accuracy, computation_times, power_law
+from scaffold import add_output, environment, option_parser, publish, table
 
 Rows = list[dict[str, Any]]
 
@@ -301,10 +298,9 @@ def jump(sizes: Sequence[int]) -> Rows:
     return rows
 
 
-def table(rows: Rows) -> list[str]:
+def claim_table(rows: Rows) -> list[str]:
     names = list(rows[0])
-    lines = ["| " + " | ".join(map(_cell, names)) + " |", "|---" + "|---:" * (len(names) - 1) + "|"]
-    return [*lines, *("| " + " | ".join(_cell(row[name]) for name in names) + " |" for row in rows)]
+    return table([_cell(name) for name in names], [[_cell(row[name]) for name in names] for row in rows])
 
 
 def _cell(value: Any) -> str:
@@ -338,20 +334,14 @@ def claims(quick: bool) -> dict[str, Rows]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("--quick", action="store_true", help="small grids")
-    parser.add_argument("--output", type=Path, help="directory for paper_claims.json and paper_claims.md")
+    add_output(parser, "paper_claims")
     arguments = parser.parse_args(argv)
     found = claims(arguments.quick)
-    setting = environment()
-    lines = [line for title, rows in found.items() for line in (f"## {title}", "", *table(rows), "")]
-    text = "\n".join([*lines, "Environment: " + ", ".join(f"{k} {v}" for k, v in setting.items())]) + "\n"
-    print(text, end="")
-    if arguments.output is not None:
-        arguments.output.mkdir(parents=True, exist_ok=True)
-        content = json.dumps({"environment": setting, "tables": found}, indent=1)
-        (arguments.output / "paper_claims.json").write_text(content + "\n", encoding="utf8")
-        (arguments.output / "paper_claims.md").write_text(text, encoding="utf8")
+    lines = [line for title, rows in found.items() for line in (f"## {title}", "", *claim_table(rows), "")]
+    result = {"environment": environment(), "tables": found}
+    publish(result, "\n".join(lines), folder=arguments.output, name="paper_claims")
     return 0
 
 

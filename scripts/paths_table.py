@@ -9,8 +9,6 @@ down that of the heat alone. Needs the extra ``fast``.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
 from collections.abc import Sequence
@@ -22,7 +20,7 @@ import numpy as np
 import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, reference, shapes, shortest_paths
 
-from environment import environment
+from scaffold import add_output, add_seed, environment, option_parser, publish, table
 
 
 def measured(mesh: Mesh, name: str, n_targets: int, seed: int) -> list[dict[str, Any]]:
@@ -62,25 +60,22 @@ def markdown(result: dict[str, Any]) -> str:
         f"Length of a path over exact distance, less 1, in percent; to one source, seed {result['seed']}. Seconds are "
         "for all paths, tables of the mesh included and the distance not.",
         "",
-        "| mesh | vertices | down | paths | median | mean | 99th percentile | largest | smallest | seconds |",
-        "|---|---:|---|---:|---:|---:|---:|---:|---:|---:|",
     ]
+    kinds = ("median", "mean", "99th percentile", "largest", "smallest")
+    cells = []
     for row in result["paths"]:
-        errors = " | ".join(
-            f"{100 * row[key]:.2g}" for key in ("median", "mean", "99th percentile", "largest", "smallest")
-        )
-        lines.append(
-            f"| {row['mesh']} | {row['n']} | {row['down']} | {row['targets']} | {errors} | {row['seconds']:.2f} |"
-        )
-    return "\n".join(lines) + "\n"
+        errors = (f"{100 * row[kind]:.2g}" for kind in kinds)
+        cells.append((row["mesh"], f"{row['n']}", row["down"], f"{row['targets']}", *errors, f"{row['seconds']:.2f}"))
+    head = ("mesh", "vertices", "down", "paths", *kinds, "seconds")
+    return "\n".join([*lines, *table(head, cells, (0, 2))])
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("meshes", type=Path, nargs="+", help="triangle meshes")
     parser.add_argument("--targets", type=int, default=200, help="paths per mesh (default 200)")
-    parser.add_argument("--seed", type=int, default=0, help="of the generator that draws them (default 0)")
-    parser.add_argument("--output", type=Path, help="directory for paths.json and paths.md")
+    add_seed(parser)
+    add_output(parser, "paths")
     arguments = parser.parse_args(argv)
     warm = shapes.grid(2)
     shortest_paths(warm, warm.V[:, 0], 8)  # compiles
@@ -90,12 +85,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         for row in measured(heat_igl.read_mesh(path), path.stem, arguments.targets, arguments.seed)
     ]
     result = {"seed": arguments.seed, "environment": environment(), "paths": rows}
-    text = markdown(result)
-    print(text, end="")
-    if arguments.output is not None:
-        arguments.output.mkdir(parents=True, exist_ok=True)
-        (arguments.output / "paths.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf8")
-        (arguments.output / "paths.md").write_text(text, encoding="utf8")
+    publish(result, markdown(result), folder=arguments.output, name="paths")
     return 0
 
 

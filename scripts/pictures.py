@@ -9,8 +9,8 @@ meshes of the pymeshlab wheel.
 
 from __future__ import annotations
 
-import argparse
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -19,20 +19,21 @@ from pathlib import Path
 from heat_igl import HeatMethodSolver
 from heat_igl.drawing.plots import plot
 
-import paper_figures
+from scaffold import environment, environment_line, option_parser, sample
 
-DOCS = Path(__file__).resolve().parents[1] / "docs" / "images"
+SCRIPTS = Path(__file__).resolve().parent
+DOCS = SCRIPTS.parent / "docs" / "images"
 
 
 def bunny(out: Path) -> None:
-    mesh = paper_figures.sample("bunny")
+    mesh = sample("bunny")
     source = 1234
     plot(mesh, HeatMethodSolver(mesh).distance(source), sources=source).save(out / "bunny.png")
 
 
 def paper(out: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        paper_figures.main(["--out", folder])
+        subprocess.run([sys.executable, SCRIPTS / "paper_figures.py", "--out", folder], check=True)
         for name in ("1_heat", "1_distance", "2", "3", "5", "5_jump"):
             shutil.copyfile(Path(folder, f"figure_{name}.png"), out / f"paper_{name}.png")
 
@@ -41,13 +42,14 @@ PICTURES: dict[str, Callable[[Path], None]] = {"bunny": bunny, "paper": paper}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("--out", type=Path, default=DOCS, help="directory (default docs/images)")
     parser.add_argument("--picture", choices=list(PICTURES), action="append", help="one of them; repeatable")
     arguments = parser.parse_args(argv)
     arguments.out.mkdir(parents=True, exist_ok=True)
     for name in arguments.picture or PICTURES:
         PICTURES[name](arguments.out)
+    print(f"Environment: {environment_line(environment())}")
     return 0
 
 

@@ -12,11 +12,7 @@ shortest paths in a graph with extra points on the edges. ``--icosphere 0`` leav
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -25,38 +21,16 @@ import numpy as np
 import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, Refinement, shapes
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
+from heat_igl.reference.steiner import steiner_distance
 from heat_igl.typing import FloatArray
 
-from accuracy_table import errors, exact_distance, potpourri
-from environment import environment
-from steiner import steiner_distance
+from measuring import drawn_sources, errors, exact_distance, median_seconds, potpourri3d
+from scaffold import add_json, environment, option_parser, publish
 
 REFINED = ("sweep", "unfold")
 # Longest edges, in mean edges; infinity is the mesh as it is.
 SPLIT = (np.inf, 2.0, 1.0, 0.7)
 Row = dict[str, Any]
-
-
-def with_slivers(mesh: Mesh, seed: int) -> Mesh:
-    """The same surface with up to a tenth of the edges split at 1e-4 of their length; vertices keep their numbers."""
-    rng = np.random.default_rng(seed)
-    faces_of: list[list[tuple[int, int]]] = [[] for _ in mesh.edges]
-    for f, row in enumerate(mesh.facets.of_face):
-        for c, e in enumerate(row):
-            faces_of[e].append((f, c))
-    alive = np.ones(mesh.n_faces, bool)
-    points, added = [], []
-    for e in rng.permutation(len(mesh.edges))[: len(mesh.edges) // 10]:
-        if not all(alive[f] for f, _ in faces_of[e]):
-            continue
-        i, j = rng.permutation(mesh.edges[e])
-        points.append(mesh.V[i] + 1e-4 * (mesh.V[j] - mesh.V[i]))
-        new = mesh.n_vertices + len(points) - 1
-        for f, c in faces_of[e]:
-            alive[f] = False
-            w, a, b = mesh.F[f, c], mesh.F[f, (c + 1) % 3], mesh.F[f, (c + 2) % 3]
-            added += [[w, a, new], [w, new, b]]
-    return Mesh(np.concatenate([mesh.V, points]), np.concatenate([mesh.F[alive], added]))
 
 
 def fan(n_faces: int) -> Mesh:
@@ -65,16 +39,6 @@ def fan(n_faces: int) -> Mesh:
     tips = np.stack([np.cos(angle), np.sin(angle), 0.3 * np.arange(n_faces)], axis=1)
     F = np.stack([np.zeros(n_faces, int), np.ones(n_faces, int), np.arange(n_faces) + 2], axis=1)
     return Mesh(np.concatenate([[[0, 0, 0], [0, 0, 1]], tips]), F)
-
-
-def median_seconds(call: Callable[[], object], repeats: int) -> float:
-    call()
-    seconds = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        call()
-        seconds.append(time.perf_counter() - start)
-    return float(np.median(seconds))
 
 
 def lifted(mesh: Mesh, n: int, seed: int) -> Mesh:
@@ -88,7 +52,7 @@ def bad_triangles(mesh: Mesh, sources: list[int], cache: Path | None) -> Row:
     """Mean error in percent at the vertices of the mesh: without slivers, with three choices of them; of heat alone."""
     row: Row = {}
     n = mesh.n_vertices
-    bad = [with_slivers(mesh, seed) for seed in range(3)]
+    bad = [shapes.with_slivers(mesh, seed) for seed in range(3)]
     exact = [exact_distance(mesh, source, cache)[0] for source in sources]
     off_plane = lifted(bad[0], n, 0)
     # Next to needles pygeodesic is now and then percents too long, or finds nothing; paths that were found bound it.
@@ -136,7 +100,7 @@ def speed(mesh: Mesh, source: int, repeats: int) -> Row:
     )
     row["tolerance 0, time of the default's"] = tight / usual
     once = median_seconds(lambda: heat_igl.unfolded_distance(mesh.V, mesh.F, source), repeats)
-    other = median_seconds(lambda: potpourri(mesh)(source), repeats)
+    other = median_seconds(lambda: potpourri3d(mesh)(source), repeats)
     row["unfolded_distance of potpourri3d"] = once / other
     row["solver pays from query"] = int(np.ceil(setup["unfold"] / (once - query))) if once > query else None
     return row
@@ -189,7 +153,7 @@ def markdown(rows: dict[str, Row]) -> str:
 
 
 def main(argv: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("meshes", nargs="*")
     parser.add_argument("--nonmanifold", nargs="*", default=[], help="meshes with edges of more than two faces")
     parser.add_argument("--seeds", type=int, default=3, help="sources per mesh, one per seed")
@@ -198,21 +162,15 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--repeats", type=int, default=5, help="timed calls")
     parser.add_argument("--icosphere", type=int, default=8, help="subdivisions")
     parser.add_argument("--exact-cache", type=Path, help="directory that keeps exact distances")
-    parser.add_argument("--json", type=Path, help="where to write the rows")
+    add_json(parser)
     options = parser.parse_args(argv)
-    print("environment:", ", ".join(f"{name} {version}" for name, version in environment().items()), flush=True)
-
     seeds = range(options.first_seed, options.first_seed + options.seeds)
-
-    def drawn(mesh: Mesh) -> list[int]:
-        return [int(np.random.default_rng(seed).choice(np.unique(mesh.F))) for seed in seeds]
-
     rows: dict[str, Row] = {}
     for path in options.meshes:
         mesh = heat_igl.read_mesh(path)
-        row = rows[Path(path).stem] = bad_triangles(mesh, drawn(mesh), options.exact_cache)
+        row = rows[Path(path).stem] = bad_triangles(mesh, drawn_sources(mesh, seeds), options.exact_cache)
         if not options.no_times:
-            row |= speed(mesh, drawn(mesh)[0], options.repeats)
+            row |= speed(mesh, drawn_sources(mesh, seeds)[0], options.repeats)
         print(f"{Path(path).stem} done", file=sys.stderr, flush=True)
     rows["fan of five"] = nonmanifold(fan(5), [2, 3, 4])
     for k in (8, 24):
@@ -220,12 +178,10 @@ def main(argv: list[str] | None = None) -> int:
         rows[f"five pages, {k} edges on the line"] = nonmanifold(mesh, [mesh.n_vertices - 1])
     for path in options.nonmanifold:
         mesh = heat_igl.read_mesh(path)
-        rows[Path(path).stem] = nonmanifold(mesh, drawn(mesh))
+        rows[Path(path).stem] = nonmanifold(mesh, drawn_sources(mesh, seeds))
     if options.icosphere:
         rows["icosphere"] = sphere(options.icosphere)
-    print(markdown(rows))
-    if options.json:
-        options.json.write_text(json.dumps({"environment": environment(), "rows": rows}, indent=1) + "\n")
+    publish({"environment": environment(), "rows": rows}, markdown(rows), json_file=options.json)
     return 0
 
 

@@ -10,18 +10,16 @@ of their distance. Needs the extras ``validate`` and ``fast``; docs/sources.md s
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, read_mesh, reference
-from heat_igl.typing import FloatArray
+from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, reference
 
-from environment import environment
+from measuring import mean_error
+from scaffold import add_json, add_seed, environment, option_parser, over_meshes, publish, table
 
 METHODS = (None, "sweep", "unfold")
 
@@ -40,11 +38,6 @@ def drawn_points(mesh: Mesh, k: int, seed: int) -> list[SurfacePoints]:
     return [SurfacePoints([face], [0.97 * rng.dirichlet(np.ones(3)) + 0.01]) for face in faces]
 
 
-def mean_error(distance: FloatArray, truth: FloatArray) -> float:
-    far = np.isfinite(truth) & (truth > 0)
-    return 100 * float((np.abs(distance - truth)[far] / truth[far]).mean())
-
-
 def measure(mesh: Mesh, k: int, seed: int) -> dict[str, float]:
     found: dict[str, list[float]] = {}
     solvers = {method: HeatMethodSolver(mesh, refine=method) for method in METHODS}
@@ -56,36 +49,30 @@ def measure(mesh: Mesh, k: int, seed: int) -> dict[str, float]:
         for method, solver in solvers.items():
             name = method or "heat"
             distance = solver.distance(point)
-            found.setdefault(f"{name}, face", []).append(mean_error(distance, truth))
-            found.setdefault(f"{name}, vertex", []).append(mean_error(solver.distance(corners[:1]), of_vertex))
+            found.setdefault(f"{name}, face", []).append(100 * mean_error(distance, truth))
+            found.setdefault(f"{name}, vertex", []).append(100 * mean_error(solver.distance(corners[:1]), of_vertex))
             found.setdefault(f"{name}, corners", []).append(float(np.abs(distance[corners] / straight - 1).max()))
     return {name: float(max(each) if "corners" in name else np.mean(each)) for name, each in found.items()}
 
 
 def markdown(rows: dict[str, dict[str, float]]) -> str:
     names = list(next(iter(rows.values())))
-    lines = [f"| mesh | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
-    for mesh, row in rows.items():
-        cells = [f"{row[name]:.1e}" if "corners" in name else f"{row[name]:.3g}" for name in names]
-        lines.append(f"| {mesh} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    cells = [
+        (mesh, *(f"{row[name]:.1e}" if "corners" in name else f"{row[name]:.3g}" for name in names))
+        for mesh, row in rows.items()
+    ]
+    return "\n".join(table(["mesh", *names], cells))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("meshes", nargs="+", type=Path)
     parser.add_argument("--sources", type=int, default=3, help="points per mesh (default 3)")
-    parser.add_argument("--seed", type=int, default=0, help="of the generator that draws them (default 0)")
-    parser.add_argument("--json", type=Path)
+    add_seed(parser)
+    add_json(parser)
     arguments = parser.parse_args(argv)
-    rows = {}
-    for path in arguments.meshes:
-        rows[path.stem] = measure(read_mesh(path), arguments.sources, arguments.seed)
-        print(path.stem, file=sys.stderr, flush=True)
-    print(markdown(rows))
-    if arguments.json is not None:
-        text = json.dumps({"environment": environment(), "rows": rows}, indent=1)
-        arguments.json.write_text(text + "\n", encoding="utf8")
+    rows = over_meshes(arguments.meshes, lambda mesh: measure(mesh, arguments.sources, arguments.seed))
+    publish({"environment": environment(), "rows": rows}, markdown(rows), json_file=arguments.json)
     return 0
 
 

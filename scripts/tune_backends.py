@@ -12,13 +12,11 @@ Writes tune_backends.json and tune_backends.md.
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
-import json
 import statistics
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -29,9 +27,10 @@ from scipy.spatial import ConvexHull
 from heat_igl import Mesh, read_mesh
 from heat_igl.linear import analyse
 from heat_igl.operators import Operators, operators
-from heat_igl.steps import Descent, HeatFlow, PoissonProblem
+from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem
 
-from environment import environment
+from measuring import bandwidth, seconds_of
+from scaffold import add_seed, environment, option_parser, publish, table
 
 SIZES = (300, 1000, 3000, 10_000, 30_000, 100_000)
 COLUMNS = ("analysis", "factors", "one", "eight", "kernel", "nonzeros", "bytes")
@@ -42,20 +41,6 @@ def sphere(n: int, rng: np.random.Generator) -> Mesh:
     points = rng.standard_normal((n, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     return Mesh(points, ConvexHull(points).simplices)
-
-
-def seconds(action: Callable[[], Any]) -> float:
-    """How long it takes."""
-    start = time.perf_counter()
-    action()
-    return time.perf_counter() - start
-
-
-def bandwidth() -> float:
-    """Bytes per second that a copy reads and writes, best of five, far larger than any cache."""
-    source = np.ones(30_000_000)
-    target = np.zeros_like(source)
-    return 2 * source.nbytes / min(seconds(lambda: np.copyto(target, source)) for _ in range(5))
 
 
 def run(domain: Operators, backend: str) -> dict[str, float]:
@@ -72,10 +57,10 @@ def run(domain: Operators, backend: str) -> dict[str, float]:
     for name, k in (("one", 1), ("eight", 8)):
         b = np.zeros((n, k))
         b[np.arange(k) * (n // k), np.arange(k)] = 1e290
-        row[name] = seconds(lambda b=b: poisson.solve(heat.solve(b))) / k
+        row[name] = seconds_of(lambda b=b: poisson.solve(heat.solve(b))) / k
     u = heat.solve(b[:, :1])
-    descent = Descent(domain, t)
-    row["kernel"] = seconds(lambda: descent.divergence(u))
+    descent = NormalizedDivergence(domain, t)
+    row["kernel"] = seconds_of(lambda: descent.divergence(u))
     factors = [*heat.factors, poisson.factor]
     row["nonzeros"] = sum(factor.nonzeros for factor in factors)
     row["bytes"] = sum(factor.n_bytes for factor in factors)
@@ -101,23 +86,21 @@ def markdown(result: dict[str, Any]) -> str:
     """The result as a table."""
     speed = result["bandwidth"]
     lines = [
-        ", ".join(f"{name} {value}" for name, value in result["environment"].items()),
-        "",
         f"Seconds, both matrices together; *one* and *eight* are per right-hand side. A copy moves {speed / 1e9:.1f} "
         "GB/s; *floor* is the time in which it would read both factors twice, and *over it* is *one* and *kernel* by "
         "that.",
         "",
-        "| vertices | backend | analysis | factors | one | eight | kernel | nonzeros per vertex | floor | over it |",
-        "|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|",
     ]
+    cells = []
     for row in result["rows"]:
         floor = 2 * row["bytes"] / speed
-        lines.append(
-            f"| {row['n']} | {row['backend']} | {row['analysis']:.4f} | {row['factors']:.4f} | {row['one']:.5f} | "
-            f"{row['eight']:.5f} | {row['kernel']:.5f} | {row['nonzeros'] / row['n']:.1f} | {floor:.5f} | "
-            f"{(row['one'] + row['kernel']) / floor:.2f} |"
-        )
-    return "\n".join([*lines, "", f"Smallest size from which multifrontal is faster: {result['threshold']}."]) + "\n"
+        cells.append((f"{row['n']}", row["backend"], f"{row['analysis']:.4f}", f"{row['factors']:.4f}"))
+        cells[-1] += tuple(f"{row[name]:.5f}" for name in ("one", "eight", "kernel"))
+        cells[-1] += (f"{row['nonzeros'] / row['n']:.1f}", f"{floor:.5f}")
+        cells[-1] += (f"{(row['one'] + row['kernel']) / floor:.2f}",)
+    head = "vertices | backend | analysis | factors | one | eight | kernel | nonzeros per vertex | floor | over it"
+    lines += table(head.split(" | "), cells, (1,))
+    return "\n".join([*lines, "", f"Smallest size from which multifrontal is faster: {result['threshold']}."])
 
 
 def threshold(rows: Sequence[dict[str, Any]]) -> int | None:
@@ -130,12 +113,12 @@ def threshold(rows: Sequence[dict[str, Any]]) -> int | None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure, print and write; see the module's docstring."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("--size", type=int, action="append", help="number of vertices; may be repeated")
     parser.add_argument("--mesh", type=Path, action="append", help="a mesh file in place of the spheres")
     parser.add_argument("--only", action="append", choices=["scipy", "multifrontal"], help="a backend")
     parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--seed", type=int, default=0)
+    add_seed(parser)
     parser.add_argument("--out", type=Path, default=Path("tune-results"), help="directory of the results")
     arguments = parser.parse_args(argv)
     backends = arguments.only or ["scipy", "multifrontal"]
@@ -153,10 +136,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "rows": rows,
         "threshold": threshold(rows),
     }
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / "tune_backends.json").write_text(json.dumps(result, indent=2) + "\n")
-    (arguments.out / "tune_backends.md").write_text(markdown(result))
-    print(markdown(result))
+    publish(result, markdown(result), folder=arguments.out, name="tune_backends")
     return 0
 
 

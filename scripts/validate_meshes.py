@@ -8,7 +8,6 @@ cannot handle, is a row that says why. Exit status 1 if any mesh exceeds ``--fai
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import sys
@@ -20,7 +19,8 @@ import heat_igl
 from heat_igl import MeshError, MissingExtraError, ReferenceSolverError, SourceError
 from heat_igl.validation import METHODS, draw_sources
 
-from environment import environment
+from scaffold import add_seed, environment, environment_line, option_parser
+from scaffold import table as markdown_table
 
 # Percent; smaller errors are rounding.
 _LEAST_SHOWN = 1e-4
@@ -90,26 +90,24 @@ def table(found: Sequence[dict[str, Any]], methods: Sequence[str], settings: dic
         f"drawn with seed {settings['seed']}; below it, seconds to prepare and milliseconds per solve.",
         "",
     ]
-    width = len(methods)
-    errors = ["| mesh | vertices | " + " | ".join(methods) + " |", "|---|---:|" + "---:|" * width]
-    times = list(errors)
-    failures = []
+    errors, times, failures = [], [], []
     for record in found:
-        start = f"| {Path(record['file']).stem} | {record.get('n_vertices', '-')} | "
+        start = Path(record["file"]).stem, str(record.get("n_vertices", "-"))
         if "failure" in record:
             failures.append(f"- {record['file']}: {record['failure']}")
         rows = {row["method"]: row for row in record.get("report", {}).get("rows", ())}
         failures += [f"- {record['file']}, {m}: {row['failure']}" for m, row in rows.items() if row["failure"]]
         means = [mean_error(record, method) for method in methods]
-        errors.append(start + " | ".join("-" if mean is None else f"{100 * mean:.3g}" for mean in means) + " |")
-        times.append(start + " | ".join(_times(rows.get(method)) for method in methods) + " |")
+        errors.append((*start, *("-" if mean is None else f"{100 * mean:.3g}" for mean in means)))
+        times.append((*start, *(_times(rows.get(method)) for method in methods)))
     complete = [r for r in found if all(mean_error(r, m) is not None for m in methods)]
     if complete:
         middle = [_geometric_mean([mean_error(r, m) or 0.0 for r in complete]) for m in methods]
-        cells = " | ".join(f"{100 * value:.3g}" for value in middle)
-        errors.append(f"| geometric mean of {len(complete)} | | {cells} |")
+        errors.append((f"geometric mean of {len(complete)}", "", *(f"{100 * value:.3g}" for value in middle)))
     reasons = ["", "No number, because:", "", *failures] if failures else []
-    return "\n".join([*head, *errors, "", *times, *reasons]) + "\n"
+    columns = ("mesh", "vertices", *methods)
+    lines = [*head, *markdown_table(columns, errors), "", *markdown_table(columns, times), *reasons]
+    return "\n".join(lines) + "\n"
 
 
 def _times(row: dict[str, Any] | None) -> str:
@@ -147,11 +145,11 @@ def draw(found: Sequence[dict[str, Any]], methods: Sequence[str], path: Path) ->
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = option_parser(__doc__)
     parser.add_argument("places", nargs="+", type=Path, metavar="FOLDER_OR_FILE")
     parser.add_argument("--output", type=Path, default=Path("validation"), help="folder for results (%(default)s)")
     parser.add_argument("--sources", type=int, default=3, help="single sources per mesh (%(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="for drawing them (%(default)s)")
+    add_seed(parser)
     parser.add_argument("--methods", default="heat,sweep,unfold,meshlab,igl,potpourri3d", help="%(default)s")
     parser.add_argument("--reference", default="exact", help="%(default)s")
     parser.add_argument("--timeout", type=float, default=120.0, help="seconds per native solve (%(default)s)")
@@ -175,7 +173,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "timeout": options.timeout,
     }
     around = environment()
-    print(", ".join(f"{name} {value}" for name, value in around.items()))
+    print(f"Environment: {environment_line(around)}")
     options.output.mkdir(parents=True, exist_ok=True)
     log = options.output / "cases.jsonl"
     done = {record["file"]: record for record in records(log) if record["settings"] == settings}

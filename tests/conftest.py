@@ -1,16 +1,23 @@
-"""Meshes that the tests share. Real ones come from the pymeshlab wheel, and from ../shared/meshes where that exists."""
+"""What the tests share: meshes, and the scripts as modules.
+
+Real meshes come from the pymeshlab wheel, and from ../shared/meshes where that exists.
+"""
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
 import heat_igl
 
-SHARED = Path(__file__).resolve().parents[2] / "shared" / "meshes"
+ROOT = Path(__file__).resolve().parents[1]
+SHARED = ROOT.parent / "shared" / "meshes"
 
 
 def wheel_path(name: str) -> Path:
@@ -26,6 +33,14 @@ def shared_path(name: str) -> Path:
     if not path.exists():
         pytest.skip(f"{name} is not at hand")
     return path
+
+
+def load_script(name: str) -> ModuleType:
+    """A script to be tested, as a module; it finds what it shares with others as ``python scripts/name.py`` does."""
+    folder = str(ROOT / "scripts")
+    if folder not in sys.path:
+        sys.path.append(folder)
+    return importlib.import_module(name)
 
 
 def perturbed(mesh: heat_igl.Mesh, amount: float = 0.15, seed: int = 0) -> heat_igl.Mesh:
@@ -49,3 +64,14 @@ def cow() -> heat_igl.Mesh:
 @pytest.fixture(scope="session")
 def bunny() -> heat_igl.Mesh:
     return heat_igl.read_mesh(wheel_path("bunny.obj"))
+
+
+@pytest.fixture(scope="session")
+def sphere() -> heat_igl.Mesh:
+    """A sphere without symmetries, of 2562 vertices."""
+    return perturbed(heat_igl.shapes.icosphere(4))
+
+
+@pytest.fixture(scope="session")
+def solver(sphere: heat_igl.Mesh) -> heat_igl.HeatMethodSolver:
+    return heat_igl.HeatMethodSolver(sphere)

@@ -2,44 +2,22 @@
 
 from __future__ import annotations
 
-import ast
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+from conftest import load_script
 
 import heat_igl
 
 PACKAGE = Path(heat_igl.__file__).parent
 
-# A module imports only from those before it.
-ORDER = """
-typing
-errors
-runtime
-mesh
-intrinsic
-shapes
-operators
-linear
-sources
-steps
-unfolding
-heat_method
-sampling
-curves
-io
-reference
-validation
-baselines
-applications
-drawing
-demo
-cluster
-cli
-__main__
-""".split()
+ROOT = PACKAGE.parent
+structure = load_script("structure")
+# From the lowest room to the highest, as ARCHITECTURE.md lists them.
+ORDER = structure.table_order((ROOT / "ARCHITECTURE.md").read_text(encoding="utf8"))
 
 EXTRAS = """
 Xlib
@@ -48,7 +26,6 @@ dask
 distributed
 ezdxf
 gdist
-google_crc32c
 matplotlib
 meshio
 numba
@@ -68,27 +45,13 @@ zarr
 """.split()
 
 
-def files(name: str) -> list[Path]:
-    """The source of a module, or of every module of a subpackage."""
-    return sorted((PACKAGE / name).glob("*.py")) or [PACKAGE / f"{name}.py"]
-
-
 def modules() -> list[str]:
-    paths = [*PACKAGE.glob("*.py"), *(path.parent for path in PACKAGE.glob("*/__init__.py"))]
-    return sorted(path.stem for path in paths if path.stem != "__init__")
+    return list(structure.room_files(PACKAGE))
 
 
-def imported_modules(name: str) -> set[str]:
-    found = set()
-    nodes = [node for file in files(name) for node in ast.walk(ast.parse(file.read_text(encoding="utf8")))]
-    for node in nodes:
-        if isinstance(node, ast.ImportFrom) and node.module == "heat_igl":
-            found |= {alias.name for alias in node.names} & set(modules())
-        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("heat_igl."):
-            found.add(node.module.split(".")[1])
-        elif isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[1] for alias in node.names if alias.name.startswith("heat_igl.")}
-    return found - {name}
+@pytest.fixture(scope="module")
+def found() -> dict[str, Any]:
+    return structure.measured(ROOT, 3)
 
 
 def test_every_module_has_its_place():
@@ -96,9 +59,19 @@ def test_every_module_has_its_place():
 
 
 @pytest.mark.parametrize("name", modules())
-def test_imports_run_one_way(name):
+def test_imports_run_one_way(found, name):
     allowed = set(ORDER[: ORDER.index(name)])
-    assert imported_modules(name) <= allowed
+    assert set(found["arrows"][name]) <= allowed
+
+
+def test_the_table_of_rooms_says_what_their_docstrings_say():
+    page = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf8")
+    assert structure.room_table(PACKAGE, ORDER) in page, "run: python scripts/structure.py --write"
+
+
+@pytest.mark.parametrize("name", structure.BOUNDS)
+def test_the_package_keeps_to_its_bounds(found, name):
+    assert found["counts"][name] <= structure.BOUNDS[name], found[name]
 
 
 def loaded(statement: str, names: list[str]) -> list[str]:
@@ -114,7 +87,9 @@ def test_import_loads_no_extra():
 
 
 def test_import_loads_what_a_distance_needs_and_little_else():
-    others = [f"heat_igl.{name}" for name in ("baselines", "cluster", "metrics", "reference", "validation")] + ["ssl"]
+    others = [
+        f"heat_igl.{name}" for name in ("baselines", "cluster", "reference", "validation", "validation.metrics")
+    ] + ["ssl"]
     assert loaded("import heat_igl", others) == []
     assert loaded("from heat_igl import *", others) == others[:-1]
 
@@ -123,7 +98,7 @@ def test_names_loaded_on_first_use_are_those_of_their_modules():
     from heat_igl import validation
 
     assert heat_igl.validate is validation.validate
-    assert heat_igl.metrics.__name__ == "heat_igl.metrics"
+    assert heat_igl.metrics.__name__ == "heat_igl.validation.metrics"
     assert set(heat_igl.__all__) <= set(dir(heat_igl))
     with pytest.raises(AttributeError, match="module 'heat_igl' has no attribute 'valdate'"):
         _ = heat_igl.valdate

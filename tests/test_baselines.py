@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import perturbed
+from conftest import load_script, perturbed
 from scipy.spatial.distance import cdist
 from scipy.special import ive, logsumexp
 
@@ -721,10 +719,7 @@ def test_table_of_errors(tmp_path, capsys):
     """The quick table holds every method, and what it says of them is sound: the factor 1/2 alone is half wrong."""
     needs("mesh")
     needs("grid")
-    path = Path(__file__).resolve().parents[1] / "scripts" / "baselines_table.py"
-    spec = importlib.util.spec_from_file_location("baselines_table", path)
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
+    script = load_script("baselines_table")
     assert script.main(["--quick", "--sources", "2", "--output", str(tmp_path)]) == 0
     written = (tmp_path / "baselines.md").read_text(encoding="utf8")
     assert capsys.readouterr().out == written

@@ -8,20 +8,14 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from conftest import load_script
 
 import heat_igl
-
-SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "benchmark.py"
 
 
 @pytest.fixture(scope="module")
 def benchmark() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("benchmark", SCRIPT)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_script("benchmark")
 
 
 def test_noisy_spheres_are_closed_outward_and_seeded(benchmark: ModuleType) -> None:
@@ -96,11 +90,12 @@ def test_floor_and_break_even(benchmark: ModuleType) -> None:
     assert [row["queries"] for row in benchmark.break_even([own, front, slower])] == [4, None]
 
 
-def test_tables_are_put_between_their_marks(benchmark: ModuleType) -> None:
+def test_tables_are_put_between_their_marks() -> None:
+    fill_in = load_script("scaffold").fill_in
     page = "a\n<!-- floor -->\nold\n<!-- /floor -->\nb <!-- timings --><!-- /timings -->\n"
-    filled = benchmark.fill_in(page, {"floor": "new | 1", "elsewhere": "x"})
+    filled = fill_in(page, {"floor": "new | 1", "elsewhere": "x"})
     assert filled == "a\n<!-- floor -->\nnew | 1\n<!-- /floor -->\nb <!-- timings --><!-- /timings -->\n"
-    assert benchmark.fill_in(filled, {"floor": "new | 1"}) == filled
+    assert fill_in(filled, {"floor": "new | 1"}) == filled
 
 
 def test_a_huge_mesh_small(benchmark: ModuleType) -> None:

@@ -13,16 +13,6 @@ from heat_igl.operators import operators
 from heat_igl.runtime import PeakMemory, blocks
 
 
-@pytest.fixture(scope="module")
-def sphere() -> Mesh:
-    return perturbed(shapes.icosphere(4))
-
-
-@pytest.fixture(scope="module")
-def solver(sphere) -> HeatMethodSolver:
-    return HeatMethodSolver(sphere)
-
-
 def test_blocks_keep_to_the_memory_and_use_the_threads():
     assert blocks.block_size(10_000, 1000, 2) == (8, 2)
     assert blocks.block_size(10_000, None, 2) == (8, 2)
@@ -136,7 +126,7 @@ def test_rows_do_not_depend_on_blocks_or_threads(sphere, refine, monkeypatch):
             monkeypatch.setattr(blocks, "_MOST", most)
             assert np.abs(solver.distances(sets) - one_by_one).max() < 1e-9 * np.pi
     monkeypatch.setattr(blocks, "_MOST", 8)
-    monkeypatch.setattr("heat_igl.heat_method.n_threads", lambda: 3)
+    monkeypatch.setattr("heat_igl.heat_method.batches.n_threads", lambda: 3)
     three = solver.distances(sets)
     assert (three == solver.distances(sets)).all()
 

@@ -174,31 +174,99 @@ def test_long_rows_lie_in_several_chunks(client, tmp_path, monkeypatch):
     np.testing.assert_array_equal(zarr.open_group(store / "ball", mode="r")["distance"][:], expected(mesh, range(70)))
 
 
-def test_a_group_that_a_crash_left_half_made_is_made_anew(client, tmp_path, monkeypatch):
+class KilledError(Exception):
+    """In place of a signal: from some write on, nothing reaches the disk."""
+
+
+@contextlib.contextmanager
+def killed_at(crash: int):
+    """Let `crash` files be written and nothing more; yields the list of what was written."""
+    written: list[str] = []
+    plain = zarr.storage.LocalStore.set
+
+    async def set_or_die(self, key, value):
+        if len(written) == crash:
+            partial = self.root / f"{key}.partial"
+            partial.parent.mkdir(parents=True, exist_ok=True)
+            partial.write_bytes(b"half of it")
+            raise KilledError
+        written.append(key)
+        await plain(self, key, value)
+
+    with pytest.MonkeyPatch.context() as patch, contextlib.suppress(KilledError):
+        patch.setattr(zarr.storage.LocalStore, "set", set_or_die)
+        yield written
+
+
+def begin_fan(store: Path, attributes) -> None:
+    made = Store(store, {"sources": "0 4", "dtype": "float32", "solver": {"refine": None}})
+    made.begin("fan", [np.array([0]), np.array([4])], 7, "float32", attributes)
+
+
+def test_a_group_that_a_crash_left_half_made_is_made_anew(client, tmp_path):
     """Wherever it happened: nothing counts before all is there."""
     store = tmp_path / "store"
-    plain = heat_igl.cluster.store._write
     whole = cluster.distances({"fan": FAN}, [0, 4], tmp_path / "whole", client=client)
-    for crash in range(7):
+    attributes = Store(tmp_path / "whole").attributes("fan")
+    with killed_at(1000) as written:
+        begin_fan(store, attributes)
+    n_files = len(written)
+    shutil.rmtree(store)
+    assert n_files >= 7  # metadata of two groups and three arrays, two chunks
+    for crash in range(n_files):
         shutil.rmtree(store, ignore_errors=True)
-        written = []
-
-        def killed(path, *contents, crash=crash, written=written):
-            if len(written) == crash:
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.with_name(path.name + ".partial").write_bytes(b"half of it")
-                raise KeyboardInterrupt
-            written.append(path)
-            plain(path, *contents)
-
-        monkeypatch.setattr("heat_igl.cluster.store._write", killed)
-        with contextlib.suppress(KeyboardInterrupt):
-            made = Store(store, {"sources": "0 4", "dtype": "float32", "solver": {"refine": None}})
-            made.begin("fan", [np.array([0]), np.array([4])], 7, "float32", {})
+        with killed_at(crash) as written:
+            begin_fan(store, attributes)
         assert len(written) == crash
-        monkeypatch.setattr("heat_igl.cluster.store._write", plain)
+        assert not (store / "fan" / "zarr.json").exists()
         assert cluster.distances({"fan": FAN}, [0, 4], store, client=client).rows == whole.rows
         np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["distance"][:], expected(FAN, [0, 4]))
+
+
+def test_a_group_that_a_crash_left_half_deleted_is_made_anew(client, tmp_path, monkeypatch):
+    """Although the mesh is again the one that the group was made for."""
+    store, other = tmp_path / "store", heat_igl.shapes.grid(3)
+    whole = cluster.distances({"mesh": FAN}, [0, 4], store, client=client)
+
+    def killed(path, *_, **__):
+        os.remove(Path(path) / "distance" / "c" / "0" / "0")
+        raise OSError("killed")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "rmtree", killed)
+        with pytest.raises(BatchError, match="killed"):
+            cluster.distances({"mesh": other}, [0, 4], store, client=client)
+    assert cluster.distances({"mesh": FAN}, [0, 4], store, client=client) == whole
+    np.testing.assert_array_equal(zarr.open_group(store / "mesh", mode="r")["distance"][:], expected(FAN, [0, 4]))
+
+
+@pytest.mark.parametrize("file", ["zarr.json", "distance/zarr.json", "source_vertex/c/0", "source_row/zarr.json"])
+@pytest.mark.parametrize("is_lost", [True, False])
+def test_a_group_that_cannot_be_read_is_made_anew(client, tmp_path, file, is_lost):
+    store = tmp_path / "store"
+    whole = cluster.distances({"fan": FAN}, [0, 4], store, client=client)
+    Store(store).update("fan", {"status": "running"})
+    path = store / "fan" / file
+    path.unlink() if is_lost else path.write_bytes(b"half of it")
+    assert cluster.distances({"fan": FAN}, [0, 4], store, client=client) == whole
+    np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["source_vertex"][:], [0, 4])
+    np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["distance"][:], expected(FAN, [0, 4]))
+
+
+def test_the_format_of_a_store_is_one_that_can_be_read(client, tmp_path):
+    store = tmp_path / "store"
+    whole = cluster.distances({"fan": FAN}, [0, 4], store, client=client)
+    root = zarr.open_group(store, mode="r+")
+    begun = root.attrs["heat_igl"]
+    assert begun["format"] == 3
+    root.update_attributes({"heat_igl": {**begun, "format": 2}})  # the last one, which differs in details only
+    assert cluster.distances({"fan": FAN}, [0, 4], store, client=client) == whole
+    root.update_attributes({"heat_igl": {**begun, "format": 1}})
+    message = r"has format 1, and this version of heat_igl reads 2 and 3: name a new store, or continue it with"
+    with pytest.raises(ValueError, match=message):
+        cluster.distances({"fan": FAN}, [0, 4], store, client=client)
+    with pytest.raises(ValueError, match=message):
+        cluster.report(store)
 
 
 def test_a_worker_that_does_not_see_the_store_ends_the_batch(tmp_path):
@@ -288,6 +356,14 @@ def test_names_must_differ(client, tmp_path):
         cluster.distances([tmp_path / "a.off", tmp_path / "b" / "a.off"], [0], tmp_path / "store", client=client)
 
 
+@pytest.mark.parametrize("name", ["", ".", "..", "zarr.json"])
+def test_a_name_that_would_overwrite_something_else_is_refused(client, tmp_path, name):
+    """The group of a mesh replaces the folder of its name: here the store, its parent, or the metadata of the store."""
+    with pytest.raises(ValueError, match=f"a mesh cannot be called '{name}' in a store: choose another name"):
+        cluster.distances({"ball": heat_igl.shapes.icosphere(1), name: FAN}, [0], tmp_path / "store", client=client)
+    cluster.distances({"ball": heat_igl.shapes.icosphere(1), "...": FAN}, [0], tmp_path / "store", client=client)
+
+
 def test_a_folder_without_meshes_is_refused(tmp_path):
     with pytest.raises(ValueError, match="holds no mesh"):
         cluster.folder(tmp_path)
@@ -309,7 +385,7 @@ def test_sources_from_a_file(tmp_path):
 
 def test_a_mesh_too_large_for_its_worker_is_a_row(client, tmp_path, monkeypatch):
     # The workers are threads of this process.
-    monkeypatch.setattr("heat_igl.cluster.worker._memory_for_solvers", lambda: 2**20)
+    monkeypatch.setattr("heat_igl.cluster.solver_cache.memory_for_solvers", lambda: 2**20)
     meshes = {"ball": heat_igl.shapes.icosphere(4), "fan": FAN}
     report = cluster.distances(meshes, [0], tmp_path / "store", client=client)
     (row,) = report.failed
@@ -475,7 +551,7 @@ def test_killed_processes_lose_nothing_and_repeat_nothing(processes, tmp_path):
         np.testing.assert_array_equal(got, expected(mesh, range(256)))
 
 
-def test_a_parcel_that_kills_its_workers_is_handed_out_again_mesh_by_mesh() -> None:
+def test_a_bundle_that_kills_its_workers_is_handed_out_again_mesh_by_mesh() -> None:
     """So that only the mesh to blame ends in the report."""
     from distributed import Future, KilledWorker
 
@@ -485,7 +561,7 @@ def test_a_parcel_that_kills_its_workers_is_handed_out_again_mesh_by_mesh() -> N
     future.result.side_effect = KilledWorker("task", None, 3)
     run = batch._Run(Mock(), Mock(), Mock())
     tasks = [Mock(), Mock(), Mock()]
-    left = run._settled(future, batch._Parcel(batch.begin, tasks))
+    left = run._collect(future, batch.TaskBundle(batch.begin, tasks))
     assert left == [(batch.begin, [task]) for task in tasks]
-    assert not run._settled(future, left[1])
+    assert not run._collect(future, left[1])
     assert run._reason == {tasks[1].item.name: "the workers that tried it died: out of memory, or a crash in a library"}

@@ -76,7 +76,7 @@ def test_near_field_joins_the_far_field(bunny):
     solver = HeatMethodSolver(bunny)
     point = SurfacePoints([1234], [[0.2, 0.5, 0.3]])
     distance = solver.distance(point)
-    near = solver._emitter.emission(solver._set(point)).near.vertex
+    near = solver._parts.assembler.term(solver._source_set(point)).near.vertex
     edges = bunny.edges[np.isin(bunny.edges, near).any(axis=1)]
     assert len(near) > 50
     change = np.abs(distance[edges[:, 0]] - distance[edges[:, 1]])

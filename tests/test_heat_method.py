@@ -14,16 +14,6 @@ from heat_igl.operators import operators
 from heat_igl.steps import fitted_laplacian, integrate
 
 
-@pytest.fixture(scope="module")
-def sphere() -> Mesh:
-    return perturbed(shapes.icosphere(4))
-
-
-@pytest.fixture(scope="module")
-def solver(sphere) -> HeatMethodSolver:
-    return HeatMethodSolver(sphere)
-
-
 def two_spheres() -> Mesh:
     sphere = perturbed(shapes.icosphere(3))
     return Mesh(np.vstack([sphere.V, sphere.V + 5]), np.vstack([sphere.F, sphere.F + sphere.n_vertices]))
@@ -216,6 +206,35 @@ def test_cold_vertices_are_reported():
     with pytest.warns(AccuracyWarning, match=r"no heat arrives at \d+ of 6002 vertices.*raise t_coef"):
         distance = HeatMethodSolver.from_operators(domain).distance(0)
     assert np.isfinite(distance).all()
+
+
+STRIP = shapes.strip(3000, 1)
+
+
+def cold_solver() -> HeatMethodSolver:
+    """On a domain whose extent is understated, so that heat runs out."""
+    return HeatMethodSolver.from_operators(dataclasses.replace(operators(STRIP), longest_distance=1.0))
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda _: HeatMethodSolver(STRIP, t=0.5), "too small"),
+        (lambda _: HeatMethodSolver.from_operators(operators(STRIP), t=0.5), "too small"),
+        (lambda _: heat_igl.heat_method_distance(STRIP.V, STRIP.F, 0, t=0.5), "too small"),
+        (lambda cold: cold.distance(0), "no heat arrives"),
+        (lambda cold: cold.voronoi(0), "no heat arrives"),
+        (lambda cold: cold.solve(0), "no heat arrives"),
+        (lambda cold: cold.distances([[0]] * 20), "no heat arrives"),
+        (lambda cold: next(cold.iter_distances([[0]] * 20)), "no heat arrives"),
+    ],
+)
+def test_a_warning_points_at_the_line_that_calls_the_package(call, message):
+    solver = cold_solver()
+    with pytest.warns(AccuracyWarning, match=message) as caught:
+        call(solver)
+    lines = {(warning.filename, warning.lineno) for warning in caught}
+    assert lines == {(__file__, call.__code__.co_firstlineno)}
 
 
 def test_magnitude():

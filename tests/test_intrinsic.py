@@ -7,7 +7,16 @@ from conftest import perturbed, shared_path
 
 import heat_igl
 from heat_igl import Mesh, MeshError, shapes
-from heat_igl.intrinsic import from_edge_lengths, intrinsic_delaunay, intrinsic_triangulation, mollify
+from heat_igl.intrinsic import (
+    Adjacency,
+    apex,
+    corner_angles,
+    from_edge_lengths,
+    intrinsic_delaunay,
+    intrinsic_triangulation,
+    lay_out,
+    mollify,
+)
 
 
 def delaunay(mesh: Mesh):
@@ -198,9 +207,9 @@ def test_flat_faces_leave_distances_as_they_are(share, cap):
 @pytest.mark.parametrize("mollification", [1e-8, 1e-11, 1e-12])
 def test_flips_come_to_an_end_on_flat_faces(cow, monkeypatch, mollification):
     """Rounding makes some flips of flat triangles undo each other; with hardly any mollification, for ever."""
-    monkeypatch.setattr(heat_igl.intrinsic, "_MOLLIFICATION", mollification)
+    monkeypatch.setattr(heat_igl.intrinsic.mollification, "_MARGIN", mollification)
     rounds = []
-    flip = heat_igl.intrinsic._Flips.flip
+    flip = heat_igl.intrinsic.delaunay._Flips.flip
 
     def counted(self, half_edge):
         rounds.append(len(half_edge))
@@ -208,7 +217,7 @@ def test_flips_come_to_an_end_on_flat_faces(cow, monkeypatch, mollification):
             pytest.fail("flips do not end")
         return flip(self, half_edge)
 
-    monkeypatch.setattr(heat_igl.intrinsic._Flips, "flip", counted)
+    monkeypatch.setattr(heat_igl.intrinsic.delaunay._Flips, "flip", counted)
     found = delaunay(with_flat_faces(cow, 0.0, True))
     assert found.n_flips > 1000
     assert found.areas.sum() == pytest.approx(cow.measures.sum(), rel=1e-6)
@@ -232,3 +241,55 @@ def test_flat_faces_far_larger_and_far_smaller_than_the_mean(share):
     assert np.ptp(distance[beyond] - clean[beyond]) < 1e-4
     assert abs(distance[beyond] - clean[beyond]).max() < 0.01 * clean.max()
     assert (distance < clean + 1e-4).all()
+
+
+def test_corner_angles_of_needles_and_caps():
+    """Isosceles triangles: the angle between the equal sides is 2 arcsin(half the base over a side)."""
+    base = np.array([1e-12, 1e-6, 1.0, np.sqrt(2), 2 - 2.0**-20, 2 - 2.0**-40])
+    angle = corner_angles(np.stack([base, np.ones(6), np.ones(6)], axis=1))
+    np.testing.assert_allclose(angle[:4, 0], 2 * np.arcsin(base[:4] / 2), rtol=0, atol=5e-16)
+    at_base = np.arctan(np.sqrt((2 - base) * (2 + base)) / base)
+    np.testing.assert_allclose(angle[:, 1], at_base, rtol=1e-14)
+    np.testing.assert_allclose(angle.sum(axis=1), np.pi, rtol=1e-15)
+    np.testing.assert_allclose(
+        corner_angles(np.array([[3.0, 4, 5]])), [[np.arctan(3 / 4), np.arctan(4 / 3), np.pi / 2]]
+    )
+
+
+def test_triangles_laid_out_have_their_lengths(bunny):
+    lengths = np.concatenate([igl.edge_lengths(bunny.V, bunny.F), [[1e-9, 1, 1], [1, 1, 2]]])
+    corners = lay_out(lengths)
+    assert (corners[:, 0] == 0).all()
+    assert (corners[:, 1, 1] == 0).all()
+    assert (corners[:, 2, 1] >= 0).all()
+    sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+    np.testing.assert_allclose(np.linalg.norm(sides, axis=2), lengths, rtol=1e-13)
+    x, y = apex(*np.array([[3.0], [4], [5]]))
+    assert (x.item(), y.item()) == pytest.approx((0, 4))
+
+
+def test_every_face_behind_the_spine_of_a_book():
+    """At the spine each half-edge has those of all other pages behind it, elsewhere its twin or nothing."""
+    triangulation = intrinsic_triangulation(shapes.book(4, 3))
+    which, other, aligned = Adjacency(triangulation).behind(np.arange(triangulation.F.size))
+    tail, head = (
+        triangulation.tail(np.arange(triangulation.F.size)),
+        triangulation.head(np.arange(triangulation.F.size)),
+    )
+    pairs = set(zip(which.tolist(), other.tolist(), strict=True))
+    ends = np.sort(np.stack([tail, head], axis=1), axis=1).tolist()
+    expected = {(a, b) for a in range(len(ends)) for b in range(len(ends)) if a != b and ends[a] == ends[b]}
+    assert len(pairs) == len(which)
+    assert pairs == expected
+    assert (aligned == (tail[which] == head[other])).all()
+    assert np.bincount(which).max() == 3
+
+
+def test_spokes_are_the_edges_at_a_vertex(cow):
+    triangulation = intrinsic_triangulation(cow)
+    vertices = np.array([11, 5, 700])
+    which, ends, lengths = Adjacency(triangulation).spokes(vertices)
+    for i, v in enumerate(vertices):
+        edges = cow.edges[(cow.edges == v).any(axis=1)]
+        assert set(ends[which == i].tolist()) == set(edges[edges != v].tolist())
+    np.testing.assert_allclose(lengths, np.linalg.norm(cow.V[vertices[which]] - cow.V[ends], axis=1), rtol=1e-12)

@@ -14,9 +14,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import heat_igl
-import heat_igl.io
 from heat_igl import Mesh, MeshError, MissingExtraError, read_attributes, read_mesh, write_mesh
+from heat_igl.io import files
 
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="needs meshio")
 VTU = pytest.param(".vtu", marks=needs_meshio)
@@ -476,8 +475,8 @@ def test_failed_write_leaves_everything_as_it_was(
         raise error
 
     if stage == "writer":
-        form = heat_igl.io._FORMATS[".off"]
-        monkeypatch.setitem(heat_igl.io._FORMATS, ".off", form._replace(write=half))
+        form = files._FORMATS[".off"]
+        monkeypatch.setitem(files._FORMATS, ".off", form._replace(write=half))
     else:
         monkeypatch.setattr(Path, "replace", no_replace)
     if isinstance(error, OSError):

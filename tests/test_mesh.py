@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import heat_igl
 from heat_igl import Mesh, MeshError
-from heat_igl.mesh import connectivity
+from heat_igl.mesh import connectivity, grouping
 
 TETRAHEDRON_V = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 TETRAHEDRON_F = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -199,7 +199,7 @@ def test_report_measures_lengths_angles_and_range() -> None:
     assert report.mean_edge == pytest.approx(lengths.mean(), rel=1e-15)
     assert (report.smallest_angle, report.largest_angle) == pytest.approx((45, 90), rel=1e-12)
     assert report.edges_across == pytest.approx((9 + 2**0.5) / lengths.mean(), rel=1e-14)
-    assert report.range_limit == heat_igl.mesh.RANGE_LIMIT
+    assert report.range_limit == heat_igl.runtime.RANGE_LIMIT
     assert report.is_intrinsic_delaunay is True
     sheared = Mesh(strip.V + strip.V[:, 1:2] * [[-2, 0, 0]], strip.F).report()
     assert sheared.is_intrinsic_delaunay is False
@@ -331,3 +331,32 @@ def test_three_pages_of_a_book() -> None:
     report = Mesh(V, [[0, 1, 2], [0, 1, 3], [0, 1, 4]]).report()
     assert report.nonmanifold_edges.tolist() == [[0, 1]]
     assert report.nonmanifold_vertices.tolist() == [0, 1]
+
+
+def test_distance_along_edges_of_length_zero() -> None:
+    """Two vertices in one place are at distance 0 from each other, however the edge between them is stored."""
+    mesh = Mesh([[0.0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 2, 0], [5, 5, 5]], [[0, 1, 2], [1, 0, 3]])
+    assert connectivity.edge_distance(mesh.edge_graph, np.array([0])).tolist() == [0, 0, 1, 2, np.inf]
+    assert connectivity.edge_distance(mesh.edge_graph, np.array([2, 3])).tolist() == [1, 1, 0, 0, np.inf]
+    counted = connectivity.edge_distance(mesh.edge_graph, np.array([2]), count_edges=True)
+    assert counted.tolist() == [1, 1, 0, 2, np.inf]
+
+
+@pytest.mark.parametrize("count", [0, 1, 300])
+def test_groups_hold_what_has_their_label(count: int) -> None:
+    labels = np.random.default_rng(5).integers(0, 40, count) // 2 * 2  # odd labels have no members
+    groups = grouping.group_by_label(labels, 40)
+    for v in range(40):
+        assert groups.members[groups.first[v] : groups.first[v + 1]].tolist() == np.flatnonzero(labels == v).tolist()
+    asked = np.array([7, 6, 6, 38])
+    members, which = groups.of(asked)
+    assert [members[which == i].tolist() for i in range(4)] == [np.flatnonzero(labels == v).tolist() for v in asked]
+    renamed = grouping.group_by_label(labels, 40, 100 + np.arange(count))
+    assert np.array_equal(renamed.members, 100 + groups.members)
+
+
+def test_runs() -> None:
+    counts = np.array([2, 0, 3, 1])
+    run, within = grouping.enumerate_runs(counts)
+    assert list(zip(run.tolist(), within.tolist(), strict=True)) == [(0, 0), (0, 1), (2, 0), (2, 1), (2, 2), (3, 0)]
+    assert grouping.next_in_run(np.array([5, 6, 7, 8, 9, 4]), counts[counts > 0]).tolist() == [6, 5, 8, 9, 7, 4]

@@ -122,7 +122,7 @@ def test_degenerate_triangles_are_mollified_and_stay_finite():
     mesh = Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0], [1, -1, 0]], [[0, 1, 3], [1, 2, 3], [0, 2, 1], [2, 0, 4]])
     for laplacian in ("intrinsic-delaunay", "cotan"):
         domain = operators(mesh, laplacian)
-        assert domain.triangulation.lengthening > 0
+        assert domain.surface.triangulation.lengthening > 0
         assert np.isfinite(domain.L.data).all()
         assert abs(domain.D @ domain.G - domain.L).max() <= 1e-10 * abs(domain.L).max()
 

@@ -9,16 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse.linalg as spl
+from conftest import load_script
 
 import heat_igl
 from heat_igl import shapes
 from heat_igl.operators import operators
 from heat_igl.steps import diffuse, integrate, normalize
 
-import paper_claims
-import paper_figures
-import paper_formulas
-from paper_formulas import Square, mean_error
+paper_claims, paper_figures, paper_formulas = (
+    load_script(f"paper_{name}") for name in ("claims", "figures", "formulas")
+)
+Square, mean_error = paper_formulas.Square, paper_formulas.mean_error
+
 
 # The jump at i = 56.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import re
 import subprocess
@@ -29,6 +28,7 @@ from heat_igl import (
     shapes,
     shortest_paths,
 )
+from heat_igl.reference.steiner import graph_distance
 
 pytest.importorskip("numba")
 
@@ -116,15 +116,6 @@ def test_the_side_on_which_to_pass_is_found_on_large_faces(name):
     assert np.quantile(error, 0.99) < 1e-3
 
 
-@lru_cache
-def steiner():
-    path = Path(__file__).parents[1] / "scripts" / "steiner.py"
-    spec = importlib.util.spec_from_file_location("steiner", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_an_edge_of_four_faces_in_a_head():
     mesh = heat_igl.read_mesh(shared_path("suzanne.obj"))
     assert mesh.facets.n_faces.max() == 4
@@ -133,7 +124,7 @@ def test_an_edge_of_four_faces_in_a_head():
     among = np.flatnonzero(mesh.components == mesh.components[ends[0]])
     sources = [*ends, *np.random.default_rng(5).choice(among, 3, replace=False)]
     # From above, as every path on the surface is, and too long by some tenths of a percent at worst.
-    bound = steiner().graph_distance(mesh, sources, 24)
+    bound = graph_distance(mesh, sources, 24)
     error = []
     for source, longest in zip(sources, bound, strict=True):
         targets = np.setdiff1d(among, source)

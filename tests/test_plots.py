@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import plots, shapes
-from heat_igl.drawing import raster
+from heat_igl import shapes
+from heat_igl.drawing import camera, figure, raster, shading
 from heat_igl.drawing.plots import Picture, picture, plot, plot_field
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, colours
 from heat_igl.drawing.surface_image import LINE
@@ -22,7 +22,7 @@ matplotlib = pytest.importorskip("matplotlib")
 @pytest.fixture(autouse=True)
 def _small(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same picture with fewer pixels."""
-    monkeypatch.setattr(plots, "DPI", 160)
+    monkeypatch.setattr(figure, "DPI", 160)
 
 
 def surface_image(drawn: Picture) -> np.ndarray:
@@ -73,7 +73,7 @@ def test_many_pixels_are_drawn_in_chunks_without_a_difference(monkeypatch: pytes
 
 def test_neighbouring_triangles_leave_no_gap() -> None:
     mesh, _ = flat_grid(8)
-    points = mesh.V @ raster.rotation(30, 40).T * [80, 80, 1] + [40, 40, 0]
+    points = mesh.V @ camera.rotation(30, 40).T * [80, 80, 1] + [40, 40, 0]
     pixels = raster.rasterize(points, mesh.F, 150, 150)
     covered = np.isfinite(pixels.depth)
     for row in covered[covered.any(axis=1)]:
@@ -83,7 +83,7 @@ def test_neighbouring_triangles_leave_no_gap() -> None:
 
 @pytest.mark.parametrize(("azimuth", "elevation"), [(0, 0), (90, 0), (33, -70), (0, 90)])
 def test_rotations_keep_shapes_and_handedness(azimuth: float, elevation: float) -> None:
-    turn = raster.rotation(azimuth, elevation)
+    turn = camera.rotation(azimuth, elevation)
     np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-15)
     assert np.linalg.det(turn) == pytest.approx(1)
     viewer = np.radians([azimuth, elevation])
@@ -136,12 +136,12 @@ def test_stripes_are_light_in_every_second_interval() -> None:
 
 def test_stripes_too_narrow_to_be_seen_become_an_even_tone() -> None:
     values = np.random.default_rng(0).uniform(0, 1, 500)
-    share = raster.stripe_coverage(values, np.full(500, 10.0), 0.01)
+    share = shading.stripe_coverage(values, np.full(500, 10.0), 0.01)
     np.testing.assert_allclose(share, 0.5, atol=1e-3)
     # A pixel's mean over the values in it, by a slow second opinion.
     fine = values[:, None] + 0.15 * (np.arange(2000) + 0.5 - 1000) / 2000
     slow = (np.floor(fine / 0.2) % 2 == 1).mean(axis=1)
-    np.testing.assert_allclose(raster.stripe_coverage(values, np.full(500, 0.15), 0.2), slow, atol=2e-3)
+    np.testing.assert_allclose(shading.stripe_coverage(values, np.full(500, 0.15), 0.2), slow, atol=2e-3)
 
 
 @pytest.mark.parametrize("name", ["viridis_r", "magma_r"])
@@ -397,4 +397,4 @@ def test_without_matplotlib_the_message_names_the_extra(monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize(("largest", "spacing"), [(1.0, 0.05), (0.85, 0.05), (635.0, 50.0), (3e-8, 2e-9), (0.0, 1.0)])
 def test_spacing_is_a_round_number(largest: float, spacing: float) -> None:
-    assert raster.isoline_spacing(largest) == pytest.approx(spacing)
+    assert shading.isoline_spacing(largest) == pytest.approx(spacing)

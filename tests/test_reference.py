@@ -32,7 +32,7 @@ from heat_igl import (
     reference,
     shapes,
 )
-from heat_igl.reference import guarded, native, solvers
+from heat_igl.reference import guarded, measurement, native
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
 
@@ -538,7 +538,7 @@ def test_what_is_no_distance_is_an_error(
 
 
 def test_a_missing_package_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solvers, "find_spec", lambda name: object() if name == "igl" else None)
+    monkeypatch.setattr(measurement, "find_spec", lambda name: object() if name == "igl" else None)
     mesh = rectangle(3, 3, 1, 1)
     with pytest.raises(MissingExtraError, match=r'pymeshlab: pip install "heat-igl\[validate\]"'):
         reference.meshlab(mesh, 0)
@@ -700,4 +700,4 @@ def test_threads_take_turns() -> None:
 
 
 def test_every_native_function_has_a_name() -> None:
-    assert sorted(solver.function for solver in reference._SOLVERS.values()) == sorted(native.__all__)
+    assert sorted(solver.function for solver in measurement._SOLVERS.values()) == sorted(native.__all__)

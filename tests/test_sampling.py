@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay
 import heat_igl
 from heat_igl import shapes
 from heat_igl.mesh import Mesh
-from heat_igl.sampling import _least_in_faces
+from heat_igl.sampling.centre import _least_in_faces
 
 
 @pytest.fixture(scope="module")

@@ -45,7 +45,7 @@ def test_identities(mesh):
 @pytest.mark.parametrize("mesh", [shapes.icosphere(3), shapes.box(6)], ids=["sphere", "box"])
 def test_one_speed_divides_all_distances(mesh):
     # Without triangles there is no near field of straight lines around the source, as there is none with a speed.
-    plain = heat_igl.HeatMethodSolver.from_operators(replace(operators(mesh), faces=None, triangulation=None))
+    plain = heat_igl.HeatMethodSolver.from_operators(replace(operators(mesh), lengths=None, surface=None))
     expected = plain.distance(5) / 2.5
     found = solver(mesh, np.full(mesh.n_faces, 2.5)).distance(5)
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
@@ -56,8 +56,8 @@ def test_one_speed_divides_all_distances(mesh):
 def test_one_speed_flips_the_same_edges(cow):
     expected = operators(cow)
     found = speed_operators(cow, np.ones(cow.n_faces))
-    assert expected.triangulation is not None
-    assert expected.triangulation.n_flips > 100
+    assert expected.surface is not None
+    assert expected.surface.triangulation.n_flips > 100
     assert abs(found.L - expected.L).max() < 1e-9 * abs(expected.L).max()
     np.testing.assert_allclose(found.M.diagonal(), expected.M.diagonal(), rtol=1e-9)
 

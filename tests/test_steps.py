@@ -11,7 +11,16 @@ from conftest import perturbed
 
 from heat_igl import HeatMethodSolver, Mesh, PolygonMesh, polygon_operators, shapes, steps
 from heat_igl.operators import Operators, operators, speed_operators, tufted_operators
-from heat_igl.steps import Descent, HeatFlow, PoissonProblem, damping, diffuse, fitted_laplacian, integrate, normalize
+from heat_igl.steps import (
+    HeatFlow,
+    NormalizedDivergence,
+    PoissonProblem,
+    damping,
+    diffuse,
+    fitted_laplacian,
+    integrate,
+    normalize,
+)
 
 
 @pytest.fixture(scope="module")
@@ -166,15 +175,15 @@ def test_one_kernel_is_the_matrix_form(disk, k, damped, fitted, scale):
             X *= np.tile(damping(domain, u, t, fitted=fitted), (domain.dimension, 1))
         expected = domain.D @ X
         for order in (None, np.random.default_rng(k).permutation(domain.n)):
-            found = Descent(domain, t if damped else None, order, fitted).divergence(u)
+            found = NormalizedDivergence(domain, t if damped else None, order, fitted).divergence(u)
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * abs(expected).max())
 
 
 def test_without_numba_there_is_the_matrix_form(disk, monkeypatch):
     u = diffuse(disk, np.eye(disk.n)[:, [3, 90]], 0.02)
     expected = disk.D @ (normalize(disk, u) * np.tile(damping(disk, u, 0.02), (2, 1)))
-    monkeypatch.setattr(steps.importlib.util, "find_spec", lambda _: None)
-    assert (Descent(disk, 0.02).divergence(u) == expected).all()
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    assert (NormalizedDivergence(disk, 0.02).divergence(u) == expected).all()
 
 
 def test_a_gradient_exchanged_by_hand_is_used(disk):
@@ -184,7 +193,7 @@ def test_a_gradient_exchanged_by_hand_is_used(disk):
     u = diffuse(disk, np.eye(disk.n)[:, [3, 90]], 0.02)
     expected = other.D @ normalize(other, u)
     assert abs(expected - disk.D @ normalize(disk, u)).max() > 0.1 * abs(expected).max()
-    found = Descent(other).divergence(u)
+    found = NormalizedDivergence(other).divergence(u)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * abs(expected).max())
 
 
@@ -223,7 +232,7 @@ def squeezed_sphere() -> Mesh:
 
 def edges_by_pair(domain: Operators) -> dict[tuple[int, int], list[tuple[float, float]]]:
     """Cotangent weight and length of each edge of the triangulation, by the two vertices that it joins."""
-    triangulation = domain.triangulation
+    triangulation = domain.surface.triangulation
     l2 = triangulation.l**2
     # Half the cotangent opposite each side, by the law of cosines; a face counts by its area in the domain.
     half = (l2.sum(axis=1, keepdims=True) - 2 * l2) * (domain.weights / (8 * triangulation.areas**2))[:, None]
@@ -242,6 +251,27 @@ def fit_of(length: float, t: float) -> float:
     return length**2 / (4 * t) / np.mean(2 * np.sinh(x / 2) ** 2)
 
 
+class Unseen:
+    """Stands for the triangles of a domain, which no step may look at."""
+
+    def __getattribute__(self, name):
+        raise AssertionError(f"a step looks at surface.{name}")
+
+
+@pytest.mark.parametrize("fitted", [False, True])
+def test_steps_see_matrices_and_lengths_but_no_surface(fitted):
+    seen = operators(squeezed_sphere())
+    t = 0.5 * seen.mean_edge_length**2
+    results = []
+    for domain in (seen, replace(seen, surface=Unseen())):
+        u = HeatFlow(domain, t, fitted=fitted).solve(dirac(domain.n, 7))
+        divergence = NormalizedDivergence(domain, t, fitted=fitted).divergence(u[:, None])
+        X = normalize(domain, u, fitted) * np.tile(damping(domain, u, t, fitted=fitted), domain.dimension)
+        results.append((u, divergence, PoissonProblem(domain).solve(divergence), integrate(domain, X)))
+    for of_seen, of_unseen in zip(*results, strict=True):
+        np.testing.assert_array_equal(of_seen, of_unseen)
+
+
 @pytest.mark.parametrize("t_coef", [0.3, 1.0, 20.0])
 def test_fitted_laplacian_takes_each_edge_by_its_own_length(t_coef):
     """Flipped edges, edges of negative weight, and the cover, which has each edge of the sphere twice."""
@@ -250,7 +280,7 @@ def test_fitted_laplacian_takes_each_edge_by_its_own_length(t_coef):
         (operators(squeezed_sphere(), "cotan"), False, 1),
         (tufted_operators(perturbed(shapes.icosphere(2))), False, 2),
     ):
-        assert (domain.triangulation.n_flips > 20) == flipped
+        assert (domain.surface.triangulation.n_flips > 20) == flipped
         t = t_coef * domain.mean_edge_length**2
         found = fitted_laplacian(domain, t)
         assert np.array_equal(found.indices, domain.L.indices)  # so that one order of elimination does for both
@@ -322,10 +352,10 @@ def test_twice_the_laplacian():
     found = HeatMethodSolver.from_operators(replace(both, weights=2 * domain.weights)).distance(7)
     np.testing.assert_allclose(found, HeatMethodSolver.from_operators(domain).distance(7), rtol=1e-12, atol=1e-14)
     # Alone it makes all edges shorter by sqrt(2), and with these lengths it is the flow of 2 t.
-    edges = domain.triangulation.edges
-    ends = domain.triangulation.tail(edges), domain.triangulation.head(edges)
-    lengths = sp.csc_matrix((domain.triangulation.l.ravel()[edges], ends), shape=domain.L.shape)
-    shorter = replace(domain, L=2 * domain.L, chords=lengths.maximum(lengths.T) / np.sqrt(2))
+    edges = domain.surface.triangulation.edges
+    ends = domain.surface.triangulation.tail(edges), domain.surface.triangulation.head(edges)
+    lengths = sp.csc_matrix((domain.surface.triangulation.l.ravel()[edges], ends), shape=domain.L.shape)
+    shorter = replace(domain, L=2 * domain.L, lengths=lengths.maximum(lengths.T) / np.sqrt(2))
     expected = HeatFlow(domain, 2 * t, fitted=True).solve(b)
     np.testing.assert_allclose(HeatFlow(shorter, t, fitted=True).solve(b), expected, rtol=1e-11)
 

@@ -7,8 +7,7 @@ from conftest import perturbed
 from heat_igl import HeatMethodSolver, Mesh, MeshError, shapes
 from heat_igl.mesh import split_long_edges
 from heat_igl.mesh.connectivity import boundary_loops
-
-from steiner import graph_distance
+from heat_igl.reference.steiner import graph_distance
 
 
 def uneven() -> Mesh:

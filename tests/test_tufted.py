@@ -12,8 +12,7 @@ from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, shapes
 from heat_igl.intrinsic import has_nonmanifold_edges, intrinsic_delaunay, intrinsic_triangulation, tufted_cover
 from heat_igl.mesh import split_long_edges
 from heat_igl.operators import Operators, cotan_operators, intrinsic_operators, operators, tufted_operators
-
-from steiner import graph_distance, steiner_distance
+from heat_igl.reference.steiner import graph_distance, steiner_distance
 
 
 def fan_of_five(longest: float) -> Mesh:
@@ -164,14 +163,14 @@ def test_cover_is_used_where_it_is_needed_and_only_there():
     for manifold in (touching, shapes.disk(4), perturbed(shapes.disk(6), 0.4)):
         assert not has_nonmanifold_edges(manifold)
         domain = operators(manifold)
-        assert len(domain.triangulation.F) == manifold.n_faces
-        assert domain.surface is None
+        assert len(domain.surface.triangulation.F) == manifold.n_faces
+        assert domain.surface.uncovered is None
 
     book = shapes.book(3, 4)
     assert has_nonmanifold_edges(book)
-    assert len(operators(book).triangulation.F) == 2 * book.n_faces
-    assert len(operators(book).surface.F) == book.n_faces
-    assert len(operators(book, "cotan").triangulation.F) == book.n_faces
+    assert len(operators(book).surface.triangulation.F) == 2 * book.n_faces
+    assert len(operators(book).surface.unfolding.F) == book.n_faces
+    assert len(operators(book, "cotan").surface.triangulation.F) == book.n_faces
 
 
 def test_closed_manifold_gives_its_own_laplacian():
@@ -186,7 +185,7 @@ def test_closed_manifold_gives_its_own_laplacian():
     assert abs(unflipped.M / 2 - own.M).max() <= 1e-12 * abs(own.M).max()
 
     plain, tufted = operators(sphere), tufted_operators(sphere)
-    assert tufted.triangulation.n_flips == 2 * plain.triangulation.n_flips > 100
+    assert tufted.surface.triangulation.n_flips == 2 * plain.surface.triangulation.n_flips > 100
     # Lengths of flipped edges are rounded in another order on the back.
     assert abs(tufted.L - plain.L).max() <= 1e-9 * abs(plain.L).max()
     t = plain.mean_edge_length**2 / 2
@@ -228,7 +227,7 @@ def assert_same_as_skin(mesh: Mesh, skin: Mesh, vertex):
     """The operators of the cover are half of those of a closed manifold whose vertices lie on those of the mesh."""
     assert (skin.facets.n_faces == 2).all()
     domain, doubled = tufted_operators(mesh), operators(skin)
-    assert doubled.triangulation.n_flips > 20
+    assert doubled.surface.triangulation.n_flips > 20
     onto = sp.csr_array((np.ones(len(vertex)), (np.arange(len(vertex)), vertex)))
     for ours, theirs in ((domain.L, doubled.L), (domain.M, doubled.M)):
         assert abs(onto.T @ theirs @ onto / 2 - ours).max() <= 1e-9 * abs(ours).max()
@@ -247,8 +246,8 @@ def test_order_and_orientation_of_the_faces_do_not_matter():
 
 def test_paths_are_to_be_unfolded_on_each_face_once():
     domain = operators(finned_sphere())
-    assert domain.surface.areas.sum() == pytest.approx(domain.weights.sum(), rel=1e-12)
-    assert (domain.surface.twin == -2).any()
+    assert domain.surface.unfolding.areas.sum() == pytest.approx(domain.weights.sum(), rel=1e-12)
+    assert (domain.surface.unfolding.twin == -2).any()
 
 
 def test_a_face_that_is_there_twice_counts_once():
@@ -259,7 +258,7 @@ def test_a_face_that_is_there_twice_counts_once():
     one, other = operators(sphere), operators(doubled)
     assert (one.L != other.L).nnz == 0
     assert (one.M != other.M).nnz == 0
-    assert other.surface is None
+    assert other.surface.uncovered is None
 
     fins = finned_sphere()
     F = np.concatenate([fins.F, np.roll(fins.F[-5:], 1, axis=1), fins.F[:9, ::-1]])
@@ -275,7 +274,7 @@ def test_degenerate_faces_and_edges_of_no_length():
     V = np.vstack([fan.V, fan.V[a], fan.V[[a, b]].mean(axis=0)])
     flat = Mesh(V, np.vstack([fan.F, [a, b, len(V) - 2], [a, b, len(V) - 1]]))
     domain = operators(flat)
-    assert domain.triangulation.lengthening > 0
+    assert domain.surface.triangulation.lengthening > 0
     assert np.isfinite(domain.G.data).all()
     assert abs(domain.D @ domain.G - domain.L).max() <= 1e-8 * abs(domain.L).max()
     distance = HeatMethodSolver(flat).distance(0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import json
 import os
 import subprocess
@@ -19,7 +18,7 @@ import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import shared_path
+from conftest import load_script, shared_path
 
 import heat_igl
 from heat_igl import (
@@ -36,7 +35,7 @@ from heat_igl import (
     validation,
 )
 from heat_igl.operators import Operators, operators
-from heat_igl.steps import Descent
+from heat_igl.steps import NormalizedDivergence
 from heat_igl.validation import draw_sources
 from heat_igl.validation.plots import error_figure
 
@@ -68,9 +67,9 @@ def test_threshold_catches_broken_heat_steps(mesh: Mesh, percent: float) -> None
 
 
 def test_threshold_catches_a_field_that_points_to_the_source(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, right = shapes.grid(20), Descent.divergence
+    mesh, right = shapes.grid(20), NormalizedDivergence.divergence
     assert not validate(mesh, 0, ["heat"]).exceeding(3.5)
-    monkeypatch.setattr(Descent, "divergence", lambda self, u: -right(self, u))
+    monkeypatch.setattr(NormalizedDivergence, "divergence", lambda self, u: -right(self, u))
     assert validate(mesh, 0, ["heat"]).exceeding(3.5)
 
 
@@ -163,7 +162,7 @@ def test_infinite_errors_reach_json_as_text() -> None:
 
 
 def test_a_method_that_fails_is_a_row_that_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reference.solvers, "find_spec", lambda name: None if name == "pymeshlab" else object())
+    monkeypatch.setattr(reference.measurement, "find_spec", lambda name: None if name == "pymeshlab" else object())
     mesh = shapes.grid(5)
     steps: list[int] = []
     report = validate(mesh, [[0], [7]], ["meshlab", "heat"], progress=lambda *step: steps.append(step[1]))
@@ -307,13 +306,7 @@ def test_bunny_within_a_minute(bunny: Mesh) -> None:
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    path = Path(__file__).parents[1] / "scripts" / "validate_meshes.py"
-    spec = importlib.util.spec_from_file_location("validate_meshes", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_script("validate_meshes")
 
 
 @pytest.fixture

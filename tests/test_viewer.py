@@ -15,8 +15,9 @@ import pytest
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.drawing import viewer
-from heat_igl.drawing.viewer import Exploration, Options
+from heat_igl.drawing import exploration, viewer
+from heat_igl.drawing.viewer import Exploration
+from heat_igl.heat_method import SolverOptions
 
 
 @pytest.fixture
@@ -54,7 +55,7 @@ def test_options_change_the_distance_as_they_change_the_solver(sphere: heat_igl.
         ).distance(source)
         np.testing.assert_array_equal(now.distance, expected)
         assert "factored anew" in now.message
-    assert now.options == Options(4.0, "dirichlet", "sweep")
+    assert now.options == SolverOptions(4.0, boundary="dirichlet", refine="sweep")
     now.change(refine=None)
     assert "factored anew" not in now.message
     assert "out of reach" in now.message
@@ -62,13 +63,13 @@ def test_options_change_the_distance_as_they_change_the_solver(sphere: heat_igl.
 
 def test_few_solvers_are_kept(sphere: heat_igl.Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
     made = []
-    build = heat_igl.HeatMethodSolver
+    build = heat_igl.HeatMethodSolver.from_options
 
-    def counting(*arguments: object, **options: object) -> heat_igl.HeatMethodSolver:
-        made.append(options["t_coef"])
-        return build(*arguments, **options)  # type: ignore[arg-type]
+    def counting(mesh: heat_igl.Mesh, options: SolverOptions) -> heat_igl.HeatMethodSolver:
+        made.append(options.t_coef)
+        return build(mesh, options)
 
-    monkeypatch.setattr(viewer, "HeatMethodSolver", counting)
+    monkeypatch.setattr(exploration.HeatMethodSolver, "from_options", counting)
     now = Exploration(sphere, 0)
     for t_coef in (2.0, 1.0, 3.0, 4.0, 1.0, 5.0, 2.0):
         now.change(t_coef=t_coef)
@@ -80,7 +81,7 @@ def test_what_cannot_be_solved_changes_nothing(sphere: heat_igl.Mesh) -> None:
     before = now.distance
     now.change(t_coef=-1.0)
     assert now.message == "t_coef must be a positive number, not -1.0"
-    assert now.options == Options()
+    assert now.options == SolverOptions()
     assert now.distance is before
     with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 9999"):
         now.choose(9999)

@@ -1,4 +1,7 @@
-"""What people do with a distance, each a short module to read and to start from; notebooks/10_applications.ipynb."""
+"""Applications of geodesic distance: landmark-guided search on edges, and analysis of particles in binary images.
+
+notebooks/10_applications.ipynb shows them.
+"""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""Shortest paths along edges by A*, led by distances from a few landmarks.
+"""Shortest paths along edges by A* with lower bounds from landmark distances.
 
-A search from one vertex to another need not look everywhere if it knows a lower bound of what is left to go. With the
-distances d from a landmark, |d(v) - d(target)| is one, by the triangle inequality (Goldberg and Harrelson 2005; Peyre
-and Cohen 2009, on surfaces), provided that along no edge d changes by more than the edge's length. Exact geodesic
-distance never does, since an edge is a path on the surface; heat distance does in places, and what is exact but for
-rounding may. So `EdgeSearch` looks at all edges and divides d by the most that it changes per length. The bound is then
-a true one whatever d was, and the paths found are shortest.
+A* visits fewer vertices than Dijkstra's algorithm if a lower bound of the distance to the target is known. For the
+distances d from a landmark, |d(v) - d(target)| is such a bound by the triangle inequality (Goldberg and Harrelson 2005;
+Peyre and Cohen 2009, on surfaces), provided that d changes along no edge by more than the length of the edge. Exact
+geodesic distance satisfies this, since an edge is a path on the surface. Heat distance violates it on some edges, and
+rounding can violate it. `EdgeSearch` therefore divides d by the largest change per length over all edges, so the bound
+is valid for any d, and the paths found are shortest paths.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = ["EdgePath", "EdgeSearch"]
 
-# What rounding may add to a difference of two distances, relative to it.
+# Relative allowance for rounding in the difference of two distances.
 _ROUNDING = 1e-9
 
 
@@ -33,11 +33,11 @@ class EdgePath:
     Attributes
     ----------
     vertices : (k,) int64
-        From the source to the target; empty where there is no way.
+        Vertices from the source to the target; empty if the target is unreachable.
     length : float
-        In the mesh's unit; ``inf`` where there is no way.
+        Length in the unit of the mesh; ``inf`` if the target is unreachable.
     n_expanded : int
-        Vertices whose neighbours were looked at.
+        Number of vertices whose neighbours were visited.
     """
 
     vertices: IntArray
@@ -46,25 +46,25 @@ class EdgePath:
 
 
 class EdgeSearch:
-    """Shortest paths along the edges of a mesh, one at a time.
+    """Shortest paths along the edges of a mesh, from one vertex to another.
 
     Parameters
     ----------
     mesh : Mesh
         Triangles or tetrahedra, n vertices.
     landmark_distances : (k, n) array_like, optional
-        Distances from k landmarks, one row for each, as ``solver.distances(landmarks)`` gives them. Those along edges
-        lead best, since they are what is searched for. Without landmarks this is Dijkstra's algorithm.
+        Distances from k landmarks, one row each, as returned by ``solver.distances(landmarks)``. Distances along edges
+        give the best bounds. Without landmarks the search is Dijkstra's algorithm.
 
     Attributes
     ----------
     steepness : (k,) float64
-        The most that each row changes along an edge, per length. What is above 1 was divided out.
+        The largest change of each row along an edge, per length. Rows with a value above 1 were divided by it.
 
     Raises
     ------
     ValueError
-        If `landmark_distances` has another shape, or an entry is NaN or negative.
+        If `landmark_distances` does not have shape (k, n), or an entry is NaN or negative.
 
     Examples
     --------
@@ -98,7 +98,7 @@ class EdgeSearch:
         Raises
         ------
         SourceError
-            If one of them is no vertex.
+            If `source` or `target` is not a vertex.
         """
         n = len(self._neighbours)
         for name, vertex in (("source", source), ("target", target)):
@@ -129,7 +129,7 @@ class EdgeSearch:
         return EdgePath(np.empty(0, np.int64), np.inf, n_expanded)
 
     def _to_go(self, target: int) -> list[float]:
-        """A lower bound (n,) of the way from each vertex to `target`, which falls by at most the length of an edge."""
+        """A lower bound (n,) of the distance to `target`; along an edge it changes by at most the length."""
         reaching = self._bounds[np.isfinite(self._bounds[:, target])]
         if not len(reaching):
             return [0.0] * self._bounds.shape[1]
@@ -158,8 +158,8 @@ def _checked(landmark_distances: ArrayLike, n: int) -> FloatArray:
 def _steepness(mesh: Mesh, rows: FloatArray) -> FloatArray:
     """The largest change per length of each row along an edge, (k,).
 
-    ``inf`` where a row changes along an edge of no length: such a row bounds nothing. Edges that the landmark does not
-    reach do not count.
+    The value is ``inf`` if a row changes along an edge of length 0; such a row gives no bound. Edges that the landmark
+    does not reach are ignored.
     """
     a, b = mesh.edges.T
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,7 +1,7 @@
-"""Particles of a binary image by geodesic distance (Lantuejoul and Beucher 1981).
+"""Analysis of particles in a binary image by geodesic distance (Lantuejoul and Beucher 1981).
 
-The distance between two pixels of a particle is the length of the shortest path inside it: it does not see the particle
-next to it, however near that is, which is what makes questions of connectivity easy. `image_domain` makes the domain.
+The geodesic distance between two pixels of a particle is the length of the shortest path inside the particle. Adjacent
+particles, however near, do not affect it. `image_domain` makes the mesh.
 """
 
 from __future__ import annotations
@@ -19,32 +19,33 @@ from heat_igl.typing import AnyArray, ArrayLike, BoolArray, IntArray
 
 __all__ = ["particle_length", "reconstruct", "skeleton", "zones_of_influence"]
 
-# Pixels that touch in a corner are connected, as in `image_domain`.
+# Diagonally adjacent pixels are connected, as in `image_domain`.
 _CONNECTED = np.ones((3, 3), bool)
 
 
 def reconstruct(mask: ArrayLike, markers: ArrayLike, radius: float = np.inf, **options: Any) -> BoolArray:
-    """The particles that hold a marker, or what lies within `radius` of one inside its particle.
+    """Reconstruct the particles that contain a marker, up to the distance `radius` from the markers.
 
     Parameters
     ----------
     mask : (rows, columns) array_like of bool
         The particles.
     markers : (rows, columns) array_like of bool
-        Pixels that mark the wanted ones; those outside `mask` mark nothing.
+        The markers; pixels outside `mask` are ignored.
     radius : float
-        Distance inside the particle up to which it is reconstructed, in pixels: a geodesic dilation.
+        Largest geodesic distance from a marker, in pixels; a finite radius gives a geodesic dilation.
     **options
         As for `HeatMethodSolver`.
 
     Returns
     -------
     (rows, columns) bool
+        Mask of the reconstructed pixels.
 
     Raises
     ------
     MeshError
-        If `mask` holds no pixel.
+        If `mask` has no pixel.
     SourceError
         If no marker lies in `mask`.
     """
@@ -54,14 +55,16 @@ def reconstruct(mask: ArrayLike, markers: ArrayLike, radius: float = np.inf, **o
 
 
 def zones_of_influence(mask: ArrayLike, markers: ArrayLike, **options: Any) -> IntArray:
-    """Which marker is nearest inside the particle. The borders between zones are the skeleton by zones of influence.
+    """Label each pixel by the nearest marker in the same particle, by geodesic distance.
+
+    The borders between the zones are the skeleton by influence zones.
 
     Parameters
     ----------
     mask : (rows, columns) array_like of bool
         The particles.
     markers : (rows, columns) array_like of int
-        0 where there is no marker, and the number of the marker where there is one.
+        The number of the marker at each pixel, 0 for no marker.
     **options
         As for `HeatMethodSolver`.
 
@@ -75,7 +78,7 @@ def zones_of_influence(mask: ArrayLike, markers: ArrayLike, **options: Any) -> I
     MeshError
         If `mask` holds no pixel.
     SourceError
-        If `markers` are no image of integers, or a marker lies outside `mask`.
+        If `markers` is not an image of integers, has no marker, or has a marker outside `mask`.
     """
     domain, solver = _solver(mask, options)
     labels = np.asarray(markers)
@@ -102,9 +105,9 @@ def zones_of_influence(mask: ArrayLike, markers: ArrayLike, **options: Any) -> I
 
 
 def particle_length(mask: ArrayLike, **options: Any) -> tuple[float, tuple[int, int], tuple[int, int]]:
-    """The longest way between two pixels of a particle, and the two, which are its ends.
+    """The geodesic diameter of a particle, and the two pixels at the ends.
 
-    A lower bound as `diameter` finds it, mostly the longest way.
+    `diameter` computes it: the result is a lower bound, which is mostly attained.
 
     Parameters
     ----------
@@ -116,14 +119,14 @@ def particle_length(mask: ArrayLike, **options: Any) -> tuple[float, tuple[int, 
     Returns
     -------
     length : float
-        In pixels, from a corner of one to a corner of the other.
+        Distance in pixels between corners of the two pixels.
     first, second : (row, column)
-        The two.
+        The pixels at the ends.
 
     Raises
     ------
     MeshError
-        If `mask` does not hold exactly one particle.
+        If `mask` does not contain exactly one particle.
     """
     domain, solver = _solver(mask, options)
     n_particles = ndimage.label(np.asarray(mask), _CONNECTED)[1]
@@ -134,38 +137,36 @@ def particle_length(mask: ArrayLike, **options: Any) -> tuple[float, tuple[int, 
 
 
 def skeleton(mask: ArrayLike, shortest_branch: float, **options: Any) -> BoolArray:
-    """The particles thinned to strokes, without the branches that end before they are `shortest_branch` long.
+    """The skeleton of the particles by thinning, without branches shorter than `shortest_branch`.
 
-    Thinning by scikit-image makes a branch of every bump in the outline. How long one is, from where it leaves the
-    rest, is a geodesic distance inside the skeleton; leaving the short ones out disconnects nothing.
+    Thinning by scikit-image makes a branch for every bump of the outline. The length of a branch is the geodesic
+    distance inside the skeleton from the fork to the tip. Removal of short branches disconnects nothing.
 
     Parameters
     ----------
     mask : (rows, columns) array_like of bool
         The particles.
     shortest_branch : float
-        Length in pixels.
+        Smallest length of a branch, in pixels.
     **options
         As for `HeatMethodSolver`.
 
     Returns
     -------
     (rows, columns) bool
-        As many connected pieces, with as many holes, as `mask` has particles.
+        The skeleton, with the same number of connected components and of holes as `mask`.
 
     Raises
     ------
     MeshError
-        If `mask` is not an image of booleans, or holds no pixel.
+        If `mask` is not a boolean image, or has no pixel.
     MissingExtraError
         If scikit-image is not installed.
     """
-    try:
+    with MissingExtraError.guard("thinning", "scikit-image", "images"):
         from skimage import morphology
-    except ImportError:
-        raise MissingExtraError.of("thinning", "scikit-image", "images") from None
     skeletonize: Any = morphology.skeletonize
-    image_domain(mask)  # for its errors
+    image_domain(mask)  # raises the errors for an invalid mask
     thin: BoolArray = np.asarray(skeletonize(np.asarray(mask)))
     n_neighbours = ndimage.convolve(thin.astype(int), _CONNECTED.astype(int), mode="constant") - 1
     forks = thin & (n_neighbours > 2)
@@ -186,7 +187,7 @@ def _solver(mask: ArrayLike, options: dict[str, Any]) -> tuple[ImageDomain, Heat
 
 
 def _pixel(domain: ImageDomain, vertex: int) -> tuple[int, int]:
-    """The pixel whose centre or corner `vertex` is."""
+    """The pixel (row, column) nearest to `vertex`, which is the centre or a corner of a pixel."""
     x, y, _ = domain.mesh.V[vertex]
     inside: AnyArray = np.argwhere(domain.index >= 0)
     row, column = inside[np.argmin((inside[:, 0] - y) ** 2 + (inside[:, 1] - x) ** 2)]

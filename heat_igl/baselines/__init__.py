@@ -1,12 +1,12 @@
-"""The paper's other ways to a distance, to compare with: each usable alone, on meshes or on regular grids.
+"""Other methods for geodesic distance that the paper discusses, for comparison, on meshes and on regular grids.
 
 On meshes: Varadhan's formula (`varadhan`), the boundary problem BP (`boundary_problem`), the Schrodinger equation
-(`schrodinger`), fast marching (`fast_marching`), and paths along edges (`graph_distance`) with theorem 3.1
-(`graph_limit`), which says that as t tends to 0 the first three end there. They take sources as the rest of the
-package does and return a distance (n,): 0 at the sources, ``inf`` where none is reached, nothing negative.
+(`schrodinger`), fast marching (`fast_marching`) and shortest paths along edges (`graph_distance`). By theorem 3.1
+(`graph_limit`) the first three tend to distances along edges as t tends to 0. They take source vertices and return
+distances (n,), which are 0 at the sources, ``inf`` at unreachable vertices, and never negative.
 
 On grids: `schrodinger_grid`, `fast_marching_grid` and `fast_sweeping`. They take a boolean array that marks the sources
-and return an array of its shape.
+and return distances in an array of the same shape.
 """
 
 from heat_igl.baselines.fronts import fast_marching, fast_marching_grid, fast_sweeping

@@ -1,6 +1,6 @@
-"""Distance by a front that moves outward: fast marching on meshes and grids, fast sweeping on grids.
+"""Solvers of the eikonal equation: fast marching on meshes and grids, fast sweeping on grids.
 
-All solve the eikonal equation ``|grad d| = 1``, equation (3) of the paper, from scratch for every set of sources.
+They solve ``|grad d| = 1``, equation (3) of the paper, anew for every source set, without precomputation.
 """
 
 from __future__ import annotations
@@ -25,43 +25,41 @@ def fast_marching(mesh: Mesh, sources: Sources) -> FloatArray:
     Parameters
     ----------
     mesh : Mesh
-        Triangles, manifold, with or without boundary.
+        A manifold triangle mesh, with or without boundary.
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices.
 
     Returns
     -------
     (n,) float64
-        In the mesh's unit; 0 at the sources, ``inf`` where none is reached.
+        Distance as computed by potpourri3d, but 0 at the sources and ``inf`` at unreachable vertices.
 
     Raises
     ------
     SourceError
-        If the sources name no vertex of the mesh.
+        If the sources are not vertices of the mesh.
     MeshError
-        If the mesh is not of triangles or not manifold, or if what comes back is no distance.
+        If the mesh is tetrahedral or not manifold, or if the values that potpourri3d returns cannot be distances.
     MissingExtraError
         If potpourri3d is not installed.
     """
     chosen = vertex_sources(sources, mesh.n_vertices)
     if mesh.is_tetrahedral:
         raise MeshError("fast marching works on triangles, and the mesh holds tetrahedra")
-    try:
+    with MissingExtraError.guard("fast marching on meshes", "potpourri3d", "bench"):
         import potpourri3d
-    except ImportError:
-        raise MissingExtraError.of("fast marching on meshes", "potpourri3d", "bench") from None
     distance = np.full(mesh.n_vertices, np.inf)
     distance[chosen] = 0.0
     reached = mesh.referenced & np.isin(mesh.components, mesh.components[chosen])
     if not reached.any():
         return distance
-    # The connected part alone: potpourri3d drops vertices without faces at the end of V, and refuses the whole mesh
-    # for an edge of three triangles anywhere.
+    # Only the components of the sources: potpourri3d drops unreferenced vertices at the end of V, and rejects the whole
+    # mesh for an edge of three triangles in any component.
     number = np.cumsum(reached) - 1
     faces = number[mesh.F[reached[mesh.F[:, 0]]]]
     try:
         solver = potpourri3d.MeshFastMarchingDistanceSolver(mesh.V[reached], faces)
-        # A curve of one point, without barycentric coordinates, is a vertex.
+        # A curve of one point without barycentric coordinates denotes a vertex.
         found = np.ravel(solver.compute_distance([[(int(number[vertex]), [])] for vertex in chosen if reached[vertex]]))
     except RuntimeError as error:
         raise MeshError(f"potpourri3d refuses the mesh: {error}; look for defects with mesh.report()") from None
@@ -84,22 +82,22 @@ def fast_marching_grid(
     spacing : float or (d,) array_like
         Step of the grid along each axis.
     domain : (n_0, ..., n_d) array_like of bool, optional
-        Where paths may run; everywhere by default.
+        The points that paths may use; all points by default.
     order : {2, 1}
-        Of the upwind differences. Where two sources are neighbours along an axis, those of first order are used: the
-        second-order ones would take both zeros for values of one smooth front, and give 2/3 of a step beside them.
+        Order of the upwind differences. If two sources are adjacent along an axis, first order is used: second-order
+        differences would treat both zeros as values of one smooth front and return 2/3 of a step beside them.
 
     Returns
     -------
     (n_0, ..., n_d) float64
-        ``inf`` outside the domain and where it is cut off.
+        Distance; ``inf`` outside the domain and at unreachable points.
 
     Raises
     ------
     SourceError
         If there is no source, one lies outside the domain, or `sources` is not boolean.
     ValueError
-        If `spacing`, `domain` or `order` has no meaning.
+        If `spacing`, `domain` or `order` is invalid.
     MissingExtraError
         If scikit-fmm is not installed.
     """
@@ -108,10 +106,8 @@ def fast_marching_grid(
     inside = grid_domain(domain, mask)
     if order not in (1, 2):
         raise ValueError(f"order must be 1 or 2, not {order!r}")
-    try:
+    with MissingExtraError.guard("fast marching on grids", "scikit-fmm", "bench"):
         import skfmm
-    except ImportError:
-        raise MissingExtraError.of("fast marching on grids", "scikit-fmm", "bench") from None
     level: Any = np.ma.masked_array(np.where(mask, 0.0, 1.0), ~inside)  # type: ignore[no-untyped-call,unused-ignore]
     aligned = [np.moveaxis(mask, axis, 0) for axis in range(mask.ndim)]
     touching = any((lines[1:] & lines[:-1]).any() for lines in aligned)
@@ -123,41 +119,35 @@ def fast_marching_grid(
 
 
 def fast_sweeping(sources: ArrayLike, spacing: ArrayLike = 1.0, *, domain: ArrayLike | None = None) -> FloatArray:
-    """Fast sweeping on a grid (Zhao 2005): Gauss-Seidel sweeps along all diagonals until nothing changes.
+    """Fast sweeping on a grid (Zhao 2005): Gauss-Seidel sweeps along all diagonals until no value changes.
 
-    Each point takes the solution of Godunov's upwind difference for ``|grad d| = 1`` (Zhao's section 2) from the
-    smaller neighbour along every axis. Of first order: the error is of the order of h log(1 / h) around point sources.
+    Each update solves Godunov's upwind difference for ``|grad d| = 1`` (Zhao, section 2) with the smaller neighbour
+    along each axis. The scheme is of first order; the error near point sources is of the order of h log(1 / h).
 
     Parameters
     ----------
-    sources : (n_0, ..., n_d) array_like of bool
-        Marks the points from which distance is measured.
-    spacing : float or (d,) array_like
-        Step of the grid along each axis.
-    domain : (n_0, ..., n_d) array_like of bool, optional
-        Where paths may run; everywhere by default.
+    sources, spacing, domain
+        As for `fast_marching_grid`.
 
     Returns
     -------
     (n_0, ..., n_d) float64
-        ``inf`` outside the domain and where it is cut off.
+        Distance, as from `fast_marching_grid`.
 
     Raises
     ------
-    SourceError
-        If there is no source, one lies outside the domain, or `sources` is not boolean.
-    ValueError
-        If `spacing` or `domain` has no meaning.
+    SourceError, ValueError
+        As for `fast_marching_grid`.
 
     Notes
     -----
-    The points on a plane i + j + ... = const do not see each other, so a sweep updates plane after plane, each at once
-    (Detrixhe, Gibou, Min 2013), with the same result as point after point.
+    Points on a plane i + j + ... = const do not depend on each other. A sweep therefore updates one plane at a time
+    (Detrixhe, Gibou, Min 2013), with the same result as one point at a time.
     """
     mask = grid_sources(sources)
     steps = grid_spacing(spacing, mask.ndim)
     inside = grid_domain(domain, mask)
-    # A border of inf spares every test for the edge of the grid.
+    # With a border of inf no update needs to test for the boundary of the grid.
     d = np.full([n + 2 for n in mask.shape], np.inf)
     d[tuple(slice(1, -1) for _ in mask.shape)][mask] = 0.0
     flat = d.ravel()
@@ -175,7 +165,7 @@ def fast_sweeping(sources: ArrayLike, spacing: ArrayLike = 1.0, *, domain: Array
 
 
 def _sweeps(unknown: BoolArray, strides: IntArray) -> list[list[IntArray]]:
-    """For every diagonal direction its planes in order, as flat indices into the grid with a border."""
+    """For every diagonal direction the planes in order, as flat indices into the grid with a border."""
     place = np.argwhere(unknown)
     index = (place + 1) @ strides
     sweeps = []
@@ -192,11 +182,11 @@ def _godunov(neighbours: FloatArray, steps: FloatArray) -> FloatArray:
     a = np.take_along_axis(neighbours, order, 0)
     h = steps[order]
     with np.errstate(invalid="ignore"):
-        above = a - a[0]  # measured from the smallest neighbour, or far from the source digits would cancel
+        above = a - a[0]  # relative to the smallest neighbour; otherwise digits cancel far from the source
     x = h[0].copy()
     weight, first, second = h[0] ** -2, np.zeros_like(x), np.full_like(x, -1.0)
     for axis in range(1, len(a)):
-        # An axis takes part only where the solution without it lies above its neighbour; inf and nan never do.
+        # An axis contributes only if the solution without it exceeds the neighbour; inf and nan never contribute.
         part = x > above[axis]
         w, y = h[axis, part] ** -2, above[axis, part]
         weight[part] += w

@@ -1,4 +1,4 @@
-"""What functions on regular grids accept: validated once, at the border."""
+"""Validation of the arguments of functions on regular grids."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["grid_domain", "grid_sources", "grid_spacing"]
 
 
 def grid_sources(sources: ArrayLike) -> BoolArray:
-    """The points of a grid that `sources` marks; `SourceError` where it is no such array."""
+    """`sources` as a boolean array; raises `SourceError` if it is not boolean or marks no point."""
     mask = np.asarray(sources)
     if mask.dtype.kind != "b" or mask.ndim == 0:
         raise SourceError(f"sources must be a boolean array with the shape of the grid, not {mask.dtype}")
@@ -21,7 +21,7 @@ def grid_sources(sources: ArrayLike) -> BoolArray:
 
 
 def grid_spacing(spacing: ArrayLike, dimension: int) -> FloatArray:
-    """The step along each axis, from one number or one per axis."""
+    """The step (d,) along each axis, from one number or one number per axis."""
     steps = np.asarray(spacing, dtype=np.float64)
     if steps.shape not in ((), (dimension,)) or not (np.isfinite(steps) & (steps > 0)).all():
         raise ValueError(f"spacing must be a positive number, or one for each of {dimension} axes, not {spacing!r}")
@@ -29,7 +29,7 @@ def grid_spacing(spacing: ArrayLike, dimension: int) -> FloatArray:
 
 
 def grid_domain(domain: ArrayLike | None, sources: BoolArray) -> BoolArray:
-    """Where paths may run, all sources included; everywhere when not given."""
+    """The mask of the points that paths may use, which must include the sources; all points if `domain` is None."""
     if domain is None:
         return np.ones(sources.shape, bool)
     mask = np.asarray(domain)

@@ -1,7 +1,7 @@
-"""Distance as the logarithm of a linear problem's solution: Varadhan's formula and the boundary problem BP.
+"""Distance as the logarithm of the solution of a linear problem: Varadhan's formula and the boundary problem BP.
 
-Both take the logarithm of heat itself, where the heat method only uses its direction, so that every error of its
-magnitude (the time step, the mesh, the boundary, the curvature) becomes one of the distance.
+The heat method uses only the direction of the heat gradient. These methods use the magnitude of the heat, so all errors
+of the magnitude (from the time step, the mesh, the boundary and the curvature) become errors of the distance.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ import scipy.sparse as sp
 from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method import smallest_time_step
 from heat_igl.linear import factorize
-from heat_igl.mesh import RANGE_LIMIT, Mesh
+from heat_igl.mesh import Mesh
 from heat_igl.operators import Operators, operators
+from heat_igl.runtime import LOWEST_HEAT as _LOWEST_HEAT
+from heat_igl.runtime import RANGE_LIMIT
+from heat_igl.runtime import SOURCE_HEAT as _SOURCE_HEAT
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.steps import HeatFlow
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["boundary_problem", "log_heat_kernel", "varadhan"]
 
-# Heat at a source and the least that still has all its digits, as in `heat_method`.
-_SOURCE_HEAT = 1e290
-_LOWEST_HEAT = 1e-300
-
-# Products that the heat kernel may cost; clean meshes need 1000 to 30 000, and a single sliver can ask for 1e9.
+# Largest number of matrix-vector products for the heat kernel. Clean meshes need 1000 to 30 000; one sliver can
+# require 1e9.
 _MOST_PRODUCTS = 1e5
 
 # Factor c in t = c h^(2/3) D^(4/3) for the heat kernel. Geometric mean of the mean errors over the square, disk,
@@ -42,7 +42,7 @@ def varadhan(
     t: float | None = None,
     form: Literal["backward-euler", "heat-kernel"] = "backward-euler",
 ) -> FloatArray:
-    """Varadhan's formula: distance from the magnitude of heat after a short time.
+    """Varadhan's formula: distance from the magnitude of the heat after a short time.
 
     Parameters
     ----------
@@ -51,42 +51,43 @@ def varadhan(
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices.
     t : float, optional
-        Time, a squared length; raised where heat could not cross the domain in double precision. By default h^2 for
-        "backward-euler" and 0.07 h^(2/3) D^(4/3) for "heat-kernel", h the mean edge length, D the longest distance.
+        Time, a squared length. It is raised if heat cannot cross the domain in double precision. The default is h^2
+        for "backward-euler" and 0.07 h^(2/3) D^(4/3) for "heat-kernel", with the mean edge length h and the longest
+        distance D.
     form : {"backward-euler", "heat-kernel"}
-        "backward-euler": ``-sqrt(t) log(u / u_source)`` of one step (4), (id - t Lap) u = delta. The paper's equation
-        (delta t) has a factor 1/2, which halves every distance: in one dimension the step is
+        "backward-euler": ``-sqrt(t) log(u / u_source)`` for one step (4), (id - t Lap) u = delta. The paper's equation
+        (delta t) has an additional factor 1/2, which halves every distance: in one dimension the step gives
         ``u = exp(-x / sqrt(t)) / (2 sqrt(t))``.
-        "heat-kernel": ``sqrt(-4 t log(k / k_source))``, equation (VF), of the heat kernel itself. Dividing by
-        k_source takes away the factor (4 pi t)^(-n/2) of (2), without which distances would depend on the unit.
+        "heat-kernel": ``sqrt(-4 t log(k / k_source))``, equation (VF), for the heat kernel. Division by k_source
+        removes the factor (4 pi t)^(-n/2) of (2), with which distances would depend on the unit.
 
     Returns
     -------
     (n,) float64
-        In the mesh's unit; 0 at the sources, ``inf`` where none is reached.
+        Distance in the unit of the mesh; 0 at the sources, ``inf`` at unreachable vertices.
 
     Raises
     ------
     SourceError
-        If the sources name no vertex of the mesh.
+        If the sources are not vertices of the mesh.
     ValueError
-        If t is not positive or `form` is unknown.
+        If t is not positive, or `form` is unknown.
 
     Warns
     -----
     AccuracyWarning
-        If an explicit t had to be raised, or heat is not positive everywhere.
+        If a given t is raised, or the heat is not positive everywhere.
 
     Notes
     -----
-    On a line of edges h the step falls by ``acosh(1 + h^2 / (2 t))`` per edge, so that the first form is too short by
-    the fraction ``h^2 / (24 t)`` (3.8 % at t = h^2); in two dimensions it is too long by
+    On a line with edges of length h, log u decreases by ``acosh(1 + h^2 / (2 t))`` per edge. The first form is then too
+    short by the fraction ``h^2 / (24 t)`` (3.8 % at t = h^2). In two dimensions it is too long by
     ``sqrt(t) log(d / sqrt(t)) / 2``.
 
-    The heat kernel of the same line is a Bessel function, too large far away: the second form is too short by the
-    fraction ``d^2 h^2 / (96 t^2)``, while curvature and the cut locus add an error of the order of t / d. Both vanish
-    alike for t = c h^(2/3) D^(4/3). Between sources nearer to each other than sqrt(t) their heat adds up to more than
-    u_source, and distance reads 0.
+    The heat kernel of the same line is a Bessel function, which is too large far from the source. The second form is
+    too short by the fraction ``d^2 h^2 / (96 t^2)``; curvature and the cut locus add an error of the order of t / d.
+    Both errors vanish at the same rate for t = c h^(2/3) D^(4/3). Between sources closer than sqrt(t) the sum of the
+    heat exceeds u_source, and the distance is 0.
     """
     domain = domain_of(mesh)
     chosen = vertex_sources(sources, domain.n)
@@ -102,29 +103,27 @@ def varadhan(
 
 
 def boundary_problem(mesh: Mesh | Operators, sources: Sources, *, t: float | None = None) -> FloatArray:
-    """The paper's boundary problem (BP): (id - t Lap) v = 0 off the sources, v = 1 on them, and -sqrt(t) log v.
+    """Distance -sqrt(t) log v from the boundary problem (BP): (id - t Lap) v = 0 off the sources, v = 1 on the sources.
 
-    From one source it is `varadhan` with ``form="backward-euler"`` to rounding, because u / u_source solves BP. From
-    several it is the better of the two: every source is held at 1, whatever its mass and its neighbours.
+    For one source the result equals `varadhan` with ``form="backward-euler"`` to rounding, because u / u_source solves
+    BP. For several sources BP is more accurate, since v is 1 at each source regardless of mass and neighbours.
 
     Parameters
     ----------
-    mesh : Mesh or Operators
-        The domain.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
+    mesh, sources
+        As for `varadhan`.
     t : float, optional
-        Time, a squared length; h^2 by default, raised where v could not cross the domain in double precision.
+        Time, a squared length; h^2 by default. It is raised if v would underflow before it crosses the domain.
 
     Returns
     -------
     (n,) float64
-        In the mesh's unit; 0 at the sources, ``inf`` where none is reached.
+        Distance, as from `varadhan`.
 
     Raises
     ------
     SourceError
-        If the sources name no vertex of the mesh.
+        If the sources are not vertices of the mesh.
     FactorizationError
         If the matrix is not positive definite.
     ValueError
@@ -133,7 +132,7 @@ def boundary_problem(mesh: Mesh | Operators, sources: Sources, *, t: float | Non
     Warns
     -----
     AccuracyWarning
-        If an explicit t had to be raised, or v is not positive everywhere.
+        If a given t is raised, or v is not positive everywhere.
     """
     domain = domain_of(mesh)
     chosen = vertex_sources(sources, domain.n)
@@ -144,7 +143,7 @@ def boundary_problem(mesh: Mesh | Operators, sources: Sources, *, t: float | Non
     v = np.zeros(domain.n)
     v[chosen] = _SOURCE_HEAT
     if free.any():
-        # In units of the mean mass, so that the large values on the sources overflow in no unit of length.
+        # Division by the mean mass prevents overflow in every unit of length.
         matrix = ((domain.M - step * domain.L) / domain.M.diagonal()[domain.referenced].mean()).tocsr()[free]
         v[free] = factorize(matrix[:, free].tocsc()).solve(-(matrix @ v))
     log_v = _logarithm(v, reached)
@@ -152,47 +151,47 @@ def boundary_problem(mesh: Mesh | Operators, sources: Sources, *, t: float | Non
 
 
 def log_heat_kernel(mesh: Mesh | Operators, sources: Sources, t: float) -> FloatArray:
-    """The logarithm of the discrete heat kernel, ``log (exp(t M^-1 L) M^-1 delta)``, accurate far from the source.
+    """Logarithm of the discrete heat kernel, ``log (exp(t M^-1 L) M^-1 delta)``, accurate far from the source.
 
     Parameters
     ----------
     mesh : Mesh or Operators
         The domain.
     sources : int, sequence of int, or (n,) mask of bool
-        Source vertices, a unit of heat on each.
+        Source vertices, each with one unit of heat.
     t : float
         Time, a squared length.
 
     Returns
     -------
     (n,) float64
-        Logarithm of heat per area; ``-inf`` where none arrives.
+        Logarithm of heat per area; ``-inf`` at unreachable vertices.
 
     Raises
     ------
     SourceError
-        If the sources name no vertex of the mesh.
+        If the sources are not vertices of the mesh.
     ValueError
         If t is not positive.
 
     Warns
     -----
     AccuracyWarning
-        If heat is not positive everywhere: below 1e-590 of the source, or with a Laplacian of negative weights.
+        If heat is not positive everywhere: it is below 1e-590 of the source, or the Laplacian has negative weights.
 
     Notes
     -----
-    By uniformization (Jensen 1953): with q the largest rate at which a vertex passes on heat, ``P = Id + M^-1 L / q``
-    has no negative entry on an intrinsic Delaunay triangulation, and
-    ``exp(t M^-1 L) = sum_j P^j exp(-q t) (q t)^j / j!`` is a sum without a cancellation: every value keeps its
-    *relative* accuracy, 1e-13 against the closed form on a torus where k falls by 95 e-foldings.
-    `scipy.sparse.linalg.expm_multiply` keeps 1e-16 of the largest value, so that on the same torus nothing is left
-    beyond 37 e-foldings, or 12 sqrt(t).
+    The method is uniformization (Jensen 1953). With q the largest entry of ``-diag(M^-1 L)``, the matrix
+    ``P = Id + M^-1 L / q`` has no negative entry on an intrinsic Delaunay triangulation, and
+    ``exp(t M^-1 L) = sum_j P^j exp(-q t) (q t)^j / j!`` is a sum without cancellation. Every value keeps full
+    *relative* accuracy: 1e-13 against the closed form on a torus on which k decreases by 95 e-foldings. In contrast,
+    the absolute accuracy of `scipy.sparse.linalg.expm_multiply` is 1e-16 of the largest value, so on the same torus no
+    digit is correct beyond 37 e-foldings, or 12 sqrt(t).
 
-    The cost is one product with P for each unit of q t. Where a vertex of tiny mass makes that more than 1e5, backward
-    Euler steps are taken instead, as free of cancellations; implicit schemes of higher order are not always positive
-    (Bolley and Crouzeix 1978). The logarithm, whose error is a series in the exponent over the number of steps, is
-    extrapolated from three runs; distances then are within 0.1 % of what the sum gives (torus, cow, bunny).
+    The cost is one product with P for each unit of q t. If a vertex of tiny mass requires more than 1e5 products,
+    backward Euler steps are used instead, which do not cancel either; implicit schemes of higher order are not always
+    positive (Bolley and Crouzeix 1978). The error of the logarithm is a series in the exponent divided by the number of
+    steps, so three runs are extrapolated. The distances are within 0.1 % of those from the sum (torus, cow, bunny).
     """
     domain = domain_of(mesh)
     chosen = vertex_sources(sources, domain.n)
@@ -232,9 +231,9 @@ def _extrapolated(domain: Operators, u: FloatArray, t: float, reached: BoolArray
 
 
 def _poisson_mean(P: sp.csr_matrix, u: FloatArray, expected: float, reached: BoolArray) -> FloatArray:
-    """The mean of ``P^j u`` over a Poisson distributed j, until the rest is below 1e-12 of every value on `reached`."""
+    """The mean of ``P^j u`` over a Poisson distributed j, truncated below 1e-12 of every value on `reached`."""
     total = np.zeros_like(u)
-    smallest = -700.0  # as a logarithm: what is lighter underflows
+    smallest = -700.0  # logarithm of the smallest weight that does not underflow
     log_weight, j = -expected, 0
     while log_weight > smallest or j < expected:
         if log_weight > smallest:
@@ -243,7 +242,7 @@ def _poisson_mean(P: sp.csr_matrix, u: FloatArray, expected: float, reached: Boo
         log_weight += np.log(expected / j)
         u = P @ u
         if j % 16 == 0 and j > expected:
-            # From here on the weights fall at least like a geometric series, and P raises no value above the largest.
+            # From here on the weights decrease at least like a geometric series, and P does not increase the maximum.
             rest = np.exp(log_weight) / (1 - expected / (j + 1)) * np.abs(u).max()
             if rest <= 1e-12 * total[reached].min():
                 break
@@ -251,12 +250,12 @@ def _poisson_mean(P: sp.csr_matrix, u: FloatArray, expected: float, reached: Boo
 
 
 def domain_of(mesh: Mesh | Operators) -> Operators:
-    """The operators of a mesh on its intrinsic Delaunay triangulation, or those given."""
+    """The operators of a mesh on the intrinsic Delaunay triangulation; given operators are returned unchanged."""
     return operators(mesh) if isinstance(mesh, Mesh) else mesh
 
 
 def time_step(t: float | None, default: float, smallest: float, name: str = "t") -> float:
-    """The time step asked for or the default, raised with a warning to what heat needs to cross the domain."""
+    """The time step `t` or the default, but at least `smallest`; a warning is issued if a given `t` is raised."""
     if t is None:
         return max(default, smallest)
     if not (np.isfinite(t) and t > 0):
@@ -271,15 +270,15 @@ def time_step(t: float | None, default: float, smallest: float, name: str = "t")
 
 
 def reached_from(domain: Operators, sources: IntArray) -> BoolArray:
-    """Vertices of faces that are connected with a source."""
+    """Mask (n,) of the referenced vertices in the components of the sources."""
     return domain.referenced & np.isin(domain.components, domain.components[sources])
 
 
 def log_step(domain: Operators, sources: IntArray, t: float, share: FloatArray | None = None) -> FloatArray:
-    """Logarithm of u in (M - t L) u = delta, `share` units of heat on each source (1 by default); equation (4)."""
+    """Logarithm of u for (M - t L) u = delta, equation (4), with `share` units of heat on each source (default 1)."""
     flow = HeatFlow(domain, t)
     mass = domain.M.diagonal()[sources] / flow.mean_mass
-    # The largest heat that cannot overflow: rows of L sum to zero, so u is at most the initial heat over mass.
+    # The largest heat that cannot overflow: the rows of L sum to zero, so u is at most the initial heat over mass.
     unit = _SOURCE_HEAT * float(mass[mass > 0].min(initial=1.0))
     initial = np.zeros(domain.n)
     initial[sources] = unit if share is None else unit * share[sources]
@@ -289,7 +288,7 @@ def log_step(domain: Operators, sources: IntArray, t: float, share: FloatArray |
 
 
 def _logarithm(heat: FloatArray, reached: BoolArray) -> FloatArray:
-    """The logarithm of `heat`, -inf where it cannot arrive, and a warning where it should have."""
+    """Logarithm of `heat`, -inf at unreachable vertices; warns if reachable vertices have no positive heat."""
     lost = reached & ~(heat >= _LOWEST_HEAT)
     if lost.any():
         warnings.warn(
@@ -304,7 +303,7 @@ def _logarithm(heat: FloatArray, reached: BoolArray) -> FloatArray:
 
 
 def fallen_from_sources(log_heat: FloatArray, domain: Operators, sources: IntArray) -> FloatArray:
-    """``-log(u / u_source)``, at least 0, with the warmest source of each component for u_source; 0 at the sources."""
+    """``-log(u / u_source)`` (n,), at least 0, with u_source the largest heat at a source of the same component."""
     warmest = np.full(int(domain.components.max()) + 1, -np.inf)
     np.maximum.at(warmest, domain.components[sources], log_heat[sources])
     arrived = np.isfinite(log_heat)

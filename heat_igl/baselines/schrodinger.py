@@ -1,8 +1,8 @@
-"""Distance as the phase of a wave function: the Schrodinger equation of Gurumoorthy and Rangarajan [GR14].
+"""Distance from the Schrodinger equation of Gurumoorthy and Rangarajan [GR14].
 
-"A fast eikonal equation solver using the Schrodinger wave equation", cited by the paper in section 2.1. The static
-equation ``phi - hbar^2 Lap phi = delta`` has ``d = -hbar log phi`` as Planck's constant, here a length, tends to 0.
-With t = hbar^2 it is the paper's backward Euler step (4).
+[GR14] is "A fast eikonal equation solver using the Schrodinger wave equation", cited by the paper in section 2.1. For
+the static equation ``phi - hbar^2 Lap phi = delta``, ``-hbar log phi`` tends to the distance as Planck's constant hbar,
+here a length, tends to 0. With t = hbar^2 the equation is the backward Euler step (4) of the paper.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from heat_igl.baselines.grids import grid_sources, grid_spacing
 from heat_igl.baselines.linear import domain_of, fallen_from_sources, log_step, reached_from, time_step
 from heat_igl.errors import MeshError
 from heat_igl.heat_method import smallest_time_step
-from heat_igl.intrinsic import IntrinsicTriangulation
+from heat_igl.intrinsic import IntrinsicTriangulation, corner_angles
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Operators
 from heat_igl.sources import Sources, vertex_sources
@@ -23,9 +23,9 @@ from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["schrodinger", "schrodinger_grid"]
 
-# Default hbar on meshes, in edge lengths. Below, the mesh's error h^2 / (24 hbar^2) grows; above, that of the cut
-# locus. Geometric mean of the mean errors over the square, disk, sphere, cylinder, cow and bunny: 2.6, 1.8 and 2.0 %
-# for 1, 1.5 and 2.
+# Default hbar on meshes, in edge lengths. For smaller hbar the discretization error h^2 / (24 hbar^2) grows, for larger
+# hbar the error at the cut locus. Geometric mean of the mean errors over the square, disk, sphere, cylinder, cow and
+# bunny: 2.6, 1.8 and 2.0 % for 1, 1.5 and 2.
 _HBAR = 1.5
 
 
@@ -36,7 +36,7 @@ def schrodinger(
     hbar: float | None = None,
     green: Literal["bessel", "exponential"] = "bessel",
 ) -> FloatArray:
-    """Distance from a wave function on a mesh, with the Laplacian of the mesh in place of that of the plane.
+    """Distance from the static Schrodinger equation on a mesh.
 
     Parameters
     ----------
@@ -45,33 +45,33 @@ def schrodinger(
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices.
     hbar : float, optional
-        Planck's constant as a length; 1.5 h by default, raised where a double could not hold phi.
+        Planck's constant as a length; 1.5 h by default. It is raised if phi would underflow.
     green : {"bessel", "exponential"}
-        How distance is read from phi. On a plane the wave function of one source is not an exponential but
-        ``K_0(d / hbar) / (2 pi hbar^2)``, a modified Bessel function, and on a cone of total angle Theta the same over
-        ``Theta hbar^2``. "bessel" inverts that; without it the factor ``sqrt(hbar / d)`` before the exponential stays
-        as an error of ``hbar log(d / hbar) / 2``. "exponential" is the formula of [GR14] as it stands,
-        ``-hbar log(phi / phi_source)``, Varadhan's with t = hbar^2.
+        Green's function that is inverted. On a plane the wave function of one source is
+        ``K_0(d / hbar) / (2 pi hbar^2)`` with a modified Bessel function; on a cone of total angle Theta it is
+        ``K_0(d / hbar) / (Theta hbar^2)``. "bessel" inverts this function. "exponential" is the formula of [GR14],
+        ``-hbar log(phi / phi_source)``, which is Varadhan's with t = hbar^2. It neglects the factor ``sqrt(hbar / d)``
+        of the Bessel function, which causes an error of ``hbar log(d / hbar) / 2``.
 
     Returns
     -------
     (n,) float64
-        In the mesh's unit; 0 at the sources, ``inf`` where none is reached. Between K sources by up to ``hbar log K``
-        too short.
+        Distance in the unit of the mesh; 0 at the sources, ``inf`` at unreachable vertices. Between K sources it is
+        too short by up to ``hbar log K``.
 
     Raises
     ------
     SourceError
-        If the sources name no vertex of the mesh.
+        If the sources are not vertices of the mesh.
     MeshError
-        If "bessel" is asked for on tetrahedra.
+        If `green` is "bessel" and the domain is not a triangle mesh.
     ValueError
         If `hbar` is not positive or `green` is unknown.
 
     Warns
     -----
     AccuracyWarning
-        If an explicit `hbar` had to be raised, or phi is not positive everywhere.
+        If a given `hbar` is raised, or phi is not positive everywhere.
     """
     domain = domain_of(mesh)
     chosen = vertex_sources(sources, domain.n)
@@ -84,10 +84,10 @@ def schrodinger(
     length = float(np.sqrt(t))
     if green == "exponential":
         return np.asarray(length * fallen_from_sources(log_step(domain, chosen, t), domain, chosen))
-    if domain.triangulation is None:
+    if domain.surface is None:
         raise MeshError("green='bessel' is for triangles, and the domain has none: pass green='exponential'")
     share = np.zeros(domain.n)
-    share[chosen] = _total_angles(domain.triangulation)[chosen] / (2 * np.pi)
+    share[chosen] = _total_angles(domain.surface.triangulation)[chosen] / (2 * np.pi)
     log_phi = log_step(domain, chosen, t, share)
     distance = np.full(domain.n, np.inf)
     reached = reached_from(domain, chosen)
@@ -98,9 +98,7 @@ def schrodinger(
 
 def _total_angles(triangulation: IntrinsicTriangulation) -> FloatArray:
     """The sum (n,) of the angles around each vertex: 2 pi inside a plane, pi on a straight boundary."""
-    square = triangulation.l**2
-    product = triangulation.l[:, [1, 2, 0]] * triangulation.l[:, [2, 0, 1]]
-    angle = np.arccos(np.clip((square.sum(axis=1, keepdims=True) - 2 * square) / (2 * product), -1, 1))
+    angle = corner_angles(triangulation.l)
     return np.asarray(
         np.bincount(triangulation.F.ravel(), weights=angle.ravel(), minlength=triangulation.n), np.float64
     )
@@ -109,8 +107,8 @@ def _total_angles(triangulation: IntrinsicTriangulation) -> FloatArray:
 def _inverse_log_bessel(y: FloatArray) -> FloatArray:
     """The x with ``log K_0(x) = y``, to rounding.
 
-    As a function of log x, log K_0 is concave and falls, so that Newton's method from the right of the solution comes
-    down to it without overshooting.
+    As a function of log x, log K_0 is concave and decreasing. Newton's method therefore converges monotonically from
+    the right of the solution.
     """
     from scipy.special import k0e, k1e  # K_0 and K_1 times exp(x), which do not underflow
 
@@ -126,13 +124,12 @@ def _inverse_log_bessel(y: FloatArray) -> FloatArray:
 
 
 def schrodinger_grid(sources: ArrayLike, spacing: ArrayLike = 1.0, *, hbar: float | None = None) -> FloatArray:
-    """Euclidean distance as the phase of a wave function, by one convolution.
+    """Euclidean distance on a regular grid from the static Schrodinger equation [GR14], by one convolution.
 
-    The static Schrodinger equation ``hbar^2 Lap phi = phi`` with point sources has ``d = -hbar log phi`` as hbar tends
-    to 0. On all of space phi is a sum of Green's functions, whose factor before ``exp(-r / hbar)`` does not matter
-    in that limit and is singular at the source; left out, ``phi = sum exp(-|x - y_k| / hbar)`` over the sources y_k
-    is a discrete convolution, and ``d - hbar log K <= -hbar log phi <= d`` for K sources (Gurumoorthy and Rangarajan,
-    "A fast eikonal equation solver using the Schrodinger wave equation", cited as [GR14] by the paper, section 2.1).
+    For the static equation ``hbar^2 Lap phi = phi`` with point sources, ``-hbar log phi`` tends to the distance d as
+    hbar tends to 0. In free space phi is a sum of Green's functions. The factor before ``exp(-r / hbar)`` does not
+    matter in the limit and is singular at the source, so it is omitted: ``phi = sum exp(-|x - y_k| / hbar)`` over the
+    sources y_k is a discrete convolution, and ``d - hbar log K <= -hbar log phi <= d`` for K sources.
 
     Parameters
     ----------
@@ -141,12 +138,12 @@ def schrodinger_grid(sources: ArrayLike, spacing: ArrayLike = 1.0, *, hbar: floa
     spacing : float or (d,) array_like
         Step of the grid along each axis.
     hbar : float, optional
-        Planck's constant as a length; a quarter of the smallest spacing by default. Time grows with 1 / hbar.
+        Planck's constant as a length; a quarter of the smallest spacing by default. The cost grows with 1 / hbar.
 
     Returns
     -------
     (n_0, ..., n_d) float64
-        Distance in all of space, by no more than ``hbar log K`` too short. Obstacles cannot be had this way.
+        Distance in free space, too short by at most ``hbar log K``. Obstacles are not supported.
 
     Raises
     ------
@@ -157,33 +154,33 @@ def schrodinger_grid(sources: ArrayLike, spacing: ArrayLike = 1.0, *, hbar: floa
 
     Notes
     -----
-    [GR14] run the fast Fourier transform in arbitrary precision: in doubles its rounding, 1e-16 of the *largest* value,
-    ends every distance at 36 hbar. Here the kernel is cut into digits of some 30 bits instead. Transforms in doubles
-    convolve one digit exactly, because the result is made of integers and rounding restores them, so that the first
-    digits that do not vanish at a point give its phi to full relative accuracy, however small.
+    [GR14] compute the fast Fourier transform in arbitrary precision: in doubles the rounding error, 1e-16 of the
+    *largest* value, limits distances to 36 hbar. Here the kernel is split into digits of about 30 bits. A transform in
+    doubles convolves one digit exactly, since the result consists of integers, which rounding restores. The first
+    nonzero digits at a point then give phi with full relative accuracy, however small it is.
     """
     mask = grid_sources(sources)
     steps = grid_spacing(spacing, mask.ndim)
     length = float(steps.min()) / 4 if hbar is None else float(hbar)
     if not (np.isfinite(length) and length > 0):
         raise ValueError(f"hbar must be a positive length, not {hbar!r}")
-    # At a source the sum is at least 1, and near many of them it may be.
+    # At a source, and near many sources, the sum can exceed 1.
     return np.maximum(-length * _log_wave(mask, steps, length), 0.0)
 
 
 def _log_wave(mask: BoolArray, steps: FloatArray, hbar: float) -> FloatArray:
-    """The logarithm of the sum of ``exp(-r / hbar)`` over the points of `mask`, without a limit to its range."""
+    """Logarithm of the sum of ``exp(-r / hbar)`` over the points of `mask`, with unlimited range."""
     from scipy import fft
 
     shape = [fft.next_fast_len(2 * n - 1, real=True) for n in mask.shape]
     offsets = [np.minimum(np.arange(n), n - np.arange(n)) * step for n, step in zip(shape, steps, strict=True)]
     r = np.sqrt(sum(x**2 for x in np.ix_(*offsets)))
-    # exp(-r / hbar) = mantissa 2^-shift, to the last bit of a double mantissa.
+    # exp(-r / hbar) = mantissa 2^-shift, with the precision of a double.
     halvings = r / (hbar * np.log(2))
     mantissa = np.rint(np.exp2(53 - halvings % 1)).astype(np.uint64)
     shift = 53 + np.floor(halvings).astype(np.int64)
-    # Rounding to the nearest integer is safe while the transform's error, about eps log2(N) times the 2-norms of both
-    # factors, stays below 1/2; six bits are kept in reserve.
+    # Rounding to the nearest integer is correct if the error of the transform, about eps log2(N) times the 2-norms of
+    # both factors, is below 1/2; six bits are a safety margin.
     size = float(r.size)
     bits = int(53 - 6 - np.log2(np.sqrt(mask.sum() * size) * np.log2(size + 1)))
     spectrum = fft.rfftn(mask.astype(np.float64), shape)
@@ -201,7 +198,7 @@ def _log_wave(mask: BoolArray, steps: FloatArray, hbar: float) -> FloatArray:
 
 
 def _digit(mantissa: AnyArray, shift: IntArray, digit: int, bits: int) -> FloatArray:
-    """Digit number `digit` after the point, to the base ``2^bits``, of ``mantissa 2^-shift``; number 0 is before it."""
+    """Digit `digit` after the point of ``mantissa 2^-shift`` to the base ``2^bits``; digit 0 is before the point."""
     right = shift - digit * bits
     down = mantissa >> np.clip(right, 0, 63).astype(np.uint64)
     up = mantissa << np.clip(-right, 0, 63).astype(np.uint64)  # bits that leave at the top belong to earlier digits

@@ -1,4 +1,4 @@
-"""The meshes and the sources of a batch, and the names that they have in the store."""
+"""The meshes and the sources of a batch, and the names of the meshes in the store."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ from heat_igl.io import MESH_SUFFIXES
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, vertex_sources
 
+# Names that a zarr group cannot have: they stand for the store itself, the folder above it, or its metadata.
+_RESERVED_NAMES = ("", ".", "..", "zarr.json")
+
 __all__ = ["Item", "MeshLike", "SourcePlan", "folder", "items", "read_source_sets"]
 
 MeshLike = str | os.PathLike[str] | Mesh | tuple[Any, Any]
@@ -23,7 +26,7 @@ MeshLike = str | os.PathLike[str] | Mesh | tuple[Any, Any]
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """A mesh of a batch: its name in the store, what it is called in messages, and the mesh or where to read it."""
+    """A mesh of a batch: its name in the store, its label in messages, and the mesh or the path to read it from."""
 
     name: str
     label: str
@@ -31,7 +34,7 @@ class Item:
 
 
 def folder(path: str | os.PathLike[str]) -> dict[str, Path]:
-    """Everything below a folder whose name ends like a mesh file's, by its path from there.
+    """All mesh files below a folder, recognized by their suffix, with their paths relative to it as keys.
 
     Raises
     ------
@@ -57,7 +60,7 @@ def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike]) -> Iterator[Item]
     Raises
     ------
     ValueError
-        If two files of a sequence have one name.
+        If two files of a sequence have one name, or a name is that of no group.
     """
     if isinstance(meshes, Mapping):
         pairs = list(meshes.items())
@@ -70,15 +73,17 @@ def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike]) -> Iterator[Item]
     for name, mesh in pairs:
         if name in seen:
             raise ValueError(f"two meshes are called {name!r}: pass a dictionary from names to meshes")
+        if name in _RESERVED_NAMES:
+            raise ValueError(f"a mesh cannot be called {name!r} in a store: choose another name")
         seen.add(name)
         label = os.fspath(mesh) if isinstance(mesh, str | os.PathLike) else name
-        # A name may hold what separates zarr's groups.
+        # A name may hold the separator of zarr's groups.
         yield Item(quote(name, safe=" ()[]"), label, Path(mesh) if isinstance(mesh, str | os.PathLike) else mesh)
 
 
 @dataclass(frozen=True)
 class SourcePlan:
-    """Which sources each mesh gets: every vertex, a number of farthest points, or the same list of source sets."""
+    """The sources of each mesh: every vertex, a number of farthest points, or the same list of source sets."""
 
     farthest: int | None = None
     source_sets: tuple[tuple[int, ...], ...] | None = None
@@ -104,7 +109,7 @@ class SourcePlan:
         sets = []
         for i, one in enumerate(sources):
             try:
-                # Which vertices a mesh has is not known yet.
+                # The number of vertices of a mesh is not known yet.
                 sets.append(tuple(int(v) for v in vertex_sources(one, np.iinfo(np.int64).max)))
             except SourceError as error:
                 raise SourceError(f"sources[{i}]: {error}") from None

@@ -1,4 +1,4 @@
-"""What came of a batch: a row for each mesh."""
+"""The result of a batch: a row for each mesh."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["BatchReport", "BatchRow", "report"]
 
 @dataclass(frozen=True)
 class BatchRow:
-    """What came of one mesh.
+    """The result for one mesh.
 
     Attributes
     ----------
@@ -23,13 +23,14 @@ class BatchRow:
     mesh : str
         The file, or the name it was given.
     status : {"done", "running", "failed"}
-        "running" where some distances are still missing.
+        "running" if some distances are still missing.
     reason : str
         Why it failed; empty otherwise.
     n_vertices, n_sources : int
-        Size of its distances; 0 where it failed.
+        Size of its distances; 0 if it failed.
     checksum : str
-        Of all its distances; empty unless they are done.
+        Checksum of all its distances; empty unless they are done. Comparable between
+        stores that one version of heat_igl wrote.
     """
 
     name: str
@@ -43,12 +44,12 @@ class BatchRow:
 
 @dataclass(frozen=True)
 class BatchReport:
-    """What came of a batch.
+    """The result of a batch.
 
     Attributes
     ----------
     store : str
-        Where the distances are.
+        Path of the store.
     rows : tuple of BatchRow
         One for each mesh, sorted by name.
     """
@@ -84,7 +85,7 @@ class BatchReport:
 
 
 def report(store: str | os.PathLike[str]) -> BatchReport:
-    """What a store holds, finished or not.
+    """The report of a store, finished or not.
 
     Raises
     ------

@@ -1,18 +1,16 @@
-"""What runs on a worker: factor a mesh once, solve blocks of sources, write them to the store.
+"""The tasks that run on a worker: factor a mesh once, solve blocks of sources, write them to the store.
 
-Tasks carry the mesh, never its factors. A worker holds the solver of one mesh at a time, and of several only while
-several threads need them and the memory that they are estimated to take fits.
+A task carries the mesh, never its factors. A worker keeps the solver of its current mesh, and several solvers only
+while several of its threads need them.
 """
 
 from __future__ import annotations
 
 import hashlib
-import threading
 import time
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -22,18 +20,17 @@ import numpy as np
 
 import heat_igl
 from heat_igl.cluster.collection import Item, SourcePlan
-from heat_igl.cluster.memory import PROCESS_MEMORY, physical_memory, solver_memory
+from heat_igl.cluster.solver_cache import SolverCache
 from heat_igl.cluster.store import MeshGroup, Store
 from heat_igl.errors import AccuracyWarning, BatchError
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat_method import HeatMethodSolver, SolverOptions
 from heat_igl.io import read_mesh
 from heat_igl.mesh import Mesh
-from heat_igl.runtime import release_free_memory
 from heat_igl.sampling import farthest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import IntArray
 
-__all__ = ["Outcome", "Task", "begin", "carry_on", "release"]
+__all__ = ["Outcome", "Task", "begin", "release", "resume"]
 
 # A task solves about this many values, and at least this many rows: factoring takes as long as 50 to 100 rows, so that
 # spreading a mesh over workers pays from a few hundred rows each.
@@ -41,6 +38,8 @@ _VALUES_PER_TASK = 5e7
 _ROWS_PER_TASK = 512
 
 TOPIC = "heat-igl-batch"
+
+_SOLVERS = SolverCache()
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +50,13 @@ class Task:
     store: Path
     plan: SourcePlan
     dtype: str
-    solver_options: dict[str, Any]
+    solver_options: SolverOptions
     blocks: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a task came to: blocks that are left for others, or the reason why there are no distances."""
+    """The result of a task: the blocks that are left for other tasks, or the reason why there are no distances."""
 
     name: str
     remaining: tuple[tuple[int, ...], ...] = ()
@@ -65,73 +64,26 @@ class Outcome:
 
 
 def begin(tasks: Sequence[Task]) -> list[Outcome]:
-    """Begin one mesh after the other, as far as the first that leaves blocks for others: its solver is at hand."""
+    """Begin meshes one after the other, and stop after the first that leaves blocks: this worker has its solver."""
     store = _opened(tasks[0].store)
     outcomes = []
     for task in tasks:
-        outcomes.append(_begin(task, store))
+        outcomes.append(_guarded(_begin, task, store))
         if outcomes[-1].remaining:
             break
-        _SHELF.drop_idle()
+        _SOLVERS.drop_idle()
     return outcomes
 
 
-def _begin(task: Task, store: Store) -> Outcome:
-    """Read and validate a mesh, factor it, make its group or continue the one that is there, and solve a first span."""
-    try:
-        mesh = _loaded(task.item)
-        fingerprint = _fingerprint(mesh)
-        known = store.attributes(task.item.name)
-        if known.get("status") == "done" and known["fingerprint"] == fingerprint:
-            return Outcome(task.item.name)
-        with _SHELF.solver(mesh, fingerprint, task) as solver:
-            made_of = {"fingerprint": fingerprint, "t": solver.t, "backend": solver.diagnostics.backend}
-            if all(known.get(key) == value for key, value in made_of.items()):
-                store.update(task.item.name, {"status": "running", "reason": ""})
-                group = store.group(task.item.name)
-                source_sets = group.source_sets()
-            else:
-                source_sets = _source_sets(task.plan, mesh, solver)
-                report = {key: _plain(value) for key, value in asdict(mesh.report()).items()}
-                attributes = {"mesh": task.item.label, **made_of, "versions": _versions(), "report": report}
-                group = store.begin(task.item.name, source_sets, mesh.n_vertices, task.dtype, attributes)
-            spans = _spans(group)
-            _report("begun", task, blocks=sum(map(len, spans)))
-            if spans:
-                _solve(task, group, source_sets, solver, spans[0])
-            return Outcome(task.item.name, remaining=tuple(spans[1:]))
-    except BatchError:
-        raise
-    except Exception as error:
-        # Whatever is wrong with one mesh is a row of the report; the others go on.
-        return Outcome(task.item.name, reason=_reason(error))
-
-
-def carry_on(tasks: Sequence[Task]) -> list[Outcome]:
+def resume(tasks: Sequence[Task]) -> list[Outcome]:
     """Solve the blocks of tasks in groups that `begin` has made."""
     store = _opened(tasks[0].store)
-    return [_carry_on(task, store) for task in tasks]
-
-
-def _carry_on(task: Task, store: Store) -> Outcome:
-    try:
-        mesh = _loaded(task.item)
-        fingerprint = _fingerprint(mesh)
-        if store.attributes(task.item.name)["fingerprint"] != fingerprint:
-            raise ValueError("the file changed while it was worked on")
-        group = store.group(task.item.name)
-        with _SHELF.solver(mesh, fingerprint, task) as solver:
-            _solve(task, group, group.source_sets(), solver, task.blocks)
-        return Outcome(task.item.name)
-    except BatchError:
-        raise
-    except Exception as error:
-        return Outcome(task.item.name, reason=_reason(error))
+    return [_guarded(_resume, task, store) for task in tasks]
 
 
 def release() -> None:
     """Free the solver that the worker still holds."""
-    _SHELF.clear()
+    _SOLVERS.clear()
 
 
 def _opened(path: Path) -> Store:
@@ -143,11 +95,76 @@ def _opened(path: Path) -> Store:
         ) from None
 
 
+def _guarded(work: Callable[[Task, Store], Outcome], task: Task, store: Store) -> Outcome:
+    """The outcome of a task. Whatever is wrong with its mesh becomes the reason; only a lost store ends the batch."""
+    try:
+        return work(task, store)
+    except BatchError:
+        raise
+    except Exception as error:
+        return Outcome(task.item.name, reason=_reason(error))
+
+
 def _reason(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     message = " ".join(str(error).split())
     return message if isinstance(error, ValueError | RuntimeError | MemoryError) and message else repr(error)
+
+
+def _begin(task: Task, store: Store) -> Outcome:
+    """Read, validate and factor a mesh, make its group or continue an earlier one, and solve the first blocks."""
+    name = task.item.name
+    mesh = _loaded(task.item)
+    fingerprint = _fingerprint(mesh)
+    known = store.attributes(name)
+    if known.get("status") == "done" and known["fingerprint"] == fingerprint:
+        return Outcome(name)
+    with _SOLVERS.solver(mesh, fingerprint, task.solver_options) as solver:
+        identity = {"fingerprint": fingerprint, "t": solver.t, "backend": solver.diagnostics.backend}
+        group, source_sets = _continued(name, store, known, identity) or _new(task, store, mesh, solver, identity)
+        spans = _spans(group)
+        _send("begun", task, blocks=sum(map(len, spans)))
+        if spans:
+            _solve(task, group, source_sets, solver, spans[0])
+        return Outcome(name, remaining=tuple(spans[1:]))
+
+
+def _resume(task: Task, store: Store) -> Outcome:
+    """Solve the blocks of a task."""
+    mesh = _loaded(task.item)
+    fingerprint = _fingerprint(mesh)
+    if store.attributes(task.item.name)["fingerprint"] != fingerprint:
+        raise ValueError("the file changed during the batch: run the same again")
+    group = store.group(task.item.name)
+    with _SOLVERS.solver(mesh, fingerprint, task.solver_options) as solver:
+        _solve(task, group, group.source_sets(), solver, task.blocks)
+    return Outcome(task.item.name)
+
+
+def _continued(
+    name: str, store: Store, known: Mapping[str, Any], identity: Mapping[str, Any]
+) -> tuple[MeshGroup, list[IntArray]] | None:
+    """The group that an earlier batch made of the same mesh by the same solver, with its sources; None without one."""
+    if any(known.get(key) != value for key, value in identity.items()):
+        return None
+    try:
+        group = store.group(name)
+        source_sets = group.source_sets()
+    except (KeyError, ValueError):  # an array or the sources are missing or damaged
+        return None
+    store.update(name, {"status": "running", "reason": ""})
+    return group, source_sets
+
+
+def _new(
+    task: Task, store: Store, mesh: Mesh, solver: HeatMethodSolver, identity: Mapping[str, Any]
+) -> tuple[MeshGroup, list[IntArray]]:
+    """A new group for a mesh, with its sources."""
+    source_sets = _source_sets(task.plan, mesh, solver)
+    report = {key: _json_value(value) for key, value in asdict(mesh.report()).items()}
+    attributes = {"mesh": task.item.label, **identity, "versions": _versions(), "report": report}
+    return store.begin(task.item.name, source_sets, mesh.n_vertices, task.dtype, attributes), source_sets
 
 
 def _loaded(item: Item) -> Mesh:
@@ -171,7 +188,7 @@ def _versions() -> dict[str, str]:
 def _source_sets(plan: SourcePlan, mesh: Mesh, solver: HeatMethodSolver) -> list[IntArray]:
     n = mesh.n_vertices
     if plan.source_sets is not None:
-        # Each ascends: its last vertex tells whether all are there.
+        # A set is sorted, so its last vertex tells whether the mesh has all of them.
         return [
             vertex_sources(list(vertices), n) if vertices[-1] >= n else np.array(vertices)
             for vertices in plan.source_sets
@@ -181,15 +198,15 @@ def _source_sets(plan: SourcePlan, mesh: Mesh, solver: HeatMethodSolver) -> list
     return list(farthest_points(solver, min(plan.farthest, n)).reshape(-1, 1))
 
 
-def _plain(value: Any) -> Any:
-    """A value that JSON has: numpy's numbers and arrays become Python's, infinity a word."""
+def _json_value(value: Any) -> Any:
+    """A value that JSON can carry: Python's numbers and lists for numpy's, the word for an infinity."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     return value if not isinstance(value, float) or np.isfinite(value) else str(value)
 
 
 def _spans(group: MeshGroup) -> list[tuple[int, ...]]:
-    """The missing blocks, as many together as make a task."""
+    """The missing blocks, cut into the shares of single tasks."""
     missing = group.missing()
     rows = group.rows(0).stop
     n = group.n_columns
@@ -207,100 +224,15 @@ def _solve(
             warnings.simplefilter("always", AccuracyWarning)
             distances = solver.distances(source_sets[rows]).astype(task.dtype, copy=False)
         group.write(block, distances)
-        said = sorted({str(warning.message) for warning in caught})
-        _report("block", task, block=block, seconds=time.perf_counter() - start, warnings=said)
+        messages = sorted({str(warning.message) for warning in caught})
+        _send("block", task, block=block, seconds=time.perf_counter() - start, warnings=messages)
 
 
-def _report(kind: str, task: Task, **facts: Any) -> None:
-    """Tell the client, if it listens."""
+def _send(kind: str, task: Task, **facts: Any) -> None:
+    """Report an event to the client, if one listens."""
     from distributed import get_worker
 
     try:
         get_worker().log_event(TOPIC, {"kind": kind, "mesh": task.item.name, **facts})
     except ValueError:  # not on a worker
         return
-
-
-@dataclass(eq=False)
-class _Place:
-    """A solver, or room for one, and how many threads use it."""
-
-    bytes: int
-    users: int = 0
-    solver: HeatMethodSolver | None = None
-    lock: threading.Lock = field(default_factory=threading.Lock)
-
-
-class _Shelf:
-    """The solvers that this process holds, as long as the memory that they are estimated to take fits."""
-
-    def __init__(self) -> None:
-        self._changed = threading.Condition()
-        self._places: dict[str, _Place] = {}
-        self._highest = 0
-
-    @contextmanager
-    def solver(self, mesh: Mesh, fingerprint: str, task: Task) -> Iterator[HeatMethodSolver]:
-        key = f"{fingerprint} {task.solver_options}"
-        place = self._take(key, solver_memory(mesh), _memory_for_solvers())
-        try:
-            with place.lock:
-                if place.solver is None:
-                    place.solver = HeatMethodSolver(mesh, **task.solver_options)
-            yield place.solver
-        finally:
-            with self._changed:
-                place.users -= 1
-                self._changed.notify_all()
-
-    def _take(self, key: str, needed: int, limit: int) -> _Place:
-        """Reserve memory, waiting for other threads to give theirs back; solvers that nobody uses are freed first."""
-        if needed > limit:
-            raise MemoryError(
-                f"it needs about {needed / 2**30:.2g} GiB, and this worker has {limit / 2**30:.2g} GiB to spare: "
-                "use fewer workers, or workers with more memory"
-            )
-        with self._changed:
-            if key not in self._places:
-                self._drop_idle()
-            while key not in self._places and sum(place.bytes for place in self._places.values()) + needed > limit:
-                self._changed.wait()
-                self._drop_idle(but=key)
-            place = self._places.setdefault(key, _Place(needed))
-            place.users += 1
-            taken = sum(place.bytes for place in self._places.values())
-            if taken > self._highest:
-                # What smaller solvers left in pieces must not add to a larger one. One that is no larger finds room in
-                # what the process holds already, and need not have it mapped again.
-                self._highest = taken
-                release_free_memory()
-            return place
-
-    def drop_idle(self) -> None:
-        """Free the solvers that nobody uses."""
-        with self._changed:
-            self._drop_idle()
-
-    def _drop_idle(self, but: str = "") -> None:
-        for key in [key for key, place in self._places.items() if not place.users and key != but]:
-            del self._places[key]
-
-    def clear(self) -> None:
-        with self._changed:
-            self._drop_idle()
-            self._highest = 0
-            release_free_memory()
-
-
-def _memory_for_solvers() -> int:
-    """Bytes that the solvers of this worker may take together: its limit less what the process takes without them."""
-    from distributed import get_worker
-
-    try:
-        limit = get_worker().memory_manager.memory_limit
-    except ValueError:
-        limit = None
-    return int(0.9 * (limit or physical_memory())) - PROCESS_MEMORY
-
-
-_SHELF = _Shelf()

@@ -1,4 +1,4 @@
-"""Curves that a distance gives: isolines and what they enclose, shortest paths."""
+"""Curves from a distance: isolines and the areas that they enclose, shortest paths."""
 
 from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas
 from heat_igl.curves.paths import shortest_paths

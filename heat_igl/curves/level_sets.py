@@ -1,8 +1,8 @@
-"""Isolines of values on a triangle mesh, and the areas that they enclose; offset curves.
+"""Isolines of values on a triangle mesh, the areas that they enclose, and offset curves.
 
-Inside a triangle values are linear, so an isoline is a polyline with one segment per triangle. Which triangles it
-crosses is decided by comparing values with the level, once per vertex: a vertex on the level counts as above it. All
-else follows from the faces, so no rounding can open a loop or draw a segment twice.
+Values are linear in each triangle, so an isoline is a polyline with one segment per triangle. The comparison of the
+values with the level decides which triangles it crosses; a vertex exactly on the level counts as above. The rest
+follows from the faces, so rounding cannot open a loop or draw a segment twice.
 """
 
 from __future__ import annotations
@@ -23,25 +23,23 @@ __all__ = ["enclosed_areas", "isolines", "offset_curves", "sublevel_areas"]
 
 
 def isolines(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> list[list[SurfaceCurve]]:
-    """The curves on which values, linear in each triangle, equal given levels.
+    """The curves of constant value, for values linear in each triangle.
 
     Parameters
     ----------
     mesh : Mesh
         Triangles.
     values : (n,) array_like
-        A value per vertex, for instance a distance. Faces with an infinite value are left out, as if they were not
-        there.
+        A value per vertex, for instance a distance. Faces with an infinite value are ignored.
     levels : float or (k,) array_like
         Levels, in any order.
 
     Returns
     -------
     list of k lists of SurfaceCurve
-        For each level its curves, in the order of their first face. A curve is closed, or it ends on the boundary, at
-        an edge of more than two faces, or at a face with an infinite value. Seen from outside (the side from which the
-        faces run counter-clockwise), lower values lie on its left; so it does where neighbouring faces agree about
-        the outside.
+        The curves of each level, in the order of their first faces. A curve is closed, or it ends on the boundary, at
+        an edge of more than two faces, or at a face with an infinite value. Lower values lie on the left of a curve,
+        seen from outside (from where the corners of faces run counter-clockwise), as long as faces are oriented alike.
 
     Raises
     ------
@@ -52,9 +50,9 @@ def isolines(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> list[list[Surf
 
     Notes
     -----
-    The curves of a level are the rim of ``{values < level}``: on a plateau at the level they run along its lower side,
-    through a vertex at the level they pass like any other, and around a minimum or maximum at the level there is none.
-    This is the convention of libigl's ``isolines``. Lengths are ``curve.lengths(mesh)``.
+    The curves of a level bound ``{values < level}``. They follow the lower side of a plateau at the level, cross a
+    vertex at the level like any other point, and there is no curve around a minimum or maximum at the level.
+    This is the convention of libigl's ``isolines``. The lengths of a curve are ``curve.lengths(mesh)``.
     """
     checked, wanted = _checked(mesh, values, levels)
     return [_curves(mesh, checked, level) for level in wanted]
@@ -68,16 +66,16 @@ def offset_curves(mesh: Mesh, solver: HeatMethodSolver, sources: Sources, radius
     mesh : Mesh
         The triangles that `solver` was made for.
     solver : HeatMethodSolver
-        With ``refine="unfold"`` the curves are exact to what a function that is linear in each triangle can follow.
+        With ``refine="unfold"`` the only error left is that of linear interpolation in each triangle.
     sources
-        Whatever ``solver.distance`` takes.
+        As ``solver.distance`` takes them.
     radius : float
-        Positive, in the mesh's unit. Curves nearer than an edge length are only as round as triangles allow.
+        Positive, in the mesh's unit. Curves nearer than an edge length are polygons of few corners.
 
     Returns
     -------
     list of SurfaceCurve
-        As `isolines` returns them for one level, with the sources on their left; empty where nothing is so far away.
+        As `isolines` returns them for one level, with the sources on their left; empty if no vertex is so far away.
 
     Raises
     ------
@@ -94,7 +92,7 @@ def offset_curves(mesh: Mesh, solver: HeatMethodSolver, sources: Sources, radius
 
 
 def sublevel_areas(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> FloatArray:
-    """Area of the part of the surface where values, linear in each triangle, are below each level.
+    """Area of ``{values < level}`` for each level, for values linear in each triangle.
 
     Parameters
     ----------
@@ -121,8 +119,8 @@ def enclosed_areas(mesh: Mesh, values: ArrayLike, level: float) -> FloatArray:
     Returns
     -------
     (c,) float64
-        For each curve of ``isolines(mesh, values, level)[0]``, the area of that connected part of ``{values < level}``
-        which lies on its left. Curves that border the same part, as the two rims of an annulus do, share one value.
+        For each curve of ``isolines(mesh, values, level)[0]``, the area of the connected part of ``{values < level}``
+        on the left of the curve. Curves that bound the same part, such as the two of an annulus, have the same value.
     """
     checked, wanted = _checked(mesh, values, level)
     if len(wanted) != 1:
@@ -132,7 +130,7 @@ def enclosed_areas(mesh: Mesh, values: ArrayLike, level: float) -> FloatArray:
     inner = mesh.edges[below[mesh.edges].all(axis=1)]
     graph = sp.coo_array((np.ones(len(inner), np.int8), (inner[:, 0], inner[:, 1])), shape=2 * (mesh.n_vertices,))
     part = csgraph.connected_components(graph, directed=False)[1]
-    # The vertices of a face that are below the level are joined by its edges.
+    # The edges of a face join all its vertices below the level.
     one_below = mesh.F[np.arange(mesh.n_faces), np.argmax(below[mesh.F], axis=1)]
     area = np.bincount(part[one_below], weights=_areas_below(mesh, checked, wanted[0]), minlength=mesh.n_vertices)
     first = np.array([curve.faces[0] for curve in curves], np.int64)
@@ -163,17 +161,18 @@ def _real(name: str, array: ArrayLike) -> FloatArray:
 
 
 class _Crossings(NamedTuple):
-    """Where a level crosses faces, and edges.
+    """Crossings of a level with faces and their edges.
 
     Attributes
     ----------
-    faces : (s,)
-        The faces with vertices on both sides.
-    apex : (s,)
-        The corner that is alone on its side.
-    toward : (s, 2)
-        How far from the apex to the next corner, and to the one after that, the level lies: 0 to 1.
-    is_below : (s,)
+    faces : (s,) int64
+        The faces with vertices on both sides of the level.
+    apex : (s,) int64
+        The corner alone on one side.
+    toward : (s, 2) float64
+        Position of the level between the apex (0) and the next corner (1), and between the apex and the corner after
+        that.
+    is_below : (s,) bool
         Whether the apex is below the level.
     """
 
@@ -193,7 +192,7 @@ def _crossings(mesh: Mesh, values: FloatArray, level: float) -> _Crossings:
     toward = np.empty((len(faces), 2))
     for i in (0, 1):
         other = mesh.F[faces, (apex + 1 + i) % 3]
-        # The same numbers in both faces of an edge give the same point; halves cannot overflow.
+        # From the lower end in both faces of an edge, so that both have the same bits; halves cannot overflow.
         low, high = np.where(is_below, corner, other), np.where(is_below, other, corner)
         from_low = (level / 2 - values[low] / 2) / (values[high] / 2 - values[low] / 2)
         toward[:, i] = np.where(is_below, from_low, 1 - from_low)
@@ -217,8 +216,8 @@ def _curves(mesh: Mesh, values: FloatArray, level: float) -> list[SurfaceCurve]:
     for i, point in ((0, start), (1, end)):
         point[rows, found.apex] = 1 - found.toward[:, i]
         point[rows, (found.apex + 1 + i) % 3] = found.toward[:, i]
-    # The edge from the apex to the next corner lies opposite the corner after that, and the other way round. From the
-    # first to the second of these the apex is on the left.
+    # A segment runs from the edge between the apex and the next corner to the edge between the apex and the corner
+    # after that, each opposite the third corner: the apex is on the left.
     ends = np.stack([mesh.facets.of_face[found.faces, (found.apex + 2 - i) % 3] for i in (0, 1)], axis=1)
     turned = ~found.is_below
     start[turned], end[turned] = end[turned], start[turned]
@@ -238,18 +237,18 @@ def _curves(mesh: Mesh, values: FloatArray, level: float) -> list[SurfaceCurve]:
 
 
 def _chains(ends: IntArray) -> list[tuple[IntArray, bool]]:
-    """Put segments one after the other.
+    """Join segments to chains.
 
     Parameters
     ----------
     ends : (s, 2) int64
-        A label for where each segment begins and ends. Segments are joined where exactly two ends have one label.
+        Labels of the start and end of each segment. Two ends are joined if they, and no other, have the same label.
 
     Returns
     -------
     list of (chain, is_closed)
-        A chain holds ``2 i`` for segment i, ``2 i + 1`` for segment i from its end to its beginning; the one of them
-        with the smallest i runs forward. Chains are sorted by it, and closed ones begin with it.
+        A chain holds ``2 i`` for segment i and ``2 i + 1`` for segment i reversed. The segment with the smallest i of a
+        chain is not reversed. Chains are sorted by this i, and closed ones begin with it.
     """
     order = np.argsort(ends.ravel(), kind="stable")
     label = ends.ravel()[order]
@@ -260,7 +259,7 @@ def _chains(ends: IntArray) -> list[tuple[IntArray, bool]]:
     partner: list[int] = joined.tolist()
 
     def follow(oriented: int, stop: int) -> list[int]:
-        # An oriented segment begins at the end of that number and ends at the other one of the pair.
+        # Ends 2 i and 2 i + 1 belong to segment i; an oriented segment has the number of the end at which it starts.
         chain = []
         while oriented >= 0:
             chain.append(oriented)

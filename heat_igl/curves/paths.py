@@ -1,4 +1,4 @@
-"""Shortest paths on a surface: traced down a distance, then straightened until they are locally shortest."""
+"""Shortest paths: traced down a distance, then straightened until they are locally shortest."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import scipy.sparse.csgraph as csgraph
 
 from heat_igl.errors import MeshError, MissingExtraError, SourceError
 from heat_igl.heat_method import HeatMethodSolver
-from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints
+from heat_igl.intrinsic import corner_angles
+from heat_igl.mesh import ON_SIDE, Mesh, SurfaceCurve, SurfacePoints, grouping
 from heat_igl.sources import Sources, source_set, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -21,10 +22,11 @@ if TYPE_CHECKING:
 
 __all__ = ["shortest_paths"]
 
-# Barycentric coordinates below this put a point on the side of its face.
-_ON_SIDE = 1e-12
-# An edge of no length has this one, in mean edge lengths: the kernel divides by it.
+# Edges are at least this long, in mean edge lengths: the kernel divides by lengths.
 _SHORTEST = 1e-12
+# A path passes a source vertex whose distance is below the offset of the source by more than this share, the rounding
+# of refined distances: the vertex is nearer to another source.
+_SAME_DISTANCE = 1e-9
 
 
 def shortest_paths(
@@ -40,22 +42,22 @@ def shortest_paths(
     mesh : Mesh
         Triangles.
     distance : (n,) array_like or HeatMethodSolver
-        Distance from the sources, or a solver to compute it. It decides which way around the surface a path takes, so
-        the better it is (``refine="unfold"``), the more often that is the shortest one. A path longer than it says by
-        a thousandth is looked for once more.
+        Distance from the sources, or a solver to compute it. It decides which way around the surface a path takes: the
+        more accurate the distance (``refine="unfold"``), the more often this is the shortest way. A second path is
+        traced if the first is longer than the distance by a thousandth.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints
-        Where the paths begin: vertices, as often and in the order given, or points on faces.
+        Start of each path: vertices, in the order given and with repetitions, or points on faces.
     sources : optional
-        Where paths may end: whatever ``solver.distance`` takes; by default the vertices where the distance is 0. Needed
-        with a solver, and where sources lie inside faces. On a curve, a path ends at the nearest point of the segment
-        in the face where it arrives.
+        Possible ends of the paths, as ``solver.distance`` takes them; by default the vertices at distance 0. Needed
+        with a solver, and for sources inside faces. On a curve, a path ends at the nearest point of the segment in the
+        face in which it arrives.
 
     Returns
     -------
     list of SurfaceCurve
-        For each target a path to a source, on the faces of `mesh`; ``path.lengths(mesh).sum()`` is its length. It is
-        straight where it crosses edges, and passes vertices with an angle of pi or more whichever way around them, so
-        that no path nearby is shorter. The path of a target that is a source is a single segment of length 0.
+        For each target a path to a source, on the faces of `mesh`, of length ``path.lengths(mesh).sum()``. The path is
+        straight across edges, and has an angle of at least pi on both sides of the vertices that it passes, so no path
+        nearby is shorter. The path of a target that is a source is a single segment of length 0.
 
     Raises
     ------
@@ -70,17 +72,17 @@ def shortest_paths(
 
     Notes
     -----
-    The steepest descent of the distance, linear in each face, gives a strip of faces. The shortest path in the
-    strip is found by a funnel, and where it bends at a vertex that it could pass another way with an angle below
-    pi, the strip is led there, until no such vertex is left (Xin and Wang 2007). Where three faces or more meet at
-    an edge, a strip goes over it from any of them into any other, and the ways around a vertex of it branch; the
-    shortest is taken. Where the descent ends at a vertex that is no source, it goes on along the edges that rise
-    least. A path is not moved past two vertices in one place.
+    The steepest descent of the distance, linear in each face, gives a strip of faces. A funnel finds the shortest path
+    in the strip. Where this path bends at a vertex with an angle below pi on the other side, the strip is moved to the
+    other side, until no such vertex is left (Xin and Wang 2007). At an edge of three faces or more, a strip may go from
+    any of them into any other, and around a vertex of this edge there are several ways; the shortest is taken. If the
+    descent ends at a vertex that is no source, it goes on along the edges that rise least. A path is not moved past two
+    vertices in one place.
 
-    Across large faces distance is far from linear, and the descent may pass a vertex on the wrong side. So where a
-    path is longer than the distance says, a second one goes straight from edge to edge towards vertices, or where
-    the distances at the ends of an edge place the source in the plane of the face, whichever agrees best with the
-    distance that is left; the shorter of the two is kept.
+    Across large faces distance is far from linear, and the descent may pass a vertex on the wrong side. So if a path is
+    longer than the distance, a second path is traced: straight from edge to edge, either towards a vertex or towards
+    the source as the distances at the ends of an edge place it in the plane of the face, whichever agrees best with the
+    distance left. The shorter of the two paths is returned.
     """
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")
@@ -150,15 +152,15 @@ def _points(name: str, mesh: Mesh, points: Sources) -> tuple[IntArray, FloatArra
 
 
 def _snapped(barycentric: FloatArray) -> FloatArray:
-    """Next to nothing off a side or a corner is on it."""
-    weights = np.where(barycentric < _ON_SIDE, 0.0, barycentric)
+    """Barycentric coordinates with those below `ON_SIDE` set to 0."""
+    weights = np.where(barycentric < ON_SIDE, 0.0, barycentric)
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 def _goals(
     mesh: Mesh, values: FloatArray, sources: Sources | None
 ) -> tuple[BoolArray, IntArray, FloatArray, FloatArray, IntArray]:
-    """Where paths may end; the fields of the kernel's `Goals`."""
+    """Possible ends of paths: the fields of the kernel's `Goals`."""
     if sources is None:
         if values.min() > 0:
             raise SourceError("distance is 0 at no vertex: name the sources, where paths may end")
@@ -169,11 +171,10 @@ def _goals(
     start, end = (_snapped(np.concatenate([points.barycentric, there])) for there in (segments.start, segments.end))
     inside, offset = np.stack([start, end], axis=1), np.concatenate([points.offset, segments.offset])
 
-    # A vertex that is nearer to another source than its own offset is passed.
     is_source = np.zeros(mesh.n_vertices, bool)
     row, _, corner = np.nonzero(inside == 1)
     vertex, begins = np.append(found.vertices, mesh.F[face[row], corner]), np.append(found.vertex_offset, offset[row])
-    is_source[vertex[values[vertex] >= begins * (1 - 1e-9)]] = True
+    is_source[vertex[values[vertex] >= begins * (1 - _SAME_DISTANCE)]] = True
 
     face, inside, offset = _on_all_sides(mesh, face, inside, offset)
     first_inside = np.concatenate([[0], np.cumsum(np.bincount(face, minlength=mesh.n_faces))])
@@ -182,7 +183,7 @@ def _goals(
 
 
 def _roots(mesh: Mesh, is_source: BoolArray, first_inside: IntArray) -> BoolArray:
-    """The vertices that are sources, or corners of faces with sources inside."""
+    """Mask (n,) of the vertices that are sources, or corners of faces with sources inside."""
     roots = is_source.copy()
     roots[mesh.F[np.diff(first_inside) > 0]] = True
     return roots
@@ -191,9 +192,9 @@ def _roots(mesh: Mesh, is_source: BoolArray, first_inside: IntArray) -> BoolArra
 def _on_all_sides(
     mesh: Mesh, face: IntArray, inside: FloatArray, offset: FloatArray
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Segments in faces, sorted by face; one that lies on a side, or at a corner, once in each face that has it."""
+    """Segments in faces, sorted by face; a segment on a side, or at a corner, once for each face around it."""
     faces, segments, copies = [face], [inside], [np.arange(len(face))]
-    weight = inside.max(axis=1)  # (p, 3): 0 for corners that play no part
+    weight = inside.max(axis=1)  # (p, 3): 0 at corners opposite a side that holds the segment
     for row in np.flatnonzero((weight == 0).any(axis=1)):
         f, played = int(face[row]), weight[row] > 0
         others = np.flatnonzero(np.isin(mesh.F, mesh.F[f, played]).sum(axis=1) == played.sum())
@@ -211,10 +212,9 @@ def _on_all_sides(
 
 
 def _ways_out(mesh: Mesh, values: FloatArray, roots: BoolArray) -> IntArray:
-    """For each vertex the next on the way along edges to a root that rises least; -1 at roots, and if there is none.
+    """The next vertex (n,) on the path along edges to a root that rises least; -1 at roots and if there is no path.
 
-    The ways are those in a minimum spanning tree whose edges weigh as much as their higher end, and among equals as
-    much as they are long.
+    These paths lie in a minimum spanning tree of the edges, ordered by the value at the higher end, then by length.
     """
     n, edges = mesh.n_vertices, mesh.edges
     rank = np.empty(len(edges))
@@ -223,32 +223,22 @@ def _ways_out(mesh: Mesh, values: FloatArray, roots: BoolArray) -> IntArray:
     rows, columns = np.concatenate([edges[:, 0], np.full(len(start), n)]), np.concatenate([edges[:, 1], start])
     graph = sp.coo_array((np.concatenate([rank, np.ones(len(start))]), (rows, columns)), shape=(n + 1, n + 1))
     tree = csgraph.minimum_spanning_tree(graph.tocsr())
-    before = csgraph.breadth_first_order(tree, n, directed=False)[1][:n]
-    return np.where((before < 0) | (before == n), -1, before).astype(np.int64)
+    previous = csgraph.breadth_first_order(tree, n, directed=False)[1][:n]
+    return np.where((previous < 0) | (previous == n), -1, previous).astype(np.int64)
 
 
 def _surface(mesh: Mesh) -> Surface:
     """The tables of the kernel."""
-    # Not mollified: the height that this gives a flat triangle would bend the paths across.
+    # Not mollified: mollification gives a flat triangle some height, and would bend the paths across it.
     lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
-    edge = mesh.facets.of_face.ravel()
-    corner = mesh.F.ravel()
+    at_edge = grouping.group_by_label(mesh.facets.of_face.ravel(), len(mesh.facets.vertices))
+    at_vertex = grouping.group_by_label(mesh.F.ravel(), mesh.n_vertices)
     tables: Surface = _kernel().Surface(
         mesh.F,
         lengths,
-        _angles(lengths),
-        edge,
-        np.concatenate([[0], np.cumsum(mesh.facets.n_faces)]),
-        np.argsort(edge, kind="stable"),
-        np.concatenate([[0], np.cumsum(np.bincount(corner, minlength=mesh.n_vertices))]),
-        np.argsort(corner, kind="stable"),
+        corner_angles(lengths),
+        mesh.facets.of_face.ravel(),
+        *at_edge,
+        *at_vertex,
     )
     return tables
-
-
-def _angles(l: FloatArray) -> FloatArray:  # noqa: E741
-    """Angle at each corner from lengths opposite to it, accurate for needles and caps."""
-    beside = np.roll(l, -1, axis=1), np.roll(l, 1, axis=1)
-    half = l.sum(axis=1, keepdims=True) / 2
-    opposite = np.maximum((half - beside[0]) * (half - beside[1]), 0.0)
-    return np.asarray(2 * np.arctan2(np.sqrt(opposite), np.sqrt(np.maximum(half * (half - l), 0.0))))

@@ -1,1 +1,16 @@
-"""What pictures and pages are made of: which part of a surface is seen, in which colours, and where it is saved."""
+"""Pictures, interactive pages and windows of a distance on a surface."""
+
+from heat_igl.drawing.output import PAGE_SUFFIXES, PICTURE_SUFFIXES
+from heat_igl.drawing.plots import Page, Picture, page, picture, plot, plot_field, write_html
+
+__all__ = [
+    "PAGE_SUFFIXES",
+    "PICTURE_SUFFIXES",
+    "Page",
+    "Picture",
+    "page",
+    "picture",
+    "plot",
+    "plot_field",
+    "write_html",
+]

@@ -1,8 +1,7 @@
-"""An interactive view as one HTML file: no server, no network, no library.
+"""An interactive view of a distance as one HTML file, without a server, network access or libraries.
 
-The surface is drawn with WebGL; a click moves the source, and the page computes the distance anew, by the sweep of
-`heat_igl.unfolding.sweeping` written a second time for browsers (page/sweep.js). Needs the extra ``view`` for the
-colours only.
+The page draws the surface with WebGL. After a click on a new source it computes the distance by the algorithm of
+`heat_igl.unfolding.sweeping`, implemented in JavaScript in page/sweep.js. The extra ``view`` is needed for the colours.
 """
 
 from __future__ import annotations
@@ -20,9 +19,10 @@ from typing import Any, get_args
 
 import numpy as np
 
-from heat_igl.drawing.output import PAGE_SUFFIXES, replace_file
+from heat_igl.drawing.output import PAGE_SUFFIXES
 from heat_igl.drawing.scene import DISTANCE_LABEL, LINE_INK, STRIPE_INK, Style, check_style, colours, scene
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
+from heat_igl.io import complete_file
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike
@@ -37,18 +37,18 @@ _FRAME = (
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """An interactive view; notebooks show it.
+    """An interactive view, which notebooks display.
 
     Attributes
     ----------
     html : str
-        The whole document.
+        The HTML document.
     """
 
     html: str
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the page; an existing file is replaced only by a complete one.
+        """Write the page to a file. An existing file is replaced only when the new one is complete.
 
         Raises
         ------
@@ -60,7 +60,8 @@ class Page:
         target = Path(path)
         if target.suffix.lower() not in PAGE_SUFFIXES:
             raise ValueError(f"{target} must end in {' or '.join(PAGE_SUFFIXES)} to be a page")
-        replace_file(target, self.html.encode("utf8"))
+        with complete_file(target) as temporary:
+            temporary.write_bytes(self.html.encode("utf8"))
 
     def _repr_html_(self) -> str:
         return _FRAME.format(html.escape(self.html, quote=True))
@@ -80,33 +81,33 @@ def page(
     title: str = "Geodesic distance",
     method: str = _AS_GIVEN,
 ) -> Page:
-    """A page that shows a distance on a surface, to be turned, zoomed and asked.
+    """Make an interactive page that shows a distance on a surface.
 
-    Dragging turns it, the wheel or two fingers zoom, Shift moves. The page reads out vertex, position and distance
-    under the pointer. A click makes the vertex the source, and the distance follows: computed in the page by unfolding
-    triangle after triangle over the intrinsic Delaunay triangulation, to 1e-3 (on average 1e-5) what
-    ``refine="sweep"`` gives. Of tetrahedra the outside is shown, and a click reads only: the way leads through the
-    inside.
+    Dragging rotates the surface, the wheel or a pinch zooms, and dragging with Shift translates. The page displays
+    vertex, position and distance under the pointer. A click makes the vertex the source; the page then computes the
+    distance by planar unfolding on the intrinsic Delaunay triangulation. The result agrees with ``refine="sweep"`` to
+    1e-3, on average to 1e-5. For tetrahedra the page shows the boundary, and a click only displays the values, since
+    shortest paths run through the interior.
 
     Parameters
     ----------
     mesh, distance, sources, spacing, style, view, up, colormap, label
-        As for `heat_igl.plots.plot`.
+        As for `heat_igl.drawing.plot`.
     title : str
-        Of the page.
+        Title of the page.
     method : str
-        Says how `distance` was found; shown until a click replaces that distance.
+        Description of the method behind `distance`, displayed until a click replaces that distance.
 
     Returns
     -------
     Page
-        Shown by notebooks; `Page.save` writes it. It takes 35 kB and 50 to 55 bytes per vertex, and needs
-        a browser with WebGL 2 and DecompressionStream (2023 or later).
+        Displayed by notebooks; `Page.save` writes it to a file. Its size is 35 kB plus 50 to 55 bytes per vertex. It
+        needs a browser with WebGL 2 and DecompressionStream (2023 or later).
 
     Raises
     ------
     ValueError, SourceError, MissingExtraError
-        As for `heat_igl.plots.plot`.
+        As for `heat_igl.drawing.plot`.
     """
     check_style(style)
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
@@ -153,9 +154,9 @@ def page(
 
 
 def _add_sweep(arrays: dict[str, AnyArray], meta: dict[str, Any], mesh: Mesh) -> None:
-    """What page/sweep.js works on: corners and edge lengths of the intrinsic Delaunay triangulation."""
+    """Add the input of page/sweep.js: corners and edge lengths of the intrinsic Delaunay triangulation."""
     triangulation = intrinsic_delaunay(intrinsic_triangulation(mesh))
-    # Faces that were not flipped become zeros, which take no room.
+    # Unflipped faces become zeros, which compress well.
     same = triangulation.F.shape == mesh.F.shape
     arrays["sweepFaces"] = (triangulation.F - mesh.F if same else triangulation.F).astype("<i4")
     arrays["lengths"] = (triangulation.l / meta["unit"]).astype("<f4")
@@ -163,11 +164,11 @@ def _add_sweep(arrays: dict[str, AnyArray], meta: dict[str, Any], mesh: Mesh) ->
 
 
 def _in_script(value: object) -> str:
-    """JSON that cannot end the script element which holds it, whatever a label says."""
+    """`value` as JSON without the character "<", which could end the surrounding script element."""
     return json.dumps(value, allow_nan=False).replace("<", "\\u003c")
 
 
 def _packed(arrays: list[AnyArray]) -> bytes:
-    """All first bytes of an array, then all second bytes, and so on: signs and exponents side by side pack best."""
+    """The arrays, compressed. Bytes are grouped by significance: adjacent signs and exponents compress best."""
     planes = [np.ascontiguousarray(array).view(np.uint8).reshape(-1, 4).T.tobytes() for array in arrays]
     return zlib.compress(b"".join(planes), 9)

@@ -1,43 +1,44 @@
-"""A finished picture: shown by notebooks, written as a file that is complete or not there."""
+"""The result of drawing: a picture for notebooks and files."""
 
 from __future__ import annotations
 
 import io
 import os
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from heat_igl.io import complete_file
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["DPI", "PAGE_SUFFIXES", "PICTURE_SUFFIXES", "Picture", "replace_file"]
+__all__ = ["DPI", "PAGE_SUFFIXES", "PICTURE_SUFFIXES", "Picture"]
 
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 PAGE_SUFFIXES = (".html", ".htm")
-DPI = 400  # of raster output: 8 cm become 1260 pixels
+DPI = 400  # resolution of raster output: 1260 pixels for 8 cm
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A finished picture; notebooks show it.
+    """A finished picture, which notebooks display.
 
     Attributes
     ----------
     figure : matplotlib.figure.Figure
-        For changes of one's own; independent of pyplot.
+        The figure, which may be changed. pyplot does not manage it.
     """
 
     figure: Figure
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write PNG, PDF or SVG, by the suffix of `path`; an existing file is replaced only by a complete one.
+        """Write a PNG, PDF or SVG file, according to the suffix. An existing file is replaced only by a complete one.
 
         Raises
         ------
         ValueError
-            If the suffix is another.
+            If the suffix is not .png, .pdf or .svg.
         OSError
             If the file cannot be written.
         """
@@ -45,40 +46,15 @@ class Picture:
         suffix = target.suffix.lower()
         if suffix not in PICTURE_SUFFIXES:
             raise ValueError(f"{target} must end in one of {', '.join(PICTURE_SUFFIXES)} to be a picture")
-        replace_file(target, self._rendered(suffix[1:]))
+        with complete_file(target) as temporary:
+            temporary.write_bytes(self._rendered(suffix[1:]))
 
     def _rendered(self, form: str, dpi: float = DPI) -> bytes:
         buffer = io.BytesIO()
-        # No date inside, so that the same input gives the same bytes.
+        # Without a date, the same input gives the same bytes.
         metadata = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}[form]
         self.figure.savefig(buffer, format=form, dpi=dpi, metadata=metadata)
         return buffer.getvalue()
 
     def _repr_png_(self) -> bytes:
         return self._rendered("png", dpi=DPI / 2)
-
-
-def replace_file(target: Path, content: bytes) -> None:
-    """Write a file that replaces an existing one only when it is complete.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; then the old one is as it was.
-    """
-    target = Path(os.path.realpath(target))  # through a link, to what it points to
-    descriptor, temporary = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

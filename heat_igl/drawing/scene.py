@@ -1,4 +1,4 @@
-"""What a picture and a page have in common: which triangles are seen from where, which values, and in which colours."""
+"""The scene that a picture or a page shows: triangles, values, view direction, sources and colours."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from heat_igl.drawing.raster import default_rotation, isoline_spacing, rotation
+from heat_igl.drawing.camera import default_rotation, rotation
+from heat_igl.drawing.shading import isoline_spacing
 from heat_igl.errors import MissingExtraError
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, source_set
@@ -29,9 +30,9 @@ Style = Literal["lines", "stripes", "plain"]
 
 DISTANCE_LABEL = "distance, in the mesh's unit"
 UNREACHABLE = (0.72, 0.72, 0.72)
-#: How much of the brightness an isoline takes away.
+#: Fraction by which an isoline reduces the brightness.
 LINE_INK = 0.58
-#: How far every second stripe is mixed with white.
+#: Fraction of white in the light stripes.
 STRIPE_INK = 0.5
 
 _PERMUTATION = {"x": [1, 0, 2], "y": [0, 1, 2], "z": [1, 2, 0]}
@@ -39,34 +40,34 @@ _PERMUTATION = {"x": [1, 0, 2], "y": [0, 1, 2], "z": [1, 2, 0]}
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A surface with values, centred and scaled, and the direction in which it is seen.
+    """A centred and scaled surface with values and a view direction.
 
     Attributes
     ----------
     V : (n, 3) float64
-        Positions in units of `unit` around `centre`: those that `F` uses lie between -1 and 1.
+        Positions relative to `centre`, in units of `unit`; coordinates of vertices of `F` lie between -1 and 1.
     F : (m, 3) int64
-        Triangles; of tetrahedra, those on the outside.
+        Triangles; for tetrahedra, the boundary.
     used : (k,) int64
         The vertices of `F`.
     centre : (3,) float64
-        In the mesh's unit.
+        Centre of the bounding box, in the unit of the mesh.
     unit : float
-        In the mesh's unit.
+        Length of 1 in the scene, in the unit of the mesh.
     turn : (3, 3) float64
-        Rows point right, up and towards the viewer.
+        Rotation to viewer coordinates: rows point right, up and towards the viewer.
     values : (n,) float64
-        In the caller's unit; ``inf`` is no value.
+        Values in the unit of the caller; ``inf`` means no value.
     limits : (float, float)
         Values at the ends of the colour bar.
     step : float
-        Between isolines or stripes.
+        Distance between isolines, or width of stripes.
     vertices : (s,) int64
         Sources that are vertices.
     dots : (k, 3) float64
-        Sources that are vertices or points in faces, as `V`.
+        Positions of sources that are vertices or points in faces, in the coordinates of `V`.
     lines : (l, 2, 3) float64
-        Segments of sources that are curves, as `V`.
+        Segments of sources that are curves, in the coordinates of `V`.
     """
 
     V: FloatArray
@@ -84,7 +85,7 @@ class Scene:
 
     @property
     def turned(self) -> FloatArray:
-        """Positions (n, 3) as the viewer has them: right, up, near."""
+        """Positions (n, 3) in viewer coordinates: right, up and near."""
         return np.asarray(self.V @ self.turn.T)
 
 
@@ -99,15 +100,17 @@ def scene(
     view: tuple[float, float] | None = None,
     up: str = "y",
 ) -> Scene:
-    """Check what is to be drawn; parameters as for `heat_igl.plots.plot` and `heat_igl.plots.plot_field`.
+    """Validate the input of a picture and return the scene.
+
+    The parameters are those of `heat_igl.drawing.plot` and `heat_igl.drawing.plot_field`.
 
     Raises
     ------
     ValueError
-        If `values` (`name` in the message) is not one number per vertex, holds NaN or nothing finite, or an option has
-        no meaning.
+        If `values` (called `name` in the message) does not have shape (n,), contains NaN or no finite value, or an
+        option is invalid.
     SourceError
-        If `sources` does not name vertices of the mesh.
+        If `sources` are invalid.
     """
     checked = _checked(name, values, mesh.n_vertices)
     vertices, dots, lines = _places(mesh, sources)
@@ -142,7 +145,7 @@ def scene(
 
 
 def _places(mesh: Mesh, sources: Sources | None) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Source vertices, and where in space vertices and points (k, 3) and segments of curves (l, 2, 3) lie."""
+    """Source vertices (s,), positions of vertices and points (k, 3), and segments of curves (l, 2, 3)."""
     if sources is None:
         return np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 2, 3))
     found = source_set(sources, mesh.n_vertices, None if mesh.is_tetrahedral else mesh.F)
@@ -159,20 +162,18 @@ def _places(mesh: Mesh, sources: Sources | None) -> tuple[IntArray, FloatArray, 
 
 
 def colours(colormap: str, is_trimmed: bool = True) -> Any:
-    """A colour map of matplotlib; trimmed, without its darkest end, on which no line would be seen.
+    """The matplotlib colour map of that name; if trimmed, without dark colours, on which lines would be invisible.
 
     Raises
     ------
     ValueError
-        If matplotlib has no such map.
+        If matplotlib has no colour map of that name.
     MissingExtraError
         If matplotlib is not installed.
     """
-    try:
+    with MissingExtraError.guard("a picture", "matplotlib", "view"):
         import matplotlib
         from matplotlib.colors import ListedColormap
-    except ImportError:
-        raise MissingExtraError.of("a picture", "matplotlib", "view") from None
     try:
         whole = matplotlib.colormaps[colormap]
     except KeyError:
@@ -182,7 +183,7 @@ def colours(colormap: str, is_trimmed: bool = True) -> Any:
 
 
 def check_style(style: str) -> None:
-    """Refuse what is not a `Style`."""
+    """Raise ValueError if `style` is not a `Style`."""
     if style not in get_args(Style):
         raise ValueError(f"style must be one of {', '.join(map(repr, get_args(Style)))}, not {style!r}")
 

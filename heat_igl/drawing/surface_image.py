@@ -1,4 +1,4 @@
-"""The image of a scene: a surface in colours, with isolines or stripes, shaded; and the dots on it."""
+"""The shaded image of a scene in colours, with isolines or stripes, and the dots of the sources."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.drawing.raster import isoline_coverage, rasterize, screen_gradient, shading, stripe_coverage, visible
+from heat_igl.drawing.raster import rasterize, visible
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, UNREACHABLE, Scene, Style
+from heat_igl.drawing.shading import isoline_coverage, screen_gradient, shading, stripe_coverage
 from heat_igl.typing import BoolArray, FloatArray
 
 __all__ = ["LINE", "OVERSAMPLING", "SOURCE", "fitted", "mark_dots", "surface_image"]
@@ -18,7 +19,7 @@ SOURCE = "#e8000b"
 
 
 def fitted(seen: Scene, columns: int, rows: int, margin: float) -> tuple[float, FloatArray]:
-    """Scale and centre, as `heat_igl.drawing.raster.to_pixels` takes them, with which the surface fills an image."""
+    """Scale and centre for `heat_igl.drawing.camera.to_pixels`, such that the surface fills the image."""
     turned = seen.turned[seen.used, :2]
     low, high = turned.min(axis=0), turned.max(axis=0)
     extent = np.maximum(high - low, 1e-3 * (high - low).max())
@@ -29,10 +30,10 @@ def fitted(seen: Scene, columns: int, rows: int, margin: float) -> tuple[float, 
 def surface_image(
     points: FloatArray, seen: Scene, columns: int, rows: int, style: Style, table: Any
 ) -> tuple[FloatArray, FloatArray]:
-    """The image (rows, columns, 4) of the surface, and its depth on the finer grid that it was drawn on."""
+    """The image (rows, columns, 4) of the surface, and the depth buffer at `OVERSAMPLING` times the resolution."""
     F, values = seen.F, seen.values
     fine = points * OVERSAMPLING
-    fine[:, :2] += (OVERSAMPLING - 1) / 2  # centres of pixels, not corners, are at whole numbers
+    fine[:, :2] += (OVERSAMPLING - 1) / 2  # integers are the centres of pixels, not corners
     pixels = rasterize(fine, F, columns * OVERSAMPLING, rows * OVERSAMPLING)
     reached: BoolArray = np.asarray(np.isfinite(values[F]).all(axis=1))
     finite = np.where(np.isfinite(values), values, 0.0)
@@ -59,7 +60,7 @@ def surface_image(
 
 
 def mark_dots(axes: Any, dots: FloatArray, depth: FloatArray) -> BoolArray:
-    """Dots at the sources, given in pixels, and rings at those behind the surface; returns which are."""
+    """Draw a dot at each source, or a ring if it is behind the surface; return the mask (k,) of hidden sources."""
     if not len(dots):
         return np.zeros(0, bool)
     fine = dots * OVERSAMPLING

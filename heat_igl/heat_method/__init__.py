@@ -1,7 +1,9 @@
 """`HeatMethodSolver`: the steps put together, factored once, asked many times."""
 
+from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
-from heat_igl.heat_method.solver import HeatMethodSolver, Magnitude, heat_method_distance, smallest_time_step
+from heat_igl.heat_method.solver import HeatMethodSolver, heat_method_distance
+from heat_igl.heat_method.time_step import smallest_time_step
 
 __all__ = [
     "Diagnostics",
@@ -9,6 +11,7 @@ __all__ = [
     "HeatSolution",
     "LabelledDistance",
     "Magnitude",
+    "SolverOptions",
     "heat_method_distance",
     "smallest_time_step",
 ]

@@ -3,63 +3,28 @@
 from __future__ import annotations
 
 import time
-import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
-from concurrent.futures import Future
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-import scipy.sparse as sp
 
-from heat_igl.errors import AccuracyWarning, SourceError
+from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
+from heat_igl.heat_method.integration import damped_field
+from heat_igl.heat_method.options import Magnitude, SolverOptions
+from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh
+from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
-from heat_igl.linear import Analysis, Backend
-from heat_igl.mesh import RANGE_LIMIT, Mesh
-from heat_igl.operators.triangles import Laplacian, Operators, edge_length_operators, operators
-from heat_igl.runtime import block_size, float_type, in_blocks, in_order, n_threads, pool, progress_bar, row_writer
-from heat_igl.sources import Sources, SourceSet, source_set
-from heat_igl.sources.emission import Emission, Emitter
-from heat_igl.steps import Boundary, Descent, HeatFlow, PoissonProblem, analysis, damping, normalize
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray
-from heat_igl.unfolding import Refine
-from heat_igl.unfolding.solver import HeatOrder
+from heat_igl.linear import Backend
+from heat_igl.mesh import Mesh
+from heat_igl.operators import Laplacian, Operators, edge_length_operators
+from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
+from heat_igl.steps import Boundary
+from heat_igl.typing import ArrayLike, FloatArray
+from heat_igl.unfolding import Refine, UnfoldingSolver
 
-__all__ = ["HeatMethodSolver", "Magnitude", "heat_method_distance", "smallest_time_step"]
-
-Magnitude = Literal["auto", "unit", "damped"]
-
-# Between two aims, see the tables of docs/heat_path.md: on scans the error falls further with t, on a regular grid of
-# squares, where heat prefers diagonals, it grows.
-_T_COEF_FITTED = 0.5
-# Below this the heat has lost digits to gradual underflow.
-_LOWEST_HEAT = 1e-300
+__all__ = ["HeatMethodSolver", "heat_method_distance"]
 
 
-def _positive(name: str, value: float) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = np.nan
-    if not (np.isfinite(number) and number > 0):
-        raise ValueError(f"{name} must be a positive number, not {value!r}")
-    return number
-
-
-def smallest_time_step(domain: Operators, fitted: bool = False) -> float:
-    """The smallest time step whose heat crosses `domain` without underflow in double precision.
-
-    Along a line of edges of length h, one backward Euler step falls by acosh(1 + h^2 / (2 t)) e-foldings per edge, and
-    by h / sqrt(t) where the flow is `fitted`. The result makes that, times the number of edges across, `RANGE_LIMIT`.
-    """
-    if fitted:
-        return (domain.longest_distance / RANGE_LIMIT) ** 2
-    h = domain.mean_edge_length
-    per_edge = RANGE_LIMIT / (domain.longest_distance / h)
-    return h**2 / (2 * (float(np.cosh(per_edge)) - 1)) if per_edge < 700 else 0.0
-
-
-class HeatMethodSolver:
+class HeatMethodSolver(BatchedSolver):
     """Geodesic distance by the heat method (Crane, Weischedel, Wardetzky 2013): factor once, ask many times.
 
     Parameters
@@ -113,8 +78,8 @@ class HeatMethodSolver:
     so. The solver is immutable; threads may share it, and a pickled copy gives the same bits.
     """
 
-    _mesh: Mesh | None
-    _options: dict[str, Any]
+    _mesh: Mesh | None = None
+    _parts: SolverParts
 
     def __init__(
         self,
@@ -129,37 +94,14 @@ class HeatMethodSolver:
         refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> None:
-        options = {
-            "t_coef": t_coef,
-            "t": t,
-            "laplacian": laplacian,
-            "boundary": boundary,
-            "magnitude": magnitude,
-            "refine": refine,
-            "backend": backend,
-        }
-        self._set_up_mesh(_as_mesh(mesh, F), options)
+        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, refine, backend)
+        self._mesh = _as_mesh(mesh, F)
+        self._parts = prepare_mesh(self._mesh, options)
 
-    def _set_up_mesh(self, mesh: Mesh, options: dict[str, Any], known: Analysis | None = None) -> None:
-        start = time.perf_counter()
-        self._mesh = mesh
-        self._options = options
-        rest = dict(options)
-        laplacian = rest.pop("laplacian")
-        if rest["magnitude"] == "auto" and laplacian == "cotan":
-            rest["magnitude"] = "unit"
-        begun: list[Future[Analysis]] = []
-        with pool(1) as beside:
-
-            def analyse(L: sp.csc_matrix) -> None:
-                begun.append(beside.submit(analysis, L, rest["backend"]))
-
-            # The order of elimination takes a third of the time and needs no more than the pattern of L.
-            domain = operators(mesh, laplacian, analyse if known is None and n_threads() > 1 else None)
-            seconds = time.perf_counter() - start
-            known = begun[0].result() if begun else known
-        waited = time.perf_counter() - start - seconds
-        self._set_up(domain, **rest, seconds_operators=seconds, seconds_analysis=waited, known=known)
+    @classmethod
+    def from_options(cls, mesh: Mesh, options: SolverOptions) -> HeatMethodSolver:
+        """A solver on `mesh` with options that were put together before."""
+        return cls._of(prepare_mesh(mesh, options), mesh)
 
     @classmethod
     def from_operators(
@@ -174,10 +116,8 @@ class HeatMethodSolver:
         backend: Backend = "auto",
     ) -> HeatMethodSolver:
         """A solver on any domain that has operators; parameters as for the class."""
-        solver = cls.__new__(cls)
-        solver._mesh = None
-        solver._set_up(domain, t_coef, t, boundary, magnitude, refine, backend)
-        return solver
+        options = SolverOptions(t_coef, t, "intrinsic-delaunay", boundary, magnitude, refine, backend)
+        return cls._of(prepare(domain, options))
 
     @classmethod
     def from_edge_lengths(
@@ -214,14 +154,10 @@ class HeatMethodSolver:
         MeshError
             If `F` or `lengths` cannot be used; the message names the first offender.
         """
+        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, refine, backend)
         start = time.perf_counter()
         domain = edge_length_operators(F, lengths, n, laplacian)
-        if magnitude == "auto" and laplacian == "cotan":
-            magnitude = "unit"
-        solver = cls.__new__(cls)
-        solver._mesh = None
-        solver._set_up(domain, t_coef, t, boundary, magnitude, refine, backend, time.perf_counter() - start)
-        return solver
+        return cls._of(prepare(domain, options, seconds_operators=time.perf_counter() - start))
 
     def with_vertices(self, V: ArrayLike) -> HeatMethodSolver:
         """A new solver after the vertices have moved; this one stays as it is.
@@ -249,91 +185,38 @@ class HeatMethodSolver:
             raise ValueError(
                 "this solver was made from operators and has no vertices to move: use from_operators again"
             )
-        solver = HeatMethodSolver.__new__(HeatMethodSolver)
-        solver._set_up_mesh(self._mesh.with_vertices(V), self._options, self._analysis)
-        return solver
+        moved = self._mesh.with_vertices(V)
+        return HeatMethodSolver._of(prepare_mesh(moved, self._parts.options, self._parts.analysis), moved)
 
-    def _set_up(
-        self,
-        domain: Operators,
-        t_coef: float | None,
-        t: float | None,
-        boundary: Boundary,
-        magnitude: Magnitude,
-        refine: Refine | None,
-        backend: Backend,
-        seconds_operators: float = 0.0,
-        seconds_analysis: float = 0.0,
-        known: Analysis | None = None,
-    ) -> None:
-        start = time.perf_counter()
-        if magnitude not in ("auto", "unit", "damped"):
-            raise ValueError(f"magnitude must be 'auto', 'unit' or 'damped', not {magnitude!r}")
-        if refine not in (None, "sweep", "unfold"):
-            raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {refine!r}")
-        self._damped = magnitude == "damped" or (magnitude == "auto" and domain.is_surface)
-        fitted = self._fitted = self._damped and domain.has_lengths
-        coefficient = (_T_COEF_FITTED if fitted else 1.0) if t_coef is None else _positive("t_coef", t_coef)
-        requested = coefficient * domain.mean_edge_length**2 if t is None else _positive("t", t)
-        step = max(requested, smallest_time_step(domain, fitted))
-        if t is not None and step > requested:
-            warnings.warn(
-                f"t = {requested:.4g} is too small for heat to cross the mesh in double precision; using {step:.4g}",
-                AccuracyWarning,
-                stacklevel=3,
-            )
-        self._operators = domain
-        self._analysis = analysis(domain.L, backend, known)
-        analysed = time.perf_counter()
-        makers: list[Callable[[], Any]] = [lambda: HeatFlow(domain, step, boundary, backend, self._analysis, fitted)]
-        if refine is None:
-            makers.append(lambda: PoissonProblem(domain, backend, self._analysis))
-        # Both matrices at once: the backends run without the interpreter's lock.
-        self._heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
-        self._poisson: PoissonProblem | None = poisson[0] if poisson else None
-        factored = time.perf_counter()
-        self._emitter = Emitter(domain, self._heat_flow, plain=not self._damped, unfolds=refine is not None)
-        self._given_faces = domain.given_faces
-        self._heat_order = None if refine is None else HeatOrder(domain, refine)
-        self._descent = None
-        if refine is None:
-            self._descent = Descent(domain, step if self._damped else None, self._analysis.order, fitted)
-        triangulation = domain.triangulation
-        factors = self._heat_flow.factors + ([] if self._poisson is None else [self._poisson.factor])
-        self._diagnostics = Diagnostics(
-            t=step,
-            t_requested=requested,
-            mean_edge_length=domain.mean_edge_length,
-            edges_across=domain.longest_distance / domain.mean_edge_length,
-            n_flips=triangulation.n_flips if triangulation else 0,
-            lengthening=triangulation.lengthening if triangulation else 0.0,
-            backend=self._heat_flow.backend,
-            seconds_operators=seconds_operators,
-            factor_nonzeros=sum(factor.nonzeros for factor in factors),
-            factor_bytes=sum(factor.n_bytes for factor in factors),
-            seconds_analysis=seconds_analysis + analysed - start,
-            seconds_factorization=factored - analysed,
-        )
+    @classmethod
+    def _of(cls, parts: SolverParts, mesh: Mesh | None = None) -> HeatMethodSolver:
+        solver = cls.__new__(cls)
+        solver._mesh, solver._parts = mesh, parts
+        return solver
 
     @property
     def operators(self) -> Operators:
         """L, M, G and D of the triangulation that is solved on."""
-        return self._operators
+        return self._parts.operators
 
     @property
     def t(self) -> float:
         """The time step in use, a squared length."""
-        return self._diagnostics.t
+        return self.diagnostics.t
 
     @property
     def diagnostics(self) -> Diagnostics:
         """What the solver did and rests on."""
-        return self._diagnostics
+        return self._parts.diagnostics
 
     @property
     def n_vertices(self) -> int:
         """Length of a distance array."""
-        return self._operators.n
+        return self.operators.n
+
+    @property
+    def _n_faces(self) -> int:
+        return len(self.operators.weights)
 
     def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
         """Distance from the nearest source.
@@ -364,8 +247,37 @@ class HeatMethodSolver:
         AccuracyWarning
             If heat underflowed on the way, so that distances beyond are too short.
         """
-        beyond = _cutoff(cutoff)
-        return np.asarray(_within(beyond, self._distances([self._set(sources)]))[0])
+        beyond = checked_cutoff(cutoff)
+        return np.asarray(cut_off(self._distances([self._source_set(sources)])[0], beyond))
+
+    def _source_set(self, sources: Sources) -> SourceSet:
+        return source_set(sources, self.n_vertices, self._parts.given_faces)
+
+    def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
+        """Distances (k, n) from k sets of sources: the method from end to end."""
+        terms = self._source_terms(source_sets)
+        u = self._heat(terms)
+        return self._distances_from_heat(terms, u)
+
+    def _source_terms(self, source_sets: list[SourceSet]) -> list[SourceTerm]:
+        """Initial heat of each set, and what is known near it."""
+        terms = [self._parts.assembler.term(sources) for sources in source_sets]
+        if isinstance(self._parts.last_steps, UnfoldingSolver):
+            return terms
+        return [drop_overtaken(term, self._parts.heat_flow, self.n_vertices) for term in terms]
+
+    def _heat(self, terms: list[SourceTerm]) -> FloatArray:
+        """Heat (n, k) after the time step: step 1."""
+        return self._parts.heat_flow.solve(right_hand_side(self.n_vertices, terms))
+
+    def _distances_from_heat(self, terms: list[SourceTerm], u: FloatArray) -> FloatArray:
+        """Distances (k, n) from heat (n, k): steps 2 and 3, or unfolding in the order of the heat."""
+        last_steps = self._parts.last_steps
+        if isinstance(last_steps, UnfoldingSolver):
+            return last_steps.distances(terms, u)
+        divergence = last_steps.divergence(terms, u)
+        phi = last_steps.poisson.solve(divergence)
+        return last_steps.pin_levels(terms, phi, u)
 
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
         """Distance, and which source is nearest: a geodesic Voronoi diagram.
@@ -382,221 +294,33 @@ class HeatMethodSolver:
             Without `refine`, labels say from which source most of the heat comes: a solve for each source, and right
             but for vertices less than an edge from the border of two cells. With it, they come with the distance.
         """
-        beyond = _cutoff(cutoff)
-        emissions, u = self._diffuse([self._set(sources)])
-        if self._heat_order is not None:
-            distance, labels = self._heat_order.labelled(emissions[0], u[:, 0])
+        beyond = checked_cutoff(cutoff)
+        terms = self._source_terms([self._source_set(sources)])
+        u = self._heat(terms)
+        if isinstance(self._parts.last_steps, UnfoldingSolver):
+            distance, labels = self._parts.last_steps.labelled(terms[0], u[:, 0])
         else:
-            distance = self._integrated(emissions, u)[0]
-            labels = self._emitter.labels(emissions[0])
-        distance = _within(beyond, distance)
+            distance = self._distances_from_heat(terms, u)[0]
+            labels = warmest_sources(terms[0], self._parts.heat_flow, self.n_vertices)
+        distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
 
-    def distances(
-        self,
-        source_sets: Sequence[Sources],
-        out: AnyArray | None = None,
-        progress: bool = False,
-        dtype: npt.DTypeLike | None = None,
-        *,
-        cutoff: float | None = None,
-    ) -> AnyArray:
-        """Distance from each of several sets of sources, solved in blocks, on all processors.
-
-        Parameters
-        ----------
-        source_sets : sequence of sources
-            k entries, each as for `distance`.
-        out : (k, n) array of float, optional
-            Where to write: an array, a `numpy.memmap`, a zarr array, or whatever has a shape and a dtype and takes
-            ``out[start:stop] = rows``. A chunked array is written a whole row of chunks at a time.
-        progress : bool
-            Show a progress bar on standard error (extra ``cli``).
-        dtype : float64 or float32, optional
-            Of the result; float64, or that of `out`.
-        cutoff : float, optional
-            Distances beyond this are ``inf``.
-
-        Returns
-        -------
-        (k, n) array of `dtype`, or `out`
-            Row i is the distance from ``source_sets[i]``; the same as one by one to rounding, whatever the number of
-            threads.
-
-        Raises
-        ------
-        SourceError
-            Before anything is solved, if an entry does not name sources; the message says which.
-        ValueError
-            If `out` has the wrong shape, cannot hold floats or cannot be written, if `dtype` is none for distances, or
-            if `cutoff` is not positive.
-
-        Notes
-        -----
-        Beside the result and one row of chunks of `out`, it holds at most 2 GiB, or what one query takes where that is
-        more: 40 bytes per face. For sources inside faces it may be three times as much. The number of threads is that
-        of the processors, or ``HEAT_IGL_NUM_THREADS``.
-        """
-        if not hasattr(source_sets, "__len__"):
-            raise SourceError(f"source_sets must be a sequence of sets of sources, not {source_sets!r}: try distance")
-        beyond = _cutoff(cutoff)
-        chosen = list(self._named(source_sets))
-        shape = (len(chosen), self.n_vertices)
-        if out is None:
-            out = np.empty(shape, float_type(dtype))
-        elif tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f":
-            raise ValueError(f"out must be an array of floats of shape {shape}, not {out.dtype} of shape {out.shape}")
-        elif dtype is not None and float_type(dtype) != out.dtype:
-            raise ValueError(f"dtype is {np.dtype(dtype)}, but out holds {out.dtype}: leave one of them away")
-        elif isinstance(out, np.ndarray) and not out.flags.writeable:
-            raise ValueError("out is read-only: open a memmap with mode='r+'")
-        write = row_writer(out)
-        with progress_bar("distances", len(chosen), progress) as advance:
-            for rows in self._blocks(chosen, len(chosen)):
-                write(_within(beyond, rows).astype(out.dtype, copy=False))
-                advance(len(rows))
-        return out
-
-    def iter_distances(self, source_sets: Iterable[Sources], dtype: npt.DTypeLike | None = None) -> Iterator[AnyArray]:
-        """Distance from each of several sets of sources, a row as soon as its block is solved.
-
-        Parameters
-        ----------
-        source_sets : iterable of sources
-            Each as for `distance`; drawn from as the rows are taken, so it may be a generator without an end.
-        dtype : float64 or float32, optional
-            Of the rows.
-
-        Yields
-        ------
-        (n,) array of `dtype`
-            In the order of `source_sets`; no view of anything else.
-
-        Raises
-        ------
-        SourceError
-            When the row of an entry that does not name sources would be next; the message says which.
-        ValueError
-            At once, if `dtype` is none for distances.
-
-        Notes
-        -----
-        Memory is bounded as for `distances`, whatever the number of sets; blocks are solved ahead on all processors
-        while rows are being used.
-        """
-        row_type = float_type(dtype)
-        if not isinstance(source_sets, Iterable):
-            raise SourceError(f"source_sets must be an iterable of sets of sources, not {source_sets!r}: try distance")
-        n_sets = len(source_sets) if isinstance(source_sets, Sized) else None
-        blocks = self._blocks(self._named(source_sets), n_sets)
-        return (row.astype(row_type) for rows in blocks for row in rows)
-
-    def _named(self, source_sets: Iterable[Sources]) -> Iterator[SourceSet]:
-        """The sources of each set; errors say which set they are in."""
-        for i, sources in enumerate(source_sets):
-            try:
-                yield self._set(sources)
-            except SourceError as error:
-                raise SourceError(f"source_sets[{i}]: {error}") from None
-
-    def _blocks(self, source_sets: Iterable[SourceSet], n_sets: int | None) -> Iterator[FloatArray]:
-        """Distances of a block of sets after the other."""
-        size, threads = block_size(len(self._operators.weights), n_sets, n_threads())
-        return in_order(self._distances, in_blocks(source_sets, size), threads)
-
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
-        chosen = [self._set(sources)]
-        emissions, u = self._diffuse(chosen)
-        X, magnitude = self._field(emissions, u)
-        if self._heat_order is not None:
-            distance = self._heat_order.distances(emissions, u)
-        else:
-            distance = self._integrated(emissions, u)
+        terms = self._source_terms([self._source_set(sources)])
+        u = self._heat(terms)
+        X, magnitude = damped_field(self.operators, terms, u, self._parts.t_damping, self._parts.fitted)
         with np.errstate(under="ignore"):
-            heat = u[:, 0] / self._emitter.unit(emissions[0]) / self._heat_flow.mean_mass
-        direction = np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T)
+            heat = u[:, 0] / terms[0].unit / self._parts.heat_flow.mean_mass
         return HeatSolution(
             heat=heat,
-            direction=direction,
+            direction=np.ascontiguousarray(X[:, 0].reshape(self.operators.dimension, -1).T),
             magnitude=np.ascontiguousarray(magnitude[:, 0]),
-            distance=distance[0],
+            distance=self._distances_from_heat(terms, u)[0],
             t=self.t,
             diagnostics=self.diagnostics,
         )
-
-    def _set(self, sources: Sources) -> SourceSet:
-        return source_set(sources, self.n_vertices, self._given_faces)
-
-    def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
-        """Distances (k, n) from k sets of sources."""
-        emissions, u = self._diffuse(source_sets)
-        if self._heat_order is not None:
-            return self._heat_order.distances(emissions, u)
-        return self._integrated(emissions, u)
-
-    def _diffuse(self, source_sets: list[SourceSet]) -> tuple[list[Emission], FloatArray]:
-        """Heat (n, k) from k sets of sources."""
-        emissions = [self._emitter.emission(sources) for sources in source_sets]
-        if self._heat_order is None:
-            emissions = [self._emitter.on_time(emission) for emission in emissions]
-        return emissions, self._heat_flow.solve(self._emitter.heat(emissions))
-
-    def _field(self, emissions: list[Emission], u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Directions (d m, k) and their magnitude (m, k)."""
-        domain = self._operators
-        X = normalize(domain, u, self._fitted)
-        magnitude = np.ones((len(domain.weights), u.shape[1]))
-        if self._damped:
-            magnitude = damping(domain, u, self.t, fitted=self._fitted)
-        for column, emission in enumerate(emissions):
-            self._emitter.guide(emission, X[:, column], magnitude[:, column])
-        return X, magnitude
-
-    def _integrated(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
-        """Distances (k, n) by step 3."""
-        if self._poisson is None or self._descent is None:
-            raise RuntimeError("this solver unfolds and has no Poisson problem")
-        if any(emission.guides.any() for emission in emissions):
-            X, magnitude = self._field(emissions, u)
-            domain = self._operators
-            divergence = domain.D @ (X * np.tile(magnitude, (domain.dimension, 1)))
-        else:
-            divergence = self._descent.divergence(u)
-        phi = self._poisson.solve(divergence)
-        if u.min() < _LOWEST_HEAT:
-            for emission, its_u in zip(emissions, u.T, strict=True):
-                self._warn_if_cold(its_u, emission)
-        rows = zip(emissions, np.ascontiguousarray(phi.T), u.T, strict=True)
-        return np.stack([self._emitter.settle(emission, its_phi, its_u) for emission, its_phi, its_u in rows])
-
-    def _warn_if_cold(self, u: FloatArray, emission: Emission) -> None:
-        """Heat that has underflowed has no gradient, and distance does not grow where X is 0: say so."""
-        domain = self._operators
-        components = domain.components
-        cold = (np.abs(u) < _LOWEST_HEAT) & np.isin(components, components[emission.near.vertex])
-        cold[emission.near.vertex] = False
-        remedy = "raise t_coef"
-        if self._heat_flow.boundary == "dirichlet":
-            cold &= ~domain.boundary
-            remedy += ", or let heat pass the boundary with boundary='average'"
-        if cold.any():
-            warnings.warn(
-                f"no heat arrives at {int(cold.sum())} of {domain.n} vertices, where distances are too short: {remedy}",
-                AccuracyWarning,
-                stacklevel=4,
-            )
-
-
-def _cutoff(value: float | None) -> float | None:
-    return None if value is None else _positive("cutoff", value)
-
-
-def _within(cutoff: float | None, distances: FloatArray) -> FloatArray:
-    if cutoff is not None:
-        distances[distances > cutoff] = np.inf
-    return distances
 
 
 def _as_mesh(mesh: Mesh | ArrayLike, F: ArrayLike | None) -> Mesh:
@@ -629,6 +353,3 @@ def heat_method_distance(V: ArrayLike, F: ArrayLike, sources: Sources, **options
         See `HeatMethodSolver.distance`, for errors too.
     """
     return HeatMethodSolver(V, F, **options).distance(sources)
-
-
-MODE = 1

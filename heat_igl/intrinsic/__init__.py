@@ -1,28 +1,31 @@
 """Triangulations known by edge lengths: flips and their history, mollification, the tufted cover, fans of angles."""
 
-from heat_igl.intrinsic.history import Flipped, Merged, Turned, apex
-from heat_igl.intrinsic.triangulation import (
-    IntrinsicTriangulation,
-    from_edge_lengths,
-    intrinsic_delaunay,
-    intrinsic_gradient,
-    intrinsic_triangulation,
-    mollify,
-    oriented,
-)
+from heat_igl.intrinsic.adjacency import Adjacency
+from heat_igl.intrinsic.delaunay import intrinsic_delaunay
+from heat_igl.intrinsic.double_cover import double_cover
+from heat_igl.intrinsic.gluing import from_edge_lengths, intrinsic_triangulation, oriented
+from heat_igl.intrinsic.gradient import intrinsic_gradient
+from heat_igl.intrinsic.history import Flipped, Merged, Turned
+from heat_igl.intrinsic.layout import apex, corner_angles, lay_out
+from heat_igl.intrinsic.mollification import mollify
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.intrinsic.tufted import has_nonmanifold_edges, tufted_cover
 
 __all__ = [
+    "Adjacency",
     "Flipped",
     "IntrinsicTriangulation",
     "Merged",
     "Turned",
     "apex",
+    "corner_angles",
+    "double_cover",
     "from_edge_lengths",
     "has_nonmanifold_edges",
     "intrinsic_delaunay",
     "intrinsic_gradient",
     "intrinsic_triangulation",
+    "lay_out",
     "mollify",
     "oriented",
     "tufted_cover",

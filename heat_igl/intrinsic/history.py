@@ -1,77 +1,71 @@
-"""Where a point of the mesh lies after faces were turned over and edges flipped.
+"""The changes that lead from a mesh to a triangulation, and the coordinates of points after them.
 
-The surface stays the same, but a face of the triangulation is not the face of the mesh with the same number. Flips are
-rigid motions of the plane around one edge, so a point is carried through them one round after the other.
+Merging, reversing and flipping faces keep the surface, but give a point another face or other barycentric coordinates.
+A flip replaces two triangles, laid out in the plane on either side of their edge, by two others that cover the same
+quadrilateral; a point keeps its place in the plane.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import igl
 import numpy as np
 
+from heat_igl.intrinsic.layout import apex
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Flipped", "Merged", "Turned", "apex"]
-
-
-def apex(base: FloatArray, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Corner opposite the base of triangles whose base starts at the origin and runs along the first axis."""
-    x = (base + (left - right) * ((left + right) / base)) / 2
-    height = igl.doublearea(np.stack([base, left, right], axis=1), 0.0) / base
-    return x, np.asarray(height)
+__all__ = ["Flipped", "Merged", "Turned"]
 
 
 class Merged(NamedTuple):
-    """Faces that were left out because another has the same vertices.
+    """Faces removed because another face has the same vertices.
 
     Attributes
     ----------
     face : (m,) int64
-        What each face became.
+        New face of each old face.
     corner : (m, 3) int64
-        Which corner of that face each corner became.
+        Corner of the new face for each corner of the old.
     """
 
     face: IntArray
     corner: IntArray
 
     def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The points (k,), (k, 3) afterwards."""
+        """Faces (k,) and barycentric coordinates (k, 3) of points after the change."""
         moved = np.empty_like(barycentric)
         np.put_along_axis(moved, self.corner[faces], barycentric, axis=1)
         return self.face[faces], moved
 
     def before(self, F: IntArray) -> IntArray:
-        """The vertices (m, 3) of all faces, from those of the faces that are left."""
+        """The vertices (m, 3) of the old faces, from those of the new."""
         return np.asarray(np.take_along_axis(F[self.face], self.corner, axis=1))
 
 
 class Turned(NamedTuple):
-    """Faces whose row was reversed, so that corner c became corner 2 - c.
+    """Faces turned over by reversing their rows: corner c became corner 2 - c.
 
     Attributes
     ----------
     turned : (m,) bool
-        Which.
+        Mask of these faces.
     """
 
     turned: BoolArray
 
     def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The points (k,), (k, 3) afterwards."""
+        """Faces (k,) and barycentric coordinates (k, 3) of points after the change."""
         return faces, np.where(self.turned[faces, None], barycentric[:, ::-1], barycentric)
 
 
 class Flipped(NamedTuple):
-    """Edges, no two in one face, that were flipped at once.
+    """Edges flipped at once, no two in one face.
 
     Attributes
     ----------
     half_edge, mate : (k,) int64
-        The two sides of each edge. Before: corner p opposite `half_edge` ab, corner q opposite `mate` ba. After: the
-        face of the first is paq, that of the second qbp, with p and q where they were.
+        The two half-edges of each edge. Before: `half_edge` ab opposite corner p, `mate` ba opposite corner q. After:
+        the first face is paq, the second qbp; p and q are the same corners as before.
     lengths : (5, k) float64
         Of ab, pa, bp, aq and qb.
     """
@@ -81,7 +75,7 @@ class Flipped(NamedTuple):
     lengths: FloatArray
 
     def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The points (k,), (k, 3) afterwards."""
+        """Faces (k,) and barycentric coordinates (k, 3) of points after the change."""
         sides = np.concatenate([self.half_edge, self.mate])
         ascending = np.argsort(sides // 3)
         place = np.searchsorted(sides[ascending] // 3, faces)
@@ -92,13 +86,13 @@ class Flipped(NamedTuple):
         side = ascending[place[moved]]
         edge, in_second = side % len(self.mate), side >= len(self.mate)
         ab, pa, bp, aq, qb = self.lengths[:, edge]
-        # a at the origin, b on the first axis, p above and q below it.
+        # a at the origin, b on the first axis, p above the axis and q below.
         (px, py), (qx, qy) = apex(ab, pa, bp), apex(ab, aq, qb)
         corner = (sides[side, None] + np.arange(3)) % 3
         at_apex, at_tail, at_head = np.take_along_axis(barycentric[moved], corner, axis=1).T
         x = np.where(in_second, at_tail * ab + at_apex * qx, at_head * ab + at_apex * px)
         y = at_apex * np.where(in_second, -qy, py)
-        # Twice the areas that pq spans with the point, with a and with b: above 0 on the side of a.
+        # Twice the signed areas of the triangles of pq with the point, a and b: positive on the side of a.
         of_point = (px - qx) * (y + qy) - (py + qy) * (x - qx)
         of_a, of_b = (px - qx) * qy + (py + qy) * qx, (px - qx) * qy - (py + qy) * (ab - qx)
         in_first = of_point >= 0

@@ -1,15 +1,19 @@
-"""Files: meshes in, meshes with attributes out, curves out."""
+"""Files: reading meshes, writing meshes with vertex attributes, and writing curves."""
 
+from heat_igl.io.atomic import complete_file
 from heat_igl.io.curves import CURVE_SUFFIXES, write_curves
-from heat_igl.io.files import MESH_SUFFIXES, read_attributes, read_mesh, read_polygon_mesh, replacing, write_mesh
+from heat_igl.io.files import MESH_SUFFIXES, read_attributes, read_mesh, read_polygon_mesh, write_mesh
+from heat_igl.io.objects import MeshLike, as_mesh
 
 __all__ = [
+    "MeshLike",
+    "as_mesh",
     "CURVE_SUFFIXES",
     "MESH_SUFFIXES",
+    "complete_file",
     "read_attributes",
     "read_mesh",
     "read_polygon_mesh",
-    "replacing",
     "write_curves",
     "write_mesh",
 ]

@@ -1,4 +1,4 @@
-"""What a file holds, checked with the place of the first offender before `heat_igl.Mesh` sees it."""
+"""The contents of a mesh file, and checks whose errors name the position in the file."""
 
 from __future__ import annotations
 
@@ -44,8 +44,7 @@ class Contents(NamedTuple):
     def F(self) -> IntArray:
         """Triangles (m, 3) or tetrahedra (m, 4); a polygon becomes the fan of triangles around its first corner.
 
-        That is right for convex polygons that are roughly planar; others should be triangulated by the program that
-        made them.
+        The fan is correct for convex, roughly planar polygons. Other polygons should be triangulated before saving.
         """
         if self.cells.tetrahedra:
             return self.cells.corners.reshape(-1, 4)
@@ -53,7 +52,7 @@ class Contents(NamedTuple):
 
 
 def integers(values: FloatArray, where: Callable[[int], str], what: str = "index") -> IntArray:
-    """`values` as integers; `where(i)` says in an error where the i-th comes from."""
+    """`values` as integers; `where(i)` is the position of the i-th value in the file, for errors."""
     bad = ~(np.abs(values) < 2.0**53) | (values != np.rint(values))
     if bad.any():
         i = int(np.argmax(bad))
@@ -73,14 +72,15 @@ def check(
     cells : Cells
         Indices from 0.
     vertex_at, cell_at : callable
-        Where in the file a vertex or a cell stands, for errors.
+        Position of a vertex or a cell in the file, for errors.
     base : int
-        The first index as the file format counts, for errors.
+        The first index in the file format, 0 or 1, for errors.
 
     Raises
     ------
     MeshError
-        Naming the place of the first offender, and how many there are.
+        If a position is not finite, an index is out of range, or a cell repeats a vertex. The message names the
+        position of the first offender and the number of offenders.
     """
     corners, degree = cells.corners, cells.degree
     n = len(V)
@@ -110,18 +110,23 @@ _CORNERS = {"triangle": 3, "quad": 4, "tetra": 4}
 
 
 def select(path: Path, blocks: list[tuple[str, IntArray]]) -> Cells:
-    """The domain among the cells of a file that may hold several kinds.
+    """Select the cells of the domain from a file with cells of several kinds.
 
-    Tetrahedra where there are any, since the triangles beside them are their boundary; else triangles, quadrilaterals
-    and polygons. Points and lines are left out. A cell of another kind is an error, since a domain without
-    it would have a hole.
+    If there are tetrahedra, they are the domain, since the triangles in such files are the boundary. Otherwise the
+    domain consists of triangles, quadrilaterals and polygons. Points and lines are ignored. Cells of other kinds are
+    an error, since without them the domain would have holes.
 
     Parameters
     ----------
     path : Path
-        Named in errors.
+        Path of the file, for errors.
     blocks : list of (str, (k, d) int64)
-        Kind, in the words of meshio ("triangle", "tetra10", ...), and vertex indices from 0.
+        Kind, named as in meshio ("triangle", "tetra10", ...), and vertex indices from 0.
+
+    Raises
+    ------
+    MeshError
+        If the file has unsupported cells, or neither polygons nor tetrahedra.
     """
     blocks = [(kind, rows) for kind, rows in blocks if len(rows) and not kind.startswith(("vertex", "line"))]
     for kind, rows in blocks:

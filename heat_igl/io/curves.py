@@ -1,4 +1,4 @@
-"""Curves on a surface to files that drawing programs read: OBJ lines, SVG and DXF."""
+"""Writing curves on a surface to files: OBJ lines, SVG and DXF."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl.errors import MissingExtraError
-from heat_igl.io.files import replacing
+from heat_igl.io.atomic import replacing
 from heat_igl.io.text import format_rows
 from heat_igl.mesh import Mesh, SurfaceCurve
 from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["CURVE_SUFFIXES", "write_curves"]
 
-# A mesh is flat when no vertex is farther than this off its plane, as a fraction of its extent.
+# A mesh is flat if all vertices are at most this far from a plane, as a fraction of the extent.
 _FLAT = 1e-9
-# Width of a line in an SVG file, as a fraction of the drawing's larger side.
+# Width of a line in an SVG file, as a fraction of the larger side of the drawing.
 _LINE = 1 / 500
 
 Curves = Sequence[SurfaceCurve] | Mapping[str, Sequence[SurfaceCurve]]
@@ -33,31 +33,31 @@ def write_curves(
     Parameters
     ----------
     path : path-like
-        The extension names the format: .obj (a polyline ``l`` for each curve), .svg (a drawing in the plane) or .dxf
-        (three-dimensional polylines). An existing file is replaced once the new one is complete.
+        The extension selects the format: .obj (a polyline ``l`` for each curve), .svg (a drawing in the plane) or .dxf
+        (three-dimensional polylines). An existing file is replaced only when the new one is complete.
     mesh : Mesh
-        The triangles that the curves lie on.
+        Triangles on which the curves lie.
     curves : sequence of SurfaceCurve, or mapping of str to such
-        For instance isolines or paths. Names make groups (OBJ, SVG) or layers (DXF).
+        For instance isolines or paths. The keys of a mapping become groups (OBJ, SVG) or layers (DXF).
     projection : (2, 3) array_like, optional
-        For .svg: how a position becomes x and y, y upwards. By default positions in the plane of a flat mesh, at their
-        true lengths: x and y themselves where that plane is one of equal z.
+        For .svg: the matrix that maps a position to x and y, with y upwards. By default the mesh must be flat and is
+        drawn in the plane of the mesh with true lengths; if z is constant, x and y are used unchanged.
 
     Raises
     ------
     ValueError
-        If the extension is unknown, the mesh is not flat and no projection is given, or a projection makes no sense.
+        If the extension is unknown, the projection is invalid, or an .svg file needs one because the mesh is not flat.
     MeshError
         If the file cannot be written.
     SourceError
-        If a curve lies on faces that the mesh has not.
+        If a curve lies on faces outside the mesh.
     MissingExtraError
         For .dxf without ezdxf.
 
     Notes
     -----
-    Coordinates are in the mesh's unit and in double precision in every format. In SVG, whose y runs downwards, they are
-    turned upside down, and a line is a 500th of the drawing wide.
+    Coordinates are in the unit of the mesh and in double precision. SVG files contain -y, since y points downwards in
+    SVG, and the width of a line is 1/500 of the drawing.
     """
     target = Path(os.fspath(path))
     write = _FORMATS.get(target.suffix.lower())
@@ -113,7 +113,7 @@ def _write_obj(path: Path, lines: _Lines) -> None:
 
 
 def _write_svg(path: Path, lines: _Lines) -> None:
-    from xml.sax.saxutils import quoteattr  # which loads a web client
+    from xml.sax.saxutils import quoteattr  # imported here, since it loads a web client
 
     points = np.concatenate([P for group in lines.values() for P, _ in group] or [np.zeros((1, 2))])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -137,10 +137,8 @@ def _write_svg(path: Path, lines: _Lines) -> None:
 
 
 def _write_dxf(path: Path, lines: _Lines) -> None:
-    try:
+    with MissingExtraError.guard("a .dxf file", "ezdxf", "io"):
         from ezdxf.filemanagement import new
-    except ImportError:
-        raise MissingExtraError.of("a .dxf file", "ezdxf", "io") from None
     document = new("R2010")
     space = document.modelspace()
     for name, group in lines.items():

@@ -1,18 +1,15 @@
-"""Mesh files: OFF, OBJ, PLY, STL, MESH, MSH and VTU, by extension.
+"""Reading and writing mesh files: OFF, OBJ, PLY, STL, MESH, MSH and VTU, selected by the extension.
 
-Every way in which a file can be wrong is a `MeshError` that names the file, the place and the remedy; nothing is
-allocated on the word of a header before the size of the file confirms it.
+Every defect of a file raises a `MeshError` that names the file, the position and the remedy. Counts in headers are
+compared with the size of the file before memory is allocated.
 """
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
-import secrets
-import shutil
 import stat
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,11 +17,12 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.io import medit, msh, obj, off, ply, stl, vtu
+from heat_igl.io.atomic import replacing
 from heat_igl.io.contents import Contents
 from heat_igl.mesh import Mesh, PolygonMesh
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "read_polygon_mesh", "replacing", "write_mesh"]
+__all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "read_polygon_mesh", "write_mesh"]
 
 
 class _Format(NamedTuple):
@@ -55,29 +53,28 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     Parameters
     ----------
     path : path-like
-        The extension, in any case, names the format: .off, .obj, .ply, .stl, .mesh, .msh or .vtu.
+        The extension, in upper or lower case, selects the format: .off, .obj, .ply, .stl, .mesh, .msh or .vtu.
 
     Returns
     -------
     Mesh
-        Vertices in the file's order, also those that no face uses (STL: in the order of their first use). A
-        file with tetrahedra yields those, and not the triangles of their boundary.
+        Vertices in the order of the file, including unreferenced ones (STL: in the order of first use). If the file
+        contains tetrahedra, the mesh consists of these, without the triangles of the boundary.
 
     Raises
     ------
     MeshError
-        If the file does not exist, cannot be read, is damaged, or holds no mesh; also for a missing file, so that
-        one class covers everything that can be wrong with a mesh. The operating system's error is its cause.
+        If the file is missing, unreadable or damaged, or contains no mesh. ``__cause__`` is the error of the operating
+        system, if there is one.
     MissingExtraError
         For .vtu without meshio.
 
     Notes
     -----
-    Polygons are split into the fan of triangles around their first corner, which suits convex, roughly planar ones;
-    `read_polygon_mesh` keeps them.
-    STL has no shared vertices: equal positions are merged, and triangles that collapse by it are dropped. Materials,
-    normals, texture coordinates, colours and line elements are left out. Formats that neither count their lines
-    nor mark their end (OBJ) cannot show that they were cut between two lines.
+    A polygon is split into the fan of triangles around the first corner, which is correct for convex, roughly planar
+    polygons; `read_polygon_mesh` keeps polygons. STL has no shared vertices: equal positions are merged, and triangles
+    that collapse by this are removed. Materials, normals, texture coordinates, colours and line elements are ignored.
+    OBJ has neither counts nor an end mark, so a file that is truncated between two lines cannot be detected.
 
     Examples
     --------
@@ -88,7 +85,7 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
 
 
 def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
-    """Read a mesh from a file with its polygons as they are.
+    """Read a mesh from a file without splitting polygons.
 
     Parameters
     ----------
@@ -98,7 +95,7 @@ def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
     Returns
     -------
     PolygonMesh
-        With the vertices that `read_mesh` gives.
+        The vertices are those of `read_mesh`.
 
     Raises
     ------
@@ -128,8 +125,7 @@ def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
     Returns
     -------
     dict of str to (n,) or (n, k) array
-        In the type that the file stores; arrays from `write_mesh` come back as the same double precision numbers,
-        bit for bit.
+        Arrays in the type of the file. Arrays written by `write_mesh` are read back bit for bit.
 
     Raises
     ------
@@ -150,13 +146,13 @@ def write_mesh(path: str | os.PathLike[str], mesh: Mesh, /, **attributes: ArrayL
     Parameters
     ----------
     path : path-like
-        The extension names the format, as for `read_mesh`. An existing file is replaced, but only once the new one is
-        complete: a failed write leaves the old file as it was, and nothing half-written.
+        The extension selects the format, as for `read_mesh`. An existing file is replaced only when the new one is
+        complete; a failed write leaves the old file unchanged and no partial file.
     mesh : Mesh
         Triangles, or (.mesh, .msh, .vtu) tetrahedra.
     **attributes : (n,) or (n, k) array_like of real numbers
-        Arrays per vertex, stored in double precision in .ply and .vtu files, infinite values included. PLY spreads
-        an array (n, k) over properties ``name_0``, ``name_1``, ...; `read_attributes` puts it together again.
+        Arrays per vertex, stored in .ply and .vtu files in double precision, including infinite values. In PLY an array
+        (n, k) becomes properties ``name_0``, ``name_1``, ..., which `read_attributes` combines again.
 
     Raises
     ------
@@ -168,8 +164,9 @@ def write_mesh(path: str | os.PathLike[str], mesh: Mesh, /, **attributes: ArrayL
 
     Notes
     -----
-    Coordinates read back exactly the same: text formats write the shortest decimal number that does. STL is written as
-    text, since binary STL is single precision; it loses the order of the vertices and those without a face.
+    Coordinates are read back exactly: text formats contain the shortest decimal number that rounds to the same double.
+    STL is written as text, since binary STL has single precision. STL files lose the order of the vertices and all
+    unreferenced vertices.
 
     Examples
     --------
@@ -217,7 +214,7 @@ def _load(path: str | os.PathLike[str]) -> tuple[Path, Contents]:
     path = _checked(path)
     try:
         mode = path.stat().st_mode
-        # A pipe or a device might never end.
+        # Reading a pipe or a device might not terminate.
         if not stat.S_ISREG(mode):
             kind = "a directory" if stat.S_ISDIR(mode) else "not a regular file"
             raise MeshError(f"{path} is {kind}: pass the path of a mesh file")
@@ -256,30 +253,3 @@ def _arrays(attributes: Mapping[str, ArrayLike], n: int) -> dict[str, FloatArray
             raise MeshError(f"{name} holds integers beyond 2**53, which double precision cannot store exactly")
         found[name] = stored
     return found
-
-
-@contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path`, which takes its place when the block ends well.
-
-    Raises
-    ------
-    MeshError
-        If the file cannot be written.
-    """
-    try:
-        # Through symbolic links, which should go on pointing where they do.
-        target = Path(os.path.realpath(path))
-        temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(4)}{target.suffix}")
-        if target.exists() and not target.is_file():
-            raise MeshError(f"{path} is not a regular file: it cannot be replaced")
-        try:
-            yield temporary
-            if target.exists():
-                shutil.copymode(target, temporary)
-            temporary.replace(target)
-        finally:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise MeshError(f"{path} cannot be written: {error.strerror or error}") from error

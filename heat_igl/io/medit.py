@@ -1,7 +1,8 @@
 """MESH, the text format of Medit: tetrahedra or triangles.
 
-Own code: meshio reads version 1 files, which libigl writes with all digits, in single precision, takes a file that is
-cut before its tetrahedra for a surface, index 0 for the last vertex, and fails where a count shares a keyword's line.
+meshio is not used, since it reads version 1 files in single precision (libigl writes them with all digits), accepts a
+file that is truncated before the tetrahedra as a surface, treats index 0 as the last vertex, and fails if a count
+follows the keyword on the same line.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ _CELLS = {
     "hexahedra": ("hexahedron", 8),
     "hexaedra": ("hexahedron", 8),
 }
-# Sections without vertices or cells. A word outside this list is an error, because a damaged keyword that is passed
-# over would take its section with it.
+# Sections without vertices or cells, which are ignored. Any other keyword is an error: it may be a damaged keyword of
+# a section with cells.
 _WITHOUT_CELLS = (
     "edges corners ridges requiredvertices requirededges requiredtriangles requiredquadrilaterals requiredtetrahedra "
     "paralleledges paralleltriangles normals tangents normalatvertices normalattrianglevertices "
@@ -48,8 +49,8 @@ class _Section:
         self.lines: IntArray = np.arange(line, end)
 
     def rows(self, width: int) -> FloatArray:
-        """The rows of numbers that the section's first number counts."""
-        # The keyword is left out by hand, since the count may stand beside it or below it.
+        """The rows of numbers; the first number of the section is the number of rows."""
+        # The count may follow the keyword on the same line or on the next one.
         beside, _ = self.text.numbers(self.lines[:1], skip=1)
         below, _ = self.text.numbers(self.lines[1:])
         values = np.concatenate([beside, below])
@@ -65,7 +66,7 @@ class _Section:
         return values[1:].reshape(n, width)
 
     def number(self) -> int:
-        """The one number of a section that holds no rows."""
+        """The single number of a section without rows."""
         beside, _ = self.text.numbers(self.lines[:1], skip=1)
         below, _ = self.text.numbers(self.lines[1:])
         values = integers(np.concatenate([beside, below]), lambda _: self.text.where(self.line), "number")

@@ -1,7 +1,7 @@
 """MSH, the format of Gmsh: versions 2 and 4.1, text and binary.
 
-Own code: meshio takes a reference to node 0 for the last node, accepts a file that is cut off with a printed
-warning, and needs memory in proportion to the largest node number, which is 1.5 GB for four nodes numbered up to 4e8.
+meshio is not used, since it treats node 0 as the last node, accepts a truncated file with a printed warning, and needs
+memory in proportion to the largest node number: 1.5 GB for four nodes with numbers up to 4e8.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _ELEMENTS = {
 
 
 class _Section:
-    """The numbers of one section, taken off its front."""
+    """One section of the file; methods consume the numbers from the front."""
 
     def __init__(self, path: Path, data: bytes, name: str, begin: int, order: str, size: int) -> None:
         opening = re.compile(rb"^\$" + name.encode() + rb"[ \t]*\r?\n", re.MULTILINE).search(data, begin)
@@ -51,13 +51,13 @@ class _Section:
             body = data[self._at : self._end]
             if not body.strip():
                 raise MeshError(f"{self.where}: the section is empty")
-            # Blank lines in place of what came before keep the line numbers right.
+            # Blank lines replace the text before the section, so that errors give the right line numbers.
             self.text = Text(path, b"\n" * data.count(10, 0, self._at) + body)
             self.values, self.line_start = self.text.numbers(np.arange(len(self.text)))
             self._at = 0
 
     def take(self, count: int, kind: str) -> FloatArray:
-        """The next `count` numbers, which binary files store as `kind`: "int", "size" or "real"."""
+        """The next `count` numbers; `kind` is the binary type: "int", "size" or "real"."""
         if self.order:
             return self.records(count, self._dtypes[kind]).astype(np.float64)
         if count > len(self.values) - self._at:
@@ -74,14 +74,14 @@ class _Section:
         return found
 
     def counts(self, count: int, kind: str) -> list[int]:
-        """The next `count` numbers, which must be whole and not negative."""
+        """The next `count` numbers, which must be nonnegative integers."""
         found = integers(self.take(count, kind), lambda _: self.where, "count").tolist()
         if min(found) < 0:
             raise MeshError(f"{self.where}: {min(found)} is no count: the file is damaged")
         return [int(number) for number in found]
 
     def total(self) -> int:
-        """The count at the start of a section of version 2, which is text in binary files too."""
+        """The count at the start of a section in version 2; it is text in binary files too."""
         if not self.order:
             if self.text.count[0] != 1:
                 raise self.text.error(0, "expected a count, alone on its line")
@@ -93,18 +93,18 @@ class _Section:
         return int(line[1])
 
     def tags(self, values: FloatArray) -> IntArray:
-        """Numbers of nodes."""
+        """`values` as node numbers."""
         return integers(values.ravel(), lambda _: self.where, "node number").reshape(values.shape)
 
     def short(self) -> MeshError:
         return MeshError(f"{self.where}: fewer numbers than announced: the file is cut short, or its counts are wrong")
 
     def skip_text(self) -> None:
-        """Count all numbers of a text section as taken."""
+        """Skip the remaining numbers of a text section."""
         self._at = len(self.values)
 
     def close(self) -> int:
-        """Where the section ends; nothing may be left in it."""
+        """The end of the section in the file; raises MeshError if numbers are left."""
         if not self.order:
             if self._at < len(self.values):
                 raise MeshError(f"{self.where}: {len(self.values) - self._at} more numbers than announced")
@@ -144,7 +144,7 @@ def _elements_2(section: _Section) -> Blocks:
             blocks.append((kind, section.tags(rows[:, 1 + n_tags :])))
             n -= max(k, 1)
         return blocks
-    # One element per line: number, type, how many tags, tags, nodes.
+    # One element per line: number, type, number of tags, tags, nodes.
     text, start = section.text, section.line_start[1:]
     if len(start) != n:
         raise MeshError(f"{section.where}: {n} elements are announced, but {len(start)} lines follow")
@@ -173,7 +173,7 @@ def _nodes_4(section: _Section) -> tuple[IntArray, FloatArray]:
         dimension, _, parametric = integers(section.take(3, "int"), lambda _: section.where, "entity").tolist()
         (k,) = section.counts(1, "size")
         tags.append(section.take(k, "size"))
-        # Nodes of a parametrized entity carry their parameters behind the position.
+        # Nodes of a parametrized entity have parameters after the position.
         width = 3 + (min(max(dimension, 0), 3) if parametric == 1 else 0)
         positions.append(section.take(k * width, "real").reshape(k, width)[:, :3])
     tag = section.tags(np.concatenate(tags))
@@ -197,7 +197,7 @@ def _elements_4(section: _Section) -> Blocks:
 
 
 def _positions(section: _Section, tag: IntArray, blocks: Blocks) -> Blocks:
-    """Where in the list of nodes those of each element stand; node numbers may have gaps and any order."""
+    """Replace node numbers, which may have gaps and any order, by positions in the list of nodes."""
     order = np.argsort(tag, kind="stable")
     ascending = tag[order]
     twice = np.flatnonzero(ascending[1:] == ascending[:-1])
@@ -253,7 +253,7 @@ def read(path: Path, data: bytes) -> Contents:
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:  # noqa: ARG001
-    """Write triangles or tetrahedra as text MSH of version 2.2, which most programs read."""
+    """Write triangles or tetrahedra as text MSH, version 2.2, which most programs can read."""
     number = 4 if mesh.is_tetrahedral else 2
     vertices = np.column_stack([np.arange(1, mesh.n_vertices + 1), mesh.V])
     faces = np.column_stack([np.arange(1, mesh.n_faces + 1), mesh.F + 1])

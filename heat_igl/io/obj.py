@@ -1,6 +1,6 @@
-"""OBJ: its polygons and vertices; materials, normals and lines are passed over.
+"""OBJ: vertices and polygons; materials, normals and lines are ignored.
 
-Own code, since meshio takes no polygons of mixed degree, no negative indices and any text whatsoever.
+meshio is not used, since it rejects polygons of mixed degree and negative indices, and accepts arbitrary text.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from heat_igl.typing import FloatArray
 
 __all__ = ["read", "write"]
 
-# Records that say nothing about vertices and polygons. A word outside this list is an error, because a damaged "v"
-# that is passed over would shift every index after it.
+# Records that are ignored. Any other word is an error: ignoring a damaged "v" would shift all indices after it.
 _PASSED_OVER = (
     b"vt vn vp vc l p g o s mg usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj ctech "
     b"stech cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con call csh"
@@ -53,7 +52,7 @@ def read(path: Path, data: bytes) -> Contents:
         line = F_lines[np.searchsorted(end, np.argmax(number == 0), side="right")]
         raise text.error(line, f"vertex 0 ({int((number == 0).sum())} such indices): OBJ counts vertices from 1")
     if (number < 0).any():
-        # -1 is the latest vertex above the line.
+        # -1 is the last vertex before this line.
         above = np.repeat(np.cumsum(is_v)[F_lines], degree)
         corners = np.where(number < 0, above + number, number - 1)
     else:

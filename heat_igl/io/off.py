@@ -1,4 +1,7 @@
-"""OFF: counts, one vertex per line, one polygon per line. Own code, since meshio reads neither colours nor polygons."""
+"""OFF: counts, one vertex per line, one polygon per line.
+
+meshio is not used, since it reads neither colours nor polygons.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +18,13 @@ from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["read", "write"]
 
-# Texture coordinates (ST), colours (C) and normals (N) follow the position, so one reader serves all of them. Some
-# collections glue the first count to the keyword.
+# Texture coordinates (ST), colours (C) and normals (N) follow the position and are ignored. Some collections lack the
+# space between the keyword and the first count.
 _KEYWORD = re.compile(rb"(ST)?C?N?OFF(\d*)|(off)(\d*)")
 
 
 def _counts(text: Text) -> tuple[int, int, int]:
-    """Numbers of vertices and faces, and the line after them."""
+    """Number of vertices, number of faces, and index of the line after the counts."""
     head = text.tokens(0)
     keyword = _KEYWORD.fullmatch(head[0])
     line = 0

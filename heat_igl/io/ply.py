@@ -1,8 +1,8 @@
 """PLY, text and binary of either byte order, with attributes per vertex.
 
-Own code: meshio refuses further elements and the property name vertex_index, has no 16-bit types in binary files,
-reads unsigned bytes as signed ones, takes the bytes after a list for the next list, and leaves out arrays (n, k).
-libigl's reader frees memory twice on files whose properties differ in type.
+meshio is not used: it rejects additional elements and the property name vertex_index, has no 16-bit types in binary
+files, reads unsigned bytes as signed ones, reads the bytes after a list as the next list, and omits arrays (n, k).
+The reader of libigl frees memory twice if properties have different types.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def _binary(path: Path, data: bytes, header: _Header) -> Iterator[tuple[_Element
 
 
 def _equal_rows(data: bytes, at: int, element: _Element, order: str) -> AnyArray | None:
-    """The rows of an element as one structured array; None where lists differ in length."""
+    """The rows of an element as a structured array, or None if lists differ in length."""
     fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
     lists = []
     place = at
@@ -162,7 +162,7 @@ def _columns_of_equal_rows(element: _Element, rows: AnyArray) -> dict[str, _Colu
 
 
 def _unequal_rows(data: bytes, at: int, element: _Element, order: str) -> tuple[int, dict[str, _Column]]:
-    """Walk the rows, since where a list ends is only known from its length."""
+    """The columns of an element whose lists differ in length, and the position after the last row."""
     steps: list[tuple[struct.Struct | None, int, list[int], list[int]]] = []
     for prop in element.properties:
         count = struct.Struct(order + _STRUCT[prop.count_dtype]) if prop.count_dtype else None
@@ -231,7 +231,7 @@ def read(path: Path, data: bytes) -> Contents:
     if header.order:
         found = _binary(path, data, header)
     else:
-        # Blank lines in place of the header keep the line numbers right.
+        # Blank lines replace the header, so that errors give the right line numbers.
         found = _ascii(Text(path, b"\n" * header.n_lines + data[header.end :]), header)
     tables = {element.name: (element, columns) for element, columns in found}
     element, columns = tables["vertex"]
@@ -264,7 +264,7 @@ def read(path: Path, data: bytes) -> Contents:
 
 
 def _gathered(columns: dict[str, AnyArray], vectors: dict[str, int]) -> dict[str, AnyArray]:
-    """Put the properties name_0, name_1, ... of an array (n, k) together again."""
+    """Combine the properties name_0, name_1, ... to an array (n, k)."""
     for name, k in vectors.items():
         parts = [f"{name}_{i}" for i in range(min(k, len(columns) + 1))]
         if parts and name not in columns and all(part in columns for part in parts):
@@ -273,9 +273,9 @@ def _gathered(columns: dict[str, AnyArray], vectors: dict[str, int]) -> dict[str
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
-    """Write triangles as binary PLY, everything real in double precision.
+    """Write triangles as binary PLY with all real numbers in double precision.
 
-    PLY has no vectors: an array (n, k) becomes the properties name_0 to name_(k-1), and a comment says so.
+    PLY has no vectors: an array (n, k) becomes the properties name_0 to name_(k-1), and a comment records k.
     """
     columns: dict[str, FloatArray] = dict(zip("xyz", mesh.V.T, strict=True))
     header = ["ply", "format binary_little_endian 1.0"]

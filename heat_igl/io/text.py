@@ -1,7 +1,7 @@
-"""A text file as tokens, without one Python object per token.
+"""Tokens and numbers of a text file, for the readers of OFF, OBJ, PLY, STL, MESH and MSH.
 
-The readers of OFF, OBJ, PLY, STL, MESH and MSH share this: it knows where every line and every token starts, turns
-chosen lines into numbers in one call, and says in which line a bad one stands. Files of a million lines take seconds.
+`Text` stores the positions of lines and tokens as arrays, without a Python object per token, and parses the numbers of
+many lines in one call. Files of a million lines take seconds. Errors name the line of the first bad token.
 """
 
 from __future__ import annotations
@@ -27,32 +27,32 @@ def ragged(start: IntArray, length: IntArray) -> IntArray:
 
 
 def format_rows(row: str, values: AnyArray) -> str:
-    """Each row of `values` through the %-format `row`; ``%r`` writes a float so that it reads back the same."""
+    """Format each row of `values` by the %-format `row`. A float written with ``%r`` is read back exactly."""
     return (row * len(values)) % tuple(values.ravel().tolist())
 
 
 class Text:
-    """The lines of a text file that are not blank, as tokens separated by white space.
+    """The nonblank lines of a text file, split into tokens at white space.
 
     Parameters
     ----------
     path : Path
-        Named in errors.
+        Path of the file, for errors.
     data : bytes
         The content of the file.
     comment : str, optional
-        What starts a comment that runs to the end of its line.
+        Start of a comment, which extends to the end of the line.
     continued : bool, optional
-        Whether a backslash at the end of a line joins it with the next.
+        Whether a backslash at the end of a line continues the line.
 
     Attributes
     ----------
     path : Path
         As given.
     first : (k,) int64
-        Index of the first token of each line that holds one.
+        Index of the first token of each nonblank line.
     count : (k,) int64
-        How many tokens the line holds.
+        Number of tokens of each nonblank line.
 
     Raises
     ------
@@ -72,8 +72,8 @@ class Text:
             data = b"   " + data[3:]
         if b"\n" not in data:
             data = data.replace(b"\r", b"\n")
-        self._lines = data  # the line breaks as an editor counts them
-        # Comments are overwritten, not cut out, so that positions stay those of the file.
+        self._lines = data  # with all line breaks, for line numbers
+        # Comments are overwritten by blanks, so that positions in the file do not change.
         if comment and comment.encode() in data:
             data = re.sub(re.escape(comment).encode() + rb"[^\n]*", _blank, data)
         if continued and b"\\" in data:
@@ -99,18 +99,18 @@ class Text:
         return self._data[self._start[self.first[line]] : self._line_end(line)].split()
 
     def where(self, line: int) -> str:
-        """File, line number as an editor counts it, and what stands there."""
+        """Path, line number (counted from 1) and text of a line, for errors."""
         start = int(self._start[self.first[line]])
         shown = b" ".join(self.tokens(line)).decode("utf-8", "backslashreplace")
         shown = shown if len(shown) <= 60 else shown[:57] + "..."
         return f"{self.path}, line {self._lines.count(10, 0, start) + 1} ({shown})"
 
     def error(self, line: int, message: str) -> MeshError:
-        """A `MeshError` that names the line."""
+        """A `MeshError` with `message` that names the line."""
         return MeshError(f"{self.where(line)}: {message}")
 
     def words(self, width: int, lines: IntArray | None = None) -> AnyArray:
-        """The first `width` bytes of the first token of each line (or each of `lines`), as byte strings."""
+        """The first token of each line (or each of `lines`), cut to `width` bytes, as byte strings."""
         first = self.first if lines is None else self.first[lines]
         start, length = self._start[first], self._end[first] - self._start[first]
         letters = np.zeros((len(first), width), np.uint8)
@@ -125,30 +125,30 @@ class Text:
         Parameters
         ----------
         lines : (r,) int64
-            Ascending positions in `first`.
+            Ascending line indices: positions in `first`.
         skip : int, optional
-            How many leading tokens of each line to leave out.
+            Number of leading tokens to skip in each line.
         up_to_slash : bool, optional
-            Whether ``12/3/4`` stands for 12.
+            Whether to read ``12/3/4`` as 12.
 
         Returns
         -------
         values : (t,) float64
-            One for each token.
+            One number for each token.
         start : (r,) int64
-            Where in `values` each line starts.
+            Index in `values` of the first number of each line.
 
         Raises
         ------
         MeshError
-            Naming the first token that is no number.
+            If a token is not a number; the message names the first such token.
         """
         count = np.maximum(self.count[lines] - skip, 0)
         start = np.cumsum(count) - count
         filled = lines[count > 0]
         if not len(filled):
             return np.empty(0), start
-        # Everything else is overwritten by blanks, and one call parses what is left.
+        # All other tokens are overwritten by blanks; then one call parses the numbers.
         begin = self._start[self.first[filled] + skip]
         end = self._end[self.first[filled] + self.count[filled] - 1]
         codes = self._codes[begin[0] : end[-1]]
@@ -163,14 +163,14 @@ class Text:
             codes[slash > blank] = _SPACE
         try:
             values = np.fromstring(codes.tobytes(), np.float64, sep=" ")
-        except (ValueError, DeprecationWarning):  # which of them depends on the version of numpy
+        except (ValueError, DeprecationWarning):  # the exception depends on the version of numpy
             values = np.empty(0)
         if len(values) != count.sum():
             raise self._not_a_number(filled, skip, up_to_slash)
         return values, start
 
     def all_numbers(self) -> FloatArray:
-        """The numbers of all lines; for files in which lines have no meaning."""
+        """The numbers of all lines, for formats in which line breaks have no meaning."""
         return self.numbers(np.arange(len(self)))[0]
 
     def _line_end(self, line: int) -> int:

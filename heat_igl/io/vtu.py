@@ -1,4 +1,4 @@
-"""VTU, the XML format of VTK, through meshio: triangles or tetrahedra with attributes per vertex."""
+"""VTU, the XML format of VTK, by meshio: triangles or tetrahedra with vertex attributes."""
 
 from __future__ import annotations
 
@@ -21,16 +21,14 @@ __all__ = ["read", "write"]
 
 
 def _meshio(purpose: str) -> Any:
-    try:
+    with MissingExtraError.guard(f"{purpose} .vtu files", "meshio", "io"):
         import meshio
-    except ImportError:
-        raise MissingExtraError.of(f"{purpose} .vtu files", "meshio", "io") from None
     return meshio
 
 
 @contextlib.contextmanager
 def _strict(path: Path, purpose: str) -> Iterator[None]:
-    """Make every way in which meshio fails a `MeshError`: exceptions of any class, `sys.exit`, printed warnings."""
+    """A context that turns every failure of meshio into a `MeshError`: exceptions, `sys.exit`, printed warnings."""
     printed = io.StringIO()
     try:
         with warnings.catch_warnings(), contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
@@ -55,7 +53,7 @@ def read(path: Path, data: bytes) -> Contents:
         raise MeshError(f"{path}: the grid is in {pieces} pieces, and only one is supported: merge them before saving")
     meshio = _meshio("reading")
     with _strict(path, "read"):
-        # Not meshio.read, which prints what is wrong and ends the program.
+        # meshio.read would print the error and end the program.
         found = meshio.vtu.read(str(path))
         V: FloatArray = np.asarray(found.points, np.float64).reshape(-1, 3)
         blocks = [(str(block.type), np.asarray(block.data, np.int64)) for block in found.cells]

@@ -1,11 +1,13 @@
 """What distance is measured on: meshes of triangles, tetrahedra and polygons, images, and points and curves on them."""
 
-from heat_igl.mesh.mesh import DELAUNAY_TOLERANCE, RANGE_LIMIT, Mesh, MeshReport, checked_positions
-from heat_igl.mesh.pixels import ImageDomain, image_domain
+from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
+from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
 from heat_igl.mesh.polygons import PolygonMesh, triangle_fans, which_repeat_a_vertex
-from heat_igl.mesh.projection import ClosestPoints, closest_points, curve_on, edge_curve
+from heat_igl.mesh.projection import ClosestPoints, closest_points
+from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
 from heat_igl.mesh.subdivision import split_long_edges
-from heat_igl.mesh.surface_points import SurfaceCurve, SurfacePoints
+from heat_igl.mesh.surface_curves import curve_on, edge_curve
+from heat_igl.mesh.surface_points import ON_SIDE, ON_SIDE_COMPUTED, SurfaceCurve, SurfacePoints
 
 __all__ = [
     "ClosestPoints",
@@ -13,10 +15,12 @@ __all__ = [
     "ImageDomain",
     "Mesh",
     "MeshReport",
+    "ON_SIDE",
+    "ON_SIDE_COMPUTED",
     "PolygonMesh",
-    "RANGE_LIMIT",
     "SurfaceCurve",
     "SurfacePoints",
+    "checked_faces",
     "checked_positions",
     "closest_points",
     "curve_on",

@@ -1,6 +1,6 @@
-"""What the faces alone say: edges, boundary, components, defects. Positions play no part.
+"""Connectivity: edges, boundary, components and defects of faces, and paths along edges of given length.
 
-A *facet* is what two neighbouring simplices share: an edge of a triangle, a triangle of a tetrahedron.
+A *facet* is a face of a simplex: an edge of a triangle, a triangle of a tetrahedron. Neighbouring simplices share one.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
+from heat_igl.mesh.grouping import group_by_label
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "boundary_loops",
     "connected_components",
     "duplicate_faces",
+    "edge_distance",
     "edges",
     "facets",
     "longest_path",
@@ -39,7 +41,7 @@ class Facets(NamedTuple):
     of_face : (m, d + 1) int64
         ``of_face[f, c]`` is the facet of face ``f`` opposite its corner ``c``.
     n_faces : (k,) int64
-        How many faces hold the facet: 1 on the boundary, 2 inside, more where the mesh is not manifold.
+        Number of faces at the facet: 1 on the boundary, 2 inside, more if the mesh is not manifold.
     """
 
     vertices: IntArray
@@ -50,14 +52,14 @@ class Facets(NamedTuple):
 def unique_rows(rows: IntArray, n: int) -> tuple[IntArray, IntArray, IntArray]:
     """Distinct rows of small non-negative integers, with the inverse map and the counts.
 
-    In linear time, a tenth of that of `numpy.unique` with ``axis=0`` or less.
+    Linear time; at least ten times as fast as `numpy.unique` with ``axis=0``.
 
     Parameters
     ----------
     rows : (r, d) int64
         Values in ``range(n)``.
     n : int
-        Exclusive upper bound of the values; as many integers are held in passing.
+        Exclusive upper bound of the values; the sort needs a temporary array of n integers.
 
     Returns
     -------
@@ -66,13 +68,11 @@ def unique_rows(rows: IntArray, n: int) -> tuple[IntArray, IntArray, IntArray]:
     inverse : (r,) int64
         ``rows == rows[first][inverse]``.
     counts : (k,) int64
-        How often each occurs.
+        Number of copies of each.
     """
     ascending = np.arange(len(rows))
     for column in rows.T[::-1]:
-        # From rows to columns scipy goes by counting, and keeps the order within each.
-        keys = sp.csr_array((ascending, column[ascending], [0, len(rows)]), shape=(1, n))
-        ascending = keys.tocsc().data
+        ascending = group_by_label(column[ascending], n, ascending).members
     is_new = np.zeros(len(rows), bool)
     is_new[:1] = True
     for column in rows.T:
@@ -95,7 +95,7 @@ def facets(F: IntArray, n: int) -> Facets:
     """The distinct facets of `F`: edges of triangles, triangles of tetrahedra."""
     size = F.shape[1]
     if size == 3:
-        ends = F[:, [1, 2, 0]], F[:, [2, 0, 1]]  # sorting rows of two takes several times as long
+        ends = F[:, [1, 2, 0]], F[:, [2, 0, 1]]  # several times as fast as sorting rows of two
         rows = np.stack([np.minimum(*ends).ravel(), np.maximum(*ends).ravel()], axis=1)
     else:
         opposite = np.stack([np.delete(F, corner, axis=1) for corner in range(size)], axis=1)
@@ -108,7 +108,7 @@ def facets(F: IntArray, n: int) -> Facets:
 
 
 def _ascending(F: IntArray) -> IntArray:
-    """The rows of `F`, each sorted; triangles by columns, since sorting short rows takes several times as long."""
+    """The rows of `F`, each sorted; triangles by columns, which is several times as fast as sorting short rows."""
     if F.shape[1] != 3:
         return np.sort(F, axis=1)
     lowest, highest = reduce(np.minimum, F.T), reduce(np.maximum, F.T)
@@ -134,7 +134,7 @@ def boundary_loops(found: Facets, n: int) -> int:
 
 
 def duplicate_faces(F: IntArray, n: int) -> IntArray:
-    """Indices of the faces that have the same vertices, in any order, as an earlier face."""
+    """Indices of the faces with the same vertices, in any order, as an earlier face."""
     first, _, _ = unique_rows(_ascending(F), n)
     repeated = np.ones(len(F), bool)
     repeated[first] = False
@@ -144,8 +144,8 @@ def duplicate_faces(F: IntArray, n: int) -> IntArray:
 def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
     """Vertices whose faces do not form one fan: two cones that touch in a point, or more than two faces on an edge.
 
-    Ends of edges are the nodes of a graph, and each corner of a face joins those of its two sides; a manifold vertex
-    has one connected piece. Defined for triangle meshes.
+    For triangle meshes. The nodes of a graph are the ends of all edges. Each corner of a face joins two nodes: the ends
+    there of its two sides. The nodes at a manifold vertex form one connected component.
     """
     edge = found.of_face.T.astype(np.int32)  # opposite each corner
     joined = []
@@ -168,8 +168,8 @@ def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
 def longest_path(graph: sp.csr_array, components: IntArray) -> float:
     """Length of a longest shortest path along edges, over all components.
 
-    Two rounds of Dijkstra, the second from the farthest vertices of the first; exact on a tree, and a lower bound
-    within a few percent on surfaces.
+    Two rounds of Dijkstra's algorithm, the second from the farthest vertices of the first: exact on a tree, and a lower
+    bound within a few percent on surfaces.
 
     Parameters
     ----------
@@ -189,8 +189,26 @@ def longest_path(graph: sp.csr_array, components: IntArray) -> float:
 
 
 def shortest_edge_graph(edges: IntArray, lengths: FloatArray, n: int) -> sp.csr_array:
-    """Edge lengths as a graph (n, n); of several edges between the same two vertices the shortest."""
+    """Edge lengths as a graph (n, n), each edge once; of several edges between the same two vertices, the shortest."""
     ascending = np.argsort(lengths, kind="stable")
     pairs = np.sort(edges, axis=1)[ascending]
     first, _, _ = unique_rows(pairs, n)
     return sp.csr_array((lengths[ascending][first], tuple(pairs[first].T)), shape=(n, n))
+
+
+def edge_distance(graph: sp.csr_array, sources: IntArray, *, count_edges: bool = False) -> FloatArray:
+    """Length (n,) of the shortest path along edges from each vertex to the nearest source (Dijkstra 1959).
+
+    Never below the geodesic distance; ``inf`` at vertices that no path joins with a source.
+
+    Parameters
+    ----------
+    graph : (n, n) csr_array
+        Edge lengths, each edge stored in one direction or both; a stored 0 is an edge of length 0.
+    sources : (k,) int64
+        Source vertices.
+    count_edges : bool
+        Count edges instead of adding up their lengths.
+    """
+    found = csgraph.dijkstra(graph, directed=False, indices=sources, unweighted=count_edges, min_only=True)
+    return np.asarray(found, np.float64)

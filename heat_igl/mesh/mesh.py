@@ -1,12 +1,12 @@
-"""The mesh: validated once at the border, read-only afterwards.
+"""Meshes of triangles or tetrahedra, validated on construction and read-only afterwards.
 
-libigl trusts its input (a face index out of range corrupts memory), so everything that reaches it passes here first.
+libigl trusts its input: a face index out of range corrupts memory. So every array is validated before libigl sees it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from functools import cached_property, reduce
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 from typing import TypeVar
 
@@ -16,23 +16,14 @@ import scipy.sparse as sp
 
 from heat_igl.errors import MeshError
 from heat_igl.mesh import connectivity
+from heat_igl.mesh.report import MeshReport, mesh_report
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["DELAUNAY_TOLERANCE", "RANGE_LIMIT", "Mesh", "MeshReport", "checked_positions"]
+__all__ = ["Mesh", "checked_faces", "checked_positions"]
 
-# How many lengths sqrt(t) the heat survives in double precision: values run from 1e290 (the rest is left for the
-# gradient's 1 / length) down to 1e-300, 590 decades or 1358 e-foldings, less a margin for the first step away.
-RANGE_LIMIT = 1300.0
-
-# An edge is flipped when the cotangents opposite it sum to less than this. Cocircular corners (every quad of a grid, a
-# cylinder or a torus) sum to zero up to rounding; flipping those would change nothing but the bits, and a larger
-# tolerance keeps the choice of diagonal the same when such a mesh is moved far from the origin (rounding 1e-9).
-DELAUNAY_TOLERANCE = -1e-7
-
-# Products of four lengths (areas by Heron's formula) must stay inside the double range.
+# Heron's formula multiplies four lengths, and the product must stay inside the double range.
 _LARGEST_EXTENT = 1e60
 _SMALLEST_EXTENT = 1e-60
-
 
 # Cached properties of a mesh that do not depend on its positions.
 _OF_THE_FACES = {"facets", "edges", "components", "referenced", "boundary"}
@@ -46,7 +37,13 @@ def _frozen(array: ArrayT) -> ArrayT:
 
 
 def checked_positions(V: ArrayLike) -> FloatArray:
-    """`V` as a new (n, 3) float64 array, or a `MeshError` that names the first position that is none."""
+    """`V` as a new (n, 3) float64 array.
+
+    Raises
+    ------
+    MeshError
+        As for `Mesh`; the message names the first bad position.
+    """
     try:
         array = np.asarray(V)
     except ValueError as error:
@@ -71,7 +68,7 @@ def checked_positions(V: ArrayLike) -> FloatArray:
 
 
 def checked_faces(F: ArrayLike, n: int | None) -> IntArray:
-    """`F` as an array of its own: indices of `n` vertices, of as many as it names if that is None.
+    """`F` as a new (m, 3) or (m, 4) int64 array of indices below `n`; without `n`, of any indices.
 
     Raises
     ------
@@ -129,14 +126,13 @@ class Mesh:
     Raises
     ------
     MeshError
-        If an array has the wrong shape or type, is empty, holds a position that is not finite, an index that is no
-        vertex, or a face that repeats a vertex. The message names the first offender and how many there are.
+        If an array has the wrong shape or type or is empty, if a position is not finite, an index is out of range or a
+        face repeats a vertex. The message names the first offender and counts them.
 
     Notes
     -----
-    Both arrays are read-only, so that a solver made from the mesh cannot come to disagree with it. Meshes that are
-    merely bad (not manifold, slivers, zero areas, duplicated faces, unreferenced vertices) are accepted;
-    `report` lists what is wrong with them.
+    Both arrays are read-only, so a solver made from the mesh always agrees with it. Meshes with defects (not manifold,
+    slivers, zero areas, duplicate faces, unreferenced vertices) are accepted; `report` lists the defects.
     """
 
     V: FloatArray
@@ -163,7 +159,7 @@ class Mesh:
         object.__setattr__(self, "F", faces)
 
     def with_vertices(self, V: ArrayLike) -> Mesh:
-        """The same faces on other positions; whatever the faces alone say is shared and not found again.
+        """The same faces on other positions; properties of the faces alone are shared, not computed again.
 
         Parameters
         ----------
@@ -173,7 +169,7 @@ class Mesh:
         Raises
         ------
         MeshError
-            If V cannot be positions, or are not as many as the mesh has vertices.
+            If V is no array of positions, or has another length than the mesh has vertices.
         """
         positions = checked_positions(V)
         if len(positions) != self.n_vertices:
@@ -224,6 +220,11 @@ class Mesh:
         along = self.V[self.edges[:, 0]] - self.V[self.edges[:, 1]]
         return _frozen(np.sqrt(np.einsum("kx,kx->k", along, along)))
 
+    @property
+    def edge_graph(self) -> sp.csr_array:
+        """The edge lengths as a graph (n, n), each edge once, from its smaller vertex to its larger; not cached."""
+        return sp.csr_array((self.edge_lengths, tuple(self.edges.T)), shape=(self.n_vertices, self.n_vertices))
+
     @cached_property
     def components(self) -> IntArray:
         """Component label (n,) of each vertex; a vertex that no face uses is a component of its own."""
@@ -252,147 +253,15 @@ class Mesh:
 
     @cached_property
     def longest_distance(self) -> float:
-        """Length of a longest shortest path along edges, over all components; see `connectivity.longest_path`."""
-        n = self.n_vertices
-        graph = sp.csr_array((self.edge_lengths, tuple(self.edges.T)), shape=(n, n))
-        return connectivity.longest_path(graph, self.components)
+        """Length of a longest shortest path along edges, over all components (see `connectivity.longest_path`)."""
+        return connectivity.longest_path(self.edge_graph, self.components)
 
     def report(self) -> MeshReport:
-        """Everything about the mesh that bears on a distance computed on it.
+        """Counts, defects and sizes that bear on a distance computed on the mesh.
 
         Returns
         -------
         MeshReport
-            Prints as a table; fields that list offenders hold their indices.
+            Prints as a table; lists of defects hold indices.
         """
-        return _report(self)
-
-
-@dataclass(frozen=True)
-class MeshReport:
-    """What `Mesh.report` finds. Lengths are in the mesh's unit; lists of offenders are index arrays.
-
-    Attributes
-    ----------
-    n_vertices, n_faces, n_edges : int
-        Counts; faces are triangles or tetrahedra.
-    n_components : int
-        Components that hold faces.
-    n_boundary_loops : int
-        Closed curves (patches, for tetrahedra) of boundary.
-    euler_characteristic : int
-        Alternating sum of the numbers of simplices, unreferenced vertices left out.
-    nonmanifold_edges : (k, 2) int64
-        Edges of more than two triangles (for tetrahedra: triangles (k, 3) of more than two tetrahedra).
-    nonmanifold_vertices : (k,) int64
-        Vertices whose faces are not one fan (triangle meshes; empty for tetrahedra).
-    degenerate_faces : (k,) int64
-        Faces whose area or volume is zero to rounding: at most 1e-12 of the square (cube) of their longest edge.
-    duplicate_faces : (k,) int64
-        Faces with the vertices of an earlier one.
-    unreferenced_vertices : (k,) int64
-        Vertices that no face uses; every distance there is ``inf``.
-    shortest_edge, mean_edge, longest_edge : float
-        Over the distinct edges.
-    smallest_angle, largest_angle : float
-        Of all triangles, in degrees.
-    is_intrinsic_delaunay : bool or None
-        Whether no edge would be flipped by the intrinsic Delaunay triangulation; None for tetrahedra.
-    edges_across : float
-        `Mesh.longest_distance` in mean edge lengths.
-    range_limit : float
-        The number of edges across up to which the heat of the default time step t = h^2 stays inside the double
-        range; beyond it the solver raises t.
-    """
-
-    n_vertices: int
-    n_faces: int
-    n_edges: int
-    n_components: int
-    n_boundary_loops: int
-    euler_characteristic: int
-    nonmanifold_edges: IntArray
-    nonmanifold_vertices: IntArray
-    degenerate_faces: IntArray
-    duplicate_faces: IntArray
-    unreferenced_vertices: IntArray
-    shortest_edge: float
-    mean_edge: float
-    longest_edge: float
-    smallest_angle: float
-    largest_angle: float
-    is_intrinsic_delaunay: bool | None
-    edges_across: float
-    range_limit: float
-
-    def rows(self) -> list[tuple[str, str]]:
-        """The report as (name, value) pairs for printing; long lists of offenders are cut."""
-        return [(field.name.replace("_", " "), _shown(getattr(self, field.name))) for field in fields(self)]
-
-    def __str__(self) -> str:
-        rows = self.rows()
-        width = max(len(name) for name, _ in rows)
-        return "\n".join(f"{name:{width}}  {value}" for name, value in rows)
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, np.ndarray):
-        head = ", ".join(str(row.tolist()) for row in value[:5])
-        return f"{len(value)}" + (f": {head}" if head else "") + (", ..." if len(value) > 5 else "")
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return "-" if value is None else str(value)
-
-
-def _cotangents_and_angles(V: FloatArray, F: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Cotangent and angle (3, m) at each corner of triangles; 0 is the angle at a corner without a side."""
-    dot = np.zeros((3, len(F)))
-    for x in V.T:
-        a, b, c = x[F.T]
-        ab, bc, ca = b - a, c - b, a - c
-        dot -= ca * ab, ab * bc, bc * ca
-    cross = igl.doublearea(V, F)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return dot / cross, np.arctan2(cross, dot)
-
-
-def _is_delaunay(found: connectivity.Facets, cotangents: FloatArray) -> bool:
-    total = np.bincount(found.of_face.T.ravel(), weights=cotangents.ravel())
-    return not (total[found.n_faces == 2] < DELAUNAY_TOLERANCE).any()
-
-
-def _report(mesh: Mesh) -> MeshReport:
-    n, F = mesh.n_vertices, mesh.F
-    found = mesh.facets
-    triangles = found.vertices if mesh.is_tetrahedral else F
-    cotangents, angles = _cotangents_and_angles(mesh.V, triangles)
-    sides = igl.edge_lengths(mesh.V, F) if mesh.is_tetrahedral else mesh.edge_lengths[found.of_face]
-    longest = reduce(np.maximum, sides.T)
-    n_unreferenced = int((~mesh.referenced).sum())
-    cells = len(found.vertices) - len(F) if mesh.is_tetrahedral else len(F)
-    mean_edge = float(mesh.edge_lengths.mean())
-    return MeshReport(
-        n_vertices=n,
-        n_faces=len(F),
-        n_edges=len(mesh.edges),
-        n_components=int(mesh.components.max()) + 1 - n_unreferenced,
-        n_boundary_loops=connectivity.boundary_loops(found, n),
-        euler_characteristic=n - n_unreferenced - len(mesh.edges) + cells,
-        nonmanifold_edges=found.vertices[found.n_faces > 2],
-        nonmanifold_vertices=np.empty(0, np.int64)
-        if mesh.is_tetrahedral
-        else connectivity.nonmanifold_vertices(F, found, n),
-        degenerate_faces=np.flatnonzero(mesh.measures <= 1e-12 * longest ** (F.shape[1] - 1)),
-        duplicate_faces=connectivity.duplicate_faces(F, n),
-        unreferenced_vertices=np.flatnonzero(~mesh.referenced),
-        shortest_edge=float(mesh.edge_lengths.min()),
-        mean_edge=mean_edge,
-        longest_edge=float(mesh.edge_lengths.max()),
-        smallest_angle=float(np.degrees(angles.min())),
-        largest_angle=float(np.degrees(angles.max())),
-        is_intrinsic_delaunay=None if mesh.is_tetrahedral else _is_delaunay(found, cotangents),
-        edges_across=mesh.longest_distance / mean_edge,
-        range_limit=RANGE_LIMIT,
-    )
+        return mesh_report(self)

@@ -1,4 +1,4 @@
-"""Meshes of polygons: `PolygonMesh`, its faces checked once."""
+"""Meshes of polygons, validated on construction."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from heat_igl.errors import MeshError
+from heat_igl.mesh.grouping import next_in_run
 from heat_igl.mesh.mesh import Mesh, checked_positions
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -23,7 +24,7 @@ class PolygonMesh:
     V : (n, 3) array_like of real numbers
         Vertex positions, in any unit of length.
     polygons : sequence of m sequences of int, or (m, d) array_like of int
-        Vertex indices of each polygon in the order of its rim, counted from 0.
+        Vertex indices of each polygon, counted from 0, in order around the polygon.
 
     Attributes
     ----------
@@ -39,12 +40,12 @@ class PolygonMesh:
     Raises
     ------
     MeshError
-        As `Mesh`; also if a polygon has fewer than three corners. The message names the first offender.
+        As for `Mesh`; also if a polygon has fewer than three corners. The message names the first offender.
 
     Notes
     -----
     Polygons need be neither planar nor convex, but the virtual vertex inside (see `polygon_operators`) should see every
-    corner. Corners on a straight line, such as those where smaller neighbours meet a larger polygon, are fine.
+    corner. Corners on a straight side, as a polygon has beside smaller neighbours, are fine.
     """
 
     V: FloatArray
@@ -87,15 +88,12 @@ class PolygonMesh:
 
     @property
     def following(self) -> IntArray:
-        """The vertex (sum of degree,) after each of `corners` on the rim of its polygon."""
-        last = np.cumsum(self.degree) - 1
-        following = np.roll(self.corners, -1)
-        following[last] = self.corners[last - self.degree + 1]
-        return following
+        """The vertex (sum of degree,) after each of `corners` around its polygon."""
+        return next_in_run(self.corners, self.degree)
 
 
 def triangle_fans(corners: IntArray, degree: IntArray) -> IntArray:
-    """Triangles (sum of degree - 2, 3): each polygon as a fan around its first corner, see `PolygonMesh`."""
+    """Triangles (sum of (degree - 2), 3): each polygon as a fan around its first corner."""
     if (degree == 3).all():
         return corners.reshape(-1, 3)
     begin = np.repeat(np.cumsum(degree) - degree, degree)
@@ -105,7 +103,7 @@ def triangle_fans(corners: IntArray, degree: IntArray) -> IntArray:
 
 
 def which_repeat_a_vertex(corners: IntArray, degree: IntArray) -> BoolArray:
-    """The polygons (m,) that have a vertex twice."""
+    """Mask (m,) of the polygons in which a vertex occurs twice."""
     if len(degree) and (degree == degree[0]).all():
         rows = np.sort(corners.reshape(len(degree), -1), axis=1)
         return np.asarray((rows[:, 1:] == rows[:, :-1]).any(axis=1))
@@ -118,7 +116,7 @@ def which_repeat_a_vertex(corners: IntArray, degree: IntArray) -> BoolArray:
 
 
 def _flattened(polygons: Sequence[Sequence[int] | IntArray] | IntArray) -> tuple[IntArray, IntArray]:
-    """All corners, polygon after polygon, and the number of each."""
+    """The corners of all polygons, one polygon after the other, and the number of corners of each."""
     if not hasattr(polygons, "__len__") or not len(polygons):
         raise MeshError("polygons is empty: a mesh needs at least one")
     rows: list[AnyArray] = []

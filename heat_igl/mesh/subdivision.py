@@ -1,7 +1,7 @@
-"""More vertices where triangles are large, on the same surface.
+"""Subdivision of long edges, on the same surface.
 
-The heat method's error is one of resolution: where edges are much longer than the mean, which the time step follows,
-one direction has to do for a large triangle.
+The heat method has one direction per triangle, and a time step that follows the mean edge length. Triangles with edges
+much longer than the mean are too coarse for both.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["split_long_edges"]
 
-# More would not fit into memory, and lengths near rounding could never be reached by halving.
+# More pieces would not fit into memory, and halving could never reach a length near rounding.
 _MOST_PIECES = 1e8
 
 
@@ -28,14 +28,14 @@ def split_long_edges(mesh: Mesh, longest: float | None = None) -> Mesh:
     mesh : Mesh
         Triangles, manifold or not.
     longest : float, optional
-        In the mesh's unit; ``mesh.edge_lengths.mean()`` by default. Where triangles are of very different size, heat's
-        error falls by up to a fifth at twice the mean already (docs/refinement.md).
+        In the mesh's unit; ``mesh.edge_lengths.mean()`` by default. On meshes with triangles of very different size,
+        twice the mean already reduces the error of the heat method by up to a fifth (docs/refinement.md).
 
     Returns
     -------
     Mesh
-        Its first `mesh.n_vertices` vertices are those of `mesh`, so that sources keep their indices and
-        ``distance[: mesh.n_vertices]`` is the distance on `mesh`. The same object where nothing is too long.
+        The first `mesh.n_vertices` vertices are those of `mesh`: sources keep their indices, and
+        ``distance[: mesh.n_vertices]`` is the distance on `mesh`. The same object if no edge is too long.
 
     Raises
     ------
@@ -46,8 +46,8 @@ def split_long_edges(mesh: Mesh, longest: float | None = None) -> Mesh:
 
     Notes
     -----
-    Every face of an edge is given the same new vertex, so what was joined stays joined. Triangles next to a split edge
-    become worse; the intrinsic Delaunay triangulation that the solver makes of them does not.
+    All faces at an edge share the new vertex, so they stay joined. Triangles next to a split edge get worse; the
+    intrinsic Delaunay triangulation on which the solver works does not.
     """
     if mesh.is_tetrahedral:
         raise MeshError("split_long_edges wants triangles, and F holds tetrahedra")
@@ -70,7 +70,7 @@ def _halved(mesh: Mesh, chosen: BoolArray) -> Mesh:
     split = chosen[of_face]
     n_split = split.sum(axis=1)
     faces = [mesh.F[n_split == 0]]
-    # Corners are taken in a cyclic order in which the one side that differs from the others is opposite the first.
+    # The corners are rotated so that the side that differs from the other two is opposite the first corner.
     for count, odd in ((1, split), (2, ~split), (3, split)):
         rows = np.flatnonzero(n_split == count)
         corner = (odd[rows].argmax(axis=1)[:, None] + np.arange(3)) % 3
@@ -80,14 +80,14 @@ def _halved(mesh: Mesh, chosen: BoolArray) -> Mesh:
 
 
 def _pieces(count: int, V: FloatArray, corners: IntArray, middles: IntArray) -> IntArray:
-    """The 2, 3 or 4 triangles that are left of triangles abc with `count` sides split, p, q, r opposite a, b, c."""
+    """The 2, 3 or 4 triangles that replace triangles abc with `count` sides split; p, q, r lie opposite a, b, c."""
     a, b, c = corners.T
     p, q, r = middles.T
     if count == 1:
         return _rows([[a, b, p], [a, p, c]])
     if count == 3:
         return _rows([[a, r, q], [b, p, r], [c, q, p], [p, q, r]])
-    # What is left of the corner a is the quadrilateral r b c q; its shorter diagonal makes the better triangles.
+    # Without the corner a the quadrilateral r b c q remains; the shorter diagonal makes the better triangles.
     by_rc = np.linalg.norm(V[r] - V[c], axis=1) < np.linalg.norm(V[q] - V[b], axis=1)
     return _rows([[a, r, q], [r, b, np.where(by_rc, c, q)], [np.where(by_rc, r, b), c, q]])
 

@@ -1,4 +1,4 @@
-"""Points and curves on a triangle mesh, given by a face and barycentric coordinates in it."""
+"""Points and curves on a triangle mesh, given by faces and barycentric coordinates."""
 
 from __future__ import annotations
 
@@ -10,10 +10,15 @@ from heat_igl.errors import SourceError
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
-__all__ = ["SurfaceCurve", "SurfacePoints"]
+__all__ = ["ON_SIDE", "ON_SIDE_COMPUTED", "SurfaceCurve", "SurfacePoints", "require_triangles"]
 
-# Barycentric coordinates that miss a sum of 1, or fall below 0, by more than this are not taken for rounding.
-_ROUNDING = 1e-9
+# A point lies on a side of its face if its barycentric coordinate is below this. For given coordinates: numbers of
+# order 1, rounded by some 1e-16 in each operation; 1e-12 allows for thousands of these.
+ON_SIDE = 1e-12
+# The same for coordinates computed from positions or lengths. A position at the distance R from the origin is rounded
+# by 1e-16 R, and that is 1e-9 of the height of a face as small as 1e-7 R. A user may have computed coordinates like
+# that, so they may also be negative, or miss a sum of 1, by this much.
+ON_SIDE_COMPUTED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +28,9 @@ class SurfacePoints:
     Parameters
     ----------
     faces : (k,) array_like of int
-        The face that each point lies in, or on the rim of.
+        The face of each point; the point may lie on a side or corner of it.
     barycentric : (k, 3) array_like
-        Weights of the face's three corners: not negative, sum 1.
+        Weights of the three corners: not negative, sum 1.
 
     Raises
     ------
@@ -46,7 +51,7 @@ class SurfacePoints:
         return len(self.faces)
 
     def positions(self, mesh: Mesh) -> FloatArray:
-        """Where the points are in space, (k, 3).
+        """Positions (k, 3) of the points in space.
 
         Raises
         ------
@@ -65,10 +70,10 @@ class SurfaceCurve:
     faces : (s,) array_like of int
         The face of each segment.
     start, end : (s, 3) array_like
-        Barycentric coordinates, in that face, of where the segment begins and ends. Each segment begins where the one
-        before it ends, though mostly in another face.
+        Barycentric coordinates, in that face, of the ends of the segment. Each segment starts at the point at which the
+        segment before it ends, though mostly in another face.
     is_closed : bool
-        Whether the last segment ends where the first begins.
+        Whether the last segment ends at the start of the first.
 
     Raises
     ------
@@ -91,7 +96,7 @@ class SurfaceCurve:
         return len(self.faces)
 
     def positions(self, mesh: Mesh) -> FloatArray:
-        """The corners of the polyline in space, (s + 1, 3); the last is the first again where it is closed."""
+        """Positions (s + 1, 3) of the polyline's corners; on a closed curve the last is the first again."""
         first = _in_space(mesh, self.faces[:1], self.start[:1])
         return np.concatenate([first, _in_space(mesh, self.faces, self.end)])
 
@@ -114,11 +119,11 @@ def _coordinates(name: str, barycentric: ArrayLike, k: int) -> FloatArray:
         raise SourceError(f"{name} must be real numbers of shape ({k}, 3)") from None
     if array.shape != (k, 3):
         raise SourceError(f"{name} must have shape ({k}, 3), a row for each face, not {array.shape}")
-    wrong = ~(np.isfinite(array).all(axis=1) & (array.min(axis=1) >= -_ROUNDING))
+    wrong = ~(np.isfinite(array).all(axis=1) & (array.min(axis=1) >= -ON_SIDE_COMPUTED))
     if wrong.any():
         first = int(np.flatnonzero(wrong)[0])
         raise SourceError(f"{name}[{first}] = {array[first].tolist()} must be finite and not negative")
-    wrong = np.abs(array.sum(axis=1) - 1) > _ROUNDING
+    wrong = np.abs(array.sum(axis=1) - 1) > ON_SIDE_COMPUTED
     if wrong.any():
         first = int(np.flatnonzero(wrong)[0])
         raise SourceError(f"{name}[{first}] = {array[first].tolist()} must sum to 1, not {array[first].sum():.12g}")
@@ -126,9 +131,14 @@ def _coordinates(name: str, barycentric: ArrayLike, k: int) -> FloatArray:
     return np.asarray(array / array.sum(axis=1, keepdims=True))
 
 
-def _in_space(mesh: Mesh, faces: IntArray, barycentric: FloatArray) -> FloatArray:
+def require_triangles(mesh: Mesh) -> None:
+    """Raise a `SourceError` if the mesh is tetrahedral."""
     if mesh.is_tetrahedral:
         raise SourceError("points on faces need triangles, but the mesh is tetrahedral")
+
+
+def _in_space(mesh: Mesh, faces: IntArray, barycentric: FloatArray) -> FloatArray:
+    require_triangles(mesh)
     outside = (faces < 0) | (faces >= mesh.n_faces)
     if outside.any():
         first = int(np.flatnonzero(outside)[0])

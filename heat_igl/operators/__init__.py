@@ -1,20 +1,24 @@
 """The discrete Laplacian, mass, gradient and divergence of a domain: a function per kind returns `Operators`."""
 
+from heat_igl.operators.elements import EdgeLengths, TriangleElements
+from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
+from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
 from heat_igl.operators.polygons import polygon_operators
+from heat_igl.operators.simplices import cotan_operators
 from heat_igl.operators.speed import speed_operators
-from heat_igl.operators.triangles import (
-    Laplacian,
-    Operators,
-    cotan_operators,
-    intrinsic_operators,
-    operators,
-    tufted_operators,
-)
+from heat_igl.operators.surface import Surface
+from heat_igl.operators.triangles import operators, tufted_operators
 
 __all__ = [
+    "EdgeLengths",
     "Laplacian",
+    "OnLaplacian",
     "Operators",
+    "Surface",
+    "TriangleElements",
+    "check_laplacian",
     "cotan_operators",
+    "edge_length_operators",
     "intrinsic_operators",
     "operators",
     "polygon_operators",

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from heat_igl.errors import MeshError
 from heat_igl.mesh import PolygonMesh, connectivity
-from heat_igl.operators.triangles import Operators
+from heat_igl.operators.matrices import Operators
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["polygon_operators"]
@@ -31,8 +31,8 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
     -------
     Operators
         With n vertices, the faces those triangles, d = 3. h is the mean distance between two vertices of one polygon,
-        which is what L couples: edges alone are too short for hexagons. No `triangulation`, since its vertices are not
-        those of the mesh: nothing to refine by unfolding.
+        which is what L couples: edges alone are too short for hexagons. No `surface`, since the vertices of those
+        triangles are not those of the mesh: nothing to refine by unfolding.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
         np.sort(np.stack([corners, following], axis=1), axis=1), mesh.n_vertices
     )
     h = _mean_distance(mesh, owner)
-    unit = 2.0 ** round(np.log2(h))  # see `cotan_operators`
+    unit = 2.0 ** round(np.log2(h))  # libigl multiplies lengths before it divides
     V = mesh.V / unit
     L, M, P = igl.cotmatrix(V, corners, np.concatenate([[0], np.cumsum(mesh.degree)]))
     refined = P @ V
@@ -81,7 +81,7 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
         boundary=boundary,
         referenced=triangles.referenced,
         longest_distance=connectivity.longest_path(graph, triangles.components),
-        chords=_chords(mesh.V, L),
+        lengths=_chords(mesh.V, L),
     )
 
 

@@ -10,7 +10,9 @@ import scipy.sparse as sp
 
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.mesh import Mesh, connectivity
-from heat_igl.operators.triangles import Operators, cotan_operators, intrinsic_operators
+from heat_igl.operators.intrinsic import intrinsic_operators
+from heat_igl.operators.matrices import Operators, laplacian_of_gradient
+from heat_igl.operators.simplices import cotan_operators
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = ["speed_operators"]
@@ -38,8 +40,8 @@ def speed_operators(mesh: Mesh, speed: ArrayLike) -> Operators:
     -------
     Operators
         For `HeatMethodSolver.from_operators`, with every length a travel time. Edges are flipped towards a Delaunay
-        triangulation where both faces have the same speed, and stay where it changes. No `triangulation`: ways bend at
-        edges here, so there is nothing to unfold and `refine` is refused, and sources are vertices.
+        triangulation where both faces have the same speed, and stay where it changes. No `surface`: ways bend at edges
+        here, so there is nothing to unfold and `refine` is refused, and sources are vertices.
 
     Raises
     ------
@@ -70,23 +72,21 @@ def speed_operators(mesh: Mesh, speed: ArrayLike) -> Operators:
     p = F.shape[1] - 1
     times = connectivity.shortest_edge_graph(pairs, (lengths / s[:, None]).ravel(order="F"), mesh.n_vertices)
     mass = np.bincount(F.ravel(), corner_mass / np.repeat(s, p + 1) ** p, minlength=mesh.n_vertices)
-    scaled = replace(
+    G = (sp.diags(np.tile(s, domain.dimension)) @ domain.G).tocsc()
+    weights = domain.weights / s**p
+    return replace(
         domain,
+        L=domain.L if p == 2 else laplacian_of_gradient(G, weights),
         M=sp.diags(mass, format="csc"),
-        gradient=(sp.diags(np.tile(s, domain.dimension)) @ domain.G).tocsc(),
-        weights=domain.weights / s**p,
+        gradient=G,
+        weights=weights,
         face_sizes=domain.face_sizes / s,
         mean_edge_length=float(times.data.mean()),
         boundary=mesh.boundary,
         longest_distance=connectivity.longest_path(times, domain.components),
-        triangulation=None,
-        faces=None,
+        lengths=None,
+        surface=None,
     )
-    if p == 2:
-        return scaled
-    L = (scaled.D @ scaled.G).tocsc()
-    L.sort_indices()
-    return replace(scaled, L=L)
 
 
 def _checked(speed: ArrayLike, m: int) -> FloatArray:

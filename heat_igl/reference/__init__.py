@@ -1,23 +1,21 @@
-"""Other people's geodesic solvers, each called the one way that is right, and bounds that need no solver."""
+"""Distances by other people's solvers, each called as it gives the right result, and bounds that need no solver.
+
+Every native solver runs in a child process. `docs/references.md` says how far each one can be trusted. Closed forms are
+in `heat_igl.closed_forms`.
+"""
 
 from heat_igl.reference.bounds import edge_paths, straight_lines
-from heat_igl.reference.solvers import (
-    EXACT_SOLVERS,
-    Measured,
-    close,
-    exact,
-    exact_solver,
-    igl_heat,
-    measured,
-    meshlab,
-    meshlab_border,
-    meshlab_heat,
-    potpourri3d_heat,
-)
+from heat_igl.reference.exact_distance import exact
+from heat_igl.reference.guarded import MEMORY, TIMEOUT, close
+from heat_igl.reference.heat_methods import igl_heat, potpourri3d_heat
+from heat_igl.reference.measurement import EXACT_SOLVERS, Measured, exact_solver, measured
+from heat_igl.reference.meshlab_filters import meshlab, meshlab_border, meshlab_heat
 
 __all__ = [
     "EXACT_SOLVERS",
+    "MEMORY",
     "Measured",
+    "TIMEOUT",
     "close",
     "edge_paths",
     "exact",

@@ -1,12 +1,10 @@
-"""Bounds of geodesic distance that need no reference: the straight line from below, paths along edges from above."""
+"""Bounds of geodesic distance without a reference: straight lines from below, paths along edges from above."""
 
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, connectivity
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray
 
@@ -25,12 +23,6 @@ def straight_lines(mesh: Mesh, sources: Sources) -> FloatArray:
 def edge_paths(mesh: Mesh, sources: Sources) -> FloatArray:
     """Length (n,) of the shortest path along edges from each vertex to the sources (Dijkstra 1959).
 
-    Never below the geodesic distance; ``inf`` where no path leads.
+    Never below the geodesic distance; ``inf`` at vertices that no path joins with a source.
     """
-    seeds = vertex_sources(sources, mesh.n_vertices)
-    i, j = mesh.edges.T
-    # A stored zero would count as no edge, so that two vertices in one place would be far apart.
-    lengths = np.maximum(mesh.edge_lengths, np.finfo(np.float64).tiny)
-    graph = sp.csr_array((lengths, (i, j)), shape=(mesh.n_vertices, mesh.n_vertices))
-    distance = csgraph.dijkstra(graph, directed=False, indices=seeds, min_only=True)
-    return np.asarray(distance, dtype=np.float64)
+    return connectivity.edge_distance(mesh.edge_graph, vertex_sources(sources, mesh.n_vertices))

@@ -1,8 +1,8 @@
-"""Run a function in a child process that may crash, hang or eat memory without harm to the caller.
+"""Call a function in a child process, which may crash, hang or run out of memory without harm to the caller.
 
 One child serves all calls, one after the other, until it fails; the next call starts another. Requests and replies
 are single lines of JSON on the child's standard streams. Arrays cross as ``.npy`` files that the child maps into
-memory: written once by the caller, shared through the page cache, never pickled.
+memory: written once by the caller, shared through the page cache, never pickled. `child` is the other side.
 
 A child started with `multiprocessing` would import the caller's main script again and, on some systems, inherit its
 threads and locks; a plain Python process does neither.
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import importlib
 import json
 import os
 import signal
@@ -27,7 +26,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from heat_igl.errors import ReferenceSolverError
-from heat_igl.runtime import PeakMemory, release_free_memory, resident_memory
+from heat_igl.reference.child import LONGEST_ALARM
 from heat_igl.typing import AnyArray
 
 __all__ = ["MEMORY", "TIMEOUT", "GuardedProcess", "Reply", "call", "close"]
@@ -36,21 +35,19 @@ __all__ = ["MEMORY", "TIMEOUT", "GuardedProcess", "Reply", "call", "close"]
 TIMEOUT = 600.0
 MEMORY = 8 * 2**30
 
-# Seconds that an abandoned child outlives its timeout; the longest that clocks take; memory that nobody has.
-_GRACE = 5.0
-_LONGEST_ALARM = 2.0**20
+# More bytes than any address space has, in place of infinity, which JSON does not have.
 _NO_BOUND = 2.0**62
 
-_START = "import sys; sys.path[:] = sys.argv[1:]; from heat_igl.reference.guarded import _serve; _serve()"
+_START = "import sys; sys.path[:] = sys.argv[1:]; from heat_igl.reference.child import serve; serve()"
 
 
 class Reply(NamedTuple):
-    """What came back from the child.
+    """The reply of the child to one call.
 
     Attributes
     ----------
     values : dict
-        What the function returned: arrays, and values that JSON can carry.
+        The values that the function returned: arrays, and values that JSON can carry.
     peak_memory : int or None
         Bytes by which the child's resident memory grew at most during the call.
     """
@@ -62,7 +59,7 @@ class Reply(NamedTuple):
 class GuardedProcess:
     """A child process that is started at the first `call` and serves until it fails or is closed.
 
-    Safe to use from several threads, which wait for each other. After a fork, each process has its own child.
+    Several threads may use it; they wait for each other. After a fork, each process has its own child.
 
     Parameters
     ----------
@@ -92,7 +89,7 @@ class GuardedProcess:
         timeout: float = TIMEOUT,
         memory: float = MEMORY,
     ) -> Reply:
-        """Call a function in the child and wait for what it returns.
+        """Call a function in the child, and wait until it returns.
 
         Parameters
         ----------
@@ -100,7 +97,7 @@ class GuardedProcess:
             ``"module:name"``, imported in the child. It is called with all arrays (read-only) and parameters as
             keyword arguments, and returns a mapping of names to arrays or values that JSON can carry.
         arrays : mapping of str to array
-            Handed over through files; none is pickled.
+            Passed through files; none is pickled.
         parameters : mapping of str, optional
             Values that JSON can carry.
         timeout : float
@@ -143,7 +140,7 @@ class GuardedProcess:
             return Reply(values, reply["peak_memory"])
 
     def close(self) -> None:
-        """End the child, if there is one. The next call starts a new one."""
+        """End the child, if there is one. It ends by itself when Python does; the next call starts a new one."""
         with self._lock:
             self._stop()
 
@@ -156,7 +153,7 @@ class GuardedProcess:
             late.set()
             process.kill()
 
-        timer = threading.Timer(min(timeout, _LONGEST_ALARM), stop)
+        timer = threading.Timer(min(timeout, LONGEST_ALARM), stop)
         timer.daemon = True
         timer.start()
         try:
@@ -251,64 +248,6 @@ def _explained(function: str, error: Mapping[str, str], memory: float) -> str:
     if error["kind"] in ("ImportError", "ModuleNotFoundError"):
         return f"{function} cannot be loaded: {error['text']}; install what the message names"
     return f"{function} failed with {error['kind']}: {error['text']}"
-
-
-def _bound_memory(extra: int) -> None:
-    """Let the address space of this process grow by at most `extra` bytes from now on."""
-    try:
-        resource = importlib.import_module("resource")
-        pages = int(Path("/proc/self/statm").read_text().split()[0])
-    except (ImportError, OSError):
-        return
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    bound = pages * resource.getpagesize() + extra
-    if hard != resource.RLIM_INFINITY:
-        bound = min(bound, hard)
-    resource.setrlimit(resource.RLIMIT_AS, (bound, hard))
-
-
-def _bound_time(seconds: float) -> None:
-    """End this process when the time is over; 0 for never.
-
-    The caller does that by itself. If it was killed, nobody else would, and no thread of this process could while a
-    native function holds the interpreter: the system's alarm needs neither.
-    """
-    if hasattr(signal, "alarm"):
-        signal.alarm(int(min(seconds, _LONGEST_ALARM)))
-
-
-def _handle(request: Mapping[str, Any]) -> dict[str, Any]:
-    folder = Path(request["folder"])
-    module, name = request["function"].split(":")
-    _bound_memory(request["memory"])
-    try:
-        arrays = {key: np.load(folder / f"{key}.npy", mmap_mode="r").view(np.ndarray) for key in request["arrays"]}
-        function = getattr(importlib.import_module(module), name)
-        with PeakMemory() as peak:
-            result = function(**arrays, **request["parameters"])
-        values = dict(result) if isinstance(result, Mapping) else {}
-        saved = [key for key, value in values.items() if isinstance(value, np.ndarray)]
-        for key in saved:
-            np.save(folder / f"result_{key}.npy", values.pop(key), allow_pickle=False)
-    except Exception as error:  # whatever a native library raises belongs to the caller, not to this loop
-        text = " ".join(str(error).split())[:500]
-        return {"error": {"kind": type(error).__name__, "text": text}}
-    return {"values": values, "arrays": saved, "peak_memory": peak.bytes}
-
-
-def _serve() -> None:
-    """Answer requests until the caller closes the pipe; the child's main loop."""
-    # Native libraries print to standard output, which must carry replies only.
-    replies = os.fdopen(os.dup(1), "wb", buffering=0)
-    os.dup2(2, 1)
-    for line in sys.stdin.buffer:
-        request = json.loads(line)
-        _bound_time(request["timeout"] + _GRACE)
-        reply = _handle(request)
-        _bound_time(0)
-        release_free_memory()
-        reply["resident"] = resident_memory()
-        replies.write(json.dumps(reply).encode() + b"\n")
 
 
 _shared = GuardedProcess()

@@ -1,7 +1,7 @@
-"""The native reference solvers, each called the one way that gives what it promises. Runs in the guarded child.
+"""The native reference solvers, each called in the way that gives the right result. They run in the guarded child.
 
 Every function takes arrays that were validated (one connected component, all vertices referenced) and returns the
-distance with the seconds for what could be kept between sources (``precompute_seconds``) and for the rest
+distance with the seconds for the part that could be kept between sources (``precompute_seconds``) and for the rest
 (``solve_seconds``). Loading the library is not counted.
 """
 

@@ -1,4 +1,4 @@
-"""How work is run: threads, blocks of right-hand sides, memory, compiled kernels."""
+"""Execution: threads, blocks of right-hand sides, memory, compiled kernels, the range of doubles, warnings."""
 
 from heat_igl.runtime.blocks import (
     WORKING_MEMORY,
@@ -7,16 +7,26 @@ from heat_igl.runtime.blocks import (
     in_blocks,
     in_order,
     progress_bar,
+    rich_progress,
     row_writer,
 )
+from heat_igl.runtime.extras import compiled_kernels_for
+from heat_igl.runtime.heat_range import LARGEST_EXPONENT, LOWEST_HEAT, RANGE_LIMIT, SOURCE_HEAT
 from heat_igl.runtime.memory import PeakMemory, release_free_memory, resident_memory
 from heat_igl.runtime.threads import n_threads, pool, side_by_side
+from heat_igl.runtime.warn import held_warnings, warn_caller
 
 __all__ = [
+    "LARGEST_EXPONENT",
+    "LOWEST_HEAT",
     "PeakMemory",
+    "RANGE_LIMIT",
+    "SOURCE_HEAT",
     "WORKING_MEMORY",
     "block_size",
+    "compiled_kernels_for",
     "float_type",
+    "held_warnings",
     "in_blocks",
     "in_order",
     "n_threads",
@@ -24,6 +34,8 @@ __all__ = [
     "progress_bar",
     "release_free_memory",
     "resident_memory",
+    "rich_progress",
     "row_writer",
     "side_by_side",
+    "warn_caller",
 ]

@@ -1,4 +1,4 @@
-"""Many right-hand sides in blocks: how large, on how many threads, where the rows go, and how far it is."""
+"""Many right-hand sides in blocks: block size, order, output and progress."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ __all__ = ["WORKING_MEMORY", "block_size", "float_type", "in_blocks", "in_order"
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# Right-hand sides solved together: reading the factors once for all of them pays up to here.
+# Largest number of right-hand sides in a block. They share one pass over the factors; larger blocks gain nothing.
 _MOST = 8
-# Bytes per face and right-hand side that the three steps hold at their worst moment.
+# Peak memory of the three steps, in bytes per face and right-hand side.
 _BYTES_PER_FACE = 40
-# What all threads together may hold, unless a single right-hand side needs more.
+# Limit in bytes for all threads together, unless a single right-hand side needs more.
 WORKING_MEMORY = 2**31
 
 
 def block_size(n_faces: int, n_sets: int | None, n_threads: int) -> tuple[int, int]:
-    """How many right-hand sides to solve at once, and on how many threads.
+    """Number of right-hand sides in a block, and number of threads.
 
     Parameters
     ----------
     n_faces : int
-        Of the domain.
+        Number of faces of the domain.
     n_sets : int or None
-        How many there will be; None when nobody knows.
+        Number of right-hand sides; None if unknown.
     n_threads : int
-        The most threads that may be used.
+        Largest number of threads.
 
     Returns
     -------
     (int, int)
-        Both at least 1. Together they keep to `WORKING_MEMORY`. Where there is room, the size of a block does not
-        depend on the threads, and so the bits of the results do not.
+        Both at least 1. Together the blocks stay within `WORKING_MEMORY`. If that memory is not the limit, the block
+        size does not depend on the number of threads; neither do the bits of the results.
     """
     fit = int(WORKING_MEMORY // (_BYTES_PER_FACE * n_faces))
     threads = max(1, min(n_threads, fit, n_threads if n_sets is None else n_sets))
@@ -52,7 +52,7 @@ def block_size(n_faces: int, n_sets: int | None, n_threads: int) -> tuple[int, i
 
 
 def in_blocks(items: Iterable[Item], size: int) -> Iterator[list[Item]]:
-    """Lists of `size` items, the last one shorter. If `items` raises, those before the error still come."""
+    """Yield lists of `size` items; the last list may be shorter. Items before an exception in `items` are yielded."""
     failure: Exception | None = None
     block: list[Item] = []
     iterator = iter(items)
@@ -73,10 +73,10 @@ def in_blocks(items: Iterable[Item], size: int) -> Iterator[list[Item]]:
 
 
 def in_order(work: Callable[[Item], Result], items: Iterable[Item], n_threads: int) -> Iterator[Result]:
-    """``map(work, items)`` on several threads, in order.
+    """Yield the results of ``map(work, items)``, computed on several threads, in order.
 
-    At most ``n_threads`` results are waiting or being worked on; the next item is drawn when one of them is taken. If
-    `items` raises, the results before the error still come.
+    At most ``n_threads`` items are in progress or finished but not yet yielded. If `items` raises, the results for
+    the items before the exception are yielded first.
     """
     if n_threads == 1:
         yield from map(work, items)
@@ -105,12 +105,12 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], n_threads: i
 
 
 def float_type(dtype: npt.DTypeLike | None) -> np.dtype[Any]:
-    """The type of distances to return: float64 when None.
+    """The floating-point type of returned distances; float64 if `dtype` is None.
 
     Raises
     ------
     ValueError
-        If it is neither float64 nor float32.
+        If `dtype` is neither float64 nor float32.
     """
     found = np.dtype(np.float64 if dtype is None else dtype)
     if found not in (np.float64, np.float32):
@@ -120,7 +120,9 @@ def float_type(dtype: npt.DTypeLike | None) -> np.dtype[Any]:
 
 @contextmanager
 def progress_bar(description: str, total: int, shown: bool = True) -> Iterator[Callable[[int], None]]:
-    """A progress bar on standard error, and the function that moves it on; nothing where it is not to be shown.
+    """A context with a progress bar on standard error; its value is a function that advances the bar by n rows.
+
+    With ``shown=False`` there is no bar, and the function does nothing.
 
     Raises
     ------
@@ -130,22 +132,31 @@ def progress_bar(description: str, total: int, shown: bool = True) -> Iterator[C
     if not shown:
         yield lambda _: None
         return
-    try:
-        from rich.console import Console
-        from rich.progress import MofNCompleteColumn, Progress
-    except ImportError:
-        raise MissingExtraError.of("progress=True", "rich", "cli") from None
-    columns = (*Progress.get_default_columns(), MofNCompleteColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    with rich_progress() as bar:
         task = bar.add_task(description, total=total)
         yield lambda n_rows: bar.advance(task, n_rows)
 
 
-def row_writer(out: Any) -> Callable[[AnyArray], None]:
-    """A function that takes blocks of rows and writes them to `out` (k, n) from the top, whole chunks of it at a time.
+def rich_progress() -> Any:
+    """Progress bars of rich on standard error, without tasks yet; a context manager.
 
-    An array without chunks gets every block as it comes. A chunked one, as of zarr, would compress a chunk again for
-    each block that touches it; so rows wait until the chunk is full or `out` ends.
+    Raises
+    ------
+    MissingExtraError
+        If rich is not installed.
+    """
+    with MissingExtraError.guard("progress=True", "rich", "cli"):
+        from rich.console import Console
+        from rich.progress import MofNCompleteColumn, Progress
+    columns = (*Progress.get_default_columns(), MofNCompleteColumn())
+    return Progress(*columns, console=Console(stderr=True))
+
+
+def row_writer(out: Any) -> Callable[[AnyArray], None]:
+    """A function that writes successive blocks of rows to `out` (k, n), from the first row on.
+
+    If `out` has chunks, as zarr arrays have, rows are collected until they fill a chunk or reach the end of `out`:
+    writing a part of a chunk would compress the whole chunk again. Other arrays receive every block at once.
     """
     chunks = getattr(out, "shards", None) or getattr(out, "chunks", None)
     height = int(chunks[0]) if chunks else 1

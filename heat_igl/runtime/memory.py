@@ -1,4 +1,4 @@
-"""How much memory a stretch of code needed at its worst moment."""
+"""Peak and current memory of this process."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SAMPLE_SECONDS = 0.005
 
 
 def _status(field: str) -> int | None:
-    """A field of Linux' ``/proc/self/status`` in bytes; None on other systems."""
+    """A field of ``/proc/self/status`` (Linux) in bytes; None on other systems."""
     try:
         text = Path("/proc/self/status").read_text()
     except OSError:
@@ -34,7 +34,7 @@ def _psutil_process() -> Any:
 
 
 def resident_memory() -> int | None:
-    """Bytes of physical memory that this process holds now; None where nobody can tell."""
+    """Physical memory of this process in bytes; None if it cannot be determined."""
     known = _status("VmRSS")
     if known is None and (process := _psutil_process()) is not None:
         known = int(process.memory_info().rss)
@@ -42,15 +42,15 @@ def resident_memory() -> int | None:
 
 
 class PeakMemory:
-    """A context that measures the growth of this process's resident memory while it is open.
+    """A context that measures the growth of the resident memory of this process.
 
-    Linux keeps a high-water mark that can be reset, which misses nothing. Elsewhere psutil is asked every 5 ms, which
-    can miss a short peak, and where psutil is missing too, `bytes` stays None.
+    On Linux the peak is exact, since the kernel records a high-water mark. On other systems psutil samples the memory
+    every 5 ms, which can miss a short peak. Without psutil `bytes` stays None.
 
     Attributes
     ----------
     bytes : int or None
-        Highest resident memory inside the context minus that at its start; set on leaving.
+        Peak resident memory inside the context minus the memory at the start; set on exit.
     """
 
     def __init__(self) -> None:
@@ -84,7 +84,7 @@ class PeakMemory:
 
 
 def release_free_memory() -> None:
-    """Hand memory that was freed earlier back to the system (glibc only): reusing it would not show as growth."""
+    """Return freed memory to the system (glibc only). Reuse of such memory would not count as growth."""
     with contextlib.suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
 

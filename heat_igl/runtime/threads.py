@@ -1,4 +1,4 @@
-"""How many threads to use, and work on them."""
+"""The number of threads, and pools of threads that share the processors."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ __all__ = ["n_threads", "pool", "side_by_side"]
 
 Item = TypeVar("Item")
 
-# Among how many threads the processors are divided that this thread is one of.
+# Per thread: the number of threads, this one included, among which the processors are divided.
 _divided = threading.local()
 
 
 def n_threads() -> int:
-    """Number of threads to use: the processors this process may run on, or fewer by ``HEAT_IGL_NUM_THREADS``.
+    """Number of threads to use: the available processors, at most ``HEAT_IGL_NUM_THREADS`` if that is set.
 
-    In a thread of a `pool`, its share of them, at least 1.
+    In a thread of a `pool` this number is divided by the size of the pool; the result is at least 1.
 
     Raises
     ------
     ValueError
-        If that environment variable is set to anything but a positive number.
+        If the environment variable is not a positive number.
     """
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     wanted = os.environ.get("HEAT_IGL_NUM_THREADS")
@@ -36,7 +36,7 @@ def n_threads() -> int:
 
 
 def pool(k: int) -> ThreadPoolExecutor:
-    """Some threads, k, that divide the processors of this one: `n_threads` tells each of them its share."""
+    """A pool of k threads, among which the processors of the calling thread are divided (see `n_threads`)."""
     among = k * _among()
     return ThreadPoolExecutor(k, initializer=lambda: setattr(_divided, "among", among))
 
@@ -46,7 +46,7 @@ def _among() -> int:
 
 
 def side_by_side(work: Callable[[Item], Any], items: Sequence[Item]) -> None:
-    """Call `work` on every item, each on a thread of its own; the first on this one."""
+    """Call `work` on every item in parallel: the first on the calling thread, each other on a new thread."""
     if len(items) == 1:
         work(items[0])
         return

@@ -1,5 +1,6 @@
 """What a source is, the right-hand side it gives, and the exact distance near it."""
 
+from heat_igl.sources.assembly import SourceAssembler, SourceTerm, right_hand_side, take_shorter
 from heat_igl.sources.near_field import NearField, Seeds
 from heat_igl.sources.specification import (
     OffsetSources,
@@ -16,11 +17,15 @@ __all__ = [
     "NearField",
     "OffsetSources",
     "Seeds",
+    "SourceAssembler",
     "SourcePoints",
     "SourceSegments",
     "SourceSet",
+    "SourceTerm",
     "Sources",
     "nearest_first",
+    "right_hand_side",
     "source_set",
+    "take_shorter",
     "vertex_sources",
 ]

@@ -1,24 +1,23 @@
-"""The three steps of the heat method, each to be tried alone: diffuse, normalize, integrate."""
+"""The three steps of the heat method, each to be tried alone: diffuse, normalize, integrate.
 
+Algorithm 1 of the paper, on any domain that has `Operators`. The two steps that solve a system also exist as a class
+that factors once, `HeatFlow` and `PoissonProblem`. Fields are arrays (n,) over vertices, or (n, k) for k right-hand
+sides at once; vector fields are stacked by coordinate like the rows of G: (d m,) or (d m, k).
+"""
+
+from heat_igl.steps.diffusion import Boundary, HeatFlow, check_boundary, diffuse
 from heat_igl.steps.fitted import fitted_laplacian
-from heat_igl.steps.three_steps import (
-    Boundary,
-    Descent,
-    HeatFlow,
-    PoissonProblem,
-    analysis,
-    damping,
-    diffuse,
-    integrate,
-    normalize,
-)
+from heat_igl.steps.integration import PoissonProblem, integrate
+from heat_igl.steps.normalization import NormalizedDivergence, damping, normalize
+from heat_igl.steps.pattern import analysis
 
 __all__ = [
     "Boundary",
-    "Descent",
     "HeatFlow",
+    "NormalizedDivergence",
     "PoissonProblem",
     "analysis",
+    "check_boundary",
     "damping",
     "diffuse",
     "fitted_laplacian",

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.operators import Operators
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import FloatArray
 
 __all__ = ["fitted_laplacian"]
 
@@ -25,7 +25,7 @@ def fitted_laplacian(domain: Operators, t: float) -> sp.csc_matrix:
     Parameters
     ----------
     domain : Operators
-        One whose lengths are known (`Operators.has_lengths`): by its `chords`, or else by its `triangulation`.
+        One whose `lengths` are known.
     t : float
         Time step, a squared length.
 
@@ -44,10 +44,13 @@ def fitted_laplacian(domain: Operators, t: float) -> sp.csc_matrix:
     The weights are those of L and the lengths those of the edges, and they have to agree: t is a squared length in the
     metric of L and M. Twice L and twice M are the same metric. Twice L alone is that of edges shorter by sqrt(2): in
     M - t L it counts like 2 t, so heat falls like exp(-d / sqrt(2 t)) over short edges, but long ones would still be
-    fitted at t. Give `Operators.chords` for such an L, or keep L and pass 2 t.
+    fitted at t. Give `Operators.lengths` for such an L, or keep L and pass 2 t.
     """
     L, n = domain.L, domain.n
-    i, j, length = _lengths(domain)
+    edges = domain.edge_lengths()
+    if edges is None:
+        raise ValueError("weights are fitted to the lengths of edges, which this domain does not have")
+    i, j, length = edges
     fit = _fit(length / np.sqrt(t))
     # Entry 0 takes what L does not couple.
     entry = sp.csc_matrix((np.arange(1, L.nnz + 1, dtype=L.indices.dtype), L.indices, L.indptr), shape=L.shape)
@@ -65,23 +68,11 @@ def fitted_laplacian(domain: Operators, t: float) -> sp.csc_matrix:
         first = int(np.argmax(unknown))
         raise ValueError(
             f"L[{L.indices[first]}, {column[first]}] couples vertices whose distance is not known "
-            f"({int(unknown.sum())} entries do): give chords for all that L couples, or do not fit (magnitude='unit')"
+            f"({int(unknown.sum())} entries do): give lengths for all that L couples, or do not fit (magnitude='unit')"
         )
     weight *= factor[1:]
     weight[on_diagonal] = -np.bincount(column, weight, n)[column[on_diagonal]]
     return sp.csc_matrix((weight, L.indices, L.indptr), shape=L.shape)
-
-
-def _lengths(domain: Operators) -> tuple[IntArray, IntArray, FloatArray]:
-    """Both ends and length of each edge."""
-    if domain.chords is not None:
-        above = sp.triu(domain.chords, 1, format="coo")
-        return above.row, above.col, above.data
-    triangulation = domain.triangulation
-    if triangulation is None:
-        raise ValueError("weights are fitted to the lengths of edges, which this domain does not have")
-    edges = triangulation.edges
-    return triangulation.tail(edges), triangulation.head(edges), triangulation.l.ravel()[edges]
 
 
 def _fit(x: FloatArray) -> FloatArray:

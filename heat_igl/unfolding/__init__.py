@@ -1,10 +1,12 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
 from heat_igl.unfolding.refinement import Known, Refine, Refinement, unfolded_distance
+from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = [
     "Known",
     "Refine",
     "Refinement",
+    "UnfoldingSolver",
     "unfolded_distance",
 ]

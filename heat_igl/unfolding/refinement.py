@@ -11,12 +11,17 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 
-from heat_igl.errors import MeshError, MissingExtraError
-from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, oriented
-from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.errors import MeshError
+from heat_igl.intrinsic import (
+    IntrinsicTriangulation,
+    double_cover,
+    intrinsic_delaunay,
+    intrinsic_triangulation,
+    oriented,
+)
+from heat_igl.mesh import Mesh, SurfacePoints, connectivity
+from heat_igl.runtime import compiled_kernels_for
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
@@ -89,7 +94,7 @@ class Refinement:
         self._n_sheets = 1
         if not triangulation.aligned.all():
             self._n_sheets = 2
-            F, lengths, twin = _double_cover(triangulation)
+            F, lengths, twin = double_cover(triangulation)
         self._triangulation = triangulation
         self._number, self._face, F, lengths, twin = fans.breadth_first(F, lengths, twin, self._n_sheets * self.n)
         self._F = F
@@ -312,59 +317,10 @@ def _ascending(
 
 def _kernels() -> tuple[ModuleType, ModuleType, ModuleType]:
     """The modules of compiled kernels, loaded when they are first needed."""
-    try:
+    with compiled_kernels_for("refinement"):
         from heat_igl.intrinsic import fans
         from heat_igl.unfolding import sweeping, unfolding
-    except ImportError as error:
-        if error.name is None or not error.name.startswith(("numba", "llvmlite")):
-            raise
-        raise MissingExtraError.of("refinement", "numba", "fast") from None
     return fans, sweeping, unfolding
-
-
-def _double_cover(triangulation: IntrinsicTriangulation) -> tuple[IntArray, FloatArray, IntArray]:
-    """The oriented double cover: each face on one sheet as it is and on the other turned over, glued where sides agree.
-
-    Vertex v becomes v and v + n, one for each orientation of the faces around it. Turning a face over swaps its corners
-    1 and 2. Fans that meet in v alone are assigned to its two copies arbitrarily: in v, a path may change sheets.
-    """
-    F, n = triangulation.F, triangulation.n
-    size = F.size
-    corner = np.arange(size)
-    turned = np.where(corner % 3 == 0, corner, corner + np.where(corner % 3 == 1, 1, -1))
-    # Half-edges, and corners, of the second sheet are numbered after those of the first.
-    sheet_of_first = np.concatenate([corner, size + turned])  # by original half-edge: where it lies on either sheet
-    twin = np.full(2 * size, -1)
-    glued = np.flatnonzero(triangulation.twin >= 0)
-    mate = triangulation.twin[glued]
-    other_sheet = ~triangulation.aligned[glued]
-    for sheet in (0, 1):
-        there = np.where(other_sheet, 1 - sheet, sheet)
-        twin[sheet_of_first[sheet * size + glued]] = sheet_of_first[there * size + mate]
-    vertex = np.concatenate([F.ravel(), F[:, [0, 2, 1]].ravel()])
-    lengths = np.concatenate([triangulation.l, triangulation.l[:, [0, 2, 1]]])
-    # Corners around one vertex of the cover are linked through the sides that they share.
-    half_edge = np.flatnonzero(twin >= 0)
-    following, preceding = (
-        half_edge - half_edge % 3 + (half_edge + 1) % 3,
-        half_edge - half_edge % 3 + (half_edge + 2) % 3,
-    )
-    mate = twin[half_edge]
-    mate_following, mate_preceding = mate - mate % 3 + (mate + 1) % 3, mate - mate % 3 + (mate + 2) % 3
-    links = sp.coo_array(
-        (
-            np.ones(2 * len(half_edge), np.int8),
-            (np.concatenate([following, preceding]), np.concatenate([mate_preceding, mate_following])),
-        ),
-        shape=(2 * size, 2 * size),
-    )
-    fan = csgraph.connected_components(links, directed=False)[1]
-    # The copy of a fan with the smaller label keeps the vertex's number.
-    first, second = fan[sheet_of_first[:size]], fan[sheet_of_first[size:]]
-    is_second = np.empty(2 * size, bool)
-    is_second[sheet_of_first[:size]] = first > second
-    is_second[sheet_of_first[size:]] = second > first
-    return (vertex + n * is_second).reshape(-1, 3), lengths, twin
 
 
 def unfolded_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, tolerance: float = _TOLERANCE) -> FloatArray:
@@ -403,11 +359,4 @@ def unfolded_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, tolerance
         raise MeshError("unfolding needs triangles, but F has 4 columns")
     chosen = vertex_sources(sources, mesh.n_vertices)
     refinement = Refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-    return refinement.unfold(_edge_distance(mesh, chosen), chosen, tolerance)
-
-
-def _edge_distance(mesh: Mesh, sources: IntArray) -> FloatArray:
-    """Distance (n,) along edges, ``inf`` where there is no way."""
-    n = mesh.n_vertices
-    graph = sp.csr_array((mesh.edge_lengths, tuple(mesh.edges.T)), shape=(n, n))
-    return np.asarray(csgraph.dijkstra(graph, directed=False, indices=sources, min_only=True))
+    return refinement.unfold(connectivity.edge_distance(mesh.edge_graph, chosen), chosen, tolerance)

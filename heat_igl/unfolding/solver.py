@@ -8,12 +8,11 @@ import numpy as np
 
 from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Operators
-from heat_igl.sources import NearField, SourcePoints
-from heat_igl.sources.emission import Emission, take_shorter
+from heat_igl.sources import NearField, SourcePoints, SourceTerm, take_shorter
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 
-__all__ = ["HeatOrder"]
+__all__ = ["UnfoldingSolver"]
 
 # Curves are unfolded from as points, at most so many mean edge lengths apart.
 _SPACING = 0.125
@@ -21,7 +20,7 @@ _SPACING = 0.125
 _SWEEP_ERROR = 0.01
 
 
-class HeatOrder:
+class UnfoldingSolver:
     """`Refinement` of a domain, asked by sets of sources and their heat.
 
     Parameters
@@ -40,32 +39,31 @@ class HeatOrder:
     """
 
     def __init__(self, domain: Operators, refine: Refine) -> None:
-        # Not the tufted cover: on it, a path over an edge of five faces can go on in one of them only.
-        triangulation = domain.surface or domain.triangulation
-        if triangulation is None:
+        surface = domain.surface
+        if surface is None:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
-        self._refinement = Refinement(triangulation)
+        self._refinement = Refinement(surface.unfolding)
         self._sweeps = refine == "sweep"
         self._error = _SWEEP_ERROR if self._sweeps else 0.0
-        self._faces = None if domain.faces is None else NearField(domain.faces)
+        self._faces = None if surface.faces is None else NearField(surface.faces)
         self._domain = domain
-        self._given_faces = np.empty((0, 3), np.int64) if domain.given_faces is None else domain.given_faces
+        self._given_faces = np.empty((0, 3), np.int64) if surface.given_faces is None else surface.given_faces
         self._spacing = _SPACING * domain.mean_edge_length
 
-    def distances(self, emissions: list[Emission], u: FloatArray) -> FloatArray:
+    def distances(self, terms: list[SourceTerm], u: FloatArray) -> FloatArray:
         """Distances (k, n) for heat (n, k).
 
         Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
         """
-        return np.stack([self._distance(emission, one) for emission, one in zip(emissions, u.T, strict=True)])
+        return np.stack([self._distance(term, one) for term, one in zip(terms, u.T, strict=True)])
 
-    def labelled(self, emission: Emission, u: FloatArray) -> tuple[FloatArray, IntArray]:
+    def labelled(self, term: SourceTerm, u: FloatArray) -> tuple[FloatArray, IntArray]:
         """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 where none is reached."""
         labels = np.empty(len(u), np.int64)
-        return self._distance(emission, u, labels), labels
+        return self._distance(term, u, labels), labels
 
-    def _distance(self, emission: Emission, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
-        sources, points, components = emission.sources, self._points(emission), self._domain.components
+    def _distance(self, term: SourceTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
+        sources, points, components = term.sources, self._points(term), self._domain.components
         places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
         # Tolerances are relative to the distance: what all have in common is added afterwards.
         earliest = np.full(self._domain.n_components, np.inf)
@@ -77,7 +75,7 @@ class HeatOrder:
         k = len(sources.vertices)
         unfolded = self._refinement.unfold
         if self._sweeps:
-            unfolded = partial(self._refinement.sweep, known=self._known(emission, points, earliest))
+            unfolded = partial(self._refinement.sweep, known=self._known(term, points, earliest))
         distance = unfolded(
             -u,
             sources.vertices,
@@ -86,12 +84,12 @@ class HeatOrder:
             point_offsets=late[k:] if late.any() and places else None,
             labels=labels,
         )
-        start = self._domain.on_vertices(earliest)
+        start = self._domain.expand_to_vertices(earliest)
         if offset.any():
             distance += start
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, points.label, [-1]])[labels]
-        for seeds in (emission.near.at(emission.guides), emission.far):
+        for seeds in (term.near_seen, term.far):
             if not len(seeds.vertex):
                 continue
             taken = take_shorter(distance, seeds, self._error, start)
@@ -99,20 +97,20 @@ class HeatOrder:
                 labels[seeds.vertex[taken]] = seeds.label[taken]
         return distance
 
-    def _known(self, emission: Emission, points: SourcePoints, earliest: FloatArray) -> Known | None:
+    def _known(self, term: SourceTerm, points: SourcePoints, earliest: FloatArray) -> Known | None:
         """What straight lines from points reach."""
-        near = emission.near.at(emission.guides)
+        near = term.near_seen
         if not len(near.vertex):
             return None
         # A curve has many sources of one label, and which of them a line comes from is not known.
-        label = np.concatenate([emission.sources.vertex_label, points.label])
+        label = np.concatenate([term.sources.vertex_label, points.label])
         which, first, count = np.unique(label, return_index=True, return_counts=True)
         at = np.searchsorted(which, near.label)
         near, source = near.at(count[at] == 1), first[at][count[at] == 1]
         return Known(near.vertex, near.value - earliest[self._domain.components[near.vertex]], source)
 
-    def _points(self, emission: Emission) -> SourcePoints:
-        points, segments = emission.sources.points, emission.sources.segments
+    def _points(self, term: SourceTerm) -> SourcePoints:
+        points, segments = term.sources.points, term.sources.segments
         if self._faces is None or not len(segments.faces):
             return points
         return points.joined(self._faces.samples(segments, self._spacing)[0]).joined(segments.ends())

@@ -1,4 +1,4 @@
-"""How far a distance is from the truth: references, closed forms, error norms, reports."""
+"""Grade distances: closed forms to compare with, error norms, and reports on several methods."""
 
 from heat_igl.validation.comparison import METHODS, Method, Progress, Solver, draw_sources, validate
 from heat_igl.validation.metrics import (

@@ -1,8 +1,8 @@
-"""Distances that are known without a solver: on the plane, sphere, cylinder, cone and flat torus, and in convex solids.
+"""Distances by a formula: on the plane, sphere, cylinder, cone and flat torus, and in convex solids.
 
-Each takes the sources of the rest of the package and returns the distance (n,) to the nearest of them, in the mesh's
-unit, ``inf`` where no source can be reached. On the curved surfaces this is the distance on the smooth surface; a mesh
-inscribed in it is shorter by a fraction that shrinks with the square of the edge length.
+Each function returns the distance (n,) to the nearest source, in the mesh's unit; ``inf`` if no source can be reached.
+On curved surfaces this is the distance on the smooth surface. The distance on a mesh inscribed in it is shorter by a
+fraction that shrinks with the square of the edge length.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["cone", "convex_solid", "cylinder", "flat_torus", "plane", "sphere"]
 
-# Rounding of coordinates read from text files with seven digits.
+# Relative to the size of the shape: the rounding of coordinates in text files with seven digits.
 _TOLERANCE = 1e-6
 
 
@@ -74,7 +74,7 @@ def sphere(mesh: Mesh, sources: Sources, *, center: ArrayLike = (0.0, 0.0, 0.0))
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices.
     center : (3,) array_like
-        Of the sphere.
+        Center of the sphere.
 
     Returns
     -------
@@ -156,11 +156,11 @@ def flat_torus(coordinates: ArrayLike, sources: Sources, *, periods: ArrayLike =
     Parameters
     ----------
     coordinates : (n, 2) array_like
-        Where each vertex lies in the plane: a flat torus fits into space only when folded.
+        Coordinates of each vertex in the plane: a flat torus fits into space only when folded.
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices.
     periods : (2,) array_like
-        Lengths after which either coordinate repeats.
+        Lengths after which the two coordinates repeat.
 
     Returns
     -------
@@ -187,6 +187,7 @@ def flat_torus(coordinates: ArrayLike, sources: Sources, *, periods: ArrayLike =
 
 
 def _nearest(mesh: Mesh, sources: Sources, distance_from: Callable[[int], FloatArray]) -> FloatArray:
+    """The minimum over all sources of the distance from one source, within the component of each."""
     distance = np.full(mesh.n_vertices, np.inf)
     for source in vertex_sources(sources, mesh.n_vertices):
         reached = mesh.components == mesh.components[source]
@@ -196,11 +197,12 @@ def _nearest(mesh: Mesh, sources: Sources, distance_from: Callable[[int], FloatA
 
 
 def _turn(angle: FloatArray) -> FloatArray:
-    """The smaller of the two ways around, without sign."""
+    """The absolute value of an angle that is reduced to at most half a turn."""
     return np.abs(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
 
 
 def _common(name: str, values: FloatArray) -> float:
+    """The value that all entries share up to rounding; refuses values that differ."""
     middle = float(np.median(values))
     spread = float(np.abs(values - middle).max())
     if spread > _TOLERANCE * middle:
@@ -212,7 +214,7 @@ def _common(name: str, values: FloatArray) -> float:
 
 
 def _require_convex(points: FloatArray, content: float) -> None:
-    """The mesh must fill the convex hull of its vertices, or straight lines would leave it."""
+    """Refuse a mesh that does not fill the convex hull of its vertices: straight lines would leave it."""
     from scipy.spatial import ConvexHull, QhullError  # takes as long to import as the rest of the package
 
     try:

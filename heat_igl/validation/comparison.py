@@ -1,4 +1,4 @@
-"""One report that says how far each method is from a reference, and what it costs."""
+"""Compare methods with a reference on one mesh: errors and costs in one report."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ import numpy as np
 
 from heat_igl.errors import FactorizationError, MeshError, MissingExtraError, ReferenceSolverError, SourceError
 from heat_igl.mesh import Mesh
-from heat_igl.reference import edge_paths, straight_lines
-from heat_igl.reference.guarded import MEMORY, TIMEOUT
+from heat_igl.reference import MEMORY, TIMEOUT, edge_paths, straight_lines
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.validation import metrics
-from heat_igl.validation.methods import METHODS, Counter, Method, Progress, Run, Solver, named, run
+from heat_igl.validation.methods import METHODS, Counter, Method, Progress, Run, Solver, resolved, run
 from heat_igl.validation.metrics import BoundViolations
 from heat_igl.validation.report import ValidationReport, ValidationRow
 
@@ -38,27 +37,28 @@ def validate(
     mesh : Mesh
         Triangles; for tetrahedra, give a `reference` of your own.
     sources : sources, or sequence of sources
-        One set of sources (an index, a sequence of indices, a mask), or a sequence of several such sets, from each of
-        which a distance is measured: ``[3, 7]`` is one set of two vertices, ``[[3], [7]]`` are two sets of one.
+        One set of sources (an index, a sequence of indices, a mask), or a sequence of sets, with one distance for each:
+        ``[3, 7]`` is one set of two vertices, ``[[3], [7]]`` are two sets of one vertex.
     methods : sequence of str or (str, callable)
-        Of `METHODS`: "heat", "sweep" and "unfold" are `HeatMethodSolver` without and with ``refine``; "igl" and
-        "potpourri3d" the heat methods of these libraries; "meshlab" and "meshlab_heat" MeshLab's filters; "exact" the
-        polyhedral distance. A method of one's own is a pair of its name and a function from the mesh to an object
-        with a ``distance(sources)``.
+        Names from `METHODS`: "heat", "sweep" and "unfold" are `HeatMethodSolver` without and with ``refine``; "igl" and
+        "potpourri3d" are the heat methods of these libraries; "meshlab" and "meshlab_heat" are MeshLab's filters;
+        "exact" is the polyhedral distance. Any other method is a pair of a name and a function from the mesh to an
+        object with a method ``distance(sources)``.
     reference : str, array, callable or None
-        "exact" or another name of `METHODS`; distances (k, n) or (n,); a function of mesh and sources, such as those
-        of `heat_igl.closed_forms`; or None to check only what needs no reference.
+        "exact" or another name from `METHODS`; distances (k, n) or (n,); a function of mesh and sources, such as those
+        of `heat_igl.closed_forms`; or None for only the checks that need no reference.
     name : str
-        Of the mesh, for the report.
+        Name of the mesh in the report.
     timeout, memory : float
         Bounds for native solvers, see `heat_igl.reference.exact`.
     progress : callable, optional
-        Called with the name of what comes next, the number of distances done, and their total.
+        Called before each distance with the name of the method, the number of distances done, and their total; at the
+        end with "done" and the total twice.
 
     Returns
     -------
     ValidationReport
-        A method that fails is a row that says why.
+        A method that fails is a row with the reason.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def validate(
         If a method is unknown, or two have one name; if the reference has the wrong shape.
     """
     sets = _source_sets(sources, mesh.n_vertices)
-    chosen = [named(method) for method in methods]
+    chosen = [resolved(method) for method in methods]
     if len({label for label, _ in chosen}) < len(chosen):
         raise ValueError(f"methods must have different names, not {', '.join(label for label, _ in chosen)}")
     counter = Counter(progress, len(sets) * (len(chosen) + (reference is not None)))
@@ -82,12 +82,12 @@ def validate(
         try:
             if known is not None and method == label:
                 found = known
-                counter.start(len(sets))
-                counter.skip_to_next()
+                counter.begin_method(len(sets))
+                counter.end_method()
             else:
                 found = run(mesh, sets, method, prepare, bounds, counter)
         except (ReferenceSolverError, MissingExtraError, FactorizationError, MeshError) as error:
-            counter.skip_to_next()
+            counter.end_method()
             rows.append(ValidationRow(method, failure=str(error)))
             continue
         distances[method] = found.distances
@@ -97,7 +97,7 @@ def validate(
 
 
 def draw_sources(mesh: Mesh, count: int, seed: int = 0) -> list[list[int]]:
-    """Single sources for `validate`: `count` different vertices of the component with the most faces, by a seed.
+    """Single sources for `validate`: `count` random vertices of the component with the most faces, all different.
 
     Raises
     ------
@@ -125,20 +125,20 @@ def _truths(
     bounds: Mapping[str, float],
     counter: Counter,
 ) -> tuple[str | None, FloatArray | None, Run | None]:
-    """Name and distances of the reference, and its run where it is a method."""
+    """Name and distances of the reference, and its run if it is a method."""
     if reference is None:
         return None, None, None
     if isinstance(reference, str):
-        found = run(mesh, sets, *named(reference), bounds, counter)
+        found = run(mesh, sets, *resolved(reference), bounds, counter)
         return reference, found.distances, found
-    counter.start(len(sets))
+    counter.begin_method(len(sets))
     if callable(reference):
         counter.step("reference")
         given: AnyArray = np.stack([reference(mesh, sources) for sources in sets])
         label = getattr(reference, "__name__", "function")
     else:
         given, label = np.atleast_2d(np.asarray(reference, dtype=np.float64)), "given distances"
-    counter.skip_to_next()
+    counter.end_method()
     if given.shape != (len(sets), mesh.n_vertices):
         raise ValueError(f"reference must have shape ({len(sets)}, {mesh.n_vertices}), not {given.shape}")
     return label, given, None

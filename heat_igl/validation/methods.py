@@ -1,4 +1,4 @@
-"""The methods that a validation compares: what each name stands for, and how one is run and measured."""
+"""The methods that a validation compares, by name, and how one of them is run and its cost measured."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from heat_igl.mesh import Mesh
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["METHODS", "Counter", "Method", "Prepare", "Progress", "Run", "Solver", "named", "run"]
+__all__ = ["METHODS", "Counter", "Method", "Prepare", "Progress", "Run", "Solver", "resolved", "run"]
 
 
 class Solver(Protocol):
-    """What a method of one's own has to look like: `HeatMethodSolver` is one."""
+    """The interface of a method; `HeatMethodSolver` has it."""
 
     def distance(self, sources: IntArray, /) -> FloatArray:
         """Distance (n,) from a set of sources."""
@@ -33,7 +33,7 @@ Prepare = Callable[[Mesh], Solver]
 Method = str | tuple[str, Prepare]
 Progress = Callable[[str, int, int], None]
 
-# Methods that run in this process, by the options of the solver; the others are native references.
+# Methods that run in this process, with the options of the solver; the others are native references.
 _OPTIONS: Mapping[str, Mapping[str, Any]] = {"heat": {}, "sweep": {"refine": "sweep"}, "unfold": {"refine": "unfold"}}
 _NATIVE = {
     "meshlab": "meshlab",
@@ -43,13 +43,13 @@ _NATIVE = {
     "exact": "exact",
 }
 
-#: Names that `validate` knows.
+#: The names of methods that `validate` takes.
 METHODS = (*_OPTIONS, *_NATIVE)
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Distances (k, n) of a method and what they cost; the fields are those of `ValidationRow`."""
+    """Distances (k, n) of a method and their cost; the other fields are those of `ValidationRow`."""
 
     distances: FloatArray
     precompute_seconds: float
@@ -60,7 +60,15 @@ class Run:
 
 
 class Counter:
-    """Tells the caller which distance comes next."""
+    """Counts the distances of all methods, and reports each one to a callback before it begins.
+
+    Parameters
+    ----------
+    progress : callable or None
+        The callback, see `validate`.
+    total : int
+        Distances of all methods together.
+    """
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress = progress
@@ -68,33 +76,33 @@ class Counter:
         self._done = 0
         self._block_end = 0
 
-    def start(self, n_distances: int) -> None:
-        """A method begins that will take as many steps."""
+    def begin_method(self, n_distances: int) -> None:
+        """A method begins that will find so many distances."""
         self._block_end = self._done + n_distances
 
     def step(self, label: str) -> None:
-        """A distance begins."""
+        """A distance of the method `label` begins."""
         if self._progress is not None:
             self._progress(label, self._done, self._total)
         self._done += 1
 
-    def skip_to_next(self) -> None:
-        """The method is over, wherever it was."""
+    def end_method(self) -> None:
+        """The method ends, possibly before it has found all of its distances."""
         self._done = self._block_end
 
     def finish(self) -> None:
-        """All is done."""
+        """All methods have ended."""
         if self._progress is not None:
             self._progress("done", self._total, self._total)
 
 
-def named(method: Method) -> tuple[str, Prepare | None]:
-    """Name of a method, and what prepares its solver; None for native references.
+def resolved(method: Method) -> tuple[str, Prepare | None]:
+    """Name of a method, and the function that makes its solver; None for native references.
 
     Raises
     ------
     ValueError
-        If the name is unknown, or taken where the method is one's own.
+        If the name is unknown, or if a pair has a name from `METHODS`.
     """
     if not isinstance(method, str):
         if method[0] in METHODS:
@@ -121,12 +129,12 @@ def run(
     bounds: Mapping[str, float],
     counter: Counter,
 ) -> Run:
-    """Distances from each set of sources by a method as `named` gives it; `bounds` are timeout and memory."""
-    counter.start(len(sets))
+    """Distances from each set of sources by a method from `resolved`; `bounds` are timeout and memory."""
+    counter.begin_method(len(sets))
     if prepare is None:
         return _run_native(mesh, sets, label, bounds, counter)
     distances, seconds = [], []
-    with PeakMemory() as peak, _noted() as notes:
+    with PeakMemory() as peak, _accuracy_notes() as notes:
         start = time.perf_counter()
         solver = prepare(mesh)
         ready = time.perf_counter()
@@ -145,8 +153,8 @@ def run(
 
 
 @contextmanager
-def _noted() -> Iterator[list[str]]:
-    """Collect what is said about accuracy, each once, for the report; other warnings go their way."""
+def _accuracy_notes() -> Iterator[list[str]]:
+    """Collect the warnings about accuracy, each once, for the report; other warnings are issued again."""
     notes: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", AccuracyWarning)

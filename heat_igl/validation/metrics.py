@@ -1,4 +1,4 @@
-"""How far a distance is from the truth, and what can be said of it without the truth.
+"""Measures of a distance: errors against the truth, and violations of properties that every distance has.
 
 Relative errors are fractions, not percent. A row of a (k, n) array is the distance from one set of sources, as
 `HeatMethodSolver.distances` returns it.
@@ -41,17 +41,17 @@ class ErrorSummary:
     Attributes
     ----------
     mean, median, percentile_95, maximum : float
-        Of the relative error |d - truth| / truth, over vertices at a positive finite distance.
+        Statistics of the relative error |d - truth| / truth, over vertices at a positive finite distance.
     l1, l2, l_infinity : float
-        Norms of d - truth over the largest distance from the same sources; the first two weighted by vertex area and
-        divided by the area (the square root of it).
+        Norms of d - truth, divided by the largest distance from the same sources. L1 and L2 are weighted by vertex area
+        and normalized by the total area.
     near_field : float
         Mean relative error over the neighbours of the sources.
     n_compared : int
-        Vertices that entered, summed over the sets of sources.
+        Number of vertices in these statistics, summed over the sets of sources.
     n_wrong_reach : int
-        Vertices that are unreachable (infinite or NaN) in one of the two and not in the other. Where only the truth
-        is finite, the error counts as infinite.
+        Number of vertices that are unreachable (infinite or NaN) in one of the two and not in the other. If only the
+        truth is finite, the error counts as infinite.
     """
 
     mean: float
@@ -68,16 +68,16 @@ class ErrorSummary:
 
 @dataclass(frozen=True)
 class TriangleViolations:
-    """Where d(a, v) > d(a, b) + d(b, v), for sources a, b and vertices v.
+    """Violations of the triangle inequality: d(a, v) > d(a, b) + d(b, v), for sources a, b and vertices v.
 
     Attributes
     ----------
     count : int
         Triples with an excess above rounding.
     fraction : float
-        Of all triples that were tried.
+        Share of all triples that were tried.
     largest : float
-        Largest excess, over d(a, v).
+        Largest excess, divided by d(a, v).
     """
 
     count: int
@@ -92,9 +92,10 @@ class BoundViolations:
     Attributes
     ----------
     n_below, n_above : int
-        Nearer than the straight line, farther than the shortest path along edges, beyond rounding.
+        Number of vertices nearer than the straight line, and farther than the shortest path along edges, beyond
+        rounding.
     largest_below, largest_above : float
-        By which fraction of the bound at most.
+        Largest violations, as fractions of the bound.
     """
 
     n_below: int
@@ -114,7 +115,7 @@ def relative_error(distance: ArrayLike, truth: ArrayLike) -> FloatArray:
     Returns
     -------
     (n,) or (k, n) float64
-        NaN where the truth is 0 or infinite; ``inf`` where only the distance is not finite.
+        NaN if the truth is 0 or infinite; ``inf`` if only the distance is not finite.
 
     Raises
     ------
@@ -129,12 +130,12 @@ def relative_error(distance: ArrayLike, truth: ArrayLike) -> FloatArray:
 
 
 def error_summary(mesh: Mesh, distances: ArrayLike, truths: ArrayLike, source_sets: Sequence[Sources]) -> ErrorSummary:
-    """All error norms in one.
+    """All error norms of some distances.
 
     Parameters
     ----------
     mesh : Mesh
-        For areas and neighbours.
+        Gives the areas and neighbours of vertices.
     distances, truths : (k, n) array_like
         One row per set of sources.
     source_sets : sequence of sources
@@ -177,7 +178,7 @@ def error_summary(mesh: Mesh, distances: ArrayLike, truths: ArrayLike, source_se
 
 
 def eikonal_residual(mesh: Mesh, distance: ArrayLike) -> FloatArray:
-    """How far the slope of a distance is from 1: | |grad d| - 1 | on each face.
+    """Residual of the eikonal equation |grad d| = 1 on each face: | |grad d| - 1 |.
 
     Parameters
     ----------
@@ -189,8 +190,8 @@ def eikonal_residual(mesh: Mesh, distance: ArrayLike) -> FloatArray:
     Returns
     -------
     (m,) float64
-        NaN on faces that are degenerate or not reached. No discrete distance makes it vanish at the sources and
-        across the cut locus, so its mean tends to 0 with the edge length and not its maximum.
+        NaN on faces that are degenerate or not reached. It does not vanish at the sources and across the cut locus for
+        any discrete distance, so its mean tends to 0 with the edge length, and its maximum does not.
     """
     d = np.asarray(distance, dtype=np.float64)
     reached = np.isfinite(d)[mesh.F].all(axis=1) & (mesh.measures > 0)
@@ -201,7 +202,7 @@ def eikonal_residual(mesh: Mesh, distance: ArrayLike) -> FloatArray:
 
 
 def asymmetry(distances: ArrayLike, sources: ArrayLike) -> FloatArray:
-    """The matrix d(a, b) - d(b, a) over pairs of sources; 0 for a true distance.
+    """The matrix d(a, b) - d(b, a) over pairs of sources; 0 for an exact distance.
 
     Parameters
     ----------
@@ -246,11 +247,11 @@ def bound_violations(
     mesh : Mesh
         Triangles or tetrahedra.
     distance : (n,) array_like
-        In the mesh's unit; vertices where it is not finite are left out.
+        In the mesh's unit; vertices at which it is not finite are left out.
     sources : int, sequence of int, or (n,) mask of bool
-        That it was measured from.
+        The sources of the distance.
     limits : pair of (n,) float64, optional
-        `straight_lines` and `edge_paths` from these sources, where they are known already.
+        `straight_lines` and `edge_paths` from these sources, if they are known already.
 
     Returns
     -------

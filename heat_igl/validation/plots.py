@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from heat_igl.drawing.raster import to_pixels
+from heat_igl.drawing.camera import to_pixels
 from heat_igl.drawing.scene import Scene, colours, scene
 from heat_igl.drawing.surface_image import fitted, mark_dots, surface_image
 from heat_igl.errors import MissingExtraError
@@ -21,25 +21,25 @@ if TYPE_CHECKING:
 
 __all__ = ["error_figure"]
 
-# Errors from 0.001 % to 10 %: what tells methods apart. All panels share the range, so that they can be compared.
+# Errors from 0.001 % to 10 %, the range in which methods differ. All panels share it, so that they can be compared.
 _LOWEST, _HIGHEST = 1e-5, 1e-1
 _ROW_INCHES = 2.6
 _COLUMNS, _LARGEST_ROWS = 800, 640  # of the picture of the surface
 
 
 def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[str, FloatArray]) -> Figure:
-    """Two panels for each method.
+    """A figure with two panels for each method: its error on the surface, and against distance.
 
     Parameters
     ----------
     title : str
-        Of the figure.
+        Title of the figure.
     mesh : Mesh
         Triangles, or tetrahedra whose boundary is drawn; seen as `heat_igl.plots.plot` shows it, with y upwards.
     truth : (n,) float64
         Distance to compare with.
     distances : mapping of str to (n,) float64
-        Of at least one method.
+        Distances of at least one method, by name.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[s
     table = colours("viridis", is_trimmed=False)
     for (surface, scatter), (method, distance) in zip(axes, distances.items(), strict=True):
         error = np.nan_to_num(relative_error(distance, truth), nan=_HIGHEST)
-        # A source has no relative error; it is drawn as if it had the smallest. What is out of reach has no colour.
+        # A source has no relative error; it is drawn as if it had the smallest. Unreachable vertices have no colour.
         shown = np.where(reachable, np.clip(error, _LOWEST, _HIGHEST), np.where(truth == 0, _LOWEST, np.inf))
         _paint(surface, replace(seen, values=np.log10(shown)), table)
         surface.set_title(method, fontsize=10)

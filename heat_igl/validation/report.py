@@ -1,4 +1,4 @@
-"""What a validation found: rows of numbers, as a dictionary, as Markdown, as a figure."""
+"""The result of a validation: rows of numbers, as a dictionary, as Markdown, or as a figure."""
 
 from __future__ import annotations
 
@@ -25,27 +25,28 @@ class ValidationRow:
     Attributes
     ----------
     method : str
-        Its name.
+        Name of the method.
     parameters : dict
-        What it was run with, and what it chose itself.
+        The parameters that it was given or chose itself.
     errors : ErrorSummary or None
-        Against the reference; None without one, or where the method failed.
+        Errors against the reference; None without a reference, or if the method failed.
     eikonal : float or None
         Mean over faces, weighted by area, of | |grad d| - 1 |.
     bounds : BoundViolations or None
         Sums and maxima over the sets of sources.
     asymmetry : float or None
-        Largest |d(a, b) - d(b, a)| over the mean of both; None unless there are two single sources or more.
+        Largest |d(a, b) - d(b, a)|, divided by the mean of both; None unless there are at least two sets of sources and
+        each is a single vertex.
     triangle_excess : float or None
         Largest violation of the triangle inequality, see `TriangleViolations.largest`; None likewise.
     precompute_seconds, solve_seconds : float or None
-        What depends on the mesh alone; the median over the sets of sources of the rest.
+        Time for the part that depends on the mesh alone; median over the sets of sources of the time for the rest.
     peak_memory : int or None
         Bytes by which the process that ran the method grew at most.
     notes : tuple of str
         Warnings about accuracy that the method gave.
     failure : str or None
-        Why there are no numbers.
+        The reason why the method failed; None if it did not.
     """
 
     method: str
@@ -92,11 +93,11 @@ class ValidationReport:
     Attributes
     ----------
     name : str
-        Of the mesh.
+        Name of the mesh.
     mesh : Mesh
         The mesh.
     reference : str or None
-        What the errors are measured against.
+        The reference that the errors are measured against.
     source_sets : tuple of (k_i,) int64
         The sets of sources, one distance each.
     rows : tuple of ValidationRow
@@ -160,7 +161,7 @@ class ValidationReport:
         Parameters
         ----------
         case : int
-            Which set of sources.
+            Index of the set of sources.
 
         Returns
         -------
@@ -206,7 +207,7 @@ def _number(value: float | None) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Numbers, text, None and their containers; JSON has no word for infinity."""
+    """A value that JSON can carry. It has no infinity and no NaN, which become text."""
     if isinstance(value, Mapping):
         return {str(name): _plain(entry) for name, entry in value.items()}
     if isinstance(value, (list, tuple)):

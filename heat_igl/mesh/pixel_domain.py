@@ -1,4 +1,4 @@
-"""Planar images: the pixels of a mask as a domain, and arrays per vertex as images again."""
+"""Planar images: the pixels of a mask as a flat mesh, and values per vertex as an image again."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ImageDomain:
         Parameters
         ----------
         pixels : (rows, columns) array_like of bool
-            Those outside the domain are passed over.
+            Pixels outside the domain are ignored.
 
         Raises
         ------
@@ -56,7 +56,7 @@ class ImageDomain:
         return found
 
     def image(self, values: ArrayLike, outside: float = np.inf) -> AnyArray:
-        """An array per vertex (n,), such as a distance, as an image (rows, columns); `outside` off the domain.
+        """Values per vertex (n,), such as a distance, as an image (rows, columns); `outside` off the domain.
 
         Raises
         ------
@@ -72,7 +72,7 @@ class ImageDomain:
         return image
 
     def per_face(self, image: ArrayLike) -> AnyArray:
-        """A value per pixel (rows, columns), such as a speed, as one per face of `mesh` (m,).
+        """Values per pixel (rows, columns), such as a speed, as values per face of `mesh` (m,).
 
         Raises
         ------
@@ -86,11 +86,11 @@ class ImageDomain:
 
 
 def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> ImageDomain:
-    """The domain that the pixels of `mask` cover.
+    """A flat mesh of the pixels of `mask`.
 
-    Every pixel is a rectangle, cut into four triangles around its centre: no direction of diagonals is preferred, no
-    pixel is lost, and areas are right. Pixels are connected as skimage's ``connectivity=2`` has it: those that touch in
-    a corner only are connected through that point, and a stroke one pixel wide is a strip one pixel wide.
+    Every pixel is a rectangle, cut into four triangles around its centre: no diagonal direction is preferred, no pixel
+    is lost, and the area of the mesh is that of the pixels. Pixels that touch only in a corner are connected through
+    this point, as with skimage's ``connectivity=2``, and a stroke one pixel wide becomes a strip one pixel wide.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> Ima
     Returns
     -------
     ImageDomain
-        With a mesh of one vertex per pixel and one per corner, and its `ImageDomain.index`.
+        Its mesh has a vertex for each pixel and one for each corner of pixels.
 
     Raises
     ------

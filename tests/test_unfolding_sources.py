@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import perturbed
-from test_refine import METHODS, exact, moebius_strip, random_disk, relative_error
+from test_unfolding import METHODS, exact, moebius_strip, random_disk, relative_error
 
 from heat_igl import Mesh, Refinement, SurfacePoints, shapes
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation

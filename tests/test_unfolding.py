@@ -16,8 +16,6 @@ from heat_igl import HeatMethodSolver, Mesh, Refinement, shapes, unfolded_distan
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 
-from refinement_table import with_slivers
-
 pytest.importorskip("numba")
 
 METHODS = ("sweep", "unfold")
@@ -260,7 +258,7 @@ def test_straight_over_an_edge_of_more_than_two_faces(method, k):
 
 def test_slivers_do_little_harm(bumpy):
     truth = exact(bumpy, 5)
-    bad = with_slivers(bumpy, 0)
+    bad = shapes.with_slivers(bumpy, 0)
     assert bad.n_vertices > bumpy.n_vertices + 200
     error = {}
     for name, mesh in (("clean", bumpy), ("slivers", bad)):
@@ -275,7 +273,7 @@ def test_slivers_do_little_harm(bumpy):
 def test_slivers_do_little_harm_on_the_cow(cow, seed):
     """Saddles with a twin a hair away: its path may neither keep the direction to its twin nor end in its bend."""
     sources = [901, 2227, 808]
-    clean, bad = (HeatMethodSolver(mesh, refine="unfold") for mesh in (cow, with_slivers(cow, seed)))
+    clean, bad = (HeatMethodSolver(mesh, refine="unfold") for mesh in (cow, shapes.with_slivers(cow, seed)))
     error = np.zeros(2)
     for source in sources:
         truth = exact(cow, source)
@@ -311,7 +309,7 @@ def test_no_poisson_problem_is_factored(bumpy, monkeypatch):
     def forbidden(*_: object) -> None:
         raise AssertionError("a Poisson problem was set up")
 
-    monkeypatch.setattr("heat_igl.heat_method.PoissonProblem", forbidden)
+    monkeypatch.setattr("heat_igl.heat_method.parts.PoissonProblem", forbidden)
     assert HeatMethodSolver(bumpy, refine="unfold").distance(0).max() > 1
     with pytest.raises(AssertionError, match="Poisson"):
         HeatMethodSolver(bumpy)

@@ -1,0 +1,101 @@
+"""The solvers that a worker keeps, within the memory that it has."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from heat_igl.cluster.memory import memory_for_solvers, solver_memory
+from heat_igl.heat_method import HeatMethodSolver, SolverOptions
+from heat_igl.mesh import Mesh
+from heat_igl.runtime import release_free_memory
+
+__all__ = ["SolverCache"]
+
+
+@dataclass(eq=False)
+class CacheEntry:
+    """A solver, or the memory reserved for it, and how many threads use it."""
+
+    bytes: int
+    n_users: int = 0
+    solver: HeatMethodSolver | None = None
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+
+class SolverCache:
+    """Solvers by mesh and options, shared by the threads of a worker.
+
+    A solver is freed when no thread uses it and another one needs the memory, or with `drop_idle` or `clear`.
+    """
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._entries: dict[str, CacheEntry] = {}
+        self._highest = 0
+
+    @contextmanager
+    def solver(self, mesh: Mesh, fingerprint: str, options: SolverOptions) -> Iterator[HeatMethodSolver]:
+        """The solver of `mesh`, whose arrays have this fingerprint; made if it is not there.
+
+        Waits until the memory that it is estimated to take is free.
+
+        Raises
+        ------
+        MemoryError
+            If that is more than the worker has.
+        """
+        key = f"{fingerprint} {options}"
+        entry = self._reserve(key, solver_memory(mesh), memory_for_solvers())
+        try:
+            with entry.lock:
+                if entry.solver is None:
+                    entry.solver = HeatMethodSolver.from_options(mesh, options)
+            yield entry.solver
+        finally:
+            with self._changed:
+                entry.n_users -= 1
+                self._changed.notify_all()
+
+    def drop_idle(self) -> None:
+        """Free the solvers that no thread uses."""
+        with self._changed:
+            self._drop_idle()
+
+    def clear(self) -> None:
+        """Free the solvers that no thread uses, and give their memory back to the system."""
+        with self._changed:
+            self._drop_idle()
+            self._highest = 0
+            release_free_memory()
+
+    def _reserve(self, key: str, needed: int, limit: int) -> CacheEntry:
+        """Reserve memory: free idle solvers first, then wait for other threads to finish with theirs."""
+        if needed > limit:
+            raise MemoryError(
+                f"it needs about {needed / 2**30:.2g} GiB, and this worker has {limit / 2**30:.2g} GiB to spare: "
+                "use fewer workers, or workers with more memory"
+            )
+        with self._changed:
+            if key not in self._entries:
+                self._drop_idle()
+            while key not in self._entries and self._reserved() + needed > limit:
+                self._changed.wait()
+                self._drop_idle(but=key)
+            entry = self._entries.setdefault(key, CacheEntry(needed))
+            entry.n_users += 1
+            if self._reserved() > self._highest:
+                # The free pieces that smaller solvers left must not add to the memory of a larger one. One that is no
+                # larger fits into what the process holds already, which then need not be mapped again.
+                self._highest = self._reserved()
+                release_free_memory()
+            return entry
+
+    def _reserved(self) -> int:
+        return sum(entry.bytes for entry in self._entries.values())
+
+    def _drop_idle(self, but: str = "") -> None:
+        for key in [key for key, entry in self._entries.items() if not entry.n_users and key != but]:
+            del self._entries[key]

@@ -1,0 +1,113 @@
+"""The state behind an interactive view: a mesh, sources, options and the distance. No window is involved."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from heat_igl import reference
+from heat_igl.errors import FactorizationError, MissingExtraError, ReferenceSolverError
+from heat_igl.heat_method import HeatMethodSolver, SolverOptions
+from heat_igl.mesh import Mesh
+from heat_igl.sources import Sources, vertex_sources
+from heat_igl.typing import FloatArray, IntArray
+
+__all__ = ["Exploration"]
+
+# Number of factored solvers to keep, since users alternate between a few settings.
+_KEPT_SOLVERS = 4
+
+
+class Exploration:
+    """A mesh with sources, options and the distance, which is updated after every change.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles or tetrahedra.
+    sources : int, sequence of int, or (n,) mask of bool
+        Initial source vertices.
+    options : SolverOptions
+        Initial options.
+
+    Attributes
+    ----------
+    mesh, options
+        The mesh, and the current options (see `change`).
+    sources : (k,) int64
+        The current source vertices (see `choose`).
+    distance : (n,) float64
+        Distance from `sources` with `options`.
+    t_coef : float
+        The time step in use, in squared mean edge lengths.
+    error : (n,) float64 or None
+        Error of `distance` in percent of the exact distance, 0 at the sources and ``inf`` at unreachable vertices.
+        `compare` computes it; any change resets it to None.
+    message : str
+        One line for the user: the result of the last change, or the error.
+
+    Raises
+    ------
+    MeshError, SourceError, FactorizationError, MissingExtraError, ValueError
+        As for `HeatMethodSolver`.
+    """
+
+    def __init__(self, mesh: Mesh, sources: Sources = 0, options: SolverOptions | None = None) -> None:
+        self.mesh = mesh
+        self.options = options or SolverOptions()
+        self.sources: IntArray = vertex_sources(sources, mesh.n_vertices)
+        self.error: FloatArray | None = None
+        self._solvers: dict[SolverOptions, HeatMethodSolver] = {}
+        self._solve(self.sources, self.options)
+
+    def choose(self, vertex: int, add: bool = False) -> None:
+        """Make `vertex` the only source. With `add`, add it to the sources, or remove it if it is one of several."""
+        chosen = {vertex}
+        if add:
+            chosen = set(self.sources.tolist()) ^ {vertex} or {vertex}
+        self._solve(vertex_sources(sorted(chosen), self.mesh.n_vertices), self.options)
+
+    def change(self, **options: Any) -> None:
+        """Change options. If the solver fails, nothing changes, and `message` gives the reason."""
+        try:
+            self._solve(self.sources, replace(self.options, **options))
+        except (ValueError, FactorizationError, MissingExtraError) as error:
+            self.message = str(error)
+
+    def compare(self) -> None:
+        """Compute `error` against exact distance, which takes seconds; `message` gives the mean or the failure."""
+        try:
+            exact = reference.exact(self.mesh, self.sources)
+        except (ReferenceSolverError, MissingExtraError) as problem:
+            self.message = f"no exact distance: {problem}"
+            return
+        error = np.where(np.isfinite(exact), 0.0, np.inf)
+        away = (exact > 0) & np.isfinite(exact)
+        error[away] = 100 * (self.distance[away] / exact[away] - 1)
+        self.error = error
+        mean, largest = (float(of(np.abs(error[away]), initial=0.0)) for of in (np.sum, np.max))
+        self.message = f"error {mean / max(int(away.sum()), 1):.3g} % in the mean, {largest:.3g} % at most"
+
+    def _solve(self, sources: IntArray, options: SolverOptions) -> None:
+        start = time.perf_counter()
+        solver = self._solvers.pop(options, None)
+        is_new = solver is None
+        if solver is None:
+            solver = HeatMethodSolver.from_options(self.mesh, options)
+        self._solvers[options] = solver  # the dictionary is ordered by last use
+        while len(self._solvers) > _KEPT_SOLVERS:
+            del self._solvers[next(iter(self._solvers))]
+        self.distance = solver.distance(sources)
+        self.t_coef = solver.t / solver.diagnostics.mean_edge_length**2
+        self.sources, self.options, self.error = sources, options, None
+        finite = np.where(np.isfinite(self.distance), self.distance, -1.0)
+        self.message = (
+            f"{1000 * (time.perf_counter() - start):.0f} ms{', factored anew' if is_new else ''}; farthest "
+            f"{finite.max():.6g} at vertex {int(finite.argmax())}"
+        )
+        lost = int((finite < 0).sum())
+        if lost:
+            self.message += f"; {lost} vertices are out of reach"

@@ -1,0 +1,182 @@
+"""Distances from many sets of sources: in blocks, on all processors, into an array or one after the other."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence, Sized
+
+import numpy as np
+import numpy.typing as npt
+
+from heat_igl.errors import SourceError
+from heat_igl.heat_method.options import positive
+from heat_igl.runtime import (
+    block_size,
+    float_type,
+    held_warnings,
+    in_blocks,
+    in_order,
+    n_threads,
+    progress_bar,
+    row_writer,
+    warn_caller,
+)
+from heat_igl.sources import Sources, SourceSet
+from heat_igl.typing import AnyArray, FloatArray
+
+__all__ = ["BatchedSolver", "checked_cutoff", "cut_off"]
+
+
+class BatchedSolver(ABC):
+    """A solver for k sets of sources at a time, asked for any number of them."""
+
+    @property
+    @abstractmethod
+    def n_vertices(self) -> int:
+        """Length of a distance array."""
+
+    @property
+    @abstractmethod
+    def _n_faces(self) -> int:
+        """Faces of the domain, by which the memory of a block is estimated."""
+
+    @abstractmethod
+    def _source_set(self, sources: Sources) -> SourceSet:
+        """`sources`, checked."""
+
+    @abstractmethod
+    def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
+        """Distances (k, n) from k sets of sources; on any thread."""
+
+    def distances(
+        self,
+        source_sets: Sequence[Sources],
+        out: AnyArray | None = None,
+        progress: bool = False,
+        dtype: npt.DTypeLike | None = None,
+        *,
+        cutoff: float | None = None,
+    ) -> AnyArray:
+        """Distance from each of several sets of sources, solved in blocks, on all processors.
+
+        Parameters
+        ----------
+        source_sets : sequence of sources
+            k entries, each as for `distance`.
+        out : (k, n) array of float, optional
+            Where to write: an array, a `numpy.memmap`, a zarr array, or whatever has a shape and a dtype and takes
+            ``out[start:stop] = rows``. A chunked array is written a whole row of chunks at a time.
+        progress : bool
+            Show a progress bar on standard error (extra ``cli``).
+        dtype : float64 or float32, optional
+            Of the result; float64, or that of `out`.
+        cutoff : float, optional
+            Distances beyond this are ``inf``.
+
+        Returns
+        -------
+        (k, n) array of `dtype`, or `out`
+            Row i is the distance from ``source_sets[i]``; the same as one by one to rounding, whatever the number of
+            threads.
+
+        Raises
+        ------
+        SourceError
+            Before anything is solved, if an entry does not name sources; the message says which.
+        ValueError
+            If `out` has the wrong shape, cannot hold floats or cannot be written, if `dtype` is none for distances, or
+            if `cutoff` is not positive.
+
+        Notes
+        -----
+        Beside the result and one row of chunks of `out`, it holds at most 2 GiB, or what one query takes where that is
+        more: 40 bytes per face. For sources inside faces it may be three times as much. The number of threads is that
+        of the processors, or ``HEAT_IGL_NUM_THREADS``.
+        """
+        if not hasattr(source_sets, "__len__"):
+            raise SourceError(f"source_sets must be a sequence of sets of sources, not {source_sets!r}: try distance")
+        beyond = checked_cutoff(cutoff)
+        chosen = list(self._named(source_sets))
+        shape = (len(chosen), self.n_vertices)
+        if out is None:
+            out = np.empty(shape, float_type(dtype))
+        elif tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f":
+            raise ValueError(f"out must be an array of floats of shape {shape}, not {out.dtype} of shape {out.shape}")
+        elif dtype is not None and float_type(dtype) != out.dtype:
+            raise ValueError(f"dtype is {np.dtype(dtype)}, but out holds {out.dtype}: leave one of them away")
+        elif isinstance(out, np.ndarray) and not out.flags.writeable:
+            raise ValueError("out is read-only: open a memmap with mode='r+'")
+        write = row_writer(out)
+        with progress_bar("distances", len(chosen), progress) as advance:
+            for rows in self._blocks(chosen, len(chosen)):
+                write(cut_off(rows, beyond).astype(out.dtype, copy=False))
+                advance(len(rows))
+        return out
+
+    def iter_distances(self, source_sets: Iterable[Sources], dtype: npt.DTypeLike | None = None) -> Iterator[AnyArray]:
+        """Distance from each of several sets of sources, a row as soon as its block is solved.
+
+        Parameters
+        ----------
+        source_sets : iterable of sources
+            Each as for `distance`; drawn from as the rows are taken, so it may be a generator without an end.
+        dtype : float64 or float32, optional
+            Of the rows.
+
+        Yields
+        ------
+        (n,) array of `dtype`
+            In the order of `source_sets`; no view of anything else.
+
+        Raises
+        ------
+        SourceError
+            When the row of an entry that does not name sources would be next; the message says which.
+        ValueError
+            At once, if `dtype` is none for distances.
+
+        Notes
+        -----
+        Memory is bounded as for `distances`, whatever the number of sets; blocks are solved ahead on all processors
+        while rows are being used.
+        """
+        row_type = float_type(dtype)
+        if not isinstance(source_sets, Iterable):
+            raise SourceError(f"source_sets must be an iterable of sets of sources, not {source_sets!r}: try distance")
+        n_sets = len(source_sets) if isinstance(source_sets, Sized) else None
+        blocks = self._blocks(self._named(source_sets), n_sets)
+        return (row.astype(row_type) for rows in blocks for row in rows)
+
+    def _named(self, source_sets: Iterable[Sources]) -> Iterator[SourceSet]:
+        """The sources of each set; errors say which set they are in."""
+        for i, sources in enumerate(source_sets):
+            try:
+                yield self._source_set(sources)
+            except SourceError as error:
+                raise SourceError(f"source_sets[{i}]: {error}") from None
+
+    def _blocks(self, source_sets: Iterable[SourceSet], n_sets: int | None) -> Iterator[FloatArray]:
+        """Distances of a block of sets after the other."""
+
+        def solved(block: list[SourceSet]) -> tuple[FloatArray, list[tuple[str, type[Warning]]]]:
+            with held_warnings() as held:
+                return self._distances(block), held
+
+        size, threads = block_size(self._n_faces, n_sets, n_threads())
+        for rows, held in in_order(solved, in_blocks(source_sets, size), threads):
+            # The caller's line is on this thread.
+            for warning in held:
+                warn_caller(*warning)
+            yield rows
+
+
+def checked_cutoff(value: float | None) -> float | None:
+    """The cutoff as a float; None for none."""
+    return None if value is None else positive("cutoff", value)
+
+
+def cut_off(distances: FloatArray, cutoff: float | None) -> FloatArray:
+    """The same array, with ``inf`` for distances beyond `cutoff`."""
+    if cutoff is not None:
+        distances[distances > cutoff] = np.inf
+    return distances

@@ -1,0 +1,72 @@
+"""`SolverOptions`: what a heat method solver can be asked for, checked once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from heat_igl.linear import Backend
+from heat_igl.operators import Laplacian, Operators, check_laplacian
+from heat_igl.steps import Boundary, check_boundary
+from heat_igl.unfolding import Refine
+
+__all__ = ["Magnitude", "SolverOptions", "positive"]
+
+Magnitude = Literal["auto", "unit", "damped"]
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """The options of `HeatMethodSolver`, with their meanings and defaults; checked when they are put together.
+
+    Attributes
+    ----------
+    t_coef, t, laplacian, boundary, magnitude, refine, backend
+        As for `HeatMethodSolver`.
+
+    Raises
+    ------
+    ValueError
+        If an option has no meaning.
+    """
+
+    t_coef: float | None = None
+    t: float | None = None
+    laplacian: Laplacian = "intrinsic-delaunay"
+    boundary: Boundary = "neumann"
+    magnitude: Magnitude = "auto"
+    refine: Refine | None = None
+    backend: Backend = "auto"
+
+    def __post_init__(self) -> None:
+        for name in ("t_coef", "t"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, positive(name, value))
+        check_laplacian(self.laplacian)
+        check_boundary(self.boundary)
+        if self.magnitude not in get_args(Magnitude):
+            raise ValueError(f"magnitude must be 'auto', 'unit' or 'damped', not {self.magnitude!r}")
+        if self.refine is not None and self.refine not in get_args(Refine):
+            raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {self.refine!r}")
+        if self.backend not in get_args(Backend):
+            raise ValueError(f"backend must be one of {', '.join(map(repr, get_args(Backend)))}, not {self.backend!r}")
+
+    def damps(self, domain: Operators) -> bool:
+        """Whether the field is damped where heat arrives from several sides: ``magnitude="auto"`` resolved."""
+        if self.magnitude == "auto":
+            return domain.is_surface and self.laplacian != "cotan"
+        return self.magnitude == "damped"
+
+
+def positive(name: str, value: float) -> float:
+    """`value` as a float; a ValueError that calls it `name` if it is not a positive number."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not (np.isfinite(number) and number > 0):
+        raise ValueError(f"{name} must be a positive number, not {value!r}")
+    return number

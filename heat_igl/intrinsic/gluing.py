@@ -1,0 +1,95 @@
+"""Gluing: intrinsic triangulations from faces and edge lengths, and faces oriented alike."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import igl
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.intrinsic.history import Turned
+from heat_igl.intrinsic.mollification import mollify
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, half_edge_head, half_edge_tail
+from heat_igl.mesh import Mesh, connectivity
+from heat_igl.typing import ArrayLike, IntArray
+
+__all__ = ["from_edge_lengths", "intrinsic_triangulation", "oriented"]
+
+# Two lengths of one edge may differ by this share: digits lost when the lengths were written to a file, for instance.
+_SAME_LENGTH = 1e-9
+
+
+def from_edge_lengths(
+    l: ArrayLike,  # noqa: E741
+    F: IntArray,
+    n: int,
+    facets: connectivity.Facets | None = None,
+) -> IntrinsicTriangulation:
+    """Triangles with given edge lengths, glued where they share two vertices; degenerate ones are mollified.
+
+    Parameters
+    ----------
+    l : (m, 3) array_like
+        ``l[f, c]`` is the length of the edge opposite corner ``c`` of face ``f``.
+    F : (m, 3) int64
+        Faces, validated like those of a `Mesh`.
+    n : int
+        Number of vertices.
+    facets : Facets, optional
+        The facets of F, if they are known.
+
+    Raises
+    ------
+    MeshError
+        If `l` has the wrong shape or an entry that is not a length, or gives an edge two lengths.
+    """
+    found = connectivity.facets(F, n) if facets is None else facets
+    lengths = np.array(l, dtype=np.float64)
+    if lengths.shape != F.shape:
+        raise MeshError(f"l must have one length per side of F, shape {F.shape}, but it has shape {lengths.shape}")
+    bad = ~(np.isfinite(lengths) & (lengths >= 0))
+    if bad.any():
+        f, c = (int(i) for i in np.argwhere(bad)[0])
+        raise MeshError(f"l[{f}, {c}] = {lengths[f, c]} is not a length ({int(bad.sum())} entries are not)")
+    half_edge = np.arange(F.size)
+    first, last = np.empty((2, len(found.n_faces)), np.int64)
+    # Of several values written to one place, the last stays.
+    last[found.of_face.ravel()] = half_edge
+    first[found.of_face.ravel()[::-1]] = half_edge[::-1]
+    a, b = first[found.n_faces == 2], last[found.n_faces == 2]
+    differs = np.abs(lengths.ravel()[a] - lengths.ravel()[b]) > _SAME_LENGTH * lengths.ravel()[a]
+    if differs.any():
+        one, other = int(a[differs][0]), int(b[differs][0])
+        raise MeshError(
+            f"l gives the edge between faces {one // 3} and {other // 3} two lengths, {lengths.flat[one]} and "
+            f"{lengths.flat[other]} ({int(differs.sum())} edges differ)"
+        )
+    twin = np.where(found.n_faces[found.of_face.ravel()] == 1, -1, -2)
+    twin[a], twin[b] = b, a
+    aligned = np.ones(F.size, bool)
+    aligned[a] = aligned[b] = half_edge_tail(F, a) == half_edge_head(F, b)
+    lengthening = mollify(lengths)
+    return IntrinsicTriangulation(F, lengths + lengthening, twin, aligned, n, lengthening=lengthening)
+
+
+def intrinsic_triangulation(mesh: Mesh) -> IntrinsicTriangulation:
+    """The triangles of `mesh` by their edge lengths; degenerate ones are mollified."""
+    return from_edge_lengths(igl.edge_lengths(mesh.V, mesh.F), mesh.F, mesh.n_vertices, mesh.facets)
+
+
+def oriented(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
+    """The same surface, with faces reversed until neighbours are oriented alike; a Moebius strip keeps a seam."""
+    F = triangulation.F
+    turned = (igl.bfs_orient(F)[0] != F).any(axis=1)
+    # libigl reverses the row of a face, so corner c becomes 2 - c.
+    corner = np.where(turned[:, None], np.arange(3)[::-1], np.arange(3))
+    new_of = (3 * np.arange(len(F))[:, None] + corner).ravel()  # new half-edge of old; the map is its own inverse
+    twin = triangulation.twin[new_of]
+    twin[twin >= 0] = new_of[twin[twin >= 0]]
+    F, lengths = np.take_along_axis(F, corner, 1), np.take_along_axis(triangulation.l, corner, 1)
+    aligned = np.ones(F.size, bool)
+    inner = np.flatnonzero(twin >= 0)
+    aligned[inner] = half_edge_tail(F, inner) == half_edge_head(F, twin[inner])
+    history = (*triangulation.history, Turned(turned))
+    return replace(triangulation, F=F, l=lengths, twin=twin, aligned=aligned, history=history)

@@ -1,0 +1,56 @@
+"""Triangles known by their edge lengths, laid out in the plane: positions of the corners, and the angles there."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+
+from heat_igl.typing import FloatArray
+
+__all__ = ["apex", "corner_angles", "lay_out"]
+
+
+def apex(base: FloatArray, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Corner opposite the base of triangles whose base runs from the origin along the positive first axis.
+
+    Parameters
+    ----------
+    base : (k,) float64
+        Lengths of the bases.
+    left, right : (k,) float64
+        Lengths of the sides at the origin, and at the other end of the base.
+
+    Returns
+    -------
+    x, y : (k,) float64
+        Coordinates; y is never negative.
+
+    Notes
+    -----
+    The height y comes from the area by Kahan's form of Heron's formula: ``sqrt(left^2 - x^2)`` loses the digits of
+    slivers.
+    """
+    x = (base + (left - right) * ((left + right) / base)) / 2
+    height = igl.doublearea(np.stack([base, left, right], axis=1), 0.0) / base
+    return x, np.asarray(height)
+
+
+def lay_out(l: FloatArray) -> FloatArray:  # noqa: E741
+    """Corners (k, 3, 2) of triangles with edge lengths `l` (k, 3): corner 0 at the origin, corner 1 at (l[:, 2], 0)."""
+    x, y = apex(l[:, 2], l[:, 1], l[:, 0])
+    corners = np.zeros((len(l), 3, 2))
+    corners[:, 1, 0], corners[:, 2, 0], corners[:, 2, 1] = l[:, 2], x, y
+    return corners
+
+
+def corner_angles(l: FloatArray) -> FloatArray:  # noqa: E741
+    """Angle (k, 3) at each corner of triangles with edge lengths `l` (k, 3), opposite the corners.
+
+    From half the angle, ``tan^2 = (s - b)(s - c) / (s (s - a))`` with s half the perimeter. The error is that of a
+    change of the lengths by some 1e-16 of the longest; the arccosine of the cosine rule loses half the digits of a
+    small angle.
+    """
+    beside = np.roll(l, -1, axis=1), np.roll(l, 1, axis=1)
+    half = l.sum(axis=1, keepdims=True) / 2
+    opposite = np.maximum((half - beside[0]) * (half - beside[1]), 0.0)
+    return np.asarray(2 * np.arctan2(np.sqrt(opposite), np.sqrt(np.maximum(half * (half - l), 0.0))))

@@ -1,0 +1,190 @@
+"""Meshes of other libraries as `Mesh` or `PolygonMesh`: recognized by their attributes, so nothing is imported."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.io.files import read_mesh
+from heat_igl.mesh import Mesh, PolygonMesh
+from heat_igl.typing import AnyArray, ArrayLike, IntArray
+
+__all__ = ["MeshLike", "as_mesh"]
+
+MeshLike = Any
+"""`Mesh`, `PolygonMesh`, a pair (V, F), a path, or a mesh of another library, see `as_mesh`."""
+
+_UNDERSTOOD = (
+    "a Mesh or PolygonMesh, a pair (V, F), a path, or a mesh of trimesh, pyvista or vtk, open3d, meshio, pymeshlab, "
+    "vedo or nibabel"
+)
+# Cells by the names of meshio and by the numbers of VTK.
+_TRIANGLES, _QUADS, _POLYGONS, _TETRAHEDRA = ("triangle", 5), ("quad", 9), ("polygon", 7), ("tetra", 10)
+
+
+def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh:
+    """A mesh of any library as a mesh of this one.
+
+    Parameters
+    ----------
+    mesh : mesh or array_like
+        `Mesh` and `PolygonMesh` are returned as they are. Besides: a pair (V, F); a path, read by `read_mesh`; meshes
+        of trimesh, pyvista and vtk (PolyData, UnstructuredGrid), open3d, meshio, pymeshlab (also a MeshSet: its
+        current mesh), vedo, and nibabel (surfaces in GIFTI). With `F`, the positions V (n, 3).
+    F : (m, 3) or (m, 4) array_like of int, optional
+        Triangles or tetrahedra, when `mesh` is V.
+
+    Returns
+    -------
+    Mesh or PolygonMesh
+        In the vertices' own order and unit. Polygons with more than three corners give a `PolygonMesh`; a mesh with
+        tetrahedra gives those, without the triangles of their boundary.
+
+    Raises
+    ------
+    MeshError
+        If the object is not understood (the message lists what is), or its mesh cannot be used.
+
+    Notes
+    -----
+    Objects are recognized by the attributes that hold positions and faces. An array (m, 4) in a pair (V, F) holds
+    tetrahedra, as everywhere in this package; `PolygonMesh` takes quadrilaterals.
+    """
+    if F is not None:
+        if isinstance(mesh, (Mesh, PolygonMesh)):
+            raise MeshError(f"F is given beside a {type(mesh).__name__}: pass a mesh alone, or positions V and faces F")
+        return Mesh(mesh, F)
+    if isinstance(mesh, (Mesh, PolygonMesh)):
+        return mesh
+    if isinstance(mesh, (str, os.PathLike)):
+        return read_mesh(mesh)
+    if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
+        return Mesh(*mesh)
+    if isinstance(mesh, np.ndarray):
+        raise MeshError("faces F are missing: pass a mesh, or positions V and faces F")
+    for convert in _CONVERSIONS:
+        found = convert(mesh)
+        if found is not None:
+            return found
+    raise MeshError(f"mesh is {_named(mesh)}, which is not understood: pass {_UNDERSTOOD}")
+
+
+def _named(mesh: object) -> str:
+    kind = type(mesh)
+    return (
+        f"of type {kind.__qualname__}" if kind.__module__ == "builtins" else f"a {kind.__module__}.{kind.__qualname__}"
+    )
+
+
+def _pymeshlab(mesh: Any) -> Mesh | PolygonMesh | None:
+    """pymeshlab: Mesh, and MeshSet with a current mesh."""
+    if hasattr(mesh, "current_mesh"):
+        mesh = mesh.current_mesh()
+    if not (hasattr(mesh, "vertex_matrix") and hasattr(mesh, "face_matrix")):
+        return None
+    return Mesh(mesh.vertex_matrix(), np.asarray(mesh.face_matrix(), np.int64))
+
+
+def _cells(mesh: Any) -> Mesh | PolygonMesh | None:
+    """Meshio's Mesh and pyvista's UnstructuredGrid: blocks of cells, each of one type."""
+    if not (hasattr(mesh, "points") and isinstance(getattr(mesh, "cells_dict", None), Mapping)):
+        return None
+    cells: Mapping[Any, AnyArray] = mesh.cells_dict
+
+    def of(kinds: tuple[str, int]) -> list[AnyArray]:
+        return [np.asarray(cells[kind]) for kind in kinds if kind in cells]
+
+    tetrahedra = of(_TETRAHEDRA)
+    if tetrahedra:
+        return Mesh(mesh.points, tetrahedra[0])
+    return _of_polygons(mesh.points, [*of(_TRIANGLES), *of(_QUADS), *of(_POLYGONS)])
+
+
+def _poly_data(mesh: Any) -> Mesh | PolygonMesh | None:
+    """PolyData of pyvista and vtk: polygons one after the other, each behind the number of its corners."""
+    if hasattr(mesh, "points") and hasattr(mesh, "faces") and hasattr(mesh, "n_points"):
+        return _of_polygons(mesh.points, [_unpadded(np.asarray(mesh.faces))])
+    if hasattr(mesh, "GetPoints") and hasattr(mesh, "GetPolys"):
+        polygons = mesh.GetPolys()
+        corners, ends = (np.asarray(part) for part in (polygons.GetConnectivityArray(), polygons.GetOffsetsArray()))
+        return _of_polygons(np.asarray(mesh.GetPoints().GetData()), [np.split(corners, ends[1:-1])])
+    return None
+
+
+def _vertices_and_faces(mesh: Any) -> Mesh | PolygonMesh | None:
+    """Trimesh (faces), open3d (triangles) and vedo (cells): arrays of positions and of indices."""
+    for positions in ("vertices", "points"):
+        for faces in ("faces", "triangles", "cells"):
+            V, polygons = getattr(mesh, positions, None), getattr(mesh, faces, None)
+            if V is not None and polygons is not None and not callable(V) and not callable(polygons):
+                return _of_polygons(np.asarray(V), [_rows(polygons)])
+    return None
+
+
+def _tensors(mesh: Any) -> Mesh | PolygonMesh | None:
+    """open3d's mesh of tensors."""
+    if not (hasattr(mesh, "vertex") and hasattr(mesh, "triangle")):
+        return None
+    return Mesh(mesh.vertex.positions.cpu().numpy(), mesh.triangle.indices.cpu().numpy())
+
+
+def _gifti(mesh: Any) -> Mesh | PolygonMesh | None:
+    """Nibabel's GiftiImage, with coordinates and triangles among its arrays."""
+    if not hasattr(mesh, "agg_data"):
+        return None
+    V, F = mesh.agg_data(("pointset", "triangle"))
+    if not len(V) or not len(F):
+        raise MeshError("the GIFTI image holds no surface: it needs coordinates (POINTSET) and faces (TRIANGLE)")
+    return Mesh(V, F)
+
+
+# The more telling attributes first: pyvista's PolyData also has what the later ones look for.
+_CONVERSIONS: tuple[Callable[[Any], Mesh | PolygonMesh | None], ...] = (
+    _pymeshlab,
+    _cells,
+    _poly_data,
+    _gifti,
+    _tensors,
+    _vertices_and_faces,
+)
+
+
+def _rows(faces: Any) -> AnyArray | list[IntArray]:
+    """Faces as an array (m, d), or as a list where they differ in degree."""
+    try:
+        return np.asarray(faces)
+    except ValueError:
+        return [np.asarray(face) for face in faces]
+
+
+def _unpadded(faces: IntArray) -> list[IntArray] | IntArray:
+    """The polygons of an array in which each stands behind the number of its corners."""
+    if not len(faces):
+        return np.empty((0, 3), np.int64)
+    degree = int(faces[0])
+    if degree > 0 and len(faces) % (degree + 1) == 0:
+        rows = faces.reshape(-1, degree + 1)
+        if (rows[:, 0] == degree).all():
+            return rows[:, 1:]
+    polygons, at = [], 0
+    while at < len(faces):
+        polygons.append(faces[at + 1 : at + 1 + faces[at]])
+        at += int(faces[at]) + 1
+    return polygons
+
+
+def _of_polygons(V: AnyArray, blocks: Iterable[AnyArray | list[IntArray]]) -> Mesh | PolygonMesh:
+    """Triangles where all faces are, polygons otherwise."""
+    blocks = [block for block in blocks if len(block)]
+    if not blocks:
+        raise MeshError("the mesh has no faces: a distance needs triangles, polygons or tetrahedra")
+    if all(isinstance(block, np.ndarray) and block.ndim == 2 and block.shape[1] == 3 for block in blocks):
+        return Mesh(V, np.concatenate(blocks))
+    polygons = [np.asarray(face, np.int64) for block in blocks for face in block]
+    if all(len(face) == 3 for face in polygons):
+        return Mesh(V, np.array(polygons))
+    return PolygonMesh(V, polygons)

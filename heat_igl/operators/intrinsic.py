@@ -1,0 +1,104 @@
+"""Operators of triangles that are known by the lengths of their edges."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import igl
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, intrinsic_delaunay
+from heat_igl.mesh import Mesh, connectivity
+from heat_igl.mesh.mesh import checked_faces
+from heat_igl.operators.elements import TriangleElements
+from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
+from heat_igl.operators.simplices import longest_sides, padded
+from heat_igl.operators.surface import Surface
+from heat_igl.typing import ArrayLike
+
+__all__ = ["edge_length_operators", "intrinsic_operators"]
+
+
+def intrinsic_operators(
+    triangulation: IntrinsicTriangulation,
+    paths: Mesh | Operators | None = None,
+    on_laplacian: OnLaplacian | None = None,
+) -> Operators:
+    """The operators of triangles that are known by their edge lengths, gradients in the plane of each (d = 2).
+
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        The triangles.
+    paths : Mesh or Operators, optional
+        Gives the components and the longest path along edges, on the same vertices; without it both are found along
+        the edges of the triangulation.
+    on_laplacian : callable, optional
+        Called with L as soon as it is known.
+    """
+    F, lengths, n = triangulation.F, triangulation.l, triangulation.n
+    L = padded(igl.cotmatrix_intrinsic(lengths, F), n)
+    if on_laplacian is not None:
+        on_laplacian(L)
+    referenced = np.zeros(n, bool)
+    referenced[F] = True
+    elements = TriangleElements.in_planes(triangulation)
+    if paths is not None:
+        components, longest_distance = paths.components, paths.longest_distance
+    else:
+        components = connectivity.connected_components(F, n)
+        i, j, length = elements.edge_lengths()
+        graph = connectivity.shortest_edge_graph(np.stack([i, j], axis=1), length, n)
+        longest_distance = connectivity.longest_path(graph, components)
+    return Operators(
+        L=L,
+        M=padded(igl.massmatrix_intrinsic(lengths, F), n),
+        gradient=elements,
+        weights=triangulation.areas,
+        face_sizes=longest_sides(lengths),
+        mean_edge_length=triangulation.mean_edge_length,
+        components=components,
+        boundary=triangulation.boundary,
+        referenced=referenced,
+        longest_distance=longest_distance,
+        lengths=elements,
+        surface=Surface(triangulation, faces=None if triangulation.history else triangulation),
+    )
+
+
+def edge_length_operators(
+    F: ArrayLike, lengths: ArrayLike, n: int | None = None, laplacian: Laplacian = "intrinsic-delaunay"
+) -> Operators:
+    """The operators of triangles that are given by their edge lengths.
+
+    Parameters
+    ----------
+    F : (m, 3) array_like of int
+        Vertices of each triangle.
+    lengths : (m, 3) array_like
+        ``lengths[f, c]`` is that of the side of triangle f opposite its corner c.
+    n : int, optional
+        Number of vertices; one more than the largest in `F` if not given.
+    laplacian : {"intrinsic-delaunay", "cotan"}
+        As for `operators`.
+
+    Raises
+    ------
+    MeshError
+        If `F` or `lengths` cannot be used.
+    ValueError
+        If `laplacian` is neither.
+    """
+    check_laplacian(laplacian)
+    triangles = checked_faces(F, n)
+    if triangles.shape[1] != 3:
+        raise MeshError(f"F must have shape (m, 3), triangles, but it has shape {triangles.shape}")
+    faces = from_edge_lengths(lengths, triangles, int(triangles.max()) + 1 if n is None else n)
+    given = intrinsic_operators(faces)
+    if laplacian == "cotan":
+        return given
+    triangulation = intrinsic_delaunay(faces)
+    if triangulation is faces:
+        return given
+    return replace(intrinsic_operators(triangulation, given), surface=Surface(triangulation, faces))

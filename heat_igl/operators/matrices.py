@@ -1,0 +1,159 @@
+"""`Operators`: the matrices of a domain, and the few numbers beside them that the heat method takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+
+from heat_igl.operators.elements import EdgeLengths, TriangleElements
+from heat_igl.operators.surface import Surface
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+
+__all__ = ["Laplacian", "OnLaplacian", "Operators", "check_laplacian", "divergence_matrix", "laplacian_of_gradient"]
+
+# Which triangulation of a triangle mesh the operators belong to.
+Laplacian = Literal["intrinsic-delaunay", "cotan"]
+
+# Called with L, or a multiple of it, as soon as it is known: the order of elimination needs no more than its pattern.
+OnLaplacian = Callable[[sp.csc_matrix], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Operators:
+    """The operators of a domain with n vertices and m faces (triangles, or tetrahedra).
+
+    Lengths are in the domain's own unit, d is the number of gradient components per face: 3 where faces lie in space,
+    2 where each has a plane of its own.
+
+    Attributes
+    ----------
+    L : (n, n) csc_matrix
+        Cotangent Laplacian, symmetric, negative semidefinite, integrated: rows sum to 0. Unit 1 for triangles, length
+        for tetrahedra. L = D G.
+    M : (n, n) csc_matrix
+        Lumped mass, diagonal: the area (volume) of each vertex's cell. Sums to the area of the domain.
+    gradient : (d m, n) csc_matrix, or TriangleElements
+        G, or the elements that make it on first use: triangles are solved on without the matrix.
+    G : (d m, n) csc_matrix
+        Gradient of piecewise linear functions, constant per face, stacked by coordinate: row ``k * m + f`` is
+        component k on face f. Unit 1 / length.
+    D : (n, d m) csc_matrix
+        Integrated divergence, D = -G^T W with W the face areas repeated d times.
+    weights : (m,) float64
+        Area (volume) of each face.
+    face_sizes : (m,) float64
+        Longest edge of each face: over it, a front of heat falls by the factor that `damping` expects.
+    mean_edge_length : float
+        h, over the distinct edges of the triangulation that the operators belong to.
+    components : (n,) int64
+        Component label of each vertex.
+    boundary : (n,) bool
+        Vertices on the boundary.
+    referenced : (n,) bool
+        Vertices that a face uses; on the others M is 0.
+    longest_distance : float
+        Length of a longest shortest path along edges; heat has to last that far.
+    is_surface : bool
+        Whether the domain has two dimensions; tetrahedra have three.
+    lengths : (n, n) csc_matrix, TriangleElements or None
+        Distance of the vertices that an entry of L couples, symmetric, or the elements whose edges these are; None
+        where it is not known, and heat is not fitted to it (`fitted_laplacian`).
+    surface : Surface or None
+        The triangles, for exact distance near sources and for unfolding; None where distance is not measured along
+        triangles. The three steps never read it.
+    """
+
+    L: sp.csc_matrix
+    M: sp.csc_matrix
+    gradient: sp.csc_matrix | TriangleElements
+    weights: FloatArray
+    face_sizes: FloatArray
+    mean_edge_length: float
+    components: IntArray
+    boundary: BoolArray
+    referenced: BoolArray
+    longest_distance: float
+    is_surface: bool = True
+    lengths: sp.csc_matrix | TriangleElements | None = None
+    surface: Surface | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of vertices."""
+        return int(self.L.shape[0])
+
+    @property
+    def dimension(self) -> int:
+        """Number d of gradient components per face."""
+        return int(self.G.shape[0]) // len(self.weights)
+
+    @cached_property
+    def n_components(self) -> int:
+        """Number of components, vertices without faces among them."""
+        return int(self.components.max()) + 1
+
+    def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
+        """The value (n,) of each vertex's component, from one for each component."""
+        return np.broadcast_to(of_component, self.n) if self.n_components == 1 else of_component[self.components]
+
+    @cached_property
+    def mean_mass(self) -> float:
+        """Mean mass of the vertices that a face uses."""
+        return float(self.M.diagonal()[self.referenced].mean())
+
+    @cached_property
+    def G(self) -> sp.csc_matrix:
+        """Gradient (d m, n)."""
+        return self.gradient.matrix() if isinstance(self.gradient, TriangleElements) else self.gradient
+
+    @cached_property
+    def gradient_rows(self) -> sp.csr_matrix:
+        """G by rows, to be multiplied with."""
+        return self.G.tocsr()
+
+    @cached_property
+    def D(self) -> sp.csc_matrix:
+        """Integrated divergence (n, d m)."""
+        return divergence_matrix(self.gradient_rows, self.weights)
+
+    @cached_property
+    def boundary_faces(self) -> IntArray:
+        """Faces (k,) with a vertex on the boundary."""
+        if isinstance(self.gradient, TriangleElements):
+            return np.flatnonzero(self.boundary[self.gradient.corners].any(axis=1))
+        return np.asarray(np.unique(self.G[:, self.boundary].indices % len(self.weights)))
+
+    def edge_lengths(self) -> EdgeLengths | None:
+        """Pairs of vertices that L couples and their distance, each edge once; None where `lengths` is."""
+        if isinstance(self.lengths, TriangleElements):
+            return self.lengths.edge_lengths()
+        if self.lengths is None:
+            return None
+        above = sp.triu(self.lengths, 1, format="coo")
+        return EdgeLengths(above.row, above.col, above.data)
+
+
+def check_laplacian(laplacian: str) -> None:
+    """Raise a ValueError if there is no such `Laplacian`."""
+    if laplacian not in ("intrinsic-delaunay", "cotan"):
+        raise ValueError(f"laplacian must be 'intrinsic-delaunay' or 'cotan', not {laplacian!r}")
+
+
+def divergence_matrix(gradient_rows: sp.csr_matrix, weights: FloatArray) -> sp.csc_matrix:
+    """Integrated divergence D = -G^T W (n, d m), for G (d m, n) by rows and face areas `weights` (m,)."""
+    dimension = gradient_rows.shape[0] // len(weights)
+    scale = np.repeat(np.tile(-weights, dimension), np.diff(gradient_rows.indptr))
+    entries = (scale * gradient_rows.data, gradient_rows.indices, gradient_rows.indptr)
+    return sp.csc_matrix(entries, shape=gradient_rows.shape[::-1])
+
+
+def laplacian_of_gradient(G: sp.csc_matrix, weights: FloatArray) -> sp.csc_matrix:
+    """L = D G (n, n), for G (d m, n) and face areas `weights` (m,)."""
+    L = (divergence_matrix(G.tocsr(), weights) @ G).tocsc()
+    L.sort_indices()
+    return L

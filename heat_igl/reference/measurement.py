@@ -1,0 +1,167 @@
+"""Run a native solver on a mesh: choose it by name, call it in a child process, check its distance, measure its cost.
+
+A solver runs on one connected component at a time. So sources in several components work, and a vertex that no source
+reaches is ``inf``, whatever number the solver would write there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from heat_igl.errors import MissingExtraError, ReferenceSolverError
+from heat_igl.mesh import Mesh
+from heat_igl.reference import guarded
+from heat_igl.reference.checks import require_between_bounds, require_finite, require_manifold
+from heat_igl.reference.guarded import MEMORY, TIMEOUT
+from heat_igl.sources import Sources, vertex_sources
+from heat_igl.typing import FloatArray, IntArray
+
+__all__ = ["EXACT_SOLVERS", "Measured", "exact_solver", "measured"]
+
+#: The exact solvers in the order in which `exact` tries them; the last one needs no extra.
+EXACT_SOLVERS = ("pygeodesic", "gdist", "igl")
+
+
+@dataclass(frozen=True)
+class _Solver:
+    """A native solver: its function in `native`, and the package and the extra that it needs."""
+
+    function: str
+    module: str
+    package: str = ""
+    extra: str = "validate"
+    is_exact: bool = False
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+_SOLVERS = {
+    "gdist": _Solver("gdist_exact", "gdist", "tvb-gdist", is_exact=True),
+    "pygeodesic": _Solver("pygeodesic_exact", "pygeodesic", "pygeodesic", is_exact=True),
+    "igl": _Solver("igl_exact", "igl", is_exact=True),
+    "igl_heat": _Solver("igl_heat", "igl", options={"t": None, "intrinsic_delaunay": False}),
+    "meshlab": _Solver("meshlab_front", "pymeshlab", "pymeshlab"),
+    "meshlab_border": _Solver("meshlab_border", "pymeshlab", "pymeshlab"),
+    "meshlab_heat": _Solver("meshlab_heat", "pymeshlab", "pymeshlab", options={"m": 1.0}),
+    "potpourri3d_heat": _Solver(
+        "potpourri3d_heat", "potpourri3d", "potpourri3d", "bench", options={"t_coef": 1.0, "use_robust": True}
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A distance and its cost.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        In the mesh's unit.
+    precompute_seconds : float
+        Time for the part that depends on the mesh alone.
+    solve_seconds : float
+        Time for the rest.
+    peak_memory : int or None
+        Bytes by which the child process grew at most; None if the system cannot tell.
+    """
+
+    distance: FloatArray
+    precompute_seconds: float
+    solve_seconds: float
+    peak_memory: int | None
+
+
+def exact_solver() -> str:
+    """The exact solver that is taken by default: the first of `EXACT_SOLVERS` that is installed."""
+    return next(name for name in EXACT_SOLVERS if name == "igl" or find_spec(_SOLVERS[name].module) is not None)
+
+
+def measured(
+    solver: str, mesh: Mesh, sources: Sources, *, timeout: float = TIMEOUT, memory: float = MEMORY, **options: Any
+) -> Measured:
+    """Distance by a named native solver, with its cost in time and memory.
+
+    Parameters
+    ----------
+    solver : str
+        One of `EXACT_SOLVERS`, "exact" for the first of them that is installed, or the name of another function of
+        `heat_igl.reference`: "meshlab", "meshlab_border", "meshlab_heat", "igl_heat", "potpourri3d_heat".
+    mesh, sources, timeout, memory
+        As for `exact`.
+    **options
+        As for the function of that name.
+
+    Returns
+    -------
+    Measured
+        Seconds are sums over the components that hold a source; memory is the largest of them.
+
+    Raises
+    ------
+    SourceError, ReferenceSolverError, MissingExtraError
+        As for `exact`.
+    """
+    if solver == "exact":
+        solver = exact_solver()
+    chosen = _SOLVERS.get(solver)
+    if chosen is None:
+        raise ReferenceSolverError(f"solver {solver!r} is unknown: choose one of exact, {', '.join(_SOLVERS)}")
+    if mesh.is_tetrahedral:
+        raise ReferenceSolverError(
+            f"{solver} works on triangles, and the mesh holds tetrahedra: use heat_igl.closed_forms.convex_solid"
+        )
+    if find_spec(chosen.module) is None:
+        raise MissingExtraError.of(f"the reference {solver}", chosen.package, chosen.extra)
+    # A closed surface has no boundary to start from, and everything is infinitely far from it.
+    to_boundary = solver == "meshlab_border"
+    seeds = np.flatnonzero(mesh.boundary) if to_boundary else vertex_sources(sources, mesh.n_vertices)
+    if chosen.is_exact:
+        require_manifold(mesh, seeds)
+
+    def run(part: Mesh, part_seeds: IntArray) -> guarded.Reply:
+        arrays = {"V": part.V, "F": part.F}
+        if not to_boundary:
+            arrays["sources"] = part_seeds
+        reply = guarded.call(
+            f"heat_igl.reference.native:{chosen.function}",
+            arrays,
+            {**chosen.options, **options},
+            timeout=timeout,
+            memory=memory,
+        )
+        distance = reply.values["distance"]
+        require_finite(solver, part, distance)
+        if chosen.is_exact:
+            require_between_bounds(solver, part, part_seeds, distance)
+        return reply
+
+    return _over_components(mesh, seeds, run)
+
+
+def _over_components(mesh: Mesh, seeds: IntArray, run: Callable[[Mesh, IntArray], guarded.Reply]) -> Measured:
+    """Run on each component that holds a seed: solvers fail at vertices without faces and on other components."""
+    distance = np.full(mesh.n_vertices, np.inf)
+    distance[seeds] = 0.0  # also where no face uses the seed
+    costs = np.zeros(2)
+    peaks: list[int | None] = [0]
+    labels = np.unique(mesh.components[seeds])
+    for label in labels:
+        inside = mesh.components == label
+        part, index = mesh, seeds
+        if not inside.all():
+            faces = mesh.F[inside[mesh.F[:, 0]]]
+            if not len(faces):
+                continue
+            renumbered = np.cumsum(inside) - 1
+            part = Mesh(mesh.V[inside], renumbered[faces])
+            index = renumbered[seeds[inside[seeds]]]
+        reply = run(part, index)
+        distance[inside] = reply.values["distance"]
+        costs += reply.values["precompute_seconds"], reply.values["solve_seconds"]
+        peaks.append(reply.peak_memory)
+    known = [peak for peak in peaks if peak is not None]
+    return Measured(distance, float(costs[0]), float(costs[1]), max(known) if len(known) == len(peaks) else None)

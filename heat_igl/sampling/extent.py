@@ -1,0 +1,82 @@
+"""Diameter and distance matrix."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.sampling.queries import checked_vertices, distance_rows
+from heat_igl.typing import ArrayLike, FloatArray
+
+__all__ = ["diameter", "distance_matrix"]
+
+
+def diameter(solver: HeatMethodSolver, *, start: int = 0, rounds: int = 10) -> tuple[float, int, int]:
+    """Two vertices that are far apart, found by repeatedly moving to the farthest vertex.
+
+    Parameters
+    ----------
+    solver : HeatMethodSolver
+        Of any domain.
+    start : int
+        Vertex whose component is measured.
+    rounds : int
+        Largest number of queries; three or four mostly suffice.
+
+    Returns
+    -------
+    distance : float
+        Their distance: at most the diameter over all vertices as the solver measures it, at least half of it, and
+        mostly within a few percent of it.
+    first, second : int
+        The two vertices.
+
+    Raises
+    ------
+    SourceError
+        If `start` is no vertex.
+    ValueError
+        If `rounds` is not a positive integer.
+    """
+    if not isinstance(rounds, int | np.integer) or rounds < 1:
+        raise ValueError(f"rounds must be a positive integer, not {rounds!r}")
+    here = int(checked_vertices("start", start, solver.n_vertices)[0])
+    best = (-1.0, here, here)
+    for _ in range(rounds):
+        distance = solver.distance(here)
+        there = int(np.argmax(np.where(np.isfinite(distance), distance, -1.0)))
+        if distance[there] <= best[0]:
+            break
+        best = (float(distance[there]), here, there)
+        here = there
+    return best
+
+
+def distance_matrix(solver: HeatMethodSolver, indices: ArrayLike | None = None) -> FloatArray:
+    """Distances between all pairs of vertices, or of some.
+
+    Parameters
+    ----------
+    solver : HeatMethodSolver
+        Of any domain with n vertices; asked k times.
+    indices : (k,) array_like of int, or (n,) mask of bool, optional
+        Distinct vertices; all n if not given, which takes 8 n^2 bytes.
+
+    Returns
+    -------
+    (k, k) float64
+        Symmetric: the mean of both directions, which differ by the solver's error. 0 on the diagonal, ``inf`` between
+        components.
+
+    Raises
+    ------
+    SourceError
+        If an entry of `indices` is no vertex, or comes twice.
+    """
+    chosen = (
+        np.arange(solver.n_vertices) if indices is None else checked_vertices("indices", indices, solver.n_vertices)
+    )
+    matrix = np.empty((len(chosen), len(chosen)))
+    for i, row in enumerate(distance_rows(solver, chosen)):
+        matrix[i] = row[chosen]
+    return np.asarray((matrix + matrix.T) / 2)

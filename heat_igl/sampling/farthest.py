@@ -1,0 +1,66 @@
+"""Farthest-point sampling."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.sampling.voronoi import VoronoiCells, claim_nearer
+from heat_igl.sources import vertex_sources
+from heat_igl.typing import ArrayLike, IntArray
+
+__all__ = ["farthest_cells", "farthest_points"]
+
+
+def farthest_points(solver: HeatMethodSolver, k: int, *, start: ArrayLike = 0) -> IntArray:
+    """`k` vertices, each as far as possible from those before (Gonzalez 1985; Moenning and Dodgson 2003).
+
+    Parameters
+    ----------
+    solver : HeatMethodSolver
+        Of any domain; asked k - 1 times.
+    k : int
+        Number of vertices.
+    start : int, sequence of int, or (n,) mask of bool
+        The first vertex; several are all taken first, in ascending order.
+
+    Returns
+    -------
+    (k,) int64
+        Distinct vertices; the first j of them are the result for j. Every component of the domain gets one before any
+        gets a second. No vertex is farther from the points than the last point is from the others.
+
+    Raises
+    ------
+    SourceError
+        If `start` does not name vertices.
+    ValueError
+        If `k` is no integer, fewer than the starting vertices, or more than the vertices that a face uses.
+    """
+    return farthest_cells(solver, k, start=start).sites
+
+
+def farthest_cells(solver: HeatMethodSolver, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
+    """The Voronoi cells of `farthest_points`, for one query more; arguments and errors as there."""
+    first = vertex_sources(np.asarray(start), solver.n_vertices)
+    referenced = solver.operators.referenced
+    used = referenced.copy()
+    used[first] = True
+    _check_count(k, len(first), int(used.sum()))
+    sites = np.empty(k, np.int64)
+    labels = np.full(solver.n_vertices, -1)
+    distance = np.full(solver.n_vertices, np.inf)
+    # Vertices that no face uses are infinitely far from all others, but are not to be sampled.
+    open_to_choice = np.where(used, np.inf, -np.inf)
+    for i in range(k):
+        sites[i] = first[i] if i < len(first) else np.argmax(np.minimum(distance, open_to_choice))
+        open_to_choice[sites[i]] = -np.inf
+        claim_nearer(distance, labels, i, solver.distance(int(sites[i])))
+    return VoronoiCells(sites, labels, distance)
+
+
+def _check_count(k: int, least: int, most: int) -> None:
+    if not isinstance(k, int | np.integer) or isinstance(k, bool) or not least <= k <= most:
+        raise ValueError(
+            f"k must be an integer from {least}, the vertices to start from, to {most}, all there are, not {k!r}"
+        )

@@ -1,0 +1,274 @@
+"""From a set of sources to the right-hand side of step 1, and the exact distances near the sources."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from heat_igl.operators import Operators
+from heat_igl.runtime import SOURCE_HEAT
+from heat_igl.sources.near_field import NearField, Seeds
+from heat_igl.sources.specification import SourceSet
+from heat_igl.typing import BoolArray, FloatArray, IntArray
+
+__all__ = ["SourceAssembler", "SourceTerm", "right_hand_side", "take_shorter"]
+
+# How far around points and curves distance is taken from straight lines, in mean edge lengths. Mean error on the bunny
+# and the cow from 5 points inside faces: RADIUS_MEASUREMENT
+_RADIUS = 6.0
+# A curve gives as much heat per so many mean edge lengths as a point does: a point's heat falls on the way like that of
+# a curve of about this length, so that both are equally warm a few edges away.
+_EDGES_PER_POINT = 4.0
+# A curve is integrated by points at most so many mean edge lengths apart: hat functions vary over one edge.
+_SPACING = 0.25
+_NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
+
+
+@dataclass(frozen=True, eq=False)
+class SourceTerm:
+    """One set of sources on a domain: a right-hand side of step 1, and the distances that are known beside it.
+
+    Attributes
+    ----------
+    sources : SourceSet
+        As the user gave it.
+    vertex, label : (e,) int64
+        Vertices that initial heat is put on, and the source that it belongs to.
+    share, delay : (e,) float64
+        How much of it: ``unit * share * exp(-delay)``.
+    mass : (e,) float64
+        Mass of those vertices, in units of the mean mass.
+    largest_heat : float
+        What heat may reach anywhere.
+    anchors : Seeds
+        Known distances that fix the level of the integrated phi.
+    near : Seeds
+        Known distances that the result takes over: at the sources and around them.
+    seen : (g,) bool
+        Which of `near` see a point or a curve in a straight line. On faces with such corners, the field of step 2 is
+        the gradient of these distances.
+    far : Seeds
+        Known distances of corners of the sources' own faces that are too far away to be among `near`.
+    """
+
+    sources: SourceSet
+    vertex: IntArray
+    label: IntArray
+    share: FloatArray
+    delay: FloatArray
+    mass: FloatArray
+    largest_heat: float
+    anchors: Seeds
+    near: Seeds
+    seen: BoolArray
+    far: Seeds
+
+    @cached_property
+    def unit(self) -> float:
+        """The heat that a share of 1 stands for: as much as cannot exceed `largest_heat`.
+
+        Rows of L sum to zero, so the maximum principle bounds the heat by the largest initial heat over mass.
+        """
+        at_vertex = self.share
+        if len(at_vertex) > 1:
+            _, which = np.unique(self.vertex, return_inverse=True)
+            at_vertex = np.asarray(np.bincount(which, self.share), np.float64)[which]
+        held = (self.mass > 0) & (at_vertex > 0)
+        return self.largest_heat * float((self.mass[held] / at_vertex[held]).min(initial=1.0))
+
+    @property
+    def near_seen(self) -> Seeds:
+        """Those of `near` that see a point or a curve."""
+        return self.near.at(self.seen)
+
+    def restricted(self, labels: IntArray, anchors: Seeds, kept: BoolArray) -> SourceTerm:
+        """The term of the sources in `labels` alone, with other anchors and those of `near` that are `kept` (g,)."""
+        alive = np.isin(self.label, labels)
+        return replace(
+            self,
+            vertex=self.vertex[alive],
+            label=self.label[alive],
+            share=self.share[alive],
+            delay=self.delay[alive],
+            mass=self.mass[alive],
+            anchors=anchors,
+            near=self.near.at(kept),
+            seen=self.seen[kept],
+        )
+
+
+def right_hand_side(n: int, terms: Sequence[SourceTerm], shares: Sequence[FloatArray] | None = None) -> FloatArray:
+    """Right-hand sides (n, k) of `HeatFlow.solve` for k terms, or for other `shares` of their units."""
+    heat = np.zeros((n, len(terms)))
+    shares = [term.share for term in terms] if shares is None else shares
+    for column, term, share in zip(heat.T, terms, shares, strict=True):
+        # The unit is inside the exponential, since exp(-delay) alone would underflow.
+        with np.errstate(under="ignore"):
+            weights = share * np.exp(np.log(term.unit) - term.delay)
+        np.add.at(column, term.vertex, weights)
+    return heat
+
+
+class SourceAssembler:
+    """Makes the `SourceTerm` of each set of sources on one domain.
+
+    Parameters
+    ----------
+    domain : Operators
+        The domain.
+    t : float
+        Time step of the heat flow.
+    plain : bool
+        Around source vertices take every distance from heat, as the paper does, and none from edges.
+    unfolds : bool
+        Distance will come by unfolding, which finds what is around source vertices by itself.
+
+    Attributes
+    ----------
+    edges : NearField or None
+        Straight lines along the edges of the triangulation that is solved on.
+    """
+
+    def __init__(self, domain: Operators, t: float, plain: bool = False, unfolds: bool = False) -> None:
+        self._domain, self._t = domain, t
+        self._plain, self._unfolds = plain, unfolds
+        self._mass = domain.M.diagonal() / domain.mean_mass
+        # Heat is measured in units of h, so that its gradient has none.
+        self._largest_heat = SOURCE_HEAT * min(domain.mean_edge_length, 1e10)
+        surface = domain.surface
+        self.edges = None if surface is None else NearField(surface.triangulation)
+        self._faces = None if surface is None or surface.faces is None else NearField(surface.faces)
+        # Triangulations on which the edges are straight lines: one, if none was flipped.
+        self._straight = [field for field in (self.edges, self._faces) if field is not None]
+        if surface is not None and surface.faces is surface.triangulation:
+            self._straight = self._straight[:1]
+
+    def term(self, sources: SourceSet) -> SourceTerm:
+        """Initial heat of `sources`, and the distances known around them."""
+        rim = self._rim(sources)
+        ring = self._ring(sources, rim)
+        lines, far = self._straight_lines(sources, rim)
+        near = Seeds.nearest(_joined(ring, lines))
+        seen = np.zeros(len(near.vertex), bool)
+        if len(lines.vertex):
+            seen = np.isin(near.vertex, lines.vertex) & ~np.isin(near.vertex, sources.vertices)
+        vertex, share, label, offset = self._initial_heat(sources, rim)
+        return SourceTerm(
+            sources=sources,
+            vertex=vertex,
+            label=label,
+            share=share,
+            delay=self._delay(vertex, offset),
+            mass=self._mass[vertex],
+            largest_heat=self._largest_heat,
+            # Inside a region of sources there is no heat flow, and phi says nothing.
+            anchors=near.at(~np.isin(near.vertex, sources.vertices[~rim])),
+            near=near,
+            seen=seen,
+            far=far,
+        )
+
+    def _rim(self, sources: SourceSet) -> BoolArray:
+        """The source vertices that have a neighbour which is none.
+
+        Heat starts from these alone: inside a region of sources it would be level, and its gradient rounding noise
+        that is then normalized to length 1 and integrated.
+        """
+        vertices = sources.vertices
+        everyone = np.ones(len(vertices), bool)
+        if len(vertices) < 2 or np.ptp(sources.vertex_offset) > 0:
+            return everyone
+        is_source = np.zeros(self._domain.n, bool)
+        is_source[vertices] = True
+        neighbours = self._domain.L[:, vertices]
+        outward = np.repeat(np.arange(len(vertices)), np.diff(neighbours.indptr))[~is_source[neighbours.indices]]
+        if not len(outward):
+            return everyone
+        rim = np.zeros(len(vertices), bool)
+        rim[outward] = True
+        return rim
+
+    def _ring(self, sources: SourceSet, rim: BoolArray) -> Seeds:
+        """Source vertices, and around those at the rim their neighbours at the lengths of edges."""
+        itself = Seeds(sources.vertices, sources.vertex_offset, sources.vertex_label)
+        if self._plain or (self._unfolds and sources.on_vertices_alone):
+            return itself
+        vertices, offset, label = sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim]
+        found = [itself]
+        for field in self._straight:
+            which, ends, lengths = field.spokes(vertices)
+            found.append(Seeds(ends, offset[which] + lengths, label[which]))
+        return _joined(*found)
+
+    def _straight_lines(self, sources: SourceSet, rim: BoolArray) -> tuple[Seeds, Seeds]:
+        """Distance of the vertices that see a source in a straight line, as `NearField.seeds` has it.
+
+        Only where there are points or curves; for vertices alone, the ring of edges is enough, but beside an edge of
+        more than two faces it is not: the tufted cover leads over it from a face to two of the others alone.
+        """
+        surface = self._domain.surface
+        if surface is None or self._faces is None:
+            return _NONE, _NONE
+        if sources.on_vertices_alone:
+            is_covered = surface.uncovered is not None and not (self._plain or self._unfolds)
+            if not (is_covered and self._faces.meets_shared_edge(sources.vertices[rim])):
+                return _NONE, _NONE
+        vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
+        points = sources.points.joined(sources.segments.ends())
+        return self._faces.seeds(points, sources.segments, _RADIUS * self._domain.mean_edge_length, vertices)
+
+    def _initial_heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
+        """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""
+        vertices = sources.vertices[rim]
+        of_vertices = vertices, np.ones(len(vertices)), sources.vertex_label[rim], sources.vertex_offset[rim]
+        surface = self._domain.surface
+        if sources.on_vertices_alone or surface is None or self._faces is None:
+            return of_vertices
+        h = self._domain.mean_edge_length
+        samples, lengths = self._faces.samples(sources.segments, h * _SPACING)
+        amount = np.concatenate([np.ones(len(sources.points.faces)), lengths / (h * _EDGES_PER_POINT)])
+        points = sources.points.joined(samples)
+        faces, barycentric = surface.triangulation.locate(points.faces, points.barycentric)
+        of_points = (
+            surface.triangulation.F[faces].ravel(),
+            (amount[:, None] * barycentric).ravel(),
+            np.repeat(points.label, 3),
+            np.repeat(points.offset, 3),
+        )
+        vertex, share, label, offset = (np.concatenate(pair) for pair in zip(of_vertices, of_points, strict=True))
+        used = share > 0
+        return vertex[used], share[used], label[used], offset[used]
+
+    def _delay(self, vertex: IntArray, offset: FloatArray) -> FloatArray:
+        """Heat falls by exp(-d / sqrt(t)) over a distance d, so that is what a later source has less of."""
+        if offset.min(initial=np.inf) == offset.max(initial=0.0):
+            return np.zeros(len(offset))
+        components = self._domain.components
+        earliest = np.full(self._domain.n_components, np.inf)
+        np.minimum.at(earliest, components[vertex], offset)
+        return np.asarray((offset - earliest[components[vertex]]) / np.sqrt(self._t))
+
+
+def take_shorter(distance: FloatArray, seeds: Seeds, error: float, start: FloatArray) -> BoolArray:
+    """Set known values where they are shorter, or longer by less than the error of `distance`; which were.
+
+    The error is relative to the distance from where it begins, `start` (n,).
+    """
+    begin = start[seeds.vertex]
+    taken = seeds.value - begin < (distance[seeds.vertex] - begin) * (1 + error)
+    distance[seeds.vertex[taken]] = seeds.value[taken]
+    return np.asarray(taken)
+
+
+def _joined(*parts: Seeds) -> Seeds:
+    parts = tuple(part for part in parts if len(part.vertex)) or parts[:1]
+    if len(parts) == 1:
+        return parts[0]
+    return Seeds(
+        np.concatenate([part.vertex for part in parts]),
+        np.concatenate([part.value for part in parts]),
+        np.concatenate([part.label for part in parts]),
+    )

@@ -1,0 +1,129 @@
+"""Step 1: one backward Euler step of heat flow, equation (4) of the paper."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from heat_igl.linear import Analysis, Backend, Factorization, analyse
+from heat_igl.operators import Operators
+from heat_igl.steps.fitted import fitted_laplacian
+from heat_igl.steps.pattern import shifted
+from heat_igl.typing import FloatArray
+
+__all__ = ["Boundary", "HeatFlow", "check_boundary", "diffuse"]
+
+Boundary = Literal["neumann", "dirichlet", "average"]
+
+
+def check_boundary(boundary: str) -> None:
+    """Raise a ValueError if there is no such `Boundary`."""
+    if boundary not in ("neumann", "dirichlet", "average"):
+        raise ValueError(f"boundary must be 'neumann', 'dirichlet' or 'average', not {boundary!r}")
+
+
+class HeatFlow:
+    """One backward Euler step of heat flow, (M - t L) u = mean_mass * b, factored.
+
+    Dividing by the mean vertex mass leaves a matrix without a unit, so that a very large right-hand side `b` overflows
+    in no unit of length.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    t : float
+        Time step, a squared length.
+    boundary : {"neumann", "dirichlet", "average"}
+        Insulated boundary, boundary held at zero, or the mean of both solutions. Under "dirichlet" heat that is put on
+        a boundary vertex stays there as its fixed value.
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
+        See `factorize`.
+    analysis : Analysis, optional
+        As `analysis` makes it for a domain with the same pattern of L, to be shared; made anew where it does not fit.
+    fitted : bool
+        Whether to take `fitted_laplacian` for L, with which heat falls by the right factor over long edges too.
+
+    Raises
+    ------
+    FactorizationError
+        If M - t L is not positive definite.
+    ValueError
+        If t is not positive or `boundary` is unknown.
+    """
+
+    def __init__(
+        self,
+        operators: Operators,
+        t: float,
+        boundary: Boundary = "neumann",
+        backend: Backend = "auto",
+        analysis: Analysis | None = None,
+        fitted: bool = False,
+    ) -> None:
+        if not (np.isfinite(t) and t > 0):
+            raise ValueError(f"t must be a positive number (a squared length), not {t!r}")
+        check_boundary(boundary)
+        if not operators.boundary.any():
+            boundary = "neumann"
+        mass = operators.M.diagonal()
+        self.mean_mass = operators.mean_mass
+        L = fitted_laplacian(operators, t) if fitted else operators.L
+        matrix = shifted(L, -t / self.mean_mass, mass / self.mean_mass)
+        if analysis is None or not analysis.fits(matrix):
+            analysis = analyse(matrix, backend)
+        self.t = t
+        self.boundary = boundary
+        self.backend = analysis.backend
+        self._neumann: Factorization | None = None
+        self._dirichlet: Factorization | None = None
+        if boundary in ("neumann", "average"):
+            self._neumann = analysis.factorize(matrix, operators.referenced)
+        if boundary in ("dirichlet", "average"):
+            self._dirichlet = analysis.factorize(matrix, operators.referenced & ~operators.boundary)
+            self._from_boundary = matrix[:, operators.boundary]
+            self._boundary_diagonal = matrix.diagonal()[operators.boundary]
+            self._on_boundary = operators.boundary
+
+    @property
+    def factors(self) -> list[Factorization]:
+        """The factored matrices, for what they hold."""
+        return [part for part in (self._neumann, self._dirichlet) if part is not None]
+
+    def solve(self, b: FloatArray) -> FloatArray:
+        """Heat u (n,) or (n, k) after the time step, for initial heat `b` in units of `mean_mass`."""
+        solutions = []
+        if self._neumann is not None:
+            solutions.append(self._neumann.solve(b))
+        if self._dirichlet is not None:
+            held = (b[self._on_boundary].T / self._boundary_diagonal).T
+            u = self._dirichlet.solve(b - self._from_boundary @ held if held.any() else b)
+            u[self._on_boundary] = held
+            solutions.append(u)
+        return solutions[0] if len(solutions) == 1 else (solutions[0] + solutions[1]) / 2
+
+
+def diffuse(operators: Operators, u0: FloatArray, t: float, boundary: Boundary = "neumann") -> FloatArray:
+    """Step 1: heat after one backward Euler step, (M - t L) u = u0, equation (4).
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    u0 : (n,) or (n, k) float64
+        Initial heat, integrated over each vertex's cell: 1 at a source and 0 elsewhere for a Dirac. Distant values
+        fall like exp(-distance / sqrt(t)) and underflow beyond about 700 sqrt(t); a larger value at the source (1e290)
+        doubles that range and changes no direction.
+    t : float
+        Time step, a squared length; the square of the mean edge length is the paper's choice.
+    boundary : {"neumann", "dirichlet", "average"}
+        See `HeatFlow`.
+
+    Returns
+    -------
+    (n,) or (n, k) float64
+        Heat per area, u. Not negative where `operators.L` has no negative weight; 0 at unreferenced vertices.
+    """
+    flow = HeatFlow(operators, t, boundary)
+    return flow.solve(np.asarray(u0, dtype=np.float64) / flow.mean_mass)

@@ -1,0 +1,160 @@
+"""Step 2: the direction of the heat's gradient, its magnitude, and the divergence of the field that both make."""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from heat_igl.operators import Operators, TriangleElements
+from heat_igl.runtime import LOWEST_HEAT
+from heat_igl.typing import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from heat_igl.steps.descending import Triangles
+
+__all__ = ["NormalizedDivergence", "damping", "normalize"]
+
+# Share of a front's rate of decay from which on a direction is trusted fully; docs/heat_path.md compares values. Fronts
+# of a fitted flow scatter less.
+_FULL_RATE, _FULL_RATE_FITTED = 0.9, 0.95
+
+
+def normalize(operators: Operators, u: FloatArray, of_log: bool = False) -> FloatArray:
+    """Step 2: the unit field X = -grad u / |grad u| that points away from the heat.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    u : (n,) or (n, k) float64
+        Heat; only its direction of descent matters.
+    of_log : bool
+        Take the direction of grad log u instead, where u is not below 1e-300. Both are the same but for interpolation:
+        log u is nearly linear where u is nearly exponential.
+
+    Returns
+    -------
+    (d m,) or (d m, k) float64
+        Unit vectors; 0 on faces where the gradient is zero or below 1e-300, which have no direction.
+    """
+    gradient = operators.gradient_rows @ u
+    components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
+    # Squares of entries below 1e-154 would vanish, and heat far away is far below that; so each face is divided by its
+    # largest entry before the norm is taken.
+    largest = np.abs(components).max(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        components /= largest
+        components /= -np.sqrt(np.einsum("k...,k...->...", components, components))
+    components[:, largest < LOWEST_HEAT] = 0
+    if of_log:
+        along_log = normalize(operators, np.log(u, out=np.full_like(u, np.nan), where=u >= LOWEST_HEAT))
+        np.copyto(gradient, along_log, where=np.isfinite(along_log))
+    return np.asarray(gradient)
+
+
+def damping(
+    operators: Operators, u: FloatArray, t: float, full_rate: float | None = None, fitted: bool = False
+) -> FloatArray:
+    """How sure the direction of X is on each face: 1 almost everywhere, less where heat arrives from several sides.
+
+    A front of heat falls by the same factor over each length, |grad log u| = 1 / sqrt(t) for small faces and in a
+    fitted flow, else by arccosh(1 + l^2 / (2 t)) over an edge of length l on large ones. Where fronts meet, at the cut
+    locus and between two sources, it falls more slowly, and the distance has no gradient of length 1 there either.
+    Integrating a unit field all the same overestimates distance on both sides.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    u : (n,) or (n, k) float64
+        Heat.
+    t : float
+        Time step that the heat was made with.
+    full_rate : float, optional
+        Share of a front's rate from which on a direction is trusted fully: on a mesh, fronts scatter by some percent
+        around 1. 0.95 for a fitted flow and 0.9 else; docs/heat_path.md compares values.
+    fitted : bool
+        Whether the heat comes from a fitted `HeatFlow`.
+
+    Returns
+    -------
+    (m,) or (m, k) float64
+        Factor of X on each face, between 0 and 1; 1 on faces with a corner on the boundary, where an insulated
+        boundary turns the front into its own mirror image, or where u is not positive.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gradient = operators.gradient_rows @ np.log(u)
+        components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
+        rate = np.sqrt(np.einsum("k...,k...->...", components, components))
+    factor = (rate.T / _lowest_full_rate(operators, t, fitted, full_rate)).T
+    factor[operators.boundary_faces] = 1
+    return np.asarray(np.where(factor < 1, factor, 1.0))
+
+
+def _lowest_full_rate(operators: Operators, t: float, fitted: bool, full_rate: float | None = None) -> FloatArray:
+    """The rate (m,), in e-foldings per length, from which on a direction is trusted fully."""
+    if full_rate is None:
+        full_rate = _FULL_RATE_FITTED if fitted else _FULL_RATE
+    return full_rate * (np.full(len(operators.weights), t**-0.5) if fitted else _front_rate(operators, t))
+
+
+def _front_rate(operators: Operators, t: float) -> FloatArray:
+    """How fast a front of heat falls on each face (m,), in e-foldings per length, where the flow is not fitted."""
+    size = operators.face_sizes
+    # The same as arccosh(1 + size^2 / (2 t)) / size, which is 0 where size^2 is lost beside 1: faces of no size at all.
+    return np.asarray(2 * np.arcsinh(size / (2 * np.sqrt(t))) / size)
+
+
+class NormalizedDivergence:
+    """The right-hand side of step 3: the divergence of the field X of step 2, which is not stored.
+
+    The same as ``D @ (damping(...) * normalize(...))`` to rounding. For triangles there is a compiled kernel, one pass
+    over the faces, where numba is installed; its tables are made once.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    t : float, optional
+        Time step that the heat was made with, to have the field damped by `damping`; it has length 1 otherwise.
+    order : (n,) int, optional
+        All vertices, near ones near each other, to read memory in; that of the mesh may jump, and a pass that waits for
+        memory takes several times as long.
+    fitted : bool
+        Whether the heat comes from a fitted `HeatFlow`; the field then follows the gradient of log u.
+    """
+
+    def __init__(
+        self, operators: Operators, t: float | None = None, order: IntArray | None = None, fitted: bool = False
+    ) -> None:
+        self._arguments = operators, t, order, fitted
+        self._kernel: Triangles | None = None
+        if isinstance(operators.gradient, TriangleElements) and importlib.util.find_spec("numba") is not None:
+            from heat_igl.steps import descending
+
+            full_rate = np.zeros(len(operators.weights)) if t is None else _lowest_full_rate(operators, t, fitted)
+            full_rate[operators.boundary_faces] = 0.0
+            self._kernel = descending.triangles(operators.gradient, operators.weights, full_rate, order)
+        else:
+            _ = operators.D  # made on first use otherwise, in the middle of the first query
+
+    def divergence(self, u: FloatArray) -> FloatArray:
+        """Integrated divergence (n, k) for heat (n, k)."""
+        operators, t, _, fitted = self._arguments
+        if self._kernel is not None:
+            from heat_igl.steps.descending import normalized_divergence
+
+            return normalized_divergence(self._kernel, u, LOWEST_HEAT, fitted)
+        divergence = np.empty(u.shape)
+        # One column at a time: the field of all takes more memory than the caches hold.
+        for column, of_column in zip(np.ascontiguousarray(u.T), divergence.T, strict=True):
+            X = normalize(operators, column, fitted)
+            if t is not None:
+                X *= np.tile(damping(operators, column, t, fitted=fitted), operators.dimension)
+            of_column[:] = operators.D @ X
+        return divergence
+
+    def __reduce__(self) -> tuple[type[NormalizedDivergence], tuple[Operators, float | None, IntArray | None, bool]]:
+        return NormalizedDivergence, self._arguments

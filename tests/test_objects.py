@@ -1,0 +1,143 @@
+"""Meshes of other libraries: recognized by attributes, the same mesh back, one clear error for everything else."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from heat_igl import Mesh, MeshError, PolygonMesh, shapes, write_mesh
+from heat_igl.io import as_mesh
+
+SPHERE = shapes.icosphere(1)
+SQUARES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 0, 0], [2, 1, 0.0]])
+TWO_QUADS = [[0, 1, 3, 2], [1, 4, 5, 3]]
+TRIANGLE_AND_QUAD = [[0, 1, 2], [1, 4, 5, 3]]
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1.0]])
+TETRAHEDRA = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
+
+
+def padded(polygons: Any) -> np.ndarray:
+    return np.concatenate([[len(polygon), *polygon] for polygon in polygons])
+
+
+class Gifti:
+    def __init__(self, V: np.ndarray, F: np.ndarray) -> None:
+        self._arrays = {"pointset": V, "triangle": F}
+
+    def agg_data(self, intents: tuple[str, ...]) -> tuple[np.ndarray, ...]:
+        return tuple(self._arrays[intent] for intent in intents)
+
+
+class MeshSet:
+    def current_mesh(self) -> Any:
+        return SimpleNamespace(vertex_matrix=lambda: SPHERE.V, face_matrix=lambda: SPHERE.F.astype(np.int32))
+
+
+V, F = SPHERE.V, SPHERE.F
+TRIANGLES = {
+    "pair": (V, F),
+    "lists": [V.tolist(), F.tolist()],
+    "vertices and faces": SimpleNamespace(vertices=V, faces=F),
+    "vertices and triangles": SimpleNamespace(vertices=V, triangles=F.astype(np.int32)),
+    "points and padded faces": SimpleNamespace(points=V, faces=padded(F), n_points=len(V)),
+    "points and blocks by name": SimpleNamespace(points=V, cells_dict={"line": F[:, :2], "triangle": F}),
+    "points and blocks by number": SimpleNamespace(points=V, cells_dict={5: F}),
+    "mesh set": MeshSet(),
+    "GIFTI": Gifti(V, F),
+}
+
+
+@pytest.mark.parametrize("given", TRIANGLES.values(), ids=TRIANGLES)
+def test_triangles_come_as_they_are(given: Any) -> None:
+    mesh = as_mesh(given)
+    assert isinstance(mesh, Mesh)
+    np.testing.assert_array_equal(mesh.V, V)
+    np.testing.assert_array_equal(mesh.F, F)
+
+
+POLYGONS = {
+    "vertices and faces": SimpleNamespace(vertices=SQUARES, faces=TWO_QUADS),
+    "vertices and cells": SimpleNamespace(vertices=SQUARES, cells=TRIANGLE_AND_QUAD),
+    "padded quads": SimpleNamespace(points=SQUARES, faces=padded(TWO_QUADS), n_points=6),
+    "padded, of two degrees": SimpleNamespace(points=SQUARES, faces=padded(TRIANGLE_AND_QUAD), n_points=6),
+    "blocks": SimpleNamespace(points=SQUARES, cells_dict={"triangle": [[0, 1, 2]], "quad": [[1, 4, 5, 3]]}),
+}
+
+
+@pytest.mark.parametrize("given", POLYGONS.values(), ids=POLYGONS)
+def test_polygons_stay_polygons(given: Any) -> None:
+    mesh = as_mesh(given)
+    assert isinstance(mesh, PolygonMesh)
+    expected = TWO_QUADS if mesh.degree[0] == 4 else TRIANGLE_AND_QUAD
+    assert [polygon.tolist() for polygon in mesh.polygons] == expected
+    np.testing.assert_array_equal(mesh.V, SQUARES)
+
+
+@pytest.mark.parametrize("kind", ["tetra", 10])
+def test_tetrahedra_come_without_the_triangles_around_them(kind: Any) -> None:
+    cells = {"triangle": TETRAHEDRA[:, :3], kind: TETRAHEDRA}
+    mesh = as_mesh(SimpleNamespace(points=CORNERS, cells_dict=cells))
+    assert isinstance(mesh, Mesh)
+    np.testing.assert_array_equal(mesh.F, TETRAHEDRA)
+
+
+def test_own_meshes_are_returned_and_paths_are_read(tmp_path: Any) -> None:
+    polygons = PolygonMesh(SQUARES, TWO_QUADS)
+    assert as_mesh(SPHERE) is SPHERE
+    assert as_mesh(polygons) is polygons
+    write_mesh(tmp_path / "sphere.ply", SPHERE)
+    np.testing.assert_array_equal(as_mesh(tmp_path / "sphere.ply").V, V)
+    np.testing.assert_array_equal(as_mesh(str(tmp_path / "sphere.ply")).V, V)
+
+
+@pytest.mark.parametrize("library", ["trimesh", "pyvista", "meshio", "pymeshlab", "vedo", "nibabel"])
+def test_meshes_of_the_libraries_themselves(library: str) -> None:
+    module = pytest.importorskip(library)
+    made: Any
+    if library == "trimesh":
+        made = module.Trimesh(V, F, process=False)
+    elif library == "pyvista":
+        made = module.PolyData.from_regular_faces(V, F)
+    elif library == "meshio":
+        made = module.Mesh(V, [("triangle", F)])
+    elif library == "pymeshlab":
+        made = module.Mesh(V, F)
+    elif library == "vedo":
+        made = module.Mesh([V, F])
+    else:
+        arrays = [
+            module.gifti.GiftiDataArray(V.astype(np.float32), intent="NIFTI_INTENT_POINTSET"),
+            module.gifti.GiftiDataArray(F.astype(np.int32), intent="NIFTI_INTENT_TRIANGLE"),
+        ]
+        made = module.gifti.GiftiImage(darrays=arrays)
+    mesh = as_mesh(made)
+    np.testing.assert_allclose(mesh.V, V, atol=1e-7)
+    assert isinstance(mesh, Mesh)
+    np.testing.assert_array_equal(mesh.F, F)
+
+
+WRONG = {
+    "a number": (3, "mesh is of type int, which is not understood: pass a Mesh or PolygonMesh, a pair"),
+    "nothing": (None, "mesh is of type NoneType"),
+    "an object": (SimpleNamespace(vertices=V), "mesh is a types.SimpleNamespace, which is not understood"),
+    "positions alone": (V, "faces F are missing"),
+    "no faces": (SimpleNamespace(vertices=V, faces=F[:0]), "the mesh has no faces"),
+    "no file": ("missing.ply", "missing.ply: no such file"),
+    "no surface": (Gifti(V, F[:0]), "holds no surface"),
+    "faces out of range": (SimpleNamespace(vertices=V, faces=F + 1), "is no vertex"),
+}
+
+
+@pytest.mark.parametrize(("given", "message"), WRONG.values(), ids=WRONG)
+def test_what_is_not_understood_is_one_error(given: Any, message: str) -> None:
+    with pytest.raises(MeshError, match=message):
+        as_mesh(given)
+
+
+def test_faces_beside_a_mesh_are_refused() -> None:
+    np.testing.assert_array_equal(as_mesh(V, F).F, F)
+    with pytest.raises(MeshError, match="F is given beside a Mesh"):
+        as_mesh(SPHERE, F)

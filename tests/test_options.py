@@ -1,0 +1,75 @@
+"""Options of the solver: checked once, with the same words and defaults wherever they are given."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+
+import numpy as np
+import pytest
+from conftest import perturbed
+
+from heat_igl import HeatMethodSolver, cli, shapes
+from heat_igl.heat_method import SolverOptions
+from heat_igl.operators import operators
+
+FIELDS = {field.name: field.default for field in dataclasses.fields(SolverOptions)}
+
+
+@pytest.mark.parametrize(
+    ("make", "others"),
+    [
+        (HeatMethodSolver, {"mesh", "F"}),
+        (HeatMethodSolver.from_operators, {"domain"}),
+        (HeatMethodSolver.from_edge_lengths, {"F", "lengths", "n"}),
+        (cli.distance, {"mesh", "source", "at", "cutoff", "output", "picture"}),
+    ],
+)
+def test_options_have_the_same_names_and_defaults_everywhere(make, others):
+    parameters = inspect.signature(make).parameters
+    options = {name: p.default for name, p in parameters.items() if name not in others}
+    without_laplacian = {name: default for name, default in FIELDS.items() if name != "laplacian"}
+    assert options == (without_laplacian if "domain" in others else FIELDS)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("t_coef", 0, "t_coef must be a positive number, not 0"),
+        ("t", "soon", "t must be a positive number, not 'soon'"),
+        ("laplacian", "graph", "laplacian must be 'intrinsic-delaunay' or 'cotan', not 'graph'"),
+        ("boundary", "robin", "boundary must be 'neumann', 'dirichlet' or 'average', not 'robin'"),
+        ("magnitude", "log", "magnitude must be 'auto', 'unit' or 'damped', not 'log'"),
+        ("refine", "fold", "refine must be None, 'sweep' or 'unfold', not 'fold'"),
+        ("backend", "magma", "backend must be one of 'auto', .*, not 'magma'"),
+    ],
+)
+def test_an_option_without_a_meaning_is_refused_when_options_are_put_together(option, value, message):
+    with pytest.raises(ValueError, match=message):
+        SolverOptions(**{option: value})
+    with pytest.raises(ValueError, match=message):
+        HeatMethodSolver(shapes.grid(2), **{option: value})
+
+
+def test_options_put_together_before_are_those_of_the_keywords():
+    mesh = perturbed(shapes.disk(6))
+    chosen = {"t_coef": np.float32(3), "laplacian": "cotan", "boundary": "average", "backend": "scipy"}
+    options = SolverOptions(**chosen)
+    assert type(options.t_coef) is float
+    np.testing.assert_array_equal(
+        HeatMethodSolver.from_options(mesh, options).distance(5), HeatMethodSolver(mesh, **chosen).distance(5)
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "surface", "volume"),
+    [
+        (SolverOptions(), True, False),
+        (SolverOptions(laplacian="cotan"), False, False),
+        (SolverOptions(magnitude="unit"), False, False),
+        (SolverOptions(laplacian="cotan", magnitude="damped"), True, True),
+    ],
+)
+def test_which_fields_are_damped(options, surface, volume):
+    assert options.damps(operators(shapes.grid(2))) is surface
+    assert options.damps(operators(shapes.box(1))) is volume
