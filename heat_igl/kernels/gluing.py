@@ -1,7 +1,7 @@
 """Triangles by their edge lengths, made from positions: gluing, Delaunay flips without a history, numbering by a front.
 
-Half-edge ``3 f + c`` is the side of face f opposite its corner c, and that corner has the same number. For one query on
-a mesh that is asked once; `heat_igl.intrinsic` does the same with numpy for everything else, and says which flips it did.
+Half-edge ``3 f + c`` is the side of face f opposite its corner c, and that corner has the same number. This is for a
+mesh that is asked once; `heat_igl.intrinsic` does the same with numpy, and keeps the history of its flips.
 """
 
 import cython
@@ -165,8 +165,8 @@ def flip(
 ) -> int:
     """Flip edges in place until the triangulation is intrinsic Delaunay (Fisher et al. 2007); how many were flipped.
 
-    All glued faces must run along their edge in opposite directions. An edge is flipped where the cotangents opposite it
-    sum to less than `-tolerance`, and by more than their rounding.
+    All glued faces must run along their edge in opposite directions. An edge is flipped where the cotangents opposite
+    it sum to less than `-tolerance`, and by more than their rounding.
     """
     m: cython.int = twin.shape[0] // 3
     area: cython.double[::1] = np.empty(m)

@@ -1,6 +1,7 @@
 cdef struct Window:
     # The part of a half-edge that straight lines from one root cross, in the frame of the half-edge: its tail is the
-    # origin, its head lies at (length, 0), the face that the lines enter above.
+    # origin, its head lies at (length, 0), the face that the lines enter above. (Windows of parallel lines, from a
+    # segment all of whose points are sources, would be a second kind, with a direction instead of a root.)
     double x, depth      # the root laid out in the plane lies at (x, -depth)
     double start, stop   # from where to where along the half-edge
     double offset        # distance of the root
@@ -24,7 +25,7 @@ cdef struct Ray:
     double cosine, sine
 
 cdef struct Search:
-    # The surface: see `Surface` in heat_igl/unfolding/exact.py.
+    # The surface: see `shapes`.
     int* vertex
     double* length
     int* twin
@@ -93,12 +94,20 @@ cdef enum Side:
 
 cdef extern from *:
     """
+    // Windows from a bend are this fraction of a side wider, so that none is missed between them and their neighbours.
     #define SHADOW_MARGIN 1e-9
+    // What is narrower, as a fraction of a side, is no window.
     #define NARROW 1e-14
+    // A vertex missed by less than this fraction of a side is reached over the end of the window, which is longer by
+    // the square of that.
     #define NEAR 1e-7
+    // Windows whose roots are closer than this fraction of their distance have the same root.
     #define SAME 2e-14
+    // Windows that overlap by less than this fraction of both are left as they are.
+    #define OVERLAP 0.2
     """
     double SHADOW_MARGIN
     double NARROW
     double NEAR
     double SAME
+    double OVERLAP

@@ -5,7 +5,7 @@ out in the plane before the half-edge gives the distance of every point of the w
 1987). Windows that enter a face over the same side wait there in one list and cross the face together, as in Qin et al.
 2016. What is different here is the order. The square of the key of a list is the power of the root with respect to the
 circle around the face that is entered next. On a Delaunay triangulation that power grows along every straight line from
-the root, it is no larger than the square of the distance of any vertex ahead, and it sorts the faces from front to back.
+the root, it is no larger than the square of the distance of any vertex ahead, and it sorts faces from front to back.
 So a list is nearly always complete when its turn comes, a face is crossed once from each side, and no vertex can come
 nearer than the key. On other triangulations the key is the distance of the nearest point of the windows.
 
@@ -40,8 +40,8 @@ def shapes(
     Parameters
     ----------
     vertex, length, twin : (3 m,)
-        Vertex of each corner, length of each half-edge, and the half-edge glued to it: -1 on the boundary, -2 where more
-        than two faces meet.
+        Vertex of each corner, length of each half-edge, and the half-edge glued to it: -1 on the boundary, -2 where
+        more than two faces meet.
     double_area : (m,)
         Takes twice the area of each face.
     bulge : (3 m,)
@@ -240,9 +240,9 @@ def _classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
             if n_half_turns < 2 or (n_half_turns == 2 and ray.cosine > 0.0 and ray.sine < 1e-8):
                 return PASSED
             return BENDS
-    # An open fan: to its other end.
+    # An open fan: from the start to its other end.
     k = start
-    side = _next(start)
+    side = _previous(start)
     while n_seen < n_corners:
         k = _beyond(s, k, side)
         if k < 0:
@@ -576,10 +576,10 @@ def _settle(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.int:
     x: cython.double
     y: cython.double
     difference: cython.double
-    n_steps: cython.int
+    _: cython.int
     if low >= high:
         return 4 if w.stop <= u.start else 0
-    if high - low < 0.2 * (u.stop - u.start) and high - low < 0.2 * (w.stop - w.start):
+    if high - low < OVERLAP * (u.stop - u.start) and high - low < OVERLAP * (w.stop - w.start):
         return 0
     difference = u.offset - w.offset
     if difference == 0.0:
@@ -634,7 +634,7 @@ def _settle(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.int:
             q = high
             y = at_low
             x = low + (high - low) * at_low / (at_low - at_high)
-            for n_steps in range(8):
+            for _ in range(8):
                 a = sqrt((x - u.x) * (x - u.x) + u.depth * u.depth)
                 b = sqrt((x - w.x) * (x - w.x) + w.depth * w.depth)
                 y = difference + a - b
@@ -692,7 +692,6 @@ def _trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.
     k: cython.int = 0
     outcome: cython.int
     w: Window
-    u: Window
     length: cython.double = s.length[h]
     from_tail: cython.double = s.distance[s.vertex[_next(h)]]
     from_head: cython.double = s.distance[s.vertex[_previous(h)]]
@@ -761,17 +760,18 @@ def _trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.
             continue
         if j < k:
             memmove(windows + (j + 1), windows + j, (k - j) * cython.sizeof(Window))
-        elif j > 0 and fabs(windows[j - 1].x - w.x) <= SAME * (fabs(w.x) + w.depth):
+        elif (
+            j > 0
+            and fabs(windows[j - 1].x - w.x) <= SAME * (fabs(w.x) + w.depth)
+            and windows[j - 1].root == w.root
+            and windows[j - 1].offset == w.offset
+            and fabs(windows[j - 1].depth - w.depth) <= SAME * (fabs(w.x) + w.depth)
+            and windows[j - 1].start <= w.start <= windows[j - 1].stop + narrow
+        ):
             # Two halves that passed a flat vertex are one again.
-            if (
-                windows[j - 1].root == w.root
-                and windows[j - 1].offset == w.offset
-                and fabs(windows[j - 1].depth - w.depth) <= SAME * (fabs(w.x) + w.depth)
-                and windows[j - 1].start <= w.start <= windows[j - 1].stop + narrow
-            ):
-                if w.stop > windows[j - 1].stop:
-                    windows[j - 1].stop = w.stop
-                continue
+            if w.stop > windows[j - 1].stop:
+                windows[j - 1].stop = w.stop
+            continue
         windows[j] = w
         k += 1
     return k
@@ -783,11 +783,7 @@ def _trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.
 @cython.exceptval(check=False)
 def _bent(w: cython.pointer(Window), at: cython.double, x: cython.double, y: cython.double) -> cython.double:
     """Length of the path through a point of the half-edge to a point of the face."""
-    return (
-        w.offset
-        + sqrt((at - w.x) * (at - w.x) + w.depth * w.depth)
-        + sqrt((at - x) * (at - x) + y * y)
-    )
+    return w.offset + sqrt((at - w.x) * (at - w.x) + w.depth * w.depth) + sqrt((at - x) * (at - x) + y * y)
 
 
 @cython.cfunc
@@ -872,8 +868,11 @@ def _cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
         w = windows + i
         if w.side == RIGHT_OF_APEX:
             continue
-        if best >= 0 and i != best and w.start >= best_at and (
-            w.side == AROUND_APEX or nearest <= _bent(w, w.stop, apex_x, apex_y)
+        if (
+            best >= 0
+            and i != best
+            and w.start >= best_at
+            and (w.side == AROUND_APEX or nearest <= _bent(w, w.stop, apex_x, apex_y))
         ):
             continue  # would cross a shorter way to the apex
         out.depth = w.x * sin_left + w.depth * cos_left
@@ -898,8 +897,11 @@ def _cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
         w = windows + i
         if w.side == LEFT_OF_APEX:
             continue
-        if best >= 0 and i != best and w.stop <= best_at and (
-            w.side == AROUND_APEX or nearest <= _bent(w, w.start, apex_x, apex_y)
+        if (
+            best >= 0
+            and i != best
+            and w.stop <= best_at
+            and (w.side == AROUND_APEX or nearest <= _bent(w, w.start, apex_x, apex_y))
         ):
             continue
         x = length - w.x
@@ -1162,6 +1164,46 @@ def search(
     tolerance: cython.double,
     statistics: cython.longlong[::1],
 ) -> bool:
+    """Exact distances from vertices and points; false where memory runs out.
+
+    Parameters
+    ----------
+    vertex, length, twin, double_area, bulge, corner_of_vertex, next_corner, kind
+        As `shapes` takes and fills them. `kind` is filled further, the same by every search.
+    aligned : (3 m,)
+        Whether the faces at a glued half-edge run along it in opposite directions.
+    ring : (3 m,)
+        Where more than two faces meet, the next half-edge of the same edge.
+    is_delaunay : bool
+        What `shapes` returned.
+    source, offset : (k,)
+        Vertices that distance starts from, and the distance at which each starts.
+    point_face, point, point_offset : (p,), (3 p,), (p,)
+        Sources inside faces: face, barycentric coordinates, distance. A source on a side, with a coordinate of 0, comes
+        once for every face there.
+    distance, emitted : (n,)
+        Must come full of infinity; the first takes distances.
+    root, label, entered, crossing : (n,), (n + p,), (n,), (n,)
+        Take where the shortest paths come from; see `heat_igl.unfolding.exact.Origin`. They must come full of -1.
+    touched : (n,)
+        Takes the vertices that were reached, as many as `statistics` says.
+    slot : (3 m,)
+        Must come full of -1, and is again afterwards.
+    goal : (g,)
+        With `stops_early`, the search ends when the distances of these vertices and of all targets are known.
+    first_target, next_target, target_face, target : (m,), (t,), (t,), (3 t,)
+        Points whose distance is asked for, as linked lists by face, with their barycentric coordinates.
+    target_distance, target_root, target_entered, target_crossing : (t,)
+        As for vertices.
+    slack : float
+        Diameter of the largest circle around a face with targets.
+    cutoff : float
+        Distances up to here are exact, larger ones may be too large.
+    tolerance : float
+        The fraction of a distance by which another way must be shorter before a window is cut.
+    statistics : (3,)
+        Takes the numbers of vertices that were reached, of windows, and of lists that crossed a face.
+    """
     s: Search
     i: cython.int
     v: cython.int
