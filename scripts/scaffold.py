@@ -21,8 +21,7 @@ import heat_igl
 from heat_igl import Mesh, shapes
 
 PACKAGES = (
-    "numpy scipy libigl numba pyamg potpourri3d pygeodesic tvb-gdist pymeshlab meshio matplotlib scikit-fmm "
-    "distributed zarr"
+    "numpy scipy libigl pyamg potpourri3d pygeodesic tvb-gdist pymeshlab meshio matplotlib scikit-fmm distributed zarr"
 ).split()
 
 

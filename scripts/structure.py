@@ -218,11 +218,6 @@ def _docstring_lines(tree: ast.AST) -> set[int]:
     return found
 
 
-def _is_kernel(node: ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef) -> bool:
-    """Compiled by numba: such a function cannot be parted freely."""
-    return any("jit" in ast.unparse(decorator) for decorator in node.decorator_list)
-
-
 def lengths(package: Path) -> tuple[list[Length], list[Length]]:
     """Bodies of functions outside kernels, and classes, the longest first."""
     bodies, classes = [], []
@@ -235,7 +230,7 @@ def lengths(package: Path) -> tuple[list[Length], list[Length]]:
             if not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
                 continue
             is_class = isinstance(node, ast.ClassDef)
-            if not is_class and (_is_kernel(node) or "kernels" in path.parts):
+            if not is_class and "kernels" in path.parts:  # a compiled loop cannot be parted freely
                 continue
             first = node.lineno if is_class else node.body[0].lineno
             span = range(first, (node.end_lineno or first) + 1)

@@ -12,7 +12,6 @@ Writes tune_backends.json and tune_backends.md.
 
 from __future__ import annotations
 
-import importlib.util
 import statistics
 import sys
 import time
@@ -69,8 +68,6 @@ def run(domain: Operators, backend: str) -> dict[str, float]:
 
 def measured(domain: Operators, backends: Sequence[str], runs: int) -> list[dict[str, Any]]:
     """Medians per backend."""
-    for backend in backends:
-        run(domain, backend)  # compiles
     found: dict[str, list[dict[str, float]]] = {backend: [] for backend in backends}
     for _ in range(runs):
         for backend in backends:
@@ -122,8 +119,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("tune-results"), help="directory of the results")
     arguments = parser.parse_args(argv)
     backends = arguments.only or ["scipy", "multifrontal"]
-    if importlib.util.find_spec("numba") is None:
-        backends = [backend for backend in backends if backend == "scipy"]
     rng = np.random.default_rng(arguments.seed)
     if arguments.mesh:
         meshes = [read_mesh(path) for path in arguments.mesh]

@@ -206,7 +206,6 @@ def test_skeleton_keeps_pieces_and_holes(seed):
 
 def test_offset_of_a_curve_drawn_on_the_plane():
     """Around a segment: two sides and two half circles, by a distance that is off by less than an edge on average."""
-    pytest.importorskip("numba")
     mesh = shapes.grid(60)
     solver = heat_igl.HeatMethodSolver(mesh)
     first, last = 20 * 61 + 20, 30 * 61 + 40
@@ -226,7 +225,6 @@ def test_offset_of_a_curve_drawn_on_the_plane():
 
 def test_offset_of_a_curve_drawn_on_a_part():
     """Of a path over sharp edges, against exact distance from the vertices of the faces that it crosses."""
-    pytest.importorskip("numba")
     pytest.importorskip("pygeodesic")
     mesh = heat_igl.read_mesh(shared_path("fandisk.off"))
     solver = heat_igl.HeatMethodSolver(mesh)

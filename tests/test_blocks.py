@@ -115,8 +115,6 @@ def test_types_of_the_result(solver):
 
 @pytest.mark.parametrize("refine", [None, "sweep"])
 def test_rows_do_not_depend_on_blocks_or_threads(sphere, refine, monkeypatch):
-    if refine:
-        pytest.importorskip("numba")
     solver = HeatMethodSolver(sphere, refine=refine)
     sets = [[int(i)] for i in np.random.default_rng(0).choice(sphere.n_vertices, 19, replace=False)]
     one_by_one = np.stack([solver.distance(sources) for sources in sets])

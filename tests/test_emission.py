@@ -28,8 +28,6 @@ from heat_igl.steps import fitted_laplacian
 
 @pytest.fixture(params=[None, "sweep", "unfold"])
 def refine(request):
-    if request.param is not None:
-        pytest.importorskip("numba")
     return request.param
 
 

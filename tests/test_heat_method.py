@@ -296,8 +296,6 @@ def test_pickled_copy_gives_the_same_bits(solver):
 
 @pytest.mark.parametrize("backend", ["scipy", "multifrontal"])
 def test_threads_share_a_solver(sphere, backend):
-    if backend == "multifrontal":
-        pytest.importorskip("numba")
     solver = HeatMethodSolver(sphere, backend=backend)
     expected = [solver.distance(i) for i in range(20)]
     found: list = [None] * 20
@@ -316,7 +314,6 @@ def test_threads_share_a_solver(sphere, backend):
 
 
 def test_backends_agree(sphere):
-    pytest.importorskip("numba")
     one = HeatMethodSolver(sphere, backend="scipy")
     other = HeatMethodSolver(sphere, backend="multifrontal")
     assert (one.diagnostics.backend, other.diagnostics.backend) == ("scipy", "multifrontal")

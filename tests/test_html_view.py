@@ -307,7 +307,6 @@ def test_the_wheel_zooms_about_the_pointer_and_shift_moves(browser: Browser) -> 
 
 
 def test_a_click_moves_the_source_and_the_distance_follows(browser: Browser, bunny: heat_igl.Mesh) -> None:
-    pytest.importorskip("numba")
     browser.open(page(bunny, np.zeros(bunny.n_vertices), method="nothing yet"))
     assert browser.text("method") == "nothing yet"
     image = browser.image()
@@ -348,7 +347,6 @@ def test_the_distance_in_the_page_is_exact_where_it_is_flat(browser: Browser) ->
 @pytest.mark.parametrize("name", ["teapot.obj", "truck.obj", "camelhead.off"])
 def test_bad_meshes_agree_with_python_too(browser: Browser, name: str) -> None:
     """More than two faces at an edge, slivers, pieces."""
-    pytest.importorskip("numba")
     mesh = heat_igl.read_mesh(shared_path(name))
     browser.open(page(mesh, np.zeros(mesh.n_vertices)))
     browser.run("window.heatIgl.setSources([7])")

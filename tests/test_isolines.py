@@ -46,8 +46,6 @@ def assert_connected(mesh, curve):
 
 @pytest.mark.parametrize("refine", [None, "unfold"])
 def test_isolines_of_distance_on_a_plane_are_circles(refine):
-    if refine:
-        pytest.importorskip("numba")
     mesh = flat_perturbed(shapes.grid(160))  # 51 200 triangles
     source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1)))
     radii = np.array([0.1, 0.25, 0.4])
@@ -191,7 +189,6 @@ def test_crossings_are_those_of_libigl(bunny):
 
 
 def test_an_offset_curve_on_a_part():
-    pytest.importorskip("numba")
     mesh = heat_igl.read_mesh(shared_path("fandisk.off"))
     solver = HeatMethodSolver(mesh, refine="unfold")
     radius = 0.05 * np.ptp(mesh.V, axis=0).max()

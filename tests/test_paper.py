@@ -181,7 +181,6 @@ def test_power_law() -> None:
 
 def test_figures_from_one_command(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    pytest.importorskip("numba")
     assert paper_figures.main(["--quick", "--out", str(tmp_path)]) == 0
     names = ["1_heat", "1_distance", "2", "3", "4", "5", "5_jump"]
     for name in names:
@@ -214,7 +213,6 @@ def test_figure_of_another_mesh(tmp_path: Path) -> None:
 
 
 def test_claims_from_one_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("numba")
     assert paper_claims.main(["--quick", "--output", str(tmp_path)]) == 0
     text = (tmp_path / "paper_claims.md").read_text(encoding="utf8")
     assert capsys.readouterr().out == text

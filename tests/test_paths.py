@@ -30,8 +30,6 @@ from heat_igl import (
 )
 from heat_igl.reference.steiner import graph_distance
 
-pytest.importorskip("numba")
-
 
 def lengths(mesh, paths):
     return np.array([path.lengths(mesh).sum() for path in paths])

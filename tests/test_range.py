@@ -22,8 +22,6 @@ def test_strip_4000_long(laplacian):
 @pytest.mark.parametrize("backend", ["scipy", "multifrontal"])
 def test_heat_keeps_its_relative_accuracy_over_500_decades(backend):
     """Four vertices wide, 4000 cells long: the heat per cell falls by the closed form acosh(1 + h^2 / 2 t)."""
-    if backend == "multifrontal":
-        pytest.importorskip("numba")
     domain = operators(shapes.strip(4000, 3))
     t = 10.0
     b = np.zeros((domain.n, 9))
@@ -36,7 +34,6 @@ def test_heat_keeps_its_relative_accuracy_over_500_decades(backend):
 
 
 def test_backends_agree_on_the_strip():
-    pytest.importorskip("numba")
     mesh = shapes.strip(4000, 3)
     one, other = (HeatMethodSolver(mesh, backend=name) for name in ("scipy", "multifrontal"))
     for sources in (0, [17, 9000]):

@@ -47,7 +47,6 @@ def test_the_table_shows_what_differs_and_what_failed() -> None:
 
 def test_every_quantity_is_computed_on_a_small_mesh() -> None:
     """The same twice: the sources are drawn with a seed."""
-    pytest.importorskip("numba")
     mesh = same_results.meshes(None, 1000, 0)["five pages"]
     first, second = same_results.computed(mesh, 0), same_results.computed(mesh, 0)
     assert {"heat", "sweep", "unfold", "voronoi", "paths", "isolines", "batch"} <= set(first)

@@ -158,7 +158,6 @@ def test_unknown_boundary(disk):
 @pytest.mark.parametrize("scale", [1e-280, 1.0, 1e280])
 def test_one_kernel_is_the_matrix_form(disk, k, damped, fitted, scale):
     """On all kinds of domains; some of the field vanishes and some of the heat is negative."""
-    pytest.importorskip("numba")
     t = 0.02
     box = operators(shapes.box(4))
     icosphere, cover = operators(perturbed(shapes.icosphere(3))), tufted_operators(shapes.disk(6))
@@ -177,13 +176,6 @@ def test_one_kernel_is_the_matrix_form(disk, k, damped, fitted, scale):
         for order in (None, np.random.default_rng(k).permutation(domain.n)):
             found = NormalizedDivergence(domain, t if damped else None, order, fitted).divergence(u)
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * abs(expected).max())
-
-
-def test_without_numba_there_is_the_matrix_form(disk, monkeypatch):
-    u = diffuse(disk, np.eye(disk.n)[:, [3, 90]], 0.02)
-    expected = disk.D @ (normalize(disk, u) * np.tile(damping(disk, u, 0.02), (2, 1)))
-    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    assert (NormalizedDivergence(disk, 0.02).divergence(u) == expected).all()
 
 
 def test_a_gradient_exchanged_by_hand_is_used(disk):

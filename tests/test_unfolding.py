@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import subprocess
-import sys
 import warnings
 
 import numpy as np
@@ -15,8 +13,6 @@ import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, Refinement, shapes, unfolded_distance
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
-
-pytest.importorskip("numba")
 
 METHODS = ("sweep", "unfold")
 
@@ -354,18 +350,3 @@ def test_bad_arguments():
         unfolded_distance(grid.V, grid.F, 99)
     with pytest.raises(ValueError, match="tolerance must lie between 0 and 1, not -1"):
         unfolded_distance(grid.V, grid.F, 0, tolerance=-1)
-
-
-def test_missing_numba_names_the_extra():
-    code = (
-        "import sys; sys.modules['numba'] = None\n"
-        "import heat_igl\n"
-        "grid = heat_igl.shapes.grid(2)\n"
-        "heat_igl.HeatMethodSolver(grid).distance(0)\n"
-        "try:\n    heat_igl.HeatMethodSolver(grid, refine='unfold')\n"
-        "except heat_igl.MissingExtraError as error:\n    print(error)"
-    )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout.strip() == (
-        "refinement needs numba: pip install numba (or install heat-igl with its extra 'fast')"
-    )

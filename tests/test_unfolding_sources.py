@@ -10,8 +10,6 @@ from test_unfolding import METHODS, exact, moebius_strip, random_disk, relative_
 from heat_igl import Mesh, Refinement, SurfacePoints, shapes
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 
-pytest.importorskip("numba")
-
 NONE = np.zeros(0, np.int64)
 
 

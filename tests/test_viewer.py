@@ -44,7 +44,6 @@ def test_the_distance_follows_the_click(sphere: heat_igl.Mesh) -> None:
 
 
 def test_options_change_the_distance_as_they_change_the_solver(sphere: heat_igl.Mesh) -> None:
-    pytest.importorskip("numba")
     half = heat_igl.Mesh(sphere.V, sphere.F[sphere.V[sphere.F].mean(axis=1)[:, 2] > 0])
     source = int(half.F[0, 0])
     now = Exploration(half, source)

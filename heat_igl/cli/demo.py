@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import time
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import Refine
 from heat_igl.validation import shapes
 from heat_igl.validation.samples import bunny_path
 
@@ -54,12 +52,6 @@ def demonstrate(out: Path) -> list[tuple[str, str]]:
     mesh = read_mesh(path) if path else shapes.icosphere(5)
     rows.append((name, f"{mesh.n_vertices} vertices, {mesh.n_faces} triangles ({_since(start)} to read or make)"))
 
-    if importlib.util.find_spec("numba"):
-        start = time.perf_counter()
-        refine: Refine | None
-        for refine in (None, "unfold"):
-            HeatMethodSolver(shapes.icosphere(4), refine=refine).distance(0)
-        rows.append(("kernels", f"{_since(start)} to load them, or to compile them once after installing"))
     start = time.perf_counter()
     solver = HeatMethodSolver(mesh)
     rows.append(("precomputation", f"{_since(start)} ({solver.diagnostics.backend})"))

@@ -10,7 +10,7 @@ from heat_igl.mesh import Mesh
 
 __all__ = ["PROCESS_MEMORY", "memory_for_solvers", "physical_memory", "solver_memory"]
 
-# A worker without a solver: Python, numpy, scipy, libigl, numba, zarr and Dask. Measured 215 MiB.
+# A worker without a solver: Python, numpy, scipy, libigl, zarr and Dask. Measured 215 MiB.
 PROCESS_MEMORY = 230 * 2**20
 # The mesh, its operators and one block of right-hand sides, measured on spheres of 10k to 164k vertices.
 _BYTES_PER_VERTEX = 500

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from types import ModuleType
-from typing import TYPE_CHECKING
-
 import igl
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
-from heat_igl.errors import MeshError, MissingExtraError, SourceError
+from heat_igl.curves import tracing
+from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
 from heat_igl.intrinsic import corner_angles
-from heat_igl.mesh import ON_SIDE, Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices, grouping
+from heat_igl.mesh import ON_SIDE, Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
 from heat_igl.sources import Sources, named_vertices, source_set
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from heat_igl.curves.tracing import Surface
 
 __all__ = ["shortest_paths"]
 
@@ -67,8 +62,6 @@ def shortest_paths(
         If targets or sources are no points of the mesh, or no source can be reached from a target.
     ValueError
         If the distance has the wrong shape, or is NaN or negative somewhere.
-    MissingExtraError
-        If numba is not installed.
 
     Notes
     -----
@@ -87,10 +80,9 @@ def shortest_paths(
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")
-    kernel = _kernel()
     values = _values(mesh, distance, sources)
     face, barycentric = _points("targets", mesh, targets)
-    goals = kernel.Goals(*_goals(mesh, values, sources))
+    goals = tracing.goals(*_goals(mesh, values, sources))
     lost = (goals.escape < 0) & ~_roots(mesh, goals.is_source, goals.first_inside)
     lost = lost[mesh.F[face, 0]]
     if lost.any():
@@ -100,19 +92,9 @@ def shortest_paths(
             "components): leave out targets at infinite distance"
         )
     most_steps = 4 * mesh.n_faces + 100
-    faces, points, first_segment = kernel.trace(_surface(mesh), values, goals, face, barycentric, most_steps)
+    faces, points, first_segment = tracing.trace(_surface(mesh), values, goals, face, barycentric, most_steps)
     parts = np.split(np.arange(len(faces)), first_segment[1:-1])
     return [SurfaceCurve(faces[part], points[part, 0], points[part, 1]) for part in parts]
-
-
-def _kernel() -> ModuleType:
-    try:
-        from heat_igl.curves import tracing
-    except ImportError as error:
-        if error.name is None or not error.name.startswith(("numba", "llvmlite")):
-            raise
-        raise MissingExtraError.of("paths", "numba", "fast") from None
-    return tracing
 
 
 def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver | None, sources: Sources | None) -> FloatArray:
@@ -166,7 +148,7 @@ def _snapped(barycentric: FloatArray) -> FloatArray:
 def _goals(
     mesh: Mesh, values: FloatArray, sources: Sources | None
 ) -> tuple[BoolArray, IntArray, FloatArray, FloatArray, IntArray]:
-    """Possible ends of paths: the fields of the kernel's `Goals`."""
+    """Where paths may end; the arguments of `tracing.goals`."""
     if sources is None:
         if values.min() > 0:
             raise SourceError("distance is 0 at no vertex: name the sources, where paths may end")
@@ -233,18 +215,10 @@ def _ways_out(mesh: Mesh, values: FloatArray, roots: BoolArray) -> IntArray:
     return np.where((previous < 0) | (previous == n), -1, previous).astype(np.int64)
 
 
-def _surface(mesh: Mesh) -> Surface:
+def _surface(mesh: Mesh) -> tracing.Surface:
     """The tables of the kernel."""
     # Not mollified: mollification gives a flat triangle some height, and would bend the paths across it.
     lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
-    at_edge = grouping.group_by_label(mesh.facets.of_face.ravel(), len(mesh.facets.vertices))
-    at_vertex = grouping.group_by_label(mesh.F.ravel(), mesh.n_vertices)
-    tables: Surface = _kernel().Surface(
-        mesh.F,
-        lengths,
-        corner_angles(lengths),
-        mesh.facets.of_face.ravel(),
-        *at_edge,
-        *at_vertex,
+    return tracing.surface(
+        mesh.F, lengths, corner_angles(lengths), mesh.facets.of_face, mesh.n_vertices, len(mesh.facets.n_faces)
     )
-    return tables

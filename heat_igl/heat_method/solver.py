@@ -52,8 +52,8 @@ class HeatMethodSolver(BatchedSolver):
         source vertex get the lengths of the edges.
     refine : {"sweep", "unfold"}, optional
         Integrate nothing, and find the distance in the order of the heat by unfolding triangles, two at a time or in
-        strips: 0.06 to 0.3 % and 0.0005 to 0.003 % mean error on common meshes, see `Refinement`. Needs triangles, and
-        numba (extra ``fast``); no Poisson problem is factored.
+        strips: 0.06 to 0.3 % and 0.0005 to 0.003 % mean error on common meshes, see `Refinement`. Needs triangles; no
+        Poisson problem is factored.
     backend : {"auto", "scipy", "multifrontal", "iterative"}
         Linear solver, see `factorize`.
 

@@ -10,7 +10,6 @@ from heat_igl.runtime.blocks import (
     rich_progress,
     row_writer,
 )
-from heat_igl.runtime.extras import compiled_kernels_for
 from heat_igl.runtime.heat_range import LARGEST_EXPONENT, LOWEST_HEAT, RANGE_LIMIT, SOURCE_HEAT
 from heat_igl.runtime.memory import PeakMemory, release_free_memory, resident_memory
 from heat_igl.runtime.threads import n_threads, pool, side_by_side
@@ -24,7 +23,6 @@ __all__ = [
     "SOURCE_HEAT",
     "WORKING_MEMORY",
     "block_size",
-    "compiled_kernels_for",
     "float_type",
     "held_warnings",
     "in_blocks",

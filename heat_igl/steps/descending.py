@@ -1,4 +1,4 @@
-"""The kernel of step 2 on triangles: from heat to the divergence of its normalized gradient, face by face."""
+"""Step 2 on triangles in one pass over the faces: from heat to the divergence of its normalized gradient."""
 
 from __future__ import annotations
 
@@ -6,14 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.intrinsic.fans import jit
+from heat_igl.kernels.divergence import divergence_of_descent
 from heat_igl.operators import TriangleElements
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["Triangles", "normalized_divergence", "triangles"]
-
-# Columns of `Triangles.numbers`.
-_PER_BASE, _FOOT, _PER_HEIGHT, _AREA, _PER_RATE = 0, 1, 2, 3, 4
 
 
 class Triangles(NamedTuple):
@@ -59,40 +56,6 @@ def triangles(
     return Triangles(order, corners[by_first], numbers)
 
 
-@jit
-def _on_triangles(t: Triangles, u: FloatArray, log_u: FloatArray, smallest: float, of_log: bool) -> FloatArray:
-    """`normalized_divergence` for one column (n,), in the order of the tables."""
-    divergence = np.zeros(len(u))
-    for f in range(len(t.corners)):
-        a, b, c = t.corners[f, 0], t.corners[f, 1], t.corners[f, 2]
-        per_base, foot, per_height = t.numbers[f, _PER_BASE], t.numbers[f, _FOOT], t.numbers[f, _PER_HEIGHT]
-        rise = log_u[b] - log_u[a]
-        x_of_log, y_of_log = per_base * rise, per_height * (log_u[c] - log_u[a] - foot * rise)
-        if of_log and min(u[a], u[b], u[c]) >= smallest:
-            x, y = x_of_log, y_of_log
-            largest = max(abs(x), abs(y))
-            if largest == 0.0:
-                continue
-        else:
-            rise = u[b] - u[a]
-            x, y = per_base * rise, per_height * (u[c] - u[a] - foot * rise)
-            largest = max(abs(x), abs(y))
-            if not largest >= smallest:
-                continue
-        share = (x_of_log * x_of_log + y_of_log * y_of_log) * t.numbers[f, _PER_RATE]
-        if not share < 1.0:
-            share = 1.0
-        # Squares of entries below 1e-154 would vanish: the largest is made 1 first.
-        x, y = x * (1.0 / largest), y * (1.0 / largest)
-        scale = t.numbers[f, _AREA] * np.sqrt(share / (x * x + y * y))
-        at_c = scale * y * per_height
-        at_b = scale * x * per_base - foot * at_c
-        divergence[a] -= at_b + at_c
-        divergence[b] += at_b
-        divergence[c] += at_c
-    return divergence
-
-
 def normalized_divergence(t: Triangles, u: FloatArray, smallest: float, of_log: bool = False) -> FloatArray:
     """Integrated divergence (n, k) of -grad u / |grad u|, times |grad log u| / full_rate where that is below 1.
 
@@ -101,7 +64,8 @@ def normalized_divergence(t: Triangles, u: FloatArray, smallest: float, of_log: 
     """
     divergence = np.zeros(u.shape)
     for column, of_column in zip(u.T, divergence.T, strict=True):
-        ordered = column[t.order]
+        ordered = column[t.order].astype(np.float64, copy=False)
         with np.errstate(divide="ignore", invalid="ignore"):
-            of_column[t.order] = _on_triangles(t, ordered, np.log(ordered), smallest, of_log)
+            log_u = np.log(ordered)
+        of_column[t.order] = divergence_of_descent(t.corners, t.numbers, ordered, log_u, smallest, of_log)
     return divergence

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from heat_igl.operators import Operators, TriangleElements
 from heat_igl.runtime import LOWEST_HEAT
+from heat_igl.steps.descending import Triangles, normalized_divergence, triangles
 from heat_igl.typing import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from heat_igl.steps.descending import Triangles
 
 __all__ = ["NormalizedDivergence", "damping", "normalize"]
 
@@ -116,7 +111,7 @@ class NormalizedDivergence:
     """The right-hand side of step 3: the divergence of the field X of step 2.
 
     The same as ``D @ (damping(...) * normalize(...))`` to rounding. For triangles there is a compiled kernel, one pass
-    over the faces that stores no field, where numba is installed; its tables are made once.
+    over the faces that stores no field; its tables are made once.
 
     Parameters
     ----------
@@ -138,12 +133,10 @@ class NormalizedDivergence:
         self._full_rate: FloatArray | None = None
         self._kernel: Triangles | None = None
         full_rate = None if t is None else _lowest_full_rate(operators, t, fitted)
-        if isinstance(operators.gradient, TriangleElements) and importlib.util.find_spec("numba") is not None:
-            from heat_igl.steps import descending
-
+        if isinstance(operators.gradient, TriangleElements):
             full_rate = np.zeros(len(operators.weights)) if full_rate is None else full_rate
             full_rate[operators.boundary_faces] = 0.0
-            self._kernel = descending.triangles(operators.gradient, operators.weights, full_rate, order)
+            self._kernel = triangles(operators.gradient, operators.weights, full_rate, order)
         else:
             self._full_rate = full_rate
             _ = operators.D  # made on first use otherwise, in the middle of the first query
@@ -152,8 +145,6 @@ class NormalizedDivergence:
         """Integrated divergence (n, k) for heat (n, k)."""
         operators, _, _, fitted = self._arguments
         if self._kernel is not None:
-            from heat_igl.steps.descending import normalized_divergence
-
             return normalized_divergence(self._kernel, u, LOWEST_HEAT, fitted)
         divergence = np.empty(u.shape)
         # One column at a time: the field of all takes more memory than the caches hold.

@@ -57,8 +57,6 @@ def unfolded_distance(V: MeshLike, F: Any = None, sources: Any = None, *, tolera
         If the mesh cannot be used, or is tetrahedral.
     SourceError
         If `sources` does not name places on the mesh.
-    MissingExtraError
-        If numba is not installed.
     """
     if sources is None:
         F, sources = None, F

@@ -7,19 +7,16 @@ gives the order alone; no Poisson problem is solved. docs/refinement.md derives 
 
 from __future__ import annotations
 
-from types import ModuleType
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation, double_cover, oriented
+from heat_igl.intrinsic.fans import breadth_first, tables
+from heat_igl.kernels.ordering import ascending
 from heat_igl.mesh import SurfacePoints
-from heat_igl.runtime import compiled_kernels_for
-from heat_igl.typing import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from heat_igl.intrinsic.fans import Tables
-    from heat_igl.unfolding.unfolding import Points
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.walks import INSIDE, Points, sweep, unfold, unknown, views
 
 __all__ = ["TOLERANCE", "Known", "Refine", "Refinement"]
 
@@ -65,11 +62,6 @@ class Refinement:
     triangulation : IntrinsicTriangulation
         n vertices; an intrinsic Delaunay one, since long thin triangles hide the way from their neighbours.
 
-    Raises
-    ------
-    MissingExtraError
-        If numba is not installed.
-
     Notes
     -----
     Paths end at the boundary and where more than two faces meet: they run along such edges, not across. A surface that
@@ -78,7 +70,6 @@ class Refinement:
     """
 
     def __init__(self, triangulation: IntrinsicTriangulation) -> None:
-        fans, _, _ = _kernels()
         self.n = triangulation.n
         if not triangulation.aligned.all():
             triangulation = oriented(triangulation)
@@ -88,9 +79,9 @@ class Refinement:
             self._n_sheets = 2
             F, lengths, twin = double_cover(triangulation)
         self._triangulation = triangulation
-        self._number, self._face, F, lengths, twin = fans.breadth_first(F, lengths, twin, self._n_sheets * self.n)
+        self._number, self._face, F, lengths, twin = breadth_first(F, lengths, twin, self._n_sheets * self.n)
         self._F = F
-        self._tables: Tables = fans.tables(F, lengths, twin, len(self._number))
+        self._tables = tables(F, lengths, twin, len(self._number))
 
     def sweep(
         self,
@@ -131,22 +122,21 @@ class Refinement:
             ``inf`` where no source is reached. Neither an upper nor a lower bound on a curved surface; on a flat
             convex one exact to rounding.
         """
-        _, sweeping, _ = _kernels()
         starts = self._starts(sources, offsets, points, point_offsets)
         n = len(self._number)
         distance = np.full(n + starts.n_points, np.inf)
-        distance[starts.row] = starts.state[:, 0]
+        distance[starts.row] = starts.walk["distance"]
         label = None
         if len(sources) + starts.n_points > 1 or labels is not None or offsets is not None or point_offsets is not None:
-            label = np.full(len(distance), -1)
-            label[starts.row] = starts.label
+            label = np.full(len(distance), -1, np.int32)
+            label[starts.row] = starts.walk["label"]
         is_stale = np.ones(n, bool)
         if known is not None:
             row = self._number[np.concatenate([known.vertex + self.n * sheet for sheet in range(self._n_sheets)])]
             distance[row], is_stale[row] = np.tile(known.distance, self._n_sheets), False
             if label is not None:
                 label[row] = np.tile(known.source, self._n_sheets)
-        sweeping.sweep(self._order(key), self._tables, distance[:n], label, starts.offset, is_stale)
+        sweep(self._order(key), self._tables, distance[:n], label, starts.offset, is_stale)
         return self._on_base(distance, label, labels)
 
     def unfold(
@@ -185,26 +175,25 @@ class Refinement:
         """
         if not 0 <= tolerance <= 1:
             raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
-        _, _, unfolding = _kernels()
         # Below 1e-5, forecasts are wrong by as much because of the curvature on the way.
         shortfall = max(_SHORTFALL * tolerance, 1e-5)
         starts = self._starts(sources, offsets, points, point_offsets)
-        state = np.zeros((len(self._number) + starts.n_points, 6))
-        state[:, 0], state[:, 4] = np.inf, unfolding.NO_FAN
-        state[starts.row] = starts.state
-        label = inside = None
-        if labels is not None or points is not None:
-            label = np.full(len(state), -1)
-            label[starts.row] = starts.label
-            inside = starts.points
-        order = self._order(key)
-        unfolding.unfold(order, self._tables, state, label, inside, tolerance, shortfall, _MAX_SEARCH, _MAX_PASSES)
-        return self._on_base(state[:, 0], label, labels)
+        walk = unknown(len(self._number) + starts.n_points)
+        walk[starts.row] = starts.walk
+        unfold(
+            self._order(key),
+            self._tables,
+            walk,
+            starts.points,
+            tolerance=tolerance,
+            shortfall=shortfall,
+            max_steps=_MAX_SEARCH,
+            max_passes=_MAX_PASSES,
+        )
+        return self._on_base(walk["distance"], walk["label"], labels)
 
-    def _order(self, key: FloatArray) -> IntArray:
+    def _order(self, key: FloatArray) -> AnyArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
-        from heat_igl.unfolding.ordering import ascending
-
         on_sheets = np.tile(key, self._n_sheets) if self._n_sheets > 1 else np.ascontiguousarray(key)
         return np.asarray(self._number[ascending(on_sheets)])
 
@@ -218,36 +207,32 @@ class Refinement:
         """What the kernels start from, on all sheets and by the numbers of the tables."""
         n, k, sheets = len(self._number), len(sources), range(self._n_sheets)
         row = self._number[np.concatenate([sources + self.n * sheet for sheet in sheets])]
-        state = np.zeros((len(row), 6))
-        state[:, 4] = -1
-        label = np.tile(np.arange(k), self._n_sheets)
+        walk = unknown(len(row))
+        walk["label"] = np.tile(np.arange(k), self._n_sheets)
         begin = np.zeros(k) if offsets is None else np.asarray(offsets, np.float64)
         if points is None:
-            state[:, 0] = state[:, 1] = begin[label]
-            return _ascending(row, state, label, begin)
-        _, _, unfolding = _kernels()
+            walk["distance"] = walk["offset"] = begin[walk["label"]]
+            return _ascending(row, walk, begin)
         faces, barycentric, point = self._faces_of(points)
-        vertex, seen = unfolding.views(faces, barycentric, self._F, self._tables)
-        place = np.zeros((len(points), 6))
-        place[:, 4] = -1
-        row = np.concatenate([row, vertex, n + np.arange(len(points))])
-        state = np.concatenate([state, seen, place])
-        label = np.concatenate([label, k + np.repeat(point, 3), k + np.arange(len(points))])
+        vertex, seen = views(faces, barycentric, self._F, self._tables)
+        place = unknown(len(points))
+        walk["distance"] = place["distance"] = 0.0
+        seen["label"], place["label"] = k + np.repeat(point, 3), k + np.arange(len(points))
+        row, walk = np.concatenate([row, vertex, n + np.arange(len(points))]), np.concatenate([walk, seen, place])
         begin = np.concatenate([begin, np.zeros(len(points)) if point_offsets is None else point_offsets])
-        state[:, 0] += begin[label]
-        state[:, 1] = begin[label]
+        walk["offset"] = begin[walk["label"]]
+        walk["distance"] += walk["offset"]
         by_face = np.argsort(faces, kind="stable")
-        first = np.full(len(self._F), -1)
+        first = np.full(len(self._F), -1, np.int32)
         first[faces[by_face][::-1]] = by_face[::-1]
-        following = np.full(len(faces), -1)
+        inside = np.zeros(len(faces), INSIDE)
+        inside["barycentric"], inside["following"], inside["row"] = barycentric, -1, n + point
         same = faces[by_face][1:] == faces[by_face][:-1]
-        following[by_face[:-1][same]] = by_face[1:][same]
-        inside = unfolding.Points(first, following, np.ascontiguousarray(barycentric), n + point)
-        return _ascending(row, state, label, begin, len(points), inside)
+        inside["following"][by_face[:-1][same]] = by_face[1:][same]
+        return _ascending(row, walk, begin, len(points), Points(first, inside))
 
     def _faces_of(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray]:
         """Triangles of the tables that hold points, coordinates in them, and which point each is."""
-        fans, _, _ = _kernels()
         faces, barycentric = self._triangulation.locate(points.faces, points.barycentric)
         point = np.arange(len(faces))
         if self._n_sheets == 2:
@@ -258,9 +243,10 @@ class Refinement:
         faces = self._face[faces]
         # A point on a side also lies in the face beyond it.
         i, c = np.nonzero(barycentric < _ON_SIDE)
-        beyond = self._tables.step_id[3 * faces[i] + c]
-        there = np.flatnonzero(beyond[:, fans.FAR] >= 0)
-        i, c, following = i[there], c[there], beyond[there, fans.TO_RIGHT].astype(np.int64)
+        beyond = self._tables.across(faces[i], c)
+        there = np.flatnonzero(beyond >= 0)
+        i, c, beyond = i[there], c[there], beyond[there]
+        following = beyond - beyond % 3 + (beyond + 1) % 3
         other = np.zeros((len(i), 3))
         # Its corner after the far one is at the end, as seen from here, of the side that starts after corner c.
         other[np.arange(len(i)), following % 3] = barycentric[i, (c + 2) % 3]
@@ -271,7 +257,7 @@ class Refinement:
             np.concatenate([point, point[i]]),
         )
 
-    def _on_base(self, distance: FloatArray, label: IntArray | None, labels: IntArray | None) -> FloatArray:
+    def _on_base(self, distance: FloatArray, label: AnyArray | None, labels: IntArray | None) -> FloatArray:
         on_sheets = distance[self._number].reshape(self._n_sheets, -1)
         if self._n_sheets == 1:
             if labels is not None and label is not None:
@@ -284,32 +270,18 @@ class Refinement:
 
 
 class _Starts(NamedTuple):
-    """Rows of the state that are known, the nearest last: (k,), (k, 6), (k,); then by label where it begins."""
+    """Rows of the walks that are known and these, (k,) each, the nearest last; then by label where it begins."""
 
-    row: IntArray
-    state: FloatArray
-    label: IntArray
+    row: AnyArray
+    walk: AnyArray
     offset: FloatArray
     n_points: int = 0
     points: Points | None = None
 
 
 def _ascending(
-    row: IntArray,
-    state: FloatArray,
-    label: IntArray,
-    offset: FloatArray,
-    n_points: int = 0,
-    points: Points | None = None,
+    row: AnyArray, walk: AnyArray, offset: FloatArray, n_points: int = 0, points: Points | None = None
 ) -> _Starts:
     """Far ones first, so that of several for one vertex the nearest is written last."""
-    order = np.argsort(-state[:, 0], kind="stable")
-    return _Starts(row[order], state[order], label[order], offset, n_points, points)
-
-
-def _kernels() -> tuple[ModuleType, ModuleType, ModuleType]:
-    """The modules of compiled kernels, loaded when they are first needed."""
-    with compiled_kernels_for("refinement"):
-        from heat_igl.intrinsic import fans
-        from heat_igl.unfolding import sweeping, unfolding
-    return fans, sweeping, unfolding
+    order = np.argsort(-walk["distance"], kind="stable")
+    return _Starts(row[order], walk[order], offset, n_points, points)

@@ -79,8 +79,6 @@ class UnfoldingSolver:
     ------
     ValueError
         If the domain has no triangles.
-    MissingExtraError
-        If numba is not installed.
     """
 
     def __init__(self, domain: UnfoldingDomain, refine: Refine, tolerance: float | None = None) -> None:

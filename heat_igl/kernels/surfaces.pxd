@@ -1,0 +1,106 @@
+from libc.math cimport sqrt
+
+cdef extern from *:
+    """
+    // A point nearer to a vertex than this, in edge lengths, is at the vertex.
+    #define SNAP 1e-9
+    """
+    double SNAP
+
+# Edge lengths are opposite the corners; none is 0.
+cdef struct Triangle:
+    double length[3]
+    double angle[3]
+    int vertex[3]
+    int edge[3]
+
+# Barycentric coordinates of a point in a face, or a difference of two.
+cdef struct Place:
+    double c[3]
+
+
+cdef class Surface:
+    cdef const Triangle[::1] triangle
+    cdef const int[::1] first_side, side, first_corner, corner
+    cdef const double[::1] d
+
+
+# The corner of face f at vertex v, -1 if it has none.
+cdef inline int corner_of(Surface s, int f, int v) noexcept nogil:
+    cdef const Triangle* t = &s.triangle[f]
+    if t.vertex[0] == v:
+        return 0
+    if t.vertex[1] == v:
+        return 1
+    return 2 if t.vertex[2] == v else -1
+
+
+# The other half-edge of the face of h at its vertex v.
+cdef inline int other_side(Surface s, int h, int v) noexcept nogil:
+    return 3 * (h // 3) + 3 - h % 3 - corner_of(s, h // 3, v)
+
+
+# The corner that a point is at, -1 if at none.
+cdef inline int only_corner(const Place* x) noexcept nogil:
+    cdef int c
+    for c in range(3):
+        if x.c[c] > 1.0 - SNAP:
+            return c
+    return -1
+
+
+# The side that a point lies on, -1 inside.
+cdef inline int side_of(const Place* x) noexcept nogil:
+    cdef int c, on = -1
+    for c in range(3):
+        if x.c[c] == 0.0:
+            on = c
+    return on
+
+
+cdef inline Place at_corner(int c) noexcept nogil:
+    cdef Place x
+    x.c[0] = x.c[1] = x.c[2] = 0.0
+    x.c[c] = 1.0
+    return x
+
+
+# `share` of the way from corner a to corner b.
+cdef inline Place between(int a, int b, double share) noexcept nogil:
+    cdef Place x
+    x.c[0] = x.c[1] = x.c[2] = 0.0
+    x.c[a], x.c[b] = 1.0 - share, share
+    return x
+
+
+cdef inline Place difference(const Place* x, const Place* y) noexcept nogil:
+    cdef Place z
+    z.c[0], z.c[1], z.c[2] = x.c[0] - y.c[0], x.c[1] - y.c[1], x.c[2] - y.c[2]
+    return z
+
+
+# A point x in the face of half-edge h on that edge, in the face of half-edge g on the same edge.
+cdef inline Place moved(Surface s, int h, int g, const Place* x) noexcept nogil:
+    cdef Place there
+    cdef int c
+    there.c[0] = there.c[1] = there.c[2] = 0.0
+    for c in range(3):
+        if c != h % 3:
+            there.c[corner_of(s, g // 3, s.triangle[h // 3].vertex[c])] = x.c[c]
+    return there
+
+
+# Scalar product of two vectors in face f, given by differences of places.
+cdef inline double product(Surface s, int f, const Place* x, const Place* y) noexcept nogil:
+    cdef const Triangle* t = &s.triangle[f]
+    return -0.5 * (
+        t.length[0] * t.length[0] * (x.c[1] * y.c[2] + x.c[2] * y.c[1])
+        + t.length[1] * t.length[1] * (x.c[2] * y.c[0] + x.c[0] * y.c[2])
+        + t.length[2] * t.length[2] * (x.c[0] * y.c[1] + x.c[1] * y.c[0])
+    )
+
+
+# How far two points of face f are apart.
+cdef inline double apart(Surface s, int f, const Place* x, const Place* y) noexcept nogil:
+    cdef Place along = difference(x, y)
+    return sqrt(max(product(s, f, &along, &along), 0.0))

@@ -1,0 +1,17 @@
+"""What kernels of paths read: triangles, what lies around edges and vertices, a distance, and places in faces."""
+
+import cython
+
+__all__ = ["Surface"]
+
+
+@cython.final
+@cython.cclass
+class Surface:
+    """Views of the arrays of `heat_igl.curves.tracing.Surface`, and of a distance (n,) on its vertices."""
+
+    def __init__(self, surface, d):
+        self.triangle = surface.triangle
+        self.first_side, self.side = surface.first_side, surface.side
+        self.first_corner, self.corner = surface.first_corner, surface.corner
+        self.d = d

@@ -1,0 +1,18 @@
+cdef extern from *:
+    """
+    // Changes by less than this are not passed on: on a curved surface the sweep is wrong by more anyway.
+    #define NEGLIGIBLE 3e-4
+    // In a flat domain it is exact, provided that all changes are passed on.
+    #define SWEEP_ROUNDING 1e-12
+    // Part of an edge by which a source has to lie beyond it: circles about its ends, nearly touching, lose digits.
+    #define CLOSE 1e-3
+    """
+    double NEGLIGIBLE, SWEEP_ROUNDING, CLOSE
+
+cdef enum:
+    # Visits per vertex up to which the sweep goes back at once, and after which it gives up. Heat's order takes 1.1 in
+    # all, a random one 20 to 40.
+    GO_BACK = 10
+    GIVE_UP = 50
+    # Spokes that a processor keeps in its own cache.
+    CACHED = 1 << 14

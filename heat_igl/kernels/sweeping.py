@@ -1,0 +1,391 @@
+"""Kernel of the sweep: distance by unfolding two triangles at a time, in a given order.
+
+Seen from a vertex v, a source lies behind the side ab of one of its triangles, where circles about a and b meet. The
+triangle beyond ab has the third corner w, which is nearer to the source and so knows better where it is.
+"""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.half_edges import HalfEdges, Spoke
+from cython.cimports.heat_igl.kernels.prefetch import prefetch
+from cython.cimports.heat_igl.kernels.sweeping import CACHED, CLOSE, GIVE_UP, GO_BACK, NEGLIGIBLE, SWEEP_ROUNDING
+from cython.cimports.libc.math import INFINITY, sqrt
+
+__all__ = ["sweep"]
+
+
+def sweep(
+    order: cython.const[cython.int][::1],
+    tables,
+    d: cython.double[::1],
+    label,
+    offset: cython.const[cython.double][::1],
+    is_stale: cython.uchar[::1],
+):
+    """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, in the given order.
+
+    Where a vertex turns out to be nearer than one that came before it, the sweep goes back to that one at once, before
+    what is wrong there spreads. Returns the number of visits per vertex. Vertices that are not in `is_stale` (n,) bool
+    are visited only if what they depend on changes.
+
+    `label` (n,) int32, None unless there is more than one source, is handed on with the distance: the source that it is
+    measured from, -1 where none is reached; ``offset[label]`` is the distance at which that source begins. Circles
+    about the ends of a side meet in a source if both ends are measured from it. Between ends of different sources a
+    straight front comes in, from the source of the end that it passes nearer to.
+    """
+    n = order.shape[0]
+    rank = np.empty(n, np.int32)
+    rank[order] = np.arange(n, dtype=np.int32)
+    one = _Sweep()
+    one.t = HalfEdges(tables)
+    one.order, one.rank, one.d, one.is_stale, one.offset = order, rank, d, is_stale, offset
+    one.is_flat = tables.is_flat.view(np.uint8)
+    one.has_labels = label is not None
+    one.label = label if one.has_labels else np.empty(0, np.int32)
+    with cython.nogil:
+        one.run()
+    return one.n_visits / n
+
+
+@cython.final
+@cython.cclass
+class _Sweep:
+    """What a sweep reads and writes; by vertex but for `order`, the vertices, and `offset`, by source."""
+
+    t: HalfEdges
+    order: cython.const[cython.int][::1]
+    rank: cython.const[cython.int][::1]
+    is_flat: cython.const[cython.uchar][::1]
+    is_stale: cython.uchar[::1]
+    d: cython.double[::1]
+    has_labels: cython.bint
+    label: cython.int[::1]
+    offset: cython.const[cython.double][::1]
+    n_visits: cython.longlong
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def run(self) -> cython.void:
+        """Visit all that is stale, in order, going back where need be."""
+        n: cython.Py_ssize_t = self.order.shape[0]
+        i: cython.Py_ssize_t = 0
+        again: cython.Py_ssize_t = n  # from where to begin once more when the end is reached
+        back: cython.Py_ssize_t
+        v: cython.int
+        is_large: cython.bint = self.t.spoke.shape[0] > CACHED
+        self.n_visits = 0
+        while self.n_visits < GIVE_UP * n:
+            if i == n:
+                if again == n:
+                    break
+                i, again = again, n
+            v = self.order[i]
+            i += 1
+            if is_large:
+                self.read_ahead(i)
+            if not self.is_stale[v]:
+                continue
+            self.is_stale[v] = False
+            self.n_visits += 1
+            back = self.visit(v)
+            if back < i:
+                if self.n_visits < GO_BACK * n:
+                    i = back
+                else:
+                    again = min(again, back)
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def read_ahead(self, i: cython.Py_ssize_t) -> cython.void:
+        """Have what the next visits read fetched: on large meshes that takes longer than the visits."""
+        n: cython.Py_ssize_t = self.order.shape[0]
+        k: cython.int
+        v: cython.int
+        if i + 3 < n:
+            prefetch(cython.address(self.t.first[self.order[i + 3]]))
+        if i + 1 < n:
+            v = self.order[i + 1]
+            for k in range(self.t.first[v], self.t.first[v + 1]):
+                prefetch(cython.address(self.t.spoke[k]))
+        if i < n:
+            v = self.order[i]
+            for k in range(self.t.first[v], self.t.first[v + 1]):
+                prefetch(cython.address(self.d[self.t.spoke[k].neighbour]))
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def visit(self, v: cython.int) -> cython.Py_ssize_t:
+        """Give v the best that its triangles say; returns the lowest rank of what that makes stale, or n."""
+        k: cython.int
+        old: cython.double = self.d[v]
+        best: cython.double = old
+        across: cython.double = INFINITY  # squared
+        squared: cython.double
+        begin: cython.double = 0.0
+        # Where the best of either kind comes from.
+        nearest: cython.int = -1
+        along_edge: cython.int = v
+        spoke: cython.int = self.t.first[v]
+        for k in range(self.t.first[v], self.t.first[v + 1]):
+            s = cython.address(self.t.spoke[k])
+            da: cython.double = self.d[s.neighbour]
+            db: cython.double = self.d[s.next_neighbour]
+            if da + s.length < best:
+                best, along_edge = da + s.length, s.neighbour
+            if not min(da, db) < best:
+                continue
+            if not self.has_labels:
+                squared = _across(da, db, s)
+            elif self.label[s.neighbour] == self.label[s.next_neighbour]:
+                begin = self.offset[self.label[s.neighbour]]
+                squared = begin + sqrt(_across(da - begin, db - begin, s))
+                squared = squared * squared
+            else:
+                squared = _across_straight(da, db, s)
+                squared = squared * squared
+            if squared < across:
+                spoke, across = k, squared
+        across = sqrt(across)
+        if self.has_labels:
+            nearest = self.label[along_edge]
+        if across < best:
+            source: cython.int = -1
+            across = self.seen_from_beyond(spoke, across, cython.address(source))
+            if across < best:
+                best, nearest = across, source
+        if not best < old:
+            return self.order.shape[0]
+        self.d[v] = best
+        begin = 0.0
+        if self.has_labels:
+            self.label[v] = nearest
+            begin = self.offset[nearest]
+        return self.mark(v, old, begin)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def seen_from_beyond(
+        self, k: cython.int, across: cython.double, source: cython.pointer[cython.int]
+    ) -> cython.double:
+        """Distance across the triangle left of spoke k, `across` by its own corners, and by the one beyond.
+
+        Where the corners are not measured from the same source the distance stays. `source` is set to where it comes
+        from, if there are labels.
+        """
+        s = cython.address(self.t.spoke[k])
+        da: cython.double = self.d[s.neighbour]
+        db: cython.double = self.d[s.next_neighbour]
+        w: cython.int = s.beyond
+        begin: cython.double = 0.0
+        if self.has_labels:
+            source[0] = self.label[s.neighbour]
+            if self.label[s.next_neighbour] != source[0]:
+                if not _comes_nearer_to_a(da, db, s):
+                    source[0] = self.label[s.next_neighbour]
+                return across
+            begin = self.offset[source[0]]
+        if w >= 0 and self.d[w] < across and (not self.has_labels or self.label[w] == source[0]):
+            squared: cython.double = _across_two(da - begin, db - begin, self.d[w] - begin, s)
+            if squared < INFINITY:
+                return begin + sqrt(squared)
+        return across
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def mark(self, v: cython.int, old: cython.double, begin: cython.double) -> cython.Py_ssize_t:
+        """Mark whom v's new distance can improve, if it is less than `old` by enough; returns their lowest rank, or n.
+
+        `begin` is the distance at which v's source begins.
+        """
+        back: cython.Py_ssize_t = self.order.shape[0]
+        if self.is_flat[v]:
+            if self.d[v] < old * (1 - SWEEP_ROUNDING):
+                back = self.mark_farther(v)
+                back = min(back, self.mark_nearer(v, begin))
+        elif self.d[v] < old * (1 - NEGLIGIBLE):
+            # With curvature around, what `mark_nearer` finds is less than the sweep's error.
+            back = self.mark_farther(v)
+        return back
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def mark_farther(self, v: cython.int) -> cython.Py_ssize_t:
+        """Mark the farther neighbours, which a smaller d[v] can improve. Those still to come are stale anyway."""
+        lowest: cython.Py_ssize_t = self.order.shape[0]
+        k: cython.int
+        a: cython.int
+        dv: cython.double = self.d[v]
+        for k in range(self.t.first[v], self.t.first[v + 1]):
+            a = self.t.spoke[k].neighbour
+            if dv < self.d[a] and not self.is_stale[a]:
+                self.is_stale[a] = True
+                lowest = min(lowest, self.rank[a])
+        return lowest
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def mark_nearer(self, v: cython.int, begin: cython.double) -> cython.Py_ssize_t:
+        """Mark the nearer neighbours that a smaller d[v] can improve.
+
+        The path of such a one crosses the edge between v and a vertex that is nearer still. That takes an angle there
+        whose cosine is below L / (2 d), L the length of the spoke and d counted from `begin`, where the source begins.
+        """
+        lowest: cython.Py_ssize_t = self.order.shape[0]
+        k: cython.int
+        a: cython.int
+        b: cython.int
+        dv: cython.double = self.d[v] - begin
+        for k in range(self.t.first[v], self.t.first[v + 1]):
+            s = cython.address(self.t.spoke[k])
+            a, b = s.neighbour, s.next_neighbour
+            da: cython.double = self.d[a] - begin
+            db: cython.double = self.d[b] - begin
+            right: cython.double = s.length
+            left: cython.double = self.t.spoke[s.next].length
+            if (
+                not self.is_stale[a]
+                and db < da
+                and 2.0 * da * s.along < right * right
+                and _beyond_side(s.base, s.along, s.height, left, db, dv) < da * da * self.kept(a)
+            ):
+                self.is_stale[a] = True
+                lowest = min(lowest, self.rank[a])
+            if (
+                not self.is_stale[b]
+                and da < db
+                and 2.0 * db * (s.base - s.along) < left * left
+                and _beyond_side(s.base, s.base - s.along, s.height, right, da, dv) < db * db * self.kept(b)
+            ):
+                self.is_stale[b] = True
+                lowest = min(lowest, self.rank[b])
+        return lowest
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def kept(self, v: cython.int) -> cython.double:
+        """The part of v's distance above which a smaller one is no news."""
+        return 1 - SWEEP_ROUNDING if self.is_flat[v] else 1 - NEGLIGIBLE
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _across(da: cython.double, db: cython.double, s: cython.pointer[cython.const[Spoke]]) -> cython.double:
+    """Squared distance from v of the source that is at distances da and db from the ends of the side opposite v.
+
+    ``inf`` unless the straight line between them crosses that side. Without branches, which at random cost more than
+    the arithmetic.
+    """
+    x: cython.double = 0.5 * ((da - db) * (da + db) / s.base + s.base)
+    y_squared: cython.double = da * da - x * x
+    y: cython.double = sqrt(max(y_squared, 0.0))
+    crossing: cython.double = x * s.height + s.along * y  # times y + height
+    squared: cython.double = (s.along - x) * (s.along - x) + (s.height + y) * (s.height + y)
+    return squared if (y_squared >= 0) & (crossing >= 0) & (crossing <= (y + s.height) * s.base) else INFINITY
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _across_straight(da: cython.double, db: cython.double, s: cython.pointer[cython.const[Spoke]]) -> cython.double:
+    """Distance at v of a straight front that is at distances da and db at the ends of the side opposite v.
+
+    ``inf`` unless the straight line in which it comes to v crosses that side.
+    """
+    slope: cython.double = (db - da) / s.base
+    rise_squared: cython.double = 1.0 - slope * slope
+    rise: cython.double = sqrt(max(rise_squared, 0.0))
+    foot: cython.double = s.along * rise - s.height * slope  # times rise
+    is_crossed: cython.bint = (foot >= 0) & (foot <= rise * s.base)
+    return da + slope * s.along + rise * s.height if is_crossed else INFINITY
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _comes_nearer_to_a(da: cython.double, db: cython.double, s: cython.pointer[cython.const[Spoke]]) -> cython.bint:
+    """Whether a straight front comes to v across the side ab nearer to a than to b."""
+    slope: cython.double = (db - da) / s.base
+    rise: cython.double = sqrt(max(1.0 - slope * slope, 0.0))
+    return s.along * rise - s.height * slope < 0.5 * rise * s.base
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _across_two(
+    da: cython.double, db: cython.double, dw: cython.double, s: cython.pointer[cython.const[Spoke]]
+) -> cython.double:
+    """Squared distance from v of the source behind ab, as the corner w beyond ab and one of a and b know it.
+
+    The line to the source as a and b know it leaves the farther triangle between w and p, one of them; it is drawn anew
+    to where circles about p and w meet. If that is on the other side of w, the path bends at w. ``inf`` if a and b know
+    better: the source lies in the farther triangle, or hidden by p.
+    """
+    # a in the origin, b on the first axis, v above it, w at (wx, -wy).
+    wx: cython.double = s.beyond_along
+    wy: cython.double = s.beyond_depth
+    x: cython.double = 0.5 * ((da - db) * (da + db) / s.base + s.base)
+    y: cython.double = sqrt(max(da * da - x * x, 0.0))
+    ux: cython.double = s.along - wx
+    uy: cython.double = s.height + wy
+    is_right: cython.bint = ux * (y + s.height) < uy * (s.along - x)
+    sign: cython.double = 1.0 if is_right else -1.0
+    px: cython.double = 0.0 if is_right else s.base
+    dp: cython.double = da if is_right else db
+    ex: cython.double = wx - px
+    square: cython.double = ex * ex + wy * wy
+    if not sign * (y * ex - (x - px) * wy) > CLOSE * square:
+        return INFINITY
+    along: cython.double = 0.5 * ((dp - dw) * (dp + dw) / square + 1.0)
+    h: cython.double = sign * sqrt(max(dp * dp / square - along * along, 0.0))
+    sx: cython.double = s.along - px - along * ex + h * wy
+    sy: cython.double = s.height + along * wy + h * ex
+    if sign * (ux * sy - uy * sx) > 0:
+        bent: cython.double = sqrt(ux * ux + uy * uy) + dw
+        return bent * bent
+    return sx * sx + sy * sy if sign * ((s.along - px) * sy - s.height * sx) >= 0 else INFINITY
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _beyond_side(
+    base: cython.double,
+    along: cython.double,
+    height: cython.double,
+    side: cython.double,
+    db: cython.double,
+    dv: cython.double,
+) -> cython.double:
+    """Squared distance of a by a straight line over the side vb, of length `side`; ``inf`` if there is none.
+
+    a lies in the origin, b on the first axis, v at (along, height).
+    """
+    per_side: cython.double = 1.0 / (side * side)
+    x: cython.double = 0.5 * ((dv - db) * (dv + db) * per_side + 1.0)
+    y_squared: cython.double = dv * dv * per_side - x * x
+    if not y_squared >= 0:
+        return INFINITY
+    y: cython.double = sqrt(y_squared)
+    sx: cython.double = along + x * (base - along) + y * height
+    sy: cython.double = height - x * height + y * (base - along)
+    return sx * sx + sy * sy if sy >= 0 and along * sy <= height * sx else INFINITY

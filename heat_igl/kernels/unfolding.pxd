@@ -1,0 +1,3 @@
+cdef enum:
+    # Vertices that may wait for one another when the order is wrong.
+    MAX_WAITING = 64

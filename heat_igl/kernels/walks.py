@@ -1,0 +1,72 @@
+"""What a query of the unfolding reads and writes, and the ends of walks inside faces."""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.half_edges import HalfEdges
+from cython.cimports.heat_igl.kernels.walks import REAL_BEND, View, take
+from cython.cimports.libc.math import sqrt
+
+__all__ = ["Query"]
+
+# Cones that may wait in a search.
+_MAX_CONES = 256
+_ADVICE = np.dtype([("saving", "f8"), ("promise", "f8"), ("side", "i4")], align=True)
+_VIEW = np.dtype([(name, "f8") for name in "ax ay bx by rx ry lx ly".split()] + [("h", "i4"), ("spoke", "i4")])
+_CONE = np.dtype([("view", _VIEW), ("forecast", "f8"), ("a", "i4"), ("b", "i4")])
+
+
+@cython.final
+@cython.cclass
+class Query:
+    """The tables, what is known of each vertex, and room to work in.
+
+    Parameters
+    ----------
+    tables : Tables
+        The triangulation.
+    walk : (n + p,) structures
+        What is known of n vertices and p sources inside faces; changed in place.
+    first_inside, inside
+        Those of `heat_igl.unfolding.walks.Points`; of length 0 if there are none.
+    tolerance, shortfall, max_steps
+        As `heat_igl.unfolding.walks.unfold` has them.
+    """
+
+    def __init__(self, tables, walk, first_inside, inside, tolerance, shortfall, max_steps):
+        self.t = HalfEdges(tables)
+        self.walk, self.first_inside, self.inside = walk, first_inside, inside
+        self.tolerance, self.shortfall, self.max_steps = tolerance, shortfall, max_steps
+        self.advice = np.zeros(np.diff(tables.first).max(), _ADVICE)
+        self.cone = np.zeros(_MAX_CONES, _CONE)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def arrive(q: Query, view: View, wx: cython.double, wy: cython.double) -> cython.bint:
+    """Note the straight paths to the sources inside the face behind a view; whether one is the shortest so far.
+
+    That face is a, w, b; only what lies in the cone is seen in a straight line.
+    """
+    # From w, its face runs first to b and then to a.
+    at_w: cython.int = view.h % 3
+    at_b: cython.int = (at_w + 1) % 3
+    at_a: cython.int = (at_w + 2) % 3
+    entry: cython.int = q.first_inside[view.h // 3]
+    arrived: cython.bint = False
+    first = cython.address(q.t.spoke[view.spoke])
+    while entry >= 0:
+        point = cython.address(q.inside[entry])
+        a: cython.double = point.barycentric[at_a]
+        b: cython.double = point.barycentric[at_b]
+        w: cython.double = point.barycentric[at_w]
+        x: cython.double = w * wx + a * view.ax + b * view.bx
+        y: cython.double = w * wy + a * view.ay + b * view.by
+        slack: cython.double = 1e-12 * (x * x + y * y)
+        distance: cython.double = q.walk[point.row].distance + sqrt(x * x + y * y)
+        is_seen: cython.bint = view.rx * y - view.ry * x >= -slack and x * view.ly - y * view.lx >= -slack
+        if is_seen and distance < q.found.distance:
+            take(q, distance, point.row, x, y, REAL_BEND, view.spoke, -first.along, -first.height)
+            arrived = True
+        entry = point.following
+    return arrived

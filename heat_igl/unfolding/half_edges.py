@@ -1,0 +1,247 @@
+"""A triangulated surface as the windows of exact distance read it: half-edge by half-edge, in the order of a front."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, mollify
+from heat_igl.kernels import gluing, windows
+from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+
+__all__ = ["HalfEdges", "Located", "Tables", "from_mesh", "from_triangulation"]
+
+# A point whose barycentric coordinate is below this lies on the side of its face.
+_ON_SIDE = 1e-13
+# A last bound on the work; meshes measured so far take less than one flip per face.
+_MOST_FLIPS_PER_FACE = 100
+
+
+class Tables(NamedTuple):
+    """What the kernel reads, in its order; see `heat_igl.kernels.windows.shapes`."""
+
+    vertex: AnyArray
+    length: FloatArray
+    twin: AnyArray
+    aligned: AnyArray
+    ring: AnyArray
+    double_area: FloatArray
+    bulge: FloatArray
+    corner_of_vertex: AnyArray
+    next_corner: AnyArray
+    kind: AnyArray
+    is_delaunay: bool
+
+
+class Located(NamedTuple):
+    """Points in the triangles, by their new numbers; one on a side, once for every triangle there.
+
+    Attributes
+    ----------
+    faces : (q,) int32
+        Triangle of each.
+    barycentric : (q, 3) float64
+        Coordinates in it; exactly 0 on a side.
+    point : (q,) int64
+        Which point it is.
+    """
+
+    faces: AnyArray
+    barycentric: FloatArray
+    point: IntArray
+
+
+class HalfEdges:
+    """The tables of one surface, with vertices and faces numbered anew.
+
+    Parameters
+    ----------
+    vertex, twin, ring : (3 m,) int32
+        Vertex of each corner; the half-edge glued to each, -1 on the boundary and -2 where more than two faces meet;
+        there the next half-edge of the same edge, elsewhere the half-edge itself.
+    aligned : (3 m,) uint8
+        Whether glued faces run along their half-edge in opposite directions.
+    length : (3 m,) float64
+        Of each half-edge.
+    n : int
+        Number of vertices.
+    exponent : int
+        Lengths are in units of ``2 ** exponent``.
+    first_face : int
+        The face from which faces and vertices are numbered.
+    triangulation : IntrinsicTriangulation, optional
+        What the tables were made from, to locate points.
+
+    Raises
+    ------
+    MeshError
+        If there are too many triangles for 32-bit indices.
+    """
+
+    def __init__(
+        self,
+        vertex: AnyArray,
+        twin: AnyArray,
+        ring: AnyArray,
+        aligned: AnyArray,
+        length: FloatArray,
+        n: int,
+        exponent: int,
+        first_face: int = 0,
+        triangulation: IntrinsicTriangulation | None = None,
+    ) -> None:
+        m = len(vertex) // 3
+        if 3 * m + n >= 2**30:
+            raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
+        # By a power of two: no digit changes, and no square leaves the range of doubles.
+        shift = _exponent(length)
+        self.n, self.exponent = n, exponent + shift
+        self._triangulation = triangulation
+        vertex, twin, ring, aligned, length, self.number, self.face = gluing.breadth_first(
+            vertex, twin, ring, aligned, np.ldexp(length, -shift), n, first_face
+        )
+        derived = (
+            np.empty(m),
+            np.empty(3 * m),
+            np.full(n, -1, np.int32),
+            np.empty(3 * m, np.int32),
+            np.zeros(n, np.uint8),
+        )
+        is_delaunay = windows.shapes(vertex, length, twin, *derived)
+        self.tables = Tables(vertex, length, twin, aligned, ring, *derived, is_delaunay)
+        self.old_vertex = np.empty(n, np.int64)
+        self.old_vertex[self.number] = np.arange(n)
+
+    def scaled(self, lengths: FloatArray | float) -> FloatArray:
+        """Lengths of the caller in the unit of the tables."""
+        return np.asarray(np.ldexp(lengths, -self.exponent))
+
+    def unscaled(self, lengths: FloatArray) -> FloatArray:
+        """Lengths of the tables in the caller's unit."""
+        return np.asarray(np.ldexp(lengths, self.exponent))
+
+    def old_half_edge(self, half_edge: AnyArray) -> IntArray:
+        """Half-edges by the caller's numbers; -1 stays."""
+        old = 3 * self.face[half_edge // 3].astype(np.int64) + half_edge % 3
+        return np.asarray(np.where(half_edge >= 0, old, -1))
+
+    def located(self, points: SurfacePoints | None) -> Located:
+        """Points of the mesh in the triangles.
+
+        Raises
+        ------
+        ValueError
+            If the tables come from `from_mesh`, which keeps no history of its flips.
+        """
+        if points is None:
+            return Located(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, np.int64))
+        if self._triangulation is None:
+            raise ValueError("this surface knows vertices only: make it from a triangulation")
+        faces, barycentric = self._triangulation.locate(points.faces, points.barycentric)
+        new_face = np.empty(len(self.face), np.int64)
+        new_face[self.face] = np.arange(len(self.face))
+        barycentric = np.where(barycentric < _ON_SIDE, 0.0, barycentric)
+        barycentric /= barycentric.sum(axis=1, keepdims=True)
+        return self._on_all_faces(new_face[faces], barycentric)
+
+    def _on_all_faces(self, faces: IntArray, barycentric: FloatArray) -> Located:
+        """Points, and those on a side once more for every other face there."""
+        t = self.tables
+        point = np.arange(len(faces))
+        rows = [(faces, barycentric, point)]
+        is_zero = barycentric == 0
+        i, c = np.nonzero(is_zero & (is_zero.sum(axis=1) == 1)[:, None])
+        start = here = 3 * faces[i] + c
+        while len(here):
+            # To the other triangle at the side, or to the next of many, until all have been met.
+            there = np.where(t.twin[here] >= 0, t.twin[here], t.ring[here]).astype(np.int64)
+            go_on = there != start
+            i, c, start, here = i[go_on], c[go_on], start[go_on], there[go_on]
+            same_vertex = t.vertex[_following(start)] == t.vertex[_following(here)]
+            same_way = np.where(t.twin[start] >= 0, t.aligned[start] == 0, same_vertex)
+            tail, head = barycentric[i, (c + 1) % 3], barycentric[i, (c + 2) % 3]
+            other, k = np.zeros((len(i), 3)), np.arange(len(i))
+            other[k, (here + 1) % 3] = np.where(same_way, tail, head)
+            other[k, (here + 2) % 3] = np.where(same_way, head, tail)
+            rows.append((here // 3, other, point[i]))
+        faces, barycentric, point = (np.concatenate(column) for column in zip(*rows, strict=True))
+        return Located(faces.astype(np.int32), barycentric, point)
+
+    def by_face(self, located: Located) -> tuple[AnyArray, AnyArray]:
+        """The first point of each triangle, and the next point of the same triangle; -1 for none."""
+        faces = located.faces
+        first = np.full(len(self.face) if len(faces) else 0, -1, np.int32)
+        following = np.full(len(faces), -1, np.int32)
+        order = np.argsort(faces, kind="stable")
+        first[faces[order][::-1]] = order[::-1]
+        same = faces[order][1:] == faces[order][:-1]
+        following[order[:-1][same]] = order[1:][same]
+        return first, following
+
+    def largest_circle(self, located: Located) -> float:
+        """Diameter of the largest circle around a triangle that holds a point; 0 without points."""
+        if not len(located.faces):
+            return 0.0
+        sides = self.tables.length.reshape(-1, 3)[located.faces]
+        return float((sides.prod(axis=1) / self.tables.double_area[located.faces]).max())
+
+
+def from_triangulation(triangulation: IntrinsicTriangulation) -> HalfEdges:
+    """The tables of a triangulation."""
+    exponent = _exponent(triangulation.l)
+    return HalfEdges(
+        triangulation.F.ravel().astype(np.int32),
+        triangulation.twin.astype(np.int32),
+        _rings(triangulation),
+        triangulation.aligned.astype(np.uint8),
+        np.ldexp(triangulation.l.ravel(), -exponent),
+        triangulation.n,
+        exponent,
+        triangulation=triangulation,
+    )
+
+
+def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
+    """The tables of the intrinsic Delaunay triangulation of a mesh that is asked once, for distances from vertices.
+
+    Without a history of the flips; what is near vertex `start` comes first in memory.
+    """
+    exponent = _exponent(np.ptp(mesh.V[mesh.F[:, 0]], axis=0))
+    vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, np.ldexp(1.0, -exponent))
+    if n_across:
+        return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh)))
+    length += mollify(length.reshape(-1, 3))
+    gluing.flip(vertex, twin, ring, length, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * mesh.n_faces)
+    first_face = int(np.argmax(vertex == start)) // 3
+    return HalfEdges(vertex, twin, ring, aligned, length, mesh.n_vertices, exponent, first_face)
+
+
+def _following(half_edge: IntArray) -> IntArray:
+    """The next half-edge of the same face."""
+    return np.asarray(half_edge + 1 - 3 * (half_edge % 3 == 2))
+
+
+def _exponent(lengths: FloatArray) -> int:
+    """The power of two just above the mean."""
+    return int(np.frexp(lengths.mean())[1])
+
+
+def _rings(triangulation: IntrinsicTriangulation) -> AnyArray:
+    """For a half-edge where more than two faces meet, the next of those there; elsewhere itself."""
+    ring = np.arange(len(triangulation.twin), dtype=np.int32)
+    many = np.flatnonzero(triangulation.twin == -2)
+    if len(many):
+        # Such edges were never flipped: the two vertices tell them apart.
+        ends = np.sort(np.stack([triangulation.tail(many), triangulation.head(many)]), axis=0)
+        order = np.lexsort((many, *ends))
+        many, ends = many[order], ends[:, order]
+        is_first: BoolArray = np.ones(len(many), bool)
+        is_first[1:] = (ends[:, 1:] != ends[:, :-1]).any(axis=0)
+        first = np.flatnonzero(is_first)
+        following = np.roll(many, -1)
+        following[np.append(first[1:], len(many)) - 1] = many[first]
+        ring[many] = following
+    return ring

@@ -1,0 +1,114 @@
+"""What is known of the path of each vertex, and the compiled loops that find it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.intrinsic.fans import Tables, aligned
+from heat_igl.kernels import sweeping, unfolding
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+__all__ = ["INSIDE", "WALK", "Points", "sweep", "unfold", "unknown", "views"]
+
+# What is known of the path of a vertex: its `distance`; the distance of the last bend (or source), `offset`; how far
+# that is away in a straight line, `reach`; the direction in which it lies, `angle` in the `fan` of the vertex (-1:
+# none, at a source), whose angles sum to `total` (negative: open); the `label` of the source that the path ends at.
+WALK = np.dtype(
+    [(name, "f8") for name in ("distance", "offset", "reach", "angle", "total")]
+    + [("fan", "i4"), ("label", "i4"), ("spare", "f8", 2)]
+)
+# A source inside a face: the next one in the same face, `following` (-1 after the last), and the `row` of the walks
+# that stands for it.
+INSIDE = np.dtype([("barycentric", "f8", 3), ("following", "i4"), ("row", "i4")])
+
+
+class Points(NamedTuple):
+    """Sources inside faces, for walks to end at. One on an edge is listed in the faces on both sides.
+
+    Attributes
+    ----------
+    first : (m,) int32
+        First entry of each face, -1 if it has none; no entries at all where no face has any.
+    inside : (e,) `INSIDE`
+        The entries.
+    """
+
+    first: AnyArray
+    inside: AnyArray
+
+
+def unknown(n: int) -> AnyArray:
+    """Walks (n,) of vertices that no path is known of."""
+    walk = aligned(n, WALK)
+    walk["distance"], walk["fan"], walk["label"] = np.inf, -1, -1
+    return walk
+
+
+def sweep(
+    order: AnyArray, t: Tables, d: FloatArray, label: AnyArray | None, offset: FloatArray, is_stale: AnyArray
+) -> float:
+    """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex; returns the visits per vertex.
+
+    Parameters
+    ----------
+    order : (n,) int32
+        Vertices, near ones first.
+    t : Tables
+        The triangulation.
+    d : (n,) float64
+        Distances known, ``inf`` where none is; changed in place.
+    label : (n,) int32 or None
+        The source that each is measured from, -1 for none; None if there is only one. Changed in place.
+    offset : (k,) float64
+        The distance at which each source begins.
+    is_stale : (n,) bool
+        Vertices to be visited; others only if what they depend on changes.
+    """
+    visits: float = sweeping.sweep(order, t, d, label, offset, is_stale.view(np.uint8))
+    return visits
+
+
+def unfold(
+    order: AnyArray,
+    t: Tables,
+    walk: AnyArray,
+    points: Points | None,
+    *,
+    tolerance: float,
+    shortfall: float,
+    max_steps: int,
+    max_passes: int,
+) -> None:
+    """Distance by straight paths through strips of triangles, to be read from `walk`.
+
+    Parameters
+    ----------
+    order : (n,) int32
+        Vertices, near ones first. One that comes too early is visited again.
+    t : Tables
+        The triangulation.
+    walk : (n + p,) `WALK`
+        What is known of each vertex and of each of p sources inside faces; changed in place. Distance is ``inf`` where
+        nothing is known, and where no source is reached.
+    points : Points or None
+        The sources inside faces.
+    tolerance : float
+        Relative gain below which a path is not straightened further.
+    shortfall : float
+        A vertex that is by more than this fraction farther than a neighbour promised is searched for a better path.
+    max_steps : int
+        Triangles that one search may cross.
+    max_passes : int
+        Passes over vertices that a later one may have improved.
+    """
+    first, inside = (np.empty(0, np.int32), np.empty(0, INSIDE)) if points is None else points
+    unfolding.unfold(order, t, walk, first, inside, tolerance, shortfall, max_steps, max_passes)
+
+
+def views(faces: IntArray, barycentric: FloatArray, F: AnyArray, t: Tables) -> tuple[AnyArray, AnyArray]:
+    """How the corners (3 k,) of faces see points in them: their vertices, and their walks to a source of distance 0."""
+    vertex, walk = np.empty(3 * len(faces), np.int32), np.zeros(3 * len(faces), WALK)
+    unfolding.views(faces.astype(np.int64), np.ascontiguousarray(barycentric), F, t, vertex, walk)
+    return vertex, walk

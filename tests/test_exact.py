@@ -1,0 +1,381 @@
+"""Exact distance by windows: closed forms, other people's exact solver, graphs of Steiner points, identities."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import scipy.spatial
+from conftest import flat_perturbed, perturbed, shared_path, wheel_path
+from test_unfolding import exact as pygeodesic
+from test_unfolding import moebius_strip, random_disk, relative_error
+from test_unfolding_sources import COORDINATES, sheared, with_point
+
+from heat_igl import Mesh, SurfacePoints, read_mesh, shapes
+from heat_igl.errors import MeshError, SourceError
+from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
+from heat_igl.kernels import gluing
+from heat_igl.reference.steiner import graph_distance
+from heat_igl.unfolding.exact import ExactSurface, exact_distance
+from heat_igl.unfolding.half_edges import from_mesh
+
+
+def delaunay(mesh: Mesh) -> ExactSurface:
+    return ExactSurface(intrinsic_delaunay(intrinsic_triangulation(mesh)))
+
+
+def as_given(mesh: Mesh) -> ExactSurface:
+    return ExactSurface(intrinsic_triangulation(mesh))
+
+
+SURFACES = {"given": as_given, "delaunay": delaunay, "from scratch": lambda mesh: ExactSurface(from_mesh(mesh, 0))}
+
+
+def bumpy() -> Mesh:
+    return perturbed(shapes.icosphere(3), 0.3, 1)
+
+
+def cube() -> Mesh:
+    V = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    return Mesh(V, scipy.spatial.ConvexHull(V).simplices)
+
+
+def two_arms(n: int) -> Mesh:
+    """A flat square without one quadrant: paths from its one arm into the other bend at the inner corner, (0, 0)."""
+    mesh = shapes.grid(2 * n)
+    V = mesh.V - 0.5 * mesh.V.max(axis=0)
+    x, y, _ = V[mesh.F].mean(axis=1).T
+    return Mesh(V, mesh.F[(x < 0) | (y < 0)])
+
+
+FLAT = {
+    "grid": lambda: shapes.grid(20),
+    "sheared grid": lambda: sheared(shapes.grid(12), 2.3),
+    "sheared disk": lambda: sheared(random_disk(500, 3), 3.3),
+    "perturbed grid": lambda: flat_perturbed(shapes.grid(15)),
+}
+
+
+@pytest.mark.parametrize("name", FLAT)
+@pytest.mark.parametrize("surface", SURFACES)
+def test_flat_convex_domains(name, surface):
+    mesh = FLAT[name]()
+    for source in (0, mesh.n_vertices // 2):
+        d = SURFACES[surface](mesh).solve(np.array([source])).distance
+        np.testing.assert_allclose(d, np.linalg.norm(mesh.V - mesh.V[source], axis=1), rtol=1e-12, atol=1e-14)
+
+
+def test_windows_that_passed_a_flat_vertex_are_joined():
+    """A plane needs hardly more windows than edges, however many vertices it has."""
+    mesh = flat_perturbed(shapes.grid(60))
+    assert delaunay(mesh).solve(np.array([0])).n_windows < 3 * len(mesh.edges)
+
+
+def test_rolled_out_prism():
+    mesh = shapes.cylinder(24, 20)
+    ring, k = np.divmod(np.arange(mesh.n_vertices), 24)
+    truth = np.hypot(np.minimum(k, 24 - k) * 2 * np.sin(np.pi / 24), ring * (2 * np.pi / 20))
+    assert relative_error(exact_distance(mesh.V, mesh.F, 0), truth).max() < 1e-12
+
+
+def test_rolled_out_pyramid():
+    """Around an apex of less than 2 pi shortest paths pass on either side, never through it."""
+    mesh = shapes.cone(9, 6)
+    apex = int(np.argmin(np.linalg.norm(mesh.V[:, :2], axis=1)))
+    radius = np.linalg.norm(mesh.V - mesh.V[apex], axis=1)
+    turn = np.rint(np.arctan2(*mesh.V[:, 1::-1].T) / (2 * np.pi / 9)).astype(int) % 9
+    rim = np.flatnonzero(np.isclose(radius, radius.max()))
+    a, b = rim[turn[rim] == 0][0], rim[turn[rim] == 1][0]
+    angle = 2 * np.arcsin(np.linalg.norm(mesh.V[a] - mesh.V[b]) / 2 / radius[a])
+    for source in (a, apex, int(np.flatnonzero(turn == 3)[0])):
+        steps = np.abs(turn - turn[source])
+        between = np.minimum(steps, 9 - steps) * angle
+        truth = np.sqrt(radius**2 + radius[source] ** 2 - 2 * radius * radius[source] * np.cos(between))
+        np.testing.assert_allclose(exact_distance(mesh.V, mesh.F, source), truth, rtol=1e-12, atol=1e-14)
+
+
+def test_cube():
+    mesh = cube()
+    straight = np.linalg.norm(mesh.V, axis=1)
+    truth = np.where(np.isclose(straight, np.sqrt(3)), np.sqrt(5), straight)
+    np.testing.assert_allclose(exact_distance(mesh.V, mesh.F, 0), truth, rtol=1e-14)
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_paths_bend_at_the_boundary(surface):
+    mesh = two_arms(8)
+    x, y, _ = mesh.V.T
+    is_used = np.bincount(mesh.F.ravel(), minlength=mesh.n_vertices) > 0
+    source = int(np.argmin(np.linalg.norm(mesh.V - [-0.1, 0.4, 0], axis=1)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        over_the_corner = y[source] - (y - y[source]) / (x - x[source]) * x[source]
+    beyond = is_used & (x > 0) & (over_the_corner > 1e-12)
+    assert beyond.sum() > 20
+    straight = np.linalg.norm(mesh.V - mesh.V[source], axis=1)
+    truth = np.where(beyond, np.hypot(x[source], y[source]) + np.hypot(x, y), straight)
+    found = SURFACES[surface](mesh).solve(np.array([source]))
+    np.testing.assert_allclose(found.distance, np.where(is_used, truth, np.inf), rtol=1e-12, atol=1e-14)
+    corner = int(np.argmin(np.hypot(x, y)))
+    strictly = beyond & (over_the_corner > 1e-6) & (y < 0)
+    np.testing.assert_array_equal(found.origin.root[strictly], corner)
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_paths_go_on_into_every_page_of_a_book(surface):
+    mesh = shapes.book(4, 6)
+    distance, along = np.hypot(*mesh.V[:, :2].T), mesh.V[:, 2]
+    page = np.rint(np.arctan2(*mesh.V[:, 1::-1].T) / (2 * np.pi / 4)) % 4
+    for source in (0, mesh.n_vertices // 2, mesh.n_vertices - 1):
+        same = (page == page[source]) | (distance < 1e-12) | (distance[source] < 1e-12)
+        across = np.where(same, distance - distance[source], distance + distance[source])
+        truth = np.hypot(across, along - along[source])
+        d = SURFACES[surface](mesh).solve(np.array([source])).distance
+        np.testing.assert_allclose(d, truth, rtol=1e-12, atol=1e-14)
+
+
+def test_paths_go_through_a_vertex_where_two_fans_meet():
+    tie = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]])
+    np.testing.assert_allclose(exact_distance(tie.V, tie.F, 2), [2**0.5, 1, 0, 1 + 2**0.5, 2 * 2**0.5], rtol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["suzanne.obj", "truck.obj"])
+def test_nonmanifold_meshes_against_steiner_points(name):
+    mesh = read_mesh(shared_path(name))
+    sources = np.random.default_rng(0).choice(np.unique(mesh.F), 2)
+    upper = graph_distance(mesh, sources, 6)
+    for source, bound in zip(sources, upper, strict=True):
+        d = exact_distance(mesh.V, mesh.F, int(source))
+        np.testing.assert_array_equal(np.isfinite(d), np.isfinite(bound))
+        there = np.isfinite(d) & (d > 0)
+        excess = bound[there] / d[there] - 1
+        # Mollification lengthens edges of degenerate faces.
+        assert excess.min() > -1e-7
+        assert excess.mean() < 1e-2
+
+
+@pytest.mark.parametrize("name", ["cow.obj", "bunny.obj"])
+def test_meshes_of_the_wheel_against_pygeodesic(name):
+    agree(read_mesh(wheel_path(name)), 2)
+
+
+@pytest.mark.parametrize(
+    "name", "camelhead.off spot.obj fertility.off 3holes.off cheburashka.off lion.off fandisk.off homer.obj".split()
+)
+def test_shared_meshes_against_pygeodesic(name):
+    agree(read_mesh(shared_path(name)), 4)
+
+
+def agree(mesh: Mesh, n_sources: int) -> None:
+    for source in np.random.default_rng(5).choice(np.unique(mesh.F), n_sources, replace=False):
+        d = exact_distance(mesh.V, mesh.F, int(source))
+        assert relative_error(d, pygeodesic(mesh, int(source))).max() < 1e-10
+
+
+def rough_star(seed: int) -> Mesh:
+    rng = np.random.default_rng(seed)
+    P = rng.normal(size=(rng.integers(8, 50), 3))
+    P /= np.linalg.norm(P, axis=1)[:, None]
+    return Mesh(P * np.exp(rng.normal(size=(len(P), 1)) * 0.4), scipy.spatial.ConvexHull(P).simplices)
+
+
+def rough_field(seed: int) -> Mesh:
+    rng = np.random.default_rng(seed)
+    P = rng.random((rng.integers(8, 60), 2))
+    return Mesh(np.column_stack([P, rng.normal(size=len(P)) * 0.3]), scipy.spatial.Delaunay(P).simplices)
+
+
+@pytest.mark.parametrize("make", [rough_star, rough_field])
+@pytest.mark.parametrize("surface", SURFACES)
+def test_coarse_rough_meshes_against_pygeodesic(make, surface):
+    for seed in range(60):
+        mesh = make(seed)
+        if mesh.report().smallest_angle < 0.1:
+            continue  # pygeodesic loses digits at needles
+        d = SURFACES[surface](mesh).solve(np.array([3])).distance
+        assert relative_error(d, pygeodesic(mesh, 3)).max() < 1e-10, seed
+
+
+def test_moebius_strip_against_pygeodesic():
+    mesh = moebius_strip(30, 4)
+    d = [SURFACES[name](mesh).solve(np.array([7])).distance for name in SURFACES]
+    for one in d:
+        assert relative_error(one, pygeodesic(mesh, 7)).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", ["bumpy", "moebius", "book"])
+def test_distance_is_symmetric(name):
+    mesh = {"bumpy": bumpy, "moebius": lambda: moebius_strip(30, 4), "book": lambda: shapes.book(3, 5)}[name]()
+    chosen = np.random.default_rng(2).choice(mesh.n_vertices, 15, replace=False)
+    surface = delaunay(mesh)
+    between = np.array([surface.solve(np.array([v])).distance[chosen] for v in chosen])
+    np.testing.assert_allclose(between, between.T, rtol=1e-12, atol=1e-14)
+
+
+def test_scales():
+    mesh = bumpy()
+    d = exact_distance(mesh.V, mesh.F, 0)
+    np.testing.assert_array_equal(exact_distance(mesh.V * 2.0**90, mesh.F, 0), d * 2.0**90)
+    for scale in (1e-30, 1e30):
+        np.testing.assert_allclose(exact_distance(mesh.V * scale, mesh.F, 0), d * scale, rtol=1e-12)
+        surface = delaunay(Mesh(mesh.V * scale, mesh.F))
+        np.testing.assert_allclose(surface.solve(np.array([0])).distance, d * scale, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", FLAT)
+@pytest.mark.parametrize("where", COORDINATES)
+def test_source_points_and_targets_on_flat_domains(name, where):
+    mesh = FLAT[name]()
+    rng = np.random.default_rng(0)
+    points = SurfacePoints(rng.integers(mesh.n_faces, size=4), [COORDINATES[where]] * 4)
+    places = np.tile([COORDINATES[one] for one in COORDINATES], (mesh.n_faces // 3, 1))
+    targets = SurfacePoints(rng.integers(mesh.n_faces, size=len(places)), places)
+    offsets = np.array([0.0, 0.1, 0.0, 0.3])
+    for surface in (as_given(mesh), delaunay(mesh)):
+        found = surface.solve(points=points, point_offsets=offsets, targets=targets)
+        for d, label, at in (
+            (found.distance, found.origin.label, mesh.V),
+            (found.target_distance, found.target_origin.label, targets.positions(mesh)),
+        ):
+            truth = np.linalg.norm(at[:, None] - points.positions(mesh), axis=2) + offsets
+            np.testing.assert_allclose(d, truth.min(axis=1), rtol=1e-12, atol=1e-12)
+            np.testing.assert_allclose(truth[np.arange(len(d)), label], d, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["bumpy", "moebius", "book"])
+def test_a_point_is_what_a_vertex_in_its_place_is(name):
+    mesh = {"bumpy": bumpy, "moebius": lambda: moebius_strip(30, 4), "book": lambda: shapes.book(3, 5)}[name]()
+    for face in (3, 50):
+        barycentric = np.array([0.2, 0.5, 0.3])
+        truth = exact_distance(*with_point(mesh, face, barycentric).__reduce__()[1], mesh.n_vertices)[:-1]
+        point = SurfacePoints([face], [barycentric])
+        for surface in (as_given(mesh), delaunay(mesh)):
+            np.testing.assert_allclose(surface.solve(points=point).distance, truth, rtol=1e-11, atol=1e-14)
+            for source in (0, mesh.n_vertices // 2):
+                back = surface.solve(np.array([source]), targets=point).target_distance
+                np.testing.assert_allclose(back, truth[source], rtol=1e-11)
+
+
+def test_points_on_an_edge_of_many_faces():
+    """A source and a target on the spine of a book, between its vertices, belong to all pages."""
+    mesh = shapes.book(3, 4)
+    on_spine = np.hypot(*mesh.V[:, :2].T) < 1e-12
+    f, c = np.argwhere((on_spine[mesh.F].sum(axis=1) == 2)[:, None] & ~on_spine[mesh.F])[0]
+    barycentric = np.full(3, 0.5)
+    barycentric[c] = 0
+    point = SurfacePoints([f], [barycentric])
+    truth = np.linalg.norm(mesh.V - point.positions(mesh), axis=1)
+    surface = as_given(mesh)
+    np.testing.assert_allclose(surface.solve(points=point).distance, truth, rtol=1e-12)
+    for source in (0, 20, mesh.n_vertices - 1):
+        back = surface.solve(np.array([source]), targets=point).target_distance
+        np.testing.assert_allclose(back, truth[source], rtol=1e-12)
+
+
+def test_several_sources_with_offsets_are_the_nearest_of_each():
+    mesh = bumpy()
+    surface = delaunay(mesh)
+    sources, offsets = np.array([5, 200, 411, 600]), np.array([0.0, 0.3, 0.1, 3.0])
+    each = np.array([surface.solve(sources[i : i + 1], offsets[i : i + 1]).distance for i in range(4)])
+    found = surface.solve(sources, offsets)
+    np.testing.assert_allclose(found.distance, each.min(axis=0), rtol=1e-13)
+    np.testing.assert_array_equal(found.origin.label, each.argmin(axis=0))
+    assert found.distance[600] < 3.0
+
+
+def test_cutoff_and_goals_end_early_with_the_same_bits():
+    mesh = bumpy()
+    surface = delaunay(mesh)
+    source = np.array([5])
+    targets = SurfacePoints(np.arange(0, mesh.n_faces, 7), np.tile([0.2, 0.3, 0.5], (mesh.n_faces // 7 + 1, 1)))
+    full = surface.solve(source, targets=targets)
+    near = surface.solve(source, targets=targets, cutoff=0.5)
+    np.testing.assert_array_equal(near.distance, np.where(full.distance <= 0.5, full.distance, np.inf))
+    np.testing.assert_array_equal(
+        near.target_distance, np.where(full.target_distance <= 0.5, full.target_distance, np.inf)
+    )
+    assert near.n_windows < full.n_windows / 5
+    goals = np.argsort(full.distance)[[3, 40]]
+    some = surface.solve(source, goals=goals)
+    np.testing.assert_array_equal(some.distance[goals], full.distance[goals])
+    assert some.n_windows < full.n_windows / 5
+    close = SurfacePoints(targets.faces[:1], targets.barycentric[:1])
+    one = surface.solve(mesh.F[close.faces[0], :1], targets=close, goals=np.array([], int))
+    all_of_it = surface.solve(mesh.F[close.faces[0], :1], targets=close)
+    np.testing.assert_array_equal(one.target_distance, all_of_it.target_distance)
+    assert one.n_windows < all_of_it.n_windows / 5
+
+
+def test_components_and_unused_vertices_are_not_reached():
+    one = shapes.icosphere(1)
+    n = one.n_vertices
+    mesh = Mesh(np.concatenate([one.V, one.V + 5, [[9, 9, 9]]]), np.concatenate([one.F, one.F + n]))
+    found = delaunay(mesh).solve(np.array([n + 3]))
+    assert np.isinf(found.distance[:n]).all()
+    assert np.isinf(found.distance[-1])
+    assert np.isfinite(found.distance[n:-1]).all()
+    for nothing in (found.origin.label, found.origin.root, found.origin.entered):
+        assert (nothing[:n] == -1).all()
+
+
+def test_origins_lead_back():
+    """The last part of a path is straight: at its crossing, distance is less by what is left of the path."""
+    mesh = bumpy()
+    triangulation = intrinsic_triangulation(mesh)
+    surface = ExactSurface(triangulation)
+    found = surface.solve(np.array([5]))
+    here = np.flatnonzero(found.origin.entered >= 0)
+    assert len(here) > mesh.n_vertices - 20
+    face, corner = np.divmod(found.origin.entered[here], 3)
+    np.testing.assert_array_equal(mesh.F[face, corner], here)
+    share = found.origin.crossing[here] / triangulation.l[face, corner]
+    barycentric = np.zeros((len(here), 3))
+    barycentric[np.arange(len(here)), (corner + 1) % 3] = 1 - share
+    barycentric[np.arange(len(here)), (corner + 2) % 3] = share
+    crossings = SurfacePoints(face, np.clip(barycentric, 0, 1))
+    left = np.linalg.norm(crossings.positions(mesh) - mesh.V[here], axis=1)
+    before = surface.solve(np.array([5]), targets=crossings).target_distance
+    np.testing.assert_allclose(before + left, found.distance[here], rtol=1e-11)
+
+
+def test_threads_share_a_surface_and_the_bits_are_the_same():
+    surface = delaunay(bumpy())
+    sources = [np.array([v]) for v in range(0, 600, 50)]
+    one_by_one = [surface.solve(source).distance for source in sources]
+    with ThreadPoolExecutor(2) as pool:
+        together = list(pool.map(lambda source: surface.solve(source).distance, sources))
+    np.testing.assert_array_equal(together, one_by_one)
+
+
+def test_coincident_vertices_and_needles():
+    """Degenerate faces are mollified: an edge of length 0 gets one of 1e-8 of the mean."""
+    mesh = shapes.grid(6)
+    V = mesh.V.copy()
+    V[24] = V[25]
+    truth = np.linalg.norm(V - V[0], axis=1)
+    np.testing.assert_allclose(exact_distance(V, mesh.F, 0), truth, rtol=1e-6)
+
+
+def test_compiled_flips_are_those_of_the_triangulation():
+    """The intrinsic Delaunay triangulation of points in general position is unique."""
+    mesh = sheared(random_disk(300, 1), 2.0)
+    vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, 1.0)
+    plain = intrinsic_triangulation(mesh)
+    np.testing.assert_array_equal(twin, plain.twin)
+    np.testing.assert_allclose(length, plain.l.ravel(), rtol=1e-15)
+    assert n_across == 0
+    assert aligned.all()
+    assert gluing.flip(vertex, twin, ring, length, 1e-7, 10**6) > 100
+    flipped = intrinsic_delaunay(plain)
+    np.testing.assert_allclose(np.sort(length), np.sort(flipped.l.ravel()), rtol=1e-12)
+    np.testing.assert_array_equal(length[twin[twin >= 0]], length[twin >= 0])
+
+
+def test_errors():
+    mesh = shapes.grid(3)
+    with pytest.raises(MeshError, match="needs triangles"):
+        exact_distance(shapes.box(1).V, shapes.box(1).F, 0)
+    with pytest.raises(SourceError, match="99"):
+        exact_distance(mesh.V, mesh.F, 99)
+    with pytest.raises(ValueError, match="make it from a triangulation"):
+        ExactSurface(from_mesh(mesh, 0)).solve(points=SurfacePoints([0], [[0.2, 0.3, 0.5]]))
