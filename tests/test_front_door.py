@@ -57,12 +57,14 @@ def in_the_plane() -> dict[str, tuple[Any, np.ndarray]]:
 
 
 @pytest.mark.parametrize("name", in_the_plane())
-@pytest.mark.parametrize("method", ["unfold", "sweep", "heat"])
+@pytest.mark.parametrize("method", ["unfold", "sweep", "heat", "exact"])
 def test_distance_in_the_plane(name: str, method: Any) -> None:
     sources, truth = in_the_plane()[name]
+    if method == "exact" and name == "a curve":
+        pytest.skip("exact distance starts at vertices and points")
     found = geodesic_distance(SQUARE, sources, method=method)
     assert found.dtype == np.float64
-    allowed = {"unfold": 2e-3, "sweep": 0.02, "heat": 0.1}[method]
+    allowed = {"unfold": 2e-3, "sweep": 0.02, "heat": 0.1, "exact": 1e-9}[method]
     assert np.abs(found - truth).max() < allowed * truth.max()
     if method == "unfold":
         assert (found - truth).min() > -1e-9
@@ -87,7 +89,7 @@ def test_near_exact_by_default() -> None:
 
 def test_beyond_the_cutoff_is_infinity() -> None:
     whole = geodesic_distance(TORUS, 5)
-    for method in ("unfold", "sweep", "heat"):
+    for method in ("unfold", "sweep", "heat", "exact"):
         whole = geodesic_distance(TORUS, 5, method=method)
         near = geodesic_distance(TORUS, 5, method=method, cutoff=1)
         np.testing.assert_array_equal(near, np.where(whole > 1, np.inf, whole))
@@ -98,8 +100,8 @@ def test_beyond_the_cutoff_is_infinity() -> None:
 
 def test_components_that_no_source_reaches() -> None:
     two = Mesh(np.concatenate([SQUARE.V, SQUARE.V + 3]), np.concatenate([SQUARE.F, SQUARE.F + SQUARE.n_vertices]))
-    for sources in (0, INSIDE):
-        found = geodesic_distance(two, sources)
+    for sources, method in ((0, "unfold"), (INSIDE, "unfold"), (0, "exact"), (INSIDE, "exact")):
+        found = geodesic_distance(two, sources, method=method)
         np.testing.assert_array_equal(np.isinf(found), np.arange(two.n_vertices) >= SQUARE.n_vertices)
 
 
@@ -125,15 +127,10 @@ def test_polygons_and_tetrahedra() -> None:
             geodesic_distance(box, 0, method=method)
 
 
-def test_exact_windows_are_taken_where_they_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    front_door = heat_igl.heat_method.front_door
-    monkeypatch.setattr(front_door, "find_spec", lambda _: None)
-    with pytest.raises(ValueError, match=r'method="exact" is not part of this version.*method="unfold"'):
-        geodesic_distance(TORUS, 5, method="exact")
-    monkeypatch.setattr(front_door, "find_spec", lambda _: object())
-    module = SimpleNamespace(exact_distance=lambda V, _, sources, cutoff: np.full(len(V), cutoff) + sources)
-    monkeypatch.setattr(front_door, "import_module", lambda _: module)
-    assert geodesic_distance(TORUS, 5, method="exact", cutoff=2)[0] == 7
+def test_exact_distance_starts_at_no_curve() -> None:
+    np.testing.assert_allclose(geodesic_distance(TORUS, 5, method="exact"), reference.exact(TORUS, 5), atol=1e-9)
+    with pytest.raises(SourceError, match=r'sources hold a curve.*take "unfold"'):
+        geodesic_distance(SQUARE, in_the_plane()["a curve"][0], method="exact")
 
 
 @pytest.mark.parametrize(
@@ -162,7 +159,7 @@ def test_unfolded_distance_takes_a_mesh_or_arrays() -> None:
 
 def test_faces_that_are_there_twice_count_once() -> None:
     twice = Mesh(TORUS.V, np.concatenate([TORUS.F, TORUS.F[100:400, [1, 2, 0]]]))
-    for method in ("unfold", "sweep"):
+    for method in ("unfold", "sweep", "exact"):
         expected = geodesic_distance(TORUS, 5, method=method)
         np.testing.assert_allclose(geodesic_distance(twice, 5, method=method), expected, atol=1e-9)
     solver = HeatMethodSolver(twice, refine="unfold")

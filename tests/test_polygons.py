@@ -244,8 +244,8 @@ def test_tetrahedra_are_no_polygons(tmp_path):
 
 
 L_SHAPE = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0.0]])
-COMB = np.array([[x, y, 0.0] for x, y in [(0, 0), (7, 0), (7, 3), (6, 3), (6, 1), (5, 1), (5, 3), (4, 3), (4, 1), (3, 1),
-                                          (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)]])  # fmt: skip
+_TEETH = [(x + step, y) for x in (6, 4, 2) for step, y in ((1, 3), (0, 3), (0, 1), (-1, 1))]
+COMB = np.array([(x, y, 0.0) for x, y in [(0, 0), (7, 0), *_TEETH, (1, 3), (0, 3)]])
 STAR = np.array([[(1 + i % 2) * np.cos(i * np.pi / 5), (1 + i % 2) * np.sin(i * np.pi / 5), 0] for i in range(10)])
 SLIT = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [2, 4, 0], [2, 1, 0], [2, 4, 0], [0, 4, 0.0]])
 
@@ -277,7 +277,7 @@ def test_triangles_of_concave_polygons_cover_them_once(V, place, reverse):
 
 
 def test_polygons_that_a_fan_fits_keep_it():
-    V, polygons = np.concatenate([L_SHAPE, L_SHAPE + [5, 0, 0]]), [range(6), [9, 10, 11, 6, 7, 8]]
+    V, polygons = np.concatenate([L_SHAPE, L_SHAPE + np.array([5, 0, 0])]), [range(6), [9, 10, 11, 6, 7, 8]]
     mesh = PolygonMesh(V, polygons)
     # The fan around the first corner of the L fits, and so does that around its inner corner.
     assert mesh.triangles.F[:, 0].tolist() == [0, 0, 0, 0, 9, 9, 9, 9]
@@ -313,7 +313,7 @@ def test_concave_polygons_of_files(tmp_path):
     ],
 )
 def test_polygons_that_cross_themselves_are_refused(V, order):
-    V = np.concatenate([V, np.asarray(V) + [9, 0, 0]])
+    V = np.concatenate([V, np.asarray(V) + np.array([9, 0, 0])])
     polygons = [[0, 1, 2], order] if len(order) > 3 else [order]
     with pytest.raises(heat_igl.MeshError, match=r"polygons\[1\] = \[\d.*\]: sides of this polygon cross each other"):
         PolygonMesh(V, polygons)

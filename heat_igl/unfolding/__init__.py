@@ -1,6 +1,6 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
-from heat_igl.unfolding.distance import distance_from_scratch, unfolded_distance
+from heat_igl.unfolding.distance import distance_from_scratch, exact_from_scratch, unfolded_distance
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 from heat_igl.unfolding.solver import UnfoldingSolver
 
@@ -10,5 +10,6 @@ __all__ = [
     "Refinement",
     "UnfoldingSolver",
     "distance_from_scratch",
+    "exact_from_scratch",
     "unfolded_distance",
 ]
