@@ -129,7 +129,7 @@ def test_polygons_and_tetrahedra() -> None:
 
 def test_exact_distance_starts_at_no_curve() -> None:
     np.testing.assert_allclose(geodesic_distance(TORUS, 5, method="exact"), reference.exact(TORUS, 5), atol=1e-9)
-    with pytest.raises(SourceError, match=r'sources hold a curve.*take "unfold"'):
+    with pytest.raises(SourceError, match=r'sources hold a curve.*take method="unfold"'):
         geodesic_distance(SQUARE, in_the_plane()["a curve"][0], method="exact")
 
 

@@ -103,7 +103,7 @@ def exact_from_scratch(mesh: Mesh, sources: Sources, cutoff: float = np.inf) -> 
     chosen = source_set(sources, mesh.n_vertices, mesh.F)
     if len(chosen.segments.faces):
         raise SourceError(
-            'sources hold a curve, and exact distance starts at vertices and points: take method="unfold"'
+            'sources hold a curve, but exact distance starts at vertices and points: take method="unfold"'
         )
     if chosen.on_vertices_alone:
         surface = ExactSurface(from_mesh(mesh, int(chosen.vertices[0])))
