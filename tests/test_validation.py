@@ -381,7 +381,6 @@ def test_script_validates_a_folder(script: ModuleType, folder: Path) -> None:
     mean = found[0]["report"]["rows"][0]["errors"]["mean"]
     assert lines[4].startswith(f"| disk | 217 | {100 * mean:.3g} |")
     assert lines[5] == "| fin | 5 | - | - |"
-    assert any(line.startswith("- fin.off: 1 edges connected") for line in lines)
     assert (folder / "out" / "errors.png").stat().st_size > 10_000
 
 

@@ -108,4 +108,4 @@ def dask_modules() -> tuple[Any, Any]:
     try:
         return importlib.import_module("dask"), importlib.import_module("distributed")
     except ImportError:
-        raise MissingExtraError.of("a batch", "dask and distributed", "cluster") from None
+        raise MissingExtraError.of("a batch", "distributed", "cluster") from None
