@@ -128,10 +128,10 @@ def test_polygons_and_tetrahedra() -> None:
 def test_exact_windows_are_taken_where_they_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
     front_door = heat_igl.heat_method.front_door
     monkeypatch.setattr(front_door, "find_spec", lambda _: None)
-    with pytest.raises(ValueError, match='method="exact" is not part of this version.*method="unfold"'):
+    with pytest.raises(ValueError, match=r'method="exact" is not part of this version.*method="unfold"'):
         geodesic_distance(TORUS, 5, method="exact")
     monkeypatch.setattr(front_door, "find_spec", lambda _: object())
-    module = SimpleNamespace(exact_distance=lambda V, F, sources, cutoff: np.full(len(V), cutoff) + sources)
+    module = SimpleNamespace(exact_distance=lambda V, _F, sources, cutoff: np.full(len(V), cutoff) + sources)
     monkeypatch.setattr(front_door, "import_module", lambda _: module)
     assert geodesic_distance(TORUS, 5, method="exact", cutoff=2)[0] == 7
 
