@@ -50,18 +50,18 @@ def split_long_edges(mesh: MeshLike, longest: float | None = None) -> Mesh:
     All faces at an edge share the new vertex, so they stay joined. Triangles next to a split edge get worse; the
     intrinsic Delaunay triangulation on which the solver works does not.
     """
-    refined: Mesh = as_simplices(mesh)
-    if refined.is_tetrahedral:
+    surface = as_simplices(mesh)
+    if surface.is_tetrahedral:
         raise MeshError("split_long_edges wants triangles, and F holds tetrahedra")
-    longest = float(refined.edge_lengths.mean()) if longest is None else longest
+    longest = float(surface.edge_lengths.mean()) if longest is None else longest
     if not (math.isfinite(longest) and longest > 0):
         raise ValueError(f"longest must be a positive length, not {longest!r}")
-    pieces = float(np.ceil(refined.edge_lengths / longest).sum())
+    pieces = float(np.ceil(surface.edge_lengths / longest).sum())
     if pieces > _MOST_PIECES:
         raise ValueError(f"longest = {longest:.3g} would cut the edges into {pieces:.3g} pieces: make it longer")
-    while (long := refined.edge_lengths > longest).any():
-        refined = _halved(refined, long)
-    return refined
+    while (long := surface.edge_lengths > longest).any():
+        surface = _halved(surface, long)
+    return surface
 
 
 def _halved(mesh: Mesh, chosen: BoolArray) -> Mesh:
