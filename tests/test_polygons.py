@@ -250,6 +250,17 @@ STAR = np.array([[(1 + i % 2) * np.cos(i * np.pi / 5), (1 + i % 2) * np.sin(i * 
 SLIT = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [2, 4, 0], [2, 1, 0], [2, 4, 0], [0, 4, 0.0]])
 
 
+# A strip that goes around more than once, over itself.
+_AROUND = np.linspace(0, 2.55 * np.pi, 21)
+RAMP = np.array(
+    [
+        ((r + 0.02 * a) * np.cos(a), (r + 0.02 * a) * np.sin(a), 0)
+        for r in (2, 1)
+        for a in _AROUND[:: 1 if r > 1 else -1]
+    ]
+)
+
+
 def turned(V: np.ndarray) -> np.ndarray:
     """In another plane, far from the origin, in another unit."""
     axes = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
@@ -310,6 +321,7 @@ def test_concave_polygons_of_files(tmp_path):
         ([[0, 0, 0], [3, 0, 0], [1, 1, 0], [0, 1, 0]], [0, 2, 1, 3]),
         (STAR[1::2], [0, 2, 4, 1, 3]),
         (L_SHAPE, [0, 2, 1, 5, 3, 4]),
+        (RAMP, range(len(RAMP))),
     ],
 )
 def test_polygons_that_cross_themselves_are_refused(V, order):

@@ -82,6 +82,13 @@ def test_tetrahedra_without_neighbours() -> None:
     assert Mesh(V, [[0, 1, 2, 3], [0, 1, 4, 2]]).report().degenerate_faces.tolist() == [1]
 
 
+def test_tetrahedra_of_which_one_hangs_on_an_edge() -> None:
+    V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [0, -1, 0], [0, 0, -1]]
+    F = [[0, 1, 2, 3], [1, 2, 3, 4], [0, 1, 5, 6]]
+    for thickness in (1, 1e-2):
+        assert Mesh(np.array(V) * [1, 1, thickness], F).n_faces == 3
+
+
 def test_large_arrays() -> None:
     """Half a million quadrilaterals and nearly as many tetrahedra: a quadratic check would not end."""
     V, F = quads(0.2, 700)
