@@ -105,6 +105,32 @@ def test_components_that_no_source_reaches() -> None:
         np.testing.assert_array_equal(np.isinf(found), np.arange(two.n_vertices) >= SQUARE.n_vertices)
 
 
+@pytest.mark.parametrize("method", ["unfold", "sweep", "heat", "exact"])
+def test_sources_that_no_face_uses(method: Any) -> None:
+    n = SQUARE.n_vertices
+    mesh = Mesh(np.concatenate([SQUARE.V, [[9, 9, 9]]]), SQUARE.F)
+    alone = geodesic_distance(mesh, n, method=method)
+    np.testing.assert_array_equal(alone, [*np.full(n, np.inf), 0])
+    expected = geodesic_distance(SQUARE, 3, method=method)
+    np.testing.assert_allclose(geodesic_distance(mesh, [n, 3], method=method), [*expected, 0], atol=1e-9)
+    late = geodesic_distance(mesh, OffsetSources([n, 3], [1, 2]), method=method)
+    np.testing.assert_allclose(late, [*(expected + 2), 1], atol=1e-9)
+
+
+def test_surfaces_that_cannot_be_oriented() -> None:
+    angle, across = np.meshgrid(np.linspace(0, 2 * np.pi, 40, endpoint=False), np.linspace(-0.3, 0.3, 5), indexing="ij")
+    radius = 1 + across * np.cos(angle / 2)
+    V = np.stack([radius * np.cos(angle), radius * np.sin(angle), across * np.sin(angle / 2)], axis=-1).reshape(-1, 3)
+    i, j = np.divmod(np.arange(160), 4)
+    here, there = 5 * i + j, np.where(i < 39, 5 * i + j + 5, 4 - j)
+    beyond = np.where(i < 39, there + 1, there - 1)
+    band = Mesh(V, np.concatenate([np.stack([here, there, here + 1], 1), np.stack([here + 1, there, beyond], 1)]))
+    assert band.report().n_boundary_loops == 1
+    for sources in (3, [SurfacePoints([17], [[0.2, 0.3, 0.5]]), 50]):
+        exact = geodesic_distance(band, sources, method="exact")
+        assert np.abs(geodesic_distance(band, sources) - exact).max() < 1e-4 * exact.max()
+
+
 def test_polygons_and_tetrahedra() -> None:
     x, y = np.meshgrid(np.arange(6.0), np.arange(5.0))
     V = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)

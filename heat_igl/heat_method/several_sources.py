@@ -36,7 +36,9 @@ def drop_overtaken(term: SourceTerm, heat_flow: HeatFlow, n: int) -> SourceTerm:
 
     def is_on_time(vertex: IntArray, label: IntArray) -> BoolArray:
         with np.errstate(divide="ignore"):
-            return np.asarray(np.log(u[vertex]) < np.log(u_at_once[vertex]) - delay[label] + np.log(_OVERTAKEN))
+            on_time = np.log(u[vertex]) < np.log(u_at_once[vertex]) - delay[label] + np.log(_OVERTAKEN)
+        # No heat comes to a vertex that no face uses.
+        return np.asarray(on_time | (u_at_once[vertex] == 0))
 
     anchors = term.anchors.at(is_on_time(term.anchors.vertex, term.anchors.label))
     return term.restricted(anchors.label, anchors, kept=is_on_time(term.near.vertex, term.near.label))
