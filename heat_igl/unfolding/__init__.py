@@ -1,15 +1,20 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
 from heat_igl.unfolding.distance import distance_from_scratch, exact_from_scratch, unfolded_distance
+from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = [
+    "ExactSolution",
+    "ExactSurface",
     "Known",
+    "Origin",
     "Refine",
     "Refinement",
     "UnfoldingSolver",
     "distance_from_scratch",
+    "exact_distance",
     "exact_from_scratch",
     "unfolded_distance",
 ]
