@@ -24,6 +24,8 @@ class Diagnostics:
         h, of the triangulation that was solved on.
     edges_across : float
         Longest shortest path along edges, in units of h.
+    n_vertices : int
+        Vertices that were solved on: those of the mesh, and those that refinement added.
     n_flips : int
         Edges flipped to make the triangulation intrinsic Delaunay.
     lengthening : float
@@ -41,6 +43,7 @@ class Diagnostics:
     t_requested: float
     mean_edge_length: float
     edges_across: float
+    n_vertices: int
     n_flips: int
     lengthening: float
     backend: str

@@ -53,8 +53,11 @@ class HeatMethodSolver(BatchedSolver):
         `magnitude`), else the paper's 1.
     t : float, optional
         Time step as a squared length; overrides `t_coef`.
-    laplacian : {"intrinsic-delaunay", "cotan"}
-        Triangulation to solve on, see `operators`; "cotan" is the paper's. Tetrahedra always keep their own.
+    laplacian : {"auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"}
+        Triangulation to solve on, see `operators`; "cotan" is the paper's. "auto" is the intrinsic Delaunay one where
+        triangles are even, and has more vertices where they are not: `operators` then has more rows than there are
+        answers, the first ones for the vertices of the mesh. With `refine`, "auto" adds no vertices. Tetrahedra always
+        keep their own.
     boundary : {"neumann", "dirichlet", "average"}
         What the heat does at the boundary, see `HeatFlow`.
     magnitude : {"auto", "unit", "damped"}
@@ -103,7 +106,7 @@ class HeatMethodSolver(BatchedSolver):
         *,
         t_coef: float | None = None,
         t: float | None = None,
-        laplacian: Laplacian = "intrinsic-delaunay",
+        laplacian: Laplacian = "auto",
         boundary: Boundary = "neumann",
         magnitude: Magnitude = "auto",
         refine: Refine | None = None,
@@ -146,7 +149,7 @@ class HeatMethodSolver(BatchedSolver):
         n: int | None = None,
         t_coef: float | None = None,
         t: float | None = None,
-        laplacian: Laplacian = "intrinsic-delaunay",
+        laplacian: Laplacian = "auto",
         boundary: Boundary = "neumann",
         magnitude: Magnitude = "auto",
         refine: Refine | None = None,
@@ -174,7 +177,7 @@ class HeatMethodSolver(BatchedSolver):
         """
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, refine, backend)
         start = time.perf_counter()
-        domain = edge_length_operators(F, lengths, n, laplacian)
+        domain = edge_length_operators(F, lengths, n, options.triangulation)
         solver = cls.__new__(cls)
         solver._set_up(domain, options, _Prepared(time.perf_counter() - start))
         return solver
@@ -220,7 +223,7 @@ class HeatMethodSolver(BatchedSolver):
                 begun.append(beside.submit(analysis, L, options.backend))
 
             # The order of elimination takes a third of the time and needs no more than the pattern of L.
-            domain = operators(mesh, options.laplacian, analyse if known is None and n_threads() > 1 else None)
+            domain = operators(mesh, options.triangulation, analyse if known is None and n_threads() > 1 else None)
             seconds = time.perf_counter() - start
             known = begun[0].result() if begun else known
         waited = time.perf_counter() - start - seconds
@@ -261,6 +264,7 @@ class HeatMethodSolver(BatchedSolver):
             t_requested=requested,
             mean_edge_length=domain.mean_edge_length,
             edges_across=domain.longest_distance / domain.mean_edge_length,
+            n_vertices=domain.n,
             n_flips=triangulation.n_flips if triangulation else 0,
             lengthening=triangulation.lengthening if triangulation else 0.0,
             backend=self._heat_flow.backend,
@@ -288,8 +292,8 @@ class HeatMethodSolver(BatchedSolver):
 
     @property
     def n_vertices(self) -> int:
-        """Length of a distance array."""
-        return self._operators.n
+        """Length of a distance array: the vertices of the mesh. The operators may have more."""
+        return self._operators.n_given
 
     @property
     def _n_faces(self) -> int:
@@ -341,19 +345,19 @@ class HeatMethodSolver(BatchedSolver):
         terms = [self._assembler.term(sources) for sources in source_sets]
         if isinstance(self._from_heat, UnfoldingSolver):
             return terms
-        return [drop_overtaken(term, self._heat_flow, self.n_vertices) for term in terms]
+        return [drop_overtaken(term, self._heat_flow, self._operators.n) for term in terms]
 
     def _heat(self, terms: list[SourceTerm]) -> FloatArray:
-        """Heat (n, k) after the time step: step 1."""
-        return self._heat_flow.solve(right_hand_side(self.n_vertices, terms))
+        """Heat at all vertices of the operators, for k terms: step 1."""
+        return self._heat_flow.solve(right_hand_side(self._operators.n, terms))
 
     def _distances_from_heat(self, terms: list[SourceTerm], u: FloatArray) -> FloatArray:
-        """Distances (k, n) from heat (n, k): steps 2 and 3, or unfolding in the order of the heat."""
+        """Distances (k, n) from the heat of `_heat`: steps 2 and 3, or unfolding in the order of the heat."""
         if isinstance(self._from_heat, UnfoldingSolver):
             return self._from_heat.distances(terms, u)
         divergence = self._from_heat.divergence(terms, u)
         phi = self._from_heat.poisson.solve(divergence)
-        return self._from_heat.pin_levels(terms, phi, u)
+        return self._from_heat.pin_levels(terms, phi, u)[:, : self.n_vertices]
 
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
         """Distance, and which source is nearest: a geodesic Voronoi diagram.
@@ -377,7 +381,7 @@ class HeatMethodSolver(BatchedSolver):
             distance, labels = self._from_heat.labelled(terms[0], u[:, 0])
         else:
             distance = self._distances_from_heat(terms, u)[0]
-            labels = warmest_sources(terms[0], self._heat_flow, self.n_vertices)
+            labels = warmest_sources(terms[0], self._heat_flow, self._operators.n)[: self.n_vertices]
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
@@ -388,7 +392,7 @@ class HeatMethodSolver(BatchedSolver):
         u = self._heat(terms)
         X, magnitude = damped_field(self._operators, terms, u, self._t_damping, self._fitted)
         with np.errstate(under="ignore"):
-            heat = u[:, 0] / terms[0].unit / self._heat_flow.mean_mass
+            heat = u[: self.n_vertices, 0] / terms[0].unit / self._heat_flow.mean_mass
         return HeatSolution(
             heat=heat,
             direction=np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T),

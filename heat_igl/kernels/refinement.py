@@ -32,6 +32,7 @@ class _Refinement:
     n_given: cython.longlong
     least_angle: cython.double
     largest_radius: cython.double
+    unit: cython.double[::1]
 
     @cython.cfunc
     @cython.nogil
@@ -45,8 +46,9 @@ class _Refinement:
         if not area > 0.0:
             return 0.0
         radius: cython.double = a * b * c / (4.0 * area)
-        if radius > self.largest_radius:
-            return radius
+        priority: cython.double = radius / self.unit[f]
+        if priority > self.largest_radius:
+            return priority
         shortest: cython.int = 0
         if self.l[f, 1] < self.l[f, shortest]:
             shortest = 1
@@ -57,7 +59,7 @@ class _Refinement:
         # The angle at the tip of a sharp cone stays what it is.
         if self.F[f, shortest] < self.n_given and self._total_angle(3 * f + shortest) < SHARPEST:
             return 0.0
-        return radius
+        return priority
 
     @cython.cfunc
     @cython.nogil
@@ -290,6 +292,7 @@ class _Refinement:
         beyond_1: cython.longlong = self.twin[3 * f + 1]
         beyond_2: cython.longlong = self.twin[3 * f + 2]
         # f = (p, 1, 2), g = (0, p, 2), k = (0, 1, p): each keeps one side of the old face in its old corner.
+        self.unit[g] = self.unit[k] = self.unit[f]
         self.F[f, 0] = p
         self.F[g, 0], self.F[g, 1], self.F[g, 2] = v0, p, v2
         self.F[k, 0], self.F[k, 1], self.F[k, 2] = v0, v1, p
@@ -440,7 +443,9 @@ def _foot(base: cython.double, left: cython.double, right: cython.double) -> cyt
     return 0.5 * (base + (left - right) * ((left + right) / base))
 
 
-def refine(F, l, twin, n: cython.longlong, least_angle: cython.double, largest_radius: cython.double, most_vertices):
+def refine(
+    F, l, twin, n: cython.longlong, unit, least_angle: cython.double, largest_radius: cython.double, most_vertices
+):
     """Refine m triangles without boundary until no circumradius exceeds `largest_radius` and no angle is below
     `least_angle` (radians), or until there are `most_vertices`.
 
@@ -454,6 +459,9 @@ def refine(F, l, twin, n: cython.longlong, least_angle: cython.double, largest_r
     glued = np.empty(3 * faces, np.int64)
     corners[:m], lengths[:m], glued[: 3 * m] = F, l, twin
     self.F, self.l, self.twin = corners, lengths, glued
+    units = np.empty(faces)
+    units[:m] = unit
+    self.unit = units
     self.key, self.heap = np.zeros(faces), np.empty(faces, np.int64)
     self.place = np.full(faces, -1)
     self.stack = np.empty(3 * faces + 64, np.int64)

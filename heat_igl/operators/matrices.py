@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +17,7 @@ from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 __all__ = ["Laplacian", "OnLaplacian", "Operators", "check_laplacian", "divergence_matrix", "laplacian_of_gradient"]
 
 # Which triangulation of a triangle mesh the operators belong to.
-Laplacian = Literal["intrinsic-delaunay", "cotan"]
+Laplacian = Literal["auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"]
 
 # Called with L, or a multiple of it, as soon as it is known: the order of elimination needs no more than its pattern.
 OnLaplacian = Callable[[sp.csc_matrix], None]
@@ -26,6 +26,8 @@ OnLaplacian = Callable[[sp.csc_matrix], None]
 @dataclass(frozen=True, eq=False)
 class Operators:
     """The operators of a domain with n vertices and m faces (triangles, or tetrahedra).
+
+    Where refinement has added vertices, they come after those of the mesh, which are the first `n_given`.
 
     Lengths are in the domain's own unit, d is the number of gradient components per face: 3 where faces lie in space,
     2 where each has a plane of its own.
@@ -88,6 +90,16 @@ class Operators:
         return int(self.L.shape[0])
 
     @property
+    def n_vertices(self) -> int:
+        """The same as n, as for a `Mesh`."""
+        return self.n
+
+    @property
+    def n_given(self) -> int:
+        """Number of vertices of the mesh; n where refinement has added none."""
+        return self.n if self.surface is None or self.surface.faces is None else self.surface.faces.n
+
+    @property
     def dimension(self) -> int:
         """Number d of gradient components per face."""
         return int(self.G.shape[0]) // len(self.weights)
@@ -140,8 +152,9 @@ class Operators:
 
 def check_laplacian(laplacian: str) -> None:
     """Raise a ValueError if there is no such `Laplacian`."""
-    if laplacian not in ("intrinsic-delaunay", "cotan"):
-        raise ValueError(f"laplacian must be 'intrinsic-delaunay' or 'cotan', not {laplacian!r}")
+    if laplacian not in get_args(Laplacian):
+        *others, last = map(repr, get_args(Laplacian))
+        raise ValueError(f"laplacian must be {', '.join(others)} or {last}, not {laplacian!r}")
 
 
 def divergence_matrix(gradient_rows: sp.csr_matrix, weights: FloatArray) -> sp.csc_matrix:

@@ -43,7 +43,7 @@ def farthest_points(solver: HeatMethodSolver, k: int, *, start: ArrayLike = 0) -
 def farthest_cells(solver: HeatMethodSolver, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
     """The Voronoi cells of `farthest_points`, for one query more; arguments and errors as there."""
     first = vertex_sources(np.asarray(start), solver.n_vertices)
-    referenced = solver.operators.referenced
+    referenced = solver.operators.referenced[: solver.n_vertices]
     used = referenced.copy()
     used[first] = True
     _check_count(k, len(first), int(used.sum()))

@@ -141,10 +141,16 @@ class SourceAssembler:
         surface = domain.surface
         self.edges = None if surface is None else NearField(surface.triangulation)
         self._faces = None if surface is None or surface.faces is None else NearField(surface.faces)
+        self._visible = self._faces
+        if surface is not None and domain.n_given < domain.n and not surface.triangulation.is_cover:
+            # Added vertices see sources too.
+            self._visible = self.edges
         # Triangulations on which the edges are straight lines: one, if none was flipped.
         self._straight = [field for field in (self.edges, self._faces) if field is not None]
         if surface is not None and surface.faces is surface.triangulation:
             self._straight = self._straight[:1]
+        if surface is not None and surface.uncovered is not None and surface.uncovered is not surface.faces:
+            self._straight.append(NearField(surface.uncovered))
 
     def term(self, sources: SourceSet) -> SourceTerm:
         """Initial heat of `sources`, and the distances known around them."""
@@ -210,7 +216,7 @@ class SourceAssembler:
         more than two faces it is not: the tufted cover leads over it from a face to two of the others alone.
         """
         surface = self._domain.surface
-        if surface is None or self._faces is None:
+        if surface is None or self._faces is None or self._visible is None:
             return _NONE, _NONE
         if sources.on_vertices_alone:
             is_covered = surface.uncovered is not None and not (self._plain or self._unfolds)
@@ -218,7 +224,7 @@ class SourceAssembler:
                 return _NONE, _NONE
         vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         points = sources.points.joined(sources.segments.ends())
-        return self._faces.seeds(points, sources.segments, _RADIUS * self._domain.mean_edge_length, vertices)
+        return self._visible.seeds(points, sources.segments, _RADIUS * self._domain.mean_edge_length, vertices)
 
     def _initial_heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""
@@ -231,14 +237,20 @@ class SourceAssembler:
         samples, lengths = self._faces.samples(sources.segments, h * _SPACING)
         amount = np.concatenate([np.ones(len(sources.points.faces)), lengths / (h * _EDGES_PER_POINT)])
         points = sources.points.joined(samples)
-        faces, barycentric = surface.triangulation.locate(points.faces, points.barycentric)
-        of_points = (
-            surface.triangulation.F[faces].ravel(),
-            (amount[:, None] * barycentric).ravel(),
-            np.repeat(points.label, 3),
-            np.repeat(points.offset, 3),
-        )
-        vertex, share, label, offset = (np.concatenate(pair) for pair in zip(of_vertices, of_points, strict=True))
+        # On a cover, half of the heat goes to the back.
+        sides = (False, True) if surface.triangulation.is_cover else (False,)
+        parts = [of_vertices]
+        for on_back in sides:
+            faces, barycentric = surface.triangulation.locate(points.faces, points.barycentric, on_back)
+            parts.append(
+                (
+                    surface.triangulation.F[faces].ravel(),
+                    (amount[:, None] * barycentric).ravel() / len(sides),
+                    np.repeat(points.label, 3),
+                    np.repeat(points.offset, 3),
+                )
+            )
+        vertex, share, label, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
         used = share > 0
         return vertex[used], share[used], label[used], offset[used]
 

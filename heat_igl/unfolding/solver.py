@@ -42,6 +42,8 @@ class UnfoldingSolver:
         surface = domain.surface
         if surface is None:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
+        if domain.n_given < domain.n:
+            raise ValueError(f"refine={refine!r} unfolds the triangles of the mesh: pass operators without refinement")
         self._refinement = Refinement(surface.unfolding)
         self._sweeps = refine == "sweep"
         self._error = _SWEEP_ERROR if self._sweeps else 0.0
