@@ -29,7 +29,7 @@ class Diagnostics:
     n_flips : int
         Edges flipped to make the triangulation intrinsic Delaunay.
     lengthening : float
-        What was added to every edge length because of degenerate triangles; 0 on other meshes.
+        The most that was added to an edge length because of degenerate triangles; 0 on other meshes.
     backend : str
         What holds the factors.
     factor_nonzeros, factor_bytes : int

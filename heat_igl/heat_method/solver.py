@@ -237,6 +237,7 @@ class HeatMethodSolver(BatchedSolver):
         fitted = self._fitted = damped and domain.lengths is not None
         step, requested = time_step(options, domain, fitted)
         self._t_damping = step if damped else None
+        self._time_steps = np.broadcast_to(step, domain.n_components)
         known = self._analysis = analysis(domain.L, options.backend, prepared.analysis)
         analysed = time.perf_counter()
         makers: list[Callable[[], Any]] = [
@@ -247,7 +248,7 @@ class HeatMethodSolver(BatchedSolver):
         # Both matrices at once: the backends run without the interpreter's lock.
         self._heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
         factored = time.perf_counter()
-        self._assembler = SourceAssembler(domain, step, plain=not damped, unfolds=options.refine is not None)
+        self._assembler = SourceAssembler(domain, step, self._heat_flow.mean_mass, plain=not damped, unfolds=options.refine is not None)
         self._given_faces = None if domain.surface is None else domain.surface.given_faces
         self._from_heat: Integration | UnfoldingSolver
         if options.refine is not None:
@@ -260,8 +261,8 @@ class HeatMethodSolver(BatchedSolver):
         triangulation = None if domain.surface is None else domain.surface.triangulation
         factors = self._heat_flow.factors + [problem.factor for problem in poisson]
         self._diagnostics = Diagnostics(
-            t=step,
-            t_requested=requested,
+            t=_of_largest(step, domain),
+            t_requested=_of_largest(requested, domain),
             mean_edge_length=domain.mean_edge_length,
             edges_across=domain.longest_distance / domain.mean_edge_length,
             n_vertices=domain.n,
@@ -282,8 +283,13 @@ class HeatMethodSolver(BatchedSolver):
 
     @property
     def t(self) -> float:
-        """The time step in use, a squared length."""
+        """The time step in use, a squared length; where components have their own, that of the largest (`time_steps`)."""
         return self._diagnostics.t
+
+    @property
+    def time_steps(self) -> FloatArray:
+        """The time step of each component, by their labels in ``operators.components``."""
+        return self._time_steps
 
     @property
     def diagnostics(self) -> Diagnostics:
@@ -392,7 +398,7 @@ class HeatMethodSolver(BatchedSolver):
         u = self._heat(terms)
         X, magnitude = damped_field(self._operators, terms, u, self._t_damping, self._fitted)
         with np.errstate(under="ignore"):
-            heat = u[: self.n_vertices, 0] / terms[0].unit / self._heat_flow.mean_mass
+            heat = (u[:, 0] / terms[0].unit / self._heat_flow.mean_mass)[: self.n_vertices]
         return HeatSolution(
             heat=heat,
             direction=np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T),
@@ -401,6 +407,11 @@ class HeatMethodSolver(BatchedSolver):
             t=self.t,
             diagnostics=self.diagnostics,
         )
+
+
+def _of_largest(step: float | FloatArray, domain: Operators) -> float:
+    """Of one number for each component, that of the component with most vertices."""
+    return float(step[np.bincount(domain.components).argmax()]) if isinstance(step, np.ndarray) else step
 
 
 def _as_mesh(mesh: Mesh | ArrayLike, F: ArrayLike | None) -> Mesh:

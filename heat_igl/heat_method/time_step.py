@@ -8,6 +8,7 @@ from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.operators import Operators
 from heat_igl.runtime import LARGEST_EXPONENT, RANGE_LIMIT, warn_caller
+from heat_igl.typing import FloatArray
 
 __all__ = ["smallest_time_step", "time_step"]
 
@@ -18,25 +19,33 @@ _T_COEF_FITTED = 0.5
 _T_COEF = 1.0
 
 
-def time_step(options: SolverOptions, domain: Operators, fitted: bool) -> tuple[float, float]:
+def time_step(
+    options: SolverOptions, domain: Operators, fitted: bool
+) -> tuple[float | FloatArray, float | FloatArray]:
     """The time step for `domain`, and the one that was asked for: ``options.t``, or ``t_coef * h**2``.
+
+    Each is a number, or one (n_components,) for each component where their mean edge lengths h differ.
 
     Warns
     -----
     AccuracyWarning
         If an explicit t had to be raised for the heat to cross the domain.
     """
-    requested = options.t
-    if requested is None:
-        default = _T_COEF_FITTED if fitted else _T_COEF
-        requested = (default if options.t_coef is None else options.t_coef) * domain.mean_edge_length**2
-    step = max(requested, smallest_time_step(domain, fitted))
-    if options.t is not None and step > requested:
-        warn_caller(
-            f"t = {requested:.4g} is too small for heat to cross the mesh in double precision; using {step:.4g}",
-            AccuracyWarning,
-        )
-    return step, requested
+    if options.t is not None:
+        step = max(options.t, smallest_time_step(domain, fitted))
+        if step > options.t:
+            warn_caller(
+                f"t = {options.t:.4g} is too small for heat to cross the mesh in double precision; using {step:.4g}",
+                AccuracyWarning,
+            )
+        return step, options.t
+    default = _T_COEF_FITTED if fitted else _T_COEF
+    requested = (default if options.t_coef is None else options.t_coef) * domain.mean_edge_lengths**2
+    steps = np.maximum(requested, _smallest_time_steps(domain, fitted))
+    used = np.unique(domain.components[domain.referenced])
+    if len(used) == 1:
+        return float(steps[used[0]]), float(requested[used[0]])
+    return steps, requested
 
 
 def smallest_time_step(domain: Operators, fitted: bool = False) -> float:
@@ -45,8 +54,20 @@ def smallest_time_step(domain: Operators, fitted: bool = False) -> float:
     Along a line of edges of length h, one backward Euler step falls by acosh(1 + h^2 / (2 t)) e-foldings per edge, and
     by h / sqrt(t) if the flow is `fitted`. The result makes that, times the number of edges across, `RANGE_LIMIT`.
     """
+    return _smallest(domain.longest_distance, domain.mean_edge_length, fitted)
+
+
+def _smallest_time_steps(domain: Operators, fitted: bool) -> FloatArray:
+    """`smallest_time_step` (n_components,) of each component."""
+    if domain.longest_distances is None or domain.n_components == 1:
+        return np.full(domain.n_components, smallest_time_step(domain, fitted))
+    of_component = zip(domain.longest_distances, domain.mean_edge_lengths, strict=True)
+    return np.array([_smallest(longest, h, fitted) if longest > 0 else 0.0 for longest, h in of_component])
+
+
+def _smallest(longest: float, h: float, fitted: bool) -> float:
+    """`smallest_time_step` for a longest distance and a mean edge length."""
     if fitted:
-        return (domain.longest_distance / RANGE_LIMIT) ** 2
-    h = domain.mean_edge_length
-    per_edge = RANGE_LIMIT / (domain.longest_distance / h)
-    return h**2 / (2 * (float(np.cosh(per_edge)) - 1)) if per_edge < LARGEST_EXPONENT else 0.0
+        return float((longest / RANGE_LIMIT) ** 2)
+    per_edge = RANGE_LIMIT / (longest / h)
+    return float(h**2 / (2 * (float(np.cosh(per_edge)) - 1))) if per_edge < LARGEST_EXPONENT else 0.0

@@ -58,7 +58,7 @@ class IntrinsicTriangulation:
     n_flips : int
         Number of edges flipped so far.
     lengthening : float
-        Length that `mollify` added to every edge; 0 unless a triangle was degenerate.
+        Largest length that `mollify` added to an edge; 0 unless a triangle was degenerate.
     history : tuple of Merged, Turned, Covered, Flipped or Refined
         The changes that led from the faces of the mesh to these faces, in order.
     """

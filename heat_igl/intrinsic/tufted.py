@@ -62,14 +62,15 @@ def tufted_cover(mesh: Mesh) -> IntrinsicTriangulation:
     a, b = counterclockwise[order], clockwise[following]
     twin = np.empty(2 * F.size, np.int64)
     twin[a], twin[b] = b, a
-    lengthening = mollify(lengths)
+    added = mollify(lengths, F)
+    lengths = lengths + added[:, None]
     return IntrinsicTriangulation(
         F=np.concatenate([F, F[:, BACK_CORNERS]]),
-        l=np.concatenate([lengths, lengths[:, BACK_CORNERS]]) + lengthening,
+        l=np.concatenate([lengths, lengths[:, BACK_CORNERS]]),
         twin=twin,
         aligned=np.ones(2 * F.size, bool),
         n=mesh.n_vertices,
-        lengthening=lengthening,
+        lengthening=float(added.max()),
         history=(Covered(m),),
     )
 

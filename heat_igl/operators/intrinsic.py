@@ -47,11 +47,15 @@ def intrinsic_operators(
     elements = TriangleElements.in_planes(triangulation)
     components = connectivity.connected_components(F, n) if paths is None or paths.n_vertices < n else paths.components
     if paths is not None:
-        longest_distance = paths.longest_distance
+        of_given = paths.longest_distances
+        longest = np.zeros(int(components.max()) + 1)
+        longest[components[: paths.n_vertices]] = (
+            paths.longest_distance if of_given is None else of_given[paths.components]
+        )
     else:
         i, j, length = elements.edge_lengths()
         graph = connectivity.shortest_edge_graph(np.stack([i, j], axis=1), length, n)
-        longest_distance = connectivity.longest_path(graph, components)
+        longest = connectivity.longest_paths(graph, components)
     return Operators(
         L=L,
         M=padded(igl.massmatrix_intrinsic(lengths, F), n),
@@ -62,7 +66,8 @@ def intrinsic_operators(
         components=components,
         boundary=triangulation.boundary,
         referenced=referenced,
-        longest_distance=longest_distance,
+        longest_distance=float(longest.max()),
+        longest_distances=longest,
         lengths=elements,
         surface=Surface(triangulation, faces=None if triangulation.history else triangulation),
     )

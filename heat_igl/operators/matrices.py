@@ -60,6 +60,8 @@ class Operators:
         Vertices that a face uses; on the others M is 0.
     longest_distance : float
         Length of a longest shortest path along edges; heat has to last that far.
+    longest_distances : (n_components,) float64 or None
+        The same in each component; None for `longest_distance` in all.
     is_surface : bool
         Whether the domain has two dimensions; tetrahedra have three.
     lengths : (n, n) csc_matrix, TriangleElements or None
@@ -83,6 +85,7 @@ class Operators:
     is_surface: bool = True
     lengths: sp.csc_matrix | TriangleElements | None = None
     surface: Surface | None = None
+    longest_distances: FloatArray | None = None
 
     @property
     def n(self) -> int:
@@ -112,6 +115,39 @@ class Operators:
     def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
         """The value (n,) of each vertex's component, from one for each component."""
         return np.broadcast_to(of_component, self.n) if self.n_components == 1 else of_component[self.components]
+
+    def expand_to_faces(self, of_component: AnyArray) -> AnyArray:
+        """The value (m,) of each face's component, from one for each component."""
+        m = len(self.weights)
+        if self.n_components == 1:
+            return np.broadcast_to(of_component, m)
+        if isinstance(self.gradient, TriangleElements):
+            return of_component[self.components[self.gradient.corners[:, 0]]]
+        component = np.zeros(m, np.int64)
+        component[self.G.indices % m] = np.repeat(self.components, np.diff(self.G.indptr))
+        return of_component[component]
+
+    @cached_property
+    def mean_edge_lengths(self) -> FloatArray:
+        """h (n_components,) of each component; where edges are not known, by the mean mass. That of all without edges."""
+        if self.n_components == 1:
+            return np.full(1, self.mean_edge_length)
+        edges = self.edge_lengths()
+        if edges is None:
+            scale = np.asarray(self.mean_masses / self.mean_mass) ** (1 / (2 if self.is_surface else 3))
+            return np.asarray(self.mean_edge_length * scale)
+        component = self.components[edges.i]
+        count = np.bincount(component, minlength=self.n_components)
+        total = np.bincount(component, edges.length, self.n_components)
+        return np.where(count > 0, total / np.maximum(count, 1), self.mean_edge_length)
+
+    @cached_property
+    def mean_masses(self) -> FloatArray:
+        """Mean mass (n_components,) of the vertices of each component that a face uses; that of all where there is none."""
+        component = self.components[self.referenced]
+        count = np.bincount(component, minlength=self.n_components)
+        total = np.bincount(component, self.M.diagonal()[self.referenced], self.n_components)
+        return np.where(count > 0, total / np.maximum(count, 1), self.mean_mass)
 
     @cached_property
     def mean_mass(self) -> float:

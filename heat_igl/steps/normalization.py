@@ -55,7 +55,7 @@ def normalize(operators: Operators, u: FloatArray, of_log: bool = False) -> Floa
 
 
 def damping(
-    operators: Operators, u: FloatArray, t: float, full_rate: float | None = None, fitted: bool = False
+    operators: Operators, u: FloatArray, t: float | FloatArray, full_rate: float | None = None, fitted: bool = False
 ) -> FloatArray:
     """How sure the direction of X is on each face: 1 almost everywhere, less where heat arrives from several sides.
 
@@ -70,7 +70,7 @@ def damping(
         The domain.
     u : (n,) or (n, k) float64
         Heat.
-    t : float
+    t : float or (n_components,) float64
         Time step that the heat was made with.
     full_rate : float, optional
         Share of a front's rate from which on a direction is trusted fully: on a mesh, fronts scatter by some percent
@@ -93,14 +93,18 @@ def damping(
     return np.asarray(np.where(factor < 1, factor, 1.0))
 
 
-def _lowest_full_rate(operators: Operators, t: float, fitted: bool, full_rate: float | None = None) -> FloatArray:
+def _lowest_full_rate(
+    operators: Operators, t: float | FloatArray, fitted: bool, full_rate: float | None = None
+) -> FloatArray:
     """The rate (m,), in e-foldings per length, from which on a direction is trusted fully."""
     if full_rate is None:
         full_rate = _FULL_RATE_FITTED if fitted else _FULL_RATE
+    if isinstance(t, np.ndarray):
+        t = operators.expand_to_faces(t)
     return full_rate * (np.full(len(operators.weights), t**-0.5) if fitted else _front_rate(operators, t))
 
 
-def _front_rate(operators: Operators, t: float) -> FloatArray:
+def _front_rate(operators: Operators, t: float | FloatArray) -> FloatArray:
     """How fast a front of heat falls on each face (m,), in e-foldings per length, where the flow is not fitted."""
     size = operators.face_sizes
     # The same as arccosh(1 + size^2 / (2 t)) / size, which is 0 where size^2 is lost beside 1: faces of no size at all.
@@ -117,7 +121,7 @@ class NormalizedDivergence:
     ----------
     operators : Operators
         The domain.
-    t : float, optional
+    t : float or (n_components,) float64, optional
         Time step that the heat was made with, to have the field damped by `damping`; it has length 1 otherwise.
     order : (n,) int, optional
         All vertices, near ones near each other, to read memory in; that of the mesh may jump, and a pass that waits for
@@ -127,7 +131,7 @@ class NormalizedDivergence:
     """
 
     def __init__(
-        self, operators: Operators, t: float | None = None, order: IntArray | None = None, fitted: bool = False
+        self, operators: Operators, t: float | FloatArray | None = None, order: IntArray | None = None, fitted: bool = False
     ) -> None:
         self._arguments = operators, t, order, fitted
         self._kernel: Triangles | None = None
@@ -156,5 +160,5 @@ class NormalizedDivergence:
             of_column[:] = operators.D @ X
         return divergence
 
-    def __reduce__(self) -> tuple[type[NormalizedDivergence], tuple[Operators, float | None, IntArray | None, bool]]:
+    def __reduce__(self) -> tuple[type[NormalizedDivergence], tuple[Operators, float | FloatArray | None, IntArray | None, bool]]:
         return NormalizedDivergence, self._arguments
