@@ -6,7 +6,7 @@ import numpy as np
 
 from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method.options import SolverOptions
-from heat_igl.operators import Operators
+from heat_igl.operators import Operators, is_rough_or_narrow
 from heat_igl.runtime import LARGEST_EXPONENT, RANGE_LIMIT, warn_caller
 from heat_igl.typing import FloatArray
 
@@ -15,6 +15,9 @@ __all__ = ["smallest_time_step", "time_step"]
 # Between two aims, see the tables of docs/heat_path.md: on scans the error falls further with t, on a regular grid of
 # squares, where heat prefers diagonals, it grows.
 _T_COEF_FITTED = 0.5
+# On rough and on narrow surfaces fronts bend at every vertex, and the less heat spreads the less it cuts corners: on
+# voxels, noise and a maze the error at 0.15 is 0.2 to 0.8 of that at 0.5.
+_T_COEF_ROUGH = 0.15
 # The paper's: t = h^2.
 _T_COEF = 1.0
 
@@ -39,8 +42,12 @@ def time_step(
                 AccuracyWarning,
             )
         return step, options.t
-    default = _T_COEF_FITTED if fitted else _T_COEF
-    requested = (default if options.t_coef is None else options.t_coef) * domain.mean_edge_lengths**2
+    t_coef = options.t_coef
+    if t_coef is None:
+        t_coef = _T_COEF
+        if fitted:
+            t_coef = _T_COEF_ROUGH if is_rough_or_narrow(domain) else _T_COEF_FITTED
+    requested = t_coef * domain.mean_edge_lengths**2
     steps = np.maximum(requested, _smallest_time_steps(domain, fitted))
     used = np.unique(domain.components[domain.referenced])
     if len(used) == 1:
