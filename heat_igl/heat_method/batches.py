@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence, Sized
 import numpy as np
 import numpy.typing as npt
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import AccuracyWarning, SourceError
 from heat_igl.heat_method.options import positive
 from heat_igl.runtime import (
     block_size,
@@ -43,6 +43,10 @@ class BatchedSolver(ABC):
     @abstractmethod
     def _source_set(self, sources: Sources) -> SourceSet:
         """`sources`, checked."""
+
+    def _complaint(self, distance: FloatArray, sources: SourceSet) -> str | None:
+        """The text of a warning about one answer, if one is due."""
+        return None
 
     @abstractmethod
     def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
@@ -158,15 +162,23 @@ class BatchedSolver(ABC):
     def _blocks(self, source_sets: Iterable[SourceSet], n_sets: int | None) -> Iterator[FloatArray]:
         """Distances of a block of sets after the other."""
 
-        def solved(block: list[SourceSet]) -> tuple[FloatArray, list[tuple[str, type[Warning]]]]:
+        def solved(block: list[SourceSet]) -> tuple[FloatArray, list[tuple[str, type[Warning]]], list[str | None]]:
             with held_warnings() as held:
-                return self._distances(block), held
+                rows = self._distances(block)
+                return rows, held, [self._complaint(*pair) for pair in zip(rows, block, strict=True)]
 
         size, threads = block_size(self._n_faces, n_sets, n_threads())
-        for rows, held in in_order(solved, in_blocks(source_sets, size), threads):
+        solved_before, has_complained = 0, False
+        for rows, held, complaints in in_order(solved, in_blocks(source_sets, size), threads):
             # The caller's line is on this thread.
             for warning in held:
                 warn_caller(*warning)
+            for i, complaint in enumerate(complaints):
+                # Once for the batch: where one answer is wrong, many are.
+                if complaint is not None and not has_complained:
+                    has_complained = True
+                    warn_caller(f"source_sets[{solved_before + i}]: {complaint}", AccuracyWarning)
+            solved_before += len(rows)
             yield rows
 
 

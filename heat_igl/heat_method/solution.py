@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["Diagnostics", "HeatSolution", "LabelledDistance"]
@@ -37,6 +38,8 @@ class Diagnostics:
     seconds_operators, seconds_analysis, seconds_factorization : float
         Wall-clock time of the stages of the constructor: operators; order of elimination, which begins beside them, as
         far as it takes longer; factors.
+    check : AnswerCheck or None
+        Of a `HeatSolution`, by how much its distance leaves bounds that need no reference. None for the solver.
     """
 
     t: float
@@ -52,6 +55,7 @@ class Diagnostics:
     seconds_operators: float
     seconds_analysis: float
     seconds_factorization: float
+    check: AnswerCheck | None = None
 
     @property
     def t_raised(self) -> bool:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
+from heat_igl.heat_method.checking import Checker
 from heat_igl.heat_method.integration import Integration, damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
@@ -20,13 +21,17 @@ from heat_igl.heat_method.time_step import time_step
 from heat_igl.linear import Analysis, Backend
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators, operators
-from heat_igl.runtime import in_order, n_threads, pool
+from heat_igl.errors import AccuracyWarning
+from heat_igl.runtime import in_order, n_threads, pool, warn_caller
 from heat_igl.sources import SourceAssembler, Sources, SourceSet, SourceTerm, right_hand_side, source_set
 from heat_igl.steps import Boundary, HeatFlow, NormalizedDivergence, PoissonProblem, analysis
 from heat_igl.typing import ArrayLike, FloatArray
 from heat_igl.unfolding import Refine, UnfoldingSolver
 
 __all__ = ["HeatMethodSolver", "heat_method_distance"]
+
+
+_REMEDY = "use refine='unfold', or heat_igl.geodesic_distance"
 
 
 @dataclass(frozen=True)
@@ -258,6 +263,9 @@ class HeatMethodSolver(BatchedSolver):
             self._from_heat = Integration(
                 domain, self._heat_flow, divergence, poisson[0], self._t_damping, fitted, self._assembler.edges
             )
+        self._checker = None
+        if options.refine != "unfold":
+            self._checker = Checker(domain, None if self._mesh is None else self._mesh.V, _REMEDY)
         triangulation = None if domain.surface is None else domain.surface.triangulation
         factors = self._heat_flow.factors + [problem.factor for problem in poisson]
         self._diagnostics = Diagnostics(
@@ -332,10 +340,22 @@ class HeatMethodSolver(BatchedSolver):
         Warns
         -----
         AccuracyWarning
-            If heat underflowed on the way, so that distances beyond are too short.
+            If heat underflowed on the way, so that distances beyond are too short, or if the answer leaves bounds that
+            need no reference by so much that it is wrong (see `AnswerCheck`).
         """
         beyond = checked_cutoff(cutoff)
-        return np.asarray(cut_off(self._distances([self._source_set(sources)])[0], beyond))
+        chosen = self._source_set(sources)
+        distance = self._distances([chosen])[0]
+        self._warn_if_wrong(distance, chosen)
+        return np.asarray(cut_off(distance, beyond))
+
+    def _warn_if_wrong(self, distance: FloatArray, sources: SourceSet) -> None:
+        complaint = self._complaint(distance, sources)
+        if complaint is not None:
+            warn_caller(complaint, AccuracyWarning)
+
+    def _complaint(self, distance: FloatArray, sources: SourceSet) -> str | None:
+        return None if self._checker is None else self._checker.complaint(distance, sources)
 
     def _source_set(self, sources: Sources) -> SourceSet:
         return source_set(sources, self.n_vertices, self._given_faces)
@@ -381,31 +401,37 @@ class HeatMethodSolver(BatchedSolver):
             but for vertices less than an edge from the border of two cells. With it, they come with the distance.
         """
         beyond = checked_cutoff(cutoff)
-        terms = self._source_terms([self._source_set(sources)])
+        chosen = self._source_set(sources)
+        terms = self._source_terms([chosen])
         u = self._heat(terms)
         if isinstance(self._from_heat, UnfoldingSolver):
             distance, labels = self._from_heat.labelled(terms[0], u[:, 0])
         else:
             distance = self._distances_from_heat(terms, u)[0]
             labels = warmest_sources(terms[0], self._heat_flow, self._operators.n)[: self.n_vertices]
+        self._warn_if_wrong(distance, chosen)
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
-        terms = self._source_terms([self._source_set(sources)])
+        chosen = self._source_set(sources)
+        terms = self._source_terms([chosen])
         u = self._heat(terms)
         X, magnitude = damped_field(self._operators, terms, u, self._t_damping, self._fitted)
+        distance = self._distances_from_heat(terms, u)[0]
+        self._warn_if_wrong(distance, chosen)
+        check = None if self._checker is None else self._checker.check(distance, chosen)
         with np.errstate(under="ignore"):
             heat = (u[:, 0] / terms[0].unit / self._heat_flow.mean_mass)[: self.n_vertices]
         return HeatSolution(
             heat=heat,
             direction=np.ascontiguousarray(X[:, 0].reshape(self._operators.dimension, -1).T),
             magnitude=np.ascontiguousarray(magnitude[:, 0]),
-            distance=self._distances_from_heat(terms, u)[0],
+            distance=distance,
             t=self.t,
-            diagnostics=self.diagnostics,
+            diagnostics=replace(self.diagnostics, check=check),
         )
 
 

@@ -19,6 +19,9 @@ __all__ = ["NormalizedDivergence", "damping", "normalize"]
 # Share of a front's rate of decay from which on a direction is trusted fully; docs/heat_path.md compares values. Fronts
 # of a fitted flow scatter less.
 _FULL_RATE, _FULL_RATE_FITTED = 0.9, 0.95
+# At an insulated boundary a front meets its own mirror image and falls a little more slowly. A fitted flow is damped
+# there from this share of the rate; without damping a regular grid is 1.84 % wrong instead of 1.57.
+_AT_BOUNDARY = 0.9
 
 
 def normalize(operators: Operators, u: FloatArray, of_log: bool = False) -> FloatArray:
@@ -81,15 +84,15 @@ def damping(
     Returns
     -------
     (m,) or (m, k) float64
-        Factor of X on each face, between 0 and 1; 1 on faces with a corner on the boundary, where an insulated
-        boundary turns the front into its own mirror image, or where u is not positive.
+        Factor of X on each face, between 0 and 1; 1 where u is not positive. On faces with a corner on the boundary,
+        where an insulated boundary turns the front into its own mirror image, a slower rate is enough, and the factor
+        is 1 if the flow is not `fitted`.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         gradient = operators.gradient_rows @ np.log(u)
         components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
         rate = np.sqrt(np.einsum("k...,k...->...", components, components))
-    factor = (rate.T / _lowest_full_rate(operators, t, fitted, full_rate)).T
-    factor[operators.boundary_faces] = 1
+        factor = (rate.T / _lowest_full_rate(operators, t, fitted, full_rate)).T
     return np.asarray(np.where(factor < 1, factor, 1.0))
 
 
@@ -101,7 +104,9 @@ def _lowest_full_rate(
         full_rate = _FULL_RATE_FITTED if fitted else _FULL_RATE
     if isinstance(t, np.ndarray):
         t = operators.expand_to_faces(t)
-    return full_rate * (np.full(len(operators.weights), t**-0.5) if fitted else _front_rate(operators, t))
+    lowest = full_rate * (np.full(len(operators.weights), t**-0.5) if fitted else _front_rate(operators, t))
+    lowest[operators.boundary_faces] *= _AT_BOUNDARY if fitted else 0.0
+    return np.asarray(lowest)
 
 
 def _front_rate(operators: Operators, t: float | FloatArray) -> FloatArray:
@@ -139,7 +144,6 @@ class NormalizedDivergence:
             from heat_igl.steps import descending
 
             full_rate = np.zeros(len(operators.weights)) if t is None else _lowest_full_rate(operators, t, fitted)
-            full_rate[operators.boundary_faces] = 0.0
             self._kernel = descending.triangles(operators.gradient, operators.weights, full_rate, order)
         else:
             _ = operators.D  # made on first use otherwise, in the middle of the first query
