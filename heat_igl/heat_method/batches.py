@@ -44,9 +44,9 @@ class BatchedSolver(ABC):
     def _source_set(self, sources: Sources) -> SourceSet:
         """`sources`, checked."""
 
-    def _complaint(self, distance: FloatArray, sources: SourceSet) -> str | None:
-        """The text of a warning about one answer, if one is due."""
-        return None
+    def _answers(self, source_sets: list[SourceSet]) -> tuple[FloatArray, list[str | None]]:
+        """Distances (k, n) from k sets of sources, and for each the text of a warning, if one is due."""
+        return self._distances(source_sets), [None] * len(source_sets)
 
     @abstractmethod
     def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
@@ -164,8 +164,8 @@ class BatchedSolver(ABC):
 
         def solved(block: list[SourceSet]) -> tuple[FloatArray, list[tuple[str, type[Warning]]], list[str | None]]:
             with held_warnings() as held:
-                rows = self._distances(block)
-                return rows, held, [self._complaint(*pair) for pair in zip(rows, block, strict=True)]
+                rows, complaints = self._answers(block)
+                return rows, held, complaints
 
         size, threads = block_size(self._n_faces, n_sets, n_threads())
         solved_before, has_complained = 0, False

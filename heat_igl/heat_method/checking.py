@@ -15,6 +15,8 @@ __all__ = ["AnswerCheck", "Checker"]
 
 # A warning is due from these on. With the defaults, scans and models stay below 0.002, 0.02 and 0.005.
 _SHORT_ON_AVERAGE, _SHORT_AT_WORST, _TOO_STEEP = 0.025, 0.06, 0.01
+# Mean shortfall from which on all distances are raised to straight lines.
+_RAISED = 0.005
 # Edges and vertices that are looked at: a share of all, so that the check takes a few percent of a query.
 _MOST_SAMPLES, _FEWEST_SAMPLES = 2000, 256
 # Lines from many sources to fewer vertices.
@@ -45,12 +47,21 @@ class AnswerCheck(NamedTuple):
     steepness: float
     steepest_vertex: int
 
-    def problem(self) -> str | None:
-        """What is wrong with the answer, if that is worth a warning."""
+    @property
+    def is_short(self) -> bool:
+        """Whether the answer is so far below straight lines that raising it to them pays."""
+        return self.shortfall > _RAISED
+
+    def complaint(self, remedy: str) -> str | None:
+        """The text of a warning that ends with the remedy, if the answer is worth one."""
+        problem = self._problem()
+        return None if problem is None else f"{problem}; {remedy}"
+
+    def _problem(self) -> str | None:
         if self.shortfall > _SHORT_ON_AVERAGE:
             return (
-                f"distances are at least {100 * self.shortfall:.1f} % too short on average: they are below straight "
-                f"lines, most at vertex {self.shortest_vertex}"
+                f"heat gave distances at least {100 * self.shortfall:.1f} % too short on average, most at vertex "
+                f"{self.shortest_vertex}: they were raised to straight lines, and the true ones are longer"
             )
         if self.largest_shortfall > _SHORT_AT_WORST:
             return (
@@ -74,12 +85,11 @@ class Checker:
         The domain.
     V : (n, 3) float64, optional
         Positions of its vertices; straight lines are left out without them.
-    remedy : str
-        What to do about a bad answer, the end of the warning.
     """
 
-    def __init__(self, domain: Operators, V: FloatArray | None, remedy: str) -> None:
-        self._V, self._remedy = V, remedy
+    def __init__(self, domain: Operators, V: FloatArray | None) -> None:
+        # A copy: the positions of a mesh are read-only, which kernels do not take.
+        self._V = None if V is None else np.array(V, np.float64, order="C")
         self._F = None if domain.surface is None else domain.surface.given_faces
         vertices = _sample(np.flatnonzero(domain.referenced[: domain.n_given]))
         self._vertices = vertices
@@ -109,10 +119,14 @@ class Checker:
         steepest_vertex = int(self._i[steepest]) if steepest >= 0 else -1
         return AnswerCheck(shortfall, largest, shortest, steepness, steepest_vertex)
 
-    def complaint(self, distance: FloatArray, sources: SourceSet) -> str | None:
-        """The text of a warning about one answer (n,), if one is due."""
-        problem = self.check(distance, sources).problem()
-        return None if problem is None else f"{problem}; {self._remedy}"
+    def raise_to_lines(self, distance: FloatArray, sources: SourceSet) -> None:
+        """Raise an answer (n,) to the straight lines from its sources, in place; unreachable vertices keep ``inf``."""
+        places = self._places(sources)
+        if places is None or self._V is None:
+            return
+        line = checking.straight_lines(self._V, *places)
+        line[sources.vertices] = 0.0
+        np.maximum(distance, line, out=distance)
 
     def _places(self, sources: SourceSet) -> tuple[FloatArray, FloatArray] | None:
         """Positions (k, 3) and offsets (k,) of the sources; None for curves, which have no one position."""

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
-from heat_igl.heat_method.checking import Checker
+from heat_igl.heat_method.checking import AnswerCheck, Checker
 from heat_igl.heat_method.integration import Integration, damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
@@ -263,9 +263,9 @@ class HeatMethodSolver(BatchedSolver):
             self._from_heat = Integration(
                 domain, self._heat_flow, divergence, poisson[0], self._t_damping, fitted, self._assembler.edges
             )
-        self._checker = None
+        self._checker: Checker | None = None
         if options.refine != "unfold":
-            self._checker = Checker(domain, None if self._mesh is None else self._mesh.V, _REMEDY)
+            self._checker = Checker(domain, None if self._mesh is None else self._mesh.V)
         triangulation = None if domain.surface is None else domain.surface.triangulation
         factors = self._heat_flow.factors + [problem.factor for problem in poisson]
         self._diagnostics = Diagnostics(
@@ -345,26 +345,31 @@ class HeatMethodSolver(BatchedSolver):
         """
         beyond = checked_cutoff(cutoff)
         chosen = self._source_set(sources)
-        distance = self._distances([chosen])[0]
-        self._warn_if_wrong(distance, chosen)
+        (distance,), (complaint,) = self._answers([chosen])
+        _warn(complaint)
         return np.asarray(cut_off(distance, beyond))
-
-    def _warn_if_wrong(self, distance: FloatArray, sources: SourceSet) -> None:
-        complaint = self._complaint(distance, sources)
-        if complaint is not None:
-            warn_caller(complaint, AccuracyWarning)
-
-    def _complaint(self, distance: FloatArray, sources: SourceSet) -> str | None:
-        return None if self._checker is None else self._checker.complaint(distance, sources)
 
     def _source_set(self, sources: Sources) -> SourceSet:
         return source_set(sources, self.n_vertices, self._given_faces)
 
     def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
-        """Distances (k, n) from k sets of sources: the method from end to end."""
+        return self._answers(source_sets)[0]
+
+    def _answers(self, source_sets: list[SourceSet]) -> tuple[FloatArray, list[str | None]]:
+        """Distances (k, n) from k sets of sources, and what is wrong with them: the method from end to end."""
         terms = self._source_terms(source_sets)
-        u = self._heat(terms)
-        return self._distances_from_heat(terms, u)
+        distances = self._distances_from_heat(terms, self._heat(terms))
+        checks = [self._check(*pair) for pair in zip(distances, source_sets, strict=True)]
+        return distances, [None if check is None else check.complaint(_REMEDY) for check in checks]
+
+    def _check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck | None:
+        """Check one answer (n,), and raise it to straight lines where it is far below them."""
+        if self._checker is None:
+            return None
+        check = self._checker.check(distance, sources)
+        if check.is_short:
+            self._checker.raise_to_lines(distance, sources)
+        return check
 
     def _source_terms(self, source_sets: list[SourceSet]) -> list[SourceTerm]:
         """Initial heat of each set, and what is known near it."""
@@ -409,7 +414,8 @@ class HeatMethodSolver(BatchedSolver):
         else:
             distance = self._distances_from_heat(terms, u)[0]
             labels = warmest_sources(terms[0], self._heat_flow, self._operators.n)[: self.n_vertices]
-        self._warn_if_wrong(distance, chosen)
+        check = self._check(distance, chosen)
+        _warn(check and check.complaint(_REMEDY))
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
@@ -421,8 +427,8 @@ class HeatMethodSolver(BatchedSolver):
         u = self._heat(terms)
         X, magnitude = damped_field(self._operators, terms, u, self._t_damping, self._fitted)
         distance = self._distances_from_heat(terms, u)[0]
-        self._warn_if_wrong(distance, chosen)
-        check = None if self._checker is None else self._checker.check(distance, chosen)
+        check = self._check(distance, chosen)
+        _warn(check and check.complaint(_REMEDY))
         with np.errstate(under="ignore"):
             heat = (u[:, 0] / terms[0].unit / self._heat_flow.mean_mass)[: self.n_vertices]
         return HeatSolution(
@@ -433,6 +439,11 @@ class HeatMethodSolver(BatchedSolver):
             t=self.t,
             diagnostics=replace(self.diagnostics, check=check),
         )
+
+
+def _warn(complaint: str | None) -> None:
+    if complaint is not None:
+        warn_caller(complaint, AccuracyWarning)
 
 
 def _of_largest(step: float | FloatArray, domain: Operators) -> float:
