@@ -154,7 +154,7 @@ def test_batch_into_a_given_array(tmp_path, solver):
     out = np.lib.format.open_memmap(tmp_path / "out.npy", mode="w+", dtype=np.float32, shape=(2, solver.n_vertices))
     assert solver.distances([0, [1, 2]], out=out) is out
     np.testing.assert_allclose(np.load(tmp_path / "out.npy")[1], solver.distance([1, 2]), rtol=1e-6, atol=1e-6)
-    with pytest.raises(ValueError, match=r"out must be an array of floats of shape \(3, 2562\)"):
+    with pytest.raises(ValueError, match=r"out must be an array of float64 or float32 of shape \(3, 2562\)"):
         solver.distances([0, 1, 2], out=out)
     with pytest.raises(ValueError, match="out must be an array of floats"):
         solver.distances([0], out=np.empty((1, solver.n_vertices), int))

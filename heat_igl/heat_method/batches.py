@@ -104,8 +104,11 @@ class BatchedSolver(ABC):
         shape = (len(chosen), self.n_vertices)
         if out is None:
             out = np.empty(shape, float_type(dtype))
-        elif tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f":
-            raise ValueError(f"out must be an array of floats of shape {shape}, not {out.dtype} of shape {out.shape}")
+        elif tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f" or np.dtype(out.dtype).itemsize < 4:
+            # Half precision ends at 65504: larger distances would read inf, like vertices that no source reaches.
+            raise ValueError(
+                f"out must be an array of float64 or float32 of shape {shape}, not {out.dtype} of shape {out.shape}"
+            )
         elif dtype is not None and float_type(dtype) != out.dtype:
             raise ValueError(f"dtype is {np.dtype(dtype)}, but out holds {out.dtype}: leave one of them away")
         elif isinstance(out, np.ndarray) and not out.flags.writeable:

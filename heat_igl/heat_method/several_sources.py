@@ -35,8 +35,10 @@ def drop_overtaken(term: SourceTerm, heat_flow: HeatFlow, n: int) -> SourceTerm:
     delay[term.label] = term.delay
 
     def is_on_time(vertex: IntArray, label: IntArray) -> BoolArray:
-        with np.errstate(divide="ignore"):
-            return np.asarray(np.log(u[vertex]) < np.log(u_at_once[vertex]) - delay[label] + np.log(_OVERTAKEN))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            late = np.log(u[vertex]) >= np.log(u_at_once[vertex]) - delay[label] + np.log(_OVERTAKEN)
+        # On the triangles of the mesh heat may be negative, and then says nothing; the first source is never overtaken.
+        return np.asarray(~late | (delay[label] == 0))
 
     anchors = term.anchors.at(is_on_time(term.anchors.vertex, term.anchors.label))
     return term.restricted(anchors.label, anchors, kept=is_on_time(term.near.vertex, term.near.label))

@@ -31,9 +31,6 @@ from heat_igl.unfolding import Refine, UnfoldingSolver
 __all__ = ["HeatMethodSolver", "heat_method_distance"]
 
 
-_REMEDY = "use refine='unfold', or heat_igl.geodesic_distance"
-
-
 @dataclass(frozen=True)
 class _Prepared:
     """What is known before anything is factored, and the seconds that it took."""
@@ -360,7 +357,7 @@ class HeatMethodSolver(BatchedSolver):
         terms = self._source_terms(source_sets)
         distances = self._distances_from_heat(terms, self._heat(terms))
         checks = [self._check(*pair) for pair in zip(distances, source_sets, strict=True)]
-        return distances, [None if check is None else check.complaint(_REMEDY) for check in checks]
+        return distances, [None if check is None else check.complaint(self._operators.is_surface) for check in checks]
 
     def _check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck | None:
         """Check one answer (n,), and raise it to straight lines where it is far below them."""
@@ -415,7 +412,7 @@ class HeatMethodSolver(BatchedSolver):
             distance = self._distances_from_heat(terms, u)[0]
             labels = warmest_sources(terms[0], self._heat_flow, self._operators.n)[: self.n_vertices]
         check = self._check(distance, chosen)
-        _warn(check and check.complaint(_REMEDY))
+        _warn(check and check.complaint(self._operators.is_surface))
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
@@ -428,7 +425,7 @@ class HeatMethodSolver(BatchedSolver):
         X, magnitude = damped_field(self._operators, terms, u, self._t_damping, self._fitted)
         distance = self._distances_from_heat(terms, u)[0]
         check = self._check(distance, chosen)
-        _warn(check and check.complaint(_REMEDY))
+        _warn(check and check.complaint(self._operators.is_surface))
         with np.errstate(under="ignore"):
             heat = (u[:, 0] / terms[0].unit / self._heat_flow.mean_mass)[: self.n_vertices]
         return HeatSolution(

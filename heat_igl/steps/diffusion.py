@@ -50,7 +50,7 @@ class HeatFlow:
     FactorizationError
         If M - t L is not positive definite.
     ValueError
-        If t is not positive or `boundary` is unknown.
+        If t is not positive, if `boundary` is unknown, or if it holds the heat of all vertices.
     """
 
     def __init__(
@@ -67,6 +67,12 @@ class HeatFlow:
         check_boundary(boundary)
         if not operators.boundary.any():
             boundary = "neumann"
+        inner = operators.referenced & ~operators.boundary
+        if boundary != "neumann" and not inner.any():
+            raise ValueError(
+                f"boundary={boundary!r} holds the heat on the boundary, and every vertex lies there: take "
+                "boundary='neumann', or divide the faces"
+            )
         mass = operators.M.diagonal()
         self.mean_mass = mass_unit(operators, t)
         L = fitted_laplacian(operators, t) if fitted else operators.L
@@ -82,7 +88,7 @@ class HeatFlow:
         if boundary in ("neumann", "average"):
             self._neumann = analysis.factorize(matrix, operators.referenced)
         if boundary in ("dirichlet", "average"):
-            self._dirichlet = analysis.factorize(matrix, operators.referenced & ~operators.boundary)
+            self._dirichlet = analysis.factorize(matrix, inner)
             self._from_boundary = matrix[:, operators.boundary]
             self._boundary_diagonal = matrix.diagonal()[operators.boundary]
             self._on_boundary = operators.boundary
