@@ -198,7 +198,7 @@ def distance(
         float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=_positive)
     ] = None,
     t: Annotated[float | None, typer.Option(help="Time step, a squared length.", callback=_positive)] = None,
-    laplacian: Annotated[str, _choice(Laplacian, "Triangulation to solve on.")] = "intrinsic-delaunay",
+    laplacian: Annotated[str, _choice(Laplacian, "Triangulation to solve on.")] = "auto",
     boundary: Annotated[str, _choice(Boundary, "What heat does at the boundary.")] = "neumann",
     magnitude: Annotated[str, _choice(Magnitude, "Length of the field that is integrated.")] = "auto",
     refine: Annotated[str | None, _choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,

@@ -95,7 +95,9 @@ def measure(shape: Shape, methods: list[str], cache: Path | None) -> list[Row]:
         except (ImportError, RuntimeError, ValueError) as error:
             print(f"{method} on {shape.name} left out: {error}", file=sys.stderr)
             continue
-        rows.append({"shape": shape.name, "held_out": shape.held_out, "vertices": mesh.n_vertices, "method": method} | row)
+        rows.append(
+            {"shape": shape.name, "held_out": shape.held_out, "vertices": mesh.n_vertices, "method": method} | row
+        )
     return rows
 
 
@@ -151,7 +153,9 @@ def cell(row: Row | None) -> str:
 def summary(rows: list[Row], methods: list[str]) -> list[str]:
     """Geometric means, the worst shape, and the ratios to potpourri3d: geometric mean, and the largest."""
     lines = []
-    means = {method: {row["shape"]: max(row["mean"], LEAST) for row in rows if row["method"] == method} for method in methods}
+    means = {
+        method: {row["shape"]: max(row["mean"], LEAST) for row in rows if row["method"] == method} for method in methods
+    }
     other = means.get("potpourri3d", {})
     for method, of_shape in means.items():
         if not of_shape:

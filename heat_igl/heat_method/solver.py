@@ -250,7 +250,9 @@ class HeatMethodSolver(BatchedSolver):
         # Both matrices at once: the backends run without the interpreter's lock.
         self._heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
         factored = time.perf_counter()
-        self._assembler = SourceAssembler(domain, step, self._heat_flow.mean_mass, plain=not damped, unfolds=options.refine is not None)
+        self._assembler = SourceAssembler(
+            domain, step, self._heat_flow.mean_mass, plain=not damped, unfolds=options.refine is not None
+        )
         self._given_faces = None if domain.surface is None else domain.surface.given_faces
         self._from_heat: Integration | UnfoldingSolver
         if options.refine is not None:
@@ -360,12 +362,15 @@ class HeatMethodSolver(BatchedSolver):
         return distances, [None if check is None else check.complaint(self._operators.is_surface) for check in checks]
 
     def _check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck | None:
-        """Check one answer (n,), and raise it to straight lines where it is far below them."""
+        """Check one answer (n,), and raise it to straight lines where it is far below them.
+
+        A field of length 1 is the paper's method, and its answers are left as they are.
+        """
         if self._checker is None:
             return None
         check = self._checker.check(distance, sources)
-        if check.is_short:
-            self._checker.raise_to_lines(distance, sources)
+        if check.is_short and self._t_damping is not None:
+            return check._replace(raised=self._checker.raise_to_lines(distance, sources))
         return check
 
     def _source_terms(self, source_sets: list[SourceSet]) -> list[SourceTerm]:

@@ -22,9 +22,7 @@ _T_COEF_ROUGH = 0.15
 _T_COEF = 1.0
 
 
-def time_step(
-    options: SolverOptions, domain: Operators, fitted: bool
-) -> tuple[float | FloatArray, float | FloatArray]:
+def time_step(options: SolverOptions, domain: Operators, fitted: bool) -> tuple[float | FloatArray, float | FloatArray]:
     """The time step for `domain`, and the one that was asked for: ``options.t``, or ``t_coef * h**2``.
 
     Each is a number, or one (n_components,) for each component where their mean edge lengths h differ.

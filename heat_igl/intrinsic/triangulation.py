@@ -108,9 +108,7 @@ class IntrinsicTriangulation:
         """Whether the triangles cover each face of the surface twice."""
         return any(isinstance(change, Covered) for change in self.history)
 
-    def locate(
-        self, faces: IntArray, barycentric: FloatArray, on_back: bool = False
-    ) -> tuple[IntArray, FloatArray]:
+    def locate(self, faces: IntArray, barycentric: FloatArray, on_back: bool = False) -> tuple[IntArray, FloatArray]:
         """Points of the mesh, given in faces of the mesh, in these triangles.
 
         Parameters

@@ -48,9 +48,7 @@ def edge_excess(
     return total, excess, worst
 
 
-def straight_lines(
-    positions: cython.double[:, ::1], sources: cython.double[:, ::1], offsets: cython.double[::1]
-):
+def straight_lines(positions: cython.double[:, ::1], sources: cython.double[:, ::1], offsets: cython.double[::1]):
     """Length (p,) of the shortest straight line from each position to a source, the source's offset added."""
     found = np.empty(positions.shape[0])
     shortest: cython.double[::1] = found
@@ -71,7 +69,7 @@ def straight_lines(
 
 
 def line_shortfall(
-    distance: cython.double[::1], vertex: cython.longlong[::1], line: cython.double[::1]
+    distance: cython.double[::1], vertex: cython.longlong[::1], line: cython.double[::1], start: cython.double
 ):
     """By how much distances fall short of straight lines.
 
@@ -81,13 +79,15 @@ def line_shortfall(
         Distances; those that are not finite are left out.
     vertex, line : (p,) int64, (p,) float64
         Vertices, and the straight line from each to the nearest source.
+    start : float
+        The smallest value that distance begins at: all are taken from there.
 
     Returns
     -------
     count : int
         Vertices looked at.
     shortfall : float
-        Sum of ``(line - distance) / line`` over the vertices where it is positive.
+        Sum of ``(line - distance) / (line - start)`` over the vertices where it is positive.
     largest : float
         Largest ``line - distance``.
     farthest : float
@@ -104,12 +104,12 @@ def line_shortfall(
     with cython.nogil:
         for k in range(vertex.shape[0]):
             d: cython.double = distance[vertex[k]]
-            if not isfinite(d) or line[k] <= 0.0:
+            if not isfinite(d) or line[k] <= start:
                 continue
             count += 1
-            farthest = max(farthest, d)
+            farthest = max(farthest, d - start)
             if d < line[k]:
-                total += (line[k] - d) / line[k]
+                total += (line[k] - d) / (line[k] - start)
                 if line[k] - d > largest:
                     largest = line[k] - d
                     worst = k

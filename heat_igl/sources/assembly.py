@@ -154,6 +154,10 @@ class SourceAssembler:
         if surface is not None and domain.n_given < domain.n and not surface.triangulation.is_cover:
             # Added vertices see sources too.
             self._visible = self.edges
+        # In edges of the mesh: where vertices were added, the operators have shorter ones.
+        self._radius = _RADIUS
+        if surface is not None and surface.faces is not None and domain.n_given < domain.n:
+            self._radius *= max(1.0, surface.faces.mean_edge_length / domain.mean_edge_length)
         # Triangulations on which the edges are straight lines: one, if none was flipped.
         self._straight = [field for field in (self.edges, self._faces) if field is not None]
         if surface is not None and surface.faces is surface.triangulation:
@@ -234,7 +238,7 @@ class SourceAssembler:
                 return _NONE, _NONE
         vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         points = sources.points.joined(sources.segments.ends())
-        radius = _RADIUS * self._h_at(np.arange(self._visible.triangulation.n))
+        radius = self._radius * self._h_at(np.arange(self._visible.triangulation.n))
         return self._visible.seeds(points, sources.segments, radius, vertices)
 
     def _initial_heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
