@@ -161,7 +161,8 @@ def summary(rows: list[Row], methods: list[str]) -> list[str]:
         if not of_shape:
             continue
         worst = max(of_shape, key=lambda shape: of_shape[shape])
-        line = f"- {method}: geometric mean {geometric(of_shape.values()):.3g} %, at worst {of_shape[worst]:.3g} % ({worst})"
+        mean = geometric(of_shape.values())
+        line = f"- {method}: geometric mean {mean:.3g} %, at worst {of_shape[worst]:.3g} % ({worst})"
         ratio = {shape: of_shape[shape] / other[shape] for shape in of_shape if shape in other}
         if ratio and method != "potpourri3d":
             most = max(ratio, key=lambda shape: ratio[shape])

@@ -201,7 +201,8 @@ def test_every_kind_of_answer(solver: HeatMethodSolver) -> None:
     assert solution.direction.shape == (len(solver.operators.weights), 2)
     assert solver.diagnostics.n_vertices == solver.operators.n
     offset = solver.distance(OffsetSources([5, 60], [0.0, 0.5]))
-    assert offset.shape == (n,) and offset[60] == 0.5
+    assert offset.shape == (n,)
+    assert offset[60] == 0.5
 
 
 def test_the_same_operators_give_the_same_answers(solver: HeatMethodSolver) -> None:
@@ -259,7 +260,8 @@ def test_even_meshes_stay_as_they_are() -> None:
         default, plain = operators(mesh, "auto"), operators(mesh)
         assert abs(default.L - plain.L).max() == 0
         assert abs(default.M - plain.M).max() == 0
-        assert default.surface is not None and default.surface.uncovered is None
+        assert default.surface is not None
+        assert default.surface.uncovered is None
 
 
 def test_obtuse_triangles_at_the_boundary_take_the_cover() -> None:

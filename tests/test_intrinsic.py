@@ -143,7 +143,8 @@ def test_mollification():
     assert mollify(good, np.array([[0, 1, 2]])) == 0
     flat = np.array([[1.0, 1.0, 2.0], [2.0, 2.0, 2.0]])
     added = mollify(flat, np.array([[0, 1, 2], [1, 2, 3]]))
-    assert (0 < added).all() and (added < 1e-6).all()
+    assert (added > 0).all()
+    assert (added < 1e-6).all()
     lengthened = flat + added[:, None]
     assert (lengthened.sum(axis=1) - 2 * lengthened.max(axis=1) > 0).all()
 

@@ -123,14 +123,17 @@ def test_a_wrong_answer_warns_and_is_raised_to_straight_lines() -> None:
     assert (distance >= lines - 1e-12).all()
     with pytest.warns(AccuracyWarning, match="too short"):
         check = solver.solve(210).diagnostics.check
-    assert check is not None and check.shortfall > 0.1 and check.raised
+    assert check is not None
+    assert check.shortfall > 0.1
+    assert check.raised
     # The paper's method keeps its answer.
     paper = HeatMethodSolver(mesh, laplacian="cotan")
     with pytest.warns(AccuracyWarning, match="too short"):
         assert np.mean(paper.distance(210) < 0.9 * lines) > 0.2
     # Nothing is known about lines without positions.
     unchecked = HeatMethodSolver.from_operators(solver.operators).solve(210)
-    assert unchecked.diagnostics.check is not None and np.isnan(unchecked.diagnostics.check.shortfall)
+    assert unchecked.diagnostics.check is not None
+    assert np.isnan(unchecked.diagnostics.check.shortfall)
     assert np.mean(unchecked.distance < 0.9 * lines) > 0.2
 
 
@@ -149,7 +152,8 @@ def test_a_good_answer_is_left_alone() -> None:
     solution = HeatMethodSolver(mesh).solve(0)
     check = solution.diagnostics.check
     assert check is not None
-    assert 0 <= check.shortfall < 0.005 and check.steepness < 0.01
+    assert 0 <= check.shortfall < 0.005
+    assert check.steepness < 0.01
     assert check.largest_shortfall < 0.02
     below = np.linalg.norm(mesh.V - mesh.V[0], axis=1) - solution.distance
     # The check looks at some vertices only, and takes the largest distance from these.
@@ -193,7 +197,7 @@ def test_a_boundary_of_all_vertices_cannot_be_held(boundary: str) -> None:
 
 def test_half_precision_is_refused() -> None:
     solver = HeatMethodSolver(shapes.icosphere(1))
-    with pytest.raises(ValueError, match="out must be an array of float64 or float32 .* not float16"):
+    with pytest.raises(ValueError, match=r"out must be an array of float64 or float32 .* not float16"):
         solver.distances([0], out=np.empty((1, 42), np.float16))
     assert solver.distances([0], out=np.empty((1, 42), np.float32)).max() > 2
 

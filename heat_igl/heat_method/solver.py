@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
 from heat_igl.heat_method.checking import AnswerCheck, Checker
 from heat_igl.heat_method.integration import Integration, damped_field
@@ -21,7 +22,6 @@ from heat_igl.heat_method.time_step import time_step
 from heat_igl.linear import Analysis, Backend
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators, operators
-from heat_igl.errors import AccuracyWarning
 from heat_igl.runtime import in_order, n_threads, pool, warn_caller
 from heat_igl.sources import SourceAssembler, Sources, SourceSet, SourceTerm, right_hand_side, source_set
 from heat_igl.steps import Boundary, HeatFlow, NormalizedDivergence, PoissonProblem, analysis
@@ -290,7 +290,7 @@ class HeatMethodSolver(BatchedSolver):
 
     @property
     def t(self) -> float:
-        """The time step in use, a squared length; where components have their own, that of the largest (`time_steps`)."""
+        """The time step in use, a squared length; of several (`time_steps`), that of the largest component."""
         return self._diagnostics.t
 
     @property

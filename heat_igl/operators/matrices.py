@@ -129,7 +129,7 @@ class Operators:
 
     @cached_property
     def mean_edge_lengths(self) -> FloatArray:
-        """h (n_components,) of each component; where edges are not known, by the mean mass. That of all without edges."""
+        """Mean edge length (n_components,); by the mean mass if edges are not known, and that of all without edges."""
         if self.n_components == 1:
             return np.full(1, self.mean_edge_length)
         edges = self.edge_lengths()
@@ -143,7 +143,7 @@ class Operators:
 
     @cached_property
     def mean_masses(self) -> FloatArray:
-        """Mean mass (n_components,) of the vertices of each component that a face uses; that of all where there is none."""
+        """Mean mass (n_components,) of the vertices that a face uses, in each component; that of all where none is."""
         component = self.components[self.referenced]
         count = np.bincount(component, minlength=self.n_components)
         total = np.bincount(component, self.M.diagonal()[self.referenced], self.n_components)

@@ -130,7 +130,7 @@ def _area_per_vertex(triangulation: IntrinsicTriangulation, component: IntArray)
 
 
 def is_rough_or_narrow(domain: Operators) -> bool:
-    """Whether a surface turns so much between neighbouring vertices, or is so narrow, that fronts of heat cut corners."""
+    """Whether a surface turns so much from vertex to vertex, or is so narrow, that fronts of heat cut corners."""
     surface = domain.surface
     if surface is None:
         return False

@@ -76,7 +76,7 @@ class HeatFlow:
         mass = operators.M.diagonal()
         self.mean_mass = mass_unit(operators, t)
         L = fitted_laplacian(operators, t) if fitted else operators.L
-        step = operators.expand_to_vertices(t) if np.ndim(t) else t
+        step = operators.expand_to_vertices(t) if isinstance(t, np.ndarray) else t
         matrix = shifted(L, -step / self.mean_mass, mass / self.mean_mass)
         if analysis is None or not analysis.fits(matrix):
             analysis = analyse(matrix, backend)
