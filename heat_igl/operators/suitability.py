@@ -37,7 +37,7 @@ _LARGEST_RADIUS = 1.4
 # Mean angle by which the angles around a vertex differ from a full turn, from which on a surface is rough: scans and
 # models have at most 0.5, voxels and noise at least 1.
 _ROUGH = 0.7
-_MOST_SAMPLES = 4000
+_MOST_SAMPLES = 1000
 # Share of vertices on the boundary from which on a surface is narrow: at most 0.28 on scans and models, 0.4 in a maze.
 _NARROW = 0.33
 # Growth by refinement: at most so many times the vertices, and some thousands more.
@@ -143,7 +143,7 @@ def is_rough_or_narrow(domain: Operators) -> bool:
 
 
 def _mean_angle_defect(triangulation: IntrinsicTriangulation) -> float:
-    """Mean of |2 pi - sum of angles| over inner vertices, or over some thousands of them."""
+    """Mean of |2 pi - sum of angles| over inner vertices, or over a thousand of them."""
     F, n = triangulation.F, triangulation.n
     chosen = np.zeros(n, bool)
     chosen[F] = True
