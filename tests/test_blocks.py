@@ -206,6 +206,7 @@ def test_progress_without_rich_names_the_extra(solver, monkeypatch):
 # A solver after the vertices moved.
 
 
+@pytest.mark.filterwarnings("ignore:heat gave:heat_igl.AccuracyWarning")  # "cotan" on a cow
 @pytest.mark.parametrize("options", [{}, {"t_coef": 2.0}, {"t": 0.01}, {"laplacian": "cotan"}, {"boundary": "average"}])
 def test_moved_vertices_give_what_a_new_solver_gives(cow, options):
     moved = cow.V * [1.0, 1.7, 0.6] + 0.05 * np.sin(7 * cow.V[:, [1, 2, 0]])

@@ -256,7 +256,7 @@ def test_a_warning_of_the_package_is_one_line(sphere: Path, capsys: pytest.Captu
     [
         (["--t-coef=-1"], 2, ("--t-coef", "-1 is not a positive number")),
         (["--t=nan"], 2, ("--t", "nan is not a positive number")),
-        (["--laplacian=graph"], 2, ("graph", "intrinsic-delaunay, cotan")),
+        (["--laplacian=graph"], 2, ("graph", "auto, intrinsic-delaunay, intrinsic-delaunay-refined, cotan")),
         (["--boundary=hot"], 2, ("hot", "neumann, dirichlet, average")),
         (["--magnitude=long"], 2, ("long", "auto, unit, damped")),
         (["--method=guess"], 2, ("--method", "'guess' is not one of unfold, sweep, heat, exact")),

@@ -48,7 +48,7 @@ def distance(
         float | None, typer.Option(help="Heat: time step in squared mean edge lengths.", callback=positive)
     ] = None,
     t: Annotated[float | None, typer.Option(help="Heat: time step, a squared length.", callback=positive)] = None,
-    laplacian: Annotated[str, choice(Laplacian, "Heat: triangulation to solve on.")] = "intrinsic-delaunay",
+    laplacian: Annotated[str, choice(Laplacian, "Heat: triangulation to solve on.")] = "auto",
     boundary: Annotated[str, choice(Boundary, "Heat: what heat does at the boundary.")] = "neumann",
     magnitude: Annotated[str, choice(Magnitude, "Heat: length of the field that is integrated.")] = "auto",
     refine: Annotated[str | None, choice(Refine, "Heat: unfold triangles in its order, near-exact.")] = None,

@@ -1,5 +1,6 @@
 """`HeatMethodSolver`: the steps put together, factored once, asked many times."""
 
+from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.front_door import DistanceMethod, geodesic_distance
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
@@ -7,6 +8,7 @@ from heat_igl.heat_method.solver import HeatMethodSolver, heat_method_distance
 from heat_igl.heat_method.time_step import smallest_time_step
 
 __all__ = [
+    "AnswerCheck",
     "Diagnostics",
     "DistanceMethod",
     "HeatMethodSolver",

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence, Sized
 import numpy as np
 import numpy.typing as npt
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import AccuracyWarning, SourceError
 from heat_igl.heat_method.options import positive
 from heat_igl.runtime import (
     block_size,
@@ -43,6 +43,10 @@ class BatchedSolver(ABC):
     @abstractmethod
     def _source_set(self, sources: Sources) -> SourceSet:
         """`sources`, checked."""
+
+    def _answers(self, source_sets: list[SourceSet]) -> tuple[FloatArray, list[str | None]]:
+        """Distances (k, n) from k sets of sources, and for each the text of a warning, if one is due."""
+        return self._distances(source_sets), [None] * len(source_sets)
 
     @abstractmethod
     def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
@@ -100,8 +104,11 @@ class BatchedSolver(ABC):
         shape = (len(chosen), self.n_vertices)
         if out is None:
             out = np.empty(shape, float_type(dtype))
-        elif tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f":
-            raise ValueError(f"out must be an array of floats of shape {shape}, not {out.dtype} of shape {out.shape}")
+        elif tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f" or np.dtype(out.dtype).itemsize < 4:
+            # Half precision ends at 65504: larger distances would read inf, like vertices that no source reaches.
+            raise ValueError(
+                f"out must be an array of float64 or float32 of shape {shape}, not {out.dtype} of shape {out.shape}"
+            )
         elif dtype is not None and float_type(dtype) != out.dtype:
             raise ValueError(f"dtype is {np.dtype(dtype)}, but out holds {out.dtype}: leave one of them away")
         elif isinstance(out, np.ndarray) and not out.flags.writeable:
@@ -158,15 +165,23 @@ class BatchedSolver(ABC):
     def _blocks(self, source_sets: Iterable[SourceSet], n_sets: int | None) -> Iterator[FloatArray]:
         """Distances of a block of sets after the other."""
 
-        def solved(block: list[SourceSet]) -> tuple[FloatArray, list[tuple[str, type[Warning]]]]:
+        def solved(block: list[SourceSet]) -> tuple[FloatArray, list[tuple[str, type[Warning]]], list[str | None]]:
             with held_warnings() as held:
-                return self._distances(block), held
+                rows, complaints = self._answers(block)
+                return rows, held, complaints
 
         size, threads = block_size(self._n_faces, n_sets, n_threads())
-        for rows, held in in_order(solved, in_blocks(source_sets, size), threads):
+        solved_before, has_complained = 0, False
+        for rows, held, complaints in in_order(solved, in_blocks(source_sets, size), threads):
             # The caller's line is on this thread.
             for warning in held:
                 warn_caller(*warning)
+            for i, complaint in enumerate(complaints):
+                # Once for the batch: where one answer is wrong, many are.
+                if complaint is not None and not has_complained:
+                    has_complained = True
+                    warn_caller(f"source_sets[{solved_before + i}]: {complaint}", AccuracyWarning)
+            solved_before += len(rows)
             yield rows
 
 

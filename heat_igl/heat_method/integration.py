@@ -20,7 +20,7 @@ _HEAT_ERROR = 0.2
 
 
 def damped_field(
-    domain: Operators, terms: list[SourceTerm], u: FloatArray, t: float | None, fitted: bool
+    domain: Operators, terms: list[SourceTerm], u: FloatArray, t: float | FloatArray | None, fitted: bool
 ) -> tuple[FloatArray, FloatArray]:
     """The field of step 2: directions X (d m, k) and their magnitude (m, k), for heat (n, k) from k terms.
 
@@ -67,7 +67,7 @@ class Integration:
         Step 2 on it, for the field without what is known near the sources.
     poisson : PoissonProblem
         Step 3 on it.
-    t : float, optional
+    t : float or (n_components,) float64, optional
         Time step for `damping`; the field has length 1 if it is None, and where sources are vertices, no distance but
         theirs is known beforehand, as in the paper.
     fitted : bool
@@ -82,7 +82,7 @@ class Integration:
         heat_flow: HeatFlow,
         divergence: NormalizedDivergence,
         poisson: PoissonProblem,
-        t: float | None,
+        t: float | FloatArray | None,
         fitted: bool,
         edges: NearField | None,
     ) -> None:

@@ -34,7 +34,7 @@ class SolverOptions:
 
     t_coef: float | None = None
     t: float | None = None
-    laplacian: Laplacian = "intrinsic-delaunay"
+    laplacian: Laplacian = "auto"
     boundary: Boundary = "neumann"
     magnitude: Magnitude = "auto"
     refine: Refine | None = None
@@ -53,6 +53,17 @@ class SolverOptions:
             raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {self.refine!r}")
         if self.backend not in get_args(Backend):
             raise ValueError(f"backend must be one of {', '.join(map(repr, get_args(Backend)))}, not {self.backend!r}")
+
+        if self.refine is not None and self.laplacian == "intrinsic-delaunay-refined":
+            raise ValueError(
+                f"refine={self.refine!r} unfolds the triangles of the mesh, and takes no more than an order from the "
+                "heat: leave laplacian='intrinsic-delaunay-refined' away"
+            )
+
+    @property
+    def triangulation(self) -> Laplacian:
+        """The `laplacian` for `operators`: where the heat is needed for an order alone, any Delaunay one does."""
+        return "intrinsic-delaunay" if self.laplacian == "auto" and self.refine is not None else self.laplacian
 
     def damps(self, domain: Operators) -> bool:
         """Whether the field is damped where heat arrives from several sides: ``magnitude="auto"`` resolved."""

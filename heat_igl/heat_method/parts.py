@@ -8,8 +8,10 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import scipy.sparse as sp
 
+from heat_igl.heat_method.checking import Checker
 from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.solution import Diagnostics
@@ -20,7 +22,7 @@ from heat_igl.operators import Operators, operators, polygon_operators
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
-from heat_igl.typing import IntArray
+from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding import UnfoldingSolver
 
 __all__ = ["SolverParts", "prepare", "prepare_mesh", "prepare_polygons"]
@@ -44,10 +46,14 @@ class SolverParts:
         Step 1.
     last_steps : Integration or UnfoldingSolver
         Steps 2 and 3, or what takes their place with ``refine``.
-    t_damping : float or None
+    time_steps : (n_components,) float64
+        Time step of each component.
+    t_damping : float, (n_components,) float64 or None
         Time step for `damping`; None for a field of length 1.
     fitted : bool
         Whether the heat flow is fitted to the lengths of edges.
+    checker : Checker or None
+        Checks answers against bounds that need no reference; None where they need no check.
     diagnostics : Diagnostics
         For the user.
     """
@@ -58,8 +64,10 @@ class SolverParts:
     assembler: SourceAssembler
     heat_flow: HeatFlow
     last_steps: Integration | UnfoldingSolver
-    t_damping: float | None
+    time_steps: FloatArray
+    t_damping: float | FloatArray | None
     fitted: bool
+    checker: Checker | None
     diagnostics: Diagnostics
 
     @property
@@ -78,16 +86,16 @@ def prepare_mesh(mesh: Mesh, options: SolverOptions, known: Analysis | None = No
             begun.append(beside.submit(analysis, L, options.backend))
 
         # The order of elimination takes a third of the time and needs no more than the pattern of L.
-        domain = operators(mesh, options.laplacian, analyse if known is None and n_threads() > 1 else None)
+        domain = operators(mesh, options.triangulation, analyse if known is None and n_threads() > 1 else None)
         seconds = time.perf_counter() - start
         known = begun[0].result() if begun else known
     waited = time.perf_counter() - start - seconds
-    return prepare(domain, options, known, seconds, waited)
+    return prepare(domain, options, known, seconds, waited, mesh.V)
 
 
 def prepare_polygons(mesh: PolygonMesh, options: SolverOptions) -> SolverParts:
     """The parts of a solver on polygons; there is one Laplacian on them, so an option for it is refused."""
-    if options.laplacian != "intrinsic-delaunay":
+    if options.laplacian not in ("auto", "intrinsic-delaunay"):
         raise ValueError(
             f"laplacian={options.laplacian!r} chooses a triangulation, but the mesh holds polygons: leave it away, "
             "or pass mesh.triangles"
@@ -103,6 +111,7 @@ def prepare(
     known: Analysis | None = None,
     seconds_operators: float = 0.0,
     seconds_analysis: float = 0.0,
+    V: FloatArray | None = None,
 ) -> SolverParts:
     """The parts of a solver on `domain`: resolve the options, then factor what they ask for.
 
@@ -116,8 +125,14 @@ def prepare(
         An order of elimination, taken if it fits.
     seconds_operators, seconds_analysis : float
         Time spent before, for the diagnostics.
+    V : (n, 3) float64, optional
+        Positions, to check answers against straight lines.
     """
     start = time.perf_counter()
+    if options.refine is not None and domain.n_given < domain.n:
+        raise ValueError(
+            f"refine={options.refine!r} unfolds the triangles of the mesh: pass operators without refinement"
+        )
     damped = options.damps(domain)
     fitted = damped and domain.lengths is not None
     step, requested = time_step(options, domain, fitted)
@@ -133,7 +148,8 @@ def prepare(
     # Both matrices at once: the backends run without the interpreter's lock.
     heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
     factored = time.perf_counter()
-    assembler = SourceAssembler(domain, step, plain=not damped, unfolds=options.refine is not None)
+    unfolds = options.refine is not None
+    assembler = SourceAssembler(domain, step, heat_flow.mean_mass, plain=not damped, unfolds=unfolds)
     last_steps: Integration | UnfoldingSolver
     if options.refine is not None:
         last_steps = UnfoldingSolver(domain, options.refine)
@@ -143,10 +159,11 @@ def prepare(
     triangulation = None if domain.surface is None else domain.surface.triangulation
     factors = heat_flow.factors + [problem.factor for problem in poisson]
     diagnostics = Diagnostics(
-        t=step,
-        t_requested=requested,
+        t=_of_largest(step, domain),
+        t_requested=_of_largest(requested, domain),
         mean_edge_length=domain.mean_edge_length,
         edges_across=domain.longest_distance / domain.mean_edge_length,
+        n_vertices=domain.n,
         n_flips=triangulation.n_flips if triangulation else 0,
         lengthening=triangulation.lengthening if triangulation else 0.0,
         backend=heat_flow.backend,
@@ -156,4 +173,21 @@ def prepare(
         seconds_analysis=seconds_analysis + analysed - start,
         seconds_factorization=factored - analysed,
     )
-    return SolverParts(options, domain, found, assembler, heat_flow, last_steps, t_damping, fitted, diagnostics)
+    return SolverParts(
+        options=options,
+        operators=domain,
+        analysis=found,
+        assembler=assembler,
+        heat_flow=heat_flow,
+        last_steps=last_steps,
+        time_steps=np.broadcast_to(step, domain.n_components),
+        t_damping=t_damping,
+        fitted=fitted,
+        checker=None if options.refine == "unfold" else Checker(domain, V),
+        diagnostics=diagnostics,
+    )
+
+
+def _of_largest(step: float | FloatArray, domain: Operators) -> float:
+    """Of one number for each component, that of the component with most vertices."""
+    return float(step[np.bincount(domain.components).argmax()]) if isinstance(step, np.ndarray) else step

@@ -35,10 +35,11 @@ def drop_overtaken(term: SourceTerm, heat_flow: HeatFlow, n: int) -> SourceTerm:
     delay[term.label] = term.delay
 
     def is_on_time(vertex: IntArray, label: IntArray) -> BoolArray:
-        with np.errstate(divide="ignore"):
-            on_time = np.log(u[vertex]) < np.log(u_at_once[vertex]) - delay[label] + np.log(_OVERTAKEN)
-        # No heat comes to a vertex that no face uses.
-        return np.asarray(on_time | (u_at_once[vertex] == 0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            late = np.log(u[vertex]) >= np.log(u_at_once[vertex]) - delay[label] + np.log(_OVERTAKEN)
+        # No heat comes to a vertex that no face uses. On the triangles of the mesh heat may be negative, and then says
+        # nothing; the first source is never overtaken.
+        return np.asarray(~late | (u_at_once[vertex] == 0) | (delay[label] == 0))
 
     anchors = term.anchors.at(is_on_time(term.anchors.vertex, term.anchors.label))
     return term.restricted(anchors.label, anchors, kept=is_on_time(term.near.vertex, term.near.label))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["Diagnostics", "HeatSolution", "LabelledDistance"]
@@ -24,10 +25,12 @@ class Diagnostics:
         h, of the triangulation that was solved on.
     edges_across : float
         Longest shortest path along edges, in units of h.
+    n_vertices : int
+        Vertices that were solved on: those of the mesh, and those that refinement added.
     n_flips : int
         Edges flipped to make the triangulation intrinsic Delaunay.
     lengthening : float
-        What was added to every edge length because of degenerate triangles; 0 on other meshes.
+        The most that was added to an edge length because of degenerate triangles; 0 on other meshes.
     backend : str
         What holds the factors.
     factor_nonzeros, factor_bytes : int
@@ -35,12 +38,15 @@ class Diagnostics:
     seconds_operators, seconds_analysis, seconds_factorization : float
         Wall-clock time of the stages of the constructor: operators; order of elimination, which begins beside them, as
         far as it takes longer; factors.
+    check : AnswerCheck or None
+        Of a `HeatSolution`, by how much its distance leaves bounds that need no reference. None for the solver.
     """
 
     t: float
     t_requested: float
     mean_edge_length: float
     edges_across: float
+    n_vertices: int
     n_flips: int
     lengthening: float
     backend: str
@@ -49,6 +55,7 @@ class Diagnostics:
     seconds_operators: float
     seconds_analysis: float
     seconds_factorization: float
+    check: AnswerCheck | None = None
 
     @property
     def t_raised(self) -> bool:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
+from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.integration import damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
@@ -16,6 +19,7 @@ from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDis
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators
+from heat_igl.runtime import warn_caller
 from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
 from heat_igl.steps import Boundary
 from heat_igl.typing import ArrayLike, FloatArray
@@ -40,8 +44,11 @@ class HeatMethodSolver(BatchedSolver):
         `magnitude`), else the paper's 1.
     t : float, optional
         Time step as a squared length; overrides `t_coef`.
-    laplacian : {"intrinsic-delaunay", "cotan"}
-        Triangulation to solve on, see `operators`; "cotan" is the paper's. Tetrahedra always keep their own.
+    laplacian : {"auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"}
+        Triangulation to solve on, see `operators`; "cotan" is the paper's. "auto" is the intrinsic Delaunay one where
+        triangles are even, and has more vertices where they are not: `operators` then has more rows than there are
+        answers, the first ones for the vertices of the mesh. With `refine`, "auto" adds no vertices. Tetrahedra always
+        keep their own.
     boundary : {"neumann", "dirichlet", "average"}
         What the heat does at the boundary, see `HeatFlow`.
     magnitude : {"auto", "unit", "damped"}
@@ -89,7 +96,7 @@ class HeatMethodSolver(BatchedSolver):
         *,
         t_coef: float | None = None,
         t: float | None = None,
-        laplacian: Laplacian = "intrinsic-delaunay",
+        laplacian: Laplacian = "auto",
         boundary: Boundary = "neumann",
         magnitude: Magnitude = "auto",
         refine: Refine | None = None,
@@ -130,7 +137,7 @@ class HeatMethodSolver(BatchedSolver):
         n: int | None = None,
         t_coef: float | None = None,
         t: float | None = None,
-        laplacian: Laplacian = "intrinsic-delaunay",
+        laplacian: Laplacian = "auto",
         boundary: Boundary = "neumann",
         magnitude: Magnitude = "auto",
         refine: Refine | None = None,
@@ -158,7 +165,7 @@ class HeatMethodSolver(BatchedSolver):
         """
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, refine, backend)
         start = time.perf_counter()
-        domain = edge_length_operators(F, lengths, n, laplacian)
+        domain = edge_length_operators(F, lengths, n, options.triangulation)
         return cls._of(prepare(domain, options, seconds_operators=time.perf_counter() - start))
 
     def with_vertices(self, V: ArrayLike) -> HeatMethodSolver:
@@ -217,8 +224,13 @@ class HeatMethodSolver(BatchedSolver):
 
     @property
     def t(self) -> float:
-        """The time step in use, a squared length."""
+        """The time step in use, a squared length; of several (`time_steps`), that of the largest component."""
         return self.diagnostics.t
+
+    @property
+    def time_steps(self) -> FloatArray:
+        """The time step of each component, by their labels in ``operators.components``."""
+        return self._parts.time_steps
 
     @property
     def diagnostics(self) -> Diagnostics:
@@ -227,8 +239,8 @@ class HeatMethodSolver(BatchedSolver):
 
     @property
     def n_vertices(self) -> int:
-        """Length of a distance array."""
-        return self.operators.n
+        """Length of a distance array: the vertices of the mesh. The operators may have more."""
+        return self.operators.n_given
 
     @property
     def _n_faces(self) -> int:
@@ -261,39 +273,59 @@ class HeatMethodSolver(BatchedSolver):
         Warns
         -----
         AccuracyWarning
-            If heat underflowed on the way, so that distances beyond are too short.
+            If heat underflowed on the way, so that distances beyond are too short, or if the answer leaves bounds that
+            need no reference by so much that it is wrong (see `AnswerCheck`).
         """
         beyond = checked_cutoff(cutoff)
-        return np.asarray(cut_off(self._distances([self._source_set(sources)])[0], beyond))
+        chosen = self._source_set(sources)
+        (distance,), (complaint,) = self._answers([chosen])
+        _warn(complaint)
+        return np.asarray(cut_off(distance, beyond))
 
     def _source_set(self, sources: Sources) -> SourceSet:
         return source_set(sources, self.n_vertices, self._parts.given_faces)
 
     def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
-        """Distances (k, n) from k sets of sources: the method from end to end."""
+        return self._answers(source_sets)[0]
+
+    def _answers(self, source_sets: list[SourceSet]) -> tuple[FloatArray, list[str | None]]:
+        """Distances (k, n) from k sets of sources, and what is wrong with them: the method from end to end."""
         terms = self._source_terms(source_sets)
-        u = self._heat(terms)
-        return self._distances_from_heat(terms, u)
+        distances = self._distances_from_heat(terms, self._heat(terms))
+        checks = [self._check(*pair) for pair in zip(distances, source_sets, strict=True)]
+        return distances, [None if check is None else check.complaint(self.operators.is_surface) for check in checks]
+
+    def _check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck | None:
+        """Check one answer (n,), and raise it to straight lines where it is far below them.
+
+        A field of length 1 is the paper's method, and its answers are left as they are.
+        """
+        if self._parts.checker is None:
+            return None
+        check = self._parts.checker.check(distance, sources)
+        if check.is_short and self._parts.t_damping is not None:
+            return check._replace(raised=self._parts.checker.raise_to_lines(distance, sources))
+        return check
 
     def _source_terms(self, source_sets: list[SourceSet]) -> list[SourceTerm]:
         """Initial heat of each set, and what is known near it."""
         terms = [self._parts.assembler.term(sources) for sources in source_sets]
         if isinstance(self._parts.last_steps, UnfoldingSolver):
             return terms
-        return [drop_overtaken(term, self._parts.heat_flow, self.n_vertices) for term in terms]
+        return [drop_overtaken(term, self._parts.heat_flow, self.operators.n) for term in terms]
 
     def _heat(self, terms: list[SourceTerm]) -> FloatArray:
-        """Heat (n, k) after the time step: step 1."""
-        return self._parts.heat_flow.solve(right_hand_side(self.n_vertices, terms))
+        """Heat at all vertices of the operators, for k terms: step 1."""
+        return self._parts.heat_flow.solve(right_hand_side(self.operators.n, terms))
 
     def _distances_from_heat(self, terms: list[SourceTerm], u: FloatArray) -> FloatArray:
-        """Distances (k, n) from heat (n, k): steps 2 and 3, or unfolding in the order of the heat."""
+        """Distances (k, n) from the heat of `_heat`: steps 2 and 3, or unfolding in the order of the heat."""
         last_steps = self._parts.last_steps
         if isinstance(last_steps, UnfoldingSolver):
             return last_steps.distances(terms, u)
         divergence = last_steps.divergence(terms, u)
         phi = last_steps.poisson.solve(divergence)
-        return last_steps.pin_levels(terms, phi, u)
+        return last_steps.pin_levels(terms, phi, u)[:, : self.n_vertices]
 
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
         """Distance, and which source is nearest: a geodesic Voronoi diagram.
@@ -311,32 +343,44 @@ class HeatMethodSolver(BatchedSolver):
             but for vertices less than an edge from the border of two cells. With it, they come with the distance.
         """
         beyond = checked_cutoff(cutoff)
-        terms = self._source_terms([self._source_set(sources)])
+        chosen = self._source_set(sources)
+        terms = self._source_terms([chosen])
         u = self._heat(terms)
         if isinstance(self._parts.last_steps, UnfoldingSolver):
             distance, labels = self._parts.last_steps.labelled(terms[0], u[:, 0])
         else:
             distance = self._distances_from_heat(terms, u)[0]
-            labels = warmest_sources(terms[0], self._parts.heat_flow, self.n_vertices)
+            labels = warmest_sources(terms[0], self._parts.heat_flow, self.operators.n)[: self.n_vertices]
+        check = self._check(distance, chosen)
+        _warn(check and check.complaint(self.operators.is_surface))
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
-        terms = self._source_terms([self._source_set(sources)])
+        chosen = self._source_set(sources)
+        terms = self._source_terms([chosen])
         u = self._heat(terms)
         X, magnitude = damped_field(self.operators, terms, u, self._parts.t_damping, self._parts.fitted)
+        distance = self._distances_from_heat(terms, u)[0]
+        check = self._check(distance, chosen)
+        _warn(check and check.complaint(self.operators.is_surface))
         with np.errstate(under="ignore"):
-            heat = u[:, 0] / terms[0].unit / self._parts.heat_flow.mean_mass
+            heat = (u[:, 0] / terms[0].unit / self._parts.heat_flow.mean_mass)[: self.n_vertices]
         return HeatSolution(
             heat=heat,
             direction=np.ascontiguousarray(X[:, 0].reshape(self.operators.dimension, -1).T),
             magnitude=np.ascontiguousarray(magnitude[:, 0]),
-            distance=self._distances_from_heat(terms, u)[0],
+            distance=distance,
             t=self.t,
-            diagnostics=self.diagnostics,
+            diagnostics=replace(self.diagnostics, check=check),
         )
+
+
+def _warn(complaint: str | None) -> None:
+    if complaint is not None:
+        warn_caller(complaint, AccuracyWarning)
 
 
 def heat_method_distance(V: ArrayLike, F: ArrayLike, sources: Sources, **options: Any) -> FloatArray:

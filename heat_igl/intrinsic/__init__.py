@@ -5,20 +5,25 @@ from heat_igl.intrinsic.delaunay import intrinsic_delaunay
 from heat_igl.intrinsic.double_cover import double_cover
 from heat_igl.intrinsic.gluing import from_edge_lengths, intrinsic_triangulation, oriented
 from heat_igl.intrinsic.gradient import intrinsic_gradient
-from heat_igl.intrinsic.history import Flipped, Merged, Turned
+from heat_igl.intrinsic.history import Covered, Flipped, Merged, Refined, Turned
 from heat_igl.intrinsic.layout import apex, corner_angles, lay_out
 from heat_igl.intrinsic.mollification import mollify
+from heat_igl.intrinsic.refinement import delaunay_refinement
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
-from heat_igl.intrinsic.tufted import has_nonmanifold_edges, tufted_cover
+from heat_igl.intrinsic.tufted import closed_cover, has_nonmanifold_edges, tufted_cover
 
 __all__ = [
     "Adjacency",
+    "Covered",
     "Flipped",
     "IntrinsicTriangulation",
     "Merged",
+    "Refined",
     "Turned",
     "apex",
+    "closed_cover",
     "corner_angles",
+    "delaunay_refinement",
     "double_cover",
     "from_edge_lengths",
     "has_nonmanifold_edges",

@@ -50,7 +50,7 @@ def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriang
         triangulation = oriented(triangulation)
         flips = _Flips(triangulation)
         bad = flips.bad(triangulation.edges)
-    most = _MOST_FLIPS_PER_FACE * len(triangulation.F)
+    most = triangulation.n_flips + _MOST_FLIPS_PER_FACE * len(triangulation.F)
     while len(bad) and flips.n_flips < most:
         changed = flips.flip(flips.independent(bad))
         around = (3 * changed[:, None] + np.arange(3)).ravel()
@@ -73,7 +73,7 @@ class _Flips:
         self.F, self.l = start.F.copy(), start.l.copy()
         self.twin, self.aligned = start.twin.copy(), start.aligned.copy()
         self.cotangent, self.rounding = _cotangents(self.l)
-        self.n_flips = 0
+        self.n_flips = start.n_flips
         self.history = list(start.history)
         self._moved_to = np.arange(self.F.size)
         self._best_of_face = np.full(len(self.F), self.F.size)

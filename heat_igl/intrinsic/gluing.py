@@ -69,8 +69,8 @@ def from_edge_lengths(
     twin[a], twin[b] = b, a
     aligned = np.ones(F.size, bool)
     aligned[a] = aligned[b] = half_edge_tail(F, a) == half_edge_head(F, b)
-    lengthening = mollify(lengths)
-    return IntrinsicTriangulation(F, lengths + lengthening, twin, aligned, n, lengthening=lengthening)
+    added = mollify(lengths, F)
+    return IntrinsicTriangulation(F, lengths + added[:, None], twin, aligned, n, lengthening=float(added.max()))
 
 
 def intrinsic_triangulation(mesh: Mesh) -> IntrinsicTriangulation:

@@ -12,9 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.intrinsic.layout import apex
+from heat_igl.kernels import carrying
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Flipped", "Merged", "Turned"]
+__all__ = ["Covered", "Flipped", "Merged", "Refined", "Turned"]
+
+# Faces on the back have the opposite orientation: corners 1 and 2 are swapped.
+BACK_CORNERS = np.array([0, 2, 1])
 
 
 class Merged(NamedTuple):
@@ -56,6 +60,26 @@ class Turned(NamedTuple):
     def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
         """Faces (k,) and barycentric coordinates (k, 3) of points after the change."""
         return faces, np.where(self.turned[faces, None], barycentric[:, ::-1], barycentric)
+
+
+class Covered(NamedTuple):
+    """Faces doubled: face f stays as the front, face m + f is the back, with its corners 1 and 2 swapped.
+
+    Attributes
+    ----------
+    n_faces : int
+        Number m of faces before.
+    """
+
+    n_faces: int
+
+    def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Faces (k,) and barycentric coordinates (k, 3) of points on the front."""
+        return faces, barycentric
+
+    def carry_to_back(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Faces (k,) and barycentric coordinates (k, 3) of the same points on the back."""
+        return faces + self.n_faces, barycentric[:, BACK_CORNERS]
 
 
 class Flipped(NamedTuple):
@@ -105,4 +129,29 @@ class Flipped(NamedTuple):
         barycentric[moved[:, None], corner] = np.stack(
             [np.where(in_first, at_p, at_q), third, np.where(in_first, at_q, at_p)], axis=1
         )
+        return faces, barycentric
+
+
+class Refined(NamedTuple):
+    """Faces split at new vertices and edges flipped, one after another.
+
+    Attributes
+    ----------
+    kind : (k, 3) int64
+        The moves in order: 0, face, first of the two new faces for a split; 1, half-edge, mate for a flip.
+    numbers : (k, 5) float64
+        Barycentric coordinates of the new vertex, or the lengths of `Flipped`.
+    first, following : (m,) int64, (k, 3) int64
+        Where to look for the next move that concerns a face, see `heat_igl.kernels.carrying`.
+    """
+
+    kind: IntArray
+    numbers: FloatArray
+    first: IntArray
+    following: IntArray
+
+    def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Faces (k,) and barycentric coordinates (k, 3) of points after the change."""
+        faces, barycentric = np.array(faces, np.int64), np.array(barycentric, np.float64, order="C")
+        carrying.carry(*self, faces, barycentric)
         return faces, barycentric

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from heat_igl.typing import FloatArray
+import numpy as np
+
+from heat_igl.mesh import connectivity
+from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["mollify"]
 
@@ -10,21 +13,31 @@ __all__ = ["mollify"]
 _MARGIN = 1e-8
 
 
-def mollify(l: FloatArray) -> float:  # noqa: E741
-    """The length to add to all edges so that no triangle is degenerate (Sharp and Crane 2020, section 4.5).
+def mollify(l: FloatArray, F: IntArray) -> FloatArray:  # noqa: E741
+    """The length to add to the edges so that no triangle is degenerate (Sharp and Crane 2020, section 4.5).
 
     Parameters
     ----------
     l : (m, 3) float64
         Edge lengths, opposite each corner.
+    F : (m, 3) int64
+        Faces: each component has its own mean edge length, and its own length to add.
 
     Returns
     -------
-    float
-        The smallest ``e >= 0`` for which the triangle inequalities of ``l + e`` hold by 1e-8 of the mean edge length;
-        exactly 0 where they already do, so that the lengths of a good mesh keep every bit.
+    (m,) float64
+        For each face, the smallest ``e >= 0`` for which the triangle inequalities of ``l + e`` hold in its component by
+        1e-8 of the mean edge length there; exactly 0 where they already do, so that the lengths of a good mesh keep
+        every bit.
     """
     # By columns: sums and maxima over rows of three take ten times as long.
     total = sum(l.T)
-    slack = min(float((total - 2 * side).min()) for side in l.T)
-    return max(0.0, _MARGIN * float(l.mean()) - slack)
+    slack = np.min([total - 2 * side for side in l.T], axis=0)
+    if slack.min() >= _MARGIN * l.max():
+        return np.zeros(len(l))
+    component = connectivity.connected_components(F, int(F.max()) + 1)[F[:, 0]]
+    n_faces = np.maximum(np.bincount(component), 1)
+    least = np.full(len(n_faces), np.inf)
+    np.minimum.at(least, component, slack)
+    mean = np.bincount(component, total) / (3 * n_faces)
+    return np.asarray(np.maximum(0.0, _MARGIN * mean - least)[component])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 
-from heat_igl.intrinsic.history import Flipped, Merged, Turned
+from heat_igl.intrinsic.history import Covered, Flipped, Merged, Refined, Turned
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["IntrinsicTriangulation", "half_edge_head", "half_edge_tail", "next_half_edge", "previous_half_edge"]
@@ -58,8 +58,8 @@ class IntrinsicTriangulation:
     n_flips : int
         Number of edges flipped so far.
     lengthening : float
-        Length that `mollify` added to every edge; 0 unless a triangle was degenerate.
-    history : tuple of Merged, Turned or Flipped
+        Largest length that `mollify` added to an edge; 0 unless a triangle was degenerate.
+    history : tuple of Merged, Turned, Covered, Flipped or Refined
         The changes that led from the faces of the mesh to these faces, in order.
     """
 
@@ -70,7 +70,7 @@ class IntrinsicTriangulation:
     n: int
     n_flips: int = 0
     lengthening: float = 0.0
-    history: tuple[Merged | Turned | Flipped, ...] = ()
+    history: tuple[Merged | Turned | Covered | Flipped | Refined, ...] = ()
 
     @property
     def boundary(self) -> BoolArray:
@@ -103,7 +103,12 @@ class IntrinsicTriangulation:
         """Area (m,) of each triangle, by Heron's formula in Kahan's order."""
         return np.asarray(igl.doublearea(self.l, 0.0) / 2)
 
-    def locate(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
+    @property
+    def is_cover(self) -> bool:
+        """Whether the triangles cover each face of the surface twice."""
+        return any(isinstance(change, Covered) for change in self.history)
+
+    def locate(self, faces: IntArray, barycentric: FloatArray, on_back: bool = False) -> tuple[IntArray, FloatArray]:
         """Points of the mesh, given in faces of the mesh, in these triangles.
 
         Parameters
@@ -112,6 +117,8 @@ class IntrinsicTriangulation:
             Faces that the triangulation was made from.
         barycentric : (k, 3) float64
             Coordinates in them.
+        on_back : bool
+            Of a cover, in the triangles on the back.
 
         Returns
         -------
@@ -121,5 +128,8 @@ class IntrinsicTriangulation:
             Coordinates in it.
         """
         for change in self.history:
-            faces, barycentric = change.carry(faces, barycentric)
+            if on_back and isinstance(change, Covered):
+                faces, barycentric = change.carry_to_back(faces, barycentric)
+            else:
+                faces, barycentric = change.carry(faces, barycentric)
         return faces, barycentric

@@ -8,18 +8,18 @@ The result is a closed oriented surface of triangles, and all its edges can be f
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import igl
 import numpy as np
 
+from heat_igl.intrinsic.history import BACK_CORNERS, Covered
 from heat_igl.intrinsic.mollification import mollify
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.mesh import Mesh, grouping
 from heat_igl.typing import FloatArray
 
-__all__ = ["has_nonmanifold_edges", "tufted_cover"]
-
-# The back of a face has the opposite orientation: corners 1 and 2 are swapped.
-_TURNED = np.array([0, 2, 1])
+__all__ = ["closed_cover", "has_nonmanifold_edges", "tufted_cover"]
 
 
 def has_nonmanifold_edges(mesh: Mesh) -> bool:
@@ -51,7 +51,7 @@ def tufted_cover(mesh: Mesh) -> IntrinsicTriangulation:
     lengths = igl.edge_lengths(mesh.V, F)
     front = np.arange(F.size)
     face, corner = np.divmod(front, 3)
-    back = 3 * (m + face) + _TURNED[corner]
+    back = 3 * (m + face) + BACK_CORNERS[corner]
     edge = mesh.facets.of_face.ravel()
     along = F[face, (corner + 1) % 3] == mesh.facets.vertices[edge, 0]
     # Seen along the edge from its lower to its higher vertex: the copy of the face that faces counterclockwise.
@@ -62,14 +62,49 @@ def tufted_cover(mesh: Mesh) -> IntrinsicTriangulation:
     a, b = counterclockwise[order], clockwise[following]
     twin = np.empty(2 * F.size, np.int64)
     twin[a], twin[b] = b, a
-    lengthening = mollify(lengths)
+    added = mollify(lengths, F)
+    lengths = lengths + added[:, None]
     return IntrinsicTriangulation(
-        F=np.concatenate([F, F[:, _TURNED]]),
-        l=np.concatenate([lengths, lengths[:, _TURNED]]) + lengthening,
+        F=np.concatenate([F, F[:, BACK_CORNERS]]),
+        l=np.concatenate([lengths, lengths[:, BACK_CORNERS]]),
         twin=twin,
         aligned=np.ones(2 * F.size, bool),
         n=mesh.n_vertices,
-        lengthening=lengthening,
+        lengthening=float(added.max()),
+        history=(Covered(m),),
+    )
+
+
+def closed_cover(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
+    """The tufted cover of triangles that meet two by two at their edges, without positions.
+
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        m triangles, no three at an edge; a boundary and faces that are not oriented alike are welcome.
+
+    Returns
+    -------
+    IntrinsicTriangulation
+        As `tufted_cover` makes it: inner edges are glued front to front and back to back, or front to back where the
+        two faces are not aligned, and boundary edges front to back.
+    """
+    F, lengths, m = triangulation.F, triangulation.l, len(triangulation.F)
+    front = np.arange(F.size)
+    back = 3 * (m + front // 3) + BACK_CORNERS[front % 3]
+    inner = triangulation.twin >= 0
+    mate = np.where(inner, triangulation.twin, front)
+    same_side = inner & triangulation.aligned
+    twin = np.empty(2 * F.size, np.int64)
+    twin[front] = np.where(same_side, mate, back[mate])
+    twin[back] = np.where(same_side, back[mate], mate)
+    return replace(
+        triangulation,
+        F=np.concatenate([F, F[:, BACK_CORNERS]]),
+        l=np.concatenate([lengths, lengths[:, BACK_CORNERS]]),
+        twin=twin,
+        aligned=np.ones(2 * F.size, bool),
+        history=(*triangulation.history, Covered(m)),
     )
 
 

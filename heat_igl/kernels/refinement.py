@@ -13,72 +13,43 @@ __all__ = ["refine"]
 
 
 @cython.cclass
-class _Refinement:
-    """A triangulation that grows: rows up to `n_faces` are in use."""
+class _Queue:
+    """Numbers in a binary heap by their keys, the largest first; one of key 0 is not in it."""
 
-    F: cython.longlong[:, ::1]
-    l: cython.double[:, ::1]
-    twin: cython.longlong[::1]
     key: cython.double[::1]
     heap: cython.longlong[::1]
     place: cython.longlong[::1]
-    stack: cython.longlong[::1]
-    kind: cython.longlong[:, ::1]
-    numbers: cython.double[:, ::1]
-    n_faces: cython.longlong
-    n_vertices: cython.longlong
     n_heap: cython.longlong
-    n_moves: cython.longlong
-    n_given: cython.longlong
-    least_angle: cython.double
-    largest_radius: cython.double
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def _shape(self, f: cython.longlong) -> cython.double:
-        """Priority of a triangle: the circumradius if the triangle is bad, else 0."""
-        a: cython.double = self.l[f, 0]
-        b: cython.double = self.l[f, 1]
-        c: cython.double = self.l[f, 2]
-        area: cython.double = _area(a, b, c)
-        if not area > 0.0:
-            return 0.0
-        radius: cython.double = a * b * c / (4.0 * area)
-        if radius > self.largest_radius:
-            return radius
-        shortest: cython.int = 0
-        if self.l[f, 1] < self.l[f, shortest]:
-            shortest = 1
-        if self.l[f, 2] < self.l[f, shortest]:
-            shortest = 2
-        if self.l[f, shortest] >= 2.0 * radius * self.least_angle:
-            return 0.0
-        # The angle at the tip of a sharp cone stays what it is.
-        if self.F[f, shortest] < self.n_given and self._total_angle(3 * f + shortest) < SHARPEST:
-            return 0.0
-        return radius
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def _total_angle(self, corner: cython.longlong) -> cython.double:
-        """Sum of the angles around the vertex at a corner, over the triangles that are glued to one another there."""
-        total: cython.double = 0.0
-        at: cython.longlong = corner
-        while True:
-            f: cython.longlong = at // 3
-            c: cython.int = at % 3
-            i: cython.int = (c + 1) % 3
-            j: cython.int = (c + 2) % 3
-            a: cython.double = self.l[f, c]
-            b: cython.double = self.l[f, i]
-            d: cython.double = self.l[f, j]
-            total += atan2(4.0 * _area(a, b, d), b * b + d * d - a * a)
-            t: cython.longlong = self.twin[3 * f + i]
-            at = 3 * (t // 3) + (t % 3 + 1) % 3
-            if at == corner or total > SHARPEST:
-                return total
+    def _set_key(self, f: cython.longlong, key: cython.double) -> cython.void:
+        """Give f another key: put it in, move it, or take it out."""
+        i: cython.longlong = self.place[f]
+        if i < 0:
+            if key > 0.0:
+                self.key[f] = key
+                self.heap[self.n_heap] = f
+                self.n_heap += 1
+                self._lift(self.n_heap - 1)
+            return
+        if key > 0.0:
+            grows: cython.bint = key > self.key[f]
+            self.key[f] = key
+            if grows:
+                self._lift(i)
+            else:
+                self._sink(i)
+            return
+        self.n_heap -= 1
+        self.place[f] = -1
+        last: cython.longlong = self.heap[self.n_heap]
+        if last != f:
+            self.heap[i] = last
+            self.place[last] = i
+            self._lift(i)
+            self._sink(self.place[last])
 
     @cython.cfunc
     @cython.nogil
@@ -116,6 +87,25 @@ class _Refinement:
         self.heap[i] = f
         self.place[f] = i
 
+
+@cython.cclass
+class _Triangulation(_Queue):
+    """A triangulation that grows, and its bad triangles in the queue: rows up to `n_faces` are in use."""
+
+    F: cython.longlong[:, ::1]
+    l: cython.double[:, ::1]  # noqa: E741 - the literature's name
+    twin: cython.longlong[::1]
+    unit: cython.double[::1]
+    stack: cython.longlong[::1]
+    kind: cython.longlong[:, ::1]
+    numbers: cython.double[:, ::1]
+    n_faces: cython.longlong
+    n_vertices: cython.longlong
+    n_moves: cython.longlong
+    n_given: cython.longlong
+    least_sine: cython.double
+    largest_radius: cython.double
+
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
@@ -126,36 +116,56 @@ class _Refinement:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def _set_key(self, f: cython.longlong, key: cython.double) -> cython.void:
-        i: cython.longlong = self.place[f]
-        if i < 0:
-            if key > 0.0:
-                self.key[f] = key
-                self.heap[self.n_heap] = f
-                self.n_heap += 1
-                self._lift(self.n_heap - 1)
-            return
-        if key > 0.0:
-            grows: cython.bint = key > self.key[f]
-            self.key[f] = key
-            if grows:
-                self._lift(i)
-            else:
-                self._sink(i)
-            return
-        self.n_heap -= 1
-        self.place[f] = -1
-        last: cython.longlong = self.heap[self.n_heap]
-        if last != f:
-            self.heap[i] = last
-            self.place[last] = i
-            self._lift(i)
-            self._sink(self.place[last])
+    def _shape(self, f: cython.longlong) -> cython.double:
+        """Priority of a triangle: the circumradius if the triangle is bad, else 0."""
+        a: cython.double = self.l[f, 0]
+        b: cython.double = self.l[f, 1]
+        c: cython.double = self.l[f, 2]
+        area: cython.double = _area(a, b, c)
+        if not area > 0.0:
+            return 0.0
+        radius: cython.double = a * b * c / (4.0 * area)
+        priority: cython.double = radius / self.unit[f]
+        if priority > self.largest_radius:
+            return priority
+        shortest: cython.int = 0
+        if self.l[f, 1] < self.l[f, shortest]:
+            shortest = 1
+        if self.l[f, 2] < self.l[f, shortest]:
+            shortest = 2
+        if self.l[f, shortest] >= 2.0 * radius * self.least_sine:
+            return 0.0
+        # The angle at the tip of a sharp cone stays what it is.
+        if self.F[f, shortest] < self.n_given and self._total_angle(3 * f + shortest) < SHARPEST:
+            return 0.0
+        return priority
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def _total_angle(self, corner: cython.longlong) -> cython.double:
+        """Sum of the angles around the vertex at a corner, over the triangles that are glued to one another there."""
+        total: cython.double = 0.0
+        at: cython.longlong = corner
+        while True:
+            f: cython.longlong = at // 3
+            c: cython.int = at % 3
+            i: cython.int = (c + 1) % 3
+            j: cython.int = (c + 2) % 3
+            a: cython.double = self.l[f, c]
+            b: cython.double = self.l[f, i]
+            d: cython.double = self.l[f, j]
+            total += atan2(4.0 * _area(a, b, d), b * b + d * d - a * a)
+            t: cython.longlong = self.twin[3 * f + i]
+            at = 3 * (t // 3) + (t % 3 + 1) % 3
+            if at == corner or total > SHARPEST:
+                return total
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
     def _glue(self, h: cython.longlong, t: cython.longlong) -> cython.void:
+        """Make two half-edges twins."""
         self.twin[h] = t
         self.twin[t] = h
 
@@ -175,7 +185,7 @@ class _Refinement:
     @cython.nogil
     @cython.exceptval(check=False)
     def _make_delaunay(self, n_stack: cython.longlong) -> cython.bint:
-        """Flip edges, beginning with those on the stack, until all are Delaunay; false if the room for moves is full."""
+        """Flip edges, beginning with those on the stack, until all are Delaunay; false if there is no more room."""
         while n_stack > 0:
             n_stack -= 1
             h: cython.longlong = self.stack[n_stack]
@@ -218,7 +228,7 @@ class _Refinement:
     @cython.nogil
     @cython.exceptval(check=False)
     def _flip(self, h: cython.longlong, t: cython.longlong) -> cython.void:
-        """Flip the edge ab of f = (p, a, b) and g = (q, b, a): f becomes (p, a, q) and g (q, b, p), in the same places."""
+        """Flip the edge ab of f = (p, a, b) and g = (q, b, a): f becomes (p, a, q) and g becomes (q, b, p)."""
         f: cython.longlong = h // 3
         g: cython.longlong = t // 3
         c: cython.int = h % 3
@@ -260,60 +270,22 @@ class _Refinement:
         self._judge(f)
         self._judge(g)
 
+
+@cython.cclass
+class _Refinement(_Triangulation):
+    """New vertices at circumcenters."""
+
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def _insert(self, f: cython.longlong, u: cython.double, v: cython.double, w: cython.double) -> cython.bint:
-        """Split face f at barycentric coordinates u, v, w; false if there is no more room."""
-        if self.n_moves == self.kind.shape[0]:
-            return False
-        u, v, w = max(u, LEAST), max(v, LEAST), max(w, LEAST)
-        total: cython.double = u + v + w
-        u, v, w = u / total, v / total, w / total
-        a: cython.double = self.l[f, 0]
-        b: cython.double = self.l[f, 1]
-        c: cython.double = self.l[f, 2]
-        # From the new vertex to the corners: |sum of weights times edges|, without coordinates.
-        to_0: cython.double = sqrt(max(v * v * c * c + w * w * b * b + v * w * (c * c + b * b - a * a), 0.0))
-        to_1: cython.double = sqrt(max(u * u * c * c + w * w * a * a + u * w * (c * c + a * a - b * b), 0.0))
-        to_2: cython.double = sqrt(max(u * u * b * b + v * v * a * a + u * v * (b * b + a * a - c * c), 0.0))
-        i: cython.longlong = self._note(0, f, self.n_faces)
-        self.numbers[i, 0], self.numbers[i, 1], self.numbers[i, 2] = u, v, w
-        g: cython.longlong = self.n_faces
-        k: cython.longlong = self.n_faces + 1
-        self.n_faces += 2
-        p: cython.longlong = self.n_vertices
-        self.n_vertices += 1
-        v0: cython.longlong = self.F[f, 0]
-        v1: cython.longlong = self.F[f, 1]
-        v2: cython.longlong = self.F[f, 2]
-        beyond_1: cython.longlong = self.twin[3 * f + 1]
-        beyond_2: cython.longlong = self.twin[3 * f + 2]
-        # f = (p, 1, 2), g = (0, p, 2), k = (0, 1, p): each keeps one side of the old face in its old corner.
-        self.F[f, 0] = p
-        self.F[g, 0], self.F[g, 1], self.F[g, 2] = v0, p, v2
-        self.F[k, 0], self.F[k, 1], self.F[k, 2] = v0, v1, p
-        self.l[f, 1], self.l[f, 2] = to_2, to_1
-        self.l[g, 0], self.l[g, 1], self.l[g, 2] = to_2, b, to_0
-        self.l[k, 0], self.l[k, 1], self.l[k, 2] = to_1, to_0, c
-        # A face may be glued to itself.
-        if beyond_1 == 3 * f + 2:
-            self._glue(3 * g + 1, 3 * k + 2)
-        else:
-            if beyond_1 == 3 * f + 1:
-                beyond_1 = 3 * g + 1
-            if beyond_2 == 3 * f + 2:
-                beyond_2 = 3 * k + 2
-            self._glue(3 * g + 1, beyond_1)
-            self._glue(3 * k + 2, beyond_2)
-        self._glue(3 * f + 1, 3 * g + 0)
-        self._glue(3 * f + 2, 3 * k + 0)
-        self._glue(3 * g + 2, 3 * k + 1)
-        self._judge(f)
-        self._judge(g)
-        self._judge(k)
-        self.stack[0], self.stack[1], self.stack[2] = 3 * f, 3 * g + 1, 3 * k + 2
-        return self._make_delaunay(3)
+    def run(self, most_vertices: cython.longlong) -> cython.void:
+        """Refine until no triangle is bad, there are `most_vertices`, or there is no more room."""
+        f: cython.longlong
+        for f in range(self.n_faces):
+            self._judge(f)
+        while self.n_heap > 0 and self.n_vertices < most_vertices:
+            if not self._split_worst():
+                break
 
     @cython.cfunc
     @cython.nogil
@@ -406,13 +378,58 @@ class _Refinement:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def run(self, most_vertices: cython.longlong) -> cython.void:
-        f: cython.longlong
-        for f in range(self.n_faces):
-            self._judge(f)
-        while self.n_heap > 0 and self.n_vertices < most_vertices:
-            if not self._split_worst():
-                break
+    def _insert(self, f: cython.longlong, u: cython.double, v: cython.double, w: cython.double) -> cython.bint:
+        """Split face f at barycentric coordinates u, v, w; false if there is no more room."""
+        if self.n_moves == self.kind.shape[0]:
+            return False
+        u, v, w = max(u, LEAST), max(v, LEAST), max(w, LEAST)
+        total: cython.double = u + v + w
+        u, v, w = u / total, v / total, w / total
+        a: cython.double = self.l[f, 0]
+        b: cython.double = self.l[f, 1]
+        c: cython.double = self.l[f, 2]
+        # From the new vertex to the corners: |sum of weights times edges|, without coordinates.
+        to_0: cython.double = sqrt(max(v * v * c * c + w * w * b * b + v * w * (c * c + b * b - a * a), 0.0))
+        to_1: cython.double = sqrt(max(u * u * c * c + w * w * a * a + u * w * (c * c + a * a - b * b), 0.0))
+        to_2: cython.double = sqrt(max(u * u * b * b + v * v * a * a + u * v * (b * b + a * a - c * c), 0.0))
+        i: cython.longlong = self._note(0, f, self.n_faces)
+        self.numbers[i, 0], self.numbers[i, 1], self.numbers[i, 2] = u, v, w
+        g: cython.longlong = self.n_faces
+        k: cython.longlong = self.n_faces + 1
+        self.n_faces += 2
+        p: cython.longlong = self.n_vertices
+        self.n_vertices += 1
+        v0: cython.longlong = self.F[f, 0]
+        v1: cython.longlong = self.F[f, 1]
+        v2: cython.longlong = self.F[f, 2]
+        beyond_1: cython.longlong = self.twin[3 * f + 1]
+        beyond_2: cython.longlong = self.twin[3 * f + 2]
+        # f = (p, 1, 2), g = (0, p, 2), k = (0, 1, p): each keeps one side of the old face in its old corner.
+        self.unit[g] = self.unit[k] = self.unit[f]
+        self.F[f, 0] = p
+        self.F[g, 0], self.F[g, 1], self.F[g, 2] = v0, p, v2
+        self.F[k, 0], self.F[k, 1], self.F[k, 2] = v0, v1, p
+        self.l[f, 1], self.l[f, 2] = to_2, to_1
+        self.l[g, 0], self.l[g, 1], self.l[g, 2] = to_2, b, to_0
+        self.l[k, 0], self.l[k, 1], self.l[k, 2] = to_1, to_0, c
+        # A face may be glued to itself.
+        if beyond_1 == 3 * f + 2:
+            self._glue(3 * g + 1, 3 * k + 2)
+        else:
+            if beyond_1 == 3 * f + 1:
+                beyond_1 = 3 * g + 1
+            if beyond_2 == 3 * f + 2:
+                beyond_2 = 3 * k + 2
+            self._glue(3 * g + 1, beyond_1)
+            self._glue(3 * k + 2, beyond_2)
+        self._glue(3 * f + 1, 3 * g + 0)
+        self._glue(3 * f + 2, 3 * k + 0)
+        self._glue(3 * g + 2, 3 * k + 1)
+        self._judge(f)
+        self._judge(g)
+        self._judge(k)
+        self.stack[0], self.stack[1], self.stack[2] = 3 * f, 3 * g + 1, 3 * k + 2
+        return self._make_delaunay(3)
 
 
 @cython.cfunc
@@ -440,11 +457,39 @@ def _foot(base: cython.double, left: cython.double, right: cython.double) -> cyt
     return 0.5 * (base + (left - right) * ((left + right) / base))
 
 
-def refine(F, l, twin, n: cython.longlong, least_angle: cython.double, largest_radius: cython.double, most_vertices):
-    """Refine m triangles without boundary until no circumradius exceeds `largest_radius` and no angle is below
-    `least_angle` (radians), or until there are `most_vertices`.
+def refine(
+    F,
+    l,
+    twin,
+    n: cython.longlong,
+    unit,
+    least_angle: cython.double,
+    largest_radius: cython.double,
+    most_vertices,
+):
+    """Refine triangles without a boundary until none is bad.
 
-    Returns F, l and twin of the result, the number of vertices, and the moves: their kinds (k, 3) and numbers (k, 5).
+    Parameters
+    ----------
+    F, l, twin : (m, 3) int64, (m, 3) float64, (3 m,) int64
+        The triangles, as `IntrinsicTriangulation` has them: intrinsic Delaunay, closed and oriented.
+    n : int
+        Number of vertices.
+    unit : (m,) float64
+        A length for each face, which the faces that are made of it inherit.
+    least_angle : float
+        A triangle with a smaller angle, in radians, is bad.
+    largest_radius : float
+        A triangle with a larger circumradius, in its unit, is bad.
+    most_vertices : int
+        No vertex is added when there are so many.
+
+    Returns
+    -------
+    F, l, twin, n
+        The result.
+    kind, numbers : (k, 3) int64, (k, 5) float64
+        The moves, as `Refined` has them.
     """
     m = len(F)
     most_new = max(int(most_vertices) - int(n), 0)
@@ -454,12 +499,15 @@ def refine(F, l, twin, n: cython.longlong, least_angle: cython.double, largest_r
     glued = np.empty(3 * faces, np.int64)
     corners[:m], lengths[:m], glued[: 3 * m] = F, l, twin
     self.F, self.l, self.twin = corners, lengths, glued
+    units = np.empty(faces)
+    units[:m] = unit
+    self.unit = units
     self.key, self.heap = np.zeros(faces), np.empty(faces, np.int64)
     self.place = np.full(faces, -1)
     self.stack = np.empty(3 * faces + 64, np.int64)
-    self.kind, self.numbers = np.empty((40 * most_new + 64, 3), np.int64), np.empty((40 * most_new + 64, 5))
+    self.kind, self.numbers = np.empty((16 * most_new + 64, 3), np.int64), np.empty((16 * most_new + 64, 5))
     self.n_faces, self.n_vertices, self.n_heap, self.n_moves, self.n_given = m, n, 0, 0, n
-    self.least_angle, self.largest_radius = np.sin(least_angle), largest_radius
+    self.least_sine, self.largest_radius = np.sin(least_angle), largest_radius
     limit: cython.longlong = most_vertices
     with cython.nogil:
         self.run(limit)

@@ -25,6 +25,7 @@ __all__ = [
     "edges",
     "facets",
     "longest_path",
+    "longest_paths",
     "nonmanifold_vertices",
     "shortest_edge_graph",
     "unique_rows",
@@ -166,7 +167,12 @@ def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
 
 
 def longest_path(graph: sp.csr_array, components: IntArray) -> float:
-    """Length of a longest shortest path along edges, over all components.
+    """Length of a longest shortest path along edges, over all components: the largest of `longest_paths`."""
+    return float(longest_paths(graph, components).max())
+
+
+def longest_paths(graph: sp.csr_array, components: IntArray) -> FloatArray:
+    """Length of a longest shortest path along edges in each component.
 
     Two rounds of Dijkstra's algorithm, the second from the farthest vertices of the first: exact on a tree, and a lower
     bound within a few percent on surfaces.
@@ -177,6 +183,11 @@ def longest_path(graph: sp.csr_array, components: IntArray) -> float:
         Edge lengths, each edge stored in one direction or both.
     components : (n,) int64
         Component labels 0, 1, ... of the vertices.
+
+    Returns
+    -------
+    (c,) float64
+        0 for a vertex without edges.
     """
     start = np.unique(components, return_index=True)[1]
     for _ in range(2):
@@ -185,7 +196,7 @@ def longest_path(graph: sp.csr_array, components: IntArray) -> float:
         np.maximum.at(farthest, components, distance)
         among = np.flatnonzero(distance == farthest[components])
         start[components[among]] = among
-    return float(distance.max())
+    return farthest
 
 
 def shortest_edge_graph(edges: IntArray, lengths: FloatArray, n: int) -> sp.csr_array:

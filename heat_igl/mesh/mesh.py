@@ -261,8 +261,13 @@ class Mesh:
 
     @cached_property
     def longest_distance(self) -> float:
-        """Length of a longest shortest path along edges, over all components (see `connectivity.longest_path`)."""
-        return connectivity.longest_path(self.edge_graph, self.components)
+        """Length of a longest shortest path along edges, over all components: the largest of `longest_distances`."""
+        return float(self.longest_distances.max())
+
+    @cached_property
+    def longest_distances(self) -> FloatArray:
+        """Length of a longest shortest path along edges in each component (see `connectivity.longest_paths`)."""
+        return _frozen(connectivity.longest_paths(self.edge_graph, self.components))
 
     def report(self) -> MeshReport:
         """Counts, defects and sizes that bear on a distance computed on the mesh.

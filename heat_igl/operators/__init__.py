@@ -6,6 +6,7 @@ from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check
 from heat_igl.operators.polygons import polygon_operators
 from heat_igl.operators.simplices import cotan_operators
 from heat_igl.operators.speed import speed_operators
+from heat_igl.operators.suitability import is_rough_or_narrow
 from heat_igl.operators.surface import Surface
 from heat_igl.operators.triangles import operators, tufted_operators, unfolding_surface
 
@@ -20,6 +21,7 @@ __all__ = [
     "cotan_operators",
     "edge_length_operators",
     "intrinsic_operators",
+    "is_rough_or_narrow",
     "operators",
     "polygon_operators",
     "speed_operators",

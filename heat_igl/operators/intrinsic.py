@@ -14,10 +14,11 @@ from heat_igl.mesh.mesh import checked_faces
 from heat_igl.operators.elements import TriangleElements
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
 from heat_igl.operators.simplices import longest_sides, padded
+from heat_igl.operators.suitability import fit_for_heat
 from heat_igl.operators.surface import Surface
 from heat_igl.typing import ArrayLike
 
-__all__ = ["edge_length_operators", "intrinsic_operators"]
+__all__ = ["changed_operators", "edge_length_operators", "intrinsic_operators"]
 
 
 def intrinsic_operators(
@@ -32,8 +33,8 @@ def intrinsic_operators(
     triangulation : IntrinsicTriangulation
         The triangles.
     paths : Mesh or Operators, optional
-        Gives the components and the longest path along edges, on the same vertices; without it both are found along
-        the edges of the triangulation.
+        Gives the components and the longest path along edges, on the same vertices or the first of them; without it
+        both are found along the edges of the triangulation.
     on_laplacian : callable, optional
         Called with L as soon as it is known.
     """
@@ -44,13 +45,17 @@ def intrinsic_operators(
     referenced = np.zeros(n, bool)
     referenced[F] = True
     elements = TriangleElements.in_planes(triangulation)
+    components = connectivity.connected_components(F, n) if paths is None or paths.n_vertices < n else paths.components
     if paths is not None:
-        components, longest_distance = paths.components, paths.longest_distance
+        of_given = paths.longest_distances
+        longest = np.zeros(int(components.max()) + 1)
+        longest[components[: paths.n_vertices]] = (
+            paths.longest_distance if of_given is None else of_given[paths.components]
+        )
     else:
-        components = connectivity.connected_components(F, n)
         i, j, length = elements.edge_lengths()
         graph = connectivity.shortest_edge_graph(np.stack([i, j], axis=1), length, n)
-        longest_distance = connectivity.longest_path(graph, components)
+        longest = connectivity.longest_paths(graph, components)
     return Operators(
         L=L,
         M=padded(igl.massmatrix_intrinsic(lengths, F), n),
@@ -61,10 +66,46 @@ def intrinsic_operators(
         components=components,
         boundary=triangulation.boundary,
         referenced=referenced,
-        longest_distance=longest_distance,
+        longest_distance=float(longest.max()),
+        longest_distances=longest,
         lengths=elements,
         surface=Surface(triangulation, faces=None if triangulation.history else triangulation),
     )
+
+
+def changed_operators(
+    triangulation: IntrinsicTriangulation,
+    faces: IntrinsicTriangulation,
+    uncovered: IntrinsicTriangulation,
+    paths: Mesh | Operators,
+    on_laplacian: OnLaplacian | None = None,
+) -> Operators:
+    """The operators on triangles that were made from the faces of a surface by flips, a cover or refinement (d = 2).
+
+    A cover goes over the surface twice, so L, M and the weights are one half of its own: a face of the mesh counts
+    once, and L = D G holds. No weight is negative, not even on the boundary, which the cover does not have; `boundary`
+    is that of the surface.
+
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        The triangles to solve on.
+    faces : IntrinsicTriangulation
+        Those before any flip.
+    uncovered : IntrinsicTriangulation
+        The intrinsic Delaunay triangulation of `faces` on the same vertices.
+    paths, on_laplacian
+        As for `intrinsic_operators`; of a cover, `on_laplacian` gets twice L.
+    """
+    domain = intrinsic_operators(triangulation, paths, on_laplacian)
+    if triangulation is uncovered:
+        return replace(domain, surface=Surface(triangulation, faces))
+    boundary = np.zeros(triangulation.n, bool)
+    boundary[: faces.n] = faces.boundary
+    domain = replace(domain, boundary=boundary, surface=Surface(triangulation, faces, uncovered))
+    if not triangulation.is_cover:
+        return domain
+    return replace(domain, L=domain.L / 2, M=domain.M / 2, weights=domain.weights / 2)
 
 
 def edge_length_operators(
@@ -80,15 +121,15 @@ def edge_length_operators(
         ``lengths[f, c]`` is that of the side of triangle f opposite its corner c.
     n : int, optional
         Number of vertices; one more than the largest in `F` if not given.
-    laplacian : {"intrinsic-delaunay", "cotan"}
-        As for `operators`.
+    laplacian : {"intrinsic-delaunay", "intrinsic-delaunay-refined", "auto", "cotan"}
+        As for `operators`. Where more than two faces meet at an edge, nothing is refined.
 
     Raises
     ------
     MeshError
         If `F` or `lengths` cannot be used.
     ValueError
-        If `laplacian` is neither.
+        If `laplacian` is unknown.
     """
     check_laplacian(laplacian)
     triangles = checked_faces(F, n)
@@ -98,7 +139,10 @@ def edge_length_operators(
     given = intrinsic_operators(faces)
     if laplacian == "cotan":
         return given
-    triangulation = intrinsic_delaunay(faces)
+    uncovered = intrinsic_delaunay(faces)
+    triangulation = uncovered
+    if not (faces.twin == -2).any():
+        triangulation = fit_for_heat(uncovered, laplacian, given.components)
     if triangulation is faces:
         return given
-    return replace(intrinsic_operators(triangulation, given), surface=Surface(triangulation, faces))
+    return changed_operators(triangulation, faces, uncovered, given)

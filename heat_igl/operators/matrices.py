@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +17,7 @@ from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 __all__ = ["Laplacian", "OnLaplacian", "Operators", "check_laplacian", "divergence_matrix", "laplacian_of_gradient"]
 
 # Which triangulation of a triangle mesh the operators belong to.
-Laplacian = Literal["intrinsic-delaunay", "cotan"]
+Laplacian = Literal["auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"]
 
 # Called with L, or a multiple of it, as soon as it is known: the order of elimination needs no more than its pattern.
 OnLaplacian = Callable[[sp.csc_matrix], None]
@@ -26,6 +26,8 @@ OnLaplacian = Callable[[sp.csc_matrix], None]
 @dataclass(frozen=True, eq=False)
 class Operators:
     """The operators of a domain with n vertices and m faces (triangles, or tetrahedra).
+
+    Where refinement has added vertices, they come after those of the mesh, which are the first `n_given`.
 
     Lengths are in the domain's own unit, d is the number of gradient components per face: 3 where faces lie in space,
     2 where each has a plane of its own.
@@ -58,6 +60,8 @@ class Operators:
         Vertices that a face uses; on the others M is 0.
     longest_distance : float
         Length of a longest shortest path along edges; heat has to last that far.
+    longest_distances : (n_components,) float64 or None
+        The same in each component; None for `longest_distance` in all.
     is_surface : bool
         Whether the domain has two dimensions; tetrahedra have three.
     lengths : (n, n) csc_matrix, TriangleElements or None
@@ -81,11 +85,22 @@ class Operators:
     is_surface: bool = True
     lengths: sp.csc_matrix | TriangleElements | None = None
     surface: Surface | None = None
+    longest_distances: FloatArray | None = None
 
     @property
     def n(self) -> int:
         """Number of vertices."""
         return int(self.L.shape[0])
+
+    @property
+    def n_vertices(self) -> int:
+        """The same as n, as for a `Mesh`."""
+        return self.n
+
+    @property
+    def n_given(self) -> int:
+        """Number of vertices of the mesh; n where refinement has added none."""
+        return self.n if self.surface is None or self.surface.faces is None else self.surface.faces.n
 
     @property
     def dimension(self) -> int:
@@ -100,6 +115,39 @@ class Operators:
     def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
         """The value (n,) of each vertex's component, from one for each component."""
         return np.broadcast_to(of_component, self.n) if self.n_components == 1 else of_component[self.components]
+
+    def expand_to_faces(self, of_component: AnyArray) -> AnyArray:
+        """The value (m,) of each face's component, from one for each component."""
+        m = len(self.weights)
+        if self.n_components == 1:
+            return np.broadcast_to(of_component, m)
+        if isinstance(self.gradient, TriangleElements):
+            return of_component[self.components[self.gradient.corners[:, 0]]]
+        component = np.zeros(m, np.int64)
+        component[self.G.indices % m] = np.repeat(self.components, np.diff(self.G.indptr))
+        return of_component[component]
+
+    @cached_property
+    def mean_edge_lengths(self) -> FloatArray:
+        """Mean edge length (n_components,); by the mean mass if edges are not known, and that of all without edges."""
+        if self.n_components == 1:
+            return np.full(1, self.mean_edge_length)
+        edges = self.edge_lengths()
+        if edges is None:
+            scale = np.asarray(self.mean_masses / self.mean_mass) ** (1 / (2 if self.is_surface else 3))
+            return np.asarray(self.mean_edge_length * scale)
+        component = self.components[edges.i]
+        count = np.bincount(component, minlength=self.n_components)
+        total = np.bincount(component, edges.length, self.n_components)
+        return np.where(count > 0, total / np.maximum(count, 1), self.mean_edge_length)
+
+    @cached_property
+    def mean_masses(self) -> FloatArray:
+        """Mean mass (n_components,) of the vertices that a face uses, in each component; that of all where none is."""
+        component = self.components[self.referenced]
+        count = np.bincount(component, minlength=self.n_components)
+        total = np.bincount(component, self.M.diagonal()[self.referenced], self.n_components)
+        return np.where(count > 0, total / np.maximum(count, 1), self.mean_mass)
 
     @cached_property
     def mean_mass(self) -> float:
@@ -140,8 +188,9 @@ class Operators:
 
 def check_laplacian(laplacian: str) -> None:
     """Raise a ValueError if there is no such `Laplacian`."""
-    if laplacian not in ("intrinsic-delaunay", "cotan"):
-        raise ValueError(f"laplacian must be 'intrinsic-delaunay' or 'cotan', not {laplacian!r}")
+    if laplacian not in get_args(Laplacian):
+        *others, last = map(repr, get_args(Laplacian))
+        raise ValueError(f"laplacian must be {', '.join(others)} or {last}, not {laplacian!r}")
 
 
 def divergence_matrix(gradient_rows: sp.csr_matrix, weights: FloatArray) -> sp.csc_matrix:

@@ -70,6 +70,7 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
     _check_mass(M.diagonal(), triangles.referenced)
     graph = sp.csr_array((sides[first], (corners[first], following[first])), shape=(mesh.n_vertices, mesh.n_vertices))
     begin = np.cumsum(mesh.degree) - mesh.degree
+    longest = connectivity.longest_paths(graph, triangles.components)
     return Operators(
         L=L,
         M=M * unit**2,
@@ -80,7 +81,8 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
         components=triangles.components,
         boundary=boundary,
         referenced=triangles.referenced,
-        longest_distance=connectivity.longest_path(graph, triangles.components),
+        longest_distance=float(longest.max()),
+        longest_distances=longest,
         lengths=_chords(mesh.V, L),
     )
 

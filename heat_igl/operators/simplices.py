@@ -82,6 +82,7 @@ def _assembled(
         boundary=mesh.boundary,
         referenced=mesh.referenced,
         longest_distance=mesh.longest_distance,
+        longest_distances=mesh.longest_distances,
         is_surface=not mesh.is_tetrahedral,
         lengths=lengths,
         surface=surface,

@@ -72,6 +72,7 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
         pairs = np.concatenate([F[:, pair] for pair in ([1, 2], [2, 0], [0, 1])])
     p = F.shape[1] - 1
     times = connectivity.shortest_edge_graph(pairs, (lengths / s[:, None]).ravel(order="F"), mesh.n_vertices)
+    longest = connectivity.longest_paths(times, domain.components)
     mass = np.bincount(F.ravel(), corner_mass / np.repeat(s, p + 1) ** p, minlength=mesh.n_vertices)
     G = (sp.diags(np.tile(s, domain.dimension)) @ domain.G).tocsc()
     weights = domain.weights / s**p
@@ -84,7 +85,8 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
         face_sizes=domain.face_sizes / s,
         mean_edge_length=float(times.data.mean()),
         boundary=mesh.boundary,
-        longest_distance=connectivity.longest_path(times, domain.components),
+        longest_distance=float(longest.max()),
+        longest_distances=longest,
         lengths=None,
         surface=None,
     )

@@ -22,7 +22,8 @@ class Surface:
     faces : IntrinsicTriangulation or None
         The triangles before any flip, but each once: points and curves are carried to them. None if not known.
     uncovered : IntrinsicTriangulation or None
-        The surface itself, each face once, where `triangulation` is its tufted cover, which has each face twice.
+        The surface itself, each face once and without added vertices, where `triangulation` is its tufted cover, which
+        has each face twice, or a refinement.
     """
 
     triangulation: IntrinsicTriangulation

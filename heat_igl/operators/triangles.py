@@ -1,4 +1,4 @@
-"""Operators of a mesh: on its intrinsic Delaunay triangulation, its own faces, its tufted cover, or its tetrahedra."""
+"""Operators of a mesh: on its intrinsic Delaunay triangulation, refined or not, its faces, or its tetrahedra."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from heat_igl.intrinsic import (
     tufted_cover,
 )
 from heat_igl.mesh import Mesh, connectivity
-from heat_igl.operators.intrinsic import intrinsic_operators
+from heat_igl.operators.intrinsic import changed_operators, intrinsic_operators
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
 from heat_igl.operators.simplices import cotan_operators, surface_operators
+from heat_igl.operators.suitability import fit_for_heat
 from heat_igl.operators.surface import Surface
 
 __all__ = ["operators", "tufted_operators", "unfolding_surface"]
@@ -31,11 +32,18 @@ def operators(
     ----------
     mesh : Mesh
         Triangles or tetrahedra.
-    laplacian : {"intrinsic-delaunay", "cotan"}
-        On which triangulation of a triangle mesh: its intrinsic Delaunay triangulation, whose inner edges have no
-        negative weight, or the mesh's own faces, as in the paper. Where more than two faces meet at an edge, the
-        former takes faces that are there twice once, and goes by the tufted cover if such edges remain. Tetrahedra
-        always keep their own.
+    laplacian : {"intrinsic-delaunay", "intrinsic-delaunay-refined", "auto", "cotan"}
+        On which triangulation of a triangle mesh. Tetrahedra always keep their own.
+
+        - "intrinsic-delaunay": on the mesh's vertices, no inner edge with a negative weight. Where more than two faces
+          meet at an edge, faces that are there twice are taken once, and if such edges remain, the tufted cover.
+        - "intrinsic-delaunay-refined": with more vertices, until no angle is below 25 degrees (`delaunay_refinement`),
+          at most four times as many and 4000 more; of a surface with a boundary or without an orientation, on the
+          tufted cover. Meshes of fewer than 1000 vertices get about a thousand. `Operators.n_given` are the mesh's.
+        - "auto": refined if triangles with an angle below 20 degrees cover more than 0.3 of the area, if triangles much
+          larger than the mean cover more than 0.55, or if the mesh has fewer than 64 vertices; else the tufted cover if
+          boundary edges have large negative weights; else "intrinsic-delaunay".
+        - "cotan": the mesh's own faces, as in the paper.
     on_laplacian : callable, optional
         Called with L, or a multiple of it, as soon as it is known.
 
@@ -44,34 +52,35 @@ def operators(
     MeshError
         If a tetrahedron has no volume.
     ValueError
-        If `laplacian` is neither.
+        If `laplacian` is none of these.
     """
     check_laplacian(laplacian)
     if mesh.is_tetrahedral:
         return cotan_operators(mesh, on_laplacian)
     history: tuple[Merged, ...] = ()
-    if laplacian == "intrinsic-delaunay" and has_nonmanifold_edges(mesh):
+    if laplacian != "cotan" and has_nonmanifold_edges(mesh):
         # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being manifold.
         mesh, history = _without_duplicates(mesh)
         if has_nonmanifold_edges(mesh):
-            return tufted_operators(mesh, history, on_laplacian)
+            return tufted_operators(mesh, history, on_laplacian, laplacian)
     faces = triangulation = replace(intrinsic_triangulation(mesh), history=history)
-    if laplacian == "intrinsic-delaunay":
-        triangulation = intrinsic_delaunay(faces)
-    surface = Surface(triangulation, faces)
-    if triangulation.n_flips or triangulation.lengthening:
-        return replace(intrinsic_operators(triangulation, mesh, on_laplacian), surface=surface)
-    return surface_operators(mesh, surface, on_laplacian)
+    if laplacian != "cotan":
+        uncovered = intrinsic_delaunay(faces)
+        triangulation = fit_for_heat(uncovered, laplacian, mesh.components)
+        if triangulation is not faces or triangulation.lengthening:
+            return changed_operators(triangulation, faces, uncovered, mesh, on_laplacian)
+    if triangulation.lengthening:
+        return replace(intrinsic_operators(triangulation, mesh, on_laplacian), surface=Surface(triangulation, faces))
+    return surface_operators(mesh, Surface(triangulation, faces), on_laplacian)
 
 
 def tufted_operators(
-    mesh: Mesh, history: tuple[Merged, ...] = (), on_laplacian: OnLaplacian | None = None
+    mesh: Mesh,
+    history: tuple[Merged, ...] = (),
+    on_laplacian: OnLaplacian | None = None,
+    laplacian: Laplacian = "intrinsic-delaunay",
 ) -> Operators:
-    """The operators of any triangle mesh by way of its tufted cover, made intrinsic Delaunay (d = 2).
-
-    The cover goes over the surface twice, so L, M and the weights are one half of its own: a face of the mesh counts
-    once, and L = D G holds. No weight is negative, not even on the boundary, which the cover does not have; `boundary`
-    is that of the mesh.
+    """The operators of any triangle mesh by way of its tufted cover, made intrinsic Delaunay (see `changed_operators`).
 
     Parameters
     ----------
@@ -81,19 +90,14 @@ def tufted_operators(
         How the faces of `mesh` came from those that points refer to.
     on_laplacian : callable, optional
         Called with twice L as soon as it is known.
+    laplacian : {"intrinsic-delaunay", "intrinsic-delaunay-refined", "auto"}
+        Whether the cover is refined, see `operators`.
     """
-    cover = replace(tufted_cover(mesh), history=history)
+    cover = tufted_cover(mesh)
+    triangulation = intrinsic_delaunay(replace(cover, history=(*history, *cover.history)))
+    triangulation = fit_for_heat(triangulation, laplacian, mesh.components)
     faces = replace(intrinsic_triangulation(mesh), history=history)
-    triangulation = intrinsic_delaunay(cover)
-    domain = intrinsic_operators(triangulation, mesh, on_laplacian)
-    return replace(
-        domain,
-        L=domain.L / 2,
-        M=domain.M / 2,
-        weights=domain.weights / 2,
-        boundary=mesh.boundary,
-        surface=Surface(triangulation, faces, uncovered=intrinsic_delaunay(faces)),
-    )
+    return changed_operators(triangulation, faces, intrinsic_delaunay(faces), mesh, on_laplacian)
 
 
 def unfolding_surface(mesh: Mesh) -> Surface:

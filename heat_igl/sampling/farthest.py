@@ -48,7 +48,7 @@ def farthest_cells(solver: HeatMethodSolver | MeshLike, k: int, *, start: ArrayL
     """The Voronoi cells of `farthest_points`, for one query more; arguments and errors as there."""
     solver = as_solver(solver)
     first = vertex_sources(cast(Any, start), solver.n_vertices, "start")
-    referenced = solver.operators.referenced
+    referenced = solver.operators.referenced[: solver.n_vertices]
     used = referenced.copy()
     used[first] = True
     _check_count(k, len(first), int(used.sum()))

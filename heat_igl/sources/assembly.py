@@ -122,8 +122,10 @@ class SourceAssembler:
     ----------
     domain : Operators
         The domain.
-    t : float
+    t : float or (n_components,) float64
         Time step of the heat flow.
+    mass_unit : float or (n,) float64
+        The mean mass by which the heat flow divides.
     plain : bool
         Around source vertices take every distance from heat, as the paper does, and none from edges.
     unfolds : bool
@@ -135,19 +137,36 @@ class SourceAssembler:
         Straight lines along the edges of the triangulation that is solved on.
     """
 
-    def __init__(self, domain: Operators, t: float, plain: bool = False, unfolds: bool = False) -> None:
+    def __init__(
+        self,
+        domain: Operators,
+        t: float | FloatArray,
+        mass_unit: float | FloatArray,
+        plain: bool = False,
+        unfolds: bool = False,
+    ) -> None:
         self._domain, self._t = domain, t
         self._plain, self._unfolds = plain, unfolds
-        self._mass = domain.M.diagonal() / domain.mean_mass
-        # Heat is measured in units of h, so that its gradient has none.
-        self._largest_heat = SOURCE_HEAT * min(domain.mean_edge_length, 1e10)
+        self._mass = domain.M.diagonal() / mass_unit
+        # Of each component, where each has its time step.
+        self._h = domain.mean_edge_lengths if np.ndim(t) else np.full(domain.n_components, domain.mean_edge_length)
         surface = domain.surface
         self.edges = None if surface is None else NearField(surface.triangulation)
         self._faces = None if surface is None or surface.faces is None else NearField(surface.faces)
+        self._visible = self._faces
+        if surface is not None and domain.n_given < domain.n and not surface.triangulation.is_cover:
+            # Added vertices see sources too.
+            self._visible = self.edges
+        # In edges of the mesh: where vertices were added, the operators have shorter ones.
+        self._radius = NEAR_RADIUS
+        if surface is not None and surface.faces is not None and domain.n_given < domain.n:
+            self._radius *= max(1.0, surface.faces.mean_edge_length / domain.mean_edge_length)
         # Triangulations on which the edges are straight lines: one, if none was flipped.
         self._straight = [field for field in (self.edges, self._faces) if field is not None]
         if surface is not None and surface.faces is surface.triangulation:
             self._straight = self._straight[:1]
+        if surface is not None and surface.uncovered is not None and surface.uncovered is not surface.faces:
+            self._straight.append(NearField(surface.uncovered))
 
     def term(self, sources: SourceSet) -> SourceTerm:
         """Initial heat of `sources`, and the distances known around them."""
@@ -166,7 +185,8 @@ class SourceAssembler:
             share=share,
             delay=self._delay(vertex, offset),
             mass=self._mass[vertex],
-            largest_heat=self._largest_heat,
+            # Heat is measured in units of h, so that its gradient has none.
+            largest_heat=SOURCE_HEAT * min(self._h_at(vertex).min(initial=1e10), 1e10),
             # Inside a region of sources there is no heat flow, and phi says nothing.
             anchors=near.at(~np.isin(near.vertex, sources.vertices[~rim])),
             near=near,
@@ -213,7 +233,7 @@ class SourceAssembler:
         more than two faces it is not: the tufted cover leads over it from a face to two of the others alone.
         """
         surface = self._domain.surface
-        if surface is None or self._faces is None:
+        if surface is None or self._faces is None or self._visible is None:
             return _NONE, _NONE
         if sources.on_vertices_alone:
             is_covered = surface.uncovered is not None and not (self._plain or self._unfolds)
@@ -221,27 +241,35 @@ class SourceAssembler:
                 return _NONE, _NONE
         vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         points = sources.points.joined(sources.segments.ends())
-        return self._faces.seeds(points, sources.segments, NEAR_RADIUS * self._domain.mean_edge_length, vertices)
+        radius = self._radius * self._h_at(np.arange(self._visible.triangulation.n))
+        return self._visible.seeds(points, sources.segments, radius, vertices)
 
     def _initial_heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""
         vertices = sources.vertices[rim]
         of_vertices = vertices, np.ones(len(vertices)), sources.vertex_label[rim], sources.vertex_offset[rim]
         surface = self._domain.surface
-        if sources.on_vertices_alone or surface is None or self._faces is None:
+        if sources.on_vertices_alone or surface is None or surface.given_faces is None or self._faces is None:
             return of_vertices
-        h = self._domain.mean_edge_length
+        h = self._h_at(surface.given_faces[sources.segments.faces, 0])
         samples, lengths = self._faces.samples(sources.segments, h * _SPACING)
+        h = self._h_at(surface.given_faces[samples.faces, 0])
         amount = np.concatenate([np.ones(len(sources.points.faces)), lengths / (h * _EDGES_PER_POINT)])
         points = sources.points.joined(samples)
-        faces, barycentric = surface.triangulation.locate(points.faces, points.barycentric)
-        of_points = (
-            surface.triangulation.F[faces].ravel(),
-            (amount[:, None] * barycentric).ravel(),
-            np.repeat(points.label, 3),
-            np.repeat(points.offset, 3),
-        )
-        vertex, share, label, offset = (np.concatenate(pair) for pair in zip(of_vertices, of_points, strict=True))
+        # On a cover, half of the heat goes to the back.
+        sides = (False, True) if surface.triangulation.is_cover else (False,)
+        parts = [of_vertices]
+        for on_back in sides:
+            faces, barycentric = surface.triangulation.locate(points.faces, points.barycentric, on_back)
+            parts.append(
+                (
+                    surface.triangulation.F[faces].ravel(),
+                    (amount[:, None] * barycentric).ravel() / len(sides),
+                    np.repeat(points.label, 3),
+                    np.repeat(points.offset, 3),
+                )
+            )
+        vertex, share, label, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
         used = share > 0
         return vertex[used], share[used], label[used], offset[used]
 
@@ -252,7 +280,12 @@ class SourceAssembler:
         components = self._domain.components
         earliest = np.full(self._domain.n_components, np.inf)
         np.minimum.at(earliest, components[vertex], offset)
-        return np.asarray((offset - earliest[components[vertex]]) / np.sqrt(self._t))
+        t = self._t[components[vertex]] if isinstance(self._t, np.ndarray) else self._t
+        return np.asarray((offset - earliest[components[vertex]]) / np.sqrt(t))
+
+    def _h_at(self, vertex: IntArray) -> FloatArray:
+        """Mean edge length (k,) of the components of some vertices."""
+        return np.asarray(self._h[self._domain.components[vertex]])
 
 
 def take_shorter(distance: FloatArray, seeds: Seeds, error: float, start: FloatArray) -> BoolArray:

@@ -60,7 +60,7 @@ class NearField:
         return self._adjacency.spokes(vertices)
 
     def seeds(
-        self, points: SourcePoints, segments: SourceSegments, radius: float, vertices: Seeds | None = None
+        self, points: SourcePoints, segments: SourceSegments, radius: float | FloatArray, vertices: Seeds | None = None
     ) -> tuple[Seeds, Seeds]:
         """Distance at the vertices that see a source in a straight line.
 
@@ -68,8 +68,8 @@ class NearField:
         ----------
         points, segments : SourcePoints, SourceSegments
             The sources. The ends of segments are no sources by themselves.
-        radius : float
-            Largest distance of interest.
+        radius : float or (n,) float64
+            Largest distance of interest, one or one for each vertex of the triangulation.
         vertices : Seeds, optional
             Vertices that are sources too.
 
@@ -83,6 +83,7 @@ class NearField:
             Corners of the sources' own faces beyond `radius`, where another source may be nearer.
         """
         points, segments = self._carried(points, segments)
+        radius = np.broadcast_to(radius, self.triangulation.n)
         if vertices is not None:
             points = points.joined(self._as_points(vertices))
         from_points, seen_by_points = seen_from_points(points, self._adjacency)
@@ -98,7 +99,7 @@ class NearField:
             ends = self.triangulation.tail(windows.half_edge), self.triangulation.head(windows.half_edge)
             by_corner = np.minimum(*(found.at(vertex) for vertex in ends))
             useful = windows.offset + nearest < by_corner + base[windows.half_edge]
-            windows = windows.at((nearest < radius) & useful)
+            windows = windows.at((nearest < radius[ends[0]]) & useful)
             if not len(windows):
                 break
             windows, seen = cross(windows, self._adjacency)
@@ -106,14 +107,14 @@ class NearField:
         near = self._shortest(found, radius)
         return near, own.at(~np.isin(own.vertex, near.vertex))
 
-    def _shortest(self, found: _Nearest, radius: float) -> Seeds:
+    def _shortest(self, found: _Nearest, radius: FloatArray) -> Seeds:
         """Seeds within `radius`, without the vertices that another reaches along an edge on a shorter path."""
         seeds = found.seeds(radius)
         which, ends, lengths = self.spokes(seeds.vertex)
         beaten = found.at(ends) > (seeds.value[which] + lengths) * (1 + ROUNDING)
         return seeds.at(~np.isin(seeds.vertex, ends[beaten]))
 
-    def samples(self, segments: SourceSegments, spacing: float) -> tuple[SourcePoints, FloatArray]:
+    def samples(self, segments: SourceSegments, spacing: float | FloatArray) -> tuple[SourcePoints, FloatArray]:
         """Points along segments, at most `spacing` apart, and the length of the piece around each.
 
         A point lies in the middle of its piece: there a linear function takes its mean over the piece.
@@ -167,7 +168,7 @@ class _Nearest:
         """The values at some vertices, ``inf`` where there is none yet."""
         return np.asarray(self._value[vertex])
 
-    def seeds(self, radius: float = np.inf) -> Seeds:
+    def seeds(self, radius: float | FloatArray = np.inf) -> Seeds:
         """The vertices within `radius` of their sources, ascending."""
         vertex = np.flatnonzero((self._label >= 0) & (self._value - self._offset <= radius))
         return Seeds(vertex, self._value[vertex], self._label[vertex])

@@ -5,7 +5,7 @@ that factors once, `HeatFlow` and `PoissonProblem`. Fields are arrays (n,) over 
 sides at once; vector fields are stacked by coordinate like the rows of G: (d m,) or (d m, k).
 """
 
-from heat_igl.steps.diffusion import Boundary, HeatFlow, check_boundary, diffuse
+from heat_igl.steps.diffusion import Boundary, HeatFlow, check_boundary, diffuse, mass_unit
 from heat_igl.steps.fitted import fitted_laplacian
 from heat_igl.steps.integration import PoissonProblem, integrate
 from heat_igl.steps.normalization import NormalizedDivergence, damping, normalize
@@ -22,5 +22,6 @@ __all__ = [
     "diffuse",
     "fitted_laplacian",
     "integrate",
+    "mass_unit",
     "normalize",
 ]

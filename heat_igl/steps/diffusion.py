@@ -12,7 +12,7 @@ from heat_igl.steps.fitted import fitted_laplacian
 from heat_igl.steps.pattern import shifted
 from heat_igl.typing import FloatArray
 
-__all__ = ["Boundary", "HeatFlow", "check_boundary", "diffuse"]
+__all__ = ["Boundary", "HeatFlow", "check_boundary", "diffuse", "mass_unit"]
 
 Boundary = Literal["neumann", "dirichlet", "average"]
 
@@ -27,14 +27,14 @@ class HeatFlow:
     """One backward Euler step of heat flow, (M - t L) u = mean_mass * b, factored.
 
     Dividing by the mean vertex mass leaves a matrix without a unit, so that a very large right-hand side `b` overflows
-    in no unit of length.
+    in no unit of length. Where each component has its time step, it is divided by its own mean mass.
 
     Parameters
     ----------
     operators : Operators
         The domain.
-    t : float
-        Time step, a squared length.
+    t : float or (n_components,) float64
+        Time step, a squared length; one for all components, or one for each.
     boundary : {"neumann", "dirichlet", "average"}
         Insulated boundary, boundary held at zero, or the mean of both solutions. Under "dirichlet" heat that is put on
         a boundary vertex stays there as its fixed value.
@@ -50,27 +50,34 @@ class HeatFlow:
     FactorizationError
         If M - t L is not positive definite.
     ValueError
-        If t is not positive or `boundary` is unknown.
+        If t is not positive, if `boundary` is unknown, or if it holds the heat of all vertices.
     """
 
     def __init__(
         self,
         operators: Operators,
-        t: float,
+        t: float | FloatArray,
         boundary: Boundary = "neumann",
         backend: Backend = "auto",
         analysis: Analysis | None = None,
         fitted: bool = False,
     ) -> None:
-        if not (np.isfinite(t) and t > 0):
+        if not (np.isfinite(t).all() and np.min(t) > 0):
             raise ValueError(f"t must be a positive number (a squared length), not {t!r}")
         check_boundary(boundary)
         if not operators.boundary.any():
             boundary = "neumann"
+        inner = operators.referenced & ~operators.boundary
+        if boundary != "neumann" and not inner.any():
+            raise ValueError(
+                f"boundary={boundary!r} holds the heat on the boundary, and every vertex lies there: take "
+                "boundary='neumann', or divide the faces"
+            )
         mass = operators.M.diagonal()
-        self.mean_mass = operators.mean_mass
+        self.mean_mass = mass_unit(operators, t)
         L = fitted_laplacian(operators, t) if fitted else operators.L
-        matrix = shifted(L, -t / self.mean_mass, mass / self.mean_mass)
+        step = operators.expand_to_vertices(t) if isinstance(t, np.ndarray) else t
+        matrix = shifted(L, -step / self.mean_mass, mass / self.mean_mass)
         if analysis is None or not analysis.fits(matrix):
             analysis = analyse(matrix, backend)
         self.t = t
@@ -81,7 +88,7 @@ class HeatFlow:
         if boundary in ("neumann", "average"):
             self._neumann = analysis.factorize(matrix, operators.referenced)
         if boundary in ("dirichlet", "average"):
-            self._dirichlet = analysis.factorize(matrix, operators.referenced & ~operators.boundary)
+            self._dirichlet = analysis.factorize(matrix, inner)
             self._from_boundary = matrix[:, operators.boundary]
             self._boundary_diagonal = matrix.diagonal()[operators.boundary]
             self._on_boundary = operators.boundary
@@ -102,6 +109,11 @@ class HeatFlow:
             u[self._on_boundary] = held
             solutions.append(u)
         return solutions[0] if len(solutions) == 1 else (solutions[0] + solutions[1]) / 2
+
+
+def mass_unit(operators: Operators, t: float | FloatArray) -> float | FloatArray:
+    """The mean mass by which `HeatFlow` divides: a number, or one (n,) for each vertex where each component has a t."""
+    return operators.expand_to_vertices(operators.mean_masses) if np.ndim(t) else operators.mean_mass
 
 
 def diffuse(operators: Operators, u0: FloatArray, t: float, boundary: Boundary = "neumann") -> FloatArray:

@@ -13,7 +13,7 @@ from heat_igl.typing import FloatArray
 __all__ = ["fitted_laplacian"]
 
 
-def fitted_laplacian(domain: Operators, t: float) -> sp.csc_matrix:
+def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
     """L with the weight of each edge fitted to heat that falls like exp(-d / sqrt(t)), however long the edge.
 
     Where (1 - t Laplace) u = 0, the mean of u over a circle of radius r is I0(r / sqrt(t)) times its value in the
@@ -26,7 +26,7 @@ def fitted_laplacian(domain: Operators, t: float) -> sp.csc_matrix:
     ----------
     domain : Operators
         One whose `lengths` are known.
-    t : float
+    t : float or (n_components,) float64
         Time step, a squared length.
 
     Returns
@@ -51,7 +51,7 @@ def fitted_laplacian(domain: Operators, t: float) -> sp.csc_matrix:
     if edges is None:
         raise ValueError("weights are fitted to the lengths of edges, which this domain does not have")
     i, j, length = edges
-    fit = _fit(length / np.sqrt(t))
+    fit = _fit(length / np.sqrt(t[domain.components[i]] if isinstance(t, np.ndarray) else t))
     # Entry 0 takes what L does not couple.
     entry = sp.csc_matrix((np.arange(1, L.nnz + 1, dtype=L.indices.dtype), L.indices, L.indptr), shape=L.shape)
     factor = np.zeros(L.nnz + 1)

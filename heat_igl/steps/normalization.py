@@ -14,6 +14,9 @@ __all__ = ["NormalizedDivergence", "damping", "normalize"]
 # Share of a front's rate of decay from which on a direction is trusted fully; docs/heat_path.md compares values. Fronts
 # of a fitted flow scatter less.
 _FULL_RATE, _FULL_RATE_FITTED = 0.9, 0.95
+# At an insulated boundary a front meets its own mirror image and falls a little more slowly. A fitted flow is damped
+# there from this share of the rate; without damping a regular grid is 1.84 % wrong instead of 1.68.
+_AT_BOUNDARY = 0.8
 
 
 def normalize(operators: Operators, u: FloatArray, of_log: bool = False) -> FloatArray:
@@ -50,7 +53,7 @@ def normalize(operators: Operators, u: FloatArray, of_log: bool = False) -> Floa
 
 
 def damping(
-    operators: Operators, u: FloatArray, t: float, full_rate: float | None = None, fitted: bool = False
+    operators: Operators, u: FloatArray, t: float | FloatArray, full_rate: float | None = None, fitted: bool = False
 ) -> FloatArray:
     """How sure the direction of X is on each face: 1 almost everywhere, less where heat arrives from several sides.
 
@@ -65,7 +68,7 @@ def damping(
         The domain.
     u : (n,) or (n, k) float64
         Heat.
-    t : float
+    t : float or (n_components,) float64
         Time step that the heat was made with.
     full_rate : float, optional
         Share of a front's rate from which on a direction is trusted fully: on a mesh, fronts scatter by some percent
@@ -76,31 +79,37 @@ def damping(
     Returns
     -------
     (m,) or (m, k) float64
-        Factor of X on each face, between 0 and 1; 1 on faces with a corner on the boundary, where an insulated
-        boundary turns the front into its own mirror image, or where u is not positive.
+        Factor of X on each face, between 0 and 1; 1 where u is not positive. On faces with a corner on the boundary,
+        where an insulated boundary turns the front into its own mirror image, a slower rate is enough, and the factor
+        is 1 if the flow is not `fitted`.
     """
     return _share_of_rate(operators, u, _lowest_full_rate(operators, t, fitted, full_rate))
 
 
 def _share_of_rate(operators: Operators, u: FloatArray, full_rate: FloatArray) -> FloatArray:
-    """|grad log u| over `full_rate` (m,), 1 where it is more, on the boundary, and where u is not positive."""
+    """|grad log u| over `full_rate` (m,), 1 where it is more or `full_rate` is 0, and where u is not positive."""
     with np.errstate(divide="ignore", invalid="ignore"):
         gradient = operators.gradient_rows @ np.log(u)
         components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
         rate = np.sqrt(np.einsum("k...,k...->...", components, components))
-    share = (rate.T / full_rate).T
-    share[operators.boundary_faces] = 1
+        share = (rate.T / full_rate).T
     return np.asarray(np.where(share < 1, share, 1.0))
 
 
-def _lowest_full_rate(operators: Operators, t: float, fitted: bool, full_rate: float | None = None) -> FloatArray:
+def _lowest_full_rate(
+    operators: Operators, t: float | FloatArray, fitted: bool, full_rate: float | None = None
+) -> FloatArray:
     """The rate (m,), in e-foldings per length, from which on a direction is trusted fully."""
     if full_rate is None:
         full_rate = _FULL_RATE_FITTED if fitted else _FULL_RATE
-    return full_rate * (np.full(len(operators.weights), t**-0.5) if fitted else _front_rate(operators, t))
+    if isinstance(t, np.ndarray):
+        t = operators.expand_to_faces(t)
+    lowest = full_rate * (np.full(len(operators.weights), t**-0.5) if fitted else _front_rate(operators, t))
+    lowest[operators.boundary_faces] *= _AT_BOUNDARY if fitted else 0.0
+    return np.asarray(lowest)
 
 
-def _front_rate(operators: Operators, t: float) -> FloatArray:
+def _front_rate(operators: Operators, t: float | FloatArray) -> FloatArray:
     """How fast a front of heat falls on each face (m,), in e-foldings per length, where the flow is not fitted."""
     size = operators.face_sizes
     # The same as arccosh(1 + size^2 / (2 t)) / size, which is 0 where size^2 is lost beside 1: faces of no size at all.
@@ -117,7 +126,7 @@ class NormalizedDivergence:
     ----------
     operators : Operators
         The domain.
-    t : float, optional
+    t : float or (n_components,) float64, optional
         Time step that the heat was made with, to have the field damped by `damping`; it has length 1 otherwise.
     order : (n,) int, optional
         All vertices, near ones near each other, to read memory in; that of the mesh may jump, and a pass that waits for
@@ -127,7 +136,11 @@ class NormalizedDivergence:
     """
 
     def __init__(
-        self, operators: Operators, t: float | None = None, order: IntArray | None = None, fitted: bool = False
+        self,
+        operators: Operators,
+        t: float | FloatArray | None = None,
+        order: IntArray | None = None,
+        fitted: bool = False,
     ) -> None:
         self._arguments = operators, t, order, fitted
         self._full_rate: FloatArray | None = None
@@ -135,7 +148,6 @@ class NormalizedDivergence:
         full_rate = None if t is None else _lowest_full_rate(operators, t, fitted)
         if isinstance(operators.gradient, TriangleElements):
             full_rate = np.zeros(len(operators.weights)) if full_rate is None else full_rate
-            full_rate[operators.boundary_faces] = 0.0
             self._kernel = triangles(operators.gradient, operators.weights, full_rate, order)
         else:
             self._full_rate = full_rate
@@ -155,5 +167,7 @@ class NormalizedDivergence:
             of_column[:] = operators.D @ X
         return divergence
 
-    def __reduce__(self) -> tuple[type[NormalizedDivergence], tuple[Operators, float | None, IntArray | None, bool]]:
+    def __reduce__(
+        self,
+    ) -> tuple[type[NormalizedDivergence], tuple[Operators, float | FloatArray | None, IntArray | None, bool]]:
         return NormalizedDivergence, self._arguments

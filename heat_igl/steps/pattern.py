@@ -20,14 +20,20 @@ def analysis(L: sp.csc_matrix, backend: Backend = "auto", known: Analysis | None
     return known if known is not None and known.fits(pattern) else analyse(pattern, backend)
 
 
-def shifted(L: sp.csc_matrix, factor: float, diagonal: FloatArray) -> sp.csc_matrix:
-    """``factor * L + diag(diagonal)`` with the pattern of L and its whole diagonal, zeros stored."""
+def shifted(L: sp.csc_matrix, factor: float | FloatArray, diagonal: FloatArray) -> sp.csc_matrix:
+    """``L * factor + diag(diagonal)`` with the pattern of L and its whole diagonal, zeros stored.
+
+    `factor` is a number, or one (n,) for each column.
+    """
+    if np.ndim(factor):
+        factor = np.repeat(factor, np.diff(L.indptr))
     on_diagonal = np.flatnonzero(L.indices == np.repeat(np.arange(len(diagonal)), np.diff(L.indptr)))
     if len(on_diagonal) == len(diagonal):
         data = factor * L.data
         data[on_diagonal] += diagonal
         return sp.csc_matrix((data, L.indices, L.indptr), shape=L.shape)
     # Vertices that no face uses have no entry of their own.
-    entries, everyone = L.tocoo(), np.arange(len(diagonal))
+    entries = sp.csc_matrix((factor * L.data, L.indices, L.indptr), shape=L.shape).tocoo()
+    everyone = np.arange(len(diagonal))
     rows, columns = np.append(entries.row, everyone), np.append(entries.col, everyone)
-    return sp.csc_matrix((np.append(factor * entries.data, diagonal), (rows, columns)), shape=L.shape)
+    return sp.csc_matrix((np.append(entries.data, diagonal), (rows, columns)), shape=L.shape)

@@ -213,7 +213,7 @@ def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
     vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, np.ldexp(1.0, -exponent))
     if n_across:
         return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-    length += mollify(length.reshape(-1, 3))
+    length += np.repeat(mollify(length.reshape(-1, 3), mesh.F), 3)
     gluing.flip(vertex, twin, ring, length, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * mesh.n_faces)
     first_face = int(np.argmax(vertex == start)) // 3
     return HalfEdges(vertex, twin, ring, aligned, length, mesh.n_vertices, exponent, first_face)

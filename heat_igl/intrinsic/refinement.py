@@ -1,0 +1,82 @@
+"""Intrinsic Delaunay refinement: more vertices, so that no triangle is thin or large."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from heat_igl.intrinsic.history import Refined
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
+from heat_igl.kernels import carrying, refinement
+from heat_igl.typing import FloatArray
+
+__all__ = ["delaunay_refinement"]
+
+# Degrees. The algorithm ends for certain below 30 degrees if no cone is sharp; close to that it makes many triangles.
+_LEAST_ANGLE = 25.0
+
+
+def delaunay_refinement(
+    triangulation: IntrinsicTriangulation,
+    most_vertices: int,
+    *,
+    least_angle: float = _LEAST_ANGLE,
+    largest_radius: float = np.inf,
+    unit: FloatArray | None = None,
+) -> IntrinsicTriangulation:
+    """Add circumcenters as vertices until all angles are large enough (Sharp, Soliman, Crane 2019, section 4.2).
+
+    The triangle with the largest circumcircle among the bad ones is first. Edges are flipped after each new vertex, so
+    that the triangulation stays intrinsic Delaunay. The surface stays the same, and so do its vertices, which come
+    before the new ones.
+
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        Intrinsic Delaunay, closed and oriented: every half-edge has an aligned twin.
+    most_vertices : int
+        No vertex is added when there are so many.
+    least_angle : float
+        Smallest angle in degrees, at most 30. Where the angles around a vertex of the mesh sum to less than 60 degrees,
+        the angles at the vertex are left as they are.
+    largest_radius : float
+        Largest circumradius, in the `unit` of the face.
+    unit : (m,) float64, optional
+        A length for each face, which the faces that are made of it inherit; 1 if not given.
+
+    Returns
+    -------
+    IntrinsicTriangulation
+        `triangulation` itself if no vertex is added.
+
+    Raises
+    ------
+    ValueError
+        If the surface has a boundary or is not oriented.
+    """
+    if (triangulation.twin < 0).any() or not triangulation.aligned.all():
+        raise ValueError("refinement needs a closed and oriented surface: take the tufted cover")
+    F, lengths, twin, n, kind, numbers = refinement.refine(
+        triangulation.F,
+        triangulation.l,
+        triangulation.twin,
+        triangulation.n,
+        np.ones(len(triangulation.F)) if unit is None else unit,
+        np.radians(least_angle),
+        largest_radius,
+        most_vertices,
+    )
+    if n == triangulation.n:
+        return triangulation
+    first, following = carrying.index_moves(kind, len(F))
+    return replace(
+        triangulation,
+        F=F,
+        l=lengths,
+        twin=twin,
+        aligned=np.ones(F.size, bool),
+        n=n,
+        n_flips=triangulation.n_flips + int(kind[:, 0].sum()),
+        history=(*triangulation.history, Refined(kind, numbers, first, following)),
+    )

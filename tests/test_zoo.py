@@ -1,0 +1,222 @@
+"""Heat on shapes that no default was tuned for, and the check that every answer gets."""
+
+from __future__ import annotations
+
+import warnings
+from functools import cache
+
+import numpy as np
+import pytest
+
+from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, OffsetSources, SurfacePoints, shapes, unfolded_distance
+from heat_igl.heat_method.several_sources import drop_overtaken
+from heat_igl.intrinsic import mollify
+from heat_igl.sources import SourceAssembler, source_set
+from heat_igl.typing import FloatArray
+from heat_igl.validation.zoo import SHAPES
+from tests.conftest import load_script
+
+# Mean error in percent over three sources as measured; a bound on either side.
+MEASURED = {
+    "capped cylinder 128": 0.61,
+    "plate": 1.1,
+    "box cube": 0.92,
+    "hull of 12": 0.52,
+    "scattered square 1000": 0.52,
+    "sheared grid by 3": 1.27,
+    "height field coarse": 1.4,
+    "noise 10 times": 3.0,
+    "beams": 3.8,
+    "maze": 0.53,
+    "regular grid": 1.45,
+    "spiky sphere": 2.85,
+    "two spheres 1 to 100": 0.39,
+}
+BY_NAME = {shape.name: shape for shape in SHAPES}
+
+
+@cache
+def made(name: str) -> Mesh:
+    return BY_NAME[name].make()
+
+
+def relative_error(distance: FloatArray, truth: FloatArray) -> float:
+    there = np.isfinite(truth) & (truth > 0)
+    return float(np.mean(np.abs(distance[there] - truth[there]) / truth[there]))
+
+
+def test_a_third_is_held_out() -> None:
+    assert len(SHAPES) >= 60
+    assert 0.3 < np.mean([shape.held_out for shape in SHAPES]) < 0.4
+    assert len(BY_NAME) == len(SHAPES)
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_heat_on_shapes_of_the_zoo(name: str) -> None:
+    table = load_script("zoo_table")
+    mesh = made(name)
+    solver = HeatMethodSolver(mesh)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyWarning)
+        errors = [
+            100 * relative_error(solver.distance(int(source)), unfolded_distance(mesh.V, mesh.F, int(source)))
+            for source in table.seeded_sources(mesh)
+        ]
+    assert 0.6 * MEASURED[name] < np.mean(errors) < 1.3 * MEASURED[name] + 0.1
+
+
+# Components of different size.
+
+
+def beside_a_larger_one(ratio: float) -> tuple[Mesh, int]:
+    """A sphere beside one `ratio` times larger, with a flat triangle of the size of the larger."""
+    sphere = shapes.icosphere(3)
+    n = sphere.n_vertices
+    flat = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]) * ratio + [0, 5 * ratio, 0]
+    V = np.concatenate([sphere.V, sphere.V * ratio + [3 * ratio, 0, 0], flat])
+    return Mesh(V, np.concatenate([sphere.F, sphere.F + n, [[2 * n, 2 * n + 1, 2 * n + 2]]])), n
+
+
+@pytest.mark.parametrize("options", [{}, {"laplacian": "cotan"}, {"magnitude": "unit"}])
+@pytest.mark.parametrize("ratio", [10.0, 1e3, 1e8])
+def test_a_small_component_is_as_accurate_as_alone(ratio: float, options: dict[str, str]) -> None:
+    mesh, n = beside_a_larger_one(ratio)
+    solver = HeatMethodSolver(mesh, **options)  # type: ignore[arg-type]
+    alone = HeatMethodSolver(shapes.icosphere(3), **options)  # type: ignore[arg-type]
+    assert np.abs(solver.distance(0)[:n] - alone.distance(0)).max() < 1e-9
+    assert np.abs(solver.distance(n)[n : 2 * n] / ratio - alone.distance(0)).max() < 1e-9
+    small, large = solver.time_steps[:2]
+    assert large / small == pytest.approx(ratio**2)
+    point = SurfacePoints([5], [[0.2, 0.3, 0.5]])
+    assert np.abs(solver.distance(point)[:n] - alone.distance(point)).max() < 1e-9
+
+
+def test_one_time_step_that_is_asked_for_is_that_of_all_components() -> None:
+    mesh, _ = beside_a_larger_one(3.0)
+    assert (HeatMethodSolver(mesh, t=0.01).time_steps == 0.01).all()
+
+
+def test_a_small_component_is_not_mollified() -> None:
+    small, flat = np.array([3.0, 4.0, 5.0]) * 1e-9, np.array([1.0, 1.0, 2.0])
+    added = mollify(np.stack([small, flat]), np.array([[0, 1, 2], [3, 4, 5]]))
+    assert added[0] == 0
+    assert 0 < added[1] < 1e-7
+
+
+# The check.
+
+
+def thin_rectangle() -> Mesh:
+    """Sheared so far that most edges have negative weights: the method of the paper is far off."""
+    flat = shapes.grid(20)
+    return Mesh(flat.V @ np.array([[1.0, 0, 0], [3, 1, 0], [0, 0, 1]]), flat.F)
+
+
+def test_a_wrong_answer_warns_and_is_raised_to_straight_lines() -> None:
+    mesh = thin_rectangle()
+    lines = np.linalg.norm(mesh.V - mesh.V[210], axis=1)
+    solver = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay")
+    with pytest.warns(
+        AccuracyWarning, match=r"at least \d+\.\d % too short on average, .* most at vertex \d+; use ref"
+    ):
+        distance = solver.distance(210)
+    assert (distance >= lines - 1e-12).all()
+    with pytest.warns(AccuracyWarning, match="too short"):
+        check = solver.solve(210).diagnostics.check
+    assert check is not None
+    assert check.shortfall > 0.1
+    assert check.raised
+    # The paper's method keeps its answer.
+    paper = HeatMethodSolver(mesh, laplacian="cotan")
+    with pytest.warns(AccuracyWarning, match="too short"):
+        assert np.mean(paper.distance(210) < 0.9 * lines) > 0.2
+    # Nothing is known about lines without positions.
+    unchecked = HeatMethodSolver.from_operators(solver.operators).solve(210)
+    assert unchecked.diagnostics.check is not None
+    assert np.isnan(unchecked.diagnostics.check.shortfall)
+    assert np.mean(unchecked.distance < 0.9 * lines) > 0.2
+
+
+def test_a_batch_warns_once() -> None:
+    solver = HeatMethodSolver(thin_rectangle(), laplacian="cotan")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        solver.distances(list(range(100, 130)))
+    assert len(caught) == 1
+    assert str(caught[0].message).startswith("source_sets[0]: heat gave")
+    assert caught[0].filename == __file__
+
+
+def test_a_good_answer_is_left_alone() -> None:
+    mesh = shapes.icosphere(3)
+    solution = HeatMethodSolver(mesh).solve(0)
+    check = solution.diagnostics.check
+    assert check is not None
+    assert 0 <= check.shortfall < 0.005
+    assert check.steepness < 0.01
+    assert check.largest_shortfall < 0.02
+    below = np.linalg.norm(mesh.V - mesh.V[0], axis=1) - solution.distance
+    # The check looks at some vertices only, and takes the largest distance from these.
+    assert check.largest_shortfall * solution.distance.max() <= 1.1 * below.max()
+
+
+def test_the_check_measures_from_where_distance_begins() -> None:
+    solver = HeatMethodSolver(thin_rectangle(), laplacian="cotan")
+    with pytest.warns(AccuracyWarning, match="too short"):
+        plain = solver.distance(210)
+    with pytest.warns(AccuracyWarning, match="too short"):
+        late = solver.distance(OffsetSources(210, 1e5))
+    assert np.abs(late - 1e5 - plain).max() < 1e-6
+
+
+def test_many_sources_are_checked_too() -> None:
+    mesh = thin_rectangle()
+    sources = np.flatnonzero(mesh.V[:, 1] == 0)
+    repeated = np.concatenate([sources, np.flatnonzero(mesh.V[:, 1] == 0.05)])
+    assert len(repeated) > 32
+    solver = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyWarning)
+        distance = solver.distance(repeated)
+    lines = np.maximum(mesh.V[:, 1] - 0.05, 0)
+    assert (distance >= lines - 1e-12).all()
+
+
+# Options that cannot be fulfilled.
+
+TRIANGLE = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+
+
+@pytest.mark.parametrize("boundary", ["dirichlet", "average"])
+def test_a_boundary_of_all_vertices_cannot_be_held(boundary: str) -> None:
+    with pytest.raises(ValueError, match=f"boundary='{boundary}' holds the heat .* every vertex lies there: take"):
+        HeatMethodSolver(TRIANGLE, boundary=boundary, laplacian="intrinsic-delaunay")  # type: ignore[arg-type]
+    # Refined, it has vertices inside.
+    assert HeatMethodSolver(TRIANGLE, boundary=boundary).distance(0).tolist() == [0, 1, 1]  # type: ignore[arg-type]
+
+
+def test_half_precision_is_refused() -> None:
+    solver = HeatMethodSolver(shapes.icosphere(1))
+    with pytest.raises(ValueError, match=r"out must be an array of float64 or float32 .* not float16"):
+        solver.distances([0], out=np.empty((1, 42), np.float16))
+    assert solver.distances([0], out=np.empty((1, 42), np.float32)).max() > 2
+
+
+class NegativeHeat:
+    """A heat flow on obtuse triangles: heat at the sources is below 0, or many times what it should be."""
+
+    def __init__(self, *heat: float) -> None:
+        self.heat = heat
+
+    def solve(self, b: FloatArray) -> FloatArray:
+        return np.broadcast_to(np.array(self.heat), b.shape).copy()
+
+
+@pytest.mark.parametrize("heat", [(-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (1e9, 1.0)])
+def test_the_first_source_is_never_overtaken(heat: tuple[float, float]) -> None:
+    domain = HeatMethodSolver(shapes.icosphere(2), laplacian="cotan").operators
+    assembler = SourceAssembler(domain, 0.1, domain.mean_mass)
+    sources = source_set(OffsetSources([3, 80], [0.0, 0.4]), domain.n, None)
+    term = drop_overtaken(assembler.term(sources), NegativeHeat(*heat), domain.n)  # type: ignore[arg-type]
+    assert 3 in term.anchors.vertex
+    assert 3 in term.near.vertex
