@@ -458,7 +458,14 @@ def _foot(base: cython.double, left: cython.double, right: cython.double) -> cyt
 
 
 def refine(
-    F, l, twin, n: cython.longlong, unit, least_angle: cython.double, largest_radius: cython.double, most_vertices  # noqa: E741
+    F,
+    l,
+    twin,
+    n: cython.longlong,
+    unit,
+    least_angle: cython.double,
+    largest_radius: cython.double,
+    most_vertices,  # noqa: E741
 ):
     """Refine triangles without a boundary until none is bad.
 
