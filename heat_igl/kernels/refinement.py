@@ -459,13 +459,13 @@ def _foot(base: cython.double, left: cython.double, right: cython.double) -> cyt
 
 def refine(
     F,
-    l,
+    l,  # noqa: E741
     twin,
     n: cython.longlong,
     unit,
     least_angle: cython.double,
     largest_radius: cython.double,
-    most_vertices,  # noqa: E741
+    most_vertices,
 ):
     """Refine triangles without a boundary until none is bad.
 
