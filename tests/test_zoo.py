@@ -130,6 +130,10 @@ def test_a_wrong_answer_warns_and_is_raised_to_straight_lines() -> None:
     paper = HeatMethodSolver(mesh, laplacian="cotan")
     with pytest.warns(AccuracyWarning, match="too short"):
         assert np.mean(paper.distance(210) < 0.9 * lines) > 0.2
+    # So does a time step that was asked for, which may be meant to smooth.
+    smooth = HeatMethodSolver(mesh, t_coef=2000)
+    with pytest.warns(AccuracyWarning, match="too short"):
+        assert np.mean(smooth.distance(210) < 0.9 * lines) > 0.2
     # Nothing is known about lines without positions.
     unchecked = HeatMethodSolver.from_operators(solver.operators).solve(210)
     assert unchecked.diagnostics.check is not None

@@ -20,8 +20,8 @@ _RAISED = 0.005
 _SHORT_ON_AVERAGE, _SHORT_AT_WORST, _TOO_STEEP = 0.05, 0.06, 0.025
 # Of tetrahedra, on which heat is less accurate: good ones of a box reach 0.05.
 _SHORT_IN_VOLUMES, _WORST_IN_VOLUMES = 0.1, 0.2
-# Edges and vertices that are looked at: a share of all, so that the check takes a few percent of a query.
-_MOST_SAMPLES, _FEWEST_SAMPLES = 2000, 256
+# Vertices and edges that are looked at, so that the check takes a few percent of a query.
+_MOST_VERTICES, _MOST_EDGES = 2000, 1000
 # Lines from many sources to fewer vertices.
 _MOST_LINES = 16000
 # With more sources, a tree finds the nearest sooner than a loop over all.
@@ -104,14 +104,14 @@ class Checker:
         # A copy: the positions of a mesh are read-only, which kernels do not take.
         self._V = None if V is None else np.array(V, np.float64, order="C")
         self._F = None if domain.surface is None else domain.surface.given_faces
-        vertices = _sample(np.flatnonzero(domain.referenced[: domain.n_given]))
+        vertices = _sample(np.flatnonzero(domain.referenced[: domain.n_given]), _MOST_VERTICES)
         self._vertices = vertices
         self._positions = None if V is None else np.ascontiguousarray(V[vertices])
         faces = None if domain.surface is None else domain.surface.faces
         nowhere = np.empty(0, np.int64)
         self._i, self._j, self._length = nowhere, nowhere, np.empty(0)
         if faces is not None:
-            edges = _sample(faces.edges)
+            edges = _sample(faces.edges, _MOST_EDGES)
             self._i, self._j, self._length = faces.tail(edges), faces.head(edges), faces.l.ravel()[edges]
 
     def check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck:
@@ -165,7 +165,6 @@ class Checker:
         return np.ascontiguousarray(positions), np.ascontiguousarray(offsets, np.float64)
 
 
-def _sample(items: IntArray) -> IntArray:
-    """Every item, or some of many, evenly."""
-    wanted = min(max(len(items) // 4, _FEWEST_SAMPLES), _MOST_SAMPLES)
-    return np.ascontiguousarray(items[:: len(items) // wanted + 1])
+def _sample(items: IntArray, most: int) -> IntArray:
+    """Every item, or some of more than `most`, evenly."""
+    return np.ascontiguousarray(items[:: -(-len(items) // most)]) if len(items) else items

@@ -65,6 +65,11 @@ class SolverOptions:
         """The `laplacian` for `operators`: where the heat is needed for an order alone, any Delaunay one does."""
         return "intrinsic-delaunay" if self.laplacian == "auto" and self.refine is not None else self.laplacian
 
+    @property
+    def default_time_step(self) -> bool:
+        """Whether the time step is left to the solver."""
+        return self.t_coef is None and self.t is None
+
     def damps(self, domain: Operators) -> bool:
         """Whether the field is damped where heat arrives from several sides: ``magnitude="auto"`` resolved."""
         if self.magnitude == "auto":

@@ -298,12 +298,13 @@ class HeatMethodSolver(BatchedSolver):
     def _check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck | None:
         """Check one answer (n,), and raise it to straight lines where it is far below them.
 
-        A field of length 1 is the paper's method, and its answers are left as they are.
+        A field of length 1 is the paper's method, and a time step that was asked for may be meant to smooth: their
+        answers are left as they are.
         """
         if self._parts.checker is None:
             return None
         check = self._parts.checker.check(distance, sources)
-        if check.is_short and self._parts.t_damping is not None:
+        if check.is_short and self._parts.t_damping is not None and self._parts.options.default_time_step:
             return check._replace(raised=self._parts.checker.raise_to_lines(distance, sources))
         return check
 

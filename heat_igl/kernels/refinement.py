@@ -459,7 +459,7 @@ def _foot(base: cython.double, left: cython.double, right: cython.double) -> cyt
 
 def refine(
     F,
-    l,
+    l,  # noqa: E741
     twin,
     n: cython.longlong,
     unit,
