@@ -201,7 +201,10 @@ class SourceAssembler:
         that is then normalized to length 1 and integrated.
         """
         vertices = sources.vertices
-        everyone = np.ones(len(vertices), bool)
+        # From a vertex that no face uses no heat goes anywhere.
+        everyone = self._domain.referenced[vertices]
+        if not everyone.any():
+            everyone = np.ones(len(vertices), bool)
         if len(vertices) < 2 or np.ptp(sources.vertex_offset) > 0:
             return everyone
         is_source = np.zeros(self._domain.n, bool)
