@@ -88,9 +88,9 @@ def test_scale_with_other_boundaries(boundary):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_isometric_copies_in_one_mesh(kind):
-    """A second component changes nothing on the first (with an explicit t, as h is the mean over both)."""
+    """A second component changes nothing on the first."""
     mesh = MESHES[kind]
     both = Mesh(np.vstack([mesh.V, mesh.V + 10]), np.vstack([mesh.F, mesh.F + mesh.n_vertices]))
-    found = HeatMethodSolver(both, t=HeatMethodSolver(mesh).t).distance([3, 3 + mesh.n_vertices])
+    found = HeatMethodSolver(both).distance([3, 3 + mesh.n_vertices])
     assert_same(found[: mesh.n_vertices], kind)
     assert_same(found[mesh.n_vertices :], kind)
