@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from importlib.util import find_spec
 from typing import Literal, get_args
 
 import numpy as np
@@ -11,7 +9,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.heat_method.batches import checked_cutoff, cut_off
 from heat_igl.heat_method.solver import HeatMethodSolver
-from heat_igl.mesh import Mesh, MeshLike, as_mesh, as_simplices
+from heat_igl.mesh import MeshLike, as_mesh, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import distance_from_scratch
@@ -19,9 +17,6 @@ from heat_igl.unfolding import distance_from_scratch
 __all__ = ["DistanceMethod", "geodesic_distance"]
 
 DistanceMethod = Literal["unfold", "sweep", "heat", "exact"]
-
-# The module of exact windows, and its function of V, F and source vertices.
-_EXACT = "heat_igl.unfolding.exact", "exact_distance"
 
 
 def geodesic_distance(
@@ -45,7 +40,8 @@ def geodesic_distance(
         "unfold" follows straight lines through strips of triangles: near-exact, see `unfolded_distance`. "sweep"
         unfolds two triangles at a time. Both go through the vertices in the order of Dijkstra's algorithm; polygons are
         cut into triangles. "heat" is `HeatMethodSolver` with its defaults, the only one for tetrahedra; on polygons it
-        takes `polygon_operators`. "exact" is the polyhedral distance.
+        takes `polygon_operators`. "exact" is the polyhedral distance by windows, and ends the search at the cutoff; curves
+        stand for dense points, see `UnfoldingSolver`.
     cutoff : float, optional
         Distances beyond this are ``inf``.
 
@@ -86,18 +82,7 @@ def geodesic_distance(
     if triangles.is_tetrahedral:
         raise MeshError(f'method={method!r} needs triangles, and the mesh holds tetrahedra: take method="heat"')
     if method == "exact":
-        return _exact(triangles, sources, beyond)
+        # The search ends at the cutoff; points near it, whose straight lines are known, may lie beyond.
+        farthest = np.inf if beyond is None else beyond
+        return np.asarray(cut_off(distance_from_scratch(triangles, sources, method, cutoff=farthest), beyond))
     return np.asarray(cut_off(distance_from_scratch(triangles, sources, method), beyond))
-
-
-def _exact(mesh: Mesh, sources: Sources, cutoff: float | None) -> FloatArray:
-    module, name = _EXACT
-    if find_spec(module) is None:
-        raise ValueError(
-            'method="exact" is not part of this version: take method="unfold", or heat_igl.reference.exact, which '
-            "calls other libraries"
-        )
-    distance: FloatArray = getattr(import_module(module), name)(
-        mesh.V, mesh.F, sources, cutoff=np.inf if cutoff is None else cutoff
-    )
-    return distance

@@ -58,7 +58,7 @@ def operators(
     faces = triangulation = replace(intrinsic_triangulation(mesh), history=history)
     if laplacian == "intrinsic-delaunay":
         triangulation = intrinsic_delaunay(faces)
-    surface = Surface(triangulation, faces)
+    surface = Surface(triangulation, faces, V=mesh.V)
     if triangulation.n_flips or triangulation.lengthening:
         return replace(intrinsic_operators(triangulation, mesh, on_laplacian), surface=surface)
     return surface_operators(mesh, surface, on_laplacian)
@@ -92,7 +92,7 @@ def tufted_operators(
         M=domain.M / 2,
         weights=domain.weights / 2,
         boundary=mesh.boundary,
-        surface=Surface(triangulation, faces, uncovered=intrinsic_delaunay(faces)),
+        surface=Surface(triangulation, faces, uncovered=intrinsic_delaunay(faces), V=mesh.V),
     )
 
 
@@ -102,7 +102,7 @@ def unfolding_surface(mesh: Mesh) -> Surface:
     if has_nonmanifold_edges(mesh):
         mesh, history = _without_duplicates(mesh)
     faces = replace(intrinsic_triangulation(mesh), history=history)
-    return Surface(intrinsic_delaunay(faces), faces)
+    return Surface(intrinsic_delaunay(faces), faces, V=mesh.V)
 
 
 def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Merged, ...]]:
