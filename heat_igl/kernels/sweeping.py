@@ -216,9 +216,7 @@ class _Sweep:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def between_cells(
-        self, k: cython.int, below: cython.double, source: cython.pointer[cython.int]
-    ) -> cython.double:
+    def between_cells(self, k: cython.int, below: cython.double, source: cython.pointer[cython.int]) -> cython.double:
         """Distance across the triangle left of spoke k, whose ends are measured from different sources.
 
         As one of them knows its source together with the corner beyond, if that is measured from the same. `source` is

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from heat_igl.intrinsic import IntrinsicTriangulation
+from heat_igl.kernels import bounds as kernels
 from heat_igl.operators import Surface
 from heat_igl.sources import SourcePoints, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -16,6 +17,7 @@ __all__ = ["Bounds"]
 
 # Less than this fraction is rounding.
 _ROUNDING = 1e-12
+_NO_LABELS = np.empty(0, np.int64)
 
 
 class Bounds:
@@ -31,36 +33,23 @@ class Bounds:
         self._surface = surface
 
     @cached_property
-    def _edges(self) -> tuple[AnyArray, AnyArray, FloatArray]:
-        given, solved = self._surface.faces, self._surface.unfolding
-        triangulations = [solved] if given is None or given is solved else [solved, given]
-        sides = [_sides(triangulation) for triangulation in triangulations]
-        i, j, length = (np.concatenate(column) for column in zip(*sides, strict=True))
-        return i, j, length
+    def _edges(self) -> tuple[AnyArray, FloatArray]:
+        """Ends (e, 2) and lengths (e,) of the edges unfolded in, and of given ones that were flipped."""
+        ends, length = _sides(self._surface.unfolding)
+        given = self._surface.faces
+        if given is not None and self._surface.unfolding.n_flips:
+            others, their_length = _sides(given)
+            known = np.sort(_keys(ends))
+            keys = _keys(others)
+            at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
+            is_flipped = known[at] != keys
+            ends = np.concatenate([ends, others[is_flipped]])
+            length = np.concatenate([length, their_length[is_flipped]])
+        return ends, length
 
     def shorten(self, distance: FloatArray, labels: IntArray | None = None) -> None:
         """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them."""
-        i, j, length = self._edges
-        a, b = distance[i], distance[j]
-        # With a finite distance at one end only, the other end is on another component, and none is.
-        with np.errstate(invalid="ignore"):
-            is_wrong = np.abs(a - b) > length + _ROUNDING * np.minimum(a, b)
-        while is_wrong.any():
-            # The same edge in both directions: what was wrong, and what that changes.
-            tail, head, span = i[is_wrong], j[is_wrong], length[is_wrong]
-            swapped = distance[tail] > distance[head]
-            tail, head = np.where(swapped, head, tail), np.where(swapped, tail, head)
-            shorter = distance[tail] + span
-            order = np.lexsort((shorter, head))
-            head, tail, shorter = head[order], tail[order], shorter[order]
-            first = np.flatnonzero(np.append(True, head[1:] != head[:-1]))
-            head, tail, shorter = head[first], tail[first], shorter[first]
-            distance[head] = np.minimum(distance[head], shorter)
-            if labels is not None:
-                labels[head] = labels[tail]
-            a, b = distance[i], distance[j]
-            with np.errstate(invalid="ignore"):
-                is_wrong = np.abs(a - b) > length + _ROUNDING * np.minimum(a, b)
+        kernels.shorten(*self._edges, distance, _NO_LABELS if labels is None else labels)
 
     def lengthen(self, distance: FloatArray, sources: SourceSet, points: SourcePoints) -> None:
         """Raise distances (n,) to the straight lines from the nearest source, in place.
@@ -76,14 +65,21 @@ class Bounds:
             inside = np.einsum("pc,pcx->px", points.barycentric, V[F[points.faces]])
             places = np.concatenate([places, inside])
         if len(places) == 1:
-            straight = np.linalg.norm(V - places[0], axis=1)
+            kernels.lengthen(V, places[0], distance)
         else:
             straight = np.asarray(KDTree(places).query(V)[0])
-        np.maximum(distance, straight * (1 - _ROUNDING), out=distance)
+            np.maximum(distance, straight * (1 - _ROUNDING), out=distance)
 
 
-def _sides(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, AnyArray, FloatArray]:
-    """Ends and lengths of edges, each once."""
+def _sides(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, FloatArray]:
+    """Ends (e, 2), the smaller vertex first, and lengths (e,) of edges, each once."""
     twin = triangulation.twin
     half_edges = np.flatnonzero((twin < 0) | (np.arange(len(twin)) < twin))
-    return triangulation.tail(half_edges), triangulation.head(half_edges), triangulation.l.ravel()[half_edges]
+    ends = np.stack([triangulation.tail(half_edges), triangulation.head(half_edges)], axis=1)
+    ends.sort(axis=1)
+    return ends.astype(np.int32), triangulation.l.ravel()[half_edges]
+
+
+def _keys(ends: AnyArray) -> IntArray:
+    """A number (e,) for each pair of ends."""
+    return np.asarray((ends[:, 0].astype(np.int64) << 32) | ends[:, 1])

@@ -51,7 +51,7 @@ def unfolded_distance(V: MeshLike, F: Any = None, sources: Any = None, *, tolera
     -------
     (n,) float64
         In the unit of V: 0 at the sources, ``inf`` at vertices that no source reaches. From source vertices, every
-        value is the length of a path on the surface. Exact, by windows, on small and on rough meshes (`UnfoldingSolver`).
+        value is the length of a path on the surface. Exact on small and on rough meshes, see `UnfoldingSolver`.
 
     Raises
     ------

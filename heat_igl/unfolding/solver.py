@@ -25,13 +25,14 @@ _SPACING = 0.125
 # there: sweeps are off by 0.06 to 0.4 % in the mean and by 1.6 % at most (cow, fandisk, camel's head).
 _SWEEP_ERROR = 0.01
 # Up to so many vertices, or with so much curvature at each (radians, in the mean), distance is found by exact windows,
-# whatever was asked for. There a walk passes vertices on the wrong side: 0.7 to 3.4 % of the largest distance on plates,
-# beams, voxels and terrain, which have 0.5 to 3 radians. Scanned and modelled surfaces have 0.005 to 0.15. Windows take
-# five to eight times as long as walks, a few hundredths of a second on a thousand vertices.
+# whatever was asked for. There walks pass vertices on the wrong side: by 0.7 to 3.4 % of the largest distance on plates,
+# beams, voxels and terrain, most of which have 0.5 to 3 radians. Scanned surfaces have 0.005 to 0.15.
 _FEW = 1000
 _ROUGH = 0.25
-# Sweeps from several sources start with the exact distance up to so many mean edge lengths: next to a border between two
-# cells they know no source from both ends of a side.
+# With this share of flat vertices, and holes that keep walks from proving flatness, windows are as fast as walks.
+_FLAT = 0.5
+# Sweeps from several sources start with the exact distance up to so many mean edge lengths: next to a border of two cells
+# they know no source from both ends of a side.
 _KNOWN_RADIUS = 4.0
 
 
@@ -74,6 +75,13 @@ class UnfoldingTerm(Protocol):
         """Corners of the sources' own faces that are farther away."""
 
 
+def _costs_little_to_be_exact(refinement: Refinement) -> bool:
+    """Whether the mesh is small or rough, or flat with holes."""
+    return (
+        refinement.n <= _FEW or refinement.curvature > _ROUGH or (refinement.flatness > _FLAT and refinement.has_holes)
+    )
+
+
 class _Asked(NamedTuple):
     """Vertices and points that distance starts from, and when; `labels` is filled if given."""
 
@@ -93,9 +101,9 @@ class UnfoldingSolver:
         Triangles.
     refine : {"sweep", "unfold", "exact"}
         Which update. "exact" is the polyhedral distance by windows, see `ExactSurface`; the heat is not read. The other
-        two take it as well where the mesh is small or rough. It is exact from vertices and points. A curve stands for
-        points at most an eighth of a mean edge length apart, and straight lines from the curve itself count up to 6
-        edges from it: beyond, distance from it is too long by 0.005 % at most.
+        two take it as well where the mesh is small, rough, or flat with holes. It is exact from vertices and points. A
+        curve stands for points at most an eighth of a mean edge length apart, and straight lines from the curve itself
+        count up to 6 edges from it: beyond, distance from it is too long by 0.005 % at most.
     tolerance : float, optional
         As for `Refinement.unfold`, with its default.
     cutoff : float
@@ -104,7 +112,7 @@ class UnfoldingSolver:
     Raises
     ------
     ValueError
-        If the domain has no triangles.
+        If the domain has no triangles, or `tolerance` is not a number from 0 to 1.
     """
 
     def __init__(
@@ -115,9 +123,9 @@ class UnfoldingSolver:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
         self._refinement = None if refine == "exact" else Refinement(surface.unfolding)
         #: Whether distances do not depend on the heat.
-        self.is_exact = (
-            self._refinement is None or self._refinement.n <= _FEW or self._refinement.curvature > _ROUGH
-        )
+        self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement)
+        if tolerance is not None and not 0 <= tolerance <= 1:
+            raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
         self._tolerance, self._cutoff = tolerance, cutoff
         self._sweeps = refine == "sweep" and not self.is_exact
         self._error = _SWEEP_ERROR if self._sweeps else 0.0
@@ -223,9 +231,7 @@ class UnfoldingSolver:
         groups[k:][of_curve] = len(groups) + points.label[of_curve]
         return groups
 
-    def _known(
-        self, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray, asked: _Asked
-    ) -> Known | None:
+    def _known(self, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray, asked: _Asked) -> Known | None:
         """What straight lines from points reach, and exact windows near several sources."""
         near = term.near_seen
         if len(asked.vertices) + len(points.faces) > 1 and not len(term.sources.segments.faces):
