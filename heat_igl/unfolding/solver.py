@@ -25,13 +25,13 @@ _SPACING = 0.125
 # there: sweeps are off by 0.06 to 0.4 % in the mean and by 1.6 % at most (cow, fandisk, camel's head).
 _SWEEP_ERROR = 0.01
 # Up to so many vertices, or with so much curvature at each (radians, in the mean), distance is found by exact windows,
-# whatever was asked for. There walks pass vertices on the wrong side: by 0.7 to 3.4 % of the largest distance on plates,
+# whatever was asked for. There walks pass vertices on the wrong side: 0.7 to 3.4 % of the largest distance on plates,
 # beams, voxels and terrain, most of which have 0.5 to 3 radians. Scanned surfaces have 0.005 to 0.15.
 _FEW = 1000
 _ROUGH = 0.25
 # With this share of flat vertices, and holes that keep walks from proving flatness, windows are as fast as walks.
 _FLAT = 0.5
-# Sweeps from several sources start with the exact distance up to so many mean edge lengths: next to a border of two cells
+# Sweeps from several sources start with the exact distance up to so many mean edge lengths: next to a border of cells
 # they know no source from both ends of a side.
 _KNOWN_RADIUS = 4.0
 
