@@ -8,6 +8,8 @@ import pytest
 from heat_igl import HeatMethodSolver, Mesh, Refinement, SurfacePoints, shapes, shortest_paths
 from heat_igl.mesh import connectivity
 from heat_igl.operators import unfolding_surface
+from heat_igl.sources import source_set
+from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.exact import exact_distance
 from heat_igl.validation import zoo
 
@@ -19,25 +21,12 @@ def shape(name: str) -> Mesh:
     return next(each for each in zoo.SHAPES if each.name == name).make()
 
 
-def plate_with_holes(n: int = 24) -> Mesh:
-    """A square plate of n x n cells with square holes in rows."""
-    x, y = np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij")
-    corner = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
-    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
-    full = ~((i % 6 >= 2) & (i % 6 < 5) & (j % 8 >= 2) & (j % 8 < 7))
-    a, b, c, d = (corner[i + p, j + q][full] for p, q in ((0, 0), (1, 0), (1, 1), (0, 1)))
-    F = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    used, F = np.unique(F, return_inverse=True)
-    V = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)[used]
-    return Mesh(V, F.reshape(-1, 3))
-
-
 def relative(d: np.ndarray, truth: np.ndarray) -> np.ndarray:
     return (d - truth) / truth.max()
 
 
 def test_two_paths_around_a_hole_prove_no_flatness():
-    mesh = plate_with_holes()
+    mesh = shape("sponge")
     surface = Refinement(unfolding_surface(mesh).unfolding)
     assert surface.has_holes
     assert not Refinement(unfolding_surface(shapes.grid(5)).unfolding).has_holes
@@ -117,3 +106,17 @@ def test_paths_down_an_exact_distance_are_as_long_as_it():
     length = np.array([path.lengths(mesh).sum() for path in shortest_paths(mesh, solver, targets, 5)])
     np.testing.assert_allclose(length, d[targets], rtol=1e-3)
     assert (length >= d[targets] - 1e-9).all()
+
+
+def test_what_leaves_the_bounds_is_brought_back():
+    mesh = TORUS
+    surface = unfolding_surface(mesh)
+    sources = source_set(5, mesh.n_vertices, mesh.F)
+    along_edges = connectivity.edge_distance(mesh.edge_graph, np.array([5]))
+    straight = np.linalg.norm(mesh.V - mesh.V[5], axis=1)
+    d = 2 * along_edges
+    Bounds(surface).shorten(d)
+    assert (d <= along_edges * (1 + 1e-9)).all()
+    d = straight / 2
+    Bounds(surface).lengthen(d, sources, sources.points)
+    np.testing.assert_allclose(d, straight, rtol=1e-9)
