@@ -153,10 +153,24 @@ def test_polygons_and_tetrahedra() -> None:
             geodesic_distance(box, 0, method=method)
 
 
-def test_exact_distance_starts_at_no_curve() -> None:
-    np.testing.assert_allclose(geodesic_distance(TORUS, 5, method="exact"), reference.exact(TORUS, 5), atol=1e-9)
-    with pytest.raises(SourceError, match=r'sources hold a curve.*take method="unfold"'):
-        geodesic_distance(SQUARE, in_the_plane()["a curve"][0], method="exact")
+def test_exact_windows_take_all_kinds_of_sources_and_end_at_the_cutoff() -> None:
+    """On a flat square every distance is a straight line."""
+    square = shapes.grid(12)
+    x, y, _ = square.V.T
+    middle = SurfacePoints([100], [[0.2, 0.5, 0.3]])
+    place = middle.positions(square)[0]
+    to_point, to_corner = np.linalg.norm(square.V - place, axis=1), np.hypot(x, y)
+    truths = [
+        (0, to_corner),
+        (middle, to_point),
+        ([0, middle], np.minimum(to_corner, to_point)),
+        (OffsetSources([0], [0.25]), to_corner + 0.25),
+    ]
+    for sources, truth in truths:
+        d = geodesic_distance(square, sources, method="exact")
+        np.testing.assert_allclose(d, truth, atol=1e-12)
+        near = geodesic_distance(square, sources, method="exact", cutoff=0.5)
+        np.testing.assert_array_equal(near, np.where(d <= 0.5, d, np.inf))
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def test_options_have_the_same_names_and_defaults_everywhere(make, others):
         ("laplacian", "graph", "laplacian must be 'intrinsic-delaunay' or 'cotan', not 'graph'"),
         ("boundary", "robin", "boundary must be 'neumann', 'dirichlet' or 'average', not 'robin'"),
         ("magnitude", "log", "magnitude must be 'auto', 'unit' or 'damped', not 'log'"),
-        ("refine", "fold", "refine must be None, 'sweep' or 'unfold', not 'fold'"),
+        ("refine", "fold", "refine must be None, 'sweep', 'unfold' or 'exact', not 'fold'"),
         ("backend", "magma", "backend must be one of 'auto', .*, not 'magma'"),
     ],
 )

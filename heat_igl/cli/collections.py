@@ -26,7 +26,7 @@ def batch(
     ] = "all",
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler; else this machine.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; one a processor.")] = None,
-    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
     dtype: Annotated[str, typer.Option(help="Of the distances.", callback=one_of(("float32", "float64")))] = "float32",
     log: Annotated[Path | None, typer.Option(help="File for a log of meshes and blocks.")] = None,
     dashboard: Annotated[bool, typer.Option(help="Serve Dask's dashboard (needs bokeh).")] = False,

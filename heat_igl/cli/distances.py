@@ -51,7 +51,7 @@ def distance(
     laplacian: Annotated[str, choice(Laplacian, "Heat: triangulation to solve on.")] = "auto",
     boundary: Annotated[str, choice(Boundary, "Heat: what heat does at the boundary.")] = "neumann",
     magnitude: Annotated[str, choice(Magnitude, "Heat: length of the field that is integrated.")] = "auto",
-    refine: Annotated[str | None, choice(Refine, "Heat: unfold triangles in its order, near-exact.")] = None,
+    refine: Annotated[str | None, choice(Refine, "Heat: unfold triangles in its order, near-exact; or exact.")] = None,
     backend: Annotated[str, choice(Backend, "Heat: linear solver.")] = "auto",
 ) -> None:
     """Distance from one or more sources: vertices, or points of the surface."""
@@ -122,7 +122,7 @@ def isolines(
     source: Annotated[list[int], typer.Option(help="Source vertex, counted from 0; repeat for several.")],
     spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=positive)],
     output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the lines.")],
-    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
 ) -> None:
     """Curves of equal distance from one or more source vertices."""
     loaded = read_mesh(mesh)

@@ -28,7 +28,7 @@ def view(
         float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=positive)
     ] = None,
     boundary: Annotated[str, choice(Boundary, "What heat does at the boundary.")] = "neumann",
-    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order: near-exact.")] = None,
+    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
 ) -> None:
     """A window in which a click moves the source and the distance follows; where there is no display, a page."""

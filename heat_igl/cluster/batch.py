@@ -57,7 +57,7 @@ def distances(
         others are found.
     client : distributed.Client, optional
         Client of a cluster. By default one on this machine, with a process of one thread for every processor.
-    refine : {"sweep", "unfold"}, optional
+    refine : {"sweep", "unfold", "exact"}, optional
         See `HeatMethodSolver`.
     dtype : {"float32", "float64"}
         Type to which the distances are rounded.

@@ -38,7 +38,7 @@ def shortest_paths(
         Triangles.
     distance : (n,) array_like, HeatMethodSolver or None
         Distance from the sources, or a solver to compute it; None for `geodesic_distance`. It decides which way around
-        the surface a path takes: the more accurate the distance (``refine="unfold"``), the more often this is the
+        the surface a path takes: the more accurate the distance (``refine="exact"``), the more often this is the
         shortest way. A second path is traced if the first is longer than the distance by a thousandth.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints
         Start of each path: vertices, in the order given and with repetitions, or points on faces.

@@ -12,7 +12,7 @@ from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.mesh import MeshLike, as_mesh, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import distance_from_scratch, exact_from_scratch
+from heat_igl.unfolding import distance_from_scratch
 
 __all__ = ["DistanceMethod", "geodesic_distance"]
 
@@ -40,8 +40,8 @@ def geodesic_distance(
         "unfold" follows straight lines through strips of triangles: near-exact, see `unfolded_distance`. "sweep"
         unfolds two triangles at a time. Both go through the vertices in the order of Dijkstra's algorithm; polygons are
         cut into triangles. "heat" is `HeatMethodSolver` with its defaults, the only one for tetrahedra; on polygons it
-        takes `polygon_operators`. "exact" is the polyhedral distance by windows, from vertices and points, not from
-        curves.
+        takes `polygon_operators`. "exact" is the polyhedral distance by windows, and ends the search at the cutoff;
+        curves stand for dense points, see `UnfoldingSolver`.
     cutoff : float, optional
         Distances beyond this are ``inf``.
 
@@ -82,5 +82,7 @@ def geodesic_distance(
     if triangles.is_tetrahedral:
         raise MeshError(f'method={method!r} needs triangles, and the mesh holds tetrahedra: take method="heat"')
     if method == "exact":
-        return exact_from_scratch(triangles, sources, np.inf if beyond is None else beyond)
+        # The search ends at the cutoff; points near it, whose straight lines are known, may lie beyond.
+        farthest = np.inf if beyond is None else beyond
+        return np.asarray(cut_off(distance_from_scratch(triangles, sources, method, cutoff=farthest), beyond))
     return np.asarray(cut_off(distance_from_scratch(triangles, sources, method), beyond))

@@ -50,7 +50,7 @@ class SolverOptions:
         if self.magnitude not in get_args(Magnitude):
             raise ValueError(f"magnitude must be 'auto', 'unit' or 'damped', not {self.magnitude!r}")
         if self.refine is not None and self.refine not in get_args(Refine):
-            raise ValueError(f"refine must be None, 'sweep' or 'unfold', not {self.refine!r}")
+            raise ValueError(f"refine must be None, 'sweep', 'unfold' or 'exact', not {self.refine!r}")
         if self.backend not in get_args(Backend):
             raise ValueError(f"backend must be one of {', '.join(map(repr, get_args(Backend)))}, not {self.backend!r}")
 

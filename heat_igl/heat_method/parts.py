@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -38,12 +39,12 @@ class SolverParts:
         As the user gave them.
     operators : Operators
         The domain.
-    analysis : Analysis
-        The order of elimination that all matrices share.
+    analysis : Analysis or None
+        The order of elimination that all matrices share; None if nothing was factored.
     assembler : SourceAssembler
         From sources to right-hand sides.
-    heat_flow : HeatFlow
-        Step 1.
+    factored : HeatFlow or None
+        Step 1; None with ``refine="exact"``, which takes no heat: `heat_flow` factors it when it is asked for first.
     last_steps : Integration or UnfoldingSolver
         Steps 2 and 3, or what takes their place with ``refine``.
     time_steps : (n_components,) float64
@@ -60,15 +61,23 @@ class SolverParts:
 
     options: SolverOptions
     operators: Operators
-    analysis: Analysis
+    analysis: Analysis | None
     assembler: SourceAssembler
-    heat_flow: HeatFlow
+    factored: HeatFlow | None
     last_steps: Integration | UnfoldingSolver
     time_steps: FloatArray
     t_damping: float | FloatArray | None
     fitted: bool
     checker: Checker | None
     diagnostics: Diagnostics
+
+    @cached_property
+    def heat_flow(self) -> HeatFlow:
+        """Step 1, factored."""
+        if self.factored is not None:
+            return self.factored
+        options = self.options
+        return HeatFlow(self.operators, self.time_steps, options.boundary, options.backend, self.analysis, self.fitted)
 
     @property
     def given_faces(self) -> IntArray | None:
@@ -86,7 +95,9 @@ def prepare_mesh(mesh: Mesh, options: SolverOptions, known: Analysis | None = No
             begun.append(beside.submit(analysis, L, options.backend))
 
         # The order of elimination takes a third of the time and needs no more than the pattern of L.
-        domain = operators(mesh, options.triangulation, analyse if known is None and n_threads() > 1 else None)
+        is_factored = options.refine != "exact"
+        on_laplacian = analyse if known is None and is_factored and n_threads() > 1 else None
+        domain = operators(mesh, options.triangulation, on_laplacian)
         seconds = time.perf_counter() - start
         known = begun[0].result() if begun else known
     waited = time.perf_counter() - start - seconds
@@ -138,26 +149,28 @@ def prepare(
     step, requested = time_step(options, domain, fitted)
     warn_of_large_step(options, domain)
     t_damping = step if damped else None
-    found = analysis(domain.L, options.backend, known)
+    found = None if options.refine == "exact" else analysis(domain.L, options.backend, known)
     analysed = time.perf_counter()
-    makers: list[Callable[[], Any]] = [
-        lambda: HeatFlow(domain, step, options.boundary, options.backend, found, fitted),
-    ]
+    makers: list[Callable[[], Any]] = []
+    if options.refine != "exact":
+        makers.append(lambda: HeatFlow(domain, step, options.boundary, options.backend, found, fitted))
     if options.refine is None:
         makers.append(lambda: PoissonProblem(domain, options.backend, found))
     # Both matrices at once: the backends run without the interpreter's lock.
-    heat_flow, *poisson = in_order(lambda make: make(), makers, min(len(makers), n_threads()))
+    problems = list(in_order(lambda make: make(), makers, max(1, min(len(makers), n_threads()))))
     factored = time.perf_counter()
+    heat_flow = problems[0] if problems else None
     unfolds = options.refine is not None
-    assembler = SourceAssembler(domain, step, heat_flow.mean_mass, plain=not damped, unfolds=unfolds)
+    mass_unit = domain.mean_mass if heat_flow is None else heat_flow.mean_mass
+    assembler = SourceAssembler(domain, step, mass_unit, plain=not damped, unfolds=unfolds)
     last_steps: Integration | UnfoldingSolver
-    if options.refine is not None:
-        last_steps = UnfoldingSolver(domain, options.refine)
+    if options.refine is not None or found is None:
+        last_steps = UnfoldingSolver(domain, options.refine or "exact")
     else:
         divergence = NormalizedDivergence(domain, t_damping, found.order, fitted)
-        last_steps = Integration(domain, heat_flow, divergence, poisson[0], t_damping, fitted, assembler.edges)
+        last_steps = Integration(domain, problems[0], divergence, problems[1], t_damping, fitted, assembler.edges)
     triangulation = None if domain.surface is None else domain.surface.triangulation
-    factors = heat_flow.factors + [problem.factor for problem in poisson]
+    factors = [] if heat_flow is None else heat_flow.factors + [problem.factor for problem in problems[1:]]
     diagnostics = Diagnostics(
         t=_of_largest(step, domain),
         t_requested=_of_largest(requested, domain),
@@ -166,7 +179,7 @@ def prepare(
         n_vertices=domain.n,
         n_flips=triangulation.n_flips if triangulation else 0,
         lengthening=triangulation.lengthening if triangulation else 0.0,
-        backend=heat_flow.backend,
+        backend="none" if heat_flow is None else heat_flow.backend,
         seconds_operators=seconds_operators,
         factor_nonzeros=sum(factor.nonzeros for factor in factors),
         factor_bytes=sum(factor.n_bytes for factor in factors),
@@ -178,12 +191,12 @@ def prepare(
         operators=domain,
         analysis=found,
         assembler=assembler,
-        heat_flow=heat_flow,
+        factored=heat_flow,
         last_steps=last_steps,
         time_steps=np.broadcast_to(step, domain.n_components),
         t_damping=t_damping,
         fitted=fitted,
-        checker=None if options.refine == "unfold" else Checker(domain, V),
+        checker=None if options.refine in ("unfold", "exact") else Checker(domain, V),
         diagnostics=diagnostics,
     )
 

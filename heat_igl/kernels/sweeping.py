@@ -20,6 +20,7 @@ def sweep(
     d: cython.double[::1],
     label,
     offset: cython.const[cython.double][::1],
+    group: cython.const[cython.longlong][::1],
     is_stale: cython.uchar[::1],
 ):
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, in the given order.
@@ -30,15 +31,16 @@ def sweep(
 
     `label` (n,) int32, None unless there is more than one source, is handed on with the distance: the source that it is
     measured from, -1 where none is reached; ``offset[label]`` is the distance at which that source begins. Circles
-    about the ends of a side meet in a source if both ends are measured from it. Between ends of different sources a
-    straight front comes in, from the source of the end that it passes nearer to.
+    about the ends of a side meet in a source if both ends are measured from it. Between ends of two sources of one
+    ``group[label]``, points of a curve, a straight front comes in, from the source of the end that it passes nearer to.
+    Between ends of other sources, one end and the corner beyond the side have to be measured from the same.
     """
     n = order.shape[0]
     rank = np.empty(n, np.int32)
     rank[order] = np.arange(n, dtype=np.int32)
     one = _Sweep()
     one.t = HalfEdges(tables)
-    one.order, one.rank, one.d, one.is_stale, one.offset = order, rank, d, is_stale, offset
+    one.order, one.rank, one.d, one.is_stale, one.offset, one.group = order, rank, d, is_stale, offset, group
     one.is_flat = tables.is_flat.view(np.uint8)
     one.has_labels = label is not None
     one.label = label if one.has_labels else np.empty(0, np.int32)
@@ -61,6 +63,7 @@ class _Sweep:
     has_labels: cython.bint
     label: cython.int[::1]
     offset: cython.const[cython.double][::1]
+    group: cython.const[cython.longlong][::1]
     n_visits: cython.longlong
 
     @cython.cfunc
@@ -129,6 +132,7 @@ class _Sweep:
         begin: cython.double = 0.0
         # Where the best of either kind comes from.
         nearest: cython.int = -1
+        ignored: cython.int = -1
         along_edge: cython.int = v
         spoke: cython.int = self.t.first[v]
         for k in range(self.t.first[v], self.t.first[v + 1]):
@@ -145,8 +149,11 @@ class _Sweep:
                 begin = self.offset[self.label[s.neighbour]]
                 squared = begin + sqrt(_across(da - begin, db - begin, s))
                 squared = squared * squared
-            else:
+            elif self.is_of_one_curve(self.label[s.neighbour], self.label[s.next_neighbour]):
                 squared = _across_straight(da, db, s)
+                squared = squared * squared
+            else:
+                squared = self.between_cells(k, best, cython.address(ignored))
                 squared = squared * squared
             if squared < across:
                 spoke, across = k, squared
@@ -186,6 +193,8 @@ class _Sweep:
         if self.has_labels:
             source[0] = self.label[s.neighbour]
             if self.label[s.next_neighbour] != source[0]:
+                if not self.is_of_one_curve(source[0], self.label[s.next_neighbour]):
+                    return self.between_cells(k, INFINITY, source)
                 if not _comes_nearer_to_a(da, db, s):
                     source[0] = self.label[s.next_neighbour]
                 return across
@@ -195,6 +204,36 @@ class _Sweep:
             if squared < INFINITY:
                 return begin + sqrt(squared)
         return across
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def is_of_one_curve(self, one: cython.int, other: cython.int) -> cython.bint:
+        """Whether two sources, -1 for none, are points of the same curve."""
+        return one >= 0 and other >= 0 and self.group[one] == self.group[other]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def between_cells(self, k: cython.int, below: cython.double, source: cython.pointer[cython.int]) -> cython.double:
+        """Distance across the triangle left of spoke k, whose ends are measured from different sources.
+
+        As one of them knows its source together with the corner beyond, if that is measured from the same. `source` is
+        set to the one it comes from; ``inf`` if there is none, or none below `below`.
+        """
+        s = cython.address(self.t.spoke[k])
+        best: cython.double = INFINITY
+        w: cython.int = s.beyond
+        if w < 0 or not self.d[w] < below or self.label[w] < 0:
+            return best
+        begin: cython.double = self.offset[self.label[w]]
+        if self.label[w] == self.label[s.neighbour]:
+            best = begin + sqrt(_over_one(self.d[s.neighbour] - begin, self.d[w] - begin, True, s))
+        elif self.label[w] == self.label[s.next_neighbour]:
+            best = begin + sqrt(_over_one(self.d[s.next_neighbour] - begin, self.d[w] - begin, False, s))
+        source[0] = self.label[w]
+        return best
 
     @cython.cfunc
     @cython.inline
@@ -362,6 +401,43 @@ def _across_two(
         bent: cython.double = sqrt(ux * ux + uy * uy) + dw
         return bent * bent
     return sx * sx + sy * sy if sign * ((s.along - px) * sy - s.height * sx) >= 0 else INFINITY
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _over_one(
+    dp: cython.double, dw: cython.double, is_right: cython.bint, s: cython.pointer[cython.const[Spoke]]
+) -> cython.double:
+    """Squared distance from v of the source at distances dp from one end of ab, a if `is_right`, and dw from w.
+
+    ``inf`` unless the straight line between them crosses ab, and then passes between that end and w.
+    """
+    # a in the origin, b on the first axis, v above it, w at (wx, -wy).
+    sign: cython.double = 1.0 if is_right else -1.0
+    px: cython.double = 0.0 if is_right else s.base
+    ex: cython.double = s.beyond_along - px
+    wy: cython.double = s.beyond_depth
+    square: cython.double = ex * ex + wy * wy
+    along: cython.double = 0.5 * ((dp - dw) * (dp + dw) / square + 1.0)
+    h_squared: cython.double = dp * dp / square - along * along
+    if not (square > 0 and h_squared >= 0):
+        return INFINITY
+    h: cython.double = sign * sqrt(h_squared)
+    # From the source to v, as in `_across_two`.
+    sx: cython.double = s.along - px - along * ex + h * wy
+    sy: cython.double = s.height + along * wy + h * ex
+    ux: cython.double = s.along - s.beyond_along
+    uy: cython.double = s.height + wy
+    crossing: cython.double = s.along * sy - s.height * sx  # of ab, times sy
+    if (
+        sy > 0
+        and 0.0 <= crossing <= s.base * sy
+        and sign * ((s.along - px) * sy - s.height * sx) >= 0
+        and sign * (ux * sy - uy * sx) <= 0
+    ):
+        return sx * sx + sy * sy
+    return INFINITY
 
 
 @cython.cfunc

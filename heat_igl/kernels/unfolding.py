@@ -27,9 +27,11 @@ def unfold(
     shortfall: cython.double,
     max_steps: cython.int,
     max_passes: cython.int,
+    has_holes: cython.bint,
 ):
     """Pass over the vertices `order` (n,) until nothing is stale; see `heat_igl.unfolding.walks.unfold`."""
     q = Query(tables, walk, first_inside, inside, tolerance, shortfall, max_steps)
+    q.has_holes = has_holes
     v: cython.int
     n: cython.int = q.t.first.shape[0] - 1
     is_stale: cython.uchar[::1] = np.empty(n, np.uint8)

@@ -180,8 +180,11 @@ def _common_source(q: Query, right: Limit, left: Limit) -> cython.double:
     """Length of the straight path between two vertices whose straight paths come from one point; ``inf`` if not so.
 
     Both limits of a cone see the last bend of their paths in the same place of the plane: then no curvature lies
-    between the two paths, and the cone is flat as far as that point. Exact, and the walk need not go on.
+    between the two paths, and the cone is flat as far as that point. Exact, and the walk need not go on. On a surface
+    with holes that proves nothing: one may lie between the two paths.
     """
+    if q.has_holes:
+        return INFINITY
     one: Walk = q.walk[right.vertex]
     other: Walk = q.walk[left.vertex]
     scale: cython.double = one.offset + one.reach

@@ -70,6 +70,7 @@ cdef class Query:
     cdef const Inside[::1] inside
     cdef double tolerance, shortfall
     cdef int max_steps
+    cdef bint has_holes
     cdef Way found
     cdef Advice[::1] advice
     cdef Cone[::1] cone

@@ -98,11 +98,12 @@ def changed_operators(
         As for `intrinsic_operators`; of a cover, `on_laplacian` gets twice L.
     """
     domain = intrinsic_operators(triangulation, paths, on_laplacian)
+    V = paths.V if isinstance(paths, Mesh) else None
     if triangulation is uncovered:
-        return replace(domain, surface=Surface(triangulation, faces))
+        return replace(domain, surface=Surface(triangulation, faces, V=V))
     boundary = np.zeros(triangulation.n, bool)
     boundary[: faces.n] = faces.boundary
-    domain = replace(domain, boundary=boundary, surface=Surface(triangulation, faces, uncovered))
+    domain = replace(domain, boundary=boundary, surface=Surface(triangulation, faces, uncovered, V))
     if not triangulation.is_cover:
         return domain
     return replace(domain, L=domain.L / 2, M=domain.M / 2, weights=domain.weights / 2)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
-from heat_igl.typing import IntArray
+from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["Surface"]
 
@@ -24,11 +24,14 @@ class Surface:
     uncovered : IntrinsicTriangulation or None
         The surface itself, each face once and without added vertices, where `triangulation` is its tufted cover, which
         has each face twice, or a refinement.
+    V : (n, 3) float64 or None
+        Positions of the vertices; None if not known.
     """
 
     triangulation: IntrinsicTriangulation
     faces: IntrinsicTriangulation | None = None
     uncovered: IntrinsicTriangulation | None = None
+    V: FloatArray | None = None
 
     @property
     def unfolding(self) -> IntrinsicTriangulation:

@@ -70,8 +70,10 @@ def operators(
         if triangulation is not faces or triangulation.lengthening:
             return changed_operators(triangulation, faces, uncovered, mesh, on_laplacian)
     if triangulation.lengthening:
-        return replace(intrinsic_operators(triangulation, mesh, on_laplacian), surface=Surface(triangulation, faces))
-    return surface_operators(mesh, Surface(triangulation, faces), on_laplacian)
+        return replace(
+            intrinsic_operators(triangulation, mesh, on_laplacian), surface=Surface(triangulation, faces, V=mesh.V)
+        )
+    return surface_operators(mesh, Surface(triangulation, faces, V=mesh.V), on_laplacian)
 
 
 def tufted_operators(
@@ -106,7 +108,7 @@ def unfolding_surface(mesh: Mesh) -> Surface:
     if has_nonmanifold_edges(mesh):
         mesh, history = _without_duplicates(mesh)
     faces = replace(intrinsic_triangulation(mesh), history=history)
-    return Surface(intrinsic_delaunay(faces), faces)
+    return Surface(intrinsic_delaunay(faces), faces, V=mesh.V)
 
 
 def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Merged, ...]]:

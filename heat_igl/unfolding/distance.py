@@ -51,7 +51,7 @@ def unfolded_distance(V: MeshLike, F: Any = None, sources: Any = None, *, tolera
     -------
     (n,) float64
         In the unit of V: 0 at the sources, ``inf`` at vertices that no source reaches. From source vertices, every
-        value is the length of a path on the surface.
+        value is the length of a path on the surface. Exact on small and on rough meshes, see `UnfoldingSolver`.
 
     Raises
     ------
@@ -65,8 +65,10 @@ def unfolded_distance(V: MeshLike, F: Any = None, sources: Any = None, *, tolera
     return distance_from_scratch(as_simplices(V, F), sources, "unfold", tolerance)
 
 
-def distance_from_scratch(mesh: Mesh, sources: Sources, refine: Refine, tolerance: float | None = None) -> FloatArray:
-    """Distance (n,) from one set of sources by unfolding triangles in the order of Dijkstra's algorithm.
+def distance_from_scratch(
+    mesh: Mesh, sources: Sources, refine: Refine, tolerance: float | None = None, cutoff: float = np.inf
+) -> FloatArray:
+    """Distance (n,) from one set of sources by unfolding triangles in the order of Dijkstra's algorithm, or by windows.
 
     Parameters
     ----------
@@ -74,18 +76,24 @@ def distance_from_scratch(mesh: Mesh, sources: Sources, refine: Refine, toleranc
         Triangles.
     sources : sources
         As for `HeatMethodSolver.distance`.
-    refine : {"sweep", "unfold"}
-        Which update, see `Refinement`.
+    refine : {"sweep", "unfold", "exact"}
+        Which update, see `UnfoldingSolver`.
     tolerance : float, optional
         See `Refinement.unfold`.
+    cutoff : float
+        With "exact", what is farther is ``inf``, and the search ends there.
     """
     if mesh.is_tetrahedral:
         raise MeshError('unfolding needs triangles, and the mesh holds tetrahedra: take method="heat" or a solver')
     chosen = source_set(sources, mesh.n_vertices, mesh.F)
+    if refine == "exact" and chosen.on_vertices_alone:
+        surface = ExactSurface(from_mesh(mesh, int(chosen.vertices[0])))
+        return surface.solve(chosen.vertices, chosen.vertex_offset, cutoff=cutoff).distance
     domain = _Domain(mesh, unfolding_surface(mesh))
     lines = _Lines(chosen, *_straight_lines(domain, chosen))
-    solver = UnfoldingSolver(domain, refine, tolerance)
-    return np.asarray(solver.distances([lines], -_along_edges(domain, chosen)[:, None])[0])
+    solver = UnfoldingSolver(domain, refine, tolerance, cutoff)
+    order = np.zeros(mesh.n_vertices) if solver.is_exact else -_along_edges(domain, chosen)
+    return np.asarray(solver.distances([lines], order[:, None])[0])
 
 
 def exact_from_scratch(mesh: Mesh, sources: Sources, cutoff: float = np.inf) -> FloatArray:
@@ -134,8 +142,8 @@ class _Domain:
 
     @cached_property
     def near_field(self) -> NearField:
-        assert self.surface.faces is not None
-        return NearField(self.surface.faces)
+        faces = self.surface.unfolding if self.surface.faces is None else self.surface.faces
+        return NearField(faces)
 
     def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
         return np.asarray(of_component[self.components])

@@ -7,9 +7,12 @@ gives the order alone; no Poisson problem is solved. docs/refinement.md derives 
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.csgraph as csgraph
 
 from heat_igl.intrinsic import IntrinsicTriangulation, double_cover, oriented
 from heat_igl.intrinsic.fans import breadth_first, tables
@@ -20,7 +23,7 @@ from heat_igl.unfolding.walks import INSIDE, Points, sweep, unfold, unknown, vie
 
 __all__ = ["TOLERANCE", "Known", "Refine", "Refinement"]
 
-Refine = Literal["sweep", "unfold"]
+Refine = Literal["sweep", "unfold", "exact"]
 
 # Relative gain below which a path is not straightened further. What is lost adds up to 0.0003 to 0.003 % on average; 0
 # loses nothing and takes up to twice the time.
@@ -32,6 +35,8 @@ _SHORTFALL = 15.0
 _MAX_PASSES = 50
 # Steps that the search from one vertex may take; a walk takes 20 to 50.
 _MAX_SEARCH = 500
+# Up to this share of flat vertices, holes are not counted.
+_HARDLY_FLAT = 0.05
 # A point whose barycentric coordinate is below this lies on the side of its face.
 _ON_SIDE = 1e-8
 
@@ -82,6 +87,40 @@ class Refinement:
         self._number, self._face, F, lengths, twin = breadth_first(F, lengths, twin, self._n_sheets * self.n)
         self._F = F
         self._tables = tables(F, lengths, twin, len(self._number))
+        self._twin = twin
+
+    @cached_property
+    def has_holes(self) -> bool:
+        """Whether some component is neither a disk nor a sphere, so that a closed curve may enclose no surface.
+
+        True without counting where hardly a vertex is flat: two paths seldom prove anything there.
+        """
+        if self.flatness < _HARDLY_FLAT:
+            return True
+        m, n = len(self._F), len(self._number)
+        i, j = self._F.ravel(), self._F[:, [1, 2, 0]].ravel()
+        graph = sp.coo_array((np.ones(3 * m, np.int8), (i, j)), shape=(n, n))
+        component = csgraph.connected_components(graph, directed=False)[1]
+        of_face = component[self._F[:, 0]]
+        # Each edge is shared by two half-edges, or has one alone; where more than two faces meet, they are cut apart.
+        edges = np.bincount(np.repeat(of_face, 3), np.where(self._twin.ravel() >= 0, 0.5, 1.0))
+        fans = np.bincount(component[np.unique(self._F)], minlength=len(edges))
+        characteristic = fans - edges + np.bincount(of_face, minlength=len(edges))
+        return bool((characteristic[np.bincount(of_face, minlength=len(edges)) > 0] < 1).any())
+
+    @cached_property
+    def flatness(self) -> float:
+        """The share of vertices without curvature, those on the boundary included."""
+        return float(self._tables.is_flat.mean())
+
+    @cached_property
+    def curvature(self) -> float:
+        """Mean over the fans of vertices of how far their angles are from a plane's, in radians.
+
+        The sum inside the surface is compared with two pi; on the boundary, a notch with more than pi counts.
+        """
+        total = self._tables.total
+        return float(np.where(total > 0, np.abs(2 * np.pi - total), np.maximum(-total - np.pi, 0.0)).mean())
 
     def sweep(
         self,
@@ -92,6 +131,7 @@ class Refinement:
         point_offsets: FloatArray | None = None,
         labels: IntArray | None = None,
         known: Known | None = None,
+        groups: IntArray | None = None,
     ) -> FloatArray:
         """Distance by unfolding two triangles at a time, until nothing gives less.
 
@@ -136,7 +176,8 @@ class Refinement:
             distance[row], is_stale[row] = np.tile(known.distance, self._n_sheets), False
             if label is not None:
                 label[row] = np.tile(known.source, self._n_sheets)
-        sweep(self._order(key), self._tables, distance[:n], label, starts.offset, is_stale)
+        group = np.arange(len(starts.offset)) if groups is None else np.ascontiguousarray(groups, np.int64)
+        sweep(self._order(key), self._tables, distance[:n], label, starts.offset, group, is_stale)
         return self._on_base(distance, label, labels)
 
     def unfold(
@@ -189,6 +230,7 @@ class Refinement:
             shortfall=shortfall,
             max_steps=_MAX_SEARCH,
             max_passes=_MAX_PASSES,
+            has_holes=self.has_holes,
         )
         return self._on_base(walk["distance"], walk["label"], labels)
 

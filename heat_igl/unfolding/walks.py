@@ -47,7 +47,13 @@ def unknown(n: int) -> AnyArray:
 
 
 def sweep(
-    order: AnyArray, t: Tables, d: FloatArray, label: AnyArray | None, offset: FloatArray, is_stale: AnyArray
+    order: AnyArray,
+    t: Tables,
+    d: FloatArray,
+    label: AnyArray | None,
+    offset: FloatArray,
+    group: IntArray,
+    is_stale: AnyArray,
 ) -> float:
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex; returns the visits per vertex.
 
@@ -63,10 +69,12 @@ def sweep(
         The source that each is measured from, -1 for none; None if there is only one. Changed in place.
     offset : (k,) float64
         The distance at which each source begins.
+    group : (k,) int64
+        What each source is a point of: of one curve, or of nothing else.
     is_stale : (n,) bool
         Vertices to be visited; others only if what they depend on changes.
     """
-    visits: float = sweeping.sweep(order, t, d, label, offset, is_stale.view(np.uint8))
+    visits: float = sweeping.sweep(order, t, d, label, offset, group, is_stale.view(np.uint8))
     return visits
 
 
@@ -80,6 +88,7 @@ def unfold(
     shortfall: float,
     max_steps: int,
     max_passes: int,
+    has_holes: bool = False,
 ) -> None:
     """Distance by straight paths through strips of triangles, to be read from `walk`.
 
@@ -102,9 +111,11 @@ def unfold(
         Triangles that one search may cross.
     max_passes : int
         Passes over vertices that a later one may have improved.
+    has_holes : bool
+        Whether a closed curve on some component encloses no piece of surface.
     """
     first, inside = (np.empty(0, np.int32), np.empty(0, INSIDE)) if points is None else points
-    unfolding.unfold(order, t, walk, first, inside, tolerance, shortfall, max_steps, max_passes)
+    unfolding.unfold(order, t, walk, first, inside, tolerance, shortfall, max_steps, max_passes, has_holes)
 
 
 def views(faces: IntArray, barycentric: FloatArray, F: AnyArray, t: Tables) -> tuple[AnyArray, AnyArray]:

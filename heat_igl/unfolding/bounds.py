@@ -1,0 +1,85 @@
+"""What every distance keeps: no longer than paths along edges, no shorter than straight lines through space."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from heat_igl.intrinsic import IntrinsicTriangulation
+from heat_igl.kernels import bounds as kernels
+from heat_igl.operators import Surface
+from heat_igl.sources import SourcePoints, SourceSet
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+__all__ = ["Bounds"]
+
+# Less than this fraction is rounding.
+_ROUNDING = 1e-12
+_NO_LABELS = np.empty(0, np.int64)
+
+
+class Bounds:
+    """The two bounds on a surface that take no search.
+
+    Parameters
+    ----------
+    surface : Surface
+        The triangles: along the edges of all of them there are paths.
+    """
+
+    def __init__(self, surface: Surface) -> None:
+        self._surface = surface
+
+    @cached_property
+    def _edges(self) -> tuple[AnyArray, FloatArray]:
+        """Ends (e, 2) and lengths (e,) of the edges unfolded in, and of given ones that were flipped."""
+        ends, length = _sides(self._surface.unfolding)
+        given = self._surface.faces
+        if given is not None and self._surface.unfolding.n_flips:
+            others, their_length = _sides(given)
+            known = np.sort(_keys(ends))
+            keys = _keys(others)
+            at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
+            is_flipped = known[at] != keys
+            ends = np.concatenate([ends, others[is_flipped]])
+            length = np.concatenate([length, their_length[is_flipped]])
+        return ends, length
+
+    def shorten(self, distance: FloatArray, labels: IntArray | None = None) -> None:
+        """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them."""
+        kernels.shorten(*self._edges, distance, _NO_LABELS if labels is None else labels)
+
+    def lengthen(self, distance: FloatArray, sources: SourceSet, points: SourcePoints) -> None:
+        """Raise distances (n,) to the straight lines from the nearest source, in place.
+
+        Where sources begin at different distances, or are curves, or positions are not known, nothing is raised.
+        """
+        V, F = self._surface.V, self._surface.given_faces
+        offset = np.concatenate([sources.vertex_offset, points.offset])
+        if V is None or len(sources.segments.faces) or offset.any() or (len(points.faces) and F is None):
+            return
+        places = V[sources.vertices]
+        if F is not None and len(points.faces):
+            inside = np.einsum("pc,pcx->px", points.barycentric, V[F[points.faces]])
+            places = np.concatenate([places, inside])
+        if len(places) == 1:
+            kernels.lengthen(V, places[0], distance)
+        else:
+            straight = np.asarray(KDTree(places).query(V)[0])
+            np.maximum(distance, straight * (1 - _ROUNDING), out=distance)
+
+
+def _sides(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, FloatArray]:
+    """Ends (e, 2), the smaller vertex first, and lengths (e,) of edges, each once."""
+    twin = triangulation.twin
+    half_edges = np.flatnonzero((twin < 0) | (np.arange(len(twin)) < twin))
+    ends = np.stack([triangulation.tail(half_edges), triangulation.head(half_edges)], axis=1)
+    ends.sort(axis=1)
+    return ends.astype(np.int32), triangulation.l.ravel()[half_edges]
+
+
+def _keys(ends: AnyArray) -> IntArray:
+    """A number (e,) for each pair of ends."""
+    return np.asarray((ends[:, 0].astype(np.int64) << 32) | ends[:, 1])

@@ -1,0 +1,122 @@
+"""What a refined distance promises: not below exact, not above paths along edges, near exact on every kind of shape."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from heat_igl import HeatMethodSolver, Mesh, Refinement, SurfacePoints, shapes, shortest_paths
+from heat_igl.mesh import connectivity
+from heat_igl.operators import unfolding_surface
+from heat_igl.sources import source_set
+from heat_igl.unfolding.bounds import Bounds
+from heat_igl.unfolding.exact import exact_distance
+from heat_igl.validation import zoo
+
+ROUGH = ["noise 10 times", "beams", "voxel ball", "plate", "cube less one", "noisy sphere"]
+TORUS = shapes.torus(48, 30)
+
+
+def shape(name: str) -> Mesh:
+    return next(each for each in zoo.SHAPES if each.name == name).make()
+
+
+def relative(d: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    return (d - truth) / truth.max()
+
+
+def test_two_paths_around_a_hole_prove_no_flatness():
+    mesh = shape("sponge")
+    surface = Refinement(unfolding_surface(mesh).unfolding)
+    assert surface.has_holes
+    assert not Refinement(unfolding_surface(shapes.grid(5)).unfolding).has_holes
+    for source in range(0, mesh.n_vertices, 9):
+        truth = exact_distance(mesh.V, mesh.F, source)
+        d = surface.unfold(connectivity.edge_distance(mesh.edge_graph, np.array([source])), np.array([source]))
+        assert relative(d, truth).min() > -1e-9
+
+
+@pytest.mark.parametrize("name", ROUGH)
+@pytest.mark.parametrize("refine", ["unfold", "sweep"])
+def test_small_and_rough_meshes_are_exact(name, refine):
+    mesh = shape(name)
+    solver = HeatMethodSolver(mesh, refine=refine)
+    for source in (0, mesh.n_vertices // 2):
+        np.testing.assert_allclose(
+            relative(solver.distance(source), exact_distance(mesh.V, mesh.F, source)), 0, atol=1e-10
+        )
+
+
+@pytest.mark.parametrize("name", ["height field 5000", "pill", "bumpy sphere", "lantern 40 by 400"])
+@pytest.mark.parametrize("refine", ["unfold", "sweep"])
+def test_distances_keep_to_both_bounds(name, refine):
+    mesh = shape(name)
+    solver = HeatMethodSolver(mesh, refine=refine)
+    for source in (0, mesh.n_vertices // 3):
+        d = solver.distance(source)
+        assert (d <= connectivity.edge_distance(mesh.edge_graph, np.array([source])) * (1 + 1e-9)).all()
+        assert (d >= np.linalg.norm(mesh.V - mesh.V[source], axis=1) * (1 - 1e-9)).all()
+        truth = exact_distance(mesh.V, mesh.F, source)
+        assert np.abs(relative(d, truth)).max() < (0.05 if refine == "sweep" else 0.003)
+        if refine == "unfold":
+            assert relative(d, truth).min() > -1e-9
+
+
+@pytest.mark.parametrize("count", [4, 300])
+def test_a_sweep_from_vertices_is_no_sweep_from_the_edges_between_them(count):
+    mesh = shapes.grid(40)
+    sources = np.random.default_rng(3).choice(mesh.n_vertices, count, replace=False)
+    if count == 4:
+        sources = np.array([820, 821, 861, 862])  # the corners of a cell
+    truth = np.linalg.norm(mesh.V[:, None] - mesh.V[sources], axis=2).min(axis=1)
+    d = HeatMethodSolver(mesh, refine="sweep").distance(sources)
+    assert np.abs(d - truth)[truth > 0].mean() < 0.002 * truth.mean()
+    assert np.abs(d - truth).max() < 0.05 * truth.max()
+
+
+@pytest.mark.parametrize("mesh", [TORUS, shape("book"), shape("moebius band")], ids=["torus", "book", "moebius"])
+def test_exact_takes_all_kinds_of_sources(mesh):
+    solver = HeatMethodSolver(mesh, refine="exact")
+    point = SurfacePoints([7], [[0.2, 0.5, 0.3]])
+    d = solver.distances([[3], [200], point])
+    np.testing.assert_array_equal(d[0], solver.distance(3))
+    np.testing.assert_allclose(relative(d[0], exact_distance(mesh.V, mesh.F, 3)), 0, atol=1e-11)
+    found = solver.voronoi([3, [200], point])
+    np.testing.assert_allclose(found.distance, d.min(axis=0), atol=1e-12)
+    nearest = np.take_along_axis(d, found.labels[None], axis=0)[0]
+    np.testing.assert_allclose(nearest, d.min(axis=0), atol=1e-12)
+
+
+def test_exact_factors_nothing_until_heat_is_asked_for():
+    solver = HeatMethodSolver(TORUS, refine="exact")
+    assert solver.diagnostics.backend == "none"
+    assert solver.diagnostics.factor_bytes == 0
+    d = solver.distance(5)
+    assert "heat_flow" not in vars(solver._parts)
+    solution = solver.solve(5)
+    np.testing.assert_array_equal(solution.distance, d)
+    np.testing.assert_allclose(solution.heat, HeatMethodSolver(TORUS).solve(5).heat, rtol=1e-9)
+
+
+def test_paths_down_an_exact_distance_are_as_long_as_it():
+    mesh = TORUS
+    solver = HeatMethodSolver(mesh, refine="exact")
+    d = solver.distance(5)
+    targets = np.arange(0, mesh.n_vertices, 97)
+    length = np.array([path.lengths(mesh).sum() for path in shortest_paths(mesh, solver, targets, 5)])
+    np.testing.assert_allclose(length, d[targets], rtol=1e-3)
+    assert (length >= d[targets] - 1e-9).all()
+
+
+def test_what_leaves_the_bounds_is_brought_back():
+    mesh = TORUS
+    surface = unfolding_surface(mesh)
+    sources = source_set(5, mesh.n_vertices, mesh.F)
+    along_edges = connectivity.edge_distance(mesh.edge_graph, np.array([5]))
+    straight = np.linalg.norm(mesh.V - mesh.V[5], axis=1)
+    d = 2 * along_edges
+    Bounds(surface).shorten(d)
+    assert (d <= along_edges * (1 + 1e-9)).all()
+    d = straight / 2
+    Bounds(surface).lengthen(d, sources, sources.points)
+    np.testing.assert_allclose(d, straight, rtol=1e-9)
