@@ -15,11 +15,11 @@ from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, Located, from_mesh, from_triangulation
 
-__all__ = ["ExactSolution", "ExactSurface", "Origin", "exact_distance"]
+__all__ = ["TOLERANCE", "ExactSolution", "ExactSurface", "Origin", "exact_distance"]
 
-# What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds up
+#: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds up
 # to. A larger number keeps a few windows more and changes no result.
-_TOLERANCE = 1e-11
+TOLERANCE = 1e-11
 _NO_VERTICES = np.empty(0, np.int64)
 
 
@@ -171,7 +171,7 @@ class ExactSurface:
             edges.largest_circle(place),
             goals is not None,
             float(edges.scaled(cutoff)),
-            _TOLERANCE,
+            TOLERANCE,
             statistics,
         )
         if not done:
