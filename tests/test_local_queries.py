@@ -43,7 +43,8 @@ def full(mesh: Mesh) -> FloatArray:
 def test_local_queries_are_the_full_search_to_the_bit(name):
     mesh = MESHES[name]()
     n, every = mesh.n_vertices, full(mesh)
-    radius = float(np.quantile(every, 0.1))
+    reached = np.isfinite(every)
+    radius = float(np.quantile(every[reached], 0.1))
     within = distances_within(mesh, radius)
     np.testing.assert_array_equal(within.toarray(), np.where(every <= radius, every, 0.0))
     assert within.nnz == (every <= radius).sum()
@@ -51,7 +52,7 @@ def test_local_queries_are_the_full_search_to_the_bit(name):
     indices, distances = nearest_vertices(mesh, 9)
     for v in range(n):
         order = np.lexsort((np.arange(n), every[v]))[:9]
-        np.testing.assert_array_equal(indices[v], order)
+        np.testing.assert_array_equal(indices[v], np.where(reached[v, order], order, -1))
         np.testing.assert_array_equal(distances[v], every[v, order])
     pairs = np.random.default_rng(3).integers(0, n, (300, 2))
     np.testing.assert_array_equal(pair_distances(mesh, pairs), every[pairs[:, 0], pairs[:, 1]])
@@ -109,7 +110,7 @@ def test_what_is_not_reached_is_padded():
     assert indices[1].tolist() == [2 * n] + [-1] * (n + 1)
     assert nearest_vertices(mesh, 100, [3])[0].shape == (1, 100)
     assert pair_distances(mesh, [[0, n], [n, n], [2 * n, 2 * n], [2 * n, 0]]).tolist() == [np.inf, 0.0, 0.0, np.inf]
-    assert distances_within(mesh, np.inf, [0, 2 * n]).getnnz(axis=1).tolist() == [n, 1]
+    assert np.diff(distances_within(mesh, np.inf, [0, 2 * n]).indptr).tolist() == [n, 1]
     assert pair_distances(mesh, np.empty((0, 2), int)).shape == (0,)
 
 

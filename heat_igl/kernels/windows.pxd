@@ -85,6 +85,10 @@ cdef struct Search:
     double* ranked
     int n_all_ranked
 
+cdef class Front:
+    cdef Search state
+    cdef object arrays
+
 cdef enum Kind:
     UNKNOWN = 0
     PASSED = 1           # no shortest path runs through

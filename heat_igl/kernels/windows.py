@@ -22,7 +22,7 @@ from cython.cimports.libc.math import INFINITY, fabs, sqrt
 from cython.cimports.libc.stdlib import free, malloc, realloc
 from cython.cimports.libc.string import memcpy, memmove
 
-__all__ = ["search", "search_each", "shapes"]
+__all__ = ["Front", "search", "search_each", "shapes"]
 
 
 def shapes(
@@ -1302,33 +1302,91 @@ def _write_nearest(
     return n
 
 
+class Front:
+    """A surface, and what searches on it write; `search` and `search_each` say in which state.
+
+    Parameters
+    ----------
+    vertex, length, twin, double_area, bulge, corner_of_vertex, next_corner, kind
+        As `shapes` takes and fills them. `kind` is filled further, the same by every search.
+    aligned : (3 m,)
+        Whether the faces at a glued half-edge run along it in opposite directions.
+    ring : (3 m,)
+        Where more than two faces meet, the next half-edge of the same edge.
+    is_delaunay : bool
+        What `shapes` returned.
+    distance, emitted : (n,)
+        Must come full of infinity; the first takes distances.
+    root, label, entered, crossing : (n,), (n + p,), (n,), (n,)
+        Take where the shortest paths come from; see `heat_igl.unfolding.exact.Origin`. They must come full of -1.
+    touched : (n,)
+        Takes the vertices that were reached.
+    slot : (3 m,)
+        Must come full of -1, and is again after a search.
+    tolerance : float
+        The fraction of a distance by which another way must be shorter before a window is cut.
+    """
+
+    def __init__(
+        self,
+        vertex: cython.int[::1],
+        length: cython.double[::1],
+        twin: cython.int[::1],
+        aligned: cython.uchar[::1],
+        ring: cython.int[::1],
+        double_area: cython.double[::1],
+        bulge: cython.double[::1],
+        corner_of_vertex: cython.int[::1],
+        next_corner: cython.int[::1],
+        kind: cython.uchar[::1],
+        is_delaunay: bool,
+        distance: cython.double[::1],
+        emitted: cython.double[::1],
+        root: cython.int[::1],
+        label: cython.int[::1],
+        entered: cython.int[::1],
+        crossing: cython.double[::1],
+        touched: cython.int[::1],
+        slot: cython.int[::1],
+        tolerance: cython.double,
+    ) -> None:
+        s: cython.pointer(Search) = cython.address(self.state)
+        # The pointers hold as long as the arrays do.
+        self.arrays = (vertex.base, length.base, twin.base, aligned.base, ring.base, double_area.base, bulge.base, corner_of_vertex.base, next_corner.base, kind.base, distance.base, emitted.base, root.base, label.base, entered.base, crossing.base, touched.base, slot.base)
+        s.vertex = cython.address(vertex[0])
+        s.length = cython.address(length[0])
+        s.twin = cython.address(twin[0])
+        s.aligned = cython.address(aligned[0])
+        s.ring = cython.address(ring[0])
+        s.double_area = cython.address(double_area[0])
+        s.bulge = cython.address(bulge[0])
+        s.corner_of_vertex = cython.address(corner_of_vertex[0])
+        s.next_corner = cython.address(next_corner[0])
+        s.kind = cython.address(kind[0])
+        s.distance = cython.address(distance[0])
+        s.emitted = cython.address(emitted[0])
+        s.root = cython.address(root[0])
+        s.label = cython.address(label[0])
+        s.entered = cython.address(entered[0])
+        s.crossing = cython.address(crossing[0])
+        s.touched = cython.address(touched[0])
+        s.slot = cython.address(slot[0])
+        s.is_delaunay = is_delaunay
+        s.n = corner_of_vertex.shape[0]
+        s.n_half_edges = vertex.shape[0]
+        s.tolerance = tolerance
+        s.n_points = s.n_targets = s.n_goals = 0
+        s.first_target = cython.NULL
+
+
 def search_each(
-    vertex: cython.int[::1],
-    length: cython.double[::1],
-    twin: cython.int[::1],
-    aligned: cython.uchar[::1],
-    ring: cython.int[::1],
-    double_area: cython.double[::1],
-    bulge: cython.double[::1],
-    corner_of_vertex: cython.int[::1],
-    next_corner: cython.int[::1],
-    kind: cython.uchar[::1],
-    is_delaunay: bool,
+    front: Front,
     source: cython.int[::1],
     goal: cython.int[::1],
     first_goal: cython.longlong[::1],
     cutoff: cython.double,
     n_nearest: cython.int,
     name: cython.longlong[::1],
-    distance: cython.double[::1],
-    emitted: cython.double[::1],
-    root: cython.int[::1],
-    label: cython.int[::1],
-    entered: cython.int[::1],
-    crossing: cython.double[::1],
-    touched: cython.int[::1],
-    slot: cython.int[::1],
-    tolerance: cython.double,
     found: cython.int[::1],
     value: cython.double[::1],
     end: cython.longlong[::1],
@@ -1339,8 +1397,8 @@ def search_each(
 
     Parameters
     ----------
-    vertex, length, twin, aligned, ring, double_area, bulge, corner_of_vertex, next_corner, kind, is_delaunay
-        As for `search`.
+    front : Front
+        In its first state, and in it again afterwards.
     source : (k,)
         Vertices that distance starts from, each alone.
     goal, first_goal : (g,), (k + 1,)
@@ -1351,109 +1409,61 @@ def search_each(
         and so many at most, the nearest; 0 for all.
     name : (n,)
         What vertices are called in `found`.
-    distance, emitted, root, label, entered, crossing, touched, slot
-        As for `search`, (n,) each and (3 m,); all that must come full of something is so again afterwards.
-    tolerance : float
-        As for `search`.
     found, value : (r,)
         Take vertices and their distances, source after source. The last source done is the last whose results had room.
     end : (k,)
         Takes where the results of each source end. Results for goals are one value each, and `found` is not used.
     """
-    s: Search
+    s: cython.pointer(Search) = cython.address(front.state)
     i: cython.int
     j: cython.longlong
     n_done: cython.int = 0
     at: cython.longlong = 0
     room: cython.longlong = value.shape[0]
     names: cython.p_longlong = cython.address(name[0])
-    s.vertex = cython.address(vertex[0])
-    s.length = cython.address(length[0])
-    s.twin = cython.address(twin[0])
-    s.aligned = cython.address(aligned[0])
-    s.ring = cython.address(ring[0])
-    s.double_area = cython.address(double_area[0])
-    s.bulge = cython.address(bulge[0])
-    s.corner_of_vertex = cython.address(corner_of_vertex[0])
-    s.next_corner = cython.address(next_corner[0])
-    s.kind = cython.address(kind[0])
-    s.is_delaunay = is_delaunay
-    s.n = corner_of_vertex.shape[0]
-    s.n_half_edges = vertex.shape[0]
-    s.distance = cython.address(distance[0])
-    s.root = cython.address(root[0])
-    s.label = cython.address(label[0])
-    s.entered = cython.address(entered[0])
-    s.crossing = cython.address(crossing[0])
-    s.emitted = cython.address(emitted[0])
-    s.touched = cython.address(touched[0])
-    s.slot = cython.address(slot[0])
-    s.n_points = s.n_targets = s.n_goals = 0
-    s.first_target = cython.NULL
     s.stops_early = goal.shape[0] > 0
     s.slack = 0.0
-    s.tolerance = tolerance
     with cython.nogil:
-        _allocate(cython.address(s))
+        _allocate(s)
         for i in range(source.shape[0]):
             s.cutoff = cutoff
             s.n_nearest = s.n_next = n_nearest
             if s.stops_early:
                 s.n_goals = cython.cast(cython.int, first_goal[i + 1] - first_goal[i])
                 s.goal = cython.address(goal[0]) + first_goal[i]
-            _start_at(cython.address(s), source[i], 0.0, 0)
+            _start_at(s, source[i], 0.0, 0)
             if not s.failed:
-                _run(cython.address(s))
+                _run(s)
             if s.failed:
                 break
             if s.stops_early:
                 for j in range(first_goal[i], first_goal[i + 1]):
-                    value[j] = distance[goal[j]]
+                    value[j] = s.distance[goal[j]]
                 at = first_goal[i + 1]
             else:
                 if at + (n_nearest if n_nearest > 0 else s.n_touched) > room:
                     break
                 if n_nearest > 0:
                     if s.n_touched >= n_nearest:
-                        _narrow(cython.address(s))
-                    at += _write_nearest(cython.address(s), names, cython.address(found[0]) + at, \
-                                         cython.address(value[0]) + at)
+                        _narrow(s)
+                    at += _write_nearest(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
                 else:
-                    at += _write_within(cython.address(s), names, cython.address(found[0]) + at, \
-                                        cython.address(value[0]) + at)
+                    at += _write_within(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
             end[i] = at
             n_done += 1
-            _forget(cython.address(s))
-        _forget(cython.address(s))
-        _free_front(cython.address(s))
+            _forget(s)
+        _forget(s)
+        _free_front(s)
     return -1 if s.failed else n_done
 
 
 def search(
-    vertex: cython.int[::1],
-    length: cython.double[::1],
-    twin: cython.int[::1],
-    aligned: cython.uchar[::1],
-    ring: cython.int[::1],
-    double_area: cython.double[::1],
-    bulge: cython.double[::1],
-    corner_of_vertex: cython.int[::1],
-    next_corner: cython.int[::1],
-    kind: cython.uchar[::1],
-    is_delaunay: bool,
+    front: Front,
     source: cython.int[::1],
     offset: cython.double[::1],
     point_face: cython.int[::1],
     point: cython.double[::1],
     point_offset: cython.double[::1],
-    distance: cython.double[::1],
-    emitted: cython.double[::1],
-    root: cython.int[::1],
-    label: cython.int[::1],
-    entered: cython.int[::1],
-    crossing: cython.double[::1],
-    touched: cython.int[::1],
-    slot: cython.int[::1],
     goal: cython.int[::1],
     first_target: cython.int[::1],
     next_target: cython.int[::1],
@@ -1466,34 +1476,19 @@ def search(
     slack: cython.double,
     stops_early: bool,
     cutoff: cython.double,
-    tolerance: cython.double,
     statistics: cython.longlong[::1],
 ) -> bool:
     """Exact distances from vertices and points; false where memory runs out.
 
     Parameters
     ----------
-    vertex, length, twin, double_area, bulge, corner_of_vertex, next_corner, kind
-        As `shapes` takes and fills them. `kind` is filled further, the same by every search.
-    aligned : (3 m,)
-        Whether the faces at a glued half-edge run along it in opposite directions.
-    ring : (3 m,)
-        Where more than two faces meet, the next half-edge of the same edge.
-    is_delaunay : bool
-        What `shapes` returned.
+    front : Front
+        For one search alone, whose `label` has room for p source points.
     source, offset : (k,)
         Vertices that distance starts from, and the distance at which each starts.
     point_face, point, point_offset : (p,), (3 p,), (p,)
         Sources inside faces: face, barycentric coordinates, distance. A source on a side, with a coordinate of 0, comes
         once for every face there.
-    distance, emitted : (n,)
-        Must come full of infinity; the first takes distances.
-    root, label, entered, crossing : (n,), (n + p,), (n,), (n,)
-        Take where the shortest paths come from; see `heat_igl.unfolding.exact.Origin`. They must come full of -1.
-    touched : (n,)
-        Takes the vertices that were reached, as many as `statistics` says.
-    slot : (3 m,)
-        Must come full of -1, and is again afterwards.
     goal : (g,)
         With `stops_early`, the search ends when the distances of these vertices and of all targets are known.
     first_target, next_target, target_face, target : (m,), (t,), (t,), (3 t,)
@@ -1504,34 +1499,11 @@ def search(
         Diameter of the largest circle around a face with targets.
     cutoff : float
         Distances up to here are exact, larger ones may be too large.
-    tolerance : float
-        The fraction of a distance by which another way must be shorter before a window is cut.
     statistics : (3,)
         Takes the numbers of vertices that were reached, of windows, and of lists that crossed a face.
     """
-    s: Search
+    s: cython.pointer(Search) = cython.address(front.state)
     i: cython.int
-    s.vertex = cython.address(vertex[0])
-    s.length = cython.address(length[0])
-    s.twin = cython.address(twin[0])
-    s.aligned = cython.address(aligned[0])
-    s.ring = cython.address(ring[0])
-    s.double_area = cython.address(double_area[0])
-    s.bulge = cython.address(bulge[0])
-    s.corner_of_vertex = cython.address(corner_of_vertex[0])
-    s.next_corner = cython.address(next_corner[0])
-    s.kind = cython.address(kind[0])
-    s.is_delaunay = is_delaunay
-    s.n = corner_of_vertex.shape[0]
-    s.n_half_edges = vertex.shape[0]
-    s.distance = cython.address(distance[0])
-    s.root = cython.address(root[0])
-    s.label = cython.address(label[0])
-    s.entered = cython.address(entered[0])
-    s.crossing = cython.address(crossing[0])
-    s.emitted = cython.address(emitted[0])
-    s.touched = cython.address(touched[0])
-    s.slot = cython.address(slot[0])
     s.n_points = point_face.shape[0]
     if s.n_points > 0:
         s.point_face = cython.address(point_face[0])
@@ -1541,7 +1513,6 @@ def search(
     if s.n_goals > 0:
         s.goal = cython.address(goal[0])
     s.n_targets = target_face.shape[0]
-    s.first_target = cython.NULL
     if s.n_targets > 0:
         s.first_target = cython.address(first_target[0])
         s.next_target = cython.address(next_target[0])
@@ -1553,20 +1524,19 @@ def search(
         s.target_crossing = cython.address(target_crossing[0])
     s.stops_early = stops_early
     s.slack = slack
-    s.tolerance = tolerance
     s.cutoff = cutoff
     with cython.nogil:
-        _allocate(cython.address(s))
+        _allocate(s)
         for i in range(source.shape[0]):
-            _start_at(cython.address(s), source[i], offset[i], i)
+            _start_at(s, source[i], offset[i], i)
         for i in range(s.n_points):
             if not s.failed:
-                label[s.n + i] = source.shape[0] + i
-                _push(cython.address(s), point_offset[i], s.n_half_edges + s.n + i)
+                s.label[s.n + i] = source.shape[0] + i
+                _push(s, point_offset[i], s.n_half_edges + s.n + i)
         if not s.failed:
-            _run(cython.address(s))
-        _empty_front(cython.address(s))
-        _free_front(cython.address(s))
+            _run(s)
+        _empty_front(s)
+        _free_front(s)
     statistics[0] = s.n_touched
     statistics[1] = s.n_windows
     statistics[2] = s.n_lists_done

@@ -175,7 +175,7 @@ class _Workspace:
 
     def __init__(self, edges: HalfEdges) -> None:
         n = edges.n
-        self._edges = edges
+        self._names = edges.old_vertex
         self._state = (
             np.full(n, np.inf),
             np.full(n, np.inf),
@@ -184,6 +184,7 @@ class _Workspace:
             np.empty(n, np.int32),
             np.full(len(edges.tables.vertex), -1, np.int32),
         )
+        self._front = windows.Front(*edges.tables, *self._state, TOLERANCE)
 
     def search(
         self,
@@ -199,15 +200,13 @@ class _Workspace:
         """Search from each of `sources`; the end of the results of each, for as many as had room."""
         ends = np.zeros(len(sources), np.int64)
         n_done = windows.search_each(
-            *self._edges.tables,
+            self._front,
             sources,
             goals,
             np.zeros(len(sources) + 1, np.int64) if first_goal is None else first_goal,
             cutoff,
             n_nearest,
-            self._edges.old_vertex,
-            *self._state,
-            TOLERANCE,
+            self._names,
             found,
             value,
             ends,
