@@ -18,11 +18,11 @@ EXPORTED = """
 AccuracyWarning BatchError ClosestPoints Diagnostics FactorizationError HeatMethodSolver HeatSolution ImageDomain
 LabelledDistance Mesh MeshError MeshReport MissingExtraError OffsetSources Operators PolygonMesh ReferenceSolverError
 Refinement SourceError SurfaceCurve SurfacePoints ValidationReport ValidationRow VoronoiCells as_mesh baselines
-closed_forms closest_points cluster curve_on diameter distance_matrix distances_within dual_triangulation edge_curve enclosed_areas
-farthest_cells farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain isolines metrics nearest_vertices
-offset_curves pair_distances plots polygon_operators read_attributes read_mesh read_polygon_mesh reference sample_mesh sampling shapes
-shortest_paths speed_operators split_long_edges sublevel_areas unfolded_distance validate voronoi_cells write_curves
-write_mesh
+closed_forms closest_points cluster curve_on diameter distance_matrix distances_within dual_triangulation edge_curve
+enclosed_areas farthest_cells farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain
+isolines metrics nearest_vertices offset_curves pair_distances plots polygon_operators read_attributes read_mesh
+read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
+unfolded_distance validate voronoi_cells write_curves write_mesh
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they

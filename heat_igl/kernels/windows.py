@@ -1352,7 +1352,26 @@ class Front:
     ) -> None:
         s: cython.pointer(Search) = cython.address(self.state)
         # The pointers hold as long as the arrays do.
-        self.arrays = (vertex.base, length.base, twin.base, aligned.base, ring.base, double_area.base, bulge.base, corner_of_vertex.base, next_corner.base, kind.base, distance.base, emitted.base, root.base, label.base, entered.base, crossing.base, touched.base, slot.base)
+        self.arrays = (
+            vertex.base,
+            length.base,
+            twin.base,
+            aligned.base,
+            ring.base,
+            double_area.base,
+            bulge.base,
+            corner_of_vertex.base,
+            next_corner.base,
+            kind.base,
+            distance.base,
+            emitted.base,
+            root.base,
+            label.base,
+            entered.base,
+            crossing.base,
+            touched.base,
+            slot.base,
+        )
         s.vertex = cython.address(vertex[0])
         s.length = cython.address(length[0])
         s.twin = cython.address(twin[0])
