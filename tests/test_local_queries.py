@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from conftest import perturbed, shared_path
@@ -138,7 +140,7 @@ def test_a_cutoff_ends_the_search():
     mesh = bumpy()
     surface = ExactSurface(from_mesh(mesh, 0))
     windows = [surface.solve(np.array([0]), cutoff=cutoff).n_windows for cutoff in (0.1, 0.2, 0.4, 0.8, np.inf)]
-    assert all(less < more for less, more in zip(windows, windows[1:], strict=False))
+    assert all(less < more for less, more in pairwise(windows))
     # On a sphere of radius 1 a cap of radius 0.2 is a hundredth of the area.
     assert windows[1] < 0.03 * windows[-1]
 

@@ -1,7 +1,7 @@
 """Run a solver on a mesh: choose it by name, check its distance, measure its cost; native ones in a child process.
 
-A native solver runs on one connected component at a time. So sources in several components work, and a vertex that no source
-reaches is ``inf``, whatever number the solver would write there.
+A native solver runs on one connected component at a time. So sources in several components work, and a vertex that no
+source reaches is ``inf``, whatever number the solver would write there.
 """
 
 from __future__ import annotations

@@ -17,8 +17,8 @@ from heat_igl.unfolding.half_edges import HalfEdges, Located, from_mesh, from_tr
 
 __all__ = ["TOLERANCE", "ExactSolution", "ExactSurface", "Origin", "exact_distance"]
 
-#: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds up
-# to. A larger number keeps a few windows more and changes no result.
+#: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds
+#: up to. A larger number keeps a few windows more and changes no result.
 TOLERANCE = 1e-11
 _NO_VERTICES = np.empty(0, np.int64)
 
