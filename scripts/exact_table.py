@@ -87,13 +87,13 @@ def local(mesh: Mesh, source: int, distance: Any, repeats: int) -> dict[str, Any
 
 
 def vtp_seconds(program: Path, mesh: Mesh, source: int) -> float:
-    """The last number that the program prints: the seconds of its propagation."""
+    """The seconds of its propagation, as the program prints them."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "mesh.obj")
         write_mesh(path, mesh)
         command = [str(program), "-m", str(path), "-s", str(source)]
         printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    return float(re.findall(r"\d+(?:\.\d+)?(?:e-?\d+)?", printed)[-1])
+    return float(re.findall(r"propagation step took (\S+) seconds", printed)[0])
 
 
 def _difference(distance: Any, other: Any) -> float:

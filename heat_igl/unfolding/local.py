@@ -176,15 +176,17 @@ class _Workspace:
     def __init__(self, edges: HalfEdges) -> None:
         n = edges.n
         self._names = edges.old_vertex
-        self._state: tuple[AnyArray, ...] = (
+        self._state = (
             np.full(n, np.inf),
             np.full(n, np.inf),
-            *(np.full(n, -1, np.int32) for _ in range(3)),
+            np.full(n, -1, np.int32),
+            np.full(n, -1, np.int32),
+            np.full(n, -1, np.int32),
             np.zeros(n),
             np.empty(n, np.int32),
             np.full(len(edges.tables.vertex), -1, np.int32),
         )
-        self._front = windows.Front(*edges.tables, *self._state, tolerance=TOLERANCE)
+        self._front = windows.Front(*edges.tables, *self._state, TOLERANCE)
 
     def search(
         self,
