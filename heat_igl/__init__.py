@@ -51,7 +51,7 @@ from heat_igl.sampling import (
     voronoi_cells,
 )
 from heat_igl.sources import OffsetSources
-from heat_igl.unfolding import Refinement, unfolded_distance
+from heat_igl.unfolding import Refinement, distances_within, nearest_vertices, pair_distances, unfolded_distance
 
 if TYPE_CHECKING:
     from heat_igl import baselines, cluster, reference
@@ -93,6 +93,7 @@ __all__ = [
     "cluster",
     "diameter",
     "distance_matrix",
+    "distances_within",
     "dual_triangulation",
     "enclosed_areas",
     "farthest_cells",
@@ -103,7 +104,9 @@ __all__ = [
     "image_domain",
     "isolines",
     "metrics",
+    "nearest_vertices",
     "offset_curves",
+    "pair_distances",
     "plots",
     "polygon_operators",
     "read_attributes",

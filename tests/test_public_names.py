@@ -18,11 +18,11 @@ EXPORTED = """
 AccuracyWarning BatchError ClosestPoints Diagnostics FactorizationError HeatMethodSolver HeatSolution ImageDomain
 LabelledDistance Mesh MeshError MeshReport MissingExtraError OffsetSources Operators PolygonMesh ReferenceSolverError
 Refinement SourceError SurfaceCurve SurfacePoints ValidationReport ValidationRow VoronoiCells as_mesh baselines
-closed_forms closest_points cluster curve_on diameter distance_matrix dual_triangulation edge_curve enclosed_areas
-farthest_cells farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain isolines metrics
-offset_curves plots polygon_operators read_attributes read_mesh read_polygon_mesh reference sample_mesh sampling shapes
-shortest_paths speed_operators split_long_edges sublevel_areas unfolded_distance validate voronoi_cells write_curves
-write_mesh
+closed_forms closest_points cluster curve_on diameter distance_matrix distances_within dual_triangulation edge_curve
+enclosed_areas farthest_cells farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain
+isolines metrics nearest_vertices offset_curves pair_distances plots polygon_operators read_attributes read_mesh
+read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
+unfolded_distance validate voronoi_cells write_curves write_mesh
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they
@@ -73,6 +73,9 @@ dual_triangulation(mesh, cells)
 geodesic_centre(mesh, solver, points, weights=None)
 diameter(solver, *, start=0, rounds=10)
 distance_matrix(solver, indices=None)
+distances_within(mesh, radius, sources=None)
+nearest_vertices(mesh, k, sources=None)
+pair_distances(mesh, pairs)
 validate(mesh, sources, methods=('heat', 'sweep', 'unfold', 'meshlab', 'igl'), reference='exact', *, name='mesh',\
  progress=None)
 validation.draw_sources(mesh, count, seed=0)
@@ -82,7 +85,7 @@ cluster.distances(meshes, sources, store, *, client=None, refine=None, dtype='fl
 cluster.connected(scheduler=None, n_workers=None, dashboard=False)
 cluster.folder(path)
 cluster.read_source_sets(path)
-reference.exact(mesh, sources, *, solver='auto')
+reference.exact(mesh, sources, *, solver='windows')
 reference.meshlab(mesh, sources)
 reference.meshlab_heat(mesh, sources, *, m=1.0)
 reference.meshlab_border(mesh)

@@ -33,6 +33,7 @@ from heat_igl import (
     shapes,
 )
 from heat_igl.reference import guarded, measurement, native
+from heat_igl.reference.steiner import graph_distance
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
 
@@ -49,6 +50,7 @@ def real_meshes() -> dict[str, Path]:
 
 
 MESHES = real_meshes()
+SOLVERS = ("windows", *reference.EXACT_SOLVERS)
 
 
 def load(name: str) -> Mesh:
@@ -136,11 +138,11 @@ def paths_through_edge_points(mesh: Mesh, source: int, per_edge: int) -> FloatAr
 def test_exact_solvers_agree_on_real_meshes(name: str) -> None:
     mesh = load(name)
     source = source_on_largest_component(mesh, 0)
-    truth = reference.exact(mesh, source, solver="pygeodesic")
-    for solver in ("gdist", "igl"):
+    truth = reference.exact(mesh, source)
+    for solver, tolerance in (("pygeodesic", 1e-10), ("gdist", 1e-10), ("igl", 1e-6)):
         other = reference.exact(mesh, source, solver=solver)
         assert np.array_equal(np.isinf(other), np.isinf(truth))
-        assert relative(other, truth).max() < 1e-6
+        assert relative(other, truth).max() < tolerance
 
 
 @pytest.mark.slow
@@ -149,11 +151,11 @@ def test_exact_solvers_agree_on_large_meshes(name: str) -> None:
     mesh = load(name)
     source = source_on_largest_component(mesh, 0)
     truth = reference.exact(mesh, source)
-    for solver in ("gdist", "igl"):
-        assert relative(reference.exact(mesh, source, solver=solver), truth).max() < 1e-6
+    for solver, tolerance in (("pygeodesic", 1e-10), ("gdist", 1e-10), ("igl", 1e-6)):
+        assert relative(reference.exact(mesh, source, solver=solver), truth).max() < tolerance
 
 
-@pytest.mark.parametrize("solver", reference.EXACT_SOLVERS)
+@pytest.mark.parametrize("solver", SOLVERS)
 def test_exact_from_several_sources_is_the_minimum_over_them(solver: str) -> None:
     mesh = load("cow")
     sources = [5, 1200, 2800]
@@ -180,7 +182,7 @@ def test_exact_is_approached_from_above_by_independent_paths() -> None:
     assert excess[2] < 2e-3
 
 
-@pytest.mark.parametrize("solver", reference.EXACT_SOLVERS)
+@pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("factor", [1e-9, 1e-3, 3.7, 1e6])
 def test_exact_does_not_depend_on_the_unit(solver: str, factor: float) -> None:
     mesh = load("cow")
@@ -201,7 +203,7 @@ def test_exact_is_inf_beyond_the_component_and_at_unreferenced_vertices() -> Non
     one = rectangle(6, 6, 1, 1)
     n = one.n_vertices
     mesh = Mesh(np.vstack([[[9.0, 9, 9]], one.V, one.V + np.array([3, 0, 0])]), np.vstack([one.F + 1, one.F + 1 + n]))
-    for solver in reference.EXACT_SOLVERS:
+    for solver in SOLVERS:
         distance = reference.exact(mesh, 1, solver=solver)
         assert np.isinf(distance[0])
         assert np.isinf(distance[1 + n :]).all()
@@ -211,46 +213,75 @@ def test_exact_is_inf_beyond_the_component_and_at_unreferenced_vertices() -> Non
         np.testing.assert_allclose(everywhere[1 : 1 + n], everywhere[1 + n :], atol=1e-9)
 
 
+@pytest.mark.parametrize("solver", reference.EXACT_SOLVERS)
 @pytest.mark.parametrize(
     ("name", "message"), [("truck", "belong to more than two triangles"), ("teapot", "two surfaces touch in a point")]
 )
-def test_exact_refuses_surfaces_that_are_not_manifold(name: str, message: str) -> None:
+def test_other_exact_solvers_refuse_surfaces_that_are_not_manifold(name: str, message: str, solver: str) -> None:
     mesh = load(name)
     with pytest.raises(ReferenceSolverError, match=message):
-        reference.exact(mesh, source_on_largest_component(mesh, 0))
+        reference.exact(mesh, source_on_largest_component(mesh, 0), solver=solver)
 
 
-def test_exact_refuses_small_examples_of_the_same() -> None:
-    fin = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]], [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+def fin() -> Mesh:
+    """Three triangles at one edge."""
+    return Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]], [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+
+
+def bow() -> Mesh:
+    """Two triangles that touch in a point."""
+    return Mesh([[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]])
+
+
+def test_other_exact_solvers_refuse_small_examples_of_the_same() -> None:
     with pytest.raises(ReferenceSolverError, match=r"1 edges .* more than two triangles \(first: \[0, 1\]\)"):
-        reference.exact(fin, 0)
-    bow = Mesh([[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]])
+        reference.exact(fin(), 0, solver="igl")
     with pytest.raises(ReferenceSolverError, match=r"at 1 vertices .* touch in a point \(first: 0\)"):
-        reference.exact(bow, 1)
-    assert np.isfinite(reference.exact(Mesh(fin.V, fin.F[:2]), 0)[:4]).all()
+        reference.exact(bow(), 1, solver="igl")
+    assert np.isfinite(reference.exact(Mesh(fin().V, fin().F[:2]), 0, solver="igl")[:4]).all()
 
 
-def test_exact_accepts_a_good_component_of_a_bad_mesh() -> None:
+def test_exact_takes_small_examples_of_the_same() -> None:
+    # Unfolded, two pages are a square: from the tip of one to that of the other is straight across the edge.
+    np.testing.assert_allclose(reference.exact(fin(), 2), [1, np.sqrt(2), 0, 2, 2], rtol=1e-14)
+    np.testing.assert_allclose(reference.exact(bow(), 1), np.sqrt(2) * np.array([1, 0, np.sqrt(2), 2, 2]), rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["suzanne", "teapot", "truck"])
+def test_exact_on_meshes_that_are_not_manifold_is_below_paths_through_edge_points(name: str) -> None:
+    mesh = load(name)
+    source = source_on_largest_component(mesh, 0)
+    exact, above = reference.exact(mesh, source), graph_distance(mesh, source, 8)[0]
+    assert np.array_equal(np.isfinite(exact), mesh.components == mesh.components[source])
+    assert (above >= exact * (1 - 1e-7)).all()
+    assert relative(above, exact).mean() < 0.01
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_exact_accepts_a_good_component_of_a_bad_mesh(solver: str) -> None:
     mesh = load("suzanne")
     assert len(mesh.report().nonmanifold_edges)
     eye = mesh.components == np.bincount(mesh.components).argmin()
-    distance = reference.exact(mesh, int(np.flatnonzero(eye)[0]))
+    distance = reference.exact(mesh, int(np.flatnonzero(eye)[0]), solver=solver)
     assert np.array_equal(np.isfinite(distance), eye)
 
 
-def test_exact_refuses_edges_without_length() -> None:
+def test_other_exact_solvers_refuse_edges_without_length() -> None:
     mesh = rectangle(5, 5, 1, 1)
     V = mesh.V.copy()
     V[mesh.F[0, 0]] = V[mesh.F[0, 1]]
+    collapsed = Mesh(V, mesh.F)
     with pytest.raises(ReferenceSolverError, match=r"1 edges .* have length zero"):
-        reference.exact(Mesh(V, mesh.F), 24)
+        reference.exact(collapsed, 24, solver="igl")
+    distance = reference.exact(collapsed, 24)
+    assert abs(distance[mesh.F[0, 0]] - distance[mesh.F[0, 1]]) < 1e-7
 
 
 def test_exact_refuses_tetrahedra_and_unknown_solvers() -> None:
     box = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
     with pytest.raises(ReferenceSolverError, match=r"closed_forms\.convex_solid"):
         reference.exact(box, 0)
-    with pytest.raises(ReferenceSolverError, match="'auto' or one of pygeodesic, gdist, igl"):
+    with pytest.raises(ReferenceSolverError, match="'auto' or one of windows, pygeodesic, gdist, igl"):
         reference.exact(rectangle(3, 3, 1, 1), 0, solver="magic")
     with pytest.raises(ReferenceSolverError, match="'magic' is unknown"):
         reference.measured("magic", rectangle(3, 3, 1, 1), 0)
@@ -304,7 +335,7 @@ def test_exact_tends_to_the_smooth_surface_with_the_square_of_the_edge(
 @pytest.mark.slow
 def test_exact_on_a_fine_sphere() -> None:
     mesh = shapes.icosphere(7)
-    found = reference.measured("exact", mesh, 5)
+    found = reference.measured("pygeodesic", mesh, 5)
     # Inscribed with edges of h = 0.0094, the polyhedron is shorter by a fraction of h^2 = 9e-5.
     assert relative(found.distance, closed_forms.sphere(mesh, 5)).mean() < 2e-5
     assert found.peak_memory is None or 1e9 < found.peak_memory < 4e9
@@ -461,10 +492,10 @@ def children() -> list[psutil.Process]:
 
 def test_a_crash_is_an_error_and_the_next_call_works() -> None:
     mesh = rectangle(5, 5, 1, 1)
-    before = reference.exact(mesh, 0)
+    before = reference.exact(mesh, 0, solver="igl")
     with pytest.raises(ReferenceSolverError, match=r"os:abort died with (SIGABRT|exit status).*mesh\.report\(\)"):
         guarded.call("os:abort", {})
-    assert np.array_equal(reference.exact(mesh, 0), before)
+    assert np.array_equal(reference.exact(mesh, 0, solver="igl"), before)
 
 
 @pytest.mark.parametrize("name", ["suzanne", "truck"])
@@ -488,7 +519,7 @@ def test_an_index_out_of_range_takes_nothing_down(function: str) -> None:
     options = {"t": None, "intrinsic_delaunay": False} if function == "igl_heat" else {}
     with pytest.raises(ReferenceSolverError, match=f"native:{function} (died with|failed with)"):
         guarded.call(f"heat_igl.reference.native:{function}", {"V": mesh.V, "F": F, "sources": np.array([0])}, options)
-    assert np.isfinite(reference.exact(mesh, 0)).all()
+    assert np.isfinite(reference.exact(mesh, 0, solver="igl")).all()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signal.pause")
@@ -507,8 +538,8 @@ def test_memory_is_bounded() -> None:
     reference.close()  # a child that has room left over from an earlier call would not need more
     mesh = load("camelhead")
     with pytest.raises(ReferenceSolverError, match=r"(died with|needs more than).* GiB"):
-        reference.exact(mesh, 0, memory=2**24)
-    assert np.isfinite(reference.exact(mesh, 0)).all()
+        reference.exact(mesh, 0, solver="pygeodesic", memory=2**24)
+    assert np.isfinite(reference.exact(mesh, 0, solver="igl")).all()
 
 
 @pytest.mark.parametrize(
@@ -531,10 +562,10 @@ def test_what_is_no_distance_is_an_error(
         reply.values["distance"] = change(reply.values["distance"])
         return reply
 
-    assert np.isfinite(reference.exact(mesh, 0)).all()
+    assert np.isfinite(reference.exact(mesh, 0, solver="igl")).all()
     monkeypatch.setattr(guarded, "call", changed)
     with pytest.raises(ReferenceSolverError, match=message):
-        reference.exact(mesh, 0)
+        reference.exact(mesh, 0, solver="igl")
 
 
 def test_a_missing_package_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -544,7 +575,8 @@ def test_a_missing_package_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> N
         reference.meshlab(mesh, 0)
     with pytest.raises(MissingExtraError, match="needs potpourri3d: pip install potpourri3d"):
         reference.potpourri3d_heat(mesh, 0)
-    np.testing.assert_allclose(reference.exact(mesh, 0), closed_forms.plane(mesh, 0))  # libigl's is always there
+    for solver in ("windows", "igl"):  # these are always there
+        np.testing.assert_allclose(reference.exact(mesh, 0, solver=solver), closed_forms.plane(mesh, 0))
 
 
 def test_without_an_interpreter_there_is_no_child(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -667,27 +699,27 @@ def test_a_hanging_child_does_not_outlive_a_killed_caller_for_long() -> None:
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_a_fork_gets_a_child_of_its_own() -> None:
     mesh = rectangle(5, 5, 1, 1)
-    expected = reference.exact(mesh, 0)
+    expected = reference.exact(mesh, 0, solver="igl")
     pid = guarded._shared.pid
     with guarded._shared._lock:  # as if another thread were in a call
         forked = os.fork()
         if forked == 0:
             signal.alarm(30)
-            same = np.array_equal(reference.exact(mesh, 0), expected) and guarded._shared.pid != pid
+            same = np.array_equal(reference.exact(mesh, 0, solver="igl"), expected) and guarded._shared.pid != pid
             reference.close()
             os._exit(0 if same else 1)
     assert os.waitpid(forked, 0)[1] == 0
-    assert np.array_equal(reference.exact(mesh, 0), expected)
+    assert np.array_equal(reference.exact(mesh, 0, solver="igl"), expected)
     assert guarded._shared.pid == pid
 
 
 def test_a_child_that_was_killed_between_calls_is_replaced() -> None:
     mesh = rectangle(5, 5, 1, 1)
-    expected = reference.exact(mesh, 0)
+    expected = reference.exact(mesh, 0, solver="igl")
     child = psutil.Process(guarded._shared.pid)
     child.kill()
     psutil.wait_procs([child], timeout=10)
-    assert np.array_equal(reference.exact(mesh, 0), expected)
+    assert np.array_equal(reference.exact(mesh, 0, solver="igl"), expected)
     assert guarded._shared.pid != child.pid
 
 
@@ -695,7 +727,7 @@ def test_threads_take_turns() -> None:
     mesh = rectangle(12, 12, 1, 1)
     expected = [closed_forms.plane(mesh, source) for source in range(24)]
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(lambda source: reference.exact(mesh, source), range(24)))
+        found = list(pool.map(lambda source: reference.exact(mesh, source, solver="igl"), range(24)))
     np.testing.assert_allclose(found, expected, atol=1e-9)
 
 

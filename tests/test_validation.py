@@ -186,7 +186,7 @@ def test_no_reference_brings_the_process_down(name: str) -> None:
     for row in report.rows:
         assert (row.failure is None) == (row.method in report.distances)
     failed = {row.method: row.failure or "" for row in report.rows}
-    assert "more than two triangles" in failed["exact"] or "touch in a point" in failed["exact"]
+    assert not failed["exact"]
     assert not failed["meshlab"]
 
 
@@ -215,7 +215,11 @@ TOUCHING = Mesh(  # two tetrahedra's surfaces, with one vertex in common
 )
 
 
-def test_without_a_reference_the_rest_of_the_report_stands() -> None:
+def test_without_a_reference_the_rest_of_the_report_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refusing(*_: object, **__: object) -> None:
+        raise heat_igl.ReferenceSolverError("at 1 vertices connected with the sources two surfaces touch in a point")
+
+    monkeypatch.setattr(reference, "exact", refusing)
     report = validate(TOUCHING, 1, ["heat", "unfold", "exact"])
     assert report.failure is not None
     assert "two surfaces touch in a point" in report.failure
@@ -233,7 +237,8 @@ def test_without_a_reference_the_rest_of_the_report_stands() -> None:
     assert report.exceeding(50) == report.rows
     with pytest.raises(ValueError, match="no errors to draw: at 1 vertices connected with the sources two surfaces"):
         report.plot()
-    assert validate(shapes.grid(3), 0, ["heat"]).failure is None
+    monkeypatch.undo()
+    assert validate(TOUCHING, 1, ["heat"]).failure is None
 
 
 def test_no_reference() -> None:
@@ -371,8 +376,6 @@ def test_script_validates_a_folder(script: ModuleType, folder: Path) -> None:
     assert status == 0
     assert [record["file"] for record in found] == ["disk.off", "fin.off", "grid.off", "noise.off"]
     assert ["report" in record for record in found] == [True, True, True, False]
-    assert "more than two triangles" in found[1]["report"]["reference_failure"]
-    assert "- fin.off, reference exact: 1 edges connected with the sources belong to more than two" in table
     assert found[3]["failure"]
     assert str(folder) not in json.dumps(found)
     assert found[0]["environment"]["numpy"] == np.__version__
@@ -381,7 +384,7 @@ def test_script_validates_a_folder(script: ModuleType, folder: Path) -> None:
     assert lines[2:4] == ["| mesh | vertices | heat | meshlab |", "|---|---:|---:|---:|"]
     mean = found[0]["report"]["rows"][0]["errors"]["mean"]
     assert lines[4].startswith(f"| disk | 217 | {100 * mean:.3g} |")
-    assert lines[5] == "| fin | 5 | - | - |"
+    assert lines[5].startswith("| fin | 5 | ")
     assert (folder / "out" / "errors.png").stat().st_size > 10_000
 
 

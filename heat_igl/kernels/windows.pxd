@@ -68,7 +68,7 @@ cdef struct Search:
     # The front.
     int* slot
     List* lists
-    int n_lists, n_all_lists
+    int n_lists, n_all_lists, n_made_lists
     int free_list
     int* next_free
     Entry* heap
@@ -79,6 +79,15 @@ cdef struct Search:
     bint failed
     long long n_windows, n_lists_done
     double tolerance
+    # Where the search ends: at a distance, or, if so many vertices are asked for, once the nearest are known.
+    double cutoff
+    int n_nearest, n_next
+    double* ranked
+    int n_all_ranked
+
+cdef class Front:
+    cdef Search state
+    cdef object arrays
 
 cdef enum Kind:
     UNKNOWN = 0
@@ -105,9 +114,12 @@ cdef extern from *:
     #define SAME 2e-14
     // Windows that overlap by less than this fraction of both are left as they are.
     #define OVERLAP 0.2
+    // A search goes on beyond its cutoff by this fraction, more than rounding of a key.
+    #define MARGIN 1e-12
     """
     double SHADOW_MARGIN
     double NARROW
     double NEAR
     double SAME
     double OVERLAP
+    double MARGIN

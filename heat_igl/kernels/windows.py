@@ -22,7 +22,7 @@ from cython.cimports.libc.math import INFINITY, fabs, sqrt
 from cython.cimports.libc.stdlib import free, malloc, realloc
 from cython.cimports.libc.string import memcpy, memmove
 
-__all__ = ["search", "shapes"]
+__all__ = ["Front", "search", "search_each", "shapes"]
 
 
 def shapes(
@@ -535,8 +535,10 @@ def _free_list(s: cython.pointer(Search)) -> cython.int:
         s.n_all_lists *= 2
     place = s.n_lists
     s.n_lists += 1
-    s.lists[place].windows = cython.NULL
-    s.lists[place].capacity = 0
+    if place == s.n_made_lists:
+        s.n_made_lists += 1
+        s.lists[place].windows = cython.NULL
+        s.lists[place].capacity = 0
     return place
 
 
@@ -1098,15 +1100,17 @@ def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _run(s: cython.pointer(Search), cutoff: cython.double) -> cython.void:
+def _run(s: cython.pointer(Search)) -> cython.void:
     """Carry lists, and let vertices and points shed windows, in ascending order of their keys."""
     entry: Entry
     v: cython.int
     j: cython.int
     place: cython.int
     while s.n_heap > 0 and not s.failed:
+        if s.n_nearest > 0 and s.n_touched >= s.n_next:
+            _narrow(s)
         entry = _pop(s)
-        if entry.key > cutoff + s.slack:
+        if entry.key > s.cutoff * (1.0 + MARGIN) + s.slack:
             break
         if s.stops_early and _all_found(s, entry.key):
             break
@@ -1124,31 +1128,361 @@ def _run(s: cython.pointer(Search), cutoff: cython.double) -> cython.void:
         _over_corners(s, j)
 
 
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _narrow(s: cython.pointer(Search)) -> cython.void:
+    """End the search at the distance within which as many vertices as asked for are known to lie."""
+    i: cython.int
+    j: cython.int
+    low: cython.int = 0
+    high: cython.int = s.n_touched - 1
+    wanted: cython.int = s.n_nearest - 1
+    pivot: cython.double
+    if s.n_touched > s.n_all_ranked:
+        free(s.ranked)
+        s.n_all_ranked = 2 * s.n_touched
+        s.ranked = cython.cast(cython.p_double, malloc(s.n_all_ranked * cython.sizeof(cython.double)))
+        if s.ranked == cython.NULL:
+            s.n_all_ranked = 0
+            s.failed = True
+            return
+    for i in range(s.n_touched):
+        s.ranked[i] = s.distance[s.touched[i]]
+    # Quickselect, Hoare 1961.
+    while low < high:
+        pivot = s.ranked[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while s.ranked[i] < pivot:
+                i += 1
+            while s.ranked[j] > pivot:
+                j -= 1
+            if i <= j:
+                s.ranked[i], s.ranked[j] = s.ranked[j], s.ranked[i]
+                i += 1
+                j -= 1
+        if wanted <= j:
+            high = j
+        elif wanted >= i:
+            low = i
+        else:
+            break
+    if s.ranked[wanted] < s.cutoff:
+        s.cutoff = s.ranked[wanted]
+    s.n_next = s.n_touched + s.n_nearest // 4 + 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _allocate(s: cython.pointer(Search)) -> cython.void:
+    """Room for a front."""
+    s.n_lists = s.n_made_lists = s.n_heap = s.n_touched = s.n_found = 0
+    s.n_all_lists, s.n_all_heap, s.n_out = 256, 1024, 256
+    s.free_list = -1
+    s.failed = False
+    s.n_windows = s.n_lists_done = 0
+    s.n_nearest = s.n_all_ranked = 0
+    s.ranked = cython.NULL
+    s.lists = cython.cast(cython.pointer(List), malloc(s.n_all_lists * cython.sizeof(List)))
+    s.heap = cython.cast(cython.pointer(Entry), malloc(s.n_all_heap * cython.sizeof(Entry)))
+    s.to_left = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
+    s.to_right = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
+    if s.lists == cython.NULL or s.heap == cython.NULL or s.to_left == cython.NULL or s.to_right == cython.NULL:
+        s.failed = True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _free_front(s: cython.pointer(Search)) -> cython.void:
+    i: cython.int
+    for i in range(s.n_made_lists):
+        free(s.lists[i].windows)
+    free(s.lists)
+    free(s.heap)
+    free(s.to_left)
+    free(s.to_right)
+    free(s.ranked)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _empty_front(s: cython.pointer(Search)) -> cython.void:
+    """Drop all that waits; lists and queue keep their room."""
+    i: cython.int
+    for i in range(s.n_lists):
+        if s.lists[i].half_edge >= 0:
+            s.slot[s.lists[i].half_edge] = -1
+    s.n_lists = s.n_heap = 0
+    s.free_list = -1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _forget(s: cython.pointer(Search)) -> cython.void:
+    """Make all that a search wrote what it was before."""
+    i: cython.int
+    v: cython.int
+    _empty_front(s)
+    for i in range(s.n_touched):
+        v = s.touched[i]
+        s.distance[v] = s.emitted[v] = INFINITY
+        s.root[v] = s.label[v] = s.entered[v] = -1
+    s.n_touched = s.n_found = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _start_at(s: cython.pointer(Search), v: cython.int, offset: cython.double, label: cython.int) -> cython.void:
+    """Let distance start at vertex v."""
+    if s.failed or offset >= s.distance[v]:
+        return
+    if s.distance[v] == INFINITY:
+        s.touched[s.n_touched] = v
+        s.n_touched += 1
+    s.distance[v] = offset
+    s.root[v] = v
+    s.label[v] = label
+    s.entered[v] = -1
+    _push(s, offset, s.n_half_edges + v)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _write_within(
+    s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
+) -> cython.int:
+    """All vertices within the cutoff and their distances; how many they are."""
+    i: cython.int
+    v: cython.int
+    n: cython.int = 0
+    for i in range(s.n_touched):
+        v = s.touched[i]
+        if s.distance[v] <= s.cutoff:
+            to[n] = name[v]
+            value[n] = s.distance[v]
+            n += 1
+    return n
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _write_nearest(
+    s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
+) -> cython.int:
+    """The nearest vertices, of equally near ones those with the lowest names, in order; how many they are."""
+    i: cython.int
+    j: cython.int
+    v: cython.int
+    n: cython.int = 0
+    d: cython.double
+    for i in range(s.n_touched):
+        v = s.touched[i]
+        d = s.distance[v]
+        if d > s.cutoff:
+            continue
+        if n < s.n_nearest:
+            n += 1
+        elif d > value[n - 1] or (d == value[n - 1] and name[v] > to[n - 1]):
+            continue
+        j = n - 1
+        while j > 0 and (d < value[j - 1] or (d == value[j - 1] and name[v] < to[j - 1])):
+            value[j] = value[j - 1]
+            to[j] = to[j - 1]
+            j -= 1
+        value[j] = d
+        to[j] = name[v]
+    return n
+
+
+class Front:
+    """A surface, and what searches on it write; `search` and `search_each` say in which state.
+
+    Parameters
+    ----------
+    vertex, length, twin, double_area, bulge, corner_of_vertex, next_corner, kind
+        As `shapes` takes and fills them. `kind` is filled further, the same by every search.
+    aligned : (3 m,)
+        Whether the faces at a glued half-edge run along it in opposite directions.
+    ring : (3 m,)
+        Where more than two faces meet, the next half-edge of the same edge.
+    is_delaunay : bool
+        What `shapes` returned.
+    distance, emitted : (n,)
+        Must come full of infinity; the first takes distances.
+    root, label, entered, crossing : (n,), (n + p,), (n,), (n,)
+        Take where the shortest paths come from; see `heat_igl.unfolding.exact.Origin`. They must come full of -1.
+    touched : (n,)
+        Takes the vertices that were reached.
+    slot : (3 m,)
+        Must come full of -1, and is again after a search.
+    tolerance : float
+        The fraction of a distance by which another way must be shorter before a window is cut.
+    """
+
+    def __init__(
+        self,
+        vertex: cython.int[::1],
+        length: cython.double[::1],
+        twin: cython.int[::1],
+        aligned: cython.uchar[::1],
+        ring: cython.int[::1],
+        double_area: cython.double[::1],
+        bulge: cython.double[::1],
+        corner_of_vertex: cython.int[::1],
+        next_corner: cython.int[::1],
+        kind: cython.uchar[::1],
+        is_delaunay: bool,
+        distance: cython.double[::1],
+        emitted: cython.double[::1],
+        root: cython.int[::1],
+        label: cython.int[::1],
+        entered: cython.int[::1],
+        crossing: cython.double[::1],
+        touched: cython.int[::1],
+        slot: cython.int[::1],
+        tolerance: cython.double,
+    ) -> None:
+        s: cython.pointer(Search) = cython.address(self.state)
+        # The pointers hold as long as the arrays do.
+        self.arrays = (
+            vertex.base,
+            length.base,
+            twin.base,
+            aligned.base,
+            ring.base,
+            double_area.base,
+            bulge.base,
+            corner_of_vertex.base,
+            next_corner.base,
+            kind.base,
+            distance.base,
+            emitted.base,
+            root.base,
+            label.base,
+            entered.base,
+            crossing.base,
+            touched.base,
+            slot.base,
+        )
+        s.vertex = cython.address(vertex[0])
+        s.length = cython.address(length[0])
+        s.twin = cython.address(twin[0])
+        s.aligned = cython.address(aligned[0])
+        s.ring = cython.address(ring[0])
+        s.double_area = cython.address(double_area[0])
+        s.bulge = cython.address(bulge[0])
+        s.corner_of_vertex = cython.address(corner_of_vertex[0])
+        s.next_corner = cython.address(next_corner[0])
+        s.kind = cython.address(kind[0])
+        s.distance = cython.address(distance[0])
+        s.emitted = cython.address(emitted[0])
+        s.root = cython.address(root[0])
+        s.label = cython.address(label[0])
+        s.entered = cython.address(entered[0])
+        s.crossing = cython.address(crossing[0])
+        s.touched = cython.address(touched[0])
+        s.slot = cython.address(slot[0])
+        s.is_delaunay = is_delaunay
+        s.n = corner_of_vertex.shape[0]
+        s.n_half_edges = vertex.shape[0]
+        s.tolerance = tolerance
+        s.n_points = s.n_targets = s.n_goals = 0
+        s.first_target = cython.NULL
+
+
+def search_each(
+    front: Front,
+    source: cython.int[::1],
+    goal: cython.int[::1],
+    first_goal: cython.longlong[::1],
+    cutoff: cython.double,
+    n_nearest: cython.int,
+    name: cython.longlong[::1],
+    found: cython.int[::1],
+    value: cython.double[::1],
+    end: cython.longlong[::1],
+) -> int:
+    """Distances from one vertex after the other, each search ended early; how many sources were done, -1 for no memory.
+
+    What a search touched is cleared after it, so that its cost depends on what is near alone.
+
+    Parameters
+    ----------
+    front : Front
+        In its first state, and in it again afterwards.
+    source : (k,)
+        Vertices that distance starts from, each alone.
+    goal, first_goal : (g,), (k + 1,)
+        The distances that are asked for, ``goal[first_goal[i]:first_goal[i + 1]]`` of source i, if there are any.
+    cutoff : float
+        Otherwise all vertices up to here are asked for,
+    n_nearest : int
+        and so many at most, the nearest; 0 for all.
+    name : (n,)
+        What vertices are called in `found`.
+    found, value : (r,)
+        Take vertices and their distances, source after source. The last source done is the last whose results had room.
+    end : (k,)
+        Takes where the results of each source end. Results for goals are one value each, and `found` is not used.
+    """
+    s: cython.pointer(Search) = cython.address(front.state)
+    i: cython.int
+    j: cython.longlong
+    n_done: cython.int = 0
+    at: cython.longlong = 0
+    room: cython.longlong = value.shape[0]
+    names: cython.p_longlong = cython.address(name[0])
+    s.stops_early = goal.shape[0] > 0
+    s.slack = 0.0
+    with cython.nogil:
+        _allocate(s)
+        for i in range(source.shape[0]):
+            s.cutoff = cutoff
+            s.n_nearest = s.n_next = n_nearest
+            if s.stops_early:
+                s.n_goals = cython.cast(cython.int, first_goal[i + 1] - first_goal[i])
+                s.goal = cython.address(goal[0]) + first_goal[i]
+            _start_at(s, source[i], 0.0, 0)
+            if not s.failed:
+                _run(s)
+            if s.failed:
+                break
+            if s.stops_early:
+                for j in range(first_goal[i], first_goal[i + 1]):
+                    value[j] = s.distance[goal[j]]
+                at = first_goal[i + 1]
+            else:
+                if at + (n_nearest if n_nearest > 0 else s.n_touched) > room:
+                    break
+                if n_nearest > 0:
+                    if s.n_touched >= n_nearest:
+                        _narrow(s)
+                    at += _write_nearest(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
+                else:
+                    at += _write_within(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
+            end[i] = at
+            n_done += 1
+            _forget(s)
+        _forget(s)
+        _free_front(s)
+    return -1 if s.failed else n_done
+
+
 def search(
-    vertex: cython.int[::1],
-    length: cython.double[::1],
-    twin: cython.int[::1],
-    aligned: cython.uchar[::1],
-    ring: cython.int[::1],
-    double_area: cython.double[::1],
-    bulge: cython.double[::1],
-    corner_of_vertex: cython.int[::1],
-    next_corner: cython.int[::1],
-    kind: cython.uchar[::1],
-    is_delaunay: bool,
+    front: Front,
     source: cython.int[::1],
     offset: cython.double[::1],
     point_face: cython.int[::1],
     point: cython.double[::1],
     point_offset: cython.double[::1],
-    distance: cython.double[::1],
-    emitted: cython.double[::1],
-    root: cython.int[::1],
-    label: cython.int[::1],
-    entered: cython.int[::1],
-    crossing: cython.double[::1],
-    touched: cython.int[::1],
-    slot: cython.int[::1],
     goal: cython.int[::1],
     first_target: cython.int[::1],
     next_target: cython.int[::1],
@@ -1161,34 +1495,19 @@ def search(
     slack: cython.double,
     stops_early: bool,
     cutoff: cython.double,
-    tolerance: cython.double,
     statistics: cython.longlong[::1],
 ) -> bool:
     """Exact distances from vertices and points; false where memory runs out.
 
     Parameters
     ----------
-    vertex, length, twin, double_area, bulge, corner_of_vertex, next_corner, kind
-        As `shapes` takes and fills them. `kind` is filled further, the same by every search.
-    aligned : (3 m,)
-        Whether the faces at a glued half-edge run along it in opposite directions.
-    ring : (3 m,)
-        Where more than two faces meet, the next half-edge of the same edge.
-    is_delaunay : bool
-        What `shapes` returned.
+    front : Front
+        For one search alone, whose `label` has room for p source points.
     source, offset : (k,)
         Vertices that distance starts from, and the distance at which each starts.
     point_face, point, point_offset : (p,), (3 p,), (p,)
         Sources inside faces: face, barycentric coordinates, distance. A source on a side, with a coordinate of 0, comes
         once for every face there.
-    distance, emitted : (n,)
-        Must come full of infinity; the first takes distances.
-    root, label, entered, crossing : (n,), (n + p,), (n,), (n,)
-        Take where the shortest paths come from; see `heat_igl.unfolding.exact.Origin`. They must come full of -1.
-    touched : (n,)
-        Takes the vertices that were reached, as many as `statistics` says.
-    slot : (3 m,)
-        Must come full of -1, and is again afterwards.
     goal : (g,)
         With `stops_early`, the search ends when the distances of these vertices and of all targets are known.
     first_target, next_target, target_face, target : (m,), (t,), (t,), (3 t,)
@@ -1199,35 +1518,11 @@ def search(
         Diameter of the largest circle around a face with targets.
     cutoff : float
         Distances up to here are exact, larger ones may be too large.
-    tolerance : float
-        The fraction of a distance by which another way must be shorter before a window is cut.
     statistics : (3,)
         Takes the numbers of vertices that were reached, of windows, and of lists that crossed a face.
     """
-    s: Search
+    s: cython.pointer(Search) = cython.address(front.state)
     i: cython.int
-    v: cython.int
-    s.vertex = cython.address(vertex[0])
-    s.length = cython.address(length[0])
-    s.twin = cython.address(twin[0])
-    s.aligned = cython.address(aligned[0])
-    s.ring = cython.address(ring[0])
-    s.double_area = cython.address(double_area[0])
-    s.bulge = cython.address(bulge[0])
-    s.corner_of_vertex = cython.address(corner_of_vertex[0])
-    s.next_corner = cython.address(next_corner[0])
-    s.kind = cython.address(kind[0])
-    s.is_delaunay = is_delaunay
-    s.n = corner_of_vertex.shape[0]
-    s.n_half_edges = vertex.shape[0]
-    s.distance = cython.address(distance[0])
-    s.root = cython.address(root[0])
-    s.label = cython.address(label[0])
-    s.entered = cython.address(entered[0])
-    s.crossing = cython.address(crossing[0])
-    s.emitted = cython.address(emitted[0])
-    s.touched = cython.address(touched[0])
-    s.slot = cython.address(slot[0])
     s.n_points = point_face.shape[0]
     if s.n_points > 0:
         s.point_face = cython.address(point_face[0])
@@ -1237,7 +1532,6 @@ def search(
     if s.n_goals > 0:
         s.goal = cython.address(goal[0])
     s.n_targets = target_face.shape[0]
-    s.first_target = cython.NULL
     if s.n_targets > 0:
         s.first_target = cython.address(first_target[0])
         s.next_target = cython.address(next_target[0])
@@ -1249,45 +1543,19 @@ def search(
         s.target_crossing = cython.address(target_crossing[0])
     s.stops_early = stops_early
     s.slack = slack
-    s.tolerance = tolerance
-    s.n_touched = s.n_found = 0
-    s.n_lists = s.n_heap = 0
-    s.n_all_lists, s.n_all_heap, s.n_out = 256, 1024, 256
-    s.free_list = -1
-    s.failed = False
-    s.n_windows = s.n_lists_done = 0
+    s.cutoff = cutoff
     with cython.nogil:
-        s.lists = cython.cast(cython.pointer(List), malloc(s.n_all_lists * cython.sizeof(List)))
-        s.heap = cython.cast(cython.pointer(Entry), malloc(s.n_all_heap * cython.sizeof(Entry)))
-        s.to_left = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
-        s.to_right = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
-        if s.lists == cython.NULL or s.heap == cython.NULL or s.to_left == cython.NULL or s.to_right == cython.NULL:
-            s.failed = True
+        _allocate(s)
         for i in range(source.shape[0]):
-            v = source[i]
-            if not s.failed and offset[i] < distance[v]:
-                if distance[v] == INFINITY:
-                    touched[s.n_touched] = v
-                    s.n_touched += 1
-                distance[v] = offset[i]
-                root[v] = v
-                label[v] = i
-                entered[v] = -1
-                _push(cython.address(s), offset[i], s.n_half_edges + v)
+            _start_at(s, source[i], offset[i], i)
         for i in range(s.n_points):
             if not s.failed:
-                label[s.n + i] = source.shape[0] + i
-                _push(cython.address(s), point_offset[i], s.n_half_edges + s.n + i)
+                s.label[s.n + i] = source.shape[0] + i
+                _push(s, point_offset[i], s.n_half_edges + s.n + i)
         if not s.failed:
-            _run(cython.address(s), cutoff)
-        for i in range(s.n_lists):
-            if s.lists[i].half_edge >= 0:
-                slot[s.lists[i].half_edge] = -1
-            free(s.lists[i].windows)
-        free(s.lists)
-        free(s.heap)
-        free(s.to_left)
-        free(s.to_right)
+            _run(s)
+        _empty_front(s)
+        _free_front(s)
     statistics[0] = s.n_touched
     statistics[1] = s.n_windows
     statistics[2] = s.n_lists_done

@@ -1,4 +1,4 @@
-"""Distances by other people's solvers, each called as it gives the right result, and bounds that need no solver.
+"""Exact distance, distances by other people's solvers, each called as it gives the right result, and bounds.
 
 Every native solver runs in a child process. `docs/references.md` says how far each one can be trusted. Closed forms are
 in `heat_igl.closed_forms`.

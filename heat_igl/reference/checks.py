@@ -71,16 +71,20 @@ def require_finite(name: str, mesh: Mesh, distance: FloatArray) -> None:
         )
 
 
-def require_between_bounds(name: str, mesh: Mesh, seeds: IntArray, distance: FloatArray) -> None:
+def require_between_bounds(
+    name: str, mesh: Mesh, seeds: IntArray, distance: FloatArray, *, tolerance: float = _TOLERANCE, slack: float = 0.0
+) -> None:
     """Refuse a distance that claims to be exact and is outside the bounds that hold on every mesh.
+
+    By more than the fraction `tolerance` of the bound and the length `slack`.
 
     Raises
     ------
     ReferenceSolverError
         With the name of the solver.
     """
-    too_short = distance < straight_lines(mesh, seeds) * (1 - _TOLERANCE)
-    too_long = distance > edge_paths(mesh, seeds) * (1 + _TOLERANCE)
+    too_short = distance < straight_lines(mesh, seeds) * (1 - tolerance) - slack
+    too_long = distance > edge_paths(mesh, seeds) * (1 + tolerance) + slack
     if too_short.any() or too_long.any():
         raise ReferenceSolverError(
             f"{name} is wrong on this mesh: {int(too_short.sum())} vertices are nearer than a straight line and "

@@ -1,11 +1,12 @@
-"""Run a native solver on a mesh: choose it by name, call it in a child process, check its distance, measure its cost.
+"""Run a solver on a mesh: choose it by name, check its distance, measure its cost; native ones in a child process.
 
-A solver runs on one connected component at a time. So sources in several components work, and a vertex that no source
-reaches is ``inf``, whatever number the solver would write there.
+A native solver runs on one connected component at a time. So sources in several components work, and a vertex that no
+source reaches is ``inf``, whatever number the solver would write there.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -13,18 +14,25 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import MissingExtraError, ReferenceSolverError
+from heat_igl.errors import MeshError, MissingExtraError, ReferenceSolverError
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.reference import guarded
 from heat_igl.reference.checks import require_between_bounds, require_finite, require_manifold
 from heat_igl.reference.guarded import MEMORY, TIMEOUT
+from heat_igl.runtime import PeakMemory
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray, IntArray
+from heat_igl.unfolding import exact_distance
 
-__all__ = ["EXACT_SOLVERS", "Measured", "exact_solver", "measured"]
+__all__ = ["EXACT_SOLVERS", "WINDOWS", "Measured", "exact_solver", "measured"]
 
-#: The exact solvers in the order in which `exact` tries them; the last one needs no extra.
+#: The exact solver of this package, which `exact` takes unless told otherwise.
+WINDOWS = "windows"
+#: The exact solvers of other packages, for a second opinion; the last one needs no extra.
 EXACT_SOLVERS = ("pygeodesic", "gdist", "igl")
+
+# Mollification moves distances by about 1e-8 of themselves, and on a single edge by 1e-8 of the mean edge.
+_MOLLIFIED = 1e-7
 
 
 @dataclass(frozen=True)
@@ -66,7 +74,7 @@ class Measured:
     solve_seconds : float
         Time for the rest.
     peak_memory : int or None
-        Bytes by which the child process grew at most; None if the system cannot tell.
+        Bytes by which the process grew at most, for native solvers the child; None if the system cannot tell.
     """
 
     distance: FloatArray
@@ -76,22 +84,24 @@ class Measured:
 
 
 def exact_solver() -> str:
-    """The exact solver that is taken by default: the first of `EXACT_SOLVERS` that is installed."""
-    return next(name for name in EXACT_SOLVERS if name == "igl" or find_spec(_SOLVERS[name].module) is not None)
+    """The exact solver that is taken by default: "windows", that of this package."""
+    return WINDOWS
 
 
 def measured(
     solver: str, mesh: MeshLike, sources: Sources, *, timeout: float = TIMEOUT, memory: float = MEMORY, **options: Any
 ) -> Measured:
-    """Distance by a named native solver, with its cost in time and memory.
+    """Distance by a named solver, with its cost in time and memory.
 
     Parameters
     ----------
     solver : str
-        One of `EXACT_SOLVERS`, "exact" for the first of them that is installed, or the name of another function of
+        "exact" or "windows" for the windows of this package, one of `EXACT_SOLVERS`, or the name of another function of
         `heat_igl.reference`: "meshlab", "meshlab_border", "meshlab_heat", "igl_heat", "potpourri3d_heat".
-    mesh, sources, timeout, memory
+    mesh, sources
         As for `exact`.
+    timeout, memory
+        Bounds for native solvers; windows need neither.
     **options
         As for the function of that name.
 
@@ -109,12 +119,15 @@ def measured(
     if solver == "exact":
         solver = exact_solver()
     chosen = _SOLVERS.get(solver)
-    if chosen is None:
-        raise ReferenceSolverError(f"solver {solver!r} is unknown: choose one of exact, {', '.join(_SOLVERS)}")
+    if chosen is None and solver != WINDOWS:
+        names = ", ".join(("exact", WINDOWS, *_SOLVERS))
+        raise ReferenceSolverError(f"solver {solver!r} is unknown: choose one of {names}")
     if mesh.is_tetrahedral:
         raise ReferenceSolverError(
             f"{solver} works on triangles, and the mesh holds tetrahedra: use heat_igl.closed_forms.convex_solid"
         )
+    if chosen is None:
+        return _by_windows(mesh, vertex_sources(sources, mesh.n_vertices))
     if find_spec(chosen.module) is None:
         raise MissingExtraError.of(f"the reference {solver}", chosen.package, chosen.extra)
     # A closed surface has no boundary to start from, and everything is infinitely far from it.
@@ -141,6 +154,24 @@ def measured(
         return reply
 
     return _over_components(mesh, seeds, run)
+
+
+def _by_windows(mesh: Mesh, seeds: IntArray) -> Measured:
+    """Distance by the windows of this package: any number of components, no child process."""
+    start = time.perf_counter()
+    with PeakMemory() as peak:
+        try:
+            distance = exact_distance(mesh.V, mesh.F, seeds)
+        except MeshError as error:
+            raise ReferenceSolverError(f"{WINDOWS}: {error}") from error
+    seconds = time.perf_counter() - start
+    there = np.isin(mesh.components, mesh.components[seeds])
+    if not (np.isfinite(distance) == there).all():
+        raise ReferenceSolverError(f"{WINDOWS} did not reach the components of the sources: report this as a bug")
+    # Where triangles have no height, all edges were made longer; see `mollify`.
+    slack = _MOLLIFIED * float(mesh.edge_lengths.mean())
+    require_between_bounds(WINDOWS, mesh, seeds, distance, tolerance=_MOLLIFIED, slack=slack)
+    return Measured(distance, 0.0, seconds, peak.bytes)
 
 
 def _over_components(mesh: Mesh, seeds: IntArray, run: Callable[[Mesh, IntArray], guarded.Reply]) -> Measured:

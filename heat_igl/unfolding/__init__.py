@@ -1,7 +1,8 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
-from heat_igl.unfolding.distance import distance_from_scratch, exact_from_scratch, unfolded_distance
+from heat_igl.unfolding.distance import distance_from_scratch, unfolded_distance
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
+from heat_igl.unfolding.local import distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 from heat_igl.unfolding.solver import UnfoldingSolver
 
@@ -14,7 +15,9 @@ __all__ = [
     "Refinement",
     "UnfoldingSolver",
     "distance_from_scratch",
+    "distances_within",
     "exact_distance",
-    "exact_from_scratch",
+    "nearest_vertices",
+    "pair_distances",
     "unfolded_distance",
 ]

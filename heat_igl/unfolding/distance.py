@@ -9,8 +9,8 @@ from typing import Any, overload
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, SourceError
-from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices, connectivity
+from heat_igl.errors import MeshError
+from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators import Surface, unfolding_surface
 from heat_igl.sources import NEAR_RADIUS, NearField, Seeds, SourcePoints, Sources, SourceSet, source_set
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
@@ -19,7 +19,7 @@ from heat_igl.unfolding.half_edges import from_mesh
 from heat_igl.unfolding.refinement import TOLERANCE, Refine
 from heat_igl.unfolding.solver import UnfoldingSolver
 
-__all__ = ["distance_from_scratch", "exact_from_scratch", "unfolded_distance"]
+__all__ = ["distance_from_scratch", "unfolded_distance"]
 
 _NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
 # For the order of the vertices, curves are points at most so many mean edge lengths apart.
@@ -94,31 +94,6 @@ def distance_from_scratch(
     solver = UnfoldingSolver(domain, refine, tolerance, cutoff)
     order = np.zeros(mesh.n_vertices) if solver.is_exact else -_along_edges(domain, chosen)
     return np.asarray(solver.distances([lines], order[:, None])[0])
-
-
-def exact_from_scratch(mesh: Mesh, sources: Sources, cutoff: float = np.inf) -> FloatArray:
-    """Exact polyhedral distance (n,) from one set of sources by `ExactSurface`.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Triangles.
-    sources : sources
-        As for `HeatMethodSolver.distance`, but no curves.
-    cutoff : float
-        What is farther is ``inf``, and the search ends there.
-    """
-    chosen = source_set(sources, mesh.n_vertices, mesh.F)
-    if len(chosen.segments.faces):
-        raise SourceError(
-            'sources hold a curve, but exact distance starts at vertices and points: take method="unfold"'
-        )
-    if chosen.on_vertices_alone:
-        surface = ExactSurface(from_mesh(mesh, int(chosen.vertices[0])))
-        return surface.solve(chosen.vertices, chosen.vertex_offset, cutoff=cutoff).distance
-    points = SurfacePoints(chosen.points.faces, chosen.points.barycentric)
-    surface = ExactSurface(unfolding_surface(mesh).triangulation)
-    return surface.solve(chosen.vertices, chosen.vertex_offset, points, chosen.points.offset, cutoff=cutoff).distance
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,11 +15,11 @@ from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, Located, from_mesh, from_triangulation
 
-__all__ = ["ExactSolution", "ExactSurface", "Origin", "exact_distance"]
+__all__ = ["TOLERANCE", "ExactSolution", "ExactSurface", "Origin", "exact_distance"]
 
-# What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds up
-# to. A larger number keeps a few windows more and changes no result.
-_TOLERANCE = 1e-11
+#: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds
+#: up to. A larger number keeps a few windows more and changes no result.
+TOLERANCE = 1e-11
 _NO_VERTICES = np.empty(0, np.int64)
 
 
@@ -145,13 +145,8 @@ class ExactSurface:
         n, p, t = self.n, len(starts.points.faces), len(place.faces)
         found, at_targets = _Found.of(n, n + p), _Found.of(t, 0)
         statistics = np.zeros(3, np.int64)
-        done = windows.search(
+        front = windows.Front(
             *edges.tables,
-            starts.vertices,
-            starts.offset,
-            starts.points.faces,
-            np.ascontiguousarray(starts.points.barycentric).ravel(),
-            starts.point_offset,
             found.distance,
             np.full(n, np.inf),
             found.root,
@@ -160,6 +155,15 @@ class ExactSurface:
             found.crossing,
             np.empty(n, np.int32),
             np.full(len(edges.tables.vertex), -1, np.int32),
+            TOLERANCE,
+        )
+        done = windows.search(
+            front,
+            starts.vertices,
+            starts.offset,
+            starts.points.faces,
+            np.ascontiguousarray(starts.points.barycentric).ravel(),
+            starts.point_offset,
             edges.number[_NO_VERTICES if goals is None else goals],
             *edges.by_face(place),
             place.faces,
@@ -171,7 +175,6 @@ class ExactSurface:
             edges.largest_circle(place),
             goals is not None,
             float(edges.scaled(cutoff)),
-            _TOLERANCE,
             statistics,
         )
         if not done:

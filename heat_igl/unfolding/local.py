@@ -1,0 +1,302 @@
+"""Exact distances between vertices that are near each other, each query at the cost of what it touches."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from heat_igl.errors import MeshError, SourceError
+from heat_igl.kernels import windows
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.runtime import n_threads, side_by_side
+from heat_igl.sources import Sources, named_vertices
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.unfolding.exact import TOLERANCE
+from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
+
+__all__ = ["distances_within", "nearest_vertices", "pair_distances"]
+
+# Sources that a thread takes at a time: few enough that all threads end together.
+_CHUNK = 64
+# Distances that a thread makes room for at first.
+_ROOM = 2**16
+_NO_VERTICES = np.empty(0, np.int32)
+
+
+def distances_within(mesh: MeshLike, radius: float, sources: Sources | None = None) -> sp.csr_array:
+    """Exact distances from each of some vertices to all vertices up to a radius.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles on n vertices: whatever `as_mesh` takes.
+    radius : float
+        In the mesh's unit, positive; ``inf`` for all that can be reached.
+    sources : int, sequence of int, or (n,) mask of bool, optional
+        The k vertices that are asked, each for itself; all n if not given.
+
+    Returns
+    -------
+    scipy.sparse.csr_array
+        Shape (k, n), in the mesh's unit, with sorted indices. What is stored is a distance, the 0 of a vertex from
+        itself too; what is not stored is farther than the radius.
+
+    Raises
+    ------
+    ValueError
+        If `radius` is not a positive number.
+    MeshError
+        If the mesh cannot be used, or is tetrahedral.
+    SourceError
+        If `sources` does not name vertices.
+    """
+    limit = _positive(radius)
+    triangles = _triangles(mesh)
+    chosen = _chosen(sources, triangles)
+    edges = from_mesh(triangles, int(chosen[0]))
+    parts = _in_chunks(edges, chosen, lambda work, part: _within(work, part, edges.scaled(limit)))
+    counts = np.concatenate([part.counts for part in parts])
+    ends = np.concatenate([[0], np.cumsum(counts)])
+    columns = np.concatenate([part.vertex for part in parts])
+    values = edges.unscaled(np.concatenate([part.distance for part in parts]))
+    found = sp.csr_array((values, columns, ends), shape=(len(chosen), triangles.n_vertices))
+    found.sort_indices()
+    return found
+
+
+def nearest_vertices(mesh: MeshLike, k: int, sources: Sources | None = None) -> tuple[IntArray, FloatArray]:
+    """The k vertices nearest to each of some vertices, by exact distance.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles on n vertices: whatever `as_mesh` takes.
+    k : int
+        How many vertices; the vertex itself is the first of them.
+    sources : int, sequence of int, or (n,) mask of bool, optional
+        The s vertices that are asked, each for itself; all n if not given.
+
+    Returns
+    -------
+    indices : (s, k) int64
+        In the order of their distance, and of equally near ones of their index. If fewer than k can be reached, the
+        rest is -1.
+    distances : (s, k) float64
+        In the mesh's unit; ``inf`` where the index is -1.
+
+    Raises
+    ------
+    ValueError
+        If `k` is not a positive integer.
+    MeshError
+        If the mesh cannot be used, or is tetrahedral.
+    SourceError
+        If `sources` does not name vertices.
+    """
+    if isinstance(k, bool) or not isinstance(k, int | np.integer) or k < 1:
+        raise ValueError(f"k must be a positive integer, not {k!r}")
+    triangles = _triangles(mesh)
+    chosen = _chosen(sources, triangles)
+    edges = from_mesh(triangles, int(chosen[0]))
+    # More than all vertices cannot be found.
+    wanted = min(int(k), triangles.n_vertices)
+    parts = _in_chunks(edges, chosen, lambda work, part: _nearest(work, part, wanted))
+    indices = np.full((len(chosen), int(k)), -1, np.int64)
+    distances = np.full((len(chosen), int(k)), np.inf)
+    there = np.arange(int(k)) < np.concatenate([part.counts for part in parts])[:, None]
+    indices[there] = np.concatenate([part.vertex for part in parts])
+    distances[there] = edges.unscaled(np.concatenate([part.distance for part in parts]))
+    return indices, distances
+
+
+def pair_distances(mesh: MeshLike, pairs: ArrayLike) -> FloatArray:
+    """Exact distance between the two vertices of each of some pairs.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles: whatever `as_mesh` takes.
+    pairs : (p, 2) array_like of int
+        Vertices. Pairs with the same first vertex share one search, which ends at the farthest of the second ones.
+
+    Returns
+    -------
+    (p,) float64
+        In the mesh's unit; ``inf`` for vertices of different components.
+
+    Raises
+    ------
+    MeshError
+        If the mesh cannot be used, or is tetrahedral.
+    SourceError
+        If `pairs` has another shape or type, or an entry is no vertex.
+    """
+    triangles = _triangles(mesh)
+    first, second = _checked_pairs(pairs, triangles.n_vertices).T
+    distance = np.full(len(first), np.inf)
+    components = triangles.components
+    joined = np.flatnonzero(components[first] == components[second])
+    if not len(joined):
+        return distance
+    joined = joined[np.argsort(first[joined], kind="stable")]
+    sources, begin = np.unique(first[joined], return_index=True)
+    edges = from_mesh(triangles, int(sources[0]))
+    ends = np.append(begin, len(joined))
+    goals = edges.number[second[joined]]
+    parts = _in_chunks(
+        edges, sources, lambda work, part: _to_goals(work, part, goals[ends[part.start] : ends[part.stop]], ends)
+    )
+    distance[joined] = edges.unscaled(np.concatenate([part.distance for part in parts]))
+    return distance
+
+
+class _Chunk(NamedTuple):
+    """Some of the sources: their positions, and their numbers in the tables."""
+
+    start: int
+    stop: int
+    vertices: AnyArray
+
+
+class _Near(NamedTuple):
+    """How many vertices were found from each source, which, and how far, source after source."""
+
+    counts: IntArray
+    vertex: AnyArray
+    distance: FloatArray
+
+
+class _Workspace:
+    """What searches of one thread write, in the state in which each must find it."""
+
+    def __init__(self, edges: HalfEdges) -> None:
+        n = edges.n
+        self._names = edges.old_vertex
+        self._state = (
+            np.full(n, np.inf),
+            np.full(n, np.inf),
+            np.full(n, -1, np.int32),
+            np.full(n, -1, np.int32),
+            np.full(n, -1, np.int32),
+            np.zeros(n),
+            np.empty(n, np.int32),
+            np.full(len(edges.tables.vertex), -1, np.int32),
+        )
+        self._front = windows.Front(*edges.tables, *self._state, TOLERANCE)
+
+    def search(
+        self,
+        sources: AnyArray,
+        found: AnyArray,
+        value: FloatArray,
+        *,
+        goals: AnyArray = _NO_VERTICES,
+        first_goal: AnyArray | None = None,
+        cutoff: float = np.inf,
+        n_nearest: int = 0,
+    ) -> IntArray:
+        """Search from each of `sources`; the end of the results of each, for as many as had room."""
+        ends = np.zeros(len(sources), np.int64)
+        n_done = windows.search_each(
+            self._front,
+            sources,
+            goals,
+            np.zeros(len(sources) + 1, np.int64) if first_goal is None else first_goal,
+            cutoff,
+            n_nearest,
+            self._names,
+            found,
+            value,
+            ends,
+        )
+        if n_done < 0:
+            raise MemoryError("the windows of the exact distance do not fit into memory")
+        return ends[:n_done]
+
+
+def _within(work: _Workspace, part: _Chunk, radius: AnyArray) -> _Near:
+    """All vertices up to a radius; room is doubled until the results of the next source fit."""
+    rows, done, room = [], 0, _ROOM
+    while done < len(part.vertices):
+        found, value = np.empty(room, np.int32), np.empty(room)
+        ends = work.search(part.vertices[done:], found, value, cutoff=float(radius))
+        if not len(ends):
+            room *= 2
+            continue
+        done += len(ends)
+        rows.append(_Near(np.diff(ends, prepend=0), found[: ends[-1]].copy(), value[: ends[-1]].copy()))
+    return _Near(*(np.concatenate(column) for column in zip(*rows, strict=True)))
+
+
+def _nearest(work: _Workspace, part: _Chunk, k: int) -> _Near:
+    found, value = np.empty(k * len(part.vertices), np.int32), np.empty(k * len(part.vertices))
+    ends = work.search(part.vertices, found, value, n_nearest=k)
+    return _Near(np.diff(ends, prepend=0), found[: ends[-1]], value[: ends[-1]])
+
+
+def _to_goals(work: _Workspace, part: _Chunk, goals: AnyArray, ends: IntArray) -> _Near:
+    first = ends[part.start : part.stop + 1] - ends[part.start]
+    value = np.empty(len(goals))
+    work.search(part.vertices, np.empty(1, np.int32), value, goals=goals, first_goal=first)
+    return _Near(np.diff(first), _NO_VERTICES, value)
+
+
+def _in_chunks(edges: HalfEdges, sources: IntArray, search: Callable[[_Workspace, _Chunk], _Near]) -> list[_Near]:
+    """What `search` finds from consecutive sources, on all processors; in the order of the sources."""
+    starts = range(0, len(sources), _CHUNK)
+    numbers = edges.number[sources]
+    waiting = deque(enumerate(starts))
+    parts: list[Any] = [None] * len(starts)
+
+    def run(workspace: _Workspace) -> None:
+        while waiting:
+            try:
+                i, start = waiting.popleft()
+            except IndexError:  # another thread took the last one
+                return
+            stop = min(start + _CHUNK, len(sources))
+            parts[i] = search(workspace, _Chunk(start, stop, numbers[start:stop]))
+
+    side_by_side(run, [_Workspace(edges) for _ in range(min(n_threads(), len(starts)))])
+    return parts
+
+
+def _triangles(mesh: MeshLike) -> Mesh:
+    triangles = as_simplices(mesh)
+    if triangles.is_tetrahedral:
+        raise MeshError("exact distances need triangles, and the mesh holds tetrahedra: take distance_matrix")
+    return triangles
+
+
+def _chosen(sources: Sources | None, mesh: Mesh) -> IntArray:
+    return np.arange(mesh.n_vertices) if sources is None else named_vertices(sources, mesh.n_vertices)
+
+
+def _positive(radius: float) -> float:
+    is_number = isinstance(radius, int | float | np.integer | np.floating) and not isinstance(radius, bool)
+    if not is_number or not radius > 0:
+        raise ValueError(f"radius must be a positive number, not {radius!r}")
+    return float(radius)
+
+
+def _checked_pairs(pairs: ArrayLike, n: int) -> IntArray:
+    try:
+        array = np.asarray(pairs)
+    except ValueError:
+        raise SourceError("pairs must be an array of shape (p, 2), not a ragged sequence") from None
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise SourceError(f"pairs must be an array of shape (p, 2), but it has shape {array.shape}")
+    if array.dtype.kind not in "iu":
+        raise SourceError(f"pairs must hold indices of vertices, not {array.dtype}: convert with astype(int)")
+    outside = np.flatnonzero(((array < 0) | (array >= n)).any(axis=1))
+    if len(outside):
+        first = int(outside[0])
+        raise SourceError(
+            f"pairs[{first}] = {array[first].tolist()} names no two vertices ({len(outside)} of {len(array)} do not): "
+            f"the mesh has {n} vertices, so indices run from 0 to {n - 1}"
+        )
+    return np.asarray(array, np.int64)

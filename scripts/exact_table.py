@@ -1,0 +1,141 @@
+"""Exact distance by windows: agreement with pygeodesic, windows per edge, times, and what local queries cost.
+
+    python scripts/exact_table.py bunny.obj cow.obj         # 4 sources on each
+    python scripts/exact_table.py MESH --vtp PROGRAM        # the program prints the seconds of its propagation
+    python scripts/exact_table.py MESH --output DIRECTORY   # where exact.json and exact.md go
+
+Truth is pygeodesic's (extra ``validate``); meshes that it refuses have no such column. The program of VTP (Qin et al.
+2016) is called with ``-m FILE -s VERTEX``. Local queries are compared with a query of the unfolding solver.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from heat_igl import (
+    HeatMethodSolver,
+    Mesh,
+    ReferenceSolverError,
+    distances_within,
+    nearest_vertices,
+    pair_distances,
+    reference,
+    write_mesh,
+)
+from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
+from heat_igl.unfolding import exact_distance
+from heat_igl.unfolding.exact import ExactSurface
+
+from measuring import drawn_sources, median_seconds
+from scaffold import add_output, environment, option_parser, over_meshes, publish, table
+
+# Local queries: how many, the share of the vertices that a radius holds, and mean edges between the ends of a pair.
+_LOCAL, _SHARE, _APART = 1000, 0.01, 2.0
+_NEAREST = 32
+
+
+def measured(mesh: Mesh, n_sources: int, repeats: int, vtp: Path | None) -> dict[str, Any]:
+    sources = drawn_sources(mesh, range(n_sources))
+    surface = ExactSurface(intrinsic_delaunay(intrinsic_triangulation(mesh)))
+    solutions = [surface.solve(np.array([source])) for source in sources]
+    row: dict[str, Any] = {
+        "n": mesh.n_vertices,
+        "windows per edge": float(np.mean([found.n_windows for found in solutions])) / len(mesh.edges),
+        "from arrays": median_seconds(lambda: exact_distance(mesh.V.copy(), mesh.F.copy(), sources[0]), repeats),
+        "per query": median_seconds(lambda: surface.solve(np.array([sources[0]])), repeats),
+    }
+    try:
+        others = [reference.measured("pygeodesic", mesh, source) for source in sources]
+        pairs = zip(solutions, others, strict=True)
+        row["difference"] = max(_difference(found.distance, other.distance) for found, other in pairs)
+        row["pygeodesic"] = others[0].precompute_seconds + others[0].solve_seconds
+    except ReferenceSolverError as error:
+        row["refused"] = str(error)
+    if vtp is not None:
+        row["vtp"] = vtp_seconds(vtp, mesh, sources[0])
+    return row | local(mesh, sources[0], solutions[0].distance, repeats)
+
+
+def local(mesh: Mesh, source: int, distance: Any, repeats: int) -> dict[str, Any]:
+    """Seconds of each of many local queries, preparation shared, and of one query of unfolding."""
+    rng = np.random.default_rng(0)
+    usable = np.flatnonzero(np.isfinite(distance))
+    drawn = rng.choice(usable, min(_LOCAL, len(usable)), replace=False)
+    radius = float(np.sort(distance)[int(_SHARE * mesh.n_vertices) + 1])
+    apart = _APART * float(mesh.edge_lengths.mean())
+    near = distances_within(mesh, 1.5 * apart, drawn)
+    pairs = []
+    for vertex, begin, end in zip(drawn, near.indptr[:-1], near.indptr[1:], strict=True):
+        best = np.argmin(np.abs(near.data[begin:end] - apart))
+        pairs.append((vertex, near.indices[begin + best]))
+    solver = HeatMethodSolver(mesh, refine="unfold")
+    return {
+        "unfolded": median_seconds(lambda: solver.distance(source), max(repeats, 5)),
+        "within": median_seconds(lambda: distances_within(mesh, radius, drawn), repeats) / len(drawn),
+        "held": float(np.diff(distances_within(mesh, radius, drawn).indptr).mean()),
+        "pair": median_seconds(lambda: pair_distances(mesh, pairs), repeats) / len(pairs),
+        "nearest": median_seconds(lambda: nearest_vertices(mesh, _NEAREST), 1),
+    }
+
+
+def vtp_seconds(program: Path, mesh: Mesh, source: int) -> float:
+    """The seconds of its propagation, as the program prints them."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "mesh.obj")
+        write_mesh(path, mesh)
+        command = [str(program), "-m", str(path), "-s", str(source)]
+        printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return float(re.findall(r"propagation step took (\S+) seconds", printed)[0])
+
+
+def _difference(distance: Any, other: Any) -> float:
+    there = np.isfinite(other) & (other > 0)
+    return float((np.abs(distance[there] - other[there]) / other[there]).max())
+
+
+def markdown(result: dict[str, Any]) -> str:
+    rows, shares = [], []
+    for name, row in result["meshes"].items():
+        optional = (f"{row[key]:.3g}" if key in row else "-" for key in ("pygeodesic", "vtp", "difference"))
+        seconds = (f"{row['windows per edge']:.2f}", f"{row['from arrays']:.3f}", f"{row['per query']:.3f}")
+        rows.append((name, f"{row['n']}", *seconds, *optional))
+        parts = (f"1/{row['unfolded'] / row[key]:.0f}" for key in ("within", "pair"))
+        shares.append((name, f"{row['unfolded']:.3f}", f"{row['held']:.0f}", *parts, f"{row['nearest']:.2f}"))
+    head = ("mesh", "vertices", "windows per edge", "from arrays, s", "per query, s", "pygeodesic, s", "VTP, s")
+    local_head = ("mesh", "unfolded query, s", "vertices within", "within", "pair", f"{_NEAREST} nearest of all, s")
+    lines = [
+        *table((*head, "largest relative difference"), rows),
+        "",
+        f"Local queries as a share of an unfolded one, of {_LOCAL} on all processors, preparation included: a radius "
+        f"that holds {100 * _SHARE:.0f} % of the vertices around one of them, and pairs {_APART:g} mean edges apart.",
+        "",
+        *table(local_head, shares),
+    ]
+    return "\n".join(lines)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = option_parser(__doc__)
+    parser.add_argument("meshes", type=Path, nargs="+", help="triangle meshes")
+    parser.add_argument("--sources", type=int, default=4, help="sources on each mesh (default 4)")
+    parser.add_argument("--repeats", type=int, default=3, help="timed calls, of which the median counts (default 3)")
+    parser.add_argument("--vtp", type=Path, metavar="PROGRAM", help="the program of VTP")
+    add_output(parser, "exact")
+    arguments = parser.parse_args(argv)
+    vtp = None if arguments.vtp is None else arguments.vtp.resolve()
+    found = over_meshes(arguments.meshes, lambda mesh: measured(mesh, arguments.sources, arguments.repeats, vtp))
+    result = {"environment": environment(), "meshes": found}
+    publish(result, markdown(result), folder=arguments.output, name="exact")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,178 @@
+"""Local queries: equal to the full search, ended where asked, cleared after each; errors that name the remedy."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from conftest import perturbed, shared_path
+from test_exact import bumpy, two_arms
+
+from heat_igl import Mesh, MeshError, SourceError, distances_within, nearest_vertices, pair_distances, read_mesh, shapes
+from heat_igl.typing import FloatArray
+from heat_igl.unfolding import local
+from heat_igl.unfolding.exact import ExactSurface, exact_distance
+from heat_igl.unfolding.half_edges import from_mesh
+
+
+def book() -> Mesh:
+    """Three pages at one edge, each of them bent."""
+    page = shapes.grid(6)
+    x, y, _ = (page.V - page.V.min(axis=0)).T
+    V = [np.column_stack([x * np.cos(a), x * np.sin(a), y]) for a in (0.0, 2.0, 4.0)]
+    stacked = np.concatenate(V)
+    F = np.concatenate([page.F + k * page.n_vertices for k in range(3)])
+    _, first, inverse = np.unique(np.round(stacked, 9), axis=0, return_index=True, return_inverse=True)
+    return Mesh(stacked[first], inverse.ravel()[F])
+
+
+MESHES = {
+    "bumpy": bumpy,
+    "bends at a corner": lambda: two_arms(8),
+    "edges of three faces": book,
+    "rough": lambda: perturbed(shapes.grid(12), 0.8, 2),
+}
+
+
+def full(mesh: Mesh) -> FloatArray:
+    """All distances (n, n), one full search after the other on one surface."""
+    surface = ExactSurface(from_mesh(mesh, 0))
+    return np.array([surface.solve(np.array([v])).distance for v in range(mesh.n_vertices)])
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_local_queries_are_the_full_search_to_the_bit(name):
+    mesh = MESHES[name]()
+    n, every = mesh.n_vertices, full(mesh)
+    reached = np.isfinite(every)
+    radius = float(np.quantile(every[reached], 0.1))
+    within = distances_within(mesh, radius)
+    np.testing.assert_array_equal(within.toarray(), np.where(every <= radius, every, 0.0))
+    assert within.nnz == (every <= radius).sum()
+    assert within.has_sorted_indices
+    indices, distances = nearest_vertices(mesh, 9)
+    for v in range(n):
+        order = np.lexsort((np.arange(n), every[v]))[:9]
+        np.testing.assert_array_equal(indices[v], np.where(reached[v, order], order, -1))
+        np.testing.assert_array_equal(distances[v], every[v, order])
+    pairs = np.random.default_rng(3).integers(0, n, (300, 2))
+    np.testing.assert_array_equal(pair_distances(mesh, pairs), every[pairs[:, 0], pairs[:, 1]])
+
+
+def test_rows_are_those_of_the_sources_in_their_order():
+    mesh = bumpy()
+    sources = [40, 7, 7, 300]
+    within = distances_within(mesh, 0.4, sources)
+    indices, distances = nearest_vertices(mesh, 5, sources)
+    assert within.shape == (4, mesh.n_vertices)
+    for i, v in enumerate(sources):
+        exact = exact_distance(mesh.V, mesh.F, v)
+        np.testing.assert_array_equal(within[[i]].indices, np.flatnonzero(exact <= 0.4))
+        np.testing.assert_allclose(within[[i]].data, exact[exact <= 0.4], rtol=1e-14)
+        np.testing.assert_allclose(distances[i], np.sort(exact)[:5], rtol=1e-14)
+        assert indices[i, 0] == v
+    mask = np.zeros(mesh.n_vertices, bool)
+    mask[[7, 40]] = True
+    np.testing.assert_array_equal(distances_within(mesh, 0.4, mask).toarray(), within.toarray()[[1, 0]])
+
+
+def test_threads_and_room_change_nothing(monkeypatch):
+    mesh = bumpy()
+    monkeypatch.setenv("HEAT_IGL_NUM_THREADS", "1")
+    alone = distances_within(mesh, 0.7), *nearest_vertices(mesh, 20)
+    monkeypatch.setattr(local, "n_threads", lambda: 4)
+    monkeypatch.setattr(local, "_CHUNK", 5)
+    monkeypatch.setattr(local, "_ROOM", 3)  # less than one source needs
+    together = distances_within(mesh, 0.7), *nearest_vertices(mesh, 20)
+    np.testing.assert_array_equal(alone[0].toarray(), together[0].toarray())
+    for one, other in zip(alone[1:], together[1:], strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_units_do_not_matter():
+    mesh = bumpy()
+    pairs = np.array([[0, 5], [9, 200]])
+    for scale in (2.0**-90, 2.0**90):
+        other = Mesh(mesh.V * scale, mesh.F)
+        np.testing.assert_array_equal(pair_distances(other, pairs), pair_distances(mesh, pairs) * scale)
+        near = distances_within(other, 0.3 * scale, [4])
+        np.testing.assert_array_equal(near.toarray(), distances_within(mesh, 0.3, [4]).toarray() * scale)
+
+
+def test_what_is_not_reached_is_padded():
+    one = shapes.icosphere(0)
+    n = one.n_vertices
+    mesh = Mesh(np.vstack([one.V, one.V + 5, [[9, 9, 9]]]), np.vstack([one.F, one.F + n]))
+    indices, distances = nearest_vertices(mesh, n + 2, [0, 2 * n])
+    assert sorted(indices[0, :n]) == list(range(n))
+    assert np.isfinite(distances[0, :n]).all()
+    assert (indices[0, n:] == -1).all()
+    assert np.isinf(distances[0, n:]).all()
+    assert indices[1].tolist() == [2 * n] + [-1] * (n + 1)
+    assert nearest_vertices(mesh, 100, [3])[0].shape == (1, 100)
+    assert pair_distances(mesh, [[0, n], [n, n], [2 * n, 2 * n], [2 * n, 0]]).tolist() == [np.inf, 0.0, 0.0, np.inf]
+    assert np.diff(distances_within(mesh, np.inf, [0, 2 * n]).indptr).tolist() == [n, 1]
+    assert pair_distances(mesh, np.empty((0, 2), int)).shape == (0,)
+
+
+def test_a_search_costs_what_it_touches(monkeypatch):
+    # What the kernel is handed must come back clean, or the next search would pay for it and go wrong.
+    mesh, kept = bumpy(), []
+    original = local._Workspace
+
+    class Kept(original):  # type: ignore[misc, valid-type]
+        def __init__(self, edges):
+            super().__init__(edges)
+            kept.append([array.copy() for array in self._state])
+            kept.append(self._state)
+
+    monkeypatch.setattr(local, "_Workspace", Kept)
+    distances_within(mesh, 0.5)
+    nearest_vertices(mesh, 7)
+    pair_distances(mesh, [[0, 300], [5, 9]])
+    for before, after in zip(kept[::2], kept[1::2], strict=True):
+        for i in (0, 1, 2, 3, 4, 7):
+            np.testing.assert_array_equal(before[i], after[i])
+
+
+def test_a_cutoff_ends_the_search():
+    mesh = bumpy()
+    surface = ExactSurface(from_mesh(mesh, 0))
+    windows = [surface.solve(np.array([0]), cutoff=cutoff).n_windows for cutoff in (0.1, 0.2, 0.4, 0.8, np.inf)]
+    assert all(less < more for less, more in pairwise(windows))
+    # On a sphere of radius 1 a cap of radius 0.2 is a hundredth of the area.
+    assert windows[1] < 0.03 * windows[-1]
+
+
+def test_nonmanifold_mesh_from_a_file():
+    mesh = read_mesh(shared_path("suzanne.obj"))
+    sources = [0, 100, 250]
+    indices, distances = nearest_vertices(mesh, 12, sources)
+    for i, v in enumerate(sources):
+        exact = exact_distance(mesh.V, mesh.F, v)
+        np.testing.assert_allclose(distances[i], np.sort(exact)[:12], rtol=1e-13)
+        np.testing.assert_allclose(exact[indices[i][indices[i] >= 0]], distances[i][indices[i] >= 0], rtol=1e-13)
+
+
+def test_errors():
+    mesh = shapes.grid(3)
+    for radius in (0, -1.0, np.nan, "far", True, None):
+        with pytest.raises(ValueError, match="radius must be a positive number, not"):
+            distances_within(mesh, radius)
+    for k in (0, -3, 2.0, True, "two"):
+        with pytest.raises(ValueError, match="k must be a positive integer, not"):
+            nearest_vertices(mesh, k)
+    for pairs, message in (
+        ([1, 2], r"shape \(p, 2\), but it has shape \(2,\)"),
+        ([[1, 2, 3]], r"shape \(p, 2\), but it has shape \(1, 3\)"),
+        ([[1], [2, 3]], "not a ragged sequence"),
+        ([[0.0, 1.0]], r"indices of vertices, not float64: convert with astype\(int\)"),
+        ([[0, 1], [0, 99], [-1, 2]], r"pairs\[1\] = \[0, 99\] names no two vertices \(2 of 3 do not\)"),
+    ):
+        with pytest.raises(SourceError, match=message):
+            pair_distances(mesh, pairs)
+    with pytest.raises(SourceError, match=r"sources\[0\] = 99 is no vertex"):
+        nearest_vertices(mesh, 2, [99])
+    with pytest.raises(MeshError, match="exact distances need triangles"):
+        distances_within(shapes.box(2), 1.0)
