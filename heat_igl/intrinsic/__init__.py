@@ -8,6 +8,8 @@ from heat_igl.intrinsic.gradient import intrinsic_gradient
 from heat_igl.intrinsic.history import Flipped, Merged, Turned
 from heat_igl.intrinsic.layout import apex, corner_angles, lay_out
 from heat_igl.intrinsic.mollification import mollify
+from heat_igl.intrinsic.polar_angles import PolarAngles, carried_angles, polar_angles, transport_angles
+from heat_igl.intrinsic.tangent_frames import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.intrinsic.tufted import has_nonmanifold_edges, tufted_cover
 
@@ -16,8 +18,12 @@ __all__ = [
     "Flipped",
     "IntrinsicTriangulation",
     "Merged",
+    "PolarAngles",
+    "TangentFrames",
     "Turned",
     "apex",
+    "carried_angles",
+    "checked_vectors",
     "corner_angles",
     "double_cover",
     "from_edge_lengths",
@@ -28,5 +34,8 @@ __all__ = [
     "lay_out",
     "mollify",
     "oriented",
+    "polar_angles",
+    "tangent_frames",
+    "transport_angles",
     "tufted_cover",
 ]
