@@ -176,8 +176,8 @@ def tangent_frames(mesh: Mesh) -> TangentFrames:
     boundary edge at which the faces begin, counterclockwise; the other boundary edge has the angle pi.
 
     The normal is the mean of the normals of the faces, weighted by their angles. The axis x lies in the plane across
-    the normal, in the direction that fits the polar angles of all edges best: the sum over the edges of their unit
-    vectors, each turned back by its angle.
+    the normal, in the direction that fits the polar angles of all edges best: the sum of the edges as vectors, each
+    turned back by its angle.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def tangent_frames(mesh: Mesh) -> TangentFrames:
     sides = _unit(mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F])
     face_normals = _unit(np.cross(mesh.V[mesh.F[:, 1]] - mesh.V[mesh.F[:, 0]], mesh.V[mesh.F[:, 2]] - mesh.V[mesh.F[:, 0]]))
     normal = _vertex_normals(mesh, angles, face_normals)
-    x = _first_axes(mesh, triangulation, angles, sides, normal)
+    x = _first_axes(mesh, triangulation, angles, normal)
     return TangentFrames(x, np.cross(normal, x), normal, angles, triangulation, sides, face_normals)
 
 
@@ -231,7 +231,7 @@ def _vertex_normals(mesh: Mesh, angles: PolarAngles, face_normals: FloatArray) -
 
 
 def _first_axes(
-    mesh: Mesh, triangulation: IntrinsicTriangulation, angles: PolarAngles, sides: FloatArray, normal: FloatArray
+    mesh: Mesh, triangulation: IntrinsicTriangulation, angles: PolarAngles, normal: FloatArray
 ) -> FloatArray:
     """The direction (n, 3) that the polar angles of the edges around each vertex agree on best."""
     n = mesh.n_vertices
@@ -240,18 +240,18 @@ def _first_axes(
     any_x = _unit(np.cross(np.cross(normal, least), normal))
     any_y = np.cross(normal, any_x)
     corner = np.arange(mesh.F.size)
-    vertex, direction = mesh.F.ravel(), sides.reshape(-1, 3)
+    vertex, edge = mesh.F.ravel(), (mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F]).reshape(-1, 3)
     angle = angles.leaving[previous_half_edge(corner)]
     # The last edge of a boundary vertex leaves from no corner: it arrives.
     last = np.flatnonzero(triangulation.twin[next_half_edge(corner)] < 0)
     vertex = np.append(vertex, vertex[last])
-    direction = np.concatenate([direction, -direction[previous_half_edge(last)]])
+    edge = np.concatenate([edge, -edge[previous_half_edge(last)]])
     angle = np.append(angle, np.full(len(last), np.pi))
-    along = np.einsum("kx,kx->k", direction, any_x[vertex]) + 1j * np.einsum("kx,kx->k", direction, any_y[vertex])
+    along = np.einsum("kx,kx->k", edge, any_x[vertex]) + 1j * np.einsum("kx,kx->k", edge, any_y[vertex])
     back = along * np.exp(-1j * angle)
     total = np.bincount(vertex, back.real, n) + 1j * np.bincount(vertex, back.imag, n)
     size = np.abs(total)
-    total = np.divide(total, size, out=np.ones(n, complex), where=size > 1e-12)
+    total = np.divide(total, size, out=np.ones(n, complex), where=size > 1e-12 * mesh.edge_lengths.mean())
     used = mesh.referenced[:, None]
     return np.where(used, _unit(total.real[:, None] * any_x + total.imag[:, None] * any_y), [1.0, 0.0, 0.0])
 
