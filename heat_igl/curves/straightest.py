@@ -11,7 +11,7 @@ from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.kernels import straightest as kernel
 from heat_igl.mesh import ON_SIDE, Mesh, SurfaceCurve, SurfacePoints
 from heat_igl.runtime import n_threads, side_by_side
-from heat_igl.sources import Sources, vertex_sources
+from heat_igl.sources import Sources, ordered_vertices
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["exp_map", "trace_geodesic"]
@@ -153,9 +153,7 @@ class _Tracer:
             weights = np.where(points.barycentric < ON_SIDE, 0.0, points.barycentric)
             weights /= weights.sum(axis=1, keepdims=True)
             return _Starts(points.faces, np.ascontiguousarray(weights), np.full(len(points), -1))
-        vertex_sources(points, self._mesh.n_vertices)  # which checks the vertices
-        array: AnyArray = np.atleast_1d(np.asarray(points))
-        vertices = np.flatnonzero(array) if array.dtype.kind == "b" else array.astype(np.int64)
+        vertices = ordered_vertices(points, self._mesh.n_vertices)
         corner = self._frames.angles.first[vertices]
         if (corner < 0).any():
             first = int(np.argmax(corner < 0))

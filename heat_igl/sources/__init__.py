@@ -2,6 +2,7 @@
 
 from heat_igl.sources.assembly import SourceAssembler, SourceTerm, right_hand_side, take_shorter
 from heat_igl.sources.near_field import NearField, Seeds
+from heat_igl.sources.ordered import ordered_vertices
 from heat_igl.sources.specification import (
     OffsetSources,
     SourcePoints,
@@ -24,6 +25,7 @@ __all__ = [
     "SourceTerm",
     "Sources",
     "nearest_first",
+    "ordered_vertices",
     "right_hand_side",
     "source_set",
     "take_shorter",
