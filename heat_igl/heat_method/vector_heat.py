@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from heat_igl.errors import AccuracyWarning, MeshError
 from heat_igl.heat_method.options import SolverOptions
-from heat_igl.heat_method.outward_field import outward_field, ring
+from heat_igl.heat_method.outward_field import OutwardField
 from heat_igl.heat_method.parts import prepare
 from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
@@ -75,6 +75,8 @@ class VectorHeatSolver:
     ) -> None:
         self._frames: TangentFrames | None = tangent_frames(mesh)
         domain = operators(mesh)
+        assert domain.surface is not None
+        self._outward: OutwardField | None = OutwardField(domain.surface)
         self._prepare(domain, edge_rotations(domain), SolverOptions(t_coef, t, refine=refine, backend=backend))
 
     @classmethod
@@ -107,7 +109,7 @@ class VectorHeatSolver:
         if rotations.shape != domain.L.shape:
             raise ValueError(f"rotations must have the shape of L, {domain.L.shape}, not {rotations.shape}")
         solver = cls.__new__(cls)
-        solver._frames = None
+        solver._frames = solver._outward = None
         solver._prepare(domain, rotations, SolverOptions(t_coef, t, backend=backend))
         return solver
 
@@ -235,11 +237,10 @@ class VectorHeatSolver:
         vertices = self._vertices(source)
         if len(vertices) != 1:
             raise ValueError(f"source must be one vertex, not {len(vertices)}")
-        surface = self.operators.surface
-        if surface is None or surface.faces is None:
+        if self._outward is None:
             raise MeshError("the log map needs the triangles around the source, which this domain does not have")
         v = int(vertices[0])
-        at, outward = outward_field(surface, v)
+        at, outward = self._outward.integrals(v)
         n = self.operators.n
         b = np.zeros((n, 2), complex)
         np.add.at(b[:, 0], at, outward)
@@ -247,7 +248,7 @@ class VectorHeatSolver:
         b[v, 1] = SOURCE_HEAT
         radial, axis = (_unit(Y) for Y in self._vector_flow.solve(b).T)
         direction = _unit(radial * axis.conj())
-        neighbour, exact = ring(surface, v)
+        neighbour, exact = self._outward.ring(v)
         direction[neighbour] = np.exp(1j * exact)
         distance = self._distance_solver.distance(v)
         reached = np.isfinite(distance)
