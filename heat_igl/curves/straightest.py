@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from heat_igl.errors import SourceError
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
-from heat_igl.kernels import straightest as kernel
+from heat_igl.kernels import straightest
 from heat_igl.mesh import ON_SIDE, Mesh, SurfaceCurve, SurfacePoints
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, ordered_vertices
@@ -16,6 +17,8 @@ from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["exp_map", "trace_geodesic"]
 
+# The compiled module, whose signatures are those of Cython.
+kernel: Any = straightest
 # Fewer geodesics than this are traced on one thread.
 _FEW = 500
 
@@ -57,8 +60,10 @@ def trace_geodesic(mesh: Mesh, start: Sources, direction: ArrayLike, length: flo
     The geodesic is straight in each face, and across each edge in the plane of the two faces unfolded. At a vertex
     inside it goes on so that the angles on both sides, as sums of angles in faces, are equal; this defines a unique
     continuation also where the angles do not sum to 2 pi. A geodesic is at a vertex if it meets a side within 1e-12 of
-    its length from the end. It ends where it meets the boundary, a vertex on the boundary included, and has length 0
-    if it starts on the boundary and points off the surface. It is not the shortest path to its end in general.
+    its length from the end. It ends where it meets the boundary, and has length 0 if it starts on the boundary and
+    points off the surface. At a vertex of the boundary it goes on if the faces have an angle of pi or more on exactly
+    one side of it: then it leaves at pi on this side, as a straight line in the plane does along a straight boundary
+    or past a corner. It is not the shortest path to its end in general.
     """
     tracer = _Tracer(mesh)
     begin = tracer.starts("start", start)
@@ -122,7 +127,9 @@ class _Starts(NamedTuple):
 
     def repeated(self, k: int) -> _Starts:
         """The first point k times."""
-        return _Starts(*(np.repeat(field[:1], k, axis=0) for field in self))
+        return _Starts(
+            np.repeat(self.faces[:1], k), np.repeat(self.barycentric[:1], k, axis=0), np.repeat(self.vertices[:1], k)
+        )
 
 
 class _Ends(NamedTuple):
@@ -157,7 +164,9 @@ class _Tracer:
         corner = self._frames.angles.first[vertices]
         if (corner < 0).any():
             first = int(np.argmax(corner < 0))
-            raise SourceError(f"{name}[{first}] = {vertices[first]} is a vertex that no face uses: no geodesic starts there")
+            raise SourceError(
+                f"{name}[{first}] = {vertices[first]} is a vertex that no face uses: no geodesic starts there"
+            )
         return _Starts(corner // 3, np.eye(3)[corner % 3], vertices)
 
     def directions(self, name: str, starts: _Starts, vectors: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -183,12 +192,13 @@ class _Tracer:
         size = np.hypot(*components.T)
         turn = np.arctan2(components[:, 1], components[:, 0])
         if at_vertex.any():
-            corner, inside = frames.corner_towards(at, frames.to_angles(components[at_vertex]))
+            angle = frames.to_angles(components[at_vertex])
+            corner, inside = frames.corner_towards(at, frames.angles.to_polar(at, angle) if in_space else angle)
             face, c = np.divmod(corner, 3)
             starts.faces[at_vertex], starts.barycentric[at_vertex] = face, np.eye(3)[c]
             # The direction in which the side leaves from the corner, from that of corner 0 to corner 1.
-            angle = frames.angles.corners[face]
-            turn[at_vertex] = inside + np.choose(c, [np.zeros(len(c)), np.pi - angle[:, 1], angle[:, 0] - np.pi])
+            angles = frames.angles.corners[face]
+            turn[at_vertex] = inside + np.choose(c, [np.zeros(len(c)), np.pi - angles[:, 1], angles[:, 0] - np.pi])
         return turn, size
 
     def ends(self, starts: _Starts, turn: FloatArray, lengths: FloatArray) -> _Ends:
@@ -204,7 +214,7 @@ class _Tracer:
         threads = n_threads() if k >= _FEW else 1
         bounds = np.linspace(0, k, threads + 1).astype(int)
         if k:
-            side_by_side(work, [slice(*ends) for ends in zip(bounds[:-1], bounds[1:], strict=True)])
+            side_by_side(work, [slice(*ends) for ends in pairwise(bounds)])
         return found
 
     def curve(self, start: _Starts, turn: FloatArray, length: FloatArray) -> SurfaceCurve:

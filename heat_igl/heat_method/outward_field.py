@@ -1,4 +1,4 @@
-"""The unit vectors that point away from a vertex, integrated over the triangles around it."""
+"""The radial field around a vertex: vectors in its triangles whose heat flow points away from it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ from heat_igl.operators import Surface
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["OutwardField"]
-
-# Points of Gauss's rule over the angle of a corner.
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 class OutwardField:
@@ -53,12 +50,20 @@ class OutwardField:
         once = (counts == 1) & (found != vertex)
         return found[once], directions[first[once]]
 
-    def integrals(self, vertex: int) -> tuple[IntArray, AnyArray]:
-        """The integrals of the radial unit field times the hat functions of the corners of all triangles at a vertex.
+    def to_polar(self, vertex: int, directions: AnyArray) -> AnyArray:
+        """Unit numbers (n,) with the polar angles of directions at a vertex, given as transport has them; 0 stays."""
+        if not self._angles.on_boundary[vertex]:
+            return directions
+        angle = self._angles.to_polar(np.full(len(directions), vertex), np.angle(directions))
+        return np.asarray(np.abs(directions) * np.exp(1j * angle))
 
-        In polar coordinates around the vertex, a triangle of angle A is r < R(a), and the hat function of an outer
-        corner is r g(a). Its integral is that of g(a) R(a)^3 / 3 exp(i a) over the angle, and for the vertex itself
-        that of R(a)^2 / 6 exp(i a).
+    def dipole(self, vertex: int) -> tuple[IntArray, AnyArray]:
+        """Vectors whose heat flow points away from a vertex, on the corners of the triangles around it.
+
+        They sum to 0, and the sum of their products with the positions in the tangent plane of the vertex is a multiple
+        of the identity: vectors b_j in positions x_j give the sum of b_j G(x_j) = grad G for a linear function G. Taken
+        for G the heat that a vertex far away sends, which rises in the direction in which the shortest geodesic to that
+        vertex departs. The b_j are the gradients of the hat functions times the areas of the triangles.
 
         Returns
         -------
@@ -70,23 +75,14 @@ class OutwardField:
         tri, angles = self._triangulation, self._angles
         corner, _ = self._adjacency.corners_at(np.array([vertex]))
         out, back = previous_half_edge(corner), next_half_edge(corner)
-        one, other = tri.l.ravel()[out], tri.l.ravel()[back]
-        whole = angles.corners.ravel()[corner]
-        a = whole[:, None] * (1 + _POINTS) / 2
-        weights = whole[:, None] * _WEIGHTS / 2
-        # Hat functions of the outer corners per length along the direction a: sin over the height of the corner.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            g_one = np.sin(whole[:, None] - a) / (one * np.sin(whole))[:, None]
-            g_other = np.sin(a) / (other * np.sin(whole))[:, None]
-            radius = 1 / (g_one + g_other)
-            direction = np.exp(1j * a)
-            parts = [g_one * radius**3 / 3, g_other * radius**3 / 3, radius**2 / 6]
-            at_one, at_other, at_vertex = (np.einsum("kp,kp,kp->k", weights, part, direction) for part in parts)
-        start, scale = angles.leaving[out], angles.scale[vertex]
-        at_one = at_one * np.exp(1j * (start + self._turn[out]))
-        at_other = at_other * np.exp(1j * (start + scale * whole - self._turn[back] - whole))
-        at_vertex = at_vertex * np.exp(1j * start)
-        values = np.concatenate([at_one, at_other, at_vertex])
+        leaving, scale = angles.rigid(tri.tail(np.arange(tri.F.size)))
+        wide = scale[vertex] * angles.corners.ravel()[corner]
+        x_one = tri.l.ravel()[out] * np.exp(1j * leaving[out])
+        x_other = tri.l.ravel()[back] * np.exp(1j * (leaving[out] + wide))
+        # Twice the area times the gradient is the side opposite, turned by a right angle into the triangle; as the
+        # angle of a corner may be scaled to more than pi, the sign is that of the area.
+        sign = np.sign(np.sin(wide))
+        at_one, at_other = -1j * sign * x_other, 1j * sign * x_one
         vertices = np.concatenate([tri.head(out), tri.tail(back), np.full(len(corner), vertex)])
-        good = np.isfinite(values)
-        return vertices[good], values[good]
+        values = [at_one * np.exp(1j * self._turn[out]), at_other * np.exp(-1j * self._turn[back]), -at_one - at_other]
+        return vertices, np.concatenate(values)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import AccuracyWarning, MeshError
+from heat_igl.errors import AccuracyWarning, MeshError, SourceError
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.outward_field import OutwardField
 from heat_igl.heat_method.parts import prepare
@@ -22,8 +22,6 @@ from heat_igl.unfolding import Refine
 
 __all__ = ["VectorHeatSolver"]
 
-# The paper's factor in t = t_coef h^2; smaller ones leave transport closer to the shortest geodesic.
-_T_COEF = 1.0
 # Vectors shorter than this share of the heat around them are rounding: those that arrive cancel.
 _CANCELLED = 1e-12
 
@@ -36,8 +34,9 @@ class VectorHeatSolver:
     mesh : Mesh
         Triangles, manifold and oriented alike.
     t_coef : float, optional
-        t = t_coef h^2, with h the mean edge length of the intrinsic Delaunay triangulation; 1 as in the paper. Larger
-        values blend the sources more smoothly, and are farther from transport along the shortest geodesic.
+        t = t_coef h^2, with h the mean edge length of the intrinsic Delaunay triangulation; 0.5 by default, as for
+        `HeatMethodSolver`, where the paper takes 1. Larger values blend the sources more smoothly, and are farther from
+        transport along the shortest geodesic.
     t : float, optional
         Time step as a squared length; overrides `t_coef`. It is raised where heat would not cross the mesh.
     refine : {"sweep", "unfold"}, optional
@@ -114,8 +113,6 @@ class VectorHeatSolver:
         return solver
 
     def _prepare(self, domain: Operators, rotations: sp.csc_matrix, options: SolverOptions) -> None:
-        if options.t is None and options.t_coef is None:
-            options = SolverOptions(_T_COEF, refine=options.refine, backend=options.backend)
         parts = prepare(domain, options)
         self._heat_flow = parts.heat_flow
         self._distance_solver = HeatMethodSolver._of(parts)
@@ -230,24 +227,26 @@ class VectorHeatSolver:
 
         Notes
         -----
-        Section 8.2 of the paper: the angle between the radial field and a transported axis, which both come from vector
-        heat flow, and the distance of this solver's `refine`. The neighbours of the source get the directions of their
-        edges. The angle is least accurate near the cut locus, where the paper's method blends both sides.
+        The angle between the radial field and a transported axis, which both come from vector heat flow, and the
+        distance of this solver's `refine`. The paper's radial field starts from a circle around the source, ours from
+        vectors with the sum 0, which irregular triangles there do not bias (`OutwardField.dipole`). The neighbours of
+        the source get the directions of their edges. Near the cut locus the angle is least accurate: heat that arrives
+        from both sides is blended.
         """
         vertices = self._vertices(source)
         if len(vertices) != 1:
-            raise ValueError(f"source must be one vertex, not {len(vertices)}")
+            raise SourceError(f"source must be one vertex, not {len(vertices)}")
         if self._outward is None:
             raise MeshError("the log map needs the triangles around the source, which this domain does not have")
         v = int(vertices[0])
-        at, outward = self._outward.integrals(v)
+        at, outward = self._outward.dipole(v)
         n = self.operators.n
         b = np.zeros((n, 2), complex)
         np.add.at(b[:, 0], at, outward)
         b[:, 0] *= SOURCE_HEAT / np.abs(outward).max(initial=LOWEST_HEAT)
         b[v, 1] = SOURCE_HEAT
         radial, axis = (_unit(Y) for Y in self._vector_flow.solve(b).T)
-        direction = _unit(radial * axis.conj())
+        direction = self._outward.to_polar(v, _unit(radial * axis.conj()))
         neighbour, exact = self._outward.ring(v)
         direction[neighbour] = np.exp(1j * exact)
         distance = self._distance_solver.distance(v)

@@ -1,7 +1,8 @@
 """Polar angles around vertices: the direction of every half-edge in the tangent plane of its tail.
 
 The faces around a vertex seldom have angles that sum to 2 pi. All angles there are multiplied by one factor, so that
-they do (to pi on the boundary): this defines the tangent plane of the vertex (Knoeppel, Crane, Pinkall, Schroeder 2013).
+they do (to pi on the boundary): this defines the tangent plane of the vertex (Knoeppel, Crane, Pinkall, Schroeder
+2013).
 """
 
 from __future__ import annotations
@@ -47,6 +48,34 @@ class PolarAngles:
     on_boundary: BoolArray
     first: IntArray
 
+    def rigid(self, tail: IntArray) -> tuple[FloatArray, FloatArray]:
+        """The angle (3 m,) of each half-edge for transport, and the factor (n,) of angles in faces.
+
+        Inside these are `leaving` and `scale`. The faces at a boundary vertex lie in a plane already: transport takes
+        their angles as they are, so that a flat piece with corners has no curvature, and turns them until the middle
+        between the two boundary edges is at pi / 2, as in `leaving`.
+
+        Parameters
+        ----------
+        tail : (3 m,) int64
+            Tail of each half-edge.
+        """
+        flat = self.leaving / self.scale[tail] + (np.pi - self.sums[tail]) / 2
+        return np.where(self.on_boundary[tail], flat, self.leaving), np.where(self.on_boundary, 1.0, self.scale)
+
+    def to_polar(self, vertices: IntArray, angles: FloatArray) -> FloatArray:
+        """The polar angle (k,) of directions at vertices that have the given angles (k,) for transport.
+
+        The same inside. Beyond the boundary, and where the faces have no angle, the angle stays.
+        """
+        sums = self.sums[vertices]
+        whole = 2 * np.pi
+        flat = np.mod(angles - (np.pi - sums) / 2, whole)
+        # An angle that is rounded to just below 2 pi is 0.
+        flat = np.where(flat > whole - 1e-12, 0.0, flat)
+        inside = self.on_boundary[vertices] & (flat <= sums + 1e-12) & (sums > 0)
+        return np.where(inside, np.minimum(flat * self.scale[vertices], np.pi), angles)
+
 
 def polar_angles(triangulation: IntrinsicTriangulation) -> PolarAngles:
     """The polar angles of a triangulation without flips.
@@ -90,7 +119,11 @@ def polar_angles(triangulation: IntrinsicTriangulation) -> PolarAngles:
 def _require_oriented_manifold(triangulation: IntrinsicTriangulation) -> None:
     for wrong, what, remedy in (
         (triangulation.twin == -2, "is one of more than two faces", "remove faces or separate the sheets"),
-        (~triangulation.aligned, "has faces that are oriented differently", "orient them alike, as igl.bfs_orient does"),
+        (
+            ~triangulation.aligned,
+            "has faces that are oriented differently",
+            "orient them alike, as igl.bfs_orient does",
+        ),
     ):
         if wrong.any():
             first = int(np.argmax(wrong))
@@ -168,15 +201,15 @@ def _angles_at_diagonal(
 def transport_angles(triangulation: IntrinsicTriangulation, angles: PolarAngles) -> FloatArray:
     """The angle (3 m,) by which the components of a vector turn when it is transported along each half-edge.
 
-    A vector of direction a at the tail has the direction a + angle at the head, each in the tangent plane there.
+    A vector of direction a at the tail has the direction a + angle at the head, each in the tangent plane there; on the
+    boundary as `PolarAngles.rigid` has it.
     """
     half_edge = np.arange(triangulation.F.size)
+    leaving, scale = angles.rigid(triangulation.tail(half_edge))
     following = next_half_edge(half_edge)
     # At the head: the next half-edge leaves there, and the angle of the face lies between the two.
-    back = angles.leaving[following] + angles.scale[triangulation.head(half_edge)] * angles.corners.ravel()[
-        next_half_edge(following)
-    ]
+    back = leaving[following] + scale[triangulation.head(half_edge)] * angles.corners.ravel()[next_half_edge(following)]
     twin = triangulation.twin
     glued = twin >= 0
-    back[glued] = angles.leaving[twin[glued]]
-    return np.asarray(back + np.pi - angles.leaving)
+    back[glued] = leaving[twin[glued]]
+    return np.asarray(back + np.pi - leaving)

@@ -25,8 +25,10 @@ class TangentFrames:
     """An orthonormal frame at every vertex of a triangle mesh.
 
     A tangent vector at a vertex has two components, along `x` and `y`. Its angle counts counterclockwise from x, seen
-    from the side to which the normal points. Angles between edges at a vertex are those of the faces, scaled to sum to
-    2 pi (to pi on the boundary): x is the direction of the reference edge, see `tangent_frames`.
+    from the side to which the normal points. Directions of edges, of vectors in faces and of geodesics have their polar
+    angles: those of the faces, scaled to sum to 2 pi (to pi on the boundary), see `tangent_frames`. Vectors in space
+    and transported vectors are turned without a scale; at a boundary vertex whose faces do not sum to pi, that gives
+    another angle than the polar angle of the same direction (`PolarAngles.to_polar`).
 
     Attributes
     ----------
@@ -177,7 +179,7 @@ def tangent_frames(mesh: Mesh) -> TangentFrames:
 
     The normal is the mean of the normals of the faces, weighted by their angles. The axis x lies in the plane across
     the normal, in the direction that fits the polar angles of all edges best: the sum of the edges as vectors, each
-    turned back by its angle.
+    turned back by its angle; on the boundary by its angle in the faces, with the middle of the faces at pi / 2.
 
     Parameters
     ----------
@@ -204,7 +206,9 @@ def tangent_frames(mesh: Mesh) -> TangentFrames:
     triangulation = replace(intrinsic_triangulation(mesh), l=lengths, lengthening=0.0)
     angles = polar_angles(triangulation)
     sides = _unit(mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F])
-    face_normals = _unit(np.cross(mesh.V[mesh.F[:, 1]] - mesh.V[mesh.F[:, 0]], mesh.V[mesh.F[:, 2]] - mesh.V[mesh.F[:, 0]]))
+    face_normals = _unit(
+        np.cross(mesh.V[mesh.F[:, 1]] - mesh.V[mesh.F[:, 0]], mesh.V[mesh.F[:, 2]] - mesh.V[mesh.F[:, 0]])
+    )
     normal = _vertex_normals(mesh, angles, face_normals)
     x = _first_axes(mesh, triangulation, angles, normal)
     return TangentFrames(x, np.cross(normal, x), normal, angles, triangulation, sides, face_normals)
@@ -213,7 +217,7 @@ def tangent_frames(mesh: Mesh) -> TangentFrames:
 def _unit(vectors: FloatArray) -> FloatArray:
     """Vectors (..., 3) divided by their lengths; 0 stays 0."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
 
 
 def _vertex_normals(mesh: Mesh, angles: PolarAngles, face_normals: FloatArray) -> FloatArray:
@@ -237,16 +241,16 @@ def _first_axes(
     n = mesh.n_vertices
     # Any axis across the normal, to begin with.
     least = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-    any_x = _unit(np.cross(np.cross(normal, least), normal))
+    any_x = _unit(np.asarray(np.cross(np.cross(normal, least), normal), np.float64))
     any_y = np.cross(normal, any_x)
     corner = np.arange(mesh.F.size)
     vertex, edge = mesh.F.ravel(), (mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F]).reshape(-1, 3)
-    angle = angles.leaving[previous_half_edge(corner)]
+    angle = angles.rigid(triangulation.tail(corner))[0][previous_half_edge(corner)]
     # The last edge of a boundary vertex leaves from no corner: it arrives.
     last = np.flatnonzero(triangulation.twin[next_half_edge(corner)] < 0)
     vertex = np.append(vertex, vertex[last])
     edge = np.concatenate([edge, -edge[previous_half_edge(last)]])
-    angle = np.append(angle, np.full(len(last), np.pi))
+    angle = np.append(angle, (np.pi + angles.sums[mesh.F.ravel()[last]]) / 2)
     along = np.einsum("kx,kx->k", edge, any_x[vertex]) + 1j * np.einsum("kx,kx->k", edge, any_y[vertex])
     back = along * np.exp(-1j * angle)
     total = np.bincount(vertex, back.real, n) + 1j * np.bincount(vertex, back.imag, n)

@@ -45,9 +45,9 @@ def _around(
     most: cython.longlong = twin.shape[0]
     start: cython.longlong = first
     t: cython.longlong
-    k: cython.longlong
+    _k: cython.longlong
     # Clockwise to the boundary, if there is one: across the half-edge that leaves from the corner.
-    for k in range(most):
+    for _k in range(most):
         t = twin[start + 2 if start % 3 == 0 else start - 1]
         if t < 0:
             break
@@ -56,7 +56,7 @@ def _around(
             break
     at: cython.longlong = start
     angles: cython.double = 0.0
-    for k in range(most):
+    for _k in range(most):
         leaving[at + 2 if at % 3 == 0 else at - 1] = angles
         angles += angle[at]
         count[0] += 1

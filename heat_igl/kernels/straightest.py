@@ -42,9 +42,7 @@ class _Ray:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _leave_corner(
-    tables: Triangles, ray: _Ray, corner: cython.longlong, turn: cython.double
-) -> cython.bint:
+def _leave_corner(tables: Triangles, ray: _Ray, corner: cython.longlong, turn: cython.double) -> cython.bint:
     """Let the ray leave a vertex at the angle `turn` from the side that leaves from `corner`; false if it cannot.
 
     It cannot where that is beyond the boundary.
@@ -239,8 +237,17 @@ def _trace_one(
             b = py[c2] - py[c]
             turn = atan2(-(a * dy - b * dx), -(a * dx + b * dy))
             turn = min(max(turn, 0.0), tables.angle[f, corner % 3])
-            if half < 0.0 or idle > MOST_IDLE or not _leave_corner(tables, ray, corner, turn + half):
+            if idle > MOST_IDLE:
                 break
+            if half > 0.0:
+                _leave_corner(tables, ray, corner, turn + half)
+            else:
+                # On the boundary: straight on if one side of the ray has an angle of pi, but not if both have.
+                clockwise: cython.bint = _leave_corner(tables, ray, corner, turn - PI)
+                if clockwise == _leave_corner(tables, ray, corner, turn + PI):
+                    break
+                if clockwise:
+                    _leave_corner(tables, ray, corner, turn - PI)
         else:
             h: cython.longlong = 3 * f + (side + k) % 3
             t: cython.longlong = tables.twin[h]

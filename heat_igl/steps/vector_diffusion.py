@@ -71,7 +71,7 @@ class VectorHeatFlow:
 
 
 def _real(A: sp.csc_matrix) -> sp.csc_matrix:
-    """A Hermitian matrix (n, n) as a real symmetric one (2 n, 2 n): entry a + i b becomes the block [[a, -b], [b, a]]."""
+    """A Hermitian matrix (n, n) as a real symmetric one (2 n, 2 n), with the block [[a, -b], [b, a]] for a + i b."""
     rows = A.tocsr()
     blocks = np.empty((rows.nnz, 2, 2))
     blocks[:, 0, 0] = blocks[:, 1, 1] = rows.data.real
