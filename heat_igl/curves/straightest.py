@@ -59,7 +59,7 @@ def trace_geodesic(mesh: Mesh, start: Sources, direction: ArrayLike, length: flo
     -----
     The geodesic is straight in each face, and across each edge in the plane of the two faces unfolded. At a vertex
     inside it goes on so that the angles on both sides, as sums of angles in faces, are equal; this defines a unique
-    continuation also where the angles do not sum to 2 pi. A geodesic is at a vertex if it meets a side within 1e-12 of
+    continuation also where the angles do not sum to 2 pi. A geodesic is at a vertex if it meets a side within 1e-10 of
     its length from the end. It ends where it meets the boundary, and has length 0 if it starts on the boundary and
     points off the surface. At a vertex of the boundary it goes on if the faces have an angle of pi or more on exactly
     one side of it: then it leaves at pi on this side, as a straight line in the plane does along a straight boundary

@@ -241,7 +241,8 @@ def _first_axes(
     n = mesh.n_vertices
     # Any axis across the normal, to begin with.
     least = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-    any_x = _unit(np.asarray(np.cross(np.cross(normal, least), normal), np.float64))
+    across: FloatArray = np.cross(np.cross(normal, least), normal)
+    any_x = _unit(across)
     any_y = np.cross(normal, any_x)
     corner = np.arange(mesh.F.size)
     vertex, edge = mesh.F.ravel(), (mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F]).reshape(-1, 3)

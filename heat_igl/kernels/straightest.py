@@ -236,7 +236,9 @@ def _trace_one(
             a = px[c2] - px[c]
             b = py[c2] - py[c]
             turn = atan2(-(a * dy - b * dx), -(a * dx + b * dy))
-            turn = min(max(turn, 0.0), tables.angle[f, corner % 3])
+            # A ray that passes the vertex very near may come from beyond either side.
+            if turn < 0.5 * tables.angle[f, corner % 3] - PI:
+                turn += 2.0 * PI
             if idle > MOST_IDLE:
                 break
             if half > 0.0:
