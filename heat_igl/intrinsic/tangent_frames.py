@@ -223,7 +223,7 @@ def _unit(vectors: FloatArray) -> FloatArray:
 def _vertex_normals(mesh: Mesh, angles: PolarAngles, face_normals: FloatArray) -> FloatArray:
     weighted = angles.corners[:, :, None] * face_normals[:, None]
     columns = [np.bincount(mesh.F.ravel(), weighted[..., k].ravel(), mesh.n_vertices) for k in range(3)]
-    normal = np.stack(columns, axis=1)
+    normal: FloatArray = np.stack(columns, axis=1)
     # Normals that cancel, or only faces without area: that of one face, or any.
     lost = np.linalg.norm(normal, axis=1) <= 1e-12 * angles.sums
     normal[lost] = [0.0, 0.0, 1.0]
