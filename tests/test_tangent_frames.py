@@ -113,7 +113,7 @@ def test_transport_around_vertices_turns_by_the_curvature_enclosed(mesh, charact
     of_face = (angles.scale[mesh.F] * angles.corners).sum(axis=1) - np.pi
     assert of_face.sum() == pytest.approx(2 * np.pi * characteristic, abs=1e-10)
     for v in range(mesh.n_vertices):
-        face, corner = np.nonzero(mesh.F == v)
+        face, corner = np.nonzero(v == mesh.F)
         # The half-edges opposite v are a loop counterclockwise around it.
         turned = rho[face, corner].sum()
         assert off_multiples(np.array([turned - of_face[face].sum()])).max() < 1e-11

@@ -39,9 +39,11 @@ def test_geodesics_on_a_cylinder_are_those_of_the_unrolled_plane():
     around, along = 24, 20
     mesh = shapes.cylinder(around, along, 4.0)
     side = 2 * np.sin(np.pi / around)
-    start, turns, height = 9 * around, 1.5, 1.1
-    direction = np.array([0, turns * around * side, height])  # at the angle 0, y is around and z along
-    curve = trace_geodesic(mesh, start, direction, float(np.linalg.norm(direction)))
+    first, turns, height = 9 * around, 1.5, 1.1
+    face = next(f for f in np.flatnonzero((mesh.F == first).any(axis=1)) if {first, first + 1} <= {*mesh.F[f]})
+    start = SurfacePoints([face], [mesh.F[face] == first])
+    direction = turns * around * (mesh.V[first + 1] - mesh.V[first]) + [0, 0, height]
+    curve = trace_geodesic(mesh, start, direction, float(np.hypot(turns * around * side, height)))
     expected = [-1, 0, 9 * 0.2 + height]
     np.testing.assert_allclose(curve.positions(mesh)[-1], expected, atol=1e-12)
 
@@ -82,10 +84,12 @@ def test_geodesics_on_spheres_approach_great_circles():
 
 def test_equal_angles_on_both_sides_of_a_vertex():
     mesh = shapes.cone(10, 4)
-    rim = 1 + 3 * 10
+    ring = 1 + 2 * 10
     for k in range(10):
-        curve = trace_geodesic(mesh, rim + k, -mesh.V[rim + k], 2.0)
-        np.testing.assert_allclose(curve.positions(mesh)[-1], mesh.V[rim + (k + 5) % 10], atol=1e-12)
+        face = int(np.flatnonzero((mesh.F == ring + k).any(axis=1) & (mesh.F == ring + k - 10).any(axis=1))[0])
+        start = SurfacePoints([face], [mesh.F[face] == ring + k])
+        curve = trace_geodesic(mesh, start, -mesh.V[ring + k], 1.5)
+        np.testing.assert_allclose(curve.positions(mesh)[-1], mesh.V[ring + (k + 5) % 10], atol=1e-9)
 
 
 def test_geodesics_end_on_the_boundary():
@@ -137,6 +141,8 @@ def test_geodesics_along_shortest_paths_reach_their_targets(sphere):
         corner = int(np.argmax(at))
         assert sphere.F[face, corner] == source
         segment = (path.start[-1] - path.end[-1]) @ sphere.V[sphere.F[face]]
+        if len(path) > 1 and path.start[1:].max() > 1 - 1e-6:
+            continue  # through a vertex, where a shortest path may bend
         direction = frames.from_faces([face], [corner], [segment])
         log = direction / np.linalg.norm(direction) * path.lengths(sphere).sum()
         end = exp_map(sphere, source, log).positions(sphere)[0]
@@ -154,7 +160,7 @@ def test_agrees_with_potpourri3d(bunny):
         theirs = tracer.trace_geodesic_from_face(int(start.faces[i]), start.barycentric[i], length * vectors[i])[-1]
         assert np.linalg.norm(ours - theirs) < 1e-9 * length
         vertex = int(bunny.F[start.faces[i], 0])
-        direction = frames.to_world(frames.from_angles([float(i)]), [vertex])[0]
+        direction = frames.to_world(frames.from_angles([i + 0.5]), [vertex])[0]
         ours = trace_geodesic(bunny, vertex, direction, length).positions(bunny)[-1]
         theirs = tracer.trace_geodesic_from_vertex(vertex, length * direction)[-1]
         assert np.linalg.norm(ours - theirs) < 1e-9 * length

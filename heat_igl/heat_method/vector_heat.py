@@ -242,8 +242,8 @@ class VectorHeatSolver:
         at, outward = self._outward.dipole(v)
         n = self.operators.n
         b = np.zeros((n, 2), complex)
-        np.add.at(b[:, 0], at, outward)
-        b[:, 0] *= SOURCE_HEAT / np.abs(outward).max(initial=LOWEST_HEAT)
+        largest = np.abs(outward).max(initial=0.0)
+        np.add.at(b[:, 0], at, SOURCE_HEAT * (outward / largest if largest > 0 else outward))
         b[v, 1] = SOURCE_HEAT
         radial, axis = (_unit(Y) for Y in self._vector_flow.solve(b).T)
         direction = self._outward.to_polar(v, _unit(radial * axis.conj()))
