@@ -40,7 +40,7 @@ def test_geodesics_on_a_cylinder_are_those_of_the_unrolled_plane():
     mesh = shapes.cylinder(around, along, 4.0)
     side = 2 * np.sin(np.pi / around)
     first, turns, height = 9 * around, 1.5, 1.1
-    face = next(f for f in np.flatnonzero((mesh.F == first).any(axis=1)) if {first, first + 1} <= {*mesh.F[f]})
+    face = next(f for f in np.flatnonzero((first == mesh.F).any(axis=1)) if {first, first + 1} <= {*mesh.F[f]})
     start = SurfacePoints([face], [mesh.F[face] == first])
     direction = turns * around * (mesh.V[first + 1] - mesh.V[first]) + [0, 0, height]
     curve = trace_geodesic(mesh, start, direction, float(np.hypot(turns * around * side, height)))
@@ -86,7 +86,7 @@ def test_equal_angles_on_both_sides_of_a_vertex():
     mesh = shapes.cone(10, 4)
     ring = 1 + 2 * 10
     for k in range(10):
-        face = int(np.flatnonzero((mesh.F == ring + k).any(axis=1) & (mesh.F == ring + k - 10).any(axis=1))[0])
+        face = int(np.flatnonzero((ring + k == mesh.F).any(axis=1) & (ring + k - 10 == mesh.F).any(axis=1))[0])
         start = SurfacePoints([face], [mesh.F[face] == ring + k])
         curve = trace_geodesic(mesh, start, -mesh.V[ring + k], 1.5)
         np.testing.assert_allclose(curve.positions(mesh)[-1], mesh.V[ring + (k + 5) % 10], atol=1e-9)

@@ -1,7 +1,6 @@
 """Straightest geodesics over the triangles of an oriented manifold triangulation (Polthier and Schmies 1998)."""
 
 import cython
-import numpy as np
 from cython.cimports.libc.math import atan2, cos, fabs, hypot, sin
 
 __all__ = ["Triangles", "trace"]

@@ -39,10 +39,10 @@ def connection_laplacian(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay"
     Returns
     -------
     (n, n) csc_matrix of complex128
-        Hermitian, integrated like L; negative semidefinite where no weight is negative, so always with the default. Entry (j, i) of an edge is its weight
-        in L times exp(i rho), where rho is the angle by which components turn from i to j. Applied to the numbers
-        a + i b of tangent vectors, row j is the sum over the edges of weight times (the vector at i, transported to j,
-        less the vector at j).
+        Hermitian, integrated like L; negative semidefinite where no weight is negative, so always with the default.
+        Entry (j, i) of an edge is its weight in L times exp(i rho), where rho is the angle by which components turn
+        from i to j. Applied to the numbers a + i b of tangent vectors, row j is the sum over the edges of weight times
+        (the vector at i, transported to j, less the vector at j).
 
     Raises
     ------
