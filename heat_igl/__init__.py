@@ -4,7 +4,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from heat_igl import sampling
-from heat_igl.curves import enclosed_areas, isolines, offset_curves, shortest_paths, sublevel_areas
+from heat_igl.curves import (
+    enclosed_areas,
+    exp_map,
+    isolines,
+    offset_curves,
+    shortest_paths,
+    sublevel_areas,
+    trace_geodesic,
+)
 from heat_igl.errors import (
     AccuracyWarning,
     BatchError,
@@ -19,9 +27,11 @@ from heat_igl.heat_method import (
     HeatMethodSolver,
     HeatSolution,
     LabelledDistance,
+    VectorHeatSolver,
     geodesic_distance,
     heat_method_distance,
 )
+from heat_igl.intrinsic import TangentFrames, tangent_frames
 from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_curves, write_mesh
 from heat_igl.mesh import (
     ClosestPoints,
@@ -38,7 +48,7 @@ from heat_igl.mesh import (
     image_domain,
     split_long_edges,
 )
-from heat_igl.operators import Operators, polygon_operators, speed_operators
+from heat_igl.operators import Operators, connection_laplacian, polygon_operators, speed_operators
 from heat_igl.runtime.aliases import alias_modules
 from heat_igl.sampling import (
     VoronoiCells,
@@ -81,8 +91,10 @@ __all__ = [
     "SourceError",
     "SurfaceCurve",
     "SurfacePoints",
+    "TangentFrames",
     "ValidationReport",
     "ValidationRow",
+    "VectorHeatSolver",
     "VoronoiCells",
     "as_mesh",
     "baselines",
@@ -91,11 +103,13 @@ __all__ = [
     "curve_on",
     "edge_curve",
     "cluster",
+    "connection_laplacian",
     "diameter",
     "distance_matrix",
     "distances_within",
     "dual_triangulation",
     "enclosed_areas",
+    "exp_map",
     "farthest_cells",
     "farthest_points",
     "geodesic_centre",
@@ -120,6 +134,8 @@ __all__ = [
     "speed_operators",
     "split_long_edges",
     "sublevel_areas",
+    "tangent_frames",
+    "trace_geodesic",
     "unfolded_distance",
     "validate",
     "voronoi_cells",

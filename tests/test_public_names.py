@@ -17,11 +17,12 @@ import heat_igl
 EXPORTED = """
 AccuracyWarning BatchError ClosestPoints Diagnostics FactorizationError HeatMethodSolver HeatSolution ImageDomain
 LabelledDistance Mesh MeshError MeshReport MissingExtraError OffsetSources Operators PolygonMesh ReferenceSolverError
-Refinement SourceError SurfaceCurve SurfacePoints ValidationReport ValidationRow VoronoiCells as_mesh baselines
-closed_forms closest_points cluster curve_on diameter distance_matrix distances_within dual_triangulation edge_curve
-enclosed_areas farthest_cells farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain
-isolines metrics nearest_vertices offset_curves pair_distances plots polygon_operators read_attributes read_mesh
-read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
+Refinement SourceError SurfaceCurve SurfacePoints TangentFrames ValidationReport ValidationRow VectorHeatSolver
+VoronoiCells as_mesh baselines closed_forms closest_points cluster connection_laplacian curve_on diameter
+distance_matrix distances_within dual_triangulation edge_curve enclosed_areas exp_map farthest_cells farthest_points
+geodesic_centre geodesic_distance heat_method_distance image_domain isolines metrics nearest_vertices offset_curves
+pair_distances plots polygon_operators read_attributes read_mesh read_polygon_mesh reference sample_mesh sampling
+shapes shortest_paths speed_operators split_long_edges sublevel_areas tangent_frames trace_geodesic
 unfolded_distance validate voronoi_cells write_curves write_mesh
 """.split()
 
@@ -59,6 +60,14 @@ offset_curves(mesh, solver, sources, radius)
 enclosed_areas(mesh, values, level)
 sublevel_areas(mesh, values, levels)
 shortest_paths(mesh, distance, targets, sources=None)
+tangent_frames(mesh)
+trace_geodesic(mesh, start, direction, length)
+exp_map(mesh, source, vectors)
+connection_laplacian(mesh, laplacian='intrinsic-delaunay')
+VectorHeatSolver(mesh, *, t_coef=None, t=None, refine=None, backend='auto')
+VectorHeatSolver.extend(self, sources, values)
+VectorHeatSolver.transport(self, sources, vectors)
+VectorHeatSolver.log_map(self, source)
 closest_points(mesh, positions)
 curve_on(mesh, positions, *, closed=False, tolerance=None)
 edge_curve(mesh, vertices, *, closed=False)

@@ -2,11 +2,14 @@
 
 from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas
 from heat_igl.curves.paths import shortest_paths
+from heat_igl.curves.straightest import exp_map, trace_geodesic
 
 __all__ = [
     "enclosed_areas",
+    "exp_map",
     "isolines",
     "offset_curves",
     "shortest_paths",
     "sublevel_areas",
+    "trace_geodesic",
 ]

@@ -6,6 +6,7 @@ from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.heat_method.solver import HeatMethodSolver, heat_method_distance
 from heat_igl.heat_method.time_step import smallest_time_step
+from heat_igl.heat_method.vector_heat import VectorHeatSolver
 
 __all__ = [
     "AnswerCheck",
@@ -17,6 +18,7 @@ __all__ = [
     "Magnitude",
     "SolverOptions",
     "geodesic_distance",
+    "VectorHeatSolver",
     "heat_method_distance",
     "smallest_time_step",
 ]

@@ -8,7 +8,9 @@ from heat_igl.intrinsic.gradient import intrinsic_gradient
 from heat_igl.intrinsic.history import Covered, Flipped, Merged, Refined, Turned
 from heat_igl.intrinsic.layout import apex, corner_angles, lay_out
 from heat_igl.intrinsic.mollification import mollify
+from heat_igl.intrinsic.polar_angles import PolarAngles, carried_angles, polar_angles, transport_angles
 from heat_igl.intrinsic.refinement import delaunay_refinement
+from heat_igl.intrinsic.tangent_frames import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.intrinsic.tufted import closed_cover, has_nonmanifold_edges, tufted_cover
 
@@ -22,6 +24,10 @@ __all__ = [
     "Turned",
     "apex",
     "closed_cover",
+    "PolarAngles",
+    "TangentFrames",
+    "carried_angles",
+    "checked_vectors",
     "corner_angles",
     "delaunay_refinement",
     "double_cover",
@@ -33,5 +39,8 @@ __all__ = [
     "lay_out",
     "mollify",
     "oriented",
+    "polar_angles",
+    "tangent_frames",
+    "transport_angles",
     "tufted_cover",
 ]

@@ -1,5 +1,6 @@
 """The discrete Laplacian, mass, gradient and divergence of a domain: a function per kind returns `Operators`."""
 
+from heat_igl.operators.connection import connection_laplacian, edge_rotations, with_rotations
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
 from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
@@ -18,8 +19,10 @@ __all__ = [
     "Surface",
     "TriangleElements",
     "check_laplacian",
+    "connection_laplacian",
     "cotan_operators",
     "edge_length_operators",
+    "edge_rotations",
     "intrinsic_operators",
     "is_rough_or_narrow",
     "operators",
@@ -27,4 +30,5 @@ __all__ = [
     "speed_operators",
     "tufted_operators",
     "unfolding_surface",
+    "with_rotations",
 ]

@@ -2,6 +2,7 @@
 
 from heat_igl.sources.assembly import NEAR_RADIUS, SourceAssembler, SourceTerm, right_hand_side, take_shorter
 from heat_igl.sources.near_field import NearField, Seeds
+from heat_igl.sources.ordered import ordered_vertices
 from heat_igl.sources.specification import (
     OffsetSources,
     SourcePoints,
@@ -27,6 +28,7 @@ __all__ = [
     "Sources",
     "named_vertices",
     "nearest_first",
+    "ordered_vertices",
     "right_hand_side",
     "source_set",
     "take_shorter",

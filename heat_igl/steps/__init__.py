@@ -10,12 +10,14 @@ from heat_igl.steps.fitted import fitted_laplacian
 from heat_igl.steps.integration import PoissonProblem, integrate
 from heat_igl.steps.normalization import NormalizedDivergence, damping, normalize
 from heat_igl.steps.pattern import analysis
+from heat_igl.steps.vector_diffusion import VectorHeatFlow
 
 __all__ = [
     "Boundary",
     "HeatFlow",
     "NormalizedDivergence",
     "PoissonProblem",
+    "VectorHeatFlow",
     "analysis",
     "check_boundary",
     "damping",

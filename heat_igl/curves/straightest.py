@@ -1,0 +1,237 @@
+"""Straightest geodesics: lines that go straight on over the faces of a mesh, and the exponential map."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from heat_igl.errors import SourceError
+from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
+from heat_igl.kernels import straightest
+from heat_igl.mesh import ON_SIDE, Mesh, SurfaceCurve, SurfacePoints
+from heat_igl.runtime import n_threads, side_by_side
+from heat_igl.sources import Sources, ordered_vertices
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+
+__all__ = ["exp_map", "trace_geodesic"]
+
+# The compiled module, whose signatures are those of Cython.
+kernel: Any = straightest
+# Fewer geodesics than this are traced on one thread.
+_FEW = 500
+
+
+def trace_geodesic(mesh: Mesh, start: Sources, direction: ArrayLike, length: float) -> SurfaceCurve:
+    """The straightest geodesic from a point in a direction (Polthier and Schmies 1998).
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles, manifold and oriented alike.
+    start : int or SurfacePoints
+        A vertex, or one point in a face.
+    direction : (2,) or (3,) array_like
+        Its length does not matter. Two components are those of the frame: at a vertex see `tangent_frames`; in a face
+        the first axis runs from corner 0 to corner 1, and the second to the side of corner 2. Three components are a
+        vector in space, whose part along the normal of the vertex or face is left out.
+    length : float
+        In the mesh's unit, 0 or more.
+
+    Returns
+    -------
+    SurfaceCurve
+        One segment for each face that is crossed. The curve ends earlier on the boundary:
+        ``curve.lengths(mesh).sum()`` is the length in any case.
+
+    Raises
+    ------
+    MeshError
+        If the mesh has no tangent frames, see `tangent_frames`.
+    SourceError
+        If `start` is not one vertex of a face or one point of the mesh.
+    ValueError
+        If `direction` has another shape, is not finite or is 0 in the tangent plane; if `length` is negative or not
+        finite.
+
+    Notes
+    -----
+    The geodesic is straight in each face, and across each edge in the plane of the two faces unfolded. At a vertex
+    inside it goes on so that the angles on both sides, as sums of angles in faces, are equal; this defines a unique
+    continuation also where the angles do not sum to 2 pi. A geodesic is at a vertex if it meets a side within 1e-10 of
+    its length from the end. It ends where it meets the boundary, and has length 0 if it starts on the boundary and
+    points off the surface. At a vertex of the boundary it goes on if the faces have an angle of pi or more on exactly
+    one side of it: then it leaves at pi on this side, as a straight line in the plane does along a straight boundary
+    or past a corner. It is not the shortest path to its end in general.
+    """
+    tracer = _Tracer(mesh)
+    begin = tracer.starts("start", start)
+    if len(begin.faces) != 1:
+        raise SourceError(f"start must be one vertex or point, not {len(begin.faces)}")
+    if np.ndim(direction) != 1:
+        raise ValueError(f"direction must be one vector (2,) or (3,), but it has shape {np.shape(direction)}")
+    distance = _checked_length(length)
+    turn, size = tracer.directions("direction", begin, direction)
+    if not size[0] > 0:
+        raise ValueError(f"direction = {np.asarray(direction).tolist()} is 0 in the tangent plane: it needs a length")
+    return tracer.curve(begin, turn, np.array([distance]))
+
+
+def exp_map(mesh: Mesh, source: Sources, vectors: ArrayLike) -> SurfacePoints:
+    """The exponential map: where straightest geodesics from a point along tangent vectors end.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles, manifold and oriented alike.
+    source : int, sequence of int or SurfacePoints
+        A vertex or point for all vectors, or one for each.
+    vectors : (k, 2) or (k, 3) array_like
+        In the frame of the source, or in space, as the directions of `trace_geodesic`; the length of a vector in the
+        tangent plane is that of its geodesic. The vector 0 leads to the source itself.
+
+    Returns
+    -------
+    SurfacePoints
+        k points. A geodesic that meets the boundary ends there.
+
+    Raises
+    ------
+    MeshError, SourceError, ValueError
+        As for `trace_geodesic`.
+
+    Notes
+    -----
+    Traced on all processors (`HEAT_IGL_NUM_THREADS`), with the same bits for any number of them.
+    """
+    tracer = _Tracer(mesh)
+    begin = tracer.starts("source", source)
+    array: AnyArray = np.asarray(vectors)
+    k = len(array) if array.ndim == 2 else 1
+    if len(begin.faces) == 1:
+        begin = begin.repeated(k)
+    elif len(begin.faces) != k:
+        raise SourceError(f"source must be one point, or one for each of the {k} vectors, not {len(begin.faces)}")
+    turn, size = tracer.directions("vectors", begin, vectors)
+    found = tracer.ends(begin, turn, size)
+    return SurfacePoints(found.faces, found.barycentric)
+
+
+class _Starts(NamedTuple):
+    """Points (k,) in faces; for vertices, which (k,), else -1."""
+
+    faces: IntArray
+    barycentric: FloatArray
+    vertices: IntArray
+
+    def repeated(self, k: int) -> _Starts:
+        """The first point k times."""
+        return _Starts(
+            np.repeat(self.faces[:1], k), np.repeat(self.barycentric[:1], k, axis=0), np.repeat(self.vertices[:1], k)
+        )
+
+
+class _Ends(NamedTuple):
+    """Ends of k geodesics: faces and barycentric coordinates, the lengths, and the number of segments of each."""
+
+    faces: IntArray
+    barycentric: FloatArray
+    lengths: FloatArray
+    counts: IntArray
+
+
+class _Tracer:
+    """The frames of a mesh, and the tables of the kernel."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+        self._frames: TangentFrames = tangent_frames(mesh)
+        triangulation, polar = self._frames.triangulation, self._frames.angles
+        half = np.where(polar.on_boundary, -1.0, polar.sums / 2)[mesh.F]
+        self._tables = kernel.Triangles(
+            triangulation.l, triangulation.areas, polar.corners, triangulation.twin, np.ascontiguousarray(half)
+        )
+
+    def starts(self, name: str, points: Sources) -> _Starts:
+        """Where geodesics begin: vertices in the order given, or points in faces."""
+        if isinstance(points, SurfacePoints):
+            points.positions(self._mesh)  # which checks the faces
+            weights = np.where(points.barycentric < ON_SIDE, 0.0, points.barycentric)
+            weights /= weights.sum(axis=1, keepdims=True)
+            return _Starts(points.faces, np.ascontiguousarray(weights), np.full(len(points), -1))
+        vertices = ordered_vertices(points, self._mesh.n_vertices)
+        corner = self._frames.angles.first[vertices]
+        if (corner < 0).any():
+            first = int(np.argmax(corner < 0))
+            raise SourceError(
+                f"{name}[{first}] = {vertices[first]} is a vertex that no face uses: no geodesic starts there"
+            )
+        return _Starts(corner // 3, np.eye(3)[corner % 3], vertices)
+
+    def directions(self, name: str, starts: _Starts, vectors: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """The angle (k,) of each vector in the face of its start, from corner 0 to corner 1, and its length.
+
+        At vertices the start is moved to the face into which the vector points.
+        """
+        frames, k = self._frames, len(starts.faces)
+        in_space = np.shape(vectors)[-1:] == (3,)
+        found = checked_vectors(name, vectors, k, 3 if in_space else 2)
+        at_vertex = starts.vertices >= 0
+        components = np.empty((k, 2))
+        components[~at_vertex] = found[~at_vertex][:, :2]
+        if in_space:
+            face = starts.faces
+            along = frames.sides[face, 0]
+            across = np.cross(frames.face_normals[face], along)
+            components = np.stack([np.einsum("kx,kx->k", found, axis) for axis in (along, across)], axis=1)
+        if at_vertex.any():
+            at = starts.vertices[at_vertex]
+            tangent = found[at_vertex]
+            components[at_vertex] = frames.from_world(tangent, at) if in_space else tangent
+        size = np.hypot(*components.T)
+        turn = np.arctan2(components[:, 1], components[:, 0])
+        if at_vertex.any():
+            angle = frames.to_angles(components[at_vertex])
+            corner, inside = frames.corner_towards(at, frames.angles.to_polar(at, angle) if in_space else angle)
+            face, c = np.divmod(corner, 3)
+            starts.faces[at_vertex], starts.barycentric[at_vertex] = face, np.eye(3)[c]
+            # The direction in which the side leaves from the corner, from that of corner 0 to corner 1.
+            angles = frames.angles.corners[face]
+            turn[at_vertex] = inside + np.choose(c, [np.zeros(len(c)), np.pi - angles[:, 1], angles[:, 0] - np.pi])
+        return turn, size
+
+    def ends(self, starts: _Starts, turn: FloatArray, lengths: FloatArray) -> _Ends:
+        """Trace geodesics for their ends, on all processors."""
+        k = len(turn)
+        found = _Ends(np.empty(k, np.int64), np.empty((k, 3)), np.empty(k), np.empty(k, np.int64))
+        none = np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2, 3))
+
+        def work(part: slice) -> None:
+            given = (starts.faces[part], starts.barycentric[part], turn[part], lengths[part])
+            kernel.trace(self._tables, *given, *(field[part] for field in found), *none)
+
+        threads = n_threads() if k >= _FEW else 1
+        bounds = np.linspace(0, k, threads + 1).astype(int)
+        if k:
+            side_by_side(work, [slice(*ends) for ends in pairwise(bounds)])
+        return found
+
+    def curve(self, start: _Starts, turn: FloatArray, length: FloatArray) -> SurfaceCurve:
+        """Trace one geodesic, twice: for the number of its segments, then to store them."""
+        found = self.ends(start, turn, length)
+        n = int(found.counts[0])
+        faces, points = np.empty(n, np.int64), np.empty((n, 2, 3))
+        given: tuple[Any, ...] = (start.faces, start.barycentric, turn, length)
+        kernel.trace(self._tables, *given, *found, np.zeros(1, np.int64), faces, points)
+        return SurfaceCurve(faces, points[:, 0], points[:, 1])
+
+
+def _checked_length(length: float) -> float:
+    try:
+        number = float(length)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not (np.isfinite(number) and number >= 0):
+        raise ValueError(f"length must be a finite number of at least 0, not {length!r}")
+    return number

@@ -1,0 +1,293 @@
+"""`VectorHeatSolver`: the vector heat method, for values and tangent vectors carried along shortest geodesics."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from heat_igl.errors import AccuracyWarning, MeshError, SourceError
+from heat_igl.heat_method.options import SolverOptions
+from heat_igl.heat_method.outward_field import OutwardField
+from heat_igl.heat_method.parts import prepare
+from heat_igl.heat_method.solver import HeatMethodSolver
+from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
+from heat_igl.linear import Backend
+from heat_igl.mesh import Mesh
+from heat_igl.operators import Operators, edge_rotations, operators
+from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, warn_caller
+from heat_igl.sources import Sources, ordered_vertices
+from heat_igl.steps import VectorHeatFlow
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.unfolding import Refine
+
+__all__ = ["VectorHeatSolver"]
+
+# Vectors shorter than this share of the heat around them are rounding: those that arrive cancel.
+_CANCELLED = 1e-12
+
+
+class VectorHeatSolver:
+    """The vector heat method (Sharp, Soliman, Crane 2019): factor once, ask many times.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles, manifold and oriented alike.
+    t_coef : float, optional
+        t = t_coef h^2, with h the mean edge length of the intrinsic Delaunay triangulation; 0.5 by default, as for
+        `HeatMethodSolver`, where the paper takes 1. Larger values blend the sources more smoothly, and are farther from
+        transport along the shortest geodesic.
+    t : float, optional
+        Time step as a squared length; overrides `t_coef`. It is raised where heat would not cross the mesh.
+    refine : {"sweep", "unfold"}, optional
+        How `log_map` finds the radial distance, see `HeatMethodSolver`.
+    backend : {"auto", "scipy", "multifrontal"}
+        Linear solver, see `factorize`.
+
+    Raises
+    ------
+    MeshError
+        If the mesh has no tangent frames, see `tangent_frames`.
+    FactorizationError, MissingExtraError, ValueError
+        As for `HeatMethodSolver`.
+
+    Warns
+    -----
+    AccuracyWarning
+        If an explicit `t` had to be raised.
+
+    Notes
+    -----
+    Vectors are given and returned by two components in the frames of `tangent_frames`, which `frames` holds. The solver
+    is immutable, and threads may share it. No result is NaN. Vertices on components without a source, which
+    `reaches` tells apart, get 0.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        *,
+        t_coef: float | None = None,
+        t: float | None = None,
+        refine: Refine | None = None,
+        backend: Backend = "auto",
+    ) -> None:
+        self._frames: TangentFrames | None = tangent_frames(mesh)
+        domain = operators(mesh)
+        assert domain.surface is not None
+        self._outward: OutwardField | None = OutwardField(domain.surface)
+        self._prepare(domain, edge_rotations(domain), SolverOptions(t_coef, t, refine=refine, backend=backend))
+
+    @classmethod
+    def from_operators(
+        cls,
+        domain: Operators,
+        rotations: sp.csc_matrix,
+        *,
+        t_coef: float | None = None,
+        t: float | None = None,
+        backend: Backend = "auto",
+    ) -> VectorHeatSolver:
+        """A solver on any domain that has operators and a connection.
+
+        Parameters
+        ----------
+        domain : Operators
+            The domain.
+        rotations : (n, n) csc_matrix of complex128
+            Entry (j, i), where L has one, is exp(i rho), with rho the angle by which the components of a vector turn
+            when it is transported from i to j; Hermitian, with 1 on the diagonal.
+        t_coef, t, backend
+            As for the class.
+
+        Raises
+        ------
+        ValueError
+            If `rotations` has another shape than L.
+        """
+        if rotations.shape != domain.L.shape:
+            raise ValueError(f"rotations must have the shape of L, {domain.L.shape}, not {rotations.shape}")
+        solver = cls.__new__(cls)
+        solver._frames = solver._outward = None
+        solver._prepare(domain, rotations, SolverOptions(t_coef, t, backend=backend))
+        return solver
+
+    def _prepare(self, domain: Operators, rotations: sp.csc_matrix, options: SolverOptions) -> None:
+        parts = prepare(domain, options)
+        self._heat_flow = parts.heat_flow
+        self._distance_solver = HeatMethodSolver._of(parts)
+        self._vector_flow = VectorHeatFlow(domain, rotations, parts.diagnostics.t, options.backend, parts.fitted)
+
+    @property
+    def frames(self) -> TangentFrames:
+        """The frames in which vectors are given."""
+        if self._frames is None:
+            raise ValueError("this solver was made from operators, and their frames are not known to it")
+        return self._frames
+
+    @property
+    def operators(self) -> Operators:
+        """L and M of the triangulation that is solved on."""
+        return self._distance_solver.operators
+
+    @property
+    def t(self) -> float:
+        """The time step in use, a squared length."""
+        return self._distance_solver.t
+
+    def reaches(self, sources: Sources) -> BoolArray:
+        """Mask (n,) of the vertices on the components of the sources: all others get 0."""
+        components = self.operators.components
+        return np.isin(components, components[self._vertices(sources)])
+
+    def extend(self, sources: Sources, values: ArrayLike) -> FloatArray:
+        """Values at vertices, extended to all: each vertex gets about the value of the nearest source.
+
+        Parameters
+        ----------
+        sources : int, sequence of int or (n,) mask of bool
+            Vertices; where one is repeated, its values are averaged.
+        values : float or (k,) array_like
+            One for each source, in the order in which they are named.
+
+        Returns
+        -------
+        (n,) float64
+            Between the smallest and the largest of the values; 0 where no source `reaches`.
+
+        Raises
+        ------
+        SourceError
+            If `sources` are not vertices of the mesh.
+        ValueError
+            If there is not one finite value for each source.
+
+        Notes
+        -----
+        The ratio u / phi of two heat flows, that of the values and that of ones (equation 5 of the paper).
+        """
+        vertices = self._vertices(sources)
+        given = checked_vectors("values", np.reshape(values, (-1, 1)), len(vertices), 1)[:, 0]
+        return self._extended(vertices, given)[0]
+
+    def transport(self, sources: Sources, vectors: ArrayLike) -> FloatArray:
+        """Tangent vectors at vertices, transported to all along shortest geodesics.
+
+        Parameters
+        ----------
+        sources : int, sequence of int or (n,) mask of bool
+            Vertices; the vectors of one that is repeated are averaged.
+        vectors : (k, 2) array_like
+            Components in the frame of each source, in the order in which they are named.
+
+        Returns
+        -------
+        (n, 2) float64
+            Components in the frame of each vertex. Directions are those of vectors from all sources, which the nearest
+            sources dominate, and lengths are extended as by `extend`. 0 where no source `reaches`, and where vectors
+            that arrive on different ways cancel to rounding, as at the antipode on a sphere.
+
+        Raises
+        ------
+        SourceError
+            If `sources` are not vertices of the mesh.
+        ValueError
+            If there is not one vector of two finite components for each source.
+
+        Notes
+        -----
+        Algorithm 1 of the paper: the direction of one step of vector heat flow, the length of `extend`.
+        """
+        vertices = self._vertices(sources)
+        given = checked_vectors("vectors", vectors, len(vertices), 2)
+        lengths, heat = self._extended(vertices, np.hypot(*given.T))
+        found = self._directions(vertices, given[:, 0] + 1j * given[:, 1], heat) * lengths
+        return np.stack([found.real, found.imag], axis=1)
+
+    def log_map(self, source: int) -> FloatArray:
+        """The logarithmic map: the vector from a vertex to each other along the shortest geodesic.
+
+        Parameters
+        ----------
+        source : int
+            A vertex.
+
+        Returns
+        -------
+        (n, 2) float64
+            Components in the frame of the source: as long as the distance, and in the direction in which the geodesic
+            departs. 0 where the source does not `reach`.
+
+        Raises
+        ------
+        SourceError
+            If `source` is not one vertex of the mesh.
+        MeshError
+            If the solver was made from operators without triangles.
+
+        Notes
+        -----
+        The angle between the radial field and a transported axis, which both come from vector heat flow, and the
+        distance of this solver's `refine`. The paper's radial field starts from a circle around the source, ours from
+        vectors with the sum 0, which irregular triangles there do not bias (`OutwardField.dipole`). The neighbours of
+        the source get the directions of their edges. Near the cut locus the angle is least accurate: heat that arrives
+        from both sides is blended.
+        """
+        vertices = self._vertices(source)
+        if len(vertices) != 1:
+            raise SourceError(f"source must be one vertex, not {len(vertices)}")
+        if self._outward is None:
+            raise MeshError("the log map needs the triangles around the source, which this domain does not have")
+        v = int(vertices[0])
+        at, outward = self._outward.dipole(v)
+        n = self.operators.n
+        b = np.zeros((n, 2), complex)
+        largest = np.abs(outward).max(initial=0.0)
+        np.add.at(b[:, 0], at, SOURCE_HEAT * (outward / largest if largest > 0 else outward))
+        b[v, 1] = SOURCE_HEAT
+        radial, axis = (_unit(Y) for Y in self._vector_flow.solve(b).T)
+        direction = self._outward.to_polar(v, _unit(radial * axis.conj()))
+        neighbour, exact = self._outward.ring(v)
+        direction[neighbour] = np.exp(1j * exact)
+        distance = self._distance_solver.distance(v)
+        reached = np.isfinite(distance)
+        length = np.where(reached, distance, 0.0)
+        return np.stack([length * direction.real, length * direction.imag], axis=1)
+
+    def _vertices(self, sources: Sources) -> IntArray:
+        return ordered_vertices(sources, self.operators.n)
+
+    def _extended(self, vertices: IntArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """`extend`, and the heat (n,) of ones."""
+        largest = float(np.abs(values).max())
+        b = np.zeros((self.operators.n, 2))
+        np.add.at(b[:, 0], vertices, values / largest if largest > 0 else values)
+        np.add.at(b[:, 1], vertices, 1.0)
+        unit = SOURCE_HEAT / b[:, 1].max()
+        u, phi = self._heat_flow.solve(b * unit).T
+        warm = phi > LOWEST_HEAT
+        cold = self.reaches(vertices) & ~warm
+        if cold.any():
+            warn_caller(
+                f"heat does not reach {int(cold.sum())} vertices in double precision, vertex {int(np.argmax(cold))} "
+                "first: they get 0; raise t",
+                AccuracyWarning,
+            )
+        ratio = np.divide(u, phi, out=np.zeros_like(u), where=warm) * largest
+        # A mean of the values: what is beyond them is rounding.
+        return np.where(warm, np.clip(ratio, values.min(), values.max()), 0.0), phi
+
+    def _directions(self, vertices: IntArray, vectors: AnyArray, heat: FloatArray) -> AnyArray:
+        """Unit numbers (n,), the directions of vectors that flow from the sources, or 0."""
+        b = np.zeros(self.operators.n, complex)
+        largest = float(np.abs(vectors).max())
+        np.add.at(b, vertices, vectors / largest if largest > 0 else vectors)
+        most = np.bincount(vertices).max()
+        Y = self._vector_flow.solve(b * (SOURCE_HEAT / most))
+        return _unit(np.where(np.abs(Y) > _CANCELLED * heat, Y, 0.0))
+
+
+def _unit(Y: AnyArray) -> AnyArray:
+    """Complex numbers divided by their size; 0 where that is too small for a direction."""
+    size = np.abs(Y)
+    return np.divide(Y, size, out=np.zeros_like(Y), where=size > LOWEST_HEAT)

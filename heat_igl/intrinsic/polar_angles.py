@@ -1,0 +1,215 @@
+"""Polar angles around vertices: the direction of every half-edge in the tangent plane of its tail.
+
+The faces around a vertex seldom have angles that sum to 2 pi. All angles there are multiplied by one factor, so that
+they do (to pi on the boundary): this defines the tangent plane of the vertex (Knoeppel, Crane, Pinkall, Schroeder
+2013).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.intrinsic.history import Flipped
+from heat_igl.intrinsic.layout import apex, corner_angles
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge
+from heat_igl.kernels.polar_angles import polar_angles as kernel
+from heat_igl.typing import BoolArray, FloatArray, IntArray
+
+__all__ = ["PolarAngles", "carried_angles", "polar_angles", "transport_angles"]
+
+
+@dataclass(frozen=True, eq=False)
+class PolarAngles:
+    """Angles around the vertices of a triangulation of n vertices and m faces.
+
+    Attributes
+    ----------
+    leaving : (3 m,) float64
+        Angle of each half-edge in the tangent plane of its tail, counterclockwise from the reference edge.
+    corners : (m, 3) float64
+        Angle at each corner, as it is in the face.
+    sums : (n,) float64
+        Sum of `corners` around each vertex; 0 where no face is.
+    scale : (n,) float64
+        Angle in the tangent plane over angle in a face: 2 pi / sum, and pi / sum on the boundary; 1 without faces.
+    on_boundary : (n,) bool
+        Vertices whose faces do not close up around them.
+    first : (n,) int64
+        Corner at which `leaving` is 0, -1 where no face is.
+    """
+
+    leaving: FloatArray
+    corners: FloatArray
+    sums: FloatArray
+    scale: FloatArray
+    on_boundary: BoolArray
+    first: IntArray
+
+    def rigid(self, tail: IntArray) -> tuple[FloatArray, FloatArray]:
+        """The angle (3 m,) of each half-edge for transport, and the factor (n,) of angles in faces.
+
+        Inside these are `leaving` and `scale`. The faces at a boundary vertex lie in a plane already: transport takes
+        their angles as they are, so that a flat piece with corners has no curvature, and turns them until the middle
+        between the two boundary edges is at pi / 2, as in `leaving`.
+
+        Parameters
+        ----------
+        tail : (3 m,) int64
+            Tail of each half-edge.
+        """
+        flat = self.leaving / self.scale[tail] + (np.pi - self.sums[tail]) / 2
+        return np.where(self.on_boundary[tail], flat, self.leaving), np.where(self.on_boundary, 1.0, self.scale)
+
+    def to_polar(self, vertices: IntArray, angles: FloatArray) -> FloatArray:
+        """The polar angle (k,) of directions at vertices that have the given angles (k,) for transport.
+
+        The same inside. Beyond the boundary, and where the faces have no angle, the angle stays.
+        """
+        sums = self.sums[vertices]
+        whole = 2 * np.pi
+        flat = np.mod(angles - (np.pi - sums) / 2, whole)
+        # An angle that is rounded to just below 2 pi is 0.
+        flat = np.where(flat > whole - 1e-12, 0.0, flat)
+        inside = self.on_boundary[vertices] & (flat <= sums + 1e-12) & (sums > 0)
+        return np.where(inside, np.minimum(flat * self.scale[vertices], np.pi), angles)
+
+
+def polar_angles(triangulation: IntrinsicTriangulation) -> PolarAngles:
+    """The polar angles of a triangulation without flips.
+
+    The reference edge of an inner vertex leaves from its corner of the smallest number ``3 f + c``: it leads to the
+    next corner of that face. On the boundary it is the boundary edge at which the faces begin counterclockwise, so
+    that angles run from 0 to pi.
+
+    Raises
+    ------
+    MeshError
+        If more than two faces meet at an edge, two neighbours are oriented differently, or the faces at a vertex are
+        not one fan; the message names the first offender.
+    """
+    F, n = triangulation.F, triangulation.n
+    _require_oriented_manifold(triangulation)
+    corners = corner_angles(triangulation.l)
+    lowest = np.full(n, -1)
+    lowest[F.ravel()[::-1]] = np.arange(F.size)[::-1]
+    leaving = np.zeros(F.size)
+    sums, counts, closes = kernel(corners.ravel(), triangulation.twin, lowest, leaving)
+    fans = np.bincount(F.ravel(), minlength=n) != counts
+    if fans.any():
+        first = int(np.argmax(fans))
+        raise MeshError(
+            f"the faces at vertex {first} are not one fan ({int(fans.sum())} vertices are like that): a vertex like "
+            "this has no tangent plane; give each fan a vertex of its own"
+        )
+    on_boundary = (counts > 0) & ~closes
+    whole = np.where(on_boundary, np.pi, 2 * np.pi)
+    scale = np.divide(whole, sums, out=np.ones(n), where=sums > 0)
+    first_corner = np.full(n, -1)
+    tail = triangulation.tail(np.arange(F.size))
+    starts = np.flatnonzero((leaving == 0) & (~on_boundary[tail] | (triangulation.twin < 0)))
+    first_corner[tail[starts]] = next_half_edge(starts)
+    inner = ~on_boundary
+    first_corner[inner] = lowest[inner]
+    return PolarAngles(leaving * scale[tail], corners, sums, scale, on_boundary, first_corner)
+
+
+def _require_oriented_manifold(triangulation: IntrinsicTriangulation) -> None:
+    for wrong, what, remedy in (
+        (triangulation.twin == -2, "is one of more than two faces", "remove faces or separate the sheets"),
+        (
+            ~triangulation.aligned,
+            "has faces that are oriented differently",
+            "orient them alike, as igl.bfs_orient does",
+        ),
+    ):
+        if wrong.any():
+            first = int(np.argmax(wrong))
+            ends = [int(triangulation.tail(np.array([first]))[0]), int(triangulation.head(np.array([first]))[0])]
+            raise MeshError(
+                f"the edge {ends} of face {first // 3} {what} ({int(wrong.sum())} sides of faces are like that): "
+                f"tangent vectors need an oriented manifold; {remedy}"
+            )
+
+
+def carried_angles(angles: PolarAngles, flipped: IntrinsicTriangulation) -> PolarAngles:
+    """The polar angles of a triangulation after the flips of its history; reference directions stay.
+
+    Parameters
+    ----------
+    angles : PolarAngles
+        Of the triangulation before all flips.
+    flipped : IntrinsicTriangulation
+        The triangulation now. Its history holds flips only.
+    """
+    leaving, scale = angles.leaving.copy(), angles.scale
+    F = _faces_before(flipped)
+    for change in flipped.history:
+        assert isinstance(change, Flipped)
+        _replay(leaving, scale, F, change)
+    return PolarAngles(
+        leaving, corner_angles(flipped.l), angles.sums, scale, angles.on_boundary, np.full_like(angles.first, -1)
+    )
+
+
+def _corner_slots(half_edge: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    following = next_half_edge(half_edge)
+    return half_edge, following, next_half_edge(following)
+
+
+def _faces_before(flipped: IntrinsicTriangulation) -> IntArray:
+    """The vertices (3 m,) at the corners of the faces before the flips."""
+    F = flipped.F.ravel().copy()
+    for change in flipped.history[::-1]:
+        assert isinstance(change, Flipped)
+        (p, _, q_in_f), (q, _, p_in_g) = _corner_slots(change.half_edge), _corner_slots(change.mate)
+        # (p, a, q), (q, b, p) back to (p, a, b), (q, b, a)
+        at_a, at_b = F[next_half_edge(p)], F[next_half_edge(q)]
+        F[q_in_f], F[p_in_g] = at_b, at_a
+    return F
+
+
+def _replay(leaving: FloatArray, scale: FloatArray, F: IntArray, change: Flipped) -> None:
+    """Carry the angles, and the faces, over edges flipped at once; names as in `Flipped`."""
+    (ab, bp, pa), (ba, aq, qb) = _corner_slots(change.half_edge), _corner_slots(change.mate)
+    p, q = F[ab], F[ba]
+    length_ab, length_pa, length_bp, length_aq, length_qb = change.lengths
+    # The quadrilateral p a q b: its angles at p and q, on the sides of a and b, from the new diagonal.
+    at_p, at_q = _angles_at_diagonal(length_ab, length_pa, length_bp, length_aq, length_qb)
+    leaving_qp = leaving[qb] + scale[q] * at_q
+    leaving_pq = leaving[pa] + scale[p] * at_p
+    leaving[ab], leaving[ba] = leaving[aq], leaving[bp]
+    leaving[bp], leaving[aq] = leaving_qp, leaving_pq
+    F[pa], F[qb] = q, p
+
+
+def _angles_at_diagonal(
+    ab: FloatArray, pa: FloatArray, bp: FloatArray, aq: FloatArray, qb: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Angle from pa to pq at p, and from qb to qp at q (k,), with p above ab and q below."""
+    (px, py), (qx, qy) = apex(ab, pa, bp), apex(ab, aq, qb)
+    dx, dy = px - qx, py + qy
+    # At p: from (-px, -py), towards a in the origin, counterclockwise to (-dx, -dy).
+    at_p = np.arctan2(px * dy - py * dx, px * dx + py * dy)
+    # At q: from (ab - qx, qy), towards b, counterclockwise to (dx, dy).
+    at_q = np.arctan2((ab - qx) * dy - qy * dx, (ab - qx) * dx + qy * dy)
+    return np.maximum(at_p, 0.0), np.maximum(at_q, 0.0)
+
+
+def transport_angles(triangulation: IntrinsicTriangulation, angles: PolarAngles) -> FloatArray:
+    """The angle (3 m,) by which the components of a vector turn when it is transported along each half-edge.
+
+    A vector of direction a at the tail has the direction a + angle at the head, each in the tangent plane there; on the
+    boundary as `PolarAngles.rigid` has it.
+    """
+    half_edge = np.arange(triangulation.F.size)
+    leaving, scale = angles.rigid(triangulation.tail(half_edge))
+    following = next_half_edge(half_edge)
+    # At the head: the next half-edge leaves there, and the angle of the face lies between the two.
+    back = leaving[following] + scale[triangulation.head(half_edge)] * angles.corners.ravel()[next_half_edge(following)]
+    twin = triangulation.twin
+    glued = twin >= 0
+    back[glued] = leaving[twin[glued]]
+    return np.asarray(back + np.pi - leaving)

@@ -1,0 +1,297 @@
+"""Tangent frames: two axes and a normal at every vertex, and vectors given in one way turned into another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import igl
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.intrinsic.gluing import intrinsic_triangulation
+from heat_igl.intrinsic.polar_angles import PolarAngles, polar_angles
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
+from heat_igl.mesh import Mesh
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+
+__all__ = ["TangentFrames", "checked_vectors", "tangent_frames"]
+
+# Edges are at least this long, in mean edge lengths: directions are divided by lengths.
+_SHORTEST = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class TangentFrames:
+    """An orthonormal frame at every vertex of a triangle mesh.
+
+    A tangent vector at a vertex has two components, along `x` and `y`. Its angle counts counterclockwise from x, seen
+    from the side to which the normal points. Directions of edges, of vectors in faces and of geodesics have their polar
+    angles: those of the faces, scaled to sum to 2 pi (to pi on the boundary), see `tangent_frames`. Vectors in space
+    and transported vectors are turned without a scale; at a boundary vertex whose faces do not sum to pi, that gives
+    another angle than the polar angle of the same direction (`PolarAngles.to_polar`).
+
+    Attributes
+    ----------
+    x, y, normal : (n, 3) float64
+        Unit vectors in space; ``y = normal x x``.
+    angles : PolarAngles
+        The angle of every half-edge in the frame of its tail.
+    triangulation : IntrinsicTriangulation
+        The faces of the mesh by their edge lengths.
+    sides : (m, 3, 3) float64
+        Unit vector in space along the half-edge that leaves from corner c of face f, to the next corner.
+    face_normals : (m, 3) float64
+        Unit normals of the faces, 0 where a face has no area.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    normal: FloatArray
+    angles: PolarAngles
+    triangulation: IntrinsicTriangulation
+    sides: FloatArray
+    face_normals: FloatArray
+
+    def from_world(self, vectors: ArrayLike, vertices: ArrayLike | None = None) -> FloatArray:
+        """Components (k, 2) along x and y of vectors (k, 3) in space: their normal parts are left out.
+
+        `vertices` (k,) are those at which the vectors are; all n in order if not given.
+        """
+        at = self._vertices(vertices)
+        found = checked_vectors("vectors", vectors, len(at), 3)
+        return np.stack([np.einsum("kx,kx->k", found, axis[at]) for axis in (self.x, self.y)], axis=1)
+
+    def to_world(self, vectors: ArrayLike, vertices: ArrayLike | None = None) -> FloatArray:
+        """Vectors (k, 3) in space from components (k, 2) along x and y; `vertices` as for `from_world`."""
+        at = self._vertices(vertices)
+        found = checked_vectors("vectors", vectors, len(at), 2)
+        return np.asarray(found[:, :1] * self.x[at] + found[:, 1:] * self.y[at])
+
+    def from_faces(self, faces: ArrayLike, corners: ArrayLike, vectors: ArrayLike) -> FloatArray:
+        """Components (k, 2) at a corner of vectors (k, 3) that lie in the plane of a face.
+
+        The angle from the side that leaves from the corner is scaled as the angles of the faces are, so that a vector
+        along either side of the corner gets the angle of this edge. The length stays.
+
+        Parameters
+        ----------
+        faces, corners : (k,) array_like of int
+            A face, and one of its corners 0 to 2.
+        vectors : (k, 3) array_like
+            Parts along the normal of the face are left out.
+        """
+        corner = self._corners(faces, corners)
+        found = checked_vectors("vectors", vectors, len(corner), 3)
+        face, c = np.divmod(corner, 3)
+        along = self.sides[face, c]
+        across = np.cross(self.face_normals[face], along)
+        x, y = (np.einsum("kx,kx->k", found, axis) for axis in (along, across))
+        # Between the two sides, or nearer to one of them: from -(2 pi - corner angle) / 2 on.
+        inside = self.angles.corners.ravel()[corner]
+        angle = np.arctan2(y, x)
+        angle = np.where(angle < inside / 2 - np.pi, angle + 2 * np.pi, angle)
+        leaving = self.angles.leaving[previous_half_edge(corner)]
+        return self.from_angles(
+            leaving + self.angles.scale[self.triangulation.F.ravel()[corner]] * angle, np.hypot(x, y)
+        )
+
+    def to_faces(self, vertices: ArrayLike, vectors: ArrayLike) -> tuple[IntArray, IntArray, FloatArray]:
+        """The face into which each tangent vector (k, 2) at a vertex points, the corner, and the vector (k, 3) in it.
+
+        The inverse of `from_faces`. On the boundary, vectors that point off the surface get the face next to them, and
+        lie in its plane beyond the boundary.
+        """
+        at = self._vertices(vertices)
+        found = checked_vectors("vectors", vectors, len(at), 2)
+        corner, turn = self.corner_towards(at, self.to_angles(found))
+        face, c = np.divmod(corner, 3)
+        along = self.sides[face, c]
+        across = np.cross(self.face_normals[face], along)
+        length = np.hypot(*found.T)
+        return face, c, (length * np.cos(turn))[:, None] * along + (length * np.sin(turn))[:, None] * across
+
+    @staticmethod
+    def to_angles(vectors: ArrayLike) -> FloatArray:
+        """Angle (k,) of tangent vectors (k, 2), counterclockwise from x, in [0, 2 pi)."""
+        found = checked_vectors("vectors", vectors, None, 2)
+        angle = np.arctan2(found[:, 1], found[:, 0])
+        return np.asarray(np.where(angle < 0, np.maximum(angle + 2 * np.pi, 0.0) % (2 * np.pi), angle))
+
+    @staticmethod
+    def from_angles(angles: ArrayLike, lengths: ArrayLike = 1.0) -> FloatArray:
+        """Tangent vectors (k, 2) of the given angles (k,) and lengths."""
+        angle, length = np.broadcast_arrays(np.asarray(angles, np.float64), np.asarray(lengths, np.float64))
+        return np.stack([length * np.cos(angle), length * np.sin(angle)], axis=-1)
+
+    def corner_towards(self, vertices: IntArray, angles: FloatArray) -> tuple[IntArray, FloatArray]:
+        """The corner (k,) into which directions at vertices point, and the angle (k,) in its face.
+
+        Parameters
+        ----------
+        vertices : (k,) int64
+            Vertices that a face uses.
+        angles : (k,) float64
+            In [0, 2 pi).
+
+        Returns
+        -------
+        corner : (k,) int64
+            Number ``3 f + c``.
+        turn : (k,) float64
+            From the side that leaves from the corner, not scaled. On the boundary it may be negative or larger than the
+            angle of the corner: by up to half the angle that is missing there, on either side.
+        """
+        F, polar = self.triangulation.F, self.angles
+        vertex = F.ravel()
+        # Corners sorted by vertex, and by angle at each: one search finds all.
+        leaving = polar.leaving[previous_half_edge(np.arange(F.size))]
+        order = np.lexsort((leaving, vertex))
+        # Angles are below 2 pi, so this keeps the order of the vertices.
+        key = vertex[order] * 8.0 + leaving[order]
+        first = np.searchsorted(vertex[order], vertices)
+        place = np.maximum(np.searchsorted(key, vertices * 8.0 + angles, side="right") - 1, first)
+        corner = order[place]
+        turn = angles - leaving[corner]
+        # Off the boundary: nearer to the first face than to the last.
+        off = polar.on_boundary[vertices] & (angles > 1.5 * np.pi)
+        corner, turn = np.where(off, order[first], corner), np.where(off, angles - 2 * np.pi, turn)
+        return corner, turn / polar.scale[vertices]
+
+    def _vertices(self, vertices: ArrayLike | None) -> IntArray:
+        n = len(self.x)
+        return np.arange(n) if vertices is None else _indices("vertices", vertices, n)
+
+    def _corners(self, faces: ArrayLike, corners: ArrayLike) -> IntArray:
+        face = _indices("faces", faces, len(self.face_normals))
+        corner = _indices("corners", corners, 3)
+        if len(face) != len(corner):
+            raise MeshError(f"corners must be as many as faces, {len(face)}, not {len(corner)}")
+        return 3 * face + corner
+
+
+def tangent_frames(mesh: Mesh) -> TangentFrames:
+    """Orthonormal frames at the vertices of a triangle mesh, and their polar angles.
+
+    Angles around a vertex are those of the faces times one factor per vertex, so that they sum to 2 pi, and to pi on
+    the boundary. They count counterclockwise from the reference edge of the vertex. For an inner vertex it is the edge
+    to the next corner in the first face (of the lowest index) that uses the vertex. For a boundary vertex it is the
+    boundary edge at which the faces begin, counterclockwise; the other boundary edge has the angle pi.
+
+    The normal is the mean of the normals of the faces, weighted by their angles. The axis x lies in the plane across
+    the normal, in the direction that fits the polar angles of all edges best: the sum of the edges as vectors, each
+    turned back by its angle; on the boundary by its angle in the faces, with the middle of the faces at pi / 2.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles, manifold and oriented alike, with or without boundary.
+
+    Returns
+    -------
+    TangentFrames
+        Frames, and conversions between components, vectors in space, vectors in faces, and angles. Vertices that no
+        face uses have the axes of space.
+
+    Raises
+    ------
+    MeshError
+        If the mesh is tetrahedral, more than two faces meet at an edge, neighbours are oriented differently (on a
+        Moebius strip any orientation has such neighbours), or the faces at a vertex are not one fan. The message names
+        the first offender.
+    """
+    if mesh.is_tetrahedral:
+        raise MeshError("tangent frames need triangles, but the mesh is tetrahedral")
+    # Not mollified: mollification gives a flat triangle some height, and would bend lines across it.
+    lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
+    triangulation = replace(intrinsic_triangulation(mesh), l=lengths, lengthening=0.0)
+    angles = polar_angles(triangulation)
+    sides = _unit(mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F])
+    face_normals = _unit(
+        np.cross(mesh.V[mesh.F[:, 1]] - mesh.V[mesh.F[:, 0]], mesh.V[mesh.F[:, 2]] - mesh.V[mesh.F[:, 0]])
+    )
+    normal = _vertex_normals(mesh, angles, face_normals)
+    x = _first_axes(mesh, triangulation, angles, normal)
+    return TangentFrames(x, np.cross(normal, x), normal, angles, triangulation, sides, face_normals)
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    """Vectors (..., 3) divided by their lengths; 0 stays 0."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
+
+
+def _vertex_normals(mesh: Mesh, angles: PolarAngles, face_normals: FloatArray) -> FloatArray:
+    weighted = angles.corners[:, :, None] * face_normals[:, None]
+    columns = [np.bincount(mesh.F.ravel(), weighted[..., k].ravel(), mesh.n_vertices) for k in range(3)]
+    normal: FloatArray = np.stack(columns, axis=1)
+    # Normals that cancel, or only faces without area: that of one face, or any.
+    lost = np.linalg.norm(normal, axis=1) <= 1e-12 * angles.sums
+    normal[lost] = [0.0, 0.0, 1.0]
+    of_one = np.zeros_like(normal)
+    of_one[mesh.F[::-1].ravel()] = np.repeat(face_normals[::-1], 3, axis=0)
+    lost &= of_one.any(axis=1)
+    normal[lost] = of_one[lost]
+    return _unit(normal)
+
+
+def _first_axes(
+    mesh: Mesh, triangulation: IntrinsicTriangulation, angles: PolarAngles, normal: FloatArray
+) -> FloatArray:
+    """The direction (n, 3) that the polar angles of the edges around each vertex agree on best."""
+    n = mesh.n_vertices
+    # Any axis across the normal, to begin with.
+    least = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
+    across: FloatArray = np.cross(np.cross(normal, least), normal)
+    any_x = _unit(across)
+    any_y = np.cross(normal, any_x)
+    corner = np.arange(mesh.F.size)
+    vertex, edge = mesh.F.ravel(), (mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F]).reshape(-1, 3)
+    angle = angles.rigid(triangulation.tail(corner))[0][previous_half_edge(corner)]
+    # The last edge of a boundary vertex leaves from no corner: it arrives.
+    last = np.flatnonzero(triangulation.twin[next_half_edge(corner)] < 0)
+    vertex = np.append(vertex, vertex[last])
+    edge = np.concatenate([edge, -edge[previous_half_edge(last)]])
+    angle = np.append(angle, (np.pi + angles.sums[mesh.F.ravel()[last]]) / 2)
+    along = np.einsum("kx,kx->k", edge, any_x[vertex]) + 1j * np.einsum("kx,kx->k", edge, any_y[vertex])
+    back = along * np.exp(-1j * angle)
+    total = np.bincount(vertex, back.real, n) + 1j * np.bincount(vertex, back.imag, n)
+    size = np.abs(total)
+    total = np.divide(total, size, out=np.ones(n, complex), where=size > 1e-12 * mesh.edge_lengths.mean())
+    used = mesh.referenced[:, None]
+    return np.where(used, _unit(total.real[:, None] * any_x + total.imag[:, None] * any_y), [1.0, 0.0, 0.0])
+
+
+def checked_vectors(name: str, vectors: ArrayLike, k: int | None, size: int) -> FloatArray:
+    """`vectors` as (k, size) float64; one vector may come without its row.
+
+    Raises
+    ------
+    ValueError
+        If the shape is another, or a number is not finite; the message names the first offender.
+    """
+    try:
+        array: AnyArray = np.asarray(vectors)
+    except ValueError as error:
+        raise ValueError(f"{name} must have shape (k, {size}): {error}") from None
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"{name} must hold real numbers, not {array.dtype}")
+    found = np.atleast_2d(array.astype(np.float64))
+    if found.ndim != 2 or found.shape[1] != size or (k is not None and len(found) != k):
+        wanted = "k" if k is None else k
+        raise ValueError(f"{name} must have shape ({wanted}, {size}), but it has shape {array.shape}")
+    bad = ~np.isfinite(found).all(axis=1)
+    if bad.any():
+        first = int(np.argmax(bad))
+        raise ValueError(f"{name}[{first}] = {found[first].tolist()} is not finite ({int(bad.sum())} rows are not)")
+    return found
+
+
+def _indices(name: str, indices: ArrayLike, n: int) -> IntArray:
+    array: AnyArray = np.atleast_1d(np.asarray(indices))
+    if array.ndim != 1 or array.dtype.kind not in "iu":
+        raise MeshError(f"{name} must be indices (k,), not {array.dtype} of shape {array.shape}")
+    outside = (array < 0) | (array >= n)
+    if outside.any():
+        first = int(np.argmax(outside))
+        raise MeshError(f"{name}[{first}] = {array[first]} is out of range: indices run from 0 to {n - 1}")
+    return array.astype(np.int64)

@@ -1,0 +1,120 @@
+"""The connection Laplacian: differences of tangent vectors after transport along the edges, in complex numbers.
+
+A tangent vector with components (a, b) is the number a + i b, and transport along an edge multiplies it by
+exp(i rho) (Knoeppel, Crane, Pinkall, Schroeder 2013; Sharp, Soliman, Crane 2019, section 5).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from heat_igl.errors import MeshError
+from heat_igl.intrinsic import (
+    IntrinsicTriangulation,
+    PolarAngles,
+    carried_angles,
+    polar_angles,
+    tangent_frames,
+    transport_angles,
+)
+from heat_igl.mesh import Mesh
+from heat_igl.operators.matrices import Laplacian, Operators
+from heat_igl.operators.triangles import operators
+from heat_igl.typing import FloatArray
+
+__all__ = ["connection_laplacian", "edge_rotations", "with_rotations"]
+
+
+def connection_laplacian(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> sp.csc_matrix:
+    """The connection Laplacian of a triangle mesh, in the frames of `tangent_frames`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles, manifold and oriented alike.
+    laplacian : {"intrinsic-delaunay", "cotan"}
+        The triangulation whose edges carry the weights, as for `operators`.
+
+    Returns
+    -------
+    (n, n) csc_matrix of complex128
+        Hermitian, integrated like L; negative semidefinite where no weight is negative, so always with the default.
+        Entry (j, i) of an edge is its weight in L times exp(i rho), where rho is the angle by which components turn
+        from i to j. Applied to the numbers a + i b of tangent vectors, row j is the sum over the edges of weight times
+        (the vector at i, transported to j, less the vector at j).
+
+    Raises
+    ------
+    MeshError
+        If the mesh has no tangent frames, see `tangent_frames`.
+    ValueError
+        If `laplacian` is neither.
+    """
+    tangent_frames(mesh)  # which checks the mesh
+    domain = operators(mesh, laplacian)
+    return with_rotations(domain.L, edge_rotations(domain))
+
+
+def with_rotations(L: sp.csc_matrix, rotations: sp.csc_matrix) -> sp.csc_matrix:
+    """Any Laplacian `L` (n, n) on the edges of a domain, entry by entry times its `rotations`."""
+    return sp.csc_matrix(rotations.multiply(L))
+
+
+def edge_rotations(domain: Operators) -> sp.csc_matrix:
+    """What the entries of L are multiplied by for the connection Laplacian of triangles.
+
+    Returns
+    -------
+    (n, n) csc_matrix of complex128
+        Hermitian, in the pattern of L. Entry (j, i) is exp(i rho), with rho the angle by which components turn from i
+        to j; of several edges between the same two vertices, the mean by weight. The diagonal is 1, and more by what
+        edges from a vertex to itself cost.
+
+    Raises
+    ------
+    MeshError
+        If the domain has no triangles, or they are no oriented manifold.
+    """
+    triangulation, angles = _triangles(domain)
+    half_edge = np.arange(triangulation.F.size)
+    tail, head = triangulation.tail(half_edge), triangulation.head(half_edge)
+    rho = transport_angles(triangulation, angles)
+    weight = _half_weights(triangulation)
+    turn = np.exp(1j * rho)
+    n = triangulation.n
+    loop = tail == head
+    rows, columns = np.concatenate([head, tail]), np.concatenate([tail, head])
+    off = ~np.concatenate([loop, loop])
+    places, shape = (rows[off], columns[off]), (n, n)
+    turned = sp.csc_matrix((np.concatenate([weight * turn, weight * turn.conj()])[off], places), shape=shape)
+    weights = sp.csc_matrix((np.concatenate([weight, weight])[off], places), shape=shape)
+    plain = sp.csc_matrix((np.concatenate([turn, turn.conj()])[off], places), shape=shape)
+    # Weights that cancel, as opposite a right angle, leave no mean by weight: the plain mean then.
+    size, mean = np.abs(plain.data), np.ones(len(plain.data), complex)
+    np.divide(plain.data, size, out=mean, where=size > 0)
+    trusted = np.abs(weights.data) > 1e-9 * np.abs(weights.data).max(initial=0.0)
+    np.divide(turned.data, weights.data, out=mean, where=trusted)
+    turned.data = mean
+    cost = np.bincount(tail[loop], 2 * weight[loop] * (np.cos(rho[loop]) - 1), n)
+    diagonal = domain.L.diagonal()
+    extra = np.divide(cost, diagonal, out=np.zeros(n), where=diagonal != 0)
+    return sp.csc_matrix(turned + sp.diags_array(1 + extra))
+
+
+def _triangles(domain: Operators) -> tuple[IntrinsicTriangulation, PolarAngles]:
+    surface = domain.surface
+    if surface is None or surface.faces is None or surface.uncovered is not None:
+        raise MeshError("tangent vectors need the triangles of an oriented manifold, which this domain does not have")
+    angles = polar_angles(surface.faces)
+    return surface.triangulation, carried_angles(angles, surface.triangulation)
+
+
+def _half_weights(triangulation: IntrinsicTriangulation) -> FloatArray:
+    """Half the cotangent (3 m,) opposite each half-edge: what its face adds to the weight of the edge."""
+    square = triangulation.l**2
+    eight_areas = 8 * triangulation.areas[:, None]
+    cotangent = np.divide(
+        square.sum(axis=1, keepdims=True) - 2 * square, eight_areas, out=np.zeros_like(square), where=eight_areas > 0
+    )
+    return np.asarray(cotangent.ravel())

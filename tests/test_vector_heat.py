@@ -1,0 +1,247 @@
+"""The connection Laplacian and the vector heat method."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+from conftest import flat_perturbed, perturbed
+
+import heat_igl
+from heat_igl import Mesh, VectorHeatSolver, connection_laplacian, exp_map, shapes, tangent_frames
+from heat_igl.operators import edge_rotations, operators
+from heat_igl.steps import VectorHeatFlow
+
+SHAPES = {
+    "sphere": perturbed(shapes.icosphere(3)),
+    "torus": perturbed(shapes.torus(20, 40)),
+    "slivers": shapes.with_slivers(shapes.icosphere(2), 0),
+    "cylinder": perturbed(shapes.cylinder(20, 20)),
+    "flipped": perturbed(shapes.torus(12, 40), 0.6),
+}
+
+
+def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.abs(np.angle((a[:, 0] + 1j * a[:, 1]) * (b[:, 0] - 1j * b[:, 1])))
+
+
+@pytest.mark.parametrize("laplacian", ["intrinsic-delaunay", "cotan"])
+@pytest.mark.parametrize("name", SHAPES)
+def test_connection_laplacian_is_hermitian_and_negative_semidefinite(name, laplacian):
+    mesh = SHAPES[name]
+    connection = connection_laplacian(mesh, laplacian)
+    assert connection.format == "csc"
+    assert abs(connection - connection.conj().T).max() < 1e-12 * abs(connection).max()
+    if laplacian == "intrinsic-delaunay":
+        largest = spl.eigsh(connection, k=1, which="LA", return_eigenvectors=False, tol=1e-6)[0]
+        assert largest < 1e-8 * abs(connection).max()
+    # On a single edge only the argument differs from L.
+    L = operators(mesh, laplacian).L
+    np.testing.assert_allclose(abs(connection.diagonal()), abs(L.diagonal()), rtol=1e-10)
+
+
+def test_flat_connection_is_scalar():
+    mesh = flat_perturbed(shapes.grid(8))
+    frames = tangent_frames(mesh)
+    turn = sp.diags_array(frames.x[:, 0] + 1j * frames.x[:, 1])
+    scalar = turn @ connection_laplacian(mesh) @ turn.conj()
+    assert abs(scalar - operators(mesh).L).max() < 1e-12
+
+
+def test_connection_laplacian_is_that_of_potpourri3d():
+    potpourri3d = pytest.importorskip("potpourri3d")
+    mesh = SHAPES["sphere"]
+    theirs = potpourri3d.MeshVectorHeatSolver(mesh.V, mesh.F)
+    X, Y, _ = theirs.get_tangent_frames()
+    frames = tangent_frames(mesh)
+    turn = np.einsum("vx,vx->v", frames.x, X) + 1j * np.einsum("vx,vx->v", frames.x, Y)
+    ours = sp.diags_array(turn) @ connection_laplacian(mesh) @ sp.diags_array(turn.conj())
+    assert abs(ours + theirs.get_connection_laplacian()).max() < 1e-10
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_vector_heat_solves_the_complex_system(name):
+    mesh = SHAPES[name]
+    domain = operators(mesh)
+    rotations = edge_rotations(domain)
+    t = domain.mean_edge_length**2
+    flow = VectorHeatFlow(domain, rotations, t)
+    b = np.random.default_rng(0).standard_normal((domain.n, 2)) * (1 + 2j)
+    Y = flow.solve(b)
+    matrix = domain.M - t * connection_laplacian(mesh)
+    np.testing.assert_allclose(matrix @ Y, domain.mean_mass * b, atol=1e-11 * abs(domain.mean_mass * b).max())
+    np.testing.assert_allclose(flow.solve(b[:, 0]), Y[:, 0], rtol=1e-9, atol=1e-12 * abs(Y).max())
+
+
+@pytest.mark.parametrize("mesh", [shapes.strip(1500, 3), flat_perturbed(shapes.grid(15))])
+def test_transport_in_the_plane_changes_nothing(mesh):
+    solver = VectorHeatSolver(mesh)
+    frames = solver.frames
+    source = mesh.n_vertices // 3
+    transported = frames.to_world(solver.transport(source, frames.from_world([[0.6, -0.8, 0]], [source])))
+    np.testing.assert_allclose(transported, np.broadcast_to([0.6, -0.8, 0], transported.shape), atol=1e-10)
+
+
+def test_transport_on_a_cylinder_keeps_its_axis():
+    mesh = shapes.cylinder(20, 20)
+    solver = VectorHeatSolver(mesh)
+    axis = solver.frames.from_world([[0, 0, 1.0]], [205])
+    transported = solver.frames.to_world(solver.transport(205, axis))
+    # The normals of the boundary lean over.
+    np.testing.assert_allclose(transported[~mesh.boundary, 2], 1, atol=1e-10)
+
+
+def test_transport_around_the_tip_of_a_cone_is_that_of_the_sector():
+    around, along = 60, 30
+    mesh = shapes.cone(around, along)
+    solver = VectorHeatSolver(mesh)
+    k = np.arange(around // 3)
+    ring = 1 + 19 * around + k
+    slant = np.zeros((1, 3)) + mesh.V[ring[0]]
+    slant /= np.linalg.norm(slant)
+    # In the sector, the direction away from the tip turns with the angle of the sector.
+    sector = 2 * np.arcsin(np.sin(np.pi / 6) * np.sin(np.pi / around)) * k
+    transported = solver.frames.to_world(solver.transport(ring[0], solver.frames.from_world(slant, ring[:1])))[ring]
+    away = mesh.V[ring] / np.linalg.norm(mesh.V[ring], axis=1)[:, None]
+    found = np.arccos(np.clip(np.einsum("kx,kx->k", transported, away), -1, 1))
+    np.testing.assert_allclose(found[1:], sector[1:], atol=0.02)
+
+
+def sphere_transport(p: np.ndarray, q: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Transport of w from p along great circles to q (n, 3)."""
+    return w - (q @ w)[:, None] * (p + q) / np.maximum(1 + q @ p, 1e-9)[:, None]
+
+
+def test_transport_and_log_map_converge_on_the_sphere():
+    """With a time step that stays the same: by symmetry, heat of any time step transports along great circles."""
+    transports, logs = [], []
+    for level in (2, 3, 4):
+        mesh = shapes.icosphere(level)
+        solver = VectorHeatSolver(mesh, t=0.05)
+        frames, p = solver.frames, mesh.V[0]
+        w = frames.to_world([[1.0, 0]], [0])[0]
+        near = np.flatnonzero((mesh.V @ p > -0.5) & (mesh.V @ p < 1))
+        expected = frames.from_world(sphere_transport(p, mesh.V, w))
+        transports.append(angle_between(solver.transport(0, [1, 0]), expected)[near].mean())
+        angle = np.arccos(np.clip(mesh.V @ p, -1, 1))
+        flat = frames.from_world(mesh.V - (mesh.V @ p)[:, None] * p, np.zeros(mesh.n_vertices, int))
+        true = angle[:, None] * flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+        logs.append(np.linalg.norm(solver.log_map(0) - true, axis=1)[near].mean())
+    assert transports[2] < 0.3 * transports[1] < 0.09 * transports[0]
+    assert transports[2] < np.radians(0.01)
+    assert logs[2] < 0.6 * logs[1]
+    assert logs[2] < 0.0015
+
+
+def test_log_map_is_undone_by_the_exponential_map(sphere):
+    solver = VectorHeatSolver(sphere)
+    log = solver.log_map(5)
+    ends = exp_map(sphere, 5, log).positions(sphere)
+    gap = np.linalg.norm(ends - sphere.V, axis=1)
+    assert np.median(gap) < 0.05
+    assert gap.max() < 0.35
+    np.testing.assert_allclose(np.hypot(*log.T), heat_igl.HeatMethodSolver(sphere).distance(5))
+    # Neighbours lie in the direction of their edges.
+    ring = np.unique(sphere.F[(sphere.F == 5).any(axis=1)])
+    assert gap[ring].max() < 1e-6
+
+
+def test_extension_is_between_the_values_and_near_that_of_the_nearest_source(sphere):
+    solver = VectorHeatSolver(sphere)
+    sources, values = np.array([0, 500, 1700, 2000]), np.array([3.0, -1.0, 2.0, 7.0])
+    extended = solver.extend(sources, values)
+    assert values.min() <= extended.min() <= extended.max() <= values.max()
+    labels = heat_igl.HeatMethodSolver(sphere).voronoi(sources).labels
+    assert (np.abs(extended - values[labels]) < 0.5).mean() > 0.85
+    np.testing.assert_allclose(extended[sources], values, atol=1e-3)
+    np.testing.assert_allclose(solver.extend([9, 9], [1.0, 3.0]), 2.0)
+    np.testing.assert_allclose(solver.extend(9, -4.0), -4.0)
+    np.testing.assert_array_equal(solver.extend(9, 0.0), 0)
+
+
+def test_lengths_and_linearity_of_transport(sphere):
+    solver = VectorHeatSolver(sphere)
+    one = solver.transport(3, [0.3, 0.4])
+    np.testing.assert_allclose(np.hypot(*one.T), 0.5)
+    np.testing.assert_allclose(one[3], [0.3, 0.4], atol=1e-12)
+    np.testing.assert_allclose(solver.transport(3, [-0.4, 0.3]), one @ [[0, 1], [-1, 0]], atol=1e-9)
+    assert np.isfinite(solver.transport([3, 9], np.zeros((2, 2)))).all()
+
+
+def test_vertices_that_no_source_reaches_get_zero():
+    grid = shapes.grid(4)
+    V = np.vstack([grid.V, grid.V + np.array([3, 0, 0]), [[9, 9, 9]]])
+    mesh = Mesh(V, np.vstack([grid.F, grid.F + 25]))
+    solver = VectorHeatSolver(mesh)
+    reached = solver.reaches(3)
+    np.testing.assert_array_equal(reached, np.arange(51) < 25)
+    for found in (solver.extend(3, 2.0)[:, None], solver.transport(3, [1, 2]), solver.log_map(3)):
+        assert np.isfinite(found).all()
+        assert not found[~reached].any()
+        assert found[reached].any()
+
+
+@pytest.mark.parametrize("scale", [1e-30, 1e30])
+def test_units_do_not_matter(scale):
+    mesh = SHAPES["torus"]
+    one, other = VectorHeatSolver(mesh), VectorHeatSolver(Mesh(mesh.V * scale, mesh.F))
+    np.testing.assert_allclose(one.transport(3, [1, 2]), other.transport(3, [1, 2]), atol=1e-6)
+    np.testing.assert_allclose(one.log_map(3), other.log_map(3) / scale, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus", "slivers", "flipped"])
+def test_parity_with_potpourri3d(name):
+    potpourri3d = pytest.importorskip("potpourri3d")
+    mesh = SHAPES[name]
+    theirs, ours = potpourri3d.MeshVectorHeatSolver(mesh.V, mesh.F), VectorHeatSolver(mesh, t_coef=1.0)
+    X, Y, _ = theirs.get_tangent_frames()
+    frames, sources = ours.frames, np.array([1, mesh.n_vertices // 2])
+    w = frames.to_world([[1, 0], [0, 1.0]], sources)
+    given = np.stack([np.einsum("kx,kx->k", w, axis[sources]) for axis in (X, Y)], axis=1)
+    there = theirs.transport_tangent_vectors(sources, given)
+    there = frames.from_world(there[:, :1] * X + there[:, 1:] * Y)
+    assert np.median(angle_between(ours.transport(sources, [[1, 0], [0, 1]]), there)) < np.radians(2)
+    values = np.array([1.0, 2.0])
+    assert np.median(np.abs(ours.extend(sources, values) - theirs.extend_scalar(sources, values))) < 0.02
+
+
+def test_bad_arguments_are_named():
+    solver = VectorHeatSolver(shapes.icosphere(1))
+    with pytest.raises(ValueError, match=r"vectors must have shape \(2, 2\), but it has shape \(3, 2\)"):
+        solver.transport([0, 1], np.ones((3, 2)))
+    with pytest.raises(ValueError, match=r"values\[1\] = \[nan\] is not finite"):
+        solver.extend([0, 1], [1.0, np.nan])
+    with pytest.raises(ValueError, match=r"values must have shape \(1, 1\)"):
+        solver.extend(0, [1.0, 2.0])
+    with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 99 is no vertex"):
+        solver.transport(99, [1, 0])
+    with pytest.raises(heat_igl.SourceError, match="source must be one vertex, not 2"):
+        solver.log_map([0, 1])
+    with pytest.raises(heat_igl.MeshError, match="is one of more than two faces"):
+        VectorHeatSolver(shapes.book(3, 2))
+    with pytest.raises(ValueError, match="backend='iterative' cannot solve for vectors"):
+        VectorHeatSolver(shapes.icosphere(1), backend="iterative")
+    domain = operators(shapes.grid(2))
+    with pytest.raises(ValueError, match=r"rotations must have the shape of L, \(9, 9\), not \(2, 2\)"):
+        VectorHeatSolver.from_operators(domain, sp.csc_matrix((2, 2)))
+    other = VectorHeatSolver.from_operators(domain, edge_rotations(domain))
+    assert np.isfinite(other.transport(0, [1, 0])).all()
+    with pytest.raises(ValueError, match="frames are not known"):
+        _ = other.frames
+    with pytest.raises(heat_igl.MeshError, match="the log map needs the triangles around the source"):
+        other.log_map(0)
+
+
+@pytest.mark.slow
+def test_a_large_sphere_is_finite_and_right():
+    mesh = shapes.icosphere(8)
+    solver = VectorHeatSolver(mesh)
+    frames, p = solver.frames, mesh.V[0]
+    w = frames.to_world([[1.0, 0]], [0])[0]
+    found = solver.transport(0, [1, 0])
+    assert np.isfinite(found).all()
+    near = mesh.V @ p > -0.9
+    error = angle_between(found, frames.from_world(sphere_transport(p, mesh.V, w)))[near]
+    assert error.mean() < np.radians(0.1)
+    assert error.max() < np.radians(1)
