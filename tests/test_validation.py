@@ -219,7 +219,7 @@ def test_without_a_reference_the_rest_of_the_report_stands(monkeypatch: pytest.M
     def refusing(*_: object, **__: object) -> None:
         raise heat_igl.ReferenceSolverError("at 1 vertices connected with the sources two surfaces touch in a point")
 
-    monkeypatch.setattr(reference, "exact", refusing)
+    monkeypatch.setattr(reference, "measured", refusing)
     report = validate(TOUCHING, 1, ["heat", "unfold", "exact"])
     assert report.failure is not None
     assert "two surfaces touch in a point" in report.failure
@@ -250,16 +250,6 @@ def test_no_reference() -> None:
     assert "no reference" in report.to_markdown()
     with pytest.raises(ValueError, match="no errors to draw: the report has no reference"):
         report.plot()
-
-
-def test_the_command_prints_what_stands_without_a_reference(folder: Path) -> None:
-    done = command(folder, "fin.off", "--methods", "heat", "--picture", "errors.png")
-    assert done.returncode == 0, done.stderr
-    assert "no errors, since exact failed" in done.stdout
-    assert "more than two triangles" in done.stdout
-    assert done.stderr.startswith("heat-igl: no picture of errors: ")
-    assert not (folder / "meshes" / "errors.png").exists()
-    assert command(folder, "fin.off", "--methods", "heat", "--fail-above", "5").returncode == 1
 
 
 def test_references_of_ones_own() -> None:

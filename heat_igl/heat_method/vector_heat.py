@@ -12,7 +12,7 @@ from heat_igl.heat_method.parts import prepare
 from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.operators import Operators, edge_rotations, operators
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, warn_caller
 from heat_igl.sources import Sources, ordered_vertices
@@ -65,16 +65,19 @@ class VectorHeatSolver:
 
     def __init__(
         self,
-        mesh: Mesh,
+        mesh: MeshLike,
         *,
         t_coef: float | None = None,
         t: float | None = None,
         refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> None:
-        self._frames: TangentFrames | None = tangent_frames(mesh)
-        domain = operators(mesh)
-        assert domain.surface is not None
+        triangles = as_simplices(mesh)
+        self._frames: TangentFrames | None = tangent_frames(triangles)
+        # Angles are carried over flips, not to added vertices.
+        domain = operators(triangles, "intrinsic-delaunay")
+        if domain.surface is None:
+            raise MeshError("tangent vectors need triangles, and the mesh holds tetrahedra")
         self._outward: OutwardField | None = OutwardField(domain.surface)
         self._prepare(domain, edge_rotations(domain), SolverOptions(t_coef, t, refine=refine, backend=backend))
 

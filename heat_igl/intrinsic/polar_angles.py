@@ -145,9 +145,11 @@ def carried_angles(angles: PolarAngles, flipped: IntrinsicTriangulation) -> Pola
         The triangulation now. Its history holds flips only.
     """
     leaving, scale = angles.leaving.copy(), angles.scale
-    F = _faces_before(flipped)
-    for change in flipped.history:
-        assert isinstance(change, Flipped)
+    flips = [change for change in flipped.history if isinstance(change, Flipped)]
+    if len(flips) < len(flipped.history):
+        raise ValueError("polar angles are carried over flips only: pass a triangulation without added vertices")
+    F = _faces_before(flipped.F, flips)
+    for change in flips:
         _replay(leaving, scale, F, change)
     return PolarAngles(
         leaving, corner_angles(flipped.l), angles.sums, scale, angles.on_boundary, np.full_like(angles.first, -1)
@@ -159,11 +161,10 @@ def _corner_slots(half_edge: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     return half_edge, following, next_half_edge(following)
 
 
-def _faces_before(flipped: IntrinsicTriangulation) -> IntArray:
+def _faces_before(flipped_faces: IntArray, flips: list[Flipped]) -> IntArray:
     """The vertices (3 m,) at the corners of the faces before the flips."""
-    F = flipped.F.ravel().copy()
-    for change in flipped.history[::-1]:
-        assert isinstance(change, Flipped)
+    F = flipped_faces.ravel().copy()
+    for change in flips[::-1]:
         (p, _, q_in_f), (q, _, p_in_g) = _corner_slots(change.half_edge), _corner_slots(change.mate)
         # (p, a, q), (q, b, p) back to (p, a, b), (q, b, a)
         at_a, at_b = F[next_half_edge(p)], F[next_half_edge(q)]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -54,7 +52,7 @@ class VectorHeatFlow:
             raise ValueError("backend='iterative' cannot solve for vectors: use 'auto', 'scipy' or 'multifrontal'")
         if backend == "auto":
             # Never the iterative one, which "auto" may stand for.
-            is_large = 2 * operators.n >= _SMALLEST_MULTIFRONTAL and importlib.util.find_spec("numba") is not None
+            is_large = 2 * operators.n >= _SMALLEST_MULTIFRONTAL
             backend = "multifrontal" if is_large else "scipy"
         self.t, self.mean_mass, self._n = t, operators.mean_mass, operators.n
         L = fitted_laplacian(operators, t) if fitted else operators.L
