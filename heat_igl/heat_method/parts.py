@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import scipy.sparse as sp
@@ -15,8 +15,8 @@ from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.solution import Diagnostics
 from heat_igl.heat_method.time_step import time_step
 from heat_igl.linear import Analysis
-from heat_igl.mesh import Mesh
-from heat_igl.operators import Operators, operators
+from heat_igl.mesh import Mesh, PointCloud
+from heat_igl.operators import Operators, operators, point_cloud_operators
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
@@ -68,7 +68,7 @@ class SolverParts:
         return None if self.operators.surface is None else self.operators.surface.given_faces
 
 
-def prepare_mesh(mesh: Mesh, options: SolverOptions, known: Analysis | None = None) -> SolverParts:
+def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysis | None = None) -> SolverParts:
     """The parts of a solver on `mesh`; a `known` order of elimination is taken if it fits."""
     start = time.perf_counter()
     begun: list[Future[Analysis]] = []
@@ -78,7 +78,11 @@ def prepare_mesh(mesh: Mesh, options: SolverOptions, known: Analysis | None = No
             begun.append(beside.submit(analysis, L, options.backend))
 
         # The order of elimination takes a third of the time and needs no more than the pattern of L.
-        domain = operators(mesh, options.laplacian, analyse if known is None and n_threads() > 1 else None)
+        on_laplacian = analyse if known is None and n_threads() > 1 else None
+        if isinstance(mesh, PointCloud):
+            domain = point_cloud_operators(mesh, options.laplacian, on_laplacian)
+        else:
+            domain = operators(mesh, options.laplacian, on_laplacian)
         seconds = time.perf_counter() - start
         known = begun[0].result() if begun else known
     waited = time.perf_counter() - start - seconds

@@ -14,7 +14,7 @@ from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.operators import Laplacian, Operators, edge_length_operators
 from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
 from heat_igl.steps import Boundary
@@ -29,8 +29,8 @@ class HeatMethodSolver(BatchedSolver):
 
     Parameters
     ----------
-    mesh : Mesh or (n, 3) array_like
-        A mesh, or the positions V of one whose faces are `F`.
+    mesh : Mesh, PointCloud or (n, 3) array_like
+        A mesh, a point cloud, or the positions V of one whose faces are `F`.
     F : (m, 3) or (m, 4) array_like, optional
         Faces, when `mesh` is V.
     t_coef : float, optional
@@ -78,12 +78,12 @@ class HeatMethodSolver(BatchedSolver):
     so. The solver is immutable; threads may share it, and a pickled copy gives the same bits.
     """
 
-    _mesh: Mesh | None = None
+    _mesh: Mesh | PointCloud | None = None
     _parts: SolverParts
 
     def __init__(
         self,
-        mesh: Mesh | ArrayLike,
+        mesh: Mesh | PointCloud | ArrayLike,
         F: ArrayLike | None = None,
         *,
         t_coef: float | None = None,
@@ -99,7 +99,7 @@ class HeatMethodSolver(BatchedSolver):
         self._parts = prepare_mesh(self._mesh, options)
 
     @classmethod
-    def from_options(cls, mesh: Mesh, options: SolverOptions) -> HeatMethodSolver:
+    def from_options(cls, mesh: Mesh | PointCloud, options: SolverOptions) -> HeatMethodSolver:
         """A solver on `mesh` with options that were put together before."""
         return cls._of(prepare_mesh(mesh, options), mesh)
 
@@ -189,7 +189,7 @@ class HeatMethodSolver(BatchedSolver):
         return HeatMethodSolver._of(prepare_mesh(moved, self._parts.options, self._parts.analysis), moved)
 
     @classmethod
-    def _of(cls, parts: SolverParts, mesh: Mesh | None = None) -> HeatMethodSolver:
+    def _of(cls, parts: SolverParts, mesh: Mesh | PointCloud | None = None) -> HeatMethodSolver:
         solver = cls.__new__(cls)
         solver._mesh, solver._parts = mesh, parts
         return solver
@@ -323,10 +323,10 @@ class HeatMethodSolver(BatchedSolver):
         )
 
 
-def _as_mesh(mesh: Mesh | ArrayLike, F: ArrayLike | None) -> Mesh:
-    if isinstance(mesh, Mesh):
+def _as_mesh(mesh: Mesh | PointCloud | ArrayLike, F: ArrayLike | None) -> Mesh | PointCloud:
+    if isinstance(mesh, (Mesh, PointCloud)):
         if F is not None:
-            raise TypeError("pass a Mesh alone, or positions V and faces F")
+            raise TypeError("pass a Mesh or PointCloud alone, or positions V and faces F")
         return mesh
     if F is None:
         raise TypeError("faces F are missing: pass a Mesh, or positions V and faces F")

@@ -2,6 +2,7 @@
 
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
+from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygons import PolygonMesh, triangle_fans, which_repeat_a_vertex
 from heat_igl.mesh.projection import ClosestPoints, closest_points
 from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
@@ -17,6 +18,7 @@ __all__ = [
     "MeshReport",
     "ON_SIDE",
     "ON_SIDE_COMPUTED",
+    "PointCloud",
     "PolygonMesh",
     "SurfaceCurve",
     "SurfacePoints",
