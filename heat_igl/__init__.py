@@ -21,7 +21,7 @@ from heat_igl.heat_method import (
     LabelledDistance,
     heat_method_distance,
 )
-from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_curves, write_mesh
+from heat_igl.io import read_attributes, read_mesh, read_point_cloud, read_polygon_mesh, write_curves, write_mesh
 from heat_igl.mesh import (
     ClosestPoints,
     ImageDomain,
@@ -37,7 +37,7 @@ from heat_igl.mesh import (
     image_domain,
     split_long_edges,
 )
-from heat_igl.operators import Operators, polygon_operators, speed_operators
+from heat_igl.operators import Operators, point_cloud_operators, polygon_operators, speed_operators
 from heat_igl.runtime.aliases import alias_modules
 from heat_igl.sampling import (
     VoronoiCells,
@@ -102,9 +102,11 @@ __all__ = [
     "metrics",
     "offset_curves",
     "plots",
+    "point_cloud_operators",
     "polygon_operators",
     "read_attributes",
     "read_mesh",
+    "read_point_cloud",
     "read_polygon_mesh",
     "reference",
     "sampling",

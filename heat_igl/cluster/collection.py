@@ -13,7 +13,7 @@ import numpy as np
 
 from heat_igl.errors import SourceError
 from heat_igl.io import MESH_SUFFIXES
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.sources import Sources, vertex_sources
 
 # Names that a zarr group cannot have: they stand for the store itself, the folder above it, or its metadata.
@@ -21,7 +21,7 @@ _RESERVED_NAMES = ("", ".", "..", "zarr.json")
 
 __all__ = ["Item", "MeshLike", "SourcePlan", "folder", "items", "read_source_sets"]
 
-MeshLike = str | os.PathLike[str] | Mesh | tuple[Any, Any]
+MeshLike = str | os.PathLike[str] | Mesh | PointCloud | tuple[Any, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Item:
 
     name: str
     label: str
-    mesh: Path | Mesh | tuple[Any, Any]
+    mesh: Path | Mesh | PointCloud | tuple[Any, Any]
 
 
 def folder(path: str | os.PathLike[str]) -> dict[str, Path]:

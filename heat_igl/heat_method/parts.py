@@ -25,6 +25,9 @@ from heat_igl.unfolding import UnfoldingSolver
 
 __all__ = ["SolverParts", "prepare", "prepare_mesh"]
 
+# For scattered points, whose triangles differ more in size than those of a mesh: between two aims, see docs/clouds.md.
+_T_COEF_OF_POINTS = 1.0
+
 
 @dataclass(frozen=True, eq=False)
 class SolverParts:
@@ -71,6 +74,8 @@ class SolverParts:
 def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysis | None = None) -> SolverParts:
     """The parts of a solver on `mesh`; a `known` order of elimination is taken if it fits."""
     start = time.perf_counter()
+    if isinstance(mesh, PointCloud) and options.t_coef is None:
+        options = replace(options, t_coef=_T_COEF_OF_POINTS)
     begun: list[Future[Analysis]] = []
     with pool(1) as beside:
 

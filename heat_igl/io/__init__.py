@@ -4,15 +4,18 @@ from heat_igl.io.atomic import complete_file
 from heat_igl.io.curves import CURVE_SUFFIXES, write_curves
 from heat_igl.io.files import MESH_SUFFIXES, read_attributes, read_mesh, read_polygon_mesh, write_mesh
 from heat_igl.io.objects import MeshLike, as_mesh
+from heat_igl.io.point_clouds import POINT_CLOUD_SUFFIXES, read_point_cloud
 
 __all__ = [
     "MeshLike",
     "as_mesh",
     "CURVE_SUFFIXES",
     "MESH_SUFFIXES",
+    "POINT_CLOUD_SUFFIXES",
     "complete_file",
     "read_attributes",
     "read_mesh",
+    "read_point_cloud",
     "read_polygon_mesh",
     "write_curves",
     "write_mesh",
