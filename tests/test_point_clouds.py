@@ -135,8 +135,10 @@ def test_noise_is_taken_away_and_clean_points_stay() -> None:
     assert radius.std() < 0.3 * np.linalg.norm(noisy, axis=1).std()
     assert mean_error(HeatMethodSolver(PointCloud(noisy)).distance(0), on_sphere(P, 0)) < 0.03
     assert without_noise(P) is P
-    cube = shapes.box(12).V if hasattr(shapes, "box") else P
-    assert without_noise(cube) is cube
+    # Ridges and bumps of a few spacings are detail.
+    x, y = np.random.default_rng(2).random((2, 20_000))
+    waves = np.stack([x, y, 0.02 * np.abs((40 * x + 3 * y) % 2 - 1)], axis=1)
+    assert without_noise(waves) is waves
 
 
 # What scans bring along.
@@ -146,7 +148,8 @@ def test_an_outlier_is_unreachable_and_changes_nothing_else() -> None:
     P = sphere(2000)
     cloud = PointCloud(np.append(P, [[0, 0, 5.0]], axis=0))
     distance = HeatMethodSolver(cloud).distance(0)
-    assert np.isinf(distance[-1]) and np.isfinite(distance[:-1]).all()
+    assert np.isinf(distance[-1])
+    assert np.isfinite(distance[:-1]).all()
     assert mean_error(distance[:-1], on_sphere(P, 0)) < 0.015
     assert cloud.report().unreferenced_vertices.tolist() == [2000]
 
@@ -161,7 +164,7 @@ def test_copies_of_a_point_are_at_distance_0_of_each_other() -> None:
 
 
 def two_sheets(n: int, gap: float) -> tuple[np.ndarray, np.ndarray]:
-    lower, upper = plane(n, 0), plane(n, 1) + [0, 0, gap]
+    lower, upper = plane(n, 0), plane(n, 1) + np.array([0, 0, gap])
     return np.concatenate([lower, upper]), np.repeat([[0, 0, -1.0], [0, 0, 1.0]], n, axis=0)
 
 
@@ -171,7 +174,8 @@ def test_normals_keep_sheets_apart_that_nearly_touch() -> None:
     assert (cloud.components[:2000] == cloud.components[0]).all()
     assert (cloud.components[2000:] != cloud.components[0]).all()
     distance = HeatMethodSolver(cloud).distance(0)
-    assert np.isinf(distance[2000:]).all() and np.isfinite(distance[:2000]).all()
+    assert np.isinf(distance[2000:]).all()
+    assert np.isfinite(distance[:2000]).all()
 
 
 def test_sheets_further_apart_than_the_spacing_need_no_normals() -> None:
@@ -200,7 +204,8 @@ def test_batches_voronoi_and_farthest_points_as_on_a_mesh() -> None:
 def test_a_cloud_and_its_solver_are_pickled() -> None:
     cloud = PointCloud(sphere(300), sphere(300))
     copy = pickle.loads(pickle.dumps(cloud))
-    assert (copy.P == cloud.P).all() and (copy.F == cloud.F).all() and (copy.normals == cloud.normals).all()
+    for name in ("P", "F", "normals"):
+        np.testing.assert_array_equal(getattr(copy, name), getattr(cloud, name))
     solver = HeatMethodSolver(cloud)
     assert (pickle.loads(pickle.dumps(solver)).distance(0) == solver.distance(0)).all()
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.io.text import Text
-from heat_igl.typing import FloatArray
+from heat_igl.typing import AnyArray, FloatArray
 
 __all__ = ["read"]
 
@@ -68,10 +68,10 @@ def _layout(path: Path, header: dict[str, list[str]]) -> tuple[np.dtype[np.void]
     return dtype, n
 
 
-def _from_text(path: Path, data: bytes, begin: int, dtype: np.dtype[np.void], n: int) -> np.ndarray:  # type: ignore[type-arg]
+def _from_text(path: Path, data: bytes, begin: int, dtype: np.dtype[np.void], n: int) -> AnyArray:
     # Blank lines replace the header, so that errors give the right line numbers.
     text = Text(path, b"\n" * data.count(b"\n", 0, begin) + data[begin:])
-    width = sum(dtype[i].shape[0] for i in range(len(dtype)))
+    width = sum(dtype[i].shape[0] for i in range(len(dtype.names or ())))
     if len(text) != n:
         raise MeshError(f"{path}: the header announces {n} points, but {len(text)} lines follow: the file is damaged")
     wrong = text.count != width

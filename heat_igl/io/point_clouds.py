@@ -71,7 +71,7 @@ def _from_obj(path: Path, data: bytes) -> _Points:
         if short.any():
             raise text.error(int(lines[np.argmax(short)]), f"three numbers must follow {record.decode()}")
         values, start = text.numbers(lines, skip=1)
-        return values[start[:, None] + np.arange(3)]
+        return np.asarray(values[start[:, None] + np.arange(3)])
 
     if not (word == b"v").any():
         raise MeshError(f"{path}: the file has no points (lines that start with v)")

@@ -1,4 +1,4 @@
-"""Triangles of a point cloud: the Delaunay star of every point in its tangent plane, and triangles that fit together."""
+"""Triangles of a point cloud: Delaunay stars in tangent planes, and triangles that fit together."""
 
 import cython
 import numpy as np
@@ -16,7 +16,7 @@ def delaunay_stars(
     begin: cython.Py_ssize_t,
     end: cython.Py_ssize_t,
 ):
-    """The Delaunay triangles at the points from `begin` to `end` among their neighbours, all projected to the tangent plane of the point.
+    """The Delaunay triangles at the points from `begin` to `end` among their neighbours, in tangent planes.
 
     `axes` (n, 3, 3) are the tangents and the normal of each of the points P (n, 3); rows of `neighbours` (n, k) ascend
     by distance. Triangles with a circumscribed circle of a radius above `largest` (n,) are left out, and neighbours

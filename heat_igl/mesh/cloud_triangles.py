@@ -13,12 +13,12 @@ from scipy.spatial import KDTree
 
 from heat_igl.kernels.local_delaunay import delaunay_stars, fitting_triangles
 from heat_igl.mesh.connectivity import ascending_rows, facets, unique_rows
-from heat_igl.mesh.grouping import Groups, group_by_label
+from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.neighbourhoods import Neighbourhoods
 from heat_igl.runtime import in_order, n_threads
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["cloud_triangles"]
+__all__ = ["cloud_triangles", "with_points"]
 
 # Largest radius of a circumscribed circle, in shares of the radius of the neighbourhood. Below one half, all points
 # inside the circle are known; a little more bridges the gaps of random points.
@@ -89,7 +89,7 @@ def _ears(P: FloatArray, F: IntArray, largest: FloatArray) -> IntArray:
     ears = np.stack([before, at, after], axis=1)
     radius = _circumradius(P[ears])
     small = radius < largest[ears].min(axis=1)
-    return ears[small][np.argsort(radius[small], kind="stable")].astype(np.int32)
+    return np.asarray(ears[small][np.argsort(radius[small], kind="stable")], dtype=np.int32)
 
 
 def _circumradius(corners: FloatArray) -> FloatArray:
@@ -103,10 +103,7 @@ def _circumradius(corners: FloatArray) -> FloatArray:
 
 
 def _with_isolated_points(P: FloatArray, F: IntArray, near: Neighbourhoods) -> IntArray:
-    """The triangles, those nearest to points in no triangle split into three; points far from all stay isolated.
-
-    So do copies of a point, points right above others, and those that noise has put behind others.
-    """
+    """The triangles, and in them the points that noise has put above or behind others; outliers stay isolated."""
     used = np.zeros(len(P), bool)
     used[F] = True
     isolated = np.flatnonzero(~used)
@@ -117,25 +114,27 @@ def _with_isolated_points(P: FloatArray, F: IntArray, near: Neighbourhoods) -> I
     vertex = of_used[position]
     # Outliers are farther away than a neighbour would be.
     close = distance <= near.radius[vertex]
-    isolated, vertex = isolated[close], vertex[close]
-    while len(isolated):
-        around = group_by_label(F.ravel(), len(P))
-        face = _facing(P, F, near.axes, isolated, vertex, around)
+    return with_points(P, F, near.axes, isolated[close], vertex[close])
+
+
+def with_points(P: FloatArray, F: IntArray, axes: FloatArray, points: IntArray, vertices: IntArray) -> IntArray:
+    """The triangles, with `points` (k,) put into them: of those around a vertex of `vertices` (k,), one is split."""
+    F = F.copy()
+    while len(points):
+        face = _facing(P, F, axes, points, vertices)
         # One point in each triangle and round.
         face, chosen = np.unique(face, return_index=True)
-        point = isolated[chosen]
+        point = points[chosen]
         a, b, c = F[face].T
         F[face, 2] = point
         F = np.concatenate([F, np.stack([b, c, point], axis=1), np.stack([c, a, point], axis=1)])
-        isolated, vertex = np.delete(isolated, chosen), np.delete(vertex, chosen)
+        points, vertices = np.delete(points, chosen), np.delete(vertices, chosen)
     return F
 
 
-def _facing(
-    P: FloatArray, F: IntArray, axes: FloatArray, points: IntArray, vertices: IntArray, around: Groups
-) -> IntArray:
+def _facing(P: FloatArray, F: IntArray, axes: FloatArray, points: IntArray, vertices: IntArray) -> IntArray:
     """For each point the triangle (k,) around its vertex whose middle lies most in the direction of the point."""
-    corner, which = around.of(vertices)
+    corner, which = group_by_label(F.ravel(), len(P)).of(vertices)
     face = corner // 3
 
     def direction(positions: FloatArray) -> FloatArray:

@@ -27,6 +27,9 @@ _LARGEST_K = 120
 _MOST_PASSES = 8
 # Noise is looked for at this many points.
 _SAMPLE = 4000
+# Deviations from a quadric of half as many neighbours, in shares of those from the quadric of all: noise deviates from
+# both alike, 0.68 to 1 where measured, detail from the smaller one by less, 0.14 to 0.58.
+_NOISE_NOT_DETAIL = 0.63
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,15 +75,19 @@ def neighbourhoods(P: FloatArray, normals: FloatArray | None = None) -> Neighbou
 def without_noise(P: FloatArray) -> FloatArray:
     """The points (n, 3), moved onto quadrics fitted to their neighbours if they are noisy; else `P` itself.
 
-    Noise is the deviation of the neighbours from the quadric, in shares of the spacing of the points. It is taken for
-    noise, and not for detail, if it exceeds 1 / 20 at half of all points. Then all points are moved along their
-    normals, and the test is repeated.
+    Points are noisy if neighbours deviate from the quadric by more than 1 / 20 of their spacing at half of the points,
+    and this is not detail, from which a quadric of half as many neighbours would deviate by less. Then all points are
+    moved along their normals, until the deviation is smaller.
     """
-    k = min(_K, len(P) - 1)
-    if k < 12:  # a quadric has six coefficients
+    k = _K
+    if len(P) <= 4 * k:
         return P
     most = min(_LARGEST_K, len(P) // 4)
     sample = np.unique(np.linspace(0, len(P) - 1, _SAMPLE).astype(np.int64))
+    tree = KDTree(P)
+    few, all_k = (float(np.median(_onto_quadrics(P, tree, P[sample], size)[1])) for size in (k // 2, k))
+    if few < max(_NOISE, _NOISE_NOT_DETAIL * all_k):
+        return P
     for _ in range(_MOST_PASSES):
         tree = KDTree(P)
         _, noise, thickness = _onto_quadrics(P, tree, P[sample], k)

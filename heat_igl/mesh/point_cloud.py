@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.mesh.cloud_triangles import cloud_triangles
+from heat_igl.mesh.cloud_triangles import cloud_triangles, with_points
 from heat_igl.mesh.mesh import Mesh, checked_positions
 from heat_igl.mesh.neighbourhoods import neighbourhoods, without_noise
 from heat_igl.mesh.report import MeshReport
@@ -90,6 +90,11 @@ class PointCloud:
         return len(self.P)
 
     @property
+    def n_faces(self) -> int:
+        """Number of `triangles`."""
+        return self.triangles.n_faces
+
+    @property
     def V(self) -> FloatArray:
         """The positions (n, 3), under the name that they have in a mesh."""
         return self.P
@@ -104,21 +109,27 @@ class PointCloud:
         """The surface on which distance is measured: a mesh whose vertices are the points, with a boundary or without.
 
         Its triangles are Delaunay in the tangent planes of their corners; an edge has at most two of them. Its vertices
-        are `P`, unless at half of the points the neighbours deviate from a quadric by more than 1 / 20 of their
-        spacing: then all are moved onto such quadrics.
+        are `P`, unless the points are noisy: if at half of them the neighbours deviate from a quadric by more than
+        1 / 20 of their spacing, and that is not detail, all are moved onto such quadrics.
 
         Raises
         ------
         MeshError
             If no three points are near enough to one another to make a triangle.
         """
-        V = without_noise(self.P)
-        F = cloud_triangles(V, neighbourhoods(V, self.normals), oriented=self.normals is not None)
+        # Copies of a point would compete for the same triangles.
+        distinct, original = _distinct(self.P)
+        normals = None if self.normals is None else self.normals[distinct]
+        positions = without_noise(self.P[distinct])
+        near = neighbourhoods(positions, normals)
+        F = distinct[cloud_triangles(positions, near, oriented=normals is not None)]
         if not len(F):
             raise MeshError(
                 "no three points of P are neighbours on a surface: the points are too few or too unevenly spaced"
             )
-        return Mesh(V, F)
+        V = positions[original]
+        copies = np.delete(np.arange(len(V)), distinct)
+        return Mesh(V, with_points(V, F, near.axes[original], copies, distinct[original[copies]]))
 
     @property
     def components(self) -> IntArray:
@@ -158,6 +169,20 @@ def _check_extent(P: FloatArray) -> None:
         raise MeshError(f"all {len(P)} points in P lie on a line: a surface needs points beside it")
 
 
+def _distinct(P: FloatArray) -> tuple[IntArray, IntArray]:
+    """The points (k,) that are no copy of an earlier one, and which of them each of the n points equals."""
+    order = np.lexsort(P.T)
+    is_new = np.ones(len(P), bool)
+    is_new[1:] = (P[order[1:]] != P[order[:-1]]).any(axis=1)
+    if is_new.all():
+        return np.arange(len(P)), np.arange(len(P))
+    # The sort is stable: the first of equal points has the smallest index.
+    distinct = np.sort(order[is_new])
+    original = np.empty(len(P), np.int64)
+    original[order] = np.searchsorted(distinct, order[is_new])[np.cumsum(is_new) - 1]
+    return distinct, original
+
+
 def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:
     """The normals as a new array of unit vectors."""
     try:
@@ -182,5 +207,8 @@ def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:
             f"normals[{int(np.argmin(largest))}] has length 0 ({int((largest == 0).sum())} of {n} normals have): pass "
             "normals=None to have planes fitted to the points"
         )
-    directions /= largest
-    return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
+    # Unit vectors stay as they are, so that a copy of the cloud has the same bits.
+    rows = np.abs(np.einsum("nx,nx->n", directions, directions) - 1) > 1e-14
+    directions[rows] /= largest[rows]
+    directions[rows] /= np.linalg.norm(directions[rows], axis=1, keepdims=True)
+    return directions
