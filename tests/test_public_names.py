@@ -17,12 +17,12 @@ import heat_igl
 EXPORTED = """
 AccuracyWarning BatchError ClosestPoints Diagnostics FactorizationError HeatMethodSolver HeatSolution ImageDomain
 LabelledDistance Mesh MeshError MeshReport MissingExtraError OffsetSources Operators PointCloud PolygonMesh
-ReferenceSolverError Refinement SourceError SurfaceCurve SurfacePoints ValidationReport ValidationRow VoronoiCells baselines closed_forms
-closest_points cluster curve_on diameter distance_matrix dual_triangulation edge_curve enclosed_areas farthest_cells
-farthest_points geodesic_centre heat_method_distance image_domain isolines metrics offset_curves plots
-point_cloud_operators polygon_operators read_attributes read_mesh read_point_cloud read_polygon_mesh reference sampling
-shapes shortest_paths speed_operators split_long_edges
-sublevel_areas unfolded_distance validate voronoi_cells write_curves write_mesh
+ReferenceSolverError Refinement SourceError SurfaceCurve SurfacePoints ValidationReport ValidationRow VoronoiCells
+baselines closed_forms closest_points cluster curve_on diameter distance_matrix dual_triangulation edge_curve
+enclosed_areas farthest_cells farthest_points geodesic_centre heat_method_distance image_domain isolines metrics
+offset_curves plots point_cloud_operators polygon_operators read_attributes read_mesh read_point_cloud
+read_polygon_mesh reference sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
+unfolded_distance validate voronoi_cells write_curves write_mesh
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they

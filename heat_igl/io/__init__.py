@@ -1,4 +1,4 @@
-"""Files: reading meshes, writing meshes with vertex attributes, and writing curves."""
+"""Files: reading meshes and point clouds, writing meshes with vertex attributes, and writing curves."""
 
 from heat_igl.io.atomic import complete_file
 from heat_igl.io.curves import CURVE_SUFFIXES, write_curves
