@@ -1,4 +1,4 @@
-"""What distance is measured on: meshes of triangles, tetrahedra and polygons, images, point clouds, points and curves."""
+"""What distance is measured on: meshes, images and point clouds, and points and curves on them."""
 
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
