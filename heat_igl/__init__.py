@@ -32,12 +32,13 @@ from heat_igl.heat_method import (
     heat_method_distance,
 )
 from heat_igl.intrinsic import TangentFrames, tangent_frames
-from heat_igl.io import read_attributes, read_mesh, read_polygon_mesh, write_curves, write_mesh
+from heat_igl.io import read_attributes, read_mesh, read_point_cloud, read_polygon_mesh, write_curves, write_mesh
 from heat_igl.mesh import (
     ClosestPoints,
     ImageDomain,
     Mesh,
     MeshReport,
+    PointCloud,
     PolygonMesh,
     SurfaceCurve,
     SurfacePoints,
@@ -48,7 +49,13 @@ from heat_igl.mesh import (
     image_domain,
     split_long_edges,
 )
-from heat_igl.operators import Operators, connection_laplacian, polygon_operators, speed_operators
+from heat_igl.operators import (
+    Operators,
+    connection_laplacian,
+    point_cloud_operators,
+    polygon_operators,
+    speed_operators,
+)
 from heat_igl.runtime.aliases import alias_modules
 from heat_igl.sampling import (
     VoronoiCells,
@@ -85,6 +92,7 @@ __all__ = [
     "MissingExtraError",
     "OffsetSources",
     "Operators",
+    "PointCloud",
     "PolygonMesh",
     "ReferenceSolverError",
     "Refinement",
@@ -122,9 +130,11 @@ __all__ = [
     "offset_curves",
     "pair_distances",
     "plots",
+    "point_cloud_operators",
     "polygon_operators",
     "read_attributes",
     "read_mesh",
+    "read_point_cloud",
     "read_polygon_mesh",
     "reference",
     "sample_mesh",

@@ -16,13 +16,14 @@ import heat_igl
 # All that `heat_igl.__all__` has ever held.
 EXPORTED = """
 AccuracyWarning BatchError ClosestPoints Diagnostics FactorizationError HeatMethodSolver HeatSolution ImageDomain
-LabelledDistance Mesh MeshError MeshReport MissingExtraError OffsetSources Operators PolygonMesh ReferenceSolverError
-Refinement SourceError SurfaceCurve SurfacePoints TangentFrames ValidationReport ValidationRow VectorHeatSolver
-VoronoiCells as_mesh baselines closed_forms closest_points cluster connection_laplacian curve_on diameter
-distance_matrix distances_within dual_triangulation edge_curve enclosed_areas exp_map farthest_cells farthest_points
-geodesic_centre geodesic_distance heat_method_distance image_domain isolines metrics nearest_vertices offset_curves
-pair_distances plots polygon_operators read_attributes read_mesh read_polygon_mesh reference sample_mesh sampling
-shapes shortest_paths speed_operators split_long_edges sublevel_areas tangent_frames trace_geodesic
+LabelledDistance Mesh MeshError MeshReport MissingExtraError OffsetSources Operators PointCloud PolygonMesh
+ReferenceSolverError Refinement SourceError SurfaceCurve SurfacePoints TangentFrames ValidationReport ValidationRow
+VectorHeatSolver VoronoiCells as_mesh baselines closed_forms closest_points cluster connection_laplacian curve_on
+diameter distance_matrix distances_within dual_triangulation edge_curve enclosed_areas exp_map farthest_cells
+farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain isolines metrics nearest_vertices
+offset_curves pair_distances plots point_cloud_operators polygon_operators read_attributes read_mesh read_point_cloud
+read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
+tangent_frames trace_geodesic
 unfolded_distance validate voronoi_cells write_curves write_mesh
 """.split()
 
@@ -32,6 +33,7 @@ CALLS = """
 Mesh(V, F)
 Mesh.report(self)
 PolygonMesh(V, polygons)
+PointCloud(P, normals=None)
 SurfacePoints(faces, barycentric)
 SurfaceCurve(faces, start, end, is_closed=False)
 OffsetSources(sources, offsets)
@@ -39,6 +41,7 @@ Refinement(triangulation)
 read_mesh(path)
 read_attributes(path)
 read_polygon_mesh(path)
+read_point_cloud(path)
 write_mesh(path, mesh)
 write_curves(path, mesh, curves, *, projection=None)
 heat_method_distance(V, F, sources)
@@ -74,6 +77,7 @@ edge_curve(mesh, vertices, *, closed=False)
 image_domain(mask, spacing=1.0)
 split_long_edges(mesh, longest=None)
 polygon_operators(mesh)
+point_cloud_operators(cloud)
 speed_operators(mesh, speed)
 farthest_points(solver, k, *, start=0)
 farthest_cells(solver, k, *, start=0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.io import MESH_SUFFIXES
-from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_simplices
 from heat_igl.sources import Sources, vertex_sources
 
 # Names that a zarr group cannot have: they stand for the store itself, the folder above it, or its metadata.
@@ -28,7 +28,7 @@ class Item:
 
     name: str
     label: str
-    mesh: Path | Mesh | tuple[Any, Any]
+    mesh: Path | Mesh | PointCloud | tuple[Any, Any]
 
 
 def folder(path: str | os.PathLike[str]) -> dict[str, Path]:
@@ -79,11 +79,11 @@ def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike]) -> Iterator[Item]
         yield Item(quote(name, safe=" ()[]"), label, _held(mesh, label))
 
 
-def _held(mesh: MeshLike, label: str) -> Path | Mesh | tuple[Any, Any]:
-    """What a task carries: a path, a mesh, or arrays, which are checked where they are used."""
+def _held(mesh: MeshLike, label: str) -> Path | Mesh | PointCloud | tuple[Any, Any]:
+    """What a task carries: a path, a mesh, a cloud, or arrays, which are checked where they are used."""
     if isinstance(mesh, str | os.PathLike):
         return Path(mesh)
-    if isinstance(mesh, Mesh) or (isinstance(mesh, tuple) and len(mesh) == 2):
+    if isinstance(mesh, Mesh | PointCloud) or (isinstance(mesh, tuple) and len(mesh) == 2):
         return mesh
     try:
         return as_simplices(mesh)

@@ -6,7 +6,7 @@ import os
 
 from heat_igl.cluster.store import rows_per_block
 from heat_igl.linear.iterative import factor_bytes
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, PointCloud
 
 __all__ = ["PROCESS_MEMORY", "memory_for_solvers", "physical_memory", "solver_memory"]
 
@@ -19,7 +19,7 @@ _BYTES_PER_FACE = 500
 _BYTES_PER_WRITTEN_VALUE = 8
 
 
-def solver_memory(mesh: Mesh) -> int:
+def solver_memory(mesh: Mesh | PointCloud) -> int:
     """Bytes that a solver on `mesh` and one block of queries take at most, including writing the block."""
     n, m = mesh.n_vertices, mesh.n_faces
     # Edges by Euler's formula, up to a few for boundaries and handles.

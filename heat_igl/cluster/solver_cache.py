@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from heat_igl.cluster.memory import memory_for_solvers, solver_memory
 from heat_igl.heat_method import HeatMethodSolver, SolverOptions
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.runtime import release_free_memory
 
 __all__ = ["SolverCache"]
@@ -37,7 +37,7 @@ class SolverCache:
         self._highest = 0
 
     @contextmanager
-    def solver(self, mesh: Mesh, fingerprint: str, options: SolverOptions) -> Iterator[HeatMethodSolver]:
+    def solver(self, mesh: Mesh | PointCloud, fingerprint: str, options: SolverOptions) -> Iterator[HeatMethodSolver]:
         """The solver of `mesh`, whose arrays have this fingerprint; made if it is not there.
 
         Waits until the memory that it is estimated to take is free.

@@ -25,7 +25,7 @@ from heat_igl.cluster.store import MeshGroup, Store
 from heat_igl.errors import AccuracyWarning, BatchError
 from heat_igl.heat_method import HeatMethodSolver, SolverOptions
 from heat_igl.io import read_mesh
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.sampling import farthest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import IntArray
@@ -158,7 +158,7 @@ def _continued(
 
 
 def _new(
-    task: Task, store: Store, mesh: Mesh, solver: HeatMethodSolver, identity: Mapping[str, Any]
+    task: Task, store: Store, mesh: Mesh | PointCloud, solver: HeatMethodSolver, identity: Mapping[str, Any]
 ) -> tuple[MeshGroup, list[IntArray]]:
     """A new group for a mesh, with its sources."""
     source_sets = _source_sets(task.plan, mesh, solver)
@@ -167,13 +167,13 @@ def _new(
     return store.begin(task.item.name, source_sets, mesh.n_vertices, task.dtype, attributes), source_sets
 
 
-def _loaded(item: Item) -> Mesh:
-    if isinstance(item.mesh, Mesh):
+def _loaded(item: Item) -> Mesh | PointCloud:
+    if isinstance(item.mesh, (Mesh, PointCloud)):
         return item.mesh
     return read_mesh(item.mesh) if isinstance(item.mesh, Path) else Mesh(*item.mesh)
 
 
-def _fingerprint(mesh: Mesh) -> str:
+def _fingerprint(mesh: Mesh | PointCloud) -> str:
     digest = hashlib.sha256(f"{mesh.V.shape} {mesh.F.shape}".encode())
     digest.update(mesh.V.data)
     digest.update(mesh.F.data)
@@ -185,7 +185,7 @@ def _versions() -> dict[str, str]:
     return {"heat_igl": heat_igl.__version__} | {name: version(name) for name in ("libigl", "numpy", "scipy")}
 
 
-def _source_sets(plan: SourcePlan, mesh: Mesh, solver: HeatMethodSolver) -> list[IntArray]:
+def _source_sets(plan: SourcePlan, mesh: Mesh | PointCloud, solver: HeatMethodSolver) -> list[IntArray]:
     n = mesh.n_vertices
     if plan.source_sets is not None:
         # A set is sorted, so its last vertex tells whether the mesh has all of them.

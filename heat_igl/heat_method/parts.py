@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,8 +18,8 @@ from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.solution import Diagnostics
 from heat_igl.heat_method.time_step import time_step, warn_of_large_step
 from heat_igl.linear import Analysis
-from heat_igl.mesh import Mesh, PolygonMesh
-from heat_igl.operators import Operators, operators, polygon_operators
+from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
+from heat_igl.operators import Operators, operators, point_cloud_operators, polygon_operators
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
@@ -27,6 +27,9 @@ from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding import UnfoldingSolver
 
 __all__ = ["SolverParts", "prepare", "prepare_mesh", "prepare_polygons"]
+
+# For scattered points, whose triangles differ more in size than those of a mesh: between two aims, see docs/clouds.md.
+_T_COEF_OF_POINTS = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +88,11 @@ class SolverParts:
         return None if self.operators.surface is None else self.operators.surface.given_faces
 
 
-def prepare_mesh(mesh: Mesh, options: SolverOptions, known: Analysis | None = None) -> SolverParts:
+def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysis | None = None) -> SolverParts:
     """The parts of a solver on `mesh`; a `known` order of elimination is taken if it fits."""
     start = time.perf_counter()
+    if isinstance(mesh, PointCloud) and options.t_coef is None:
+        options = replace(options, t_coef=_T_COEF_OF_POINTS)
     begun: list[Future[Analysis]] = []
     with pool(1) as beside:
 
@@ -97,7 +102,10 @@ def prepare_mesh(mesh: Mesh, options: SolverOptions, known: Analysis | None = No
         # The order of elimination takes a third of the time and needs no more than the pattern of L.
         is_factored = options.refine != "exact"
         on_laplacian = analyse if known is None and is_factored and n_threads() > 1 else None
-        domain = operators(mesh, options.triangulation, on_laplacian)
+        if isinstance(mesh, PointCloud):
+            domain = point_cloud_operators(mesh, options.triangulation, on_laplacian)
+        else:
+            domain = operators(mesh, options.triangulation, on_laplacian)
         seconds = time.perf_counter() - start
         known = begun[0].result() if begun else known
     waited = time.perf_counter() - start - seconds

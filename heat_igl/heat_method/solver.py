@@ -17,7 +17,7 @@ from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepa
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_mesh
+from heat_igl.mesh import Mesh, MeshLike, PointCloud, PolygonMesh, as_mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
@@ -88,7 +88,7 @@ class HeatMethodSolver(BatchedSolver):
     so. The solver is immutable; threads may share it, and a pickled copy gives the same bits.
     """
 
-    _mesh: Mesh | None = None
+    _mesh: Mesh | PointCloud | None = None
     _parts: SolverParts
 
     def __init__(
@@ -199,8 +199,8 @@ class HeatMethodSolver(BatchedSolver):
         moved = self._mesh.with_vertices(V)
         return HeatMethodSolver._of(prepare_mesh(moved, self._parts.options, self._parts.analysis), moved)
 
-    def _set_up(self, mesh: Mesh | PolygonMesh, options: SolverOptions) -> None:
-        if isinstance(mesh, Mesh):
+    def _set_up(self, mesh: Mesh | PolygonMesh | PointCloud, options: SolverOptions) -> None:
+        if not isinstance(mesh, PolygonMesh):
             self._mesh, self._parts = mesh, prepare_mesh(mesh, options)
         elif options.refine is not None:
             self._mesh, self._parts = mesh.triangles, prepare_mesh(mesh.triangles, options)
@@ -208,7 +208,7 @@ class HeatMethodSolver(BatchedSolver):
             self._mesh, self._parts = None, prepare_polygons(mesh, options)
 
     @classmethod
-    def _of(cls, parts: SolverParts, mesh: Mesh | None = None) -> HeatMethodSolver:
+    def _of(cls, parts: SolverParts, mesh: Mesh | PointCloud | None = None) -> HeatMethodSolver:
         solver = cls.__new__(cls)
         solver._mesh, solver._parts = mesh, parts
         return solver

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 import stat
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,7 +22,15 @@ from heat_igl.io.contents import Contents
 from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_simplices, read_paths_with
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = ["MESH_SUFFIXES", "read_attributes", "read_mesh", "read_polygon_mesh", "write_mesh"]
+__all__ = [
+    "MESH_SUFFIXES",
+    "checked_path",
+    "file_bytes",
+    "read_attributes",
+    "read_mesh",
+    "read_polygon_mesh",
+    "write_mesh",
+]
 
 
 class _Format(NamedTuple):
@@ -195,6 +203,11 @@ def _those_with(capability: str) -> str:
 
 
 def _checked(path: str | os.PathLike[str]) -> Path:
+    return checked_path(path, MESH_SUFFIXES)
+
+
+def checked_path(path: str | os.PathLike[str], suffixes: Collection[str]) -> Path:
+    """`path` as a Path; a MeshError if it cannot be one, or has none of the suffixes."""
     try:
         found = Path(os.fspath(path))
     except TypeError:
@@ -205,27 +218,31 @@ def _checked(path: str | os.PathLike[str]) -> Path:
         printable = False
     if not printable:
         raise MeshError(f"{str(path)!r} cannot be a path: it holds characters that no file name may have")
-    if found.suffix.lower() not in _FORMATS:
+    if found.suffix.lower() not in suffixes:
         if found.is_dir():
             raise MeshError(f"{found} is a directory: name a mesh file in it")
-        raise MeshError(f"{found}: unknown extension '{found.suffix}'; the formats are {', '.join(_FORMATS)}")
+        raise MeshError(f"{found}: unknown extension '{found.suffix}'; the formats are {', '.join(suffixes)}")
     return found
 
 
 def _load(path: str | os.PathLike[str]) -> tuple[Path, Contents]:
     path = _checked(path)
+    return path, _FORMATS[path.suffix.lower()].read(path, file_bytes(path))
+
+
+def file_bytes(path: Path) -> bytes:
+    """The contents of a regular file; a MeshError if it cannot be read."""
     try:
         mode = path.stat().st_mode
         # Reading a pipe or a device might not terminate.
         if not stat.S_ISREG(mode):
             kind = "a directory" if stat.S_ISDIR(mode) else "not a regular file"
             raise MeshError(f"{path} is {kind}: pass the path of a mesh file")
-        data = path.read_bytes()
+        return path.read_bytes()
     except FileNotFoundError as error:
         raise MeshError(f"{path}: no such file (looked in {path.absolute().parent})") from error
     except OSError as error:
         raise MeshError(f"{path} cannot be read: {error.strerror or error}") from error
-    return path, _FORMATS[path.suffix.lower()].read(path, data)
 
 
 def _mesh(path: Path, contents: Contents) -> Mesh:

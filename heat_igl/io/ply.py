@@ -21,7 +21,7 @@ from heat_igl.io.text import Text, ragged
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["read", "write"]
+__all__ = ["read", "read_vertices", "write"]
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -222,26 +222,11 @@ def _check(text: Text, lines: IntArray, bad: AnyArray, message: str) -> None:
 
 def read(path: Path, data: bytes) -> Contents:
     """Parse a PLY file."""
-    header = _header(path, data)
-    count = {element.name: element.n for element in header.elements}
-    for name in ("vertex", "face"):
-        if not count.get(name) or sum(element.name == name for element in header.elements) > 1:
-            strips = " (triangle strips are not supported)" if "tristrips" in count else ""
-            raise MeshError(f"{path}: the header announces no element '{name}', or announces it twice{strips}")
-    if header.order:
-        found = _binary(path, data, header)
-    else:
-        # Blank lines replace the header, so that errors give the right line numbers.
-        found = _ascii(Text(path, b"\n" * header.n_lines + data[header.end :]), header)
-    tables = {element.name: (element, columns) for element, columns in found}
-    element, columns = tables["vertex"]
-    scalars = [prop for prop in element.properties if not prop.count_dtype]
-    if not {"x", "y", "z"} <= {prop.name for prop in scalars}:
-        raise MeshError(f"{path}: element vertex needs the properties x, y and z")
-    V = np.stack([columns[axis].values.astype(np.float64) for axis in "xyz"], axis=1)
-    faces = tables["face"][1]
+    header, tables = _tables(path, data, ("vertex", "face"))
+    V, others = _vertices(path, tables)
+    faces, n_faces = tables["face"][1], tables["face"][0].n
     name = "vertex_indices" if "vertex_indices" in faces else "vertex_index"
-    if name not in faces or len(faces[name].length) != count["face"]:
+    if name not in faces or len(faces[name].length) != n_faces:
         raise MeshError(f"{path}: element face needs the list property vertex_indices (or vertex_index)")
     degree = faces[name].length
 
@@ -257,10 +242,44 @@ def read(path: Path, data: bytes) -> Contents:
     )
     cells = Cells(corners, degree)
     check(V, cells, lambda i: f"{path}, vertex {i} (counted from 0)", face_at, base=0)
+    return Contents(V, cells, _gathered(others, header.vectors))
+
+
+def read_vertices(path: Path, data: bytes) -> tuple[FloatArray, dict[str, AnyArray]]:
+    """The vertices (n, 3) of a PLY file with or without faces, and their other scalar properties."""
+    return _vertices(path, _tables(path, data, ("vertex",))[1])
+
+
+def _tables(
+    path: Path, data: bytes, needed: tuple[str, ...]
+) -> tuple[_Header, dict[str, tuple[_Element, dict[str, _Column]]]]:
+    """The header, and the columns of each element; elements that are `needed` occur once and are not empty."""
+    header = _header(path, data)
+    count = {element.name: element.n for element in header.elements}
+    for name in needed:
+        if not count.get(name) or sum(element.name == name for element in header.elements) > 1:
+            strips = " (triangle strips are not supported)" if "tristrips" in count else ""
+            raise MeshError(f"{path}: the header announces no element '{name}', or announces it twice{strips}")
+    if header.order:
+        found = _binary(path, data, header)
+    else:
+        # Blank lines replace the header, so that errors give the right line numbers.
+        found = _ascii(Text(path, b"\n" * header.n_lines + data[header.end :]), header)
+    return header, {element.name: (element, columns) for element, columns in found}
+
+
+def _vertices(
+    path: Path, tables: dict[str, tuple[_Element, dict[str, _Column]]]
+) -> tuple[FloatArray, dict[str, AnyArray]]:
+    element, columns = tables["vertex"]
+    scalars = [prop for prop in element.properties if not prop.count_dtype]
+    if not {"x", "y", "z"} <= {prop.name for prop in scalars}:
+        raise MeshError(f"{path}: element vertex needs the properties x, y and z")
+    V = np.stack([columns[axis].values.astype(np.float64) for axis in "xyz"], axis=1)
     others = {
         prop.name: columns[prop.name].values.astype(prop.dtype) for prop in scalars if prop.name not in ("x", "y", "z")
     }
-    return Contents(V, cells, _gathered(others, header.vectors))
+    return V, others
 
 
 def _gathered(columns: dict[str, AnyArray], vectors: dict[str, int]) -> dict[str, AnyArray]:

@@ -1,8 +1,9 @@
-"""What distance is measured on: meshes of triangles, tetrahedra and polygons, images, and points and curves on them."""
+"""What distance is measured on: meshes, images and point clouds, and points and curves on them."""
 
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with
 from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
+from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygons import PolygonMesh, which_repeat_a_vertex
 from heat_igl.mesh.projection import ClosestPoints, closest_points
 from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
@@ -20,6 +21,7 @@ __all__ = [
     "MeshReport",
     "ON_SIDE",
     "ON_SIDE_COMPUTED",
+    "PointCloud",
     "PolygonMesh",
     "SurfaceCurve",
     "SurfacePoints",

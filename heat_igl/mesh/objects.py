@@ -10,6 +10,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.mesh.mesh import Mesh
+from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygons import PolygonMesh
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
@@ -34,21 +35,21 @@ def read_paths_with(reader: Callable[[str | os.PathLike[str]], Mesh]) -> None:
     _readers[:] = [reader]
 
 
-def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh:
+def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | PointCloud:
     """A mesh of any library as a mesh of this one.
 
     Parameters
     ----------
     mesh : mesh or array_like
-        `Mesh` and `PolygonMesh` are returned as they are. Besides: a pair (V, F); a path, read by `read_mesh`; meshes
-        of trimesh, pyvista and vtk (PolyData, UnstructuredGrid), open3d, meshio, pymeshlab (also a MeshSet: its
-        current mesh), vedo, and nibabel (surfaces in GIFTI). With `F`, the positions V (n, 3).
+        `Mesh`, `PolygonMesh` and `PointCloud` are returned as they are. Besides: a pair (V, F); a path, read by
+        `read_mesh`; meshes of trimesh, pyvista and vtk (PolyData, UnstructuredGrid), open3d, meshio, pymeshlab (also a
+        MeshSet: its current mesh), vedo, and nibabel (surfaces in GIFTI). With `F`, the positions V (n, 3).
     F : (m, 3) or (m, 4) array_like of int, optional
         Triangles or tetrahedra, when `mesh` is V.
 
     Returns
     -------
-    Mesh or PolygonMesh
+    Mesh, PolygonMesh or PointCloud
         In the vertices' own order and unit. Polygons with more than three corners give a `PolygonMesh`; a mesh with
         tetrahedra gives those, without the triangles of their boundary.
 
@@ -63,10 +64,10 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh:
     tetrahedra, as everywhere in this package; `PolygonMesh` takes quadrilaterals.
     """
     if F is not None:
-        if isinstance(mesh, (Mesh, PolygonMesh)):
+        if isinstance(mesh, (Mesh, PolygonMesh, PointCloud)):
             raise MeshError(f"F is given beside a {type(mesh).__name__}: pass a mesh alone, or positions V and faces F")
         return Mesh(mesh, F)
-    if isinstance(mesh, (Mesh, PolygonMesh)):
+    if isinstance(mesh, (Mesh, PolygonMesh, PointCloud)):
         return mesh
     if isinstance(mesh, (str, os.PathLike)):
         return _readers[0](mesh)
@@ -82,12 +83,12 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh:
 
 
 def as_simplices(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh:
-    """A mesh of any library as triangles or tetrahedra: `as_mesh`, with polygons cut into their triangles.
+    """A mesh of any library as triangles or tetrahedra: `as_mesh`, with the triangles of polygons and of point clouds.
 
     The vertices are those of `as_mesh`. Arguments and errors are those of `as_mesh`, too.
     """
     found = as_mesh(mesh, F)
-    return found.triangles if isinstance(found, PolygonMesh) else found
+    return found if isinstance(found, Mesh) else found.triangles
 
 
 def _named(mesh: object) -> str:

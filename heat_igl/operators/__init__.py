@@ -4,6 +4,7 @@ from heat_igl.operators.connection import connection_laplacian, edge_rotations, 
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
 from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
+from heat_igl.operators.point_clouds import point_cloud_operators
 from heat_igl.operators.polygons import polygon_operators
 from heat_igl.operators.simplices import cotan_operators
 from heat_igl.operators.speed import speed_operators
@@ -26,6 +27,7 @@ __all__ = [
     "intrinsic_operators",
     "is_rough_or_narrow",
     "operators",
+    "point_cloud_operators",
     "polygon_operators",
     "speed_operators",
     "tufted_operators",

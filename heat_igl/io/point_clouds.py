@@ -1,0 +1,114 @@
+"""Reading point clouds: PLY, OBJ, XYZ, NPY and PCD, selected by the extension."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.io import pcd, ply
+from heat_igl.io.files import checked_path, file_bytes
+from heat_igl.io.text import Text
+from heat_igl.mesh import PointCloud
+from heat_igl.typing import FloatArray
+
+__all__ = ["POINT_CLOUD_SUFFIXES", "read_point_cloud"]
+
+_Points = tuple[FloatArray, FloatArray | None]
+
+
+def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
+    """Read a point cloud from a file; the faces of a mesh are ignored.
+
+    Parameters
+    ----------
+    path : path-like
+        The extension, in upper or lower case, selects the format. .ply: the vertices, and their properties nx, ny, nz
+        as normals. .obj: the lines v, and the lines vn as normals if there are as many. .xyz: a point in each line,
+        three coordinates or three and a normal; separated by white space or commas, "#" starts a comment. .npy: an
+        array (n, 3), or (n, 6) with normals. .pcd: the fields x, y, z and normal_x, normal_y, normal_z, text or binary.
+
+    Returns
+    -------
+    PointCloud
+        Points in the order of the file.
+
+    Raises
+    ------
+    MeshError
+        If the file is missing, unreadable or damaged, or its points cannot be used. Normals that are all 0, as some
+        programs write them, count as none.
+    """
+    path = checked_path(path, POINT_CLOUD_SUFFIXES)
+    P, normals = _FORMATS[path.suffix.lower()](path, file_bytes(path))
+    if normals is not None and not normals.any():
+        normals = None
+    try:
+        return PointCloud(P, normals)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
+
+
+def _from_ply(path: Path, data: bytes) -> _Points:
+    P, others = ply.read_vertices(path, data)
+    names = ("nx", "ny", "nz")
+    if not all(name in others for name in names):
+        return P, None
+    return P, np.stack([others[name].astype(np.float64) for name in names], axis=1)
+
+
+def _from_obj(path: Path, data: bytes) -> _Points:
+    text = Text(path, data, comment="#", continued=True)
+    word = text.words(3)
+
+    def rows(record: bytes) -> FloatArray:
+        lines = np.flatnonzero(word == record)
+        short = text.count[lines] < 4
+        if short.any():
+            raise text.error(int(lines[np.argmax(short)]), f"three numbers must follow {record.decode()}")
+        values, start = text.numbers(lines, skip=1)
+        return np.asarray(values[start[:, None] + np.arange(3)])
+
+    if not (word == b"v").any():
+        raise MeshError(f"{path}: the file has no points (lines that start with v)")
+    P = rows(b"v")
+    return P, rows(b"vn") if int((word == b"vn").sum()) == len(P) else None
+
+
+def _from_xyz(path: Path, data: bytes) -> _Points:
+    text = Text(path, data.replace(b",", b" "), comment="#")
+    width = int(text.count[0])
+    wrong = text.count != (width if width in (3, 6) else 3)
+    if wrong.any():
+        line = int(np.argmax(wrong))
+        raise text.error(
+            line, f"a point has 3 numbers, or 6 with a normal, and all points as many ({int(wrong.sum())} lines differ)"
+        )
+    values = text.all_numbers().reshape(-1, width)
+    return values[:, :3], values[:, 3:] if width == 6 else None
+
+
+def _from_npy(path: Path, data: bytes) -> _Points:
+    try:
+        array = np.load(io.BytesIO(data), allow_pickle=False)
+    except (ValueError, EOFError, OSError) as error:
+        raise MeshError(f"{path}: not an array in the format of numpy.save: {error}") from None
+    if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] not in (3, 6):
+        shape = getattr(array, "shape", "none")
+        raise MeshError(f"{path}: the array must have shape (n, 3), or (n, 6) with normals, but its shape is {shape}")
+    return array[:, :3], array[:, 3:] if array.shape[1] == 6 else None
+
+
+_FORMATS: dict[str, Callable[[Path, bytes], _Points]] = {
+    ".ply": _from_ply,
+    ".obj": _from_obj,
+    ".xyz": _from_xyz,
+    ".npy": _from_npy,
+    ".pcd": pcd.read,
+}
+
+POINT_CLOUD_SUFFIXES = tuple(_FORMATS)

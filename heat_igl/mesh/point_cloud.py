@@ -1,0 +1,214 @@
+"""Point clouds, validated on construction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.mesh.cloud_triangles import cloud_triangles, with_points
+from heat_igl.mesh.mesh import Mesh, checked_positions
+from heat_igl.mesh.neighbourhoods import neighbourhoods, without_noise
+from heat_igl.mesh.report import MeshReport
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
+
+__all__ = ["PointCloud"]
+
+# Points lie on a line if their second variance is at most this share of the first.
+_ON_A_LINE = 1e-20
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PointCloud:
+    """Points on a surface, without faces.
+
+    Parameters
+    ----------
+    P : (n, 3) array_like of real numbers
+        Positions, in any unit of length; copied to float64. At least four, not all on a line.
+    normals : (n, 3) array_like of real numbers, optional
+        A normal for each point, of any length but 0, all pointing to the same side of the surface. They give the
+        tangent planes, and tell sheets apart that nearly touch: neighbours whose normals point away are left out.
+        Without them, planes are fitted to the neighbours.
+
+    Attributes
+    ----------
+    P : (n, 3) float64
+        Positions.
+    normals : (n, 3) float64 or None
+        Normals of length 1.
+
+    Raises
+    ------
+    MeshError
+        If an array has the wrong shape or type, an entry is not finite, a normal has length 0, or the points lie on a
+        line. The message names the first offender and counts them.
+
+    Notes
+    -----
+    Copies of a point are kept: they are at distance 0 from each other. A point that is farther from all others than
+    these are from their neighbours, an outlier, belongs to no triangle, and its distance is ``inf``. If the points are
+    noisy, distance is measured on a surface through the noise, see `triangles`. Arrays are read-only.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from heat_igl import HeatMethodSolver, PointCloud
+    >>> P = np.random.default_rng(0).standard_normal((2000, 3))
+    >>> cloud = PointCloud(P / np.linalg.norm(P, axis=1, keepdims=True))
+    >>> bool(abs(HeatMethodSolver(cloud).distance(0).max() - np.pi) < 0.1)
+    True
+    """
+
+    P: FloatArray
+    normals: FloatArray | None
+
+    def __init__(self, P: ArrayLike, normals: ArrayLike | None = None) -> None:
+        try:
+            positions = checked_positions(P)
+        except MeshError as error:
+            raise MeshError(str(error).replace("V", "P", 1).replace("vertices", "points")) from None
+        _check_extent(positions)
+        directions = None if normals is None else _checked_normals(normals, len(positions))
+        for array in (positions, directions):
+            if array is not None:
+                array.setflags(write=False)
+        object.__setattr__(self, "P", positions)
+        object.__setattr__(self, "normals", directions)
+
+    def __repr__(self) -> str:
+        return f"PointCloud({self.n_vertices} points{'' if self.normals is None else ' with normals'})"
+
+    def __reduce__(self) -> tuple[type[PointCloud], tuple[FloatArray, FloatArray | None]]:
+        return PointCloud, (self.P, self.normals)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of points n."""
+        return len(self.P)
+
+    @property
+    def n_faces(self) -> int:
+        """Number of `triangles`."""
+        return self.triangles.n_faces
+
+    @property
+    def V(self) -> FloatArray:
+        """The positions (n, 3), under the name that they have in a mesh."""
+        return self.P
+
+    @property
+    def F(self) -> IntArray:
+        """The faces (m, 3) of `triangles`."""
+        return self.triangles.F
+
+    @cached_property
+    def triangles(self) -> Mesh:
+        """The surface on which distance is measured: a mesh whose vertices are the points, with a boundary or without.
+
+        Its triangles are Delaunay in the tangent planes of their corners; an edge has at most two of them. Its vertices
+        are `P`, unless the points are noisy: if at half of them the neighbours deviate from a quadric by more than
+        1 / 20 of their spacing, and that is not detail, all are moved onto such quadrics.
+
+        Raises
+        ------
+        MeshError
+            If no three points are near enough to one another to make a triangle.
+        """
+        # Copies of a point would compete for the same triangles.
+        distinct, original = _distinct(self.P)
+        normals = None if self.normals is None else self.normals[distinct]
+        positions = without_noise(self.P[distinct])
+        near = neighbourhoods(positions, normals)
+        F = distinct[cloud_triangles(positions, near, oriented=normals is not None)]
+        if not len(F):
+            raise MeshError(
+                "no three points of P are neighbours on a surface: the points are too few or too unevenly spaced"
+            )
+        V = positions[original]
+        copies = np.delete(np.arange(len(V)), distinct)
+        return Mesh(V, with_points(V, F, near.axes[original], copies, distinct[original[copies]]))
+
+    @property
+    def components(self) -> IntArray:
+        """Component label (n,) of each point; a point in no triangle is a component of its own."""
+        return self.triangles.components
+
+    @property
+    def boundary(self) -> BoolArray:
+        """Which points (n,) lie on the boundary of `triangles`."""
+        return self.triangles.boundary
+
+    def with_vertices(self, P: ArrayLike) -> PointCloud:
+        """A cloud of as many points at other positions, without normals: they would not be those of the new surface."""
+        moved = PointCloud(P)
+        if moved.n_vertices != self.n_vertices:
+            raise MeshError(f"P has {moved.n_vertices} rows, but the cloud has {self.n_vertices} points")
+        return moved
+
+    def report(self) -> MeshReport:
+        """The report of `triangles`: outliers are its unreferenced vertices."""
+        return self.triangles.report()
+
+
+def _check_extent(P: FloatArray) -> None:
+    if len(P) < 4:
+        raise MeshError(f"P has {len(P)} points: a surface needs four or more")
+    with np.errstate(over="ignore"):
+        extent = np.abs(P - P[0]).max()
+    if extent == 0:
+        raise MeshError(f"all {len(P)} points in P are equal: there is no distance to measure")
+    if not 1e-60 < extent < 1e60:
+        raise MeshError(f"P spans {extent:.3g} units, outside what areas in double precision allow: rescale P")
+    centred = (P - P[0]) / extent
+    centred -= centred.mean(axis=0)
+    variances = np.linalg.eigvalsh(centred.T @ centred)
+    if variances[1] <= _ON_A_LINE * variances[2] or np.linalg.matrix_rank(centred, tol=1e-9) < 2:
+        raise MeshError(f"all {len(P)} points in P lie on a line: a surface needs points beside it")
+
+
+def _distinct(P: FloatArray) -> tuple[IntArray, IntArray]:
+    """The points (k,) that are no copy of an earlier one, and which of them each of the n points equals."""
+    order = np.lexsort(P.T)
+    is_new = np.ones(len(P), bool)
+    is_new[1:] = (P[order[1:]] != P[order[:-1]]).any(axis=1)
+    if is_new.all():
+        return np.arange(len(P)), np.arange(len(P))
+    # The sort is stable: the first of equal points has the smallest index.
+    distinct = np.sort(order[is_new])
+    original = np.empty(len(P), np.int64)
+    original[order] = np.searchsorted(distinct, order[is_new])[np.cumsum(is_new) - 1]
+    return distinct, original
+
+
+def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:
+    """The normals as a new array of unit vectors."""
+    try:
+        array = np.asarray(normals)
+    except ValueError as error:
+        raise MeshError(f"normals must be an array of shape ({n}, 3): {error}") from None
+    if array.dtype.kind not in "iuf":
+        raise MeshError(f"normals must hold real numbers, not {array.dtype}")
+    if array.shape != (n, 3):
+        raise MeshError(f"normals must have shape ({n}, 3), a normal for each point, but they have shape {array.shape}")
+    directions = np.array(array, dtype=np.float64)
+    bad = ~np.isfinite(directions)
+    if bad.any():
+        row, column = (int(i) for i in np.argwhere(bad)[0])
+        raise MeshError(
+            f"normals[{row}, {column}] is {directions[row, column]} ({int(bad.any(axis=1).sum())} of {n} normals are "
+            "not finite): pass normals=None to have planes fitted to the points"
+        )
+    largest = np.abs(directions).max(axis=1, keepdims=True)
+    if (largest == 0).any():
+        raise MeshError(
+            f"normals[{int(np.argmin(largest))}] has length 0 ({int((largest == 0).sum())} of {n} normals have): pass "
+            "normals=None to have planes fitted to the points"
+        )
+    # Unit vectors stay as they are, so that a copy of the cloud has the same bits.
+    rows = np.abs(np.einsum("nx,nx->n", directions, directions) - 1) > 1e-14
+    directions[rows] /= largest[rows]
+    directions[rows] /= np.linalg.norm(directions[rows], axis=1, keepdims=True)
+    return directions

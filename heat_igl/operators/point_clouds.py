@@ -1,0 +1,41 @@
+"""The operators of point clouds: Sharp and Crane (2020), on triangles that fit together."""
+
+from __future__ import annotations
+
+from heat_igl.mesh import PointCloud
+from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators
+from heat_igl.operators.triangles import operators, tufted_operators
+
+__all__ = ["point_cloud_operators"]
+
+
+def point_cloud_operators(
+    cloud: PointCloud, laplacian: Laplacian = "intrinsic-delaunay", on_laplacian: OnLaplacian | None = None
+) -> Operators:
+    """The operators of a point cloud: those of `PointCloud.triangles`, made intrinsic Delaunay.
+
+    If the triangles have a boundary, they are glued to a copy of themselves there, to their tufted cover. At the
+    boundary of scattered points, triangles are long and thin; on the cover their outer edges are flipped, too.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        n points.
+    laplacian : {"intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan", "auto"}
+        As for `operators`; "cotan" keeps the triangles as they are, and "auto" is "intrinsic-delaunay".
+    on_laplacian : callable, optional
+        Called with L, or a multiple of it, as soon as it is known.
+
+    Raises
+    ------
+    MeshError
+        If no three points are near enough to one another to make a triangle.
+    ValueError
+        If `laplacian` is neither.
+    """
+    mesh = cloud.triangles
+    # The triangles of scattered points are even enough.
+    laplacian = "intrinsic-delaunay" if laplacian == "auto" else laplacian
+    if laplacian == "intrinsic-delaunay" and mesh.boundary.any():
+        return tufted_operators(mesh, (), on_laplacian, laplacian)
+    return operators(mesh, laplacian, on_laplacian)

@@ -1,0 +1,116 @@
+"""Distance on point clouds: error and time, beside potpourri3d's solver on the same points.
+
+    python scripts/clouds_table.py [--sizes 5000 50000] [--noise 0 0.01] [--sources 6] [--seed 0] [--json FILE]
+
+Random points on a sphere of radius 1, a cylinder of radius 1 and height 3, and a square with sides of length 1. Prints,
+as a Markdown table, the mean of |d - exact| / exact over points and sources in percent, seconds to make the solver, and
+seconds for one query. Noise is Gaussian in all coordinates, of the given standard deviation. Needs the extra ``bench``;
+docs/clouds.md shows the table.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from heat_igl import HeatMethodSolver, PointCloud
+from heat_igl.typing import FloatArray
+
+from scaffold import add_json, add_seed, environment, option_parser, publish, table
+
+Truth = Callable[[int], FloatArray]
+
+
+def sphere(n: int, rng: np.random.Generator) -> tuple[FloatArray, Truth]:
+    P = rng.standard_normal((n, 3))
+    P /= np.linalg.norm(P, axis=1, keepdims=True)
+    return P, lambda i: 2 * np.arcsin(np.clip(np.linalg.norm(P - P[i], axis=1) / 2, 0, 1))
+
+
+def cylinder(n: int, rng: np.random.Generator) -> tuple[FloatArray, Truth]:
+    angle, height = rng.random((2, n)) * [[2 * np.pi], [3]]
+
+    def truth(i: int) -> FloatArray:
+        turn = np.abs(angle - angle[i])
+        return np.hypot(np.minimum(turn, 2 * np.pi - turn), height - height[i])
+
+    return np.stack([np.cos(angle), np.sin(angle), height], axis=1), truth
+
+
+def square(n: int, rng: np.random.Generator) -> tuple[FloatArray, Truth]:
+    P = np.append(rng.random((n, 2)), np.zeros((n, 1)), axis=1)
+    return P, lambda i: np.linalg.norm(P - P[i], axis=1)
+
+
+SHAPES = {"sphere": sphere, "cylinder": cylinder, "square": square}
+
+
+def timed(
+    make: Callable[[], Callable[[int], FloatArray]], sources: Sequence[int], truth: Truth
+) -> tuple[float, float, float]:
+    """Mean relative error in percent, seconds of `make`, and seconds of a query; the first query is not counted."""
+    start = time.perf_counter()
+    query = make()
+    made = time.perf_counter() - start
+    query(sources[0])
+    start = time.perf_counter()
+    found = [query(i) for i in sources]
+    asked = (time.perf_counter() - start) / len(sources)
+    errors = []
+    for i, distance in zip(sources, found, strict=True):
+        exact = truth(i)
+        away = (exact > 0) & np.isfinite(distance)
+        errors.append(np.mean(np.abs(distance - exact)[away] / exact[away]))
+    return 100 * float(np.mean(errors)), made, asked
+
+
+def measure(shape: str, n: int, noise: float, k: int, seed: int) -> dict[str, tuple[float, float, float]]:
+    import potpourri3d
+
+    rng = np.random.default_rng(seed)
+    P, truth = SHAPES[shape](n, rng)
+    P = P + noise * rng.standard_normal(P.shape)
+    sources = rng.choice(n, k, replace=False).tolist()
+    return {
+        "heat": timed(lambda: HeatMethodSolver(PointCloud(P)).distance, sources, truth),
+        "unfold": timed(lambda: HeatMethodSolver(PointCloud(P), refine="unfold").distance, sources, truth),
+        "potpourri3d": timed(lambda: potpourri3d.PointCloudHeatSolver(P).compute_distance, sources, truth),
+    }
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = option_parser(__doc__)
+    parser.add_argument("--sizes", nargs="+", type=int, default=[5000, 50000], help="numbers of points")
+    parser.add_argument("--noise", nargs="+", type=float, default=[0.0, 0.01], help="standard deviations")
+    parser.add_argument("--sources", type=int, default=6, help="per cloud (default 6)")
+    add_seed(parser)
+    add_json(parser)
+    arguments = parser.parse_args(argv)
+    rows = []
+    for shape in SHAPES:
+        for n in arguments.sizes:
+            for noise in arguments.noise:
+                found = measure(shape, n, noise, arguments.sources, arguments.seed)
+                rows.append({"shape": shape, "points": n, "noise": noise, **found})
+                print(rows[-1], file=sys.stderr, flush=True)
+    methods = ("heat", "unfold", "potpourri3d")
+    head = ["points on", "number", "noise", *(f"{m}, %" for m in methods), *(f"{m}, s + s" for m in methods)]
+    cells = [
+        (
+            str(row["shape"]),
+            str(row["points"]),
+            f"{row['noise']:g}",
+            *(f"{row[m][0]:.2g}" for m in methods),
+            *(f"{row[m][1]:.2g} + {row[m][2]:.2g}" for m in methods),
+        )
+        for row in rows
+    ]
+    publish({"environment": environment(), "rows": rows}, "\n".join(table(head, cells)), json_file=arguments.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,392 @@
+"""Point clouds: their triangles, and the distance on them against closed forms."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+import heat_igl
+from heat_igl import HeatMethodSolver, MeshError, PointCloud, farthest_points, read_point_cloud, shapes
+from heat_igl.mesh.cloud_triangles import cloud_triangles
+from heat_igl.mesh.neighbourhoods import neighbourhoods, without_noise
+
+
+def sphere(n: int, seed: int = 0) -> np.ndarray:
+    P = np.random.default_rng(seed).standard_normal((n, 3))
+    return P / np.linalg.norm(P, axis=1, keepdims=True)
+
+
+def on_sphere(P: np.ndarray, i: int) -> np.ndarray:
+    return 2 * np.arcsin(np.clip(np.linalg.norm(P - P[i], axis=1) / 2, 0, 1))
+
+
+def plane(n: int, seed: int = 0) -> np.ndarray:
+    return np.append(np.random.default_rng(seed).random((n, 2)), np.zeros((n, 1)), axis=1)
+
+
+def cylinder(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Points, and their angle and height."""
+    angle, height = np.random.default_rng(seed).random((2, n)) * [[2 * np.pi], [3]]
+    return np.stack([np.cos(angle), np.sin(angle), height], axis=1), np.stack([angle, height], axis=1)
+
+
+def mean_error(distance: np.ndarray, truth: np.ndarray) -> float:
+    away = truth > 0
+    return float((np.abs(distance - truth)[away] / truth[away]).mean())
+
+
+# The triangles.
+
+
+def test_a_sphere_is_closed_and_a_disc_is_a_disc() -> None:
+    closed = PointCloud(sphere(2000)).report()
+    assert (closed.euler_characteristic, closed.n_boundary_loops, closed.n_components) == (2, 0, 1)
+    P = plane(2000)
+    disc = PointCloud(P[np.linalg.norm(P[:, :2] - 0.5, axis=1) < 0.5]).report()
+    assert (disc.euler_characteristic, disc.n_boundary_loops, disc.n_components) == (1, 1, 1)
+    assert len(closed.nonmanifold_edges) == len(disc.nonmanifold_edges) == 0
+
+
+def test_triangles_of_a_plane_are_its_delaunay_triangles_inside() -> None:
+    from scipy.spatial import Delaunay
+
+    P = plane(1500)
+    middle = (np.abs(P[:, :2] - 0.5) < 0.35).all(axis=1)
+
+    def inside(F: np.ndarray) -> set[tuple[int, ...]]:
+        return {tuple(sorted(row)) for row in F.tolist() if middle[row].all()}
+
+    assert inside(PointCloud(P).F) == inside(Delaunay(P[:, :2]).simplices)
+
+
+def test_nothing_depends_on_where_how_large_or_in_which_order() -> None:
+    P = sphere(500)
+    turn = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
+    order = np.random.default_rng(2).permutation(len(P))
+
+    def triangles(P: np.ndarray) -> set[tuple[int, ...]]:
+        return {tuple(sorted(row)) for row in PointCloud(P).F.tolist()}
+
+    expected = triangles(P)
+    assert triangles(1e-20 * P @ turn.T) == expected
+    assert triangles(1e20 * P) == expected
+    assert triangles(P @ turn.T + 1000) == expected
+    assert {tuple(sorted(order[list(row)])) for row in triangles(P[order])} == expected
+
+
+def test_a_grid_of_cocircular_points_has_no_gap() -> None:
+    x = np.arange(20.0)
+    P = np.stack([*np.meshgrid(x, x), np.zeros((20, 20))], axis=2).reshape(-1, 3)
+    report = PointCloud(P).report()
+    assert (report.euler_characteristic, report.n_faces) == (1, 2 * 19**2)
+
+
+# Distance.
+
+
+@pytest.mark.parametrize(("refine", "most"), [(None, 0.012), ("unfold", 0.002)])
+def test_distance_on_a_sphere(refine: heat_igl.unfolding.Refine | None, most: float) -> None:
+    P = sphere(4000)
+    distances = HeatMethodSolver(PointCloud(P), refine=refine).distances([0, 1, 2])
+    assert mean_error(distances, np.stack([on_sphere(P, i) for i in range(3)])) < most
+
+
+@pytest.mark.parametrize(("refine", "most"), [(None, 0.012), ("unfold", 0.001)])
+def test_distance_on_a_cylinder_with_two_boundaries(refine: heat_igl.unfolding.Refine | None, most: float) -> None:
+    P, at = cylinder(4000)
+    difference = np.abs(at - at[0])
+    difference[:, 0] = np.minimum(difference[:, 0], 2 * np.pi - difference[:, 0])
+    distance = HeatMethodSolver(PointCloud(P), refine=refine).distance(0)
+    assert mean_error(distance, np.linalg.norm(difference, axis=1)) < most
+
+
+def test_unfolding_is_exact_in_a_plane_where_straight_lines_stay_inside() -> None:
+    P = plane(3000)
+    source = int(np.argmin(np.linalg.norm(P - [0.5, 0.5, 0], axis=1)))
+    distance = HeatMethodSolver(PointCloud(P), refine="unfold").distance(source)
+    truth = np.linalg.norm(P - P[source], axis=1)
+    inner = ~PointCloud(P).boundary
+    np.testing.assert_allclose(distance[inner], truth[inner], rtol=1e-3, atol=1e-12)
+
+
+def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary() -> None:
+    P = plane(3000)
+    cloud = PointCloud(P)
+    truth = np.linalg.norm(P - P[0], axis=1)
+    of_cloud = HeatMethodSolver(cloud).distance(0)
+    of_mesh = HeatMethodSolver(cloud.triangles, t_coef=1, laplacian="intrinsic-delaunay").distance(0)
+    assert mean_error(of_cloud, truth) < mean_error(of_mesh, truth)
+
+
+def test_uneven_density() -> None:
+    P = sphere(6000)
+    kept = np.random.default_rng(1).random(len(P)) < np.where(P[:, 2] > 0, 1.0, 0.2)
+    P = P[kept]
+    distance = HeatMethodSolver(PointCloud(P), refine="unfold").distance(0)
+    assert mean_error(distance, on_sphere(P, 0)) < 0.005
+
+
+def test_noise_is_taken_away_and_clean_points_stay() -> None:
+    P = sphere(20_000)
+    noisy = P + 0.01 * np.random.default_rng(1).standard_normal(P.shape)
+    radius = np.linalg.norm(without_noise(noisy), axis=1)
+    assert radius.std() < 0.3 * np.linalg.norm(noisy, axis=1).std()
+    assert mean_error(HeatMethodSolver(PointCloud(noisy)).distance(0), on_sphere(P, 0)) < 0.03
+    assert without_noise(P) is P
+    # Ridges and bumps of a few spacings are detail.
+    x, y = np.random.default_rng(2).random((2, 20_000))
+    waves = np.stack([x, y, 0.02 * np.abs((40 * x + 3 * y) % 2 - 1)], axis=1)
+    assert without_noise(waves) is waves
+
+
+# What scans bring along.
+
+
+def test_an_outlier_is_unreachable_and_changes_nothing_else() -> None:
+    P = sphere(2000)
+    cloud = PointCloud(np.append(P, [[0, 0, 5.0]], axis=0))
+    distance = HeatMethodSolver(cloud).distance(0)
+    assert np.isinf(distance[-1])
+    assert np.isfinite(distance[:-1]).all()
+    assert mean_error(distance[:-1], on_sphere(P, 0)) < 0.015
+    assert cloud.report().unreferenced_vertices.tolist() == [2000]
+
+
+def test_copies_of_a_point_are_at_distance_0_of_each_other() -> None:
+    P = sphere(1000)
+    P = np.append(P, P[[3, 3, 700]], axis=0)
+    distance = HeatMethodSolver(PointCloud(P), refine="unfold").distance(3)
+    np.testing.assert_allclose(distance[[1000, 1001]], 0, atol=1e-6)
+    np.testing.assert_allclose(distance[1002], distance[700], atol=1e-6)
+    assert np.isfinite(HeatMethodSolver(PointCloud(P)).distance(3)).all()
+
+
+def two_sheets(n: int, gap: float) -> tuple[np.ndarray, np.ndarray]:
+    lower, upper = plane(n, 0), plane(n, 1) + np.array([0, 0, gap])
+    return np.concatenate([lower, upper]), np.repeat([[0, 0, -1.0], [0, 0, 1.0]], n, axis=0)
+
+
+def test_normals_keep_sheets_apart_that_nearly_touch() -> None:
+    P, normals = two_sheets(2000, 0.002)
+    cloud = PointCloud(P, normals)
+    assert (cloud.components[:2000] == cloud.components[0]).all()
+    assert (cloud.components[2000:] != cloud.components[0]).all()
+    distance = HeatMethodSolver(cloud).distance(0)
+    assert np.isinf(distance[2000:]).all()
+    assert np.isfinite(distance[:2000]).all()
+
+
+def test_sheets_further_apart_than_the_spacing_need_no_normals() -> None:
+    P, _ = two_sheets(2000, 0.2)
+    cloud = PointCloud(P)
+    assert not np.isin(cloud.components[2000:], cloud.components[:2000]).any()
+
+
+# The solver's other questions need no special case.
+
+
+def test_batches_voronoi_and_farthest_points_as_on_a_mesh() -> None:
+    P = sphere(1500)
+    solver = HeatMethodSolver(PointCloud(P))
+    one_by_one = np.stack([solver.distance(i) for i in range(5)])
+    np.testing.assert_allclose(solver.distances(range(5)), one_by_one, atol=1e-9)
+    cells = solver.voronoi([0, 1, 2])
+    nearest = np.stack([on_sphere(P, i) for i in range(3)])
+    clear = np.diff(np.sort(nearest, axis=0)[:2], axis=0)[0] > 0.1
+    assert (cells.labels == nearest.argmin(axis=0))[clear].all()
+    # Four points far from each other on a sphere are near a tetrahedron.
+    chosen = farthest_points(solver, 4)
+    assert min(on_sphere(P, int(i))[np.setdiff1d(chosen, i)].min() for i in chosen) > 1.3
+
+
+def test_a_cloud_and_its_solver_are_pickled() -> None:
+    cloud = PointCloud(sphere(300), sphere(300))
+    copy = pickle.loads(pickle.dumps(cloud))
+    for name in ("P", "F", "normals"):
+        np.testing.assert_array_equal(getattr(copy, name), getattr(cloud, name))
+    solver = HeatMethodSolver(cloud)
+    assert (pickle.loads(pickle.dumps(solver)).distance(0) == solver.distance(0)).all()
+
+
+def test_points_move() -> None:
+    P = sphere(800)
+    solver = HeatMethodSolver(PointCloud(P))
+    np.testing.assert_allclose(solver.with_vertices(2 * P).distance(0), 2 * solver.distance(0), rtol=1e-9)
+    with pytest.raises(MeshError, match="P has 799 rows, but the cloud has 800 points"):
+        solver.with_vertices(P[:-1])
+
+
+def test_a_batch_on_dask_takes_clouds(tmp_path) -> None:
+    pytest.importorskip("distributed")
+    pytest.importorskip("zarr")
+    zarr = pytest.importorskip("zarr")
+    from heat_igl import cluster
+
+    cloud = PointCloud(sphere(300))
+    cluster.distances({"cloud": cloud}, [[0], [1]], tmp_path / "store", dtype="float64")
+    stored = [array for _, array in zarr.open_group(tmp_path / "store", mode="r")["cloud"].arrays() if array.ndim == 2]
+    expected = HeatMethodSolver(cloud).distances([0, 1])
+    assert any(a.shape == expected.shape and np.allclose(a[:], expected, atol=1e-9) for a in stored)
+
+
+# Bad arguments.
+
+
+def with_entry(array: np.ndarray, row: int, value: float) -> np.ndarray:
+    changed = array.copy()
+    changed[row] = value
+    return changed
+
+
+LINE = np.arange(30.0)[:, None] * [1.0, 2.0, 3.0]
+BAD = {
+    "three points": ((np.eye(3),), "P has 3 points: a surface needs four or more"),
+    "no points": ((np.empty((0, 3)),), "P is empty"),
+    "all equal": ((np.ones((9, 3)),), "all 9 points in P are equal"),
+    "on a line": ((LINE,), "all 30 points in P lie on a line"),
+    "on a line far away": ((LINE + 1e6,), "all 30 points in P lie on a line"),
+    "nan": ((with_entry(sphere(9), 4, np.nan),), r"P\[4, 0\] is nan \(1 of 9 points are not finite\)"),
+    "planar": ((np.zeros((9, 2)),), r"P must have shape \(n, 3\), but it has shape \(9, 2\)"),
+    "huge": ((1e70 * sphere(9),), "P spans .* rescale P"),
+    "normals nan": ((sphere(9), with_entry(sphere(9), 2, np.nan)), r"normals\[2, 0\] is nan \(1 of 9 normals"),
+    "normals zero": ((sphere(9), with_entry(sphere(9), 5, 0)), r"normals\[5\] has length 0 \(1 of 9 normals have\)"),
+    "too few normals": ((sphere(9), sphere(8)), r"normals must have shape \(9, 3\)"),
+    "complex normals": ((sphere(9), sphere(9) * 1j), "normals must hold real numbers"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD.values(), ids=BAD.keys())
+def test_bad_arguments(arguments: tuple[np.ndarray, ...], message: str) -> None:
+    with pytest.raises(MeshError, match=message):
+        PointCloud(*arguments)
+
+
+def test_four_points_are_enough_and_arrays_are_read_only() -> None:
+    cloud = PointCloud([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], 5 * np.ones((4, 3)))
+    assert cloud.n_vertices == 4
+    np.testing.assert_allclose(np.linalg.norm(cloud.normals, axis=1), 1)
+    for array in (cloud.P, cloud.normals):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+    np.testing.assert_allclose(
+        HeatMethodSolver(PointCloud(cloud.P), refine="unfold").distance(0), [0, 1, 1, np.sqrt(2)], atol=1e-12
+    )
+
+
+def test_points_without_triangles_are_an_error() -> None:
+    # Neighbours of opposite normals only: no point has two neighbours on its own sheet.
+    P = plane(4)
+    normals = np.array([[0, 0, 1.0], [0, 0, -1], [0, 0, 1], [0, 0, -1]])
+    with pytest.raises(MeshError, match="no three points of P are neighbours on a surface"):
+        HeatMethodSolver(PointCloud(P, normals))
+
+
+# Files.
+
+PCD = """# .PCD v0.7
+VERSION 0.7
+FIELDS x y z rgb normal_x normal_y normal_z
+SIZE 4 4 4 4 4 4 4
+TYPE F F F U F F F
+COUNT 1 1 1 1 1 1 1
+WIDTH 40
+HEIGHT 1
+POINTS 40
+DATA {}
+"""
+
+
+def written(folder, kind: str, P: np.ndarray, N: np.ndarray):
+    """A file of points and normals that single precision holds exactly."""
+    path = folder / f"cloud.{kind.partition(' ')[0]}"
+    rows = np.concatenate([P, N], axis=1)
+    if kind == "ply":
+        header = "ply\nformat ascii 1.0\nelement vertex 40\n"
+        header += "".join(f"property float {name}\n" for name in "x y z nx ny nz".split()) + "end_header\n"
+        path.write_text(header + "\n".join(" ".join(map(repr, row)) for row in rows.tolist()))
+    elif kind == "obj":
+        lines = [f"v {' '.join(map(repr, p))}" for p in P.tolist()]
+        path.write_text("\n".join([*lines, *(f"vn {' '.join(map(repr, v))}" for v in N.tolist())]))
+    elif kind == "xyz":
+        path.write_text("# points\n" + "\n".join(", ".join(map(repr, row)) for row in rows.tolist()))
+    elif kind == "npy":
+        np.save(path, rows)
+    elif kind == "pcd ascii":
+        table = np.insert(rows, 3, 7, axis=1)
+        path.write_text(PCD.format("ascii") + "\n".join(" ".join(map(repr, row)) for row in table.tolist()))
+    else:
+        table = np.zeros(len(rows), "f4,f4,f4,u4,f4,f4,f4")
+        for name, column in zip(("f0", "f1", "f2", "f4", "f5", "f6"), rows.T, strict=True):
+            table[name] = column
+        path.write_bytes(PCD.format("binary").encode() + table.tobytes())
+    return path
+
+
+@pytest.mark.parametrize("kind", ["ply", "obj", "xyz", "npy", "pcd ascii", "pcd binary"])
+def test_formats(tmp_path, kind: str) -> None:
+    P = sphere(40).astype(np.float32).astype(np.float64)
+    cloud = read_point_cloud(written(tmp_path, kind, P, P))
+    np.testing.assert_array_equal(cloud.P, P)
+    np.testing.assert_allclose(cloud.normals, P, atol=1e-6)
+    assert read_point_cloud(written(tmp_path, kind, P, 0 * P)).normals is None
+
+
+def test_faces_of_a_mesh_are_ignored(tmp_path) -> None:
+    mesh = shapes.icosphere(1)
+    for name in ("mesh.ply", "mesh.obj"):
+        heat_igl.write_mesh(tmp_path / name, mesh)
+        np.testing.assert_array_equal(read_point_cloud(tmp_path / name).P, mesh.V)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.xyz", "0 0 0\n1 0 0\n1 2\n", r"line 3 \(1 2\): a point has 3 numbers, or 6 with a normal"),
+        ("a.xyz", "0 0 0\n1 0 x\n", "line 2 .*'x' is not a number"),
+        ("a.xyz", "0 0 0\n1 0 0\n", "a.xyz: P has 2 points"),
+        ("a.obj", "v 0 0\n", "line 1 .*three numbers must follow v"),
+        ("a.obj", "vn 0 0 1\n", "the file has no points"),
+        ("a.npy", "no array", "not an array in the format of numpy.save"),
+        ("a.pcd", "FIELDS x y z\n", "the header has no line 'DATA ascii'"),
+        ("a.pcd", PCD.format("binary_compressed"), "DATA binary_compressed is not read"),
+        ("a.pcd", PCD.format("binary"), "announces 40 points, but the file ends before them"),
+        ("a.pcd", PCD.format("ascii") + "1 2 3 4 5 6 7\n", "announces 40 points, but 1 lines follow"),
+        ("a.pcd", PCD.replace("SIZE 4 ", "SIZE ").format("ascii"), "needs FIELDS, SIZE, TYPE"),
+        ("a.pcd", PCD.replace("x y z", "x y w").format("ascii"), "points need x, y and z"),
+        ("a.ply", "ply\nformat ascii 1.0\nend_header\n", "no element 'vertex'"),
+        ("a.las", "", "unknown extension '.las'; the formats are .ply, .obj, .xyz, .npy, .pcd"),
+    ],
+)
+def test_bad_files(tmp_path, name: str, text: str, message: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(MeshError, match=message):
+        read_point_cloud(tmp_path / name)
+
+
+def test_npy_of_another_shape(tmp_path) -> None:
+    np.save(tmp_path / "a.npy", np.zeros((5, 4)))
+    with pytest.raises(MeshError, match=r"must have shape \(n, 3\), or \(n, 6\) with normals"):
+        read_point_cloud(tmp_path / "a.npy")
+
+
+# The kernel.
+
+
+def test_a_star_is_the_delaunay_star() -> None:
+    """In a plane no triangle of a star holds another point in its circle."""
+    P = plane(400)
+    near = neighbourhoods(P)
+    F = cloud_triangles(P, near, oriented=False)
+    a, b, c = (P[F[:, i], :2] for i in range(3))
+    # Circumcentre relative to a.
+    u, v = b - a, c - a
+    d = 2 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    uu, vv = (u**2).sum(axis=1), (v**2).sum(axis=1)
+    centre = a + np.stack([v[:, 1] * uu - u[:, 1] * vv, u[:, 0] * vv - v[:, 0] * uu], axis=1) / d[:, None]
+    radius = np.linalg.norm(centre - a, axis=1)
+    distance = np.linalg.norm(centre[:, None] - P[None, :, :2], axis=2)
+    inner = (np.abs(P[F][:, :, :2] - 0.5) < 0.35).all(axis=(1, 2))
+    assert inner.sum() > 100
+    assert (distance[inner] > radius[inner, None] * (1 - 1e-9)).all()
