@@ -13,7 +13,7 @@ from rich.console import Console
 
 from heat_igl.cli.options import choice, one_of
 from heat_igl.cli.output import say
-from heat_igl.unfolding import Refine
+from heat_igl.heat_method import Refine
 
 __all__ = ["COMMANDS"]
 

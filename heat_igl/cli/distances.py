@@ -15,15 +15,21 @@ import heat_igl
 from heat_igl.cli.options import MeshArgument, choice, position, positive
 from heat_igl.cli.output import check_curves, check_outputs, print_rows
 from heat_igl.errors import SourceError
-from heat_igl.heat_method import DistanceMethod, HeatMethodSolver, Magnitude, SolverOptions, geodesic_distance
+from heat_igl.heat_method import (
+    Backend,
+    Boundary,
+    DistanceMethod,
+    HeatMethodSolver,
+    Laplacian,
+    Magnitude,
+    Refine,
+    SolverOptions,
+    geodesic_distance,
+)
 from heat_igl.io import read_mesh, write_mesh
-from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, closest_points
-from heat_igl.operators import Laplacian
 from heat_igl.sources import vertex_sources
-from heat_igl.steps import Boundary
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import Refine
 
 __all__ = ["COMMANDS"]
 

@@ -12,11 +12,9 @@ from rich.console import Console
 from heat_igl.cli.demo import demonstrate
 from heat_igl.cli.options import MeshArgument, choice, positive
 from heat_igl.cli.output import check_page, check_writable, print_rows, say
-from heat_igl.heat_method import SolverOptions
+from heat_igl.heat_method import Boundary, Refine, SolverOptions
 from heat_igl.io import read_mesh
 from heat_igl.sources import vertex_sources
-from heat_igl.steps import Boundary
-from heat_igl.unfolding import Refine
 
 __all__ = ["COMMANDS"]
 

@@ -17,10 +17,9 @@ from heat_igl.cluster.report import BatchReport, rows
 from heat_igl.cluster.store import Store
 from heat_igl.cluster.worker import Outcome, Task, begin, release, resume
 from heat_igl.errors import BatchError
-from heat_igl.heat_method import SolverOptions
+from heat_igl.heat_method import Refine, SolverOptions
 from heat_igl.mesh import MeshLike
 from heat_igl.sources import Sources
-from heat_igl.unfolding import Refine
 
 __all__ = ["distances"]
 

@@ -12,8 +12,7 @@ import numpy as np
 from heat_igl.drawing.exploration import Exploration
 from heat_igl.drawing.shading import isoline_spacing
 from heat_igl.errors import MissingExtraError
-from heat_igl.steps import Boundary
-from heat_igl.unfolding import Refine
+from heat_igl.heat_method import Boundary, Refine
 
 __all__ = ["Exploration", "Window", "display_problem"]
 

@@ -2,7 +2,7 @@
 
 from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.front_door import DistanceMethod, geodesic_distance
-from heat_igl.heat_method.options import Magnitude, SolverOptions
+from heat_igl.heat_method.options import Backend, Boundary, Laplacian, Magnitude, Refine, SolverOptions
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.heat_method.solver import HeatMethodSolver, heat_method_distance
 from heat_igl.heat_method.time_step import smallest_time_step
@@ -10,12 +10,16 @@ from heat_igl.heat_method.vector_heat import VectorHeatSolver
 
 __all__ = [
     "AnswerCheck",
+    "Backend",
+    "Boundary",
     "Diagnostics",
     "DistanceMethod",
     "HeatMethodSolver",
     "HeatSolution",
     "LabelledDistance",
+    "Laplacian",
     "Magnitude",
+    "Refine",
     "SolverOptions",
     "geodesic_distance",
     "VectorHeatSolver",

@@ -12,7 +12,7 @@ from heat_igl.operators import Laplacian, Operators, check_laplacian
 from heat_igl.steps import Boundary, check_boundary
 from heat_igl.unfolding import Refine
 
-__all__ = ["Magnitude", "SolverOptions", "positive"]
+__all__ = ["Backend", "Boundary", "Laplacian", "Magnitude", "Refine", "SolverOptions", "positive"]
 
 Magnitude = Literal["auto", "unit", "damped"]
 

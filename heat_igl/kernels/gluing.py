@@ -6,25 +6,10 @@ mesh that is asked once; `heat_igl.intrinsic` does the same with numpy, and keep
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.libc.math import sqrt
 
 __all__ = ["breadth_first", "flip", "glue"]
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _next(h: cython.int) -> cython.int:
-    return h - 2 if h % 3 == 2 else h + 1
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _previous(h: cython.int) -> cython.int:
-    return h + 2 if h % 3 == 0 else h - 1
 
 
 @cython.cfunc
@@ -94,12 +79,12 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
             for c in range(3):
                 vertex[3 * f + c] = F[f, c]
         for h in range(3 * m):
-            tail, head = vertex[_next(h)], vertex[_previous(h)]
+            tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
             begin[(tail if tail < head else head) + 1] += 1
         for i in range(n):
             begin[i + 1] += begin[i]
         for h in range(3 * m):
-            tail, head = vertex[_next(h)], vertex[_previous(h)]
+            tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
             lower = tail if tail < head else head
             by_lower[begin[lower]] = h
             begin[lower] += 1
@@ -109,7 +94,7 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
             while i < begin[lower]:
                 h = by_lower[i]
                 i += 1
-                tail, head = vertex[_next(h)], vertex[_previous(h)]
+                tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
                 upper = head if tail == lower else tail
                 ring[h] = h
                 if seen_from[upper] != lower:
@@ -126,7 +111,7 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
                 length[h] = length[p]
                 if twin[p] == -1:
                     twin[p], twin[h] = h, p
-                    if vertex[_next(p)] == tail:
+                    if vertex[next_half_edge(p)] == tail:
                         aligned[p] = aligned[h] = False
                         n_across += 2
                     continue
@@ -211,8 +196,8 @@ def flip(
                 f, g = h // 3, t // 3
                 if f == g:
                     continue
-                ab, bp, pa = length[h], length[_next(h)], length[_previous(h)]
-                aq, qb = length[_next(t)], length[_previous(t)]
+                ab, bp, pa = length[h], length[next_half_edge(h)], length[previous_half_edge(h)]
+                aq, qb = length[next_half_edge(t)], length[previous_half_edge(t)]
                 p, q = bp * bp + pa * pa, aq * aq + qb * qb
                 # The cotangents, both multiplied by twice the areas.
                 x = (p - ab * ab) * area[g] + (q - ab * ab) * area[f]
@@ -230,28 +215,28 @@ def flip(
                     continue
                 n_flips += 1
                 area[f], area[g] = x, y
-                vertex[_previous(h)] = vertex[t]
-                vertex[_previous(t)] = vertex[h]
-                k, i = twin[_next(t)], twin[_next(h)]
+                vertex[previous_half_edge(h)] = vertex[t]
+                vertex[previous_half_edge(t)] = vertex[h]
+                k, i = twin[next_half_edge(t)], twin[next_half_edge(h)]
                 # aq moves to the place of h, bp to that of t; each may be glued to the other.
-                if k == _next(h):
+                if k == next_half_edge(h):
                     k = t
-                if i == _next(t):
+                if i == next_half_edge(t):
                     i = h
                 length[h], length[t] = aq, bp
-                length[_next(h)] = length[_next(t)] = pq
-                twin[_next(h)], twin[_next(t)] = _next(t), _next(h)
+                length[next_half_edge(h)] = length[next_half_edge(t)] = pq
+                twin[next_half_edge(h)], twin[next_half_edge(t)] = next_half_edge(t), next_half_edge(h)
                 twin[h] = k
                 if k >= 0:
                     twin[k] = h
                 elif k == -2:
-                    _move(ring, _next(t), h)
+                    _move(ring, next_half_edge(t), h)
                 twin[t] = i
                 if i >= 0:
                     twin[i] = t
                 elif i == -2:
-                    _move(ring, _next(h), t)
-                around[0], around[1], around[2], around[3] = h, _previous(h), t, _previous(t)
+                    _move(ring, next_half_edge(h), t)
+                around[0], around[1], around[2], around[3] = h, previous_half_edge(h), t, previous_half_edge(t)
                 for i in range(4):
                     k = around[i]
                     if twin[k] > k:

@@ -7,6 +7,7 @@ Delaunay again. Only for surfaces without a boundary: there the walk cannot leav
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.triangles import foot
 from cython.cimports.libc.math import atan2, sqrt
 
 __all__ = ["refine"]
@@ -242,8 +243,8 @@ class _Triangulation(_Queue):
         pa: cython.double = self.l[f, c2]
         aq: cython.double = self.l[g, e1]
         qb: cython.double = self.l[g, e2]
-        xp: cython.double = _foot(ab, pa, bp)
-        xq: cython.double = _foot(ab, aq, qb)
+        xp: cython.double = foot(ab, pa, bp)
+        xq: cython.double = foot(ab, aq, qb)
         height: cython.double = 2.0 * (_area(ab, pa, bp) + _area(ab, aq, qb)) / ab
         pq: cython.double = sqrt((xp - xq) * (xp - xq) + height * height)
         i: cython.longlong = self._note(1, h, t)
@@ -304,7 +305,7 @@ class _Refinement(_Triangulation):
         if u >= 0.0 and v >= 0.0 and w >= 0.0:
             return self._insert(f, u, v, w)
         # Laid out with corner 0 in the origin and corner 1 on the first axis; the walk begins in the centroid.
-        x2: cython.double = _foot(c, b, a)
+        x2: cython.double = foot(c, b, a)
         y2: cython.double = 2.0 * _area(a, b, c) / c
         ox: cython.double = (c + x2) / 3.0
         oy: cython.double = y2 / 3.0
@@ -341,7 +342,7 @@ class _Refinement(_Triangulation):
             e: cython.int = t % 3
             # Seen from g, the side runs from s to r; its apex lies beyond.
             base: cython.double = self.l[g, e]
-            along: cython.double = _foot(base, self.l[g, (e + 2) % 3], self.l[g, (e + 1) % 3]) / base
+            along: cython.double = foot(base, self.l[g, (e + 2) % 3], self.l[g, (e + 1) % 3]) / base
             across: cython.double = 2.0 * _area(base, self.l[g, (e + 1) % 3], self.l[g, (e + 2) % 3]) / (base * base)
             ex: cython.double = rx - sx
             ey: cython.double = ry - sy
@@ -446,15 +447,6 @@ def _area(a: cython.double, b: cython.double, c: cython.double) -> cython.double
         a, b = b, a
     product: cython.double = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))
     return 0.25 * sqrt(product) if product > 0.0 else 0.0
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _foot(base: cython.double, left: cython.double, right: cython.double) -> cython.double:
-    """How far along its base, from the end of the side `left`, the apex of a triangle lies."""
-    return 0.5 * (base + (left - right) * ((left + right) / base))
 
 
 def refine(

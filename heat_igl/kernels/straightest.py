@@ -1,6 +1,7 @@
 """Straightest geodesics over the triangles of an oriented manifold triangulation (Polthier and Schmies 1998)."""
 
 import cython
+from cython.cimports.heat_igl.kernels.triangles import foot
 from cython.cimports.libc.math import atan2, cos, fabs, hypot, sin
 
 __all__ = ["Triangles", "trace"]
@@ -164,7 +165,7 @@ def _trace_one(
             dy = ray.dy
         base = tables.l[f, side]
         px[0], py[0], px[1], py[1] = 0.0, 0.0, base, 0.0
-        px[2] = _foot(base, tables.l[f, (side + 2) % 3], tables.l[f, (side + 1) % 3])
+        px[2] = foot(base, tables.l[f, (side + 2) % 3], tables.l[f, (side + 1) % 3])
         py[2] = 2.0 * tables.area[f] / base
         if inside:
             sx = entry[1] * base + entry[2] * px[2]
@@ -292,15 +293,6 @@ def _store(
     for c in range(3):
         points[6 * n + c] = start[c]
         points[6 * n + 3 + c] = end[c]
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _foot(base: cython.double, left: cython.double, right: cython.double) -> cython.double:
-    """How far along its base, from the end of the side `left`, the apex of a triangle lies."""
-    return 0.5 * (base + (left - right) * ((left + right) / base))
 
 
 def trace(

@@ -18,6 +18,7 @@ Half-edge ``3 f + c`` is the side of face f opposite its corner c; the corner ca
 """
 
 import cython
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 from cython.cimports.libc.stdlib import free, malloc, realloc
 from cython.cimports.libc.string import memcpy, memmove
@@ -80,7 +81,7 @@ def shapes(
             if twin[h] > h and bulge[h] + bulge[twin[h]] < -1e-6 * length[h]:
                 is_delaunay = False
             elif twin[h] == -2:
-                kind[vertex[_next(h)]] = kind[vertex[_previous(h)]] = JOINS
+                kind[vertex[next_half_edge(h)]] = kind[vertex[previous_half_edge(h)]] = JOINS
                 is_delaunay = False
     return is_delaunay
 
@@ -94,22 +95,6 @@ def _double_area(a: cython.double, b: cython.double, c: cython.double) -> cython
     s: cython.double = 0.5 * (a + b + c)
     product: cython.double = s * (s - a) * (s - b) * (s - c)
     return 2.0 * sqrt(product) if product > 0.0 else 0.0
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _next(h: cython.int) -> cython.int:
-    return h - 2 if h % 3 == 2 else h + 1
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _previous(h: cython.int) -> cython.int:
-    return h + 2 if h % 3 == 0 else h - 1
 
 
 @cython.cfunc
@@ -181,12 +166,12 @@ def _pop(s: cython.pointer(Search)) -> Entry:
 def _beyond(s: cython.pointer(Search), k: cython.int, side: cython.int) -> cython.int:
     """The corner of the same vertex beyond a side of corner k; -1 where there is not just one face."""
     t: cython.int = s.twin[side]
-    is_tail: cython.bint = side == _previous(k)
+    is_tail: cython.bint = side == previous_half_edge(k)
     if t < 0:
         return -1
     if s.aligned[side]:
         is_tail = not is_tail
-    return _next(t) if is_tail else _previous(t)
+    return next_half_edge(t) if is_tail else previous_half_edge(t)
 
 
 @cython.cfunc
@@ -209,7 +194,7 @@ def _classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
     """Walk around v: whether its faces are one fan, and whether the angles exceed 2 pi."""
     start: cython.int = s.corner_of_vertex[v]
     k: cython.int = start
-    side: cython.int = _previous(start)
+    side: cython.int = previous_half_edge(start)
     beyond: cython.int
     n_corners: cython.int = 0
     n_seen: cython.int = 0
@@ -242,7 +227,7 @@ def _classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
             return BENDS
     # An open fan: from the start to its other end.
     k = start
-    side = _previous(start)
+    side = previous_half_edge(start)
     while n_seen < n_corners:
         k = _beyond(s, k, side)
         if k < 0:
@@ -294,8 +279,8 @@ def _emit(
     """A window over the half-edge k, from the vertex opposite; start and stop from the tail of k."""
     one: Window
     length: cython.double = s.length[k]
-    right: cython.double = s.length[_previous(k)]  # tail to apex
-    left: cython.double = s.length[_next(k)]
+    right: cython.double = s.length[previous_half_edge(k)]  # tail to apex
+    left: cython.double = s.length[next_half_edge(k)]
     if s.twin[k] == -1:
         return
     one.x = length - 0.5 * (length + (right - left) * (right + left) / length)
@@ -314,8 +299,10 @@ def _emit(
 @cython.exceptval(check=False)
 def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset: cython.double) -> cython.void:
     """Distances along the two sides of corner k from its vertex v."""
-    _relax(s, s.vertex[_next(k)], offset + s.length[_previous(k)], v, _next(k), s.length[_next(k)])
-    _relax(s, s.vertex[_previous(k)], offset + s.length[_next(k)], v, _previous(k), 0.0)
+    head: cython.int = next_half_edge(k)
+    tail: cython.int = previous_half_edge(k)
+    _relax(s, s.vertex[head], offset + s.length[tail], v, head, s.length[head])
+    _relax(s, s.vertex[tail], offset + s.length[head], v, tail, 0.0)
 
 
 @cython.cfunc
@@ -380,7 +367,7 @@ def _fill(
             far = length - _reach(s, last) + SHADOW_MARGIN * length
         _reach_ends(s, k, v, offset)
         if near < far:
-            if side == _previous(k):
+            if side == previous_half_edge(k):
                 _emit(s, k, near, far, v, offset)
             else:
                 _emit(s, k, length - far, length - near, v, offset)
@@ -419,15 +406,15 @@ def _shed(s: cython.pointer(Search), v: cython.int) -> cython.void:
             k = s.next_corner[k]
         return
     # From the apex of h: the angles between the way back, to where the path crosses h, and the two sides.
-    length, left_length, right_length = s.length[h], s.length[_previous(h)], s.length[_next(h)]
+    length, left_length, right_length = s.length[h], s.length[previous_half_edge(h)], s.length[next_half_edge(h)]
     x = 0.5 * (length + (left_length - right_length) * (left_length + right_length) / length)
     y = s.double_area[h // 3] / length
     norm = sqrt((at - x) * (at - x) + y * y)
     left.cosine, left.sine = (x * (x - at) + y * y) / (norm * left_length), y * at / (norm * left_length)
     right.cosine = ((length - x) * (at - x) + y * y) / (norm * right_length)
     right.sine = y * (length - at) / (norm * right_length)
-    has_left = _straighten(s, h, _previous(h), cython.address(left))
-    has_right = _straighten(s, h, _next(h), cython.address(right))
+    has_left = _straighten(s, h, previous_half_edge(h), cython.address(left))
+    has_right = _straighten(s, h, next_half_edge(h), cython.address(right))
     # Around a closed fan both rays bound one shadow; in an open one there are two, each up to the boundary.
     if s.kind[v] == BENDS:
         if has_left and has_right:
@@ -555,7 +542,7 @@ def _add(
     elif t == -2:
         t = s.ring[e]
         while t != e:
-            _append(s, t, run, n, in_front, s.vertex[_next(t)] == s.vertex[_next(e)])
+            _append(s, t, run, n, in_front, s.vertex[next_half_edge(t)] == s.vertex[next_half_edge(e)])
             t = s.ring[t]
 
 
@@ -695,8 +682,8 @@ def _trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.
     outcome: cython.int
     w: Window
     length: cython.double = s.length[h]
-    from_tail: cython.double = s.distance[s.vertex[_next(h)]]
-    from_head: cython.double = s.distance[s.vertex[_previous(h)]]
+    from_tail: cython.double = s.distance[s.vertex[next_half_edge(h)]]
+    from_head: cython.double = s.distance[s.vertex[previous_half_edge(h)]]
     narrow: cython.double = NARROW * length
     a: cython.double
     b: cython.double
@@ -797,8 +784,8 @@ def _cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     one: cython.pointer(List) = cython.address(s.lists[place])
     windows: cython.pointer(Window) = one.windows
     n: cython.int = one.count
-    left: cython.int = _previous(h)
-    right: cython.int = _next(h)
+    left: cython.int = previous_half_edge(h)
+    right: cython.int = next_half_edge(h)
     i: cython.int
     n_left: cython.int = 0
     n_right: cython.int = 0
@@ -969,7 +956,7 @@ def _measure(
     distance: cython.double
     w: cython.pointer(Window)
     while j >= 0:
-        x = s.target[3 * j + _previous(h) % 3] * length + s.target[3 * j + h % 3] * apex_x
+        x = s.target[3 * j + previous_half_edge(h) % 3] * length + s.target[3 * j + h % 3] * apex_x
         y = s.target[3 * j + h % 3] * apex_y
         for i in range(n):
             w = windows + i
@@ -1055,10 +1042,10 @@ def _emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         if at[c] <= 0.0:
             continue  # on the side itself, the source belongs to the face beyond it too
         length = s.length[h]
-        left_length = s.length[_previous(h)]
-        right_length = s.length[_next(h)]
+        left_length = s.length[previous_half_edge(h)]
+        right_length = s.length[next_half_edge(h)]
         one.x = at[c] * 0.5 * (length + (left_length - right_length) * (left_length + right_length) / length)
-        one.x = length - (one.x + at[_previous(h) % 3] * length)
+        one.x = length - (one.x + at[previous_half_edge(h) % 3] * length)
         one.depth = at[c] * s.double_area[f] / length
         one.start = 0.0
         one.stop = length
