@@ -57,7 +57,7 @@ def test_the_bits_are_those_of_a_solver(client, tmp_path, options):
         np.testing.assert_array_equal(group["source_vertex"][:], np.arange(n))
         np.testing.assert_array_equal(group["distance"][:], expected(mesh, range(n), **options))
         assert group.attrs["t"] == pytest.approx(
-            heat_igl.HeatMethodSolver(mesh, t_coef=options.get("t_coef")).t, rel=1e-15
+            heat_igl.HeatMethodSolver(mesh, t_coef=options.get("t_coef"), refine=options.get("refine")).t, rel=1e-15
         )
 
 

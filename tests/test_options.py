@@ -38,7 +38,11 @@ def test_options_have_the_same_names_and_defaults_everywhere(make, others):
     [
         ("t_coef", 0, "t_coef must be a positive number, not 0"),
         ("t", "soon", "t must be a positive number, not 'soon'"),
-        ("laplacian", "graph", "laplacian must be 'intrinsic-delaunay' or 'cotan', not 'graph'"),
+        (
+            "laplacian",
+            "graph",
+            "laplacian must be 'auto', 'intrinsic-delaunay', 'intrinsic-delaunay-refined' or 'cotan', not 'graph'",
+        ),
         ("boundary", "robin", "boundary must be 'neumann', 'dirichlet' or 'average', not 'robin'"),
         ("magnitude", "log", "magnitude must be 'auto', 'unit' or 'damped', not 'log'"),
         ("refine", "fold", "refine must be None, 'sweep', 'unfold' or 'exact', not 'fold'"),

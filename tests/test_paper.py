@@ -46,7 +46,8 @@ def test_in_single_precision_it_rises_before_56_because_squares_underflow(square
     double, single = errors(squares), errors(squares, dtype=np.float32)
     at = {i: k for k, i in enumerate(squares)}
     # The same curve as long as nothing underflows, then a rise that goes on.
-    np.testing.assert_allclose(single[: at[52]], double[: at[52]], rtol=0.01)
+    # Rounding in single precision depends on the processor's vectors: 0.5 to 1.2 % were seen.
+    np.testing.assert_allclose(single[: at[52]], double[: at[52]], rtol=0.015)
     assert (np.diff(single[at[54] :]) > 0).all()
     assert single[at[56]] > 1.05 * double[at[56]]
     assert single[at[58]] > 1.2 * double[at[58]]

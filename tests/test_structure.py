@@ -82,9 +82,6 @@ class Box:
         return lid
 
 
-@jit(nogil=True)
-def kernel():
-    return 1
 ''',
         kernels____init__="def compiled():\n    return 1\n",
     )

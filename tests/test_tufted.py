@@ -360,6 +360,8 @@ def test_suzanne():
     assert heat_error(fine, sources, truth) < 0.025
 
 
+# The operators that the cover is compared with are as far off as the warning says.
+@pytest.mark.filterwarnings("ignore:.*heat gave distances:heat_igl.AccuracyWarning")
 def test_truck():
     """54 edges of three faces and slivers of 179.7 degrees at them."""
     truck = heat_igl.read_mesh(shared_path("truck.obj"))

@@ -299,14 +299,14 @@ def test_without_a_display_the_command_writes_a_page(folder: Path, monkeypatch: 
         pytest.skip("only Linux tells whether there is a display")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    done = run(view("ball.off", "--source", "7", "--source", "3", "--t-coef", "2"), cwd=folder)
+    done = run(view("ball.off", "--source", "7", "--source", "3", "--t-coef", "0.5"), cwd=folder)
     assert done.returncode == 0, done.stderr
     assert done.stderr == "heat-igl: no window: there is no display\n"
     assert "ball-view.html" in done.stdout
     text = (folder / "ball-view.html").read_text(encoding="utf8")
     assert "<title>ball.off</title>" in text
     assert '"sources": [3, 7]' in text
-    assert "Distance by the heat method, t = 2 h^2, boundary neumann." in text
+    assert "Distance by the heat method, t = 0.5 h^2, boundary neumann." in text
 
 
 def test_the_command_writes_the_page_that_it_is_told_to(folder: Path) -> None:

@@ -104,6 +104,7 @@ class Checker:
         # A copy: the positions of a mesh are read-only, which kernels do not take.
         self._V = None if V is None else np.array(V, np.float64, order="C")
         self._F = None if domain.surface is None else domain.surface.given_faces
+        self._referenced = domain.referenced
         vertices = _sample(np.flatnonzero(domain.referenced[: domain.n_given]), _MOST_VERTICES)
         self._vertices = vertices
         self._positions = None if V is None else np.ascontiguousarray(V[vertices])
@@ -157,11 +158,15 @@ class Checker:
         """Positions (k, 3) and offsets (k,) of the sources; None for curves, which have no one position."""
         if self._V is None or len(sources.segments.faces):
             return None
-        positions, offsets = self._V[sources.vertices], sources.vertex_offset
+        # From a vertex that no face uses there is no distance to check.
+        used = self._referenced[sources.vertices]
+        positions, offsets = self._V[sources.vertices[used]], sources.vertex_offset[used]
         points = sources.points
         if len(points.faces) and self._F is not None:
             inside = np.einsum("kc,kcx->kx", points.barycentric, self._V[self._F[points.faces]])
             positions, offsets = np.concatenate([positions, inside]), np.concatenate([offsets, points.offset])
+        if not len(offsets):
+            return None
         return np.ascontiguousarray(positions), np.ascontiguousarray(offsets, np.float64)
 
 

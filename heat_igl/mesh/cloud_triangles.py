@@ -9,7 +9,6 @@ small gaps are closed, and points in no triangle are inserted into the nearest o
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from heat_igl.kernels.local_delaunay import delaunay_stars, fitting_triangles
 from heat_igl.mesh.connectivity import ascending_rows, facets, unique_rows
@@ -110,6 +109,8 @@ def _with_isolated_points(P: FloatArray, F: IntArray, near: Neighbourhoods) -> I
     if not len(isolated) or not len(F):
         return F
     of_used = np.flatnonzero(used)
+    from scipy.spatial import KDTree  # takes as long to import as the rest of the package
+
     distance, position = KDTree(P[of_used]).query(P[isolated])
     vertex = of_used[position]
     # Outliers are farther away than a neighbour would be.

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from heat_igl.runtime import in_order, n_threads
 from heat_igl.typing import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 __all__ = ["Neighbourhoods", "neighbourhoods", "without_noise"]
 
@@ -58,7 +61,7 @@ def neighbourhoods(P: FloatArray, normals: FloatArray | None = None) -> Neighbou
     """
     k = min(_K, len(P) - 1)
     found = Neighbourhoods(np.empty((len(P), k + 1), np.int32), np.empty(len(P)), np.empty((len(P), 3, 3)))
-    tree = KDTree(P)
+    tree = _tree(P)
 
     def fill(rows: slice) -> None:
         distance, index = tree.query(P[rows], k + 1)
@@ -84,12 +87,12 @@ def without_noise(P: FloatArray) -> FloatArray:
         return P
     most = min(_LARGEST_K, len(P) // 4)
     sample = np.unique(np.linspace(0, len(P) - 1, _SAMPLE).astype(np.int64))
-    tree = KDTree(P)
+    tree = _tree(P)
     few, all_k = (float(np.median(_onto_quadrics(P, tree, P[sample], size)[1])) for size in (k // 2, k))
     if few < max(_NOISE, _NOISE_NOT_DETAIL * all_k):
         return P
     for _ in range(_MOST_PASSES):
-        tree = KDTree(P)
+        tree = _tree(P)
         _, noise, thickness = _onto_quadrics(P, tree, P[sample], k)
         while np.median(thickness) > _THICKNESS and k < most:
             k = min(2 * k, most)
@@ -161,3 +164,10 @@ def _completed(normals: FloatArray) -> FloatArray:
     x = np.cross(normals, least)
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     return np.stack([x, np.cross(normals, x), normals], axis=1)
+
+
+def _tree(P: FloatArray) -> KDTree:
+    """A k-d tree of the points."""
+    from scipy.spatial import KDTree  # takes as long to import as the rest of the package
+
+    return KDTree(P)

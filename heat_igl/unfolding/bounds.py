@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels import bounds as kernels
@@ -67,6 +66,8 @@ class Bounds:
         if len(places) == 1:
             kernels.lengthen(V, places[0], distance)
         else:
+            from scipy.spatial import KDTree  # takes as long to import as the rest of the package
+
             straight = np.asarray(KDTree(places).query(V)[0])
             np.maximum(distance, straight * (1 - _ROUNDING), out=distance)
 
