@@ -597,12 +597,12 @@ def test_a_library_that_does_not_load_is_one_line() -> None:
 
 def test_hundred_repetitions_leave_no_child_and_no_memory() -> None:
     reference.close()
-    assert not children()
+    others = set(children())  # of other tests, such as the resource tracker of multiprocessing
     mesh = rectangle(40, 40, 1, 1)
     names = ("pygeodesic", "gdist", "igl", "meshlab", "meshlab_heat", "igl_heat", "potpourri3d_heat")
     for name in 2 * names:
         reference.measured(name, mesh, 0)
-    ours, child = psutil.Process(), children()
+    ours, child = psutil.Process(), [process for process in children() if process not in others]
     assert len(child) == 1
     gc.collect()
     resident = [(ours.memory_info().rss, child[0].memory_info().rss)]
@@ -611,14 +611,14 @@ def test_hundred_repetitions_leave_no_child_and_no_memory() -> None:
         if repetition % 25 == 24:
             gc.collect()
             resident.append((ours.memory_info().rss, child[0].memory_info().rss))
-    assert [process.pid for process in children()] == [child[0].pid]
+    assert set(children()) - others == {child[0]}
     # A leak shows in every quarter; what the allocator keeps, in one. A repetition that kept one array of positions
     # would add 38 kB, one that kept a solver megabytes; MeshLab leaks a third of a megabyte here with each call.
     ours_grew, child_grew = np.diff(resident, axis=0).min(axis=0)
     assert ours_grew < 5e5
     assert child_grew < 5e6
     reference.close()
-    assert not children()
+    assert not set(children()) - others
 
 
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="needs a high-water mark")

@@ -132,7 +132,6 @@ def test_zero_leads_to_the_source(sphere):
 
 
 def test_geodesics_along_shortest_paths_reach_their_targets(sphere):
-    pytest.importorskip("numba")
     frames = tangent_frames(sphere)
     solver = heat_igl.HeatMethodSolver(sphere, refine="unfold")
     source, targets = 11, np.arange(100, 2500, 40)
