@@ -156,17 +156,17 @@ def test_nonmanifold_meshes_against_steiner_points(name):
 
 @pytest.mark.parametrize("name", ["cow.obj", "bunny.obj"])
 def test_meshes_of_the_wheel_against_pygeodesic(name):
-    agree(read_mesh(wheel_path(name)), 2)
+    assert_agrees(read_mesh(wheel_path(name)), 2)
 
 
 @pytest.mark.parametrize(
     "name", "camelhead.off spot.obj fertility.off 3holes.off cheburashka.off lion.off fandisk.off homer.obj".split()
 )
 def test_shared_meshes_against_pygeodesic(name):
-    agree(read_mesh(shared_path(name)), 4)
+    assert_agrees(read_mesh(shared_path(name)), 4)
 
 
-def agree(mesh: Mesh, n_sources: int) -> None:
+def assert_agrees(mesh: Mesh, n_sources: int) -> None:
     for source in np.random.default_rng(5).choice(np.unique(mesh.F), n_sources, replace=False):
         d = exact_distance(mesh.V, mesh.F, int(source))
         assert relative_error(d, pygeodesic(mesh, int(source))).max() < 1e-10

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -70,9 +71,12 @@ def test_steps_are_numbers(option, value):
 
 
 def test_usual_steps_are_not_warned_about():
-    for t_coef in (0.1, 1, 10, 100):
-        HeatMethodSolver(MESH, t_coef=t_coef)
-    HeatMethodSolver(heat_igl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), t_coef=1)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for t_coef in (0.1, 1, 10, 100):
+            HeatMethodSolver(MESH, t_coef=t_coef)
+        HeatMethodSolver(heat_igl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), t_coef=1)
+    assert [str(warning.message) for warning in caught] == []
 
 
 def test_what_results_are_fits_a_line():
