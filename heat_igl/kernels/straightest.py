@@ -11,7 +11,7 @@ __all__ = ["Triangles", "trace"]
 class Triangles:
     """m triangles by edge lengths `l` (m, 3) > 0, areas (m,) and angles (m, 3), glued by `twin` (3 m,).
 
-    `half` (m, 3) is at each corner half the sum of the angles around its vertex, and negative on the boundary.
+    `half` (m, 3) is at each corner half the sum of the angles around the vertex, and negative on the boundary.
     """
 
     l: cython.double[:, ::1]  # noqa: E741
@@ -28,7 +28,7 @@ class Triangles:
 class _Ray:
     """A point on the base of a face, and the direction in which it moves.
 
-    The base is half-edge `h`, from its tail in the origin to its head on the first axis; the face is above it. The
+    The base is half-edge `h`, from the tail in the origin to the head on the first axis; the face is above it. The
     point is the share `s` of the base from the tail. `at_tail`: it is the tail, and leaves across the side opposite.
     """
 
@@ -45,7 +45,7 @@ class _Ray:
 def _leave_corner(tables: Triangles, ray: _Ray, corner: cython.longlong, turn: cython.double) -> cython.bint:
     """Let the ray leave a vertex at the angle `turn` from the side that leaves from `corner`; false if it cannot.
 
-    It cannot where that is beyond the boundary.
+    It cannot if that is beyond the boundary.
     """
     f: cython.longlong = corner // 3
     k: cython.int = corner % 3
@@ -101,7 +101,7 @@ def _trace_one(
     end: cython.p_double,
     travelled: cython.p_double,
 ) -> cython.longlong:
-    """One geodesic; returns the number of its segments, which are stored if `faces` is not null.
+    """One geodesic; returns the number of segments, which are stored if `faces` is not null.
 
     It begins at barycentric coordinates `at` in `face`, at the angle `turn` from the direction of corner 0 to corner 1.
     """
@@ -176,7 +176,8 @@ def _trace_one(
             entry[side] = 0.0
             entry[(side + 1) % 3] = 1.0 - ray.s
             entry[(side + 2) % 3] = ray.s
-        # Side k runs from point k to the next. The ray leaves by that whose tail is on its right and head on its left.
+        # Side k runs from point k to the next. The ray leaves by that whose tail is right of it and whose head is left
+        # of it.
         k = 1
         if inside:
             best = -1e300
@@ -228,7 +229,7 @@ def _trace_one(
         if ends:
             return n
         if share == 0.0 or share == 1.0:
-            # At a vertex: equal angles on both sides, as seen from where the ray comes from.
+            # At a vertex: equal angles on both sides, as seen from the incoming ray.
             c = (k + 1) % 3 if share == 1.0 else k
             corner: cython.longlong = 3 * f + (side + 1 + c) % 3
             half: cython.double = tables.half[f, corner % 3]
@@ -258,7 +259,7 @@ def _trace_one(
             c = (k + 1) % 3
             a = (px[c] - px[k]) / tables.l[f, h % 3]
             b = (py[c] - py[k]) / tables.l[f, h % 3]
-            # The other face sees the side from its head to its tail.
+            # The other face sees the side from head to tail.
             ray.dx = -(dx * a + dy * b)
             ray.dy = fabs(a * dy - b * dx)
             base = hypot(ray.dx, ray.dy)
