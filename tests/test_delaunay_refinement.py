@@ -265,7 +265,8 @@ def test_even_meshes_stay_as_they_are() -> None:
 
 
 def beside(one: Mesh, other: Mesh) -> Mesh:
-    return Mesh(np.concatenate([one.V, other.V + [0, 40, 0]]), np.concatenate([one.F, other.F + one.n_vertices]))
+    aside = other.V + np.array([0, 40, 0])
+    return Mesh(np.concatenate([one.V, aside]), np.concatenate([one.F, other.F + one.n_vertices]))
 
 
 def test_an_uneven_part_is_refined_beside_an_even_one() -> None:

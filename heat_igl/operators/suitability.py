@@ -113,9 +113,7 @@ def uneven_components(triangulation: IntrinsicTriangulation, component: IntArray
     return np.asarray((thin > _THIN_SHARE * total) | (large > _LARGE_SHARE * total))
 
 
-def refined(
-    triangulation: IntrinsicTriangulation, component: IntArray, is_chosen: BoolArray
-) -> IntrinsicTriangulation:
+def refined(triangulation: IntrinsicTriangulation, component: IntArray, is_chosen: BoolArray) -> IntrinsicTriangulation:
     """Triangles fit for heat, by `delaunay_refinement`; of the tufted cover where the surface is not closed.
 
     Parameters
