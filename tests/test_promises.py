@@ -120,3 +120,17 @@ def test_what_leaves_the_bounds_is_brought_back():
     d = straight / 2
     Bounds(surface).lengthen(d, sources, sources.points)
     np.testing.assert_allclose(d, straight, rtol=1e-9)
+
+
+@pytest.mark.parametrize("refine", ["unfold", "sweep"])
+def test_small_components_are_exact_beside_large_ones(refine):
+    rough, ball = shape("height field coarse"), shapes.icosphere(4)
+    V, F = np.concatenate([rough.V + 9, ball.V]), np.concatenate([rough.F, ball.F + rough.n_vertices])
+    solver = HeatMethodSolver(Mesh(V, F), refine=refine)
+    for source in (0, 20, 40):
+        found = solver.distance(source)
+        np.testing.assert_allclose(found[: rough.n_vertices], exact_distance(rough.V, rough.F, source), atol=1e-10)
+        assert np.isinf(found[rough.n_vertices :]).all()
+    np.testing.assert_allclose(
+        solver.distance(rough.n_vertices + 5)[rough.n_vertices :], HeatMethodSolver(ball, refine=refine).distance(5)
+    )

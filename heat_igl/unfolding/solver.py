@@ -24,9 +24,10 @@ _SPACING = 0.125
 # Where a sweep gives less than a straight line by less than this, it is the sweep that is wrong, and no shorter path is
 # there: sweeps are off by 0.06 to 0.4 % in the mean and by 1.6 % at most (cow, fandisk, camel's head).
 _SWEEP_ERROR = 0.01
-# Up to so many vertices, or with so much curvature at each (radians, in the mean), distance is found by exact windows,
-# whatever was asked for. There walks pass vertices on the wrong side: 0.7 to 3.4 % of the largest distance on plates,
-# beams, voxels and terrain, most of which have 0.5 to 3 radians. Scanned surfaces have 0.005 to 0.15.
+# In components of up to so many vertices, or with so much curvature at each (radians, in the mean), distance is found
+# by exact windows, whatever was asked for. There walks pass vertices on the wrong side: 0.7 to 3.4 % of the largest
+# distance on plates, beams, voxels and terrain, most of which have 0.5 to 3 radians. Scanned surfaces have 0.005 to
+# 0.15.
 _FEW = 1000
 _ROUGH = 0.25
 # With this share of flat vertices, and holes that keep walks from proving flatness, windows are as fast as walks.
@@ -101,9 +102,9 @@ class UnfoldingSolver:
         Triangles.
     refine : {"sweep", "unfold", "exact"}
         Which update. "exact" is the polyhedral distance by windows, see `ExactSurface`; the heat is not read. The other
-        two take it as well where the mesh is small, rough, or flat with holes. It is exact from vertices and points. A
-        curve stands for points at most an eighth of a mean edge length apart, and straight lines from the curve itself
-        count up to 6 edges from it: beyond, distance from it is too long by 0.005 % at most.
+        two take it as well where the mesh is rough or flat with holes, and in small components. It is exact from
+        vertices and points. A curve stands for points at most an eighth of a mean edge length apart, and straight lines
+        from the curve itself count up to 6 edges from it: beyond, distance from it is too long by 0.005 % at most.
     tolerance : float, optional
         As for `Refinement.unfold`, with its default.
     cutoff : float
@@ -176,7 +177,8 @@ class UnfoldingSolver:
             late[k:] if late.any() and places else None,
             labels,
         )
-        distance = self._unfolded(u, asked, term, points, earliest)
+        by_windows = self._takes_windows(component)
+        distance = self._unfolded(u, asked, term, points, earliest, by_windows)
         start = self._domain.expand_to_vertices(earliest)
         if offset.any():
             distance += start
@@ -185,20 +187,34 @@ class UnfoldingSolver:
         for seeds in (term.near_seen, term.far):
             if not len(seeds.vertex):
                 continue
-            taken = take_shorter(distance, seeds, self._error, start)
+            taken = take_shorter(distance, seeds, 0.0 if by_windows else self._error, start)
             if labels is not None:
                 labels[seeds.vertex[taken]] = seeds.label[taken]
-        if not self.is_exact:
+        if not by_windows:
             self._bounds.shorten(distance, labels)
             if self._sweeps:
                 self._bounds.lengthen(distance, sources, points)
         return distance
 
+    def _takes_windows(self, component: IntArray) -> bool:
+        """Whether distance from sources in these components is found by exact windows."""
+        return self.is_exact or bool((self._component_sizes[component] <= _FEW).all())
+
+    @cached_property
+    def _component_sizes(self) -> IntArray:
+        return np.bincount(self._domain.components)
+
     def _unfolded(
-        self, u: FloatArray, asked: _Asked, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray
+        self,
+        u: FloatArray,
+        asked: _Asked,
+        term: UnfoldingTerm,
+        points: SourcePoints,
+        earliest: FloatArray,
+        by_windows: bool,
     ) -> FloatArray:
         """Distances (n,) from vertices and points, each component's from where it begins."""
-        if self._refinement is None or self.is_exact:
+        if self._refinement is None or by_windows:
             found = self._exact.solve(
                 asked.vertices, asked.offsets, asked.points, asked.point_offsets, cutoff=self._cutoff
             )

@@ -8,7 +8,7 @@ import numpy as np
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
 from heat_igl.validation.shapes import grid, lattice_faces
-from heat_igl.validation.zoo.registry import boxes, compact, delaunay, hull, joined, merged, raised, seeded, shape
+from heat_igl.validation.zoo.registry import boxes, compact, delaunay, hull, merged, raised, seeded, shape
 
 
 def _tube(centre: FloatArray, radius: float, around: int) -> Mesh:
@@ -118,15 +118,3 @@ def _folded_paper() -> Mesh:
     i, j = np.meshgrid(np.arange(25), np.arange(25), indexing="ij")
     V = np.stack([i + 0.5 * (j % 2), 0.9 * j, 0.7 * (i % 2)], axis=-1).reshape(-1, 3).astype(float)
     return Mesh(V, lattice_faces(25, 25))
-
-
-@shape("components", held_out=True)
-def _dust() -> Mesh:
-    """Twenty hulls of 60 points beside one another, from 1 to a thousandth in size."""
-    parts, at = [], 0.0
-    for k, size in enumerate(np.logspace(0, -3, 20)):
-        points = seeded(40 + k).standard_normal((60, 3))
-        part = hull(points / np.linalg.norm(points, axis=1, keepdims=True))
-        parts.append(Mesh(size * part.V + [at, 0, 0], part.F))
-        at += 3 * size
-    return joined(*parts)

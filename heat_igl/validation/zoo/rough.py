@@ -94,6 +94,18 @@ def _part_and_plate() -> Mesh:
     )
 
 
+@shape("components")
+def _dust() -> Mesh:
+    """Twenty hulls of 60 points beside one another, from 1 to a thousandth in size."""
+    parts, at = [], 0.0
+    for k, size in enumerate(np.logspace(0, -3, 20)):
+        points = seeded(40 + k).standard_normal((60, 3))
+        part = hull(points / np.linalg.norm(points, axis=1, keepdims=True))
+        parts.append(Mesh(size * part.V + [at, 0, 0], part.F))
+        at += 3 * size
+    return joined(*parts)
+
+
 # The smallest meshes.
 
 
