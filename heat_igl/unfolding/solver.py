@@ -24,12 +24,12 @@ _SPACING = 0.125
 # Where a sweep gives less than a straight line by less than this, it is the sweep that is wrong, and no shorter path is
 # there: sweeps are off by 0.06 to 0.4 % in the mean and by 1.6 % at most (cow, fandisk, camel's head).
 _SWEEP_ERROR = 0.01
-# In components of up to so many vertices, or with so much curvature at each (radians, in the mean), distance is found
-# by exact windows, whatever was asked for. There walks pass vertices on the wrong side: 0.7 to 3.4 % of the largest
-# distance on plates, beams, voxels and terrain, most of which have 0.5 to 3 radians. Scanned surfaces have 0.005 to
-# 0.15.
+# In components of up to so many vertices distance is found by exact windows, whatever was asked for.
 _FEW = 1000
-_ROUGH = 0.25
+# So it is with so much curvature at each vertex (radians, in the mean). There walks pass vertices on the wrong side: 0.7
+# to 3.4 % of the largest distance on plates, beams, voxels and terrain, most of which have 0.5 to 3 radians, and up to
+# 0.46 % on a coarse cow with 0.14, which is too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
+_ROUGH = {"sweep": 0.25, "unfold": 0.1}
 # With this share of flat vertices, and holes that keep walks from proving flatness, windows are as fast as walks.
 _FLAT = 0.5
 # Sweeps from several sources start with the exact distance up to so many mean edge lengths: next to a border of cells
@@ -76,10 +76,10 @@ class UnfoldingTerm(Protocol):
         """Corners of the sources' own faces that are farther away."""
 
 
-def _costs_little_to_be_exact(refinement: Refinement) -> bool:
+def _costs_little_to_be_exact(refinement: Refinement, rough: float) -> bool:
     """Whether the mesh is small or rough, or flat with holes."""
     return (
-        refinement.n <= _FEW or refinement.curvature > _ROUGH or (refinement.flatness > _FLAT and refinement.has_holes)
+        refinement.n <= _FEW or refinement.curvature > rough or (refinement.flatness > _FLAT and refinement.has_holes)
     )
 
 
@@ -124,7 +124,7 @@ class UnfoldingSolver:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
         self._refinement = None if refine == "exact" else Refinement(surface.unfolding)
         #: Whether distances do not depend on the heat.
-        self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement)
+        self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement, _ROUGH[refine])
         if tolerance is not None and not 0 <= tolerance <= 1:
             raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
         self._tolerance, self._cutoff = tolerance, cutoff
