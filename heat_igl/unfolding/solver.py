@@ -24,11 +24,12 @@ _SPACING = 0.125
 # If a sweep gives less than a straight line by less than this, it is the sweep that is wrong, and no shorter path is
 # there: sweeps are off by 0.06 to 0.4 % in the mean and by 1.6 % at most (cow, fandisk, camel's head).
 _SWEEP_ERROR = 0.01
-# Up to so many vertices, or with so much curvature at each (radians, in the mean), distance is found by exact windows,
-# whatever was asked for. There walks pass vertices on the wrong side: 0.7 to 3.4 % of the largest distance on plates,
-# beams, voxels and terrain, most of which have 0.5 to 3 radians. Scanned surfaces have 0.005 to 0.15.
+# In components of up to so many vertices distance is found by exact windows, whatever was asked for.
 _FEW = 1000
-_ROUGH = 0.25
+# So it is with so much curvature at each vertex (radians, in the mean). There walks pass vertices on the wrong side: 0.7
+# to 3.4 % of the largest distance on plates, beams, voxels and terrain, most of which have 0.5 to 3 radians, and up to
+# 0.46 % on a coarse cow with 0.14, which is too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
+_ROUGH = {"sweep": 0.25, "unfold": 0.1}
 # With this share of flat vertices, and holes that keep walks from proving flatness, windows are as fast as walks.
 _FLAT = 0.5
 # Sweeps from several sources start with the exact distance up to so many mean edge lengths: next to a border of cells
@@ -75,10 +76,10 @@ class UnfoldingTerm(Protocol):
         """Corners of the sources' own faces that are farther away."""
 
 
-def _costs_little_to_be_exact(refinement: Refinement) -> bool:
+def _costs_little_to_be_exact(refinement: Refinement, rough: float) -> bool:
     """Whether the mesh is small or rough, or flat with holes."""
     return (
-        refinement.n <= _FEW or refinement.curvature > _ROUGH or (refinement.flatness > _FLAT and refinement.has_holes)
+        refinement.n <= _FEW or refinement.curvature > rough or (refinement.flatness > _FLAT and refinement.has_holes)
     )
 
 
@@ -101,9 +102,9 @@ class UnfoldingSolver:
         Triangles.
     refine : {"sweep", "unfold", "exact"}
         Which update. "exact" is the polyhedral distance by windows, see `ExactSurface`; the heat is not read. The other
-        two take it as well if the mesh is small, rough, or flat with holes. It is exact from vertices and points. A
-        curve stands for points at most an eighth of a mean edge length apart, and straight lines from the curve itself
-        count up to 6 edges from it: beyond, distance from it is too long by 0.005 % at most.
+        two take it as well where the mesh is rough or flat with holes, and in small components. It is exact from
+        vertices and points. A curve stands for points at most an eighth of a mean edge length apart, and straight lines
+        from the curve itself count up to 6 edges from it: beyond, distance from it is too long by 0.005 % at most.
     tolerance : float, optional
         As for `Refinement.unfold`, with the same default.
     cutoff : float
@@ -123,7 +124,7 @@ class UnfoldingSolver:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
         self._refinement = None if refine == "exact" else Refinement(surface.unfolding)
         #: Whether distances do not depend on the heat.
-        self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement)
+        self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement, _ROUGH[refine])
         if tolerance is not None and not 0 <= tolerance <= 1:
             raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
         self._tolerance, self._cutoff = tolerance, cutoff
@@ -176,7 +177,8 @@ class UnfoldingSolver:
             late[k:] if late.any() and places else None,
             labels,
         )
-        distance = self._unfolded(u, asked, term, points, earliest)
+        by_windows = self._takes_windows(component)
+        distance = self._unfolded(u, asked, term, points, earliest, by_windows)
         start = self._domain.expand_to_vertices(earliest)
         if offset.any():
             distance += start
@@ -185,20 +187,34 @@ class UnfoldingSolver:
         for seeds in (term.near_seen, term.far):
             if not len(seeds.vertex):
                 continue
-            taken = take_shorter(distance, seeds, self._error, start)
+            taken = take_shorter(distance, seeds, 0.0 if by_windows else self._error, start)
             if labels is not None:
                 labels[seeds.vertex[taken]] = seeds.label[taken]
-        if not self.is_exact:
+        if not by_windows:
             self._bounds.shorten(distance, labels)
             if self._sweeps:
                 self._bounds.lengthen(distance, sources, points)
         return distance
 
+    def _takes_windows(self, component: IntArray) -> bool:
+        """Whether distance from sources in these components is found by exact windows."""
+        return self.is_exact or bool((self._component_sizes[component] <= _FEW).all())
+
+    @cached_property
+    def _component_sizes(self) -> IntArray:
+        return np.bincount(self._domain.components)
+
     def _unfolded(
-        self, u: FloatArray, asked: _Asked, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray
+        self,
+        u: FloatArray,
+        asked: _Asked,
+        term: UnfoldingTerm,
+        points: SourcePoints,
+        earliest: FloatArray,
+        by_windows: bool,
     ) -> FloatArray:
-        """Distances (n,) from vertices and points, each component's from the smallest offset."""
-        if self._refinement is None or self.is_exact:
+        """Distances (n,) from vertices and points, each component's from where it begins."""
+        if self._refinement is None or by_windows:
             found = self._exact.solve(
                 asked.vertices, asked.offsets, asked.points, asked.point_offsets, cutoff=self._cutoff
             )
