@@ -8,7 +8,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, mollify
-from heat_igl.kernels import gluing, windows
+from heat_igl.kernels import gluing, window_surface
 from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
@@ -21,7 +21,7 @@ _MOST_FLIPS_PER_FACE = 100
 
 
 class Tables(NamedTuple):
-    """What the kernel reads, in its order; see `heat_igl.kernels.windows.shapes`."""
+    """What the kernel reads, in its order; see `heat_igl.kernels.window_surface.shapes`."""
 
     vertex: AnyArray
     length: FloatArray
@@ -110,7 +110,7 @@ class HalfEdges:
             np.empty(3 * m, np.int32),
             np.zeros(n, np.uint8),
         )
-        is_delaunay = windows.shapes(vertex, length, twin, *derived)
+        is_delaunay = window_surface.shapes(vertex, length, twin, *derived)
         self.tables = Tables(vertex, length, twin, aligned, ring, *derived, is_delaunay)
         self.old_vertex = np.empty(n, np.int64)
         self.old_vertex[self.number] = np.arange(n)

@@ -1,0 +1,121 @@
+cdef struct Window:
+    # The part of a half-edge that straight lines from one root cross, in the frame of the half-edge: its tail is the
+    # origin, its head lies at (length, 0), the face that the lines enter above. (Windows of parallel lines, from a
+    # segment all of whose points are sources, would be a second kind, with a direction instead of a root.)
+    double x, depth      # the root laid out in the plane lies at (x, -depth)
+    double start, stop   # from where to where along the half-edge
+    double offset        # distance of the root
+    int root             # vertex, or n + p for source point p
+    int side             # of the apex: see the sides below
+
+cdef struct List:
+    # Windows that wait at one half-edge, from its tail to its head.
+    Window* windows
+    int count, capacity
+    int half_edge
+    double key
+
+cdef struct Entry:
+    double key
+    int what             # a half-edge, or 3 m + v for vertex v
+
+cdef struct Ray:
+    # A direction at a vertex: in a corner, at an angle from one of its sides.
+    int corner, side
+    double cosine, sine
+
+cdef struct Search:
+    # The surface: see `shapes`.
+    int* vertex
+    double* length
+    int* twin
+    unsigned char* aligned
+    int* ring
+    double* double_area
+    double* bulge
+    int* corner_of_vertex
+    int* next_corner
+    unsigned char* kind
+    bint is_delaunay
+    int n, n_half_edges
+    # What is found.
+    double* distance
+    int* root
+    int* label
+    int* entered
+    double* crossing
+    double* emitted
+    int* touched
+    int n_touched
+    # Sources inside faces.
+    int n_points
+    int* point_face
+    double* point
+    double* point_offset
+    # Vertices, and points inside faces, whose distance is asked for.
+    int n_goals, n_targets, n_found
+    int* goal
+    bint stops_early
+    double slack
+    int* target_face
+    int* first_target
+    int* next_target
+    double* target
+    double* target_distance
+    int* target_root
+    int* target_entered
+    double* target_crossing
+    # The front.
+    int* slot
+    List* lists
+    int n_lists, n_all_lists, n_made_lists
+    int free_list
+    int* next_free
+    Entry* heap
+    int n_heap, n_all_heap
+    Window* to_left
+    Window* to_right
+    int n_out
+    bint failed
+    long long n_windows, n_lists_done
+    double tolerance
+    # Where the search ends: at a distance, or, if so many vertices are asked for, once the nearest are known.
+    double cutoff
+    int n_nearest, n_next
+    double* ranked
+    int n_all_ranked
+
+cdef enum Kind:
+    UNKNOWN = 0
+    PASSED = 1           # no shortest path runs through
+    BENDS = 2            # total angle above 2 pi: paths bend here
+    ENDS = 3             # on the boundary
+    JOINS = 4            # several fans, or an edge of more than two faces: paths leave into all faces
+
+cdef enum Side:
+    RIGHT_OF_APEX = 0
+    LEFT_OF_APEX = 1
+    AROUND_APEX = 2
+
+cdef extern from *:
+    """
+    // Windows from a bend are this fraction of a side wider, so that none is missed between them and their neighbours.
+    #define SHADOW_MARGIN 1e-9
+    // What is narrower, as a fraction of a side, is no window.
+    #define NARROW 1e-14
+    // A vertex missed by less than this fraction of a side is reached over the end of the window, which is longer by
+    // the square of that.
+    #define NEAR 1e-7
+    // Windows whose roots are closer than this fraction of their distance have the same root.
+    #define SAME 2e-14
+    // Windows that overlap by less than this fraction of both are left as they are.
+    #define OVERLAP 0.2
+    // A search goes on beyond its cutoff by this fraction, more than rounding of a key.
+    #define MARGIN 1e-12
+    """
+    double SHADOW_MARGIN
+    double NARROW
+    double NEAR
+    double SAME
+    double OVERLAP
+    double MARGIN
