@@ -220,6 +220,12 @@ class HeatMethodSolver(BatchedSolver):
         return f"HeatMethodSolver({self.n_vertices} vertices, t={self.t:.4g}{refined}, backend={backend!r})"
 
     @property
+    def is_exact(self) -> bool:
+        """Whether distances are exact: with ``refine="exact"``, and on small or rough meshes with another `refine`."""
+        last_steps = self._parts.last_steps
+        return isinstance(last_steps, UnfoldingSolver) and last_steps.is_exact
+
+    @property
     def operators(self) -> Operators:
         """L, M, G and D of the triangulation that is solved on."""
         return self._parts.operators
@@ -312,8 +318,7 @@ class HeatMethodSolver(BatchedSolver):
 
     def _order(self, terms: list[SourceTerm]) -> FloatArray:
         """Heat at all vertices of the operators, or zeros where the last steps do not read it."""
-        last_steps = self._parts.last_steps
-        if isinstance(last_steps, UnfoldingSolver) and last_steps.is_exact:
+        if self.is_exact:
             return np.zeros((self.operators.n, len(terms)))
         return self._heat(terms)
 

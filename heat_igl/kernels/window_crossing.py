@@ -208,6 +208,9 @@ def _measure(
                     continue
                 at = w.stop
             distance = _bent(w, at, x, y)
+            if y == 0.0:
+                # On the side itself: the path is known better, with its last face, to the copy in the face before.
+                distance += s.tolerance * distance
             if distance < s.target_distance[j]:
                 s.target_distance[j] = distance
                 s.target_root[j] = w.root
