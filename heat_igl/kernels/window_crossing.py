@@ -10,9 +10,13 @@ from cython.cimports.heat_igl.kernels.window_structures import (
     NARROW,
     NEAR,
     RIGHT_OF_APEX,
+    Apex,
     List,
     Search,
     Window,
+    backward,
+    lateral,
+    reach,
 )
 from cython.cimports.heat_igl.kernels.window_trimming import trim
 from cython.cimports.libc.math import INFINITY, sqrt
@@ -24,7 +28,136 @@ from cython.cimports.libc.math import INFINITY, sqrt
 @cython.exceptval(check=False)
 def _bent(w: cython.pointer(Window), at: cython.double, x: cython.double, y: cython.double) -> cython.double:
     """Length of the path through a point of the half-edge to a point of the face."""
-    return w.offset + sqrt((at - w.x) * (at - w.x) + w.depth * w.depth) + sqrt((at - x) * (at - x) + y * y)
+    return w.offset + reach(w, at) + sqrt((at - x) * (at - x) + y * y)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
+    """The corner opposite half-edge h."""
+    apex: Apex
+    apex.length = s.length[h]
+    apex.left_length = s.length[previous_half_edge(h)]
+    apex.right_length = s.length[next_half_edge(h)]
+    apex.x = 0.5 * (
+        apex.length + (apex.left_length - apex.right_length) * (apex.left_length + apex.right_length) / apex.length
+    )
+    apex.y = s.double_area[h // 3] / apex.length
+    apex.cos_left, apex.sin_left = apex.x / apex.left_length, apex.y / apex.left_length
+    apex.cos_right, apex.sin_right = (apex.length - apex.x) / apex.right_length, apex.y / apex.right_length
+    apex.best, apex.best_at, apex.nearest = -1, 0.0, INFINITY
+    return apex
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _reach_apex(
+    s: cython.pointer(Search),
+    h: cython.int,
+    windows: cython.pointer(Window),
+    n: cython.int,
+    apex: cython.pointer(Apex),
+) -> cython.void:
+    """Distance of the apex, and on which side of it the lines of each window pass."""
+    i: cython.int
+    x: cython.double
+    m: cython.double
+    a: cython.double
+    b: cython.double
+    distance: cython.double
+    w: cython.pointer(Window)
+    for i in range(n):
+        w = windows + i
+        if w.is_plane:
+            x = backward(w, apex.x, apex.y)
+            m = 1.0
+            a = w.start - x
+            b = w.stop - x
+            distance = w.offset + w.x * apex.x + w.depth * apex.y
+        else:
+            x = apex.x - w.x
+            m = apex.y + w.depth
+            a = (w.start - w.x) * m - w.depth * x
+            b = (w.stop - w.x) * m - w.depth * x
+            distance = w.offset + sqrt(x * x + m * m)
+        if b < 0.0:
+            w.side = LEFT_OF_APEX
+            if b < -NEAR * apex.length * m:
+                continue
+            b = w.stop
+        elif a > 0.0:
+            w.side = RIGHT_OF_APEX
+            if a > NEAR * apex.length * m:
+                continue
+            b = w.start
+        else:
+            w.side = AROUND_APEX
+            if distance < apex.nearest:
+                apex.nearest = distance
+                apex.best = i
+            continue
+        # Just missed: over the end of the window, which costs next to nothing.
+        relax(s, s.vertex[h], _bent(w, b, apex.x, apex.y), w.root, h, b)
+    if apex.best >= 0:
+        w = windows + apex.best
+        apex.best_at = backward(w, apex.x, apex.y)
+        relax(s, s.vertex[h], apex.nearest, w.root, h, apex.best_at)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
+    """The window over the side between the tail and the apex; whether there is one."""
+    scale: cython.double
+    out[0] = w[0]
+    if w.is_plane:
+        out.x = w.x * apex.cos_left + w.depth * apex.sin_left
+        out.depth = w.depth * apex.cos_left - w.x * apex.sin_left
+    else:
+        out.x = w.x * apex.cos_left - w.depth * apex.sin_left
+        out.depth = w.x * apex.sin_left + w.depth * apex.cos_left
+    if out.depth <= 0.0:
+        return False
+    scale = w.depth * apex.cos_left
+    out.start = w.start * w.depth / (scale - lateral(w, w.start) * apex.sin_left)
+    out.stop = apex.left_length
+    if w.side == LEFT_OF_APEX:
+        out.stop = w.stop * w.depth / (scale - lateral(w, w.stop) * apex.sin_left)
+        if out.stop > apex.left_length:
+            out.stop = apex.left_length
+    return out.stop - out.start > NARROW * apex.left_length
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
+    """The window over the side between the apex and the head; whether there is one."""
+    scale: cython.double
+    x: cython.double = apex.length - w.x
+    out[0] = w[0]
+    if w.is_plane:
+        out.offset = w.offset + w.x * apex.x + w.depth * apex.y
+        out.x = w.x * apex.cos_right - w.depth * apex.sin_right
+        out.depth = w.x * apex.sin_right + w.depth * apex.cos_right
+    else:
+        out.x = apex.right_length - (x * apex.cos_right - w.depth * apex.sin_right)
+        out.depth = x * apex.sin_right + w.depth * apex.cos_right
+    if out.depth <= 0.0:
+        return False
+    scale = w.depth * apex.cos_right
+    out.stop = apex.right_length - (apex.length - w.stop) * w.depth / (scale + lateral(w, w.stop) * apex.sin_right)
+    out.start = 0.0
+    if w.side == RIGHT_OF_APEX:
+        out.start = apex.right_length - (apex.length - w.start) * w.depth / (
+            scale + lateral(w, w.start) * apex.sin_right
+        )
+        if out.start < 0.0:
+            out.start = 0.0
+    return out.stop - out.start > NARROW * apex.right_length
 
 
 @cython.cfunc
@@ -36,31 +169,12 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     one: cython.pointer(List) = cython.address(s.lists[place])
     windows: cython.pointer(Window) = one.windows
     n: cython.int = one.count
-    left: cython.int = previous_half_edge(h)
-    right: cython.int = next_half_edge(h)
     i: cython.int
     n_left: cython.int = 0
     n_right: cython.int = 0
-    best: cython.int = -1
-    best_at: cython.double = 0.0
-    length: cython.double = s.length[h]
-    left_length: cython.double = s.length[left]
-    right_length: cython.double = s.length[right]
-    apex_x: cython.double
-    apex_y: cython.double
-    cos_left: cython.double
-    sin_left: cython.double
-    cos_right: cython.double
-    sin_right: cython.double
-    x: cython.double
-    m: cython.double
-    a: cython.double
-    b: cython.double
-    nearest: cython.double = INFINITY
-    distance: cython.double
-    out: cython.pointer(Window)
+    apex: Apex
     w: cython.pointer(Window)
-    apex: cython.int = s.vertex[h]
+    is_best: cython.bint
     s.slot[h] = -1
     s.n_lists_done += 1
     n = trim(s, windows, n, h)
@@ -68,109 +182,34 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
         more_room(s, n)
         if s.failed:
             return
-    apex_x = 0.5 * (length + (left_length - right_length) * (left_length + right_length) / length)
-    apex_y = s.double_area[h // 3] / length
-    # The apex: which windows see it, and how far it is.
-    for i in range(n):
-        w = windows + i
-        x = apex_x - w.x
-        m = apex_y + w.depth
-        a = (w.start - w.x) * m - w.depth * x
-        b = (w.stop - w.x) * m - w.depth * x
-        if b < 0.0:
-            w.side = LEFT_OF_APEX
-            if b < -NEAR * length * m:
-                continue
-            b = w.stop
-        elif a > 0.0:
-            w.side = RIGHT_OF_APEX
-            if a > NEAR * length * m:
-                continue
-            b = w.start
-        else:
-            w.side = AROUND_APEX
-            distance = w.offset + sqrt(x * x + m * m)
-            if distance < nearest:
-                nearest = distance
-                best = i
-            continue
-        # Just missed: over the end of the window, which costs next to nothing.
-        relax(s, apex, _bent(w, b, apex_x, apex_y), w.root, h, b)
-    if best >= 0:
-        w = windows + best
-        best_at = w.x + w.depth * (apex_x - w.x) / (apex_y + w.depth)
-        relax(s, apex, nearest, w.root, h, best_at)
+    apex = _opposite(s, h)
+    _reach_apex(s, h, windows, n, cython.address(apex))
     if s.first_target != cython.NULL and s.first_target[h // 3] >= 0:
-        _measure(s, h, windows, n, apex_x, apex_y)
-    cos_left, sin_left = apex_x / left_length, apex_y / left_length
-    cos_right, sin_right = (length - apex_x) / right_length, apex_y / right_length
-    out = s.to_left
+        _measure(s, h, windows, n, apex.x, apex.y)
     for i in range(n):
         w = windows + i
-        if w.side == RIGHT_OF_APEX:
-            continue
-        if (
-            best >= 0
-            and i != best
-            and w.start >= best_at
-            and (w.side == AROUND_APEX or nearest <= _bent(w, w.stop, apex_x, apex_y))
+        # Those that would cross a shorter way to the apex go no further.
+        is_best = apex.best < 0 or i == apex.best
+        if w.side != RIGHT_OF_APEX and (
+            is_best
+            or w.start < apex.best_at
+            or (w.side != AROUND_APEX and not apex.nearest <= _bent(w, w.stop, apex.x, apex.y))
         ):
-            continue  # would cross a shorter way to the apex
-        out.depth = w.x * sin_left + w.depth * cos_left
-        if out.depth <= 0.0:
-            continue
-        out.x = w.x * cos_left - w.depth * sin_left
-        a = w.depth * cos_left
-        out.start = w.start * w.depth / (a - (w.start - w.x) * sin_left)
-        out.stop = left_length
-        if w.side == LEFT_OF_APEX:
-            out.stop = w.stop * w.depth / (a - (w.stop - w.x) * sin_left)
-            if out.stop > left_length:
-                out.stop = left_length
-        if not (out.stop - out.start > NARROW * left_length):
-            continue
-        out.offset = w.offset
-        out.root = w.root
-        out += 1
-        n_left += 1
-    out = s.to_right
-    for i in range(n):
-        w = windows + i
-        if w.side == LEFT_OF_APEX:
-            continue
-        if (
-            best >= 0
-            and i != best
-            and w.stop <= best_at
-            and (w.side == AROUND_APEX or nearest <= _bent(w, w.start, apex_x, apex_y))
+            n_left += _to_left(w, cython.address(apex), s.to_left + n_left)
+        if w.side != LEFT_OF_APEX and (
+            is_best
+            or w.stop > apex.best_at
+            or (w.side != AROUND_APEX and not apex.nearest <= _bent(w, w.start, apex.x, apex.y))
         ):
-            continue
-        x = length - w.x
-        out.depth = x * sin_right + w.depth * cos_right
-        if out.depth <= 0.0:
-            continue
-        out.x = right_length - (x * cos_right - w.depth * sin_right)
-        a = w.depth * cos_right
-        out.stop = right_length - (length - w.stop) * w.depth / (a + (w.stop - w.x) * sin_right)
-        out.start = 0.0
-        if w.side == RIGHT_OF_APEX:
-            out.start = right_length - (length - w.start) * w.depth / (a + (w.start - w.x) * sin_right)
-            if out.start < 0.0:
-                out.start = 0.0
-        if not (out.stop - out.start > NARROW * right_length):
-            continue
-        out.offset = w.offset
-        out.root = w.root
-        out += 1
-        n_right += 1
+            n_right += _to_right(w, cython.address(apex), s.to_right + n_right)
     # The list is free again; its room stays with it.
     s.lists[place].count = s.free_list
     s.lists[place].half_edge = -1
     s.free_list = place
     if n_left > 0:
-        add(s, left, s.to_left, n_left, True)
+        add(s, previous_half_edge(h), s.to_left, n_left, True)
     if n_right > 0:
-        add(s, right, s.to_right, n_right, False)
+        add(s, next_half_edge(h), s.to_right, n_right, False)
 
 
 @cython.cfunc
@@ -198,7 +237,7 @@ def _measure(
         y = s.target[3 * j + h % 3] * apex_y
         for i in range(n):
             w = windows + i
-            at = w.x + w.depth * (x - w.x) / (y + w.depth)
+            at = backward(w, x, y)
             if at < w.start:
                 if at < w.start - NEAR * length:
                     continue

@@ -69,6 +69,30 @@ def pop(s: cython.pointer(Search)) -> Entry:
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _key(
+    s: cython.pointer(Search), w: cython.pointer(Window), length: cython.double, bulge: cython.double
+) -> cython.double:
+    """When a window has its turn. A plane is a root at infinity: the power becomes the distance of the centre."""
+    key: cython.double
+    x: cython.double = 0.0
+    if w.is_plane:
+        if s.is_delaunay:
+            return w.offset + 0.5 * (w.x * length + w.depth * bulge)
+        return w.offset + w.x * (w.start if w.x > 0.0 else w.stop)
+    if s.is_delaunay:
+        key = w.x * (w.x - length) + w.depth * (w.depth + bulge)
+        return w.offset + (sqrt(key) if key > 0.0 else 0.0)
+    if w.x < w.start:
+        x = w.start - w.x
+    elif w.x > w.stop:
+        x = w.x - w.stop
+    return w.offset + sqrt(x * x + w.depth * w.depth)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _append(
@@ -118,28 +142,20 @@ def _append(
     if mirrored:
         for i in range(n):
             to[i] = run[n - 1 - i]
-            to[i].x = length - to[i].x
+            if to[i].is_plane:
+                to[i].offset += to[i].x * length
+                to[i].x = -to[i].x
+            else:
+                to[i].x = length - to[i].x
             x = to[i].start
             to[i].start = length - to[i].stop
             to[i].stop = length - x
     else:
         memcpy(to, run, n * cython.sizeof(Window))
-    if s.is_delaunay:
-        for i in range(n):
-            key = to[i].x * (to[i].x - length) + to[i].depth * (to[i].depth + bulge)
-            key = to[i].offset + (sqrt(key) if key > 0.0 else 0.0)
-            if key < lowest:
-                lowest = key
-    else:
-        for i in range(n):
-            x = 0.0
-            if to[i].x < to[i].start:
-                x = to[i].start - to[i].x
-            elif to[i].x > to[i].stop:
-                x = to[i].x - to[i].stop
-            key = to[i].offset + sqrt(x * x + to[i].depth * to[i].depth)
-            if key < lowest:
-                lowest = key
+    for i in range(n):
+        key = _key(s, to + i, length, bulge)
+        if key < lowest:
+            lowest = key
     if lowest < one.key:
         one.key = lowest
         push(s, lowest, t)

@@ -73,7 +73,7 @@ def _emit(
     one.stop = length - start if start > 0.0 else length
     one.offset = offset
     one.root = root
-    one.side = 0
+    one.side = one.is_plane = 0
     if one.depth > 0.0:
         add(s, k, cython.address(one), 1, False)
 
@@ -261,7 +261,7 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         one.stop = length
         one.offset = offset
         one.root = root
-        one.side = 0
+        one.side = one.is_plane = 0
         if one.depth > 0.0:
             add(s, h, cython.address(one), 1, False)
     j = s.first_target[f] if s.first_target != cython.NULL else -1

@@ -1,12 +1,24 @@
+from libc.math cimport sqrt
+
 cdef struct Window:
     # The part of a half-edge that straight lines from one root cross, in the frame of the half-edge: its tail is the
-    # origin, its head lies at (length, 0), the face that the lines enter above. (Windows of parallel lines, from a
-    # segment all of whose points are sources, would be a second kind, with a direction instead of a root.)
-    double x, depth      # the root laid out in the plane lies at (x, -depth)
+    # origin, its head lies at (length, 0), the face that the lines enter above. If it is a plane, the lines are
+    # parallel, and the root is a segment all of whose points are sources (Bommes and Kobbelt 2007).
+    double x, depth      # the root laid out in the plane lies at (x, -depth); of a plane, the direction of the lines
     double start, stop   # from where to where along the half-edge
-    double offset        # distance of the root
-    int root             # vertex, or n + p for source point p
-    int side             # of the apex: see the sides below
+    double offset        # distance of the root; of a plane, the distance that it gives the tail
+    int root             # vertex, n + p for source point p, or after those, n + p + i for source segment i
+    short side           # of the apex: see the sides below
+    bint is_plane
+
+cdef struct Apex:
+    # The corner opposite a half-edge in its frame, the directions of the two sides there, and how it is reached.
+    double x, y
+    double length, left_length, right_length
+    double cos_left, sin_left, cos_right, sin_right
+    int best             # the window through which the apex is nearest, -1 if none sees it
+    double best_at       # where the path crosses the half-edge
+    double nearest
 
 cdef struct List:
     # Windows that wait at one half-edge, from its tail to its head.
@@ -52,6 +64,11 @@ cdef struct Search:
     int* point_face
     double* point
     double* point_offset
+    # Segments inside faces.
+    int n_segments
+    int* segment_face
+    double* segment      # both ends, one after the other
+    double* segment_offset
     # Vertices, and points inside faces, whose distance is asked for.
     int n_goals, n_targets, n_found
     int* goal
@@ -92,10 +109,37 @@ cdef enum Kind:
     ENDS = 3             # on the boundary
     JOINS = 4            # several fans, or an edge of more than two faces: paths leave into all faces
 
+cdef enum Order:
+    UNDECIDED = 0        # which of two windows is nearer
+    U_NEARER = 1
+    W_NEARER = 2
+    U_THEN_W = 3
+    W_THEN_U = 4
+
 cdef enum Side:
     RIGHT_OF_APEX = 0
     LEFT_OF_APEX = 1
     AROUND_APEX = 2
+
+
+# What a window adds to its offset at a point of its half-edge.
+cdef inline double reach(const Window* w, double at) noexcept nogil:
+    if w.is_plane:
+        return w.x * at
+    return sqrt((at - w.x) * (at - w.x) + w.depth * w.depth)
+
+
+# How far the line of a window through a point of its half-edge goes along it while it rises by `depth`.
+cdef inline double lateral(const Window* w, double at) noexcept nogil:
+    return w.x if w.is_plane else at - w.x
+
+
+# Where the line of a window through a point of the face meets the half-edge.
+cdef inline double backward(const Window* w, double x, double y) noexcept nogil:
+    if w.is_plane:
+        return x - y * w.x / w.depth
+    return w.x + w.depth * (x - w.x) / (y + w.depth)
+
 
 cdef extern from *:
     """
