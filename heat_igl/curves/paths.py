@@ -120,8 +120,6 @@ def _exact(
     mesh: Mesh, sources: SourceSet, face: IntArray, barycentric: FloatArray, which: IntArray
 ) -> dict[int, SurfaceCurve]:
     """Exact paths from `which` of the places, without those that are lost."""
-    if len(sources.segments.faces):
-        return {}
     found = exact_paths(mesh, sources, face[which], barycentric[which])
     _refuse_lost(np.isinf(found.distance))
     return _curves(which, found.faces, found.points, found.first)

@@ -60,9 +60,9 @@ class HeatMethodSolver(BatchedSolver):
     refine : {"sweep", "unfold", "exact"}, optional
         Integrate nothing, and find the distance in the order of the heat by unfolding triangles, two at a time or in
         strips: 0.06 to 0.3 % and 0.0005 to 0.003 % mean error on common meshes, see `Refinement`. Both are exact on
-        meshes of up to 1000 vertices and on rough ones. "exact" is the polyhedral distance by windows: five to eight
-        times the time of "unfold", and from curves as from dense points, see `UnfoldingSolver`. Needs triangles; no
-        Poisson problem is factored, and with "exact" nothing at all until `solve` asks for heat.
+        meshes of up to 1000 vertices and on rough ones. "exact" is the polyhedral distance by windows, in two to three
+        times the time of "unfold". Needs triangles; no Poisson problem is factored, and with "exact" nothing at all
+        until `solve` asks for heat.
     backend : {"auto", "scipy", "multifrontal", "iterative"}
         Linear solver, see `factorize`.
 

@@ -9,6 +9,7 @@ given up once the distance of a vertex shows that it is too far from the source.
 
 import cython
 from cython.cimports.heat_igl.kernels.triangles import foot, next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.window_structures import nearest_on
 from cython.cimports.libc.math import fabs, sqrt
 
 __all__ = ["trace_back"]
@@ -23,6 +24,9 @@ def trace_back(
     point_face: cython.const[cython.int][::1],
     point: cython.const[cython.double][:, ::1],
     point_offset: cython.const[cython.double][::1],
+    segment_face: cython.const[cython.int][::1],
+    segment: cython.const[cython.double][:, :, ::1],
+    segment_offset: cython.const[cython.double][::1],
     start,
     face: cython.int[::1],
     place: cython.double[:, :, ::1],
@@ -37,7 +41,9 @@ def trace_back(
     distance, root, entered, crossing : (n,)
         What `search` found for the vertices.
     point_face, point, point_offset : (p,), (p, 3), (p,)
-        Its sources inside faces.
+        Its source points inside faces.
+    segment_face, segment, segment_offset : (q,), (q, 2, 3), (q,)
+        Its source segments inside faces.
     start : Starts
         Where the k paths begin; see `heat_igl.unfolding.exact_paths.Starts`.
     face, place : (r,), (r, 2, 3)
@@ -50,6 +56,7 @@ def trace_back(
     back.aligned, back.ring, back.double_area = tables.aligned, tables.ring, tables.double_area
     back.distance, back.root, back.entered, back.crossing = distance, root, entered, crossing
     back.point_face, back.point, back.point_offset = point_face, point, point_offset
+    back.segment_face, back.segment, back.segment_offset = segment_face, segment, segment_offset
     back.face, back.place = face, place
     vertex: cython.const[cython.int][::1] = start.vertex
     from_face: cython.const[cython.int][::1] = start.face
@@ -103,6 +110,9 @@ class _Back:
     point_face: cython.const[cython.int][::1]
     point: cython.const[cython.double][:, ::1]
     point_offset: cython.const[cython.double][::1]
+    segment_face: cython.const[cython.int][::1]
+    segment: cython.const[cython.double][:, :, ::1]
+    segment_offset: cython.const[cython.double][::1]
     face: cython.int[::1]
     place: cython.double[:, :, ::1]
     n_segments: cython.longlong
@@ -132,7 +142,7 @@ class _Back:
             )
             if h < 0:
                 # A source inside a face with this vertex.
-                h = 3 * self.point_face[begin.root - self.distance.shape[0]]
+                h = 3 * self.face_of_source(begin.root)
                 while self.vertex[h] != v:
                     h += 1
             begin.face = h // 3
@@ -166,7 +176,7 @@ class _Back:
             if here[c] != 1.0 and ((h < 0 and v == begin.root) or self.leads(begin, v, self.to_corner(f, here, c))):
                 return self.add_to_corner(f, here, c, v)
         if h < 0:
-            return self.add_to_point(f, here, begin.root)
+            return self.add_to_source(f, here, begin.root)
         length: cython.double = self.length[h]
         x: cython.double = foot(length, self.length[previous_half_edge(h)], self.length[next_half_edge(h)])
         y: cython.double = here[h % 3] * self.double_area[f] / length
@@ -221,8 +231,8 @@ class _Back:
             return LOST
         here[t % 3], here[right % 3], here[left % 3] = 0.0, 1.0 - line.x / length, line.x / length
         x: cython.double = apex_x - line.x
-        if begin.root >= self.distance.shape[0] and self.is_at_point(begin, g, here, line.walked):
-            return self.add_to_point(g, here, begin.root)
+        if self.is_at_source(begin, g, here, line.walked):
+            return self.add_to_source(g, here, begin.root)
         if self.leads(begin, self.vertex[t], line.walked + sqrt(x * x + apex_y * apex_y)):
             return self.add_to_corner(g, here, t % 3, self.vertex[t])
         # Out over the side between the tail of t and the apex, or over the one between the apex and the head.
@@ -312,19 +322,42 @@ class _Back:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def is_at_point(
+    def face_of_source(self, root: cython.int) -> cython.int:
+        """The face that holds a source point or segment."""
+        i: cython.Py_ssize_t = root - self.distance.shape[0]
+        n_points: cython.Py_ssize_t = self.point_face.shape[0]
+        return self.point_face[i] if i < n_points else self.segment_face[i - n_points]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def nearest_of_source(self, root: cython.int, here: cython.p_double, there: cython.p_double) -> cython.double:
+        """The point of a source inside a face that is nearest to a point of the face; the offset of the source."""
+        k: cython.int
+        i: cython.Py_ssize_t = root - self.distance.shape[0]
+        if i < self.point_face.shape[0]:
+            for k in range(3):
+                there[k] = self.point[i, k]
+            return self.point_offset[i]
+        i -= self.point_face.shape[0]
+        nearest_on(
+            cython.address(self.length[3 * self.segment_face[i]]), cython.address(self.segment[i, 0, 0]), here, there
+        )
+        return self.segment_offset[i]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def is_at_source(
         self, begin: cython.pointer[cython.const[Bend]], f: cython.int, here: cython.p_double, walked: cython.double
     ) -> cython.bint:
-        """Whether the source point that the path comes from lies ahead in face f."""
-        i: cython.int = begin.root - cython.cast(cython.int, self.distance.shape[0])
+        """Whether the source inside a face that the path comes from lies ahead in face f."""
         there: cython.double[3]
-        k: cython.int
-        if self.point_face[i] != f:
+        offset: cython.double
+        if begin.root < self.distance.shape[0] or self.face_of_source(begin.root) != f:
             return False
-        for k in range(3):
-            there[k] = self.point[i, k]
-        whole: cython.double = self.point_offset[i] + walked + self.apart(f, here, there)
-        return fabs(whole - begin.distance) <= AT_ROOT * begin.distance
+        offset = self.nearest_of_source(begin.root, here, there)
+        return fabs(offset + walked + self.apart(f, here, there) - begin.distance) <= AT_ROOT * begin.distance
 
     @cython.cfunc
     @cython.nogil
@@ -350,15 +383,12 @@ class _Back:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def add_to_point(self, f: cython.int, here: cython.p_double, root: cython.int) -> cython.int:
-        """A segment to a source point."""
+    def add_to_source(self, f: cython.int, here: cython.p_double, root: cython.int) -> cython.int:
+        """A segment to a source inside face f."""
         there: cython.double[3]
-        k: cython.int
-        i: cython.int = root - cython.cast(cython.int, self.distance.shape[0])
-        if i < 0 or self.point_face[i] != f:
+        if root < self.distance.shape[0] or self.face_of_source(root) != f:
             return LOST
-        for k in range(3):
-            there[k] = self.point[i, k]
+        self.nearest_of_source(root, here, there)
         return AT_SOURCE if self.append(f, here, there) else NO_ROOM
 
     @cython.cfunc

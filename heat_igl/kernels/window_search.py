@@ -3,6 +3,7 @@
 import cython
 from cython.cimports.heat_igl.kernels.window_crossing import cross, over_corners
 from cython.cimports.heat_igl.kernels.window_lists import empty_front, pop
+from cython.cimports.heat_igl.kernels.window_segments import emit_segment
 from cython.cimports.heat_igl.kernels.window_sources import emit_point, shed
 from cython.cimports.heat_igl.kernels.window_structures import MARGIN, Entry, Search
 from cython.cimports.libc.math import INFINITY
@@ -52,7 +53,9 @@ def run(s: cython.pointer(Search)) -> cython.void:
                 cross(s, entry.what)
             continue
         v = entry.what - s.n_half_edges
-        if v >= s.n:
+        if v >= s.n + s.n_points:
+            emit_segment(s, v - s.n - s.n_points)
+        elif v >= s.n:
             emit_point(s, v - s.n)
         elif entry.key == s.distance[v] and s.emitted[v] > entry.key:
             shed(s, v)

@@ -122,6 +122,31 @@ cdef enum Side:
     AROUND_APEX = 2
 
 
+# Scalar product of two differences of barycentric coordinates, in a face with these sides opposite its corners.
+cdef inline double product(const double* side, const double* u, const double* v) noexcept nogil:
+    return -0.5 * (
+        side[0] * side[0] * (u[1] * v[2] + u[2] * v[1])
+        + side[1] * side[1] * (u[2] * v[0] + u[0] * v[2])
+        + side[2] * side[2] * (u[0] * v[1] + u[1] * v[0])
+    )
+
+
+# The point of a segment, given by the coordinates of its two ends, that is nearest to a point.
+cdef inline void nearest_on(const double* side, const double* ends, const double* point, double* found) noexcept nogil:
+    cdef double along[3]
+    cdef double off[3]
+    cdef double share = 0.0, square
+    cdef int c
+    for c in range(3):
+        along[c] = ends[3 + c] - ends[c]
+        off[c] = point[c] - ends[c]
+    square = product(side, along, along)
+    if square > 0.0:
+        share = min(max(product(side, off, along) / square, 0.0), 1.0)
+    for c in range(3):
+        found[c] = ends[c] + share * along[c]
+
+
 # What a window adds to its offset at a point of its half-edge.
 cdef inline double reach(const Window* w, double at) noexcept nogil:
     if w.is_plane:

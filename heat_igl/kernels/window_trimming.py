@@ -18,7 +18,7 @@ from cython.cimports.heat_igl.kernels.window_structures import (
     Window,
     reach,
 )
-from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.libc.math import fabs
 from cython.cimports.libc.string import memmove
 
 

@@ -84,7 +84,7 @@ class Front:
         What `shapes` returned.
     distance, emitted : (n,)
         Must come full of infinity; the first takes distances.
-    root, label, entered, crossing : (n,), (n + p,), (n,), (n,)
+    root, label, entered, crossing : (n,), (n + p + q,), (n,), (n,)
         Take where the shortest paths come from; see `heat_igl.unfolding.exact.Origin`. They must come full of -1.
     touched : (n,)
         Takes the vertices that were reached.
@@ -161,7 +161,7 @@ class Front:
         s.n = corner_of_vertex.shape[0]
         s.n_half_edges = vertex.shape[0]
         s.tolerance = tolerance
-        s.n_points = s.n_targets = s.n_goals = 0
+        s.n_points = s.n_segments = s.n_targets = s.n_goals = 0
         s.first_target = cython.NULL
 
 
@@ -250,6 +250,9 @@ def search(
     point_face: cython.int[::1],
     point: cython.double[::1],
     point_offset: cython.double[::1],
+    segment_face: cython.int[::1],
+    segment: cython.double[::1],
+    segment_offset: cython.double[::1],
     goal: cython.int[::1],
     first_target: cython.int[::1],
     next_target: cython.int[::1],
@@ -269,12 +272,15 @@ def search(
     Parameters
     ----------
     front : Front
-        For one search alone, whose `label` has room for p source points.
+        For one search alone, whose `label` has room for p source points and q segments.
     source, offset : (k,)
         Vertices that distance starts from, and the distance at which each starts.
     point_face, point, point_offset : (p,), (3 p,), (p,)
         Sources inside faces: face, barycentric coordinates, distance. A source on a side, with a coordinate of 0, comes
         once for every face there.
+    segment_face, segment, segment_offset : (q,), (6 q,), (q,)
+        Source segments inside faces, likewise: face, coordinates of one end and the other, distance. The ends must be
+        among the points.
     goal : (g,)
         With `stops_early`, the search ends when the distances of these vertices and of all targets are known.
     first_target, next_target, target_face, target : (m,), (t,), (t,), (3 t,)
@@ -295,6 +301,11 @@ def search(
         s.point_face = cython.address(point_face[0])
         s.point = cython.address(point[0])
         s.point_offset = cython.address(point_offset[0])
+    s.n_segments = segment_face.shape[0]
+    if s.n_segments > 0:
+        s.segment_face = cython.address(segment_face[0])
+        s.segment = cython.address(segment[0])
+        s.segment_offset = cython.address(segment_offset[0])
     s.n_goals = goal.shape[0]
     if s.n_goals > 0:
         s.goal = cython.address(goal[0])
@@ -319,6 +330,10 @@ def search(
             if not s.failed:
                 s.label[s.n + i] = source.shape[0] + i
                 push(s, point_offset[i], s.n_half_edges + s.n + i)
+        for i in range(s.n_segments):
+            if not s.failed:
+                s.label[s.n + s.n_points + i] = source.shape[0] + s.n_points + i
+                push(s, segment_offset[i], s.n_half_edges + s.n + s.n_points + i)
         if not s.failed:
             run(s)
         empty_front(s)

@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.mesh import Mesh, SurfacePoints
-from heat_igl.sources import Sources, vertex_sources
+from heat_igl.sources import Sources, SourceSegments, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh, from_triangulation
 from heat_igl.unfolding.window_search import Found, Searched, search
@@ -26,9 +26,10 @@ class Origin(NamedTuple):
     Attributes
     ----------
     label : (k,) int64
-        The source that the distance is measured from, counted vertices first, then points; -1 for none.
+        The source that the distance is measured from, counted vertices first, then points, then segments; -1 for none.
     root : (k,) int64
-        The last vertex at which the path bends, or its source: n + p for source point p; -1 for none.
+        The last vertex at which the path bends, or its source: n + i for source point i, and after all points likewise
+        for segments; -1 for none.
     entered : (k,) int64
         The half-edge of the triangulation over which the straight last part of the path enters its last face; -1 where
         the path starts in the place or runs inside one face.
@@ -101,6 +102,7 @@ class ExactSurface:
         offsets: FloatArray | None = None,
         points: SurfacePoints | None = None,
         point_offsets: FloatArray | None = None,
+        segments: SourceSegments | None = None,
         *,
         cutoff: float = np.inf,
         targets: SurfacePoints | None = None,
@@ -118,6 +120,9 @@ class ExactSurface:
             p sources in the faces that the triangulation was made from.
         point_offsets : (p,) float64, optional
             The distance at which each of them starts; 0 if not given.
+        segments : SourceSegments, optional
+            Segments with their offsets, every point of which is a source; their labels are not read. They need a
+            triangulation that was not flipped.
         cutoff : float
             What is farther is ``inf``, and the search ends there.
         targets : SurfacePoints, optional
@@ -135,6 +140,8 @@ class ExactSurface:
         ------
         MemoryError
             If the windows do not fit into memory.
+        ValueError
+            If there are segments or points, and the surface does not know the faces that they refer to.
         """
         done = search(
             self._half_edges,
@@ -142,6 +149,7 @@ class ExactSurface:
             offsets,
             points,
             point_offsets,
+            segments,
             cutoff=cutoff,
             targets=targets,
             goals=goals,
@@ -160,8 +168,8 @@ class ExactSurface:
         distance = edges.unscaled(found.distance[which])
         within: BoolArray = (distance <= cutoff) & (found.root[which] >= 0)
         root = np.where(within, found.root[which], -1)
-        # Copies of a source point on a side are one point.
-        names = np.concatenate([edges.old_vertex, self.n + starts.points.point, [-1]])
+        # Copies of a point or segment on a side are one, and the ends of a segment belong to it.
+        names = np.concatenate([edges.old_vertex, np.where(starts.place < 0, -1, self.n + starts.place)])
         # Roots are labelled as vertices are.
         first = found.label[which] if len(found.label) else label[root]
         origin = Origin(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -72,7 +73,7 @@ def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: Fl
     mesh : Mesh
         Triangles.
     sources : SourceSet
-        Vertices and points; segments are not looked at.
+        Vertices, points and segments.
     faces, barycentric : (k,) int64, (k, 3) float64
         Where the paths begin. The search ends when the distance of all these places is known.
 
@@ -90,7 +91,7 @@ def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: Fl
     is_corner = barycentric.max(axis=1) == 1
     vertex = np.full(len(faces), -1)
     vertex[is_corner] = mesh.F[faces[is_corner], barycentric[is_corner].argmax(axis=1)]
-    points = sources.points
+    points, segments = sources.points, sources.segments
     begin = float(sources.offsets.min())
     done = search(
         edges,
@@ -98,6 +99,7 @@ def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: Fl
         sources.vertex_offset - begin,
         SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
         points.offset - begin if len(points.faces) else None,
+        replace(segments, offset=segments.offset - begin) if len(segments.faces) else None,
         targets=SurfacePoints(faces[~is_corner], barycentric[~is_corner]) if not is_corner.all() else None,
         goals=np.unique(vertex[is_corner]),
     )
@@ -132,7 +134,7 @@ def _starts(edges: HalfEdges, done: Searched, vertex: IntArray) -> Starts:
 
 def _traced(edges: HalfEdges, done: Searched, starts: Starts) -> tuple[AnyArray, FloatArray, IntArray]:
     """Faces and ends of all segments, and where the segments of each path end; room is doubled until they fit."""
-    room, found, points = _ROOM, done.found, done.starts
+    room, found, sources = _ROOM, done.found, done.starts
     while True:
         face, place, ends = np.empty(room, np.int32), np.empty((room, 2, 3)), np.zeros(len(starts.vertex), np.int64)
         n_done = window_paths.trace_back(
@@ -141,9 +143,12 @@ def _traced(edges: HalfEdges, done: Searched, starts: Starts) -> tuple[AnyArray,
             found.root,
             found.entered,
             found.crossing,
-            points.points.faces,
-            np.ascontiguousarray(points.points.barycentric),
-            points.point_offset,
+            sources.points.faces,
+            np.ascontiguousarray(sources.points.barycentric),
+            sources.point_offset,
+            sources.segments.faces,
+            np.ascontiguousarray(sources.segments.barycentric),
+            sources.segment_offset,
             starts,
             face,
             place,

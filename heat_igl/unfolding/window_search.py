@@ -8,6 +8,7 @@ import numpy as np
 
 from heat_igl.kernels import windows
 from heat_igl.mesh import SurfacePoints
+from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, Located
 
@@ -20,12 +21,29 @@ _NO_VERTICES = np.empty(0, np.int64)
 
 
 class Starts(NamedTuple):
-    """Sources by the numbers of the tables; `label` names vertices, then points, then nothing."""
+    """Sources by the numbers of the tables.
+
+    Attributes
+    ----------
+    vertices, offset : (k,)
+        Vertices, and when each starts.
+    points, point_offset : (p,)
+        Points inside faces; ends of segments are among them.
+    segments, segment_offset : (q,)
+        Segments inside faces.
+    place : (p + q + 1,) int64
+        The number of each point and segment, counted as the caller does: points, then segments; then -1 for nothing.
+    label : (k + p + q + 1,) int64
+        The same after those of the vertices.
+    """
 
     vertices: AnyArray
     offset: FloatArray
     points: Located
     point_offset: FloatArray
+    segments: Located
+    segment_offset: FloatArray
+    place: IntArray
     label: IntArray
 
 
@@ -83,16 +101,17 @@ def search(
     offsets: FloatArray | None = None,
     points: SurfacePoints | None = None,
     point_offsets: FloatArray | None = None,
+    segments: SourceSegments | None = None,
     *,
     cutoff: float = np.inf,
     targets: SurfacePoints | None = None,
     goals: IntArray | None = None,
 ) -> Searched:
     """Distances on the tables `edges`; parameters and errors are those of `ExactSurface.solve`."""
-    starts = _starts(edges, sources, offsets, points, point_offsets)
+    starts = _starts(edges, sources, offsets, points, point_offsets, segments)
     place = edges.located(targets)
-    n, p, t = edges.n, len(starts.points.faces), len(place.faces)
-    found, at_targets = Found.of(n, n + p), Found.of(t, 0)
+    n, t = edges.n, len(place.faces)
+    found, at_targets = Found.of(n, n + len(starts.points.faces) + len(starts.segments.faces)), Found.of(t, 0)
     statistics = np.zeros(3, np.int64)
     front = windows.Front(
         *edges.tables,
@@ -113,6 +132,9 @@ def search(
         starts.points.faces,
         np.ascontiguousarray(starts.points.barycentric).ravel(),
         starts.point_offset,
+        starts.segments.faces,
+        np.ascontiguousarray(starts.segments.barycentric).ravel(),
+        starts.segment_offset,
         edges.number[_NO_VERTICES if goals is None else goals],
         *edges.by_face(place),
         place.faces,
@@ -137,21 +159,31 @@ def _starts(
     offsets: FloatArray | None,
     points: SurfacePoints | None,
     point_offsets: FloatArray | None,
+    segments: SourceSegments | None,
 ) -> Starts:
-    """Source vertices and source points for the kernel; points at corners become vertices."""
-    k = len(sources)
-    place = edges.located(points)
+    """Sources for the kernel; points and ends of segments at corners become vertices."""
+    k, p = len(sources), 0 if points is None else len(points)
     begin = np.zeros(k) if offsets is None else edges.scaled(np.asarray(offsets, np.float64))
-    late = np.zeros(len(place.point))
-    if point_offsets is not None:
-        late = edges.scaled(np.asarray(point_offsets, np.float64))[place.point]
+    late = np.zeros(p) if point_offsets is None else edges.scaled(np.asarray(point_offsets, np.float64))
+    counted = np.arange(p)
+    if segments is not None:
+        ends, number = segments.ends(), p + np.arange(len(segments.faces))
+        all_faces = np.concatenate([np.empty(0, np.int64) if points is None else points.faces, ends.faces])
+        all_places = np.concatenate([np.empty((0, 3)) if points is None else points.barycentric, ends.barycentric])
+        points = SurfacePoints(all_faces, all_places)
+        late, counted = np.concatenate([late, edges.scaled(ends.offset)]), np.concatenate([counted, number, number])
+    place, lines = edges.located(points), edges.located_segments(segments)
+    late, counted = late[place.point], counted[place.point]
     is_corner = (place.barycentric == 0).sum(axis=1) == 2
-    inside = Located(*(column[~is_corner] for column in place))
     corner = 3 * place.faces[is_corner] + place.barycentric[is_corner].argmax(axis=1)
+    numbers = np.concatenate([counted[~is_corner], p + lines.point, [-1]])
     return Starts(
         np.concatenate([edges.number[sources], edges.tables.vertex[corner]]),
         np.concatenate([begin, late[is_corner]]),
-        inside,
+        Located(*(column[~is_corner] for column in place)),
         late[~is_corner],
-        np.concatenate([np.arange(k), k + place.point[is_corner], k + inside.point, [-1]]),
+        lines,
+        np.zeros(0) if segments is None else edges.scaled(segments.offset)[lines.point],
+        numbers,
+        np.concatenate([np.arange(k), k + counted[is_corner], np.where(numbers < 0, -1, k + numbers)]),
     )
