@@ -27,6 +27,10 @@ def _percent(name: str) -> Callable[[ValidationRow], float | None]:
     return lambda row: None if row.errors is None else 100 * float(getattr(row.errors, name))
 
 
+def _bound(name: str) -> Callable[[ValidationRow], float | None]:
+    return lambda row: None if row.bounds is None else float(getattr(row.bounds, name))
+
+
 _COLUMNS = (
     _Column("mean", "mean of |d - exact| / exact, in percent", _percent("mean")),
     _Column("median", "median of the same", _percent("median"), 3),
@@ -35,8 +39,8 @@ _COLUMNS = (
     _Column("L2", "root of the integral of (d - exact)^2, in percent of that of exact^2", _percent("l2"), 4),
     _Column("near", "mean near the sources, in percent", _percent("near_field"), 1),
     _Column("eikonal", "mean of ||grad d| - 1| over the area", lambda row: row.eikonal, 1),
-    _Column("below", "values below the straight line", lambda row: row.bounds and row.bounds.n_below, 2),
-    _Column("above", "values above the path along edges", lambda row: row.bounds and row.bounds.n_above, 2),
+    _Column("below", "values below the straight line", _bound("n_below"), 2),
+    _Column("above", "values above the path along edges", _bound("n_above"), 2),
     _Column("once s", "seconds for what depends on the mesh alone", lambda row: row.precompute_seconds),
     _Column("ms", "milliseconds for a distance after that", lambda row: row.solve_seconds and 1e3 * row.solve_seconds),
     _Column("MB", "memory by which the process grew", lambda row: row.peak_memory and row.peak_memory / 1e6, 3),
@@ -51,7 +55,7 @@ def print_report(report: ValidationReport) -> None:
         return
     heading, *_, remarks = report.to_markdown().split("\n\n")
     console.print(Text(heading.replace("**", "")))
-    columns = _COLUMNS
+    columns: tuple[_Column, ...] = _COLUMNS
     unbounded = console.options.update(width=1000)
     for earliest in (4, 3, 2, 1):
         if console.measure(_table(report, columns), options=unbounded).maximum <= console.width:

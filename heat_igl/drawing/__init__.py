@@ -1,7 +1,7 @@
 """Pictures, interactive pages and windows of a distance on a surface."""
 
 from heat_igl.drawing.output import PAGE_SUFFIXES, PICTURE_SUFFIXES
-from heat_igl.drawing.plots import Page, Picture, page, picture, plot, plot_field, write_html
+from heat_igl.drawing.plots import Page, Picture, page, picture, plot, plot_field, plot_labels, write_html
 
 __all__ = [
     "PAGE_SUFFIXES",
@@ -12,5 +12,6 @@ __all__ = [
     "picture",
     "plot",
     "plot_field",
+    "plot_labels",
     "write_html",
 ]
