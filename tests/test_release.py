@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,7 @@ import pytest
 import heat_igl
 
 yaml = pytest.importorskip("yaml")
-if sys.version_info < (3, 11):
-    pytest.skip("tomllib is new in 3.11", allow_module_level=True)
-import tomllib
+tomllib = pytest.importorskip("tomllib", reason="new in Python 3.11")
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf8"))["project"]
