@@ -32,7 +32,15 @@ from heat_igl.heat_method import (
     heat_method_distance,
 )
 from heat_igl.intrinsic import TangentFrames, tangent_frames
-from heat_igl.io import read_attributes, read_mesh, read_point_cloud, read_polygon_mesh, write_curves, write_mesh
+from heat_igl.io import (
+    read_attributes,
+    read_mesh,
+    read_point_cloud,
+    read_polygon_mesh,
+    write_curves,
+    write_mesh,
+    write_point_cloud,
+)
 from heat_igl.mesh import (
     ClosestPoints,
     ImageDomain,
@@ -151,6 +159,7 @@ __all__ = [
     "voronoi_cells",
     "write_curves",
     "write_mesh",
+    "write_point_cloud",
 ]
 
 __version__ = "0.1.0"
