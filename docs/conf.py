@@ -40,6 +40,8 @@ extensions = [
 ]
 html_math_renderer = extensions[-2].rpartition(".")[2]
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_extra_path = ["_parts/pages"]  # interactive pages, copied unchanged
 templates_path = ["_templates"]
 exclude_patterns = ["_build", "_parts"]

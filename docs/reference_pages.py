@@ -9,8 +9,8 @@ GROUPS = {
     "Distance": """geodesic_distance HeatMethodSolver HeatSolution Diagnostics LabelledDistance heat_method_distance
         unfolded_distance Refinement""",
     "Only what is asked": "distances_within nearest_vertices pair_distances distance_matrix",
-    "Meshes, polygons and points": """Mesh PolygonMesh PointCloud as_mesh sample_mesh MeshReport ImageDomain image_domain
-        closest_points ClosestPoints split_long_edges""",
+    "Meshes, polygons and points": """Mesh PolygonMesh PointCloud as_mesh sample_mesh MeshReport ImageDomain
+        image_domain closest_points ClosestPoints split_long_edges""",
     "Files": """read_mesh read_polygon_mesh read_point_cloud read_attributes write_mesh write_point_cloud
         write_curves""",
     "Sources": "SurfacePoints SurfaceCurve OffsetSources curve_on edge_curve",
