@@ -30,7 +30,7 @@ def view(
     html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
     json_file: JsonOption = None,
 ) -> None:
-    """A window in which a click moves the source and the distance follows; where there is no display, a page."""
+    """A window in which a click moves the source and the distance follows, or a page if there is no display."""
     from heat_igl.drawing.viewer import Exploration, Window, display_problem
 
     check_json(json_file)

@@ -165,12 +165,14 @@ def plot_labels(
     Returns
     -------
     Picture
-        Displayed by notebooks; `Picture.save` writes it to a file.
+        As that of `plot`.
 
     Raises
     ------
-    ValueError, SourceError, MissingExtraError
-        As for `plot`; also if labels are not integers.
+    ValueError
+        If `labels` are not integers of shape (n,), or an option is invalid.
+    SourceError, MissingExtraError
+        As for `plot`.
 
     Notes
     -----
@@ -191,12 +193,12 @@ def plot_labels(
 
 
 def picture(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **options: Any) -> None:
-    """Draw a distance and write the picture to `path`: `plot` with its options, then `Picture.save`."""
+    """Draw a distance and write the picture to `path`: `plot` with the same options, then `Picture.save`."""
     plot(mesh, distance, **options).save(path)
 
 
 def write_html(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **options: Any) -> None:
-    """Write an interactive page to `path`: `page` with its options, then `Page.save`."""
+    """Write an interactive page to `path`: `page` with the same options, then `Page.save`."""
     page(mesh, distance, **options).save(path)
 
 
