@@ -459,3 +459,11 @@ def test_a_shell_is_told_how_commands_go_on(tmp_path: Path) -> None:
 
     assert completed("heat-igl dist", 1) == "distance"
     assert completed("heat-igl distance --cut", 2) == "--cutoff"
+
+
+def test_isolines_of_a_surface_are_drawn_with_hidden_lines_dotted(sphere: Path) -> None:
+    file = sphere.with_name("lines.svg")
+    assert cli.run(["isolines", str(sphere), "--source=0", "--spacing=0.5", f"--output={file}"]) == 0
+    text = file.read_text()
+    assert 'id="visible"' in text
+    assert 'id="hidden" stroke-dasharray=' in text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 import heat_igl
 from heat_igl import shapes
 from heat_igl.drawing import camera, figure, raster, shading
+from heat_igl.drawing.line_drawing import write_line_drawing
 from heat_igl.drawing.plots import Picture, picture, plot, plot_field, plot_labels
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, colours
 from heat_igl.drawing.surface_image import LINE
@@ -434,3 +436,44 @@ def test_vertices_without_a_label_are_grey() -> None:
 def test_what_are_no_labels(labels: np.ndarray, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         plot_labels(shapes.grid(4), labels)
+
+
+# --- line drawings ----------------------------------------------------------------------------------------------------
+
+
+def drawn_lines(path: Path) -> dict[str, list[np.ndarray]]:
+    """The polylines of each group, with y upwards."""
+    found = {}
+    for name, group in re.findall(r'<g id="(\w+)"[^>]*>\n(.*?)</g>', path.read_text(), re.DOTALL):
+        points = re.findall(r'points="([^"]*)"', group)
+        found[name] = [np.array([pair.split(",") for pair in text.split()], float) * [1, -1] for text in points]
+    return found
+
+
+@pytest.mark.parametrize("hidden", ["dotted", "omitted"])
+def test_lines_behind_the_surface_are_hidden(tmp_path: Path, hidden: str) -> None:
+    """Circles of latitude on a sphere, seen at right angles to the axis: the near half of each is visible."""
+    sphere = shapes.icosphere(4)
+    mesh = heat_igl.Mesh(10 * sphere.V + 3, sphere.F)
+    levels = heat_igl.isolines(mesh, mesh.V[:, 1], [0.0, 3.0, 7.0])
+    path = tmp_path / "a.svg"
+    write_line_drawing(path, mesh, levels, hidden=hidden, view=(0, 0))
+    found = drawn_lines(path)
+    assert set(found) == ({"visible", "hidden"} if hidden == "dotted" else {"visible"})
+    for group in found.values():
+        across = sum(np.abs(np.diff(line[:, 0])).sum() for line in group)
+        radii = np.sqrt(100 - np.array([-3.0, 0.0, 4.0]) ** 2)
+        assert across == pytest.approx(2 * radii.sum(), rel=0.03)
+        heights = np.concatenate([line[:, 1] for line in group])
+        assert np.abs(heights[:, None] - [-3, 0, 4]).min(axis=1).max() < 0.05
+    assert ("stroke-dasharray" in path.read_text()) == (hidden == "dotted")
+
+
+def test_a_line_drawing_goes_to_svg(tmp_path: Path) -> None:
+    mesh = shapes.icosphere(1)
+    with pytest.raises(ValueError, match=r"a\.png: line drawings go to \.svg files"):
+        write_line_drawing(tmp_path / "a.png", mesh, [])
+    with pytest.raises(ValueError, match="hidden must be one of 'dotted', 'omitted', not 'grey'"):
+        write_line_drawing(tmp_path / "a.svg", mesh, [], hidden="grey")
+    with pytest.raises(TypeError, match="curves must be a SurfaceCurve or a list of such, not int"):
+        write_line_drawing(tmp_path / "a.svg", mesh, 3)

@@ -15,6 +15,7 @@ from rich.console import Console
 import heat_igl
 from heat_igl.cli.options import JsonOption, MeshArgument, choice, position, positive
 from heat_igl.cli.output import Row, check_curves, check_json, check_outputs, print_rows, write_distance
+from heat_igl.drawing import write_line_drawing
 from heat_igl.errors import SourceError
 from heat_igl.heat_method import (
     Backend,
@@ -27,7 +28,7 @@ from heat_igl.heat_method import (
     SolverOptions,
     geodesic_distance,
 )
-from heat_igl.io import read_mesh
+from heat_igl.io import is_flat, read_mesh
 from heat_igl.mesh import Mesh, closest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import FloatArray
@@ -144,7 +145,9 @@ def isolines(
     mesh: MeshArgument,
     source: Annotated[list[int], typer.Option(help="Source vertex, counted from 0; repeat for several.")],
     spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=positive)],
-    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the lines.")],
+    output: Annotated[
+        Path, typer.Option(help="OBJ, SVG or DXF file for the lines; dotted behind, in SVG.")
+    ],
     refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -163,7 +166,10 @@ def isolines(
         )
     levels = spacing * np.arange(1, int(farthest / spacing) + 1)
     curves = heat_igl.isolines(loaded, phi, levels)
-    heat_igl.write_curves(output, loaded, {f"{level:g}": each for level, each in zip(levels, curves, strict=True)})
+    if output.suffix.lower() == ".svg" and not is_flat(loaded):
+        write_line_drawing(output, loaded, curves)
+    else:
+        heat_igl.write_curves(output, loaded, {f"{level:g}": each for level, each in zip(levels, curves, strict=True)})
     n = sum(map(len, curves))
     rows: list[Row] = [("farthest", f"{farthest:.6g}", farthest), ("lines", f"{n} at {len(levels)} distances", n)]
     print_rows([*rows, ("distances", f"{spacing:g} apart", levels.tolist()), ("wrote", str(output))], json_file)

@@ -12,7 +12,10 @@ EXAMPLES = {
         "distance bunny.obj --source 12 --source 40 --cutoff 0.1 --output distance.npy",
         "distance bunny.obj --at 0.3,0.1,0 --method exact --json -",
     ),
-    "isolines": ("isolines bunny.obj --source 1234 --spacing 0.05 --output lines.obj",),
+    "isolines": (
+        "isolines bunny.obj --source 1234 --spacing 0.05 --output lines.obj",
+        "isolines bunny.obj --source 1234 --spacing 0.05 --output lines.svg",
+    ),
     "path": ("path bunny.obj --from 12 --to 2000 --output path.obj",),
     "view": ("view bunny.obj --source 1234", "view bunny.obj --html bunny.html"),
     "demo": ("demo", "demo --out results"),

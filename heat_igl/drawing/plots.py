@@ -16,6 +16,7 @@ import numpy as np
 
 from heat_igl.drawing.figure import lay_out
 from heat_igl.drawing.html_view import Page, page
+from heat_igl.drawing.line_drawing import write_line_drawing
 from heat_igl.drawing.output import Picture
 from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, Scene, Style, check_style, colours, scene
 from heat_igl.drawing.shading import colour_numbers
@@ -23,7 +24,9 @@ from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = ["Page", "Picture", "page", "picture", "plot", "plot_field", "plot_labels", "write_html"]
+__all__ = [
+    "Page", "Picture", "page", "picture", "plot", "plot_field", "plot_labels", "write_html", "write_line_drawing",
+]  # fmt: skip
 
 # Of matplotlib's "tab10".
 _N_COLOURS = 10
