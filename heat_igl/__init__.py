@@ -36,7 +36,15 @@ if TYPE_CHECKING:
         heat_method_distance,
     )
     from heat_igl.intrinsic import TangentFrames, tangent_frames
-    from heat_igl.io import read_attributes, read_mesh, read_point_cloud, read_polygon_mesh, write_curves, write_mesh
+    from heat_igl.io import (
+        read_attributes,
+        read_mesh,
+        read_point_cloud,
+        read_polygon_mesh,
+        write_curves,
+        write_mesh,
+        write_point_cloud,
+    )
     from heat_igl.mesh import (
         ClosestPoints,
         ImageDomain,
@@ -150,6 +158,7 @@ __all__ = [
     "voronoi_cells",
     "write_curves",
     "write_mesh",
+    "write_point_cloud",
 ]
 
 __version__ = "0.1.0"
@@ -188,6 +197,7 @@ _LAZY = {
     "closed_forms": "validation.closed_forms",
     "closest_points": "mesh",
     "cluster": "cluster",
+    "compat": "compat",
     "connection_laplacian": "operators",
     "curve_on": "mesh",
     "curves": "curves",
@@ -243,6 +253,7 @@ _LAZY = {
     "voronoi_cells": "sampling",
     "write_curves": "io",
     "write_mesh": "io",
+    "write_point_cloud": "io",
 }
 
 # Modules that users import by these names: earlier name -> the module in its room.

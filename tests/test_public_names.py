@@ -24,7 +24,7 @@ farthest_points geodesic_centre geodesic_distance heat_method_distance image_dom
 offset_curves pair_distances plots point_cloud_operators polygon_operators read_attributes read_mesh read_point_cloud
 read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
 tangent_frames trace_geodesic
-unfolded_distance validate voronoi_cells write_curves write_mesh
+unfolded_distance validate voronoi_cells write_curves write_mesh write_point_cloud
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they
@@ -44,6 +44,7 @@ read_polygon_mesh(path)
 read_point_cloud(path)
 write_mesh(path, mesh)
 write_curves(path, mesh, curves, *, projection=None)
+write_point_cloud(path, cloud)
 heat_method_distance(V, F, sources)
 unfolded_distance(V, F=None, sources=None, *, tolerance=4e-05)
 geodesic_distance(mesh, sources, *, method='unfold', cutoff=None)
