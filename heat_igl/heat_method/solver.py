@@ -11,6 +11,8 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
 from heat_igl.heat_method.checking import AnswerCheck
+from heat_igl.heat_method.derivatives import DistanceDerivative
+from heat_igl.heat_method.differentiation import differentiated
 from heat_igl.heat_method.integration import damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
@@ -366,6 +368,13 @@ class HeatMethodSolver(BatchedSolver):
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
+
+    def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
+        """Distance and its derivative: ``phi, pull_back``; ``pull_back(g (n,))`` is dV (n, 3), see `DistanceDerivative`.
+
+        Arguments and errors as for `distance`, with a ValueError for what has no derivative here, see `differentiated`.
+        """
+        return differentiated(self.distance(sources), self._source_set(sources), self._parts, self._mesh)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""

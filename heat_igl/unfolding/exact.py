@@ -186,6 +186,14 @@ class ExactSurface:
             *(int(count) for count in statistics[1:]),
         )
 
+    def located(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray]:
+        """Triangles that hold points of the mesh, coordinates in them, and which point each is.
+
+        A point on a side is there once for each triangle.
+        """
+        place = self._half_edges.located(points)
+        return self._half_edges.face[place.faces].astype(np.int64), place.barycentric, place.point
+
     def _starts(
         self,
         sources: IntArray,

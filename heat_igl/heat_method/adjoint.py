@@ -1,0 +1,2 @@
+class HeatAdjoint:
+    def __init__(self,*a): pass

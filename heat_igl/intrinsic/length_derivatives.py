@@ -1,0 +1,116 @@
+"""Derivatives by the edge lengths of a triangulation, carried back to the faces that it was made from, and forth.
+
+A flip replaces the edge ab of the triangles pab and qba by pq. The line pq crosses ab at a fixed place as far as the
+first derivative goes, so in each of the two triangles the derivative of its piece, between places whose barycentric
+coordinates differ by delta, by a side l_ik is - delta_i delta_k l_ik over the length of the piece.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heat_igl.intrinsic.history import BACK_CORNERS, Covered, Flipped, Refined, Turned
+from heat_igl.intrinsic.layout import apex
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
+from heat_igl.typing import FloatArray
+
+__all__ = ["carry_lengths", "carry_lengths_back", "check_carried"]
+
+
+def carry_lengths_back(triangulation: IntrinsicTriangulation, by_side: FloatArray, n_before: int = 0) -> FloatArray:
+    """The derivative by the sides of earlier faces, from that by the sides of a triangulation.
+
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        m triangles.
+    by_side : (m, 3) float64
+        Derivative by the length opposite each corner; an edge of two faces changes both of its sides.
+    n_before : int
+        How many changes of the history the earlier faces have behind them.
+
+    Returns
+    -------
+    (m', 3) float64
+        The same for the earlier faces.
+
+    Raises
+    ------
+    ValueError
+        If vertices were added.
+    """
+    check_carried(triangulation)
+    by_side = by_side.copy()
+    for change in reversed(triangulation.history[n_before:]):
+        if isinstance(change, Flipped):
+            _unflip(change, by_side)
+        elif isinstance(change, Turned):
+            by_side[change.turned] = by_side[change.turned, ::-1]
+        elif isinstance(change, Covered):
+            m = change.n_faces
+            by_side = by_side[:m] + by_side[m:, BACK_CORNERS]
+    return by_side
+
+
+def carry_lengths(triangulation: IntrinsicTriangulation, by_side: FloatArray, n_before: int = 0) -> FloatArray:
+    """How the sides (m, 3) of a triangulation change when those of earlier faces change by `by_side` (m', 3)."""
+    by_side = by_side.copy()
+    for change in triangulation.history[n_before:]:
+        if isinstance(change, Flipped):
+            _flip(change, by_side)
+        elif isinstance(change, Turned):
+            by_side[change.turned] = by_side[change.turned, ::-1]
+        elif isinstance(change, Covered):
+            by_side = np.concatenate([by_side, by_side[:, BACK_CORNERS]])
+    return by_side
+
+
+def check_carried(triangulation: IntrinsicTriangulation) -> None:
+    """Raise a ValueError if vertices were added, whose places change with the lengths."""
+    if any(isinstance(change, Refined) for change in triangulation.history):
+        raise ValueError(
+            "the triangulation that is solved on has more vertices than the mesh, through which no derivative is carried: "
+            "take laplacian='intrinsic-delaunay', or refine='unfold'"
+        )
+
+
+def _slopes(lengths: FloatArray) -> FloatArray:
+    """Derivative (5, k) of the new edges pq by the lengths (5, k) of ab, pa, bp, aq and qb."""
+    ab, pa, bp, aq, qb = lengths
+    (px, py), (qx, qy) = apex(ab, pa, bp), apex(ab, aq, qb)
+    length = np.hypot(px - qx, py + qy)
+    # The line crosses ab at this share of it from a; p is over ab in this share of the line.
+    above = py / (py + qy)
+    share = (px + (qx - px) * above) / ab
+    p_piece, q_piece = above * length, (1 - above) * length
+    with np.errstate(divide="ignore", invalid="ignore"):
+        of_p = np.stack([-share * (1 - share) * ab, (1 - share) * pa, share * bp]) / p_piece
+        of_q = np.stack([-share * (1 - share) * ab, (1 - share) * aq, share * qb]) / q_piece
+    # A corner on ab: no piece lies on that side, and no side of it counts.
+    of_p[:, p_piece == 0] = 0.0
+    of_q[:, q_piece == 0] = 0.0
+    return np.stack([of_p[0] + of_q[0], of_p[1], of_p[2], of_q[1], of_q[2]])
+
+
+def _unflip(change: Flipped, by_side: FloatArray) -> None:
+    """Carry derivatives back over flips, in place."""
+    f, c = np.divmod(change.half_edge, 3)
+    g, e = np.divmod(change.mate, 3)
+    c1, c2, e1, e2 = (c + 1) % 3, (c + 2) % 3, (e + 1) % 3, (e + 2) % 3
+    ab, pa, bp, aq, qb = _slopes(change.lengths) * (by_side[f, c1] + by_side[g, e1])
+    of_aq, of_bp = by_side[f, c], by_side[g, e]
+    by_side[f, c1], by_side[g, e1] = of_bp + bp, of_aq + aq
+    by_side[f, c2] += pa
+    by_side[g, e2] += qb
+    by_side[f, c], by_side[g, e] = ab, 0.0
+
+
+def _flip(change: Flipped, by_side: FloatArray) -> None:
+    """Carry changes of lengths over flips, in place."""
+    f, c = np.divmod(change.half_edge, 3)
+    g, e = np.divmod(change.mate, 3)
+    c1, c2, e1, e2 = (c + 1) % 3, (c + 2) % 3, (e + 1) % 3, (e + 2) % 3
+    sides = np.stack([by_side[f, c], by_side[f, c2], by_side[f, c1], by_side[g, e1], by_side[g, e2]])
+    pq = (_slopes(change.lengths) * sides).sum(axis=0)
+    by_side[f, c], by_side[g, e] = sides[3], sides[2]
+    by_side[f, c1] = by_side[g, e1] = pq

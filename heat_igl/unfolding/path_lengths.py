@@ -1,0 +1,106 @@
+"""Distances as lengths of paths: one answer of the unfolding or of exact windows, to be differentiated."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.intrinsic import IntrinsicTriangulation
+from heat_igl.mesh import SurfacePoints
+from heat_igl.sources import SourceSet
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.exact import ExactSurface
+from heat_igl.unfolding.path_derivatives import Change, Paths, Places, Ways, half_edge_arrays
+from heat_igl.unfolding.refinement import TOLERANCE, Refinement
+
+__all__ = ["PathLengths", "from_walks", "from_windows"]
+
+
+class PathLengths:
+    """The paths of one answer, on the triangulation that they were found on.
+
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        m triangles on n vertices.
+    paths : Paths
+        On these triangles, or on others that `refinement` made of them.
+    rows : (n,) int
+        Where each vertex stands in `paths`.
+    refinement : Refinement, optional
+        Carries sides to the triangles of `paths` and back.
+    """
+
+    def __init__(
+        self, triangulation: IntrinsicTriangulation, paths: Paths, rows: AnyArray, refinement: Refinement | None = None
+    ) -> None:
+        self.triangulation, self._paths, self._rows, self._refinement = triangulation, paths, rows, refinement
+
+    @property
+    def lost(self) -> IntArray:
+        """Vertices whose path could not be followed to its end: their derivative is 0, or that of a part of the path."""
+        return np.flatnonzero(self._paths.is_lost[self._rows])
+
+    @property
+    def places(self) -> Places:
+        """The source points."""
+        return self._paths.places
+
+    def pull_back(self, g: FloatArray) -> Change:
+        """The derivative of the sum of distances times g (n,), by the sides of the triangulation."""
+        weight = np.zeros(self._paths.n)
+        weight[self._rows] = g
+        change = self._paths.pull_back(weight)
+        by_side, by_offset = change.by_side, change.by_offset
+        if self._refinement is not None:
+            by_side = self._refinement.by_given_sides(by_side)
+        on_vertices = np.append(by_offset[self._rows], by_offset[self._paths.n :])
+        return change._replace(by_side=by_side, by_offset=on_vertices)
+
+    def push_forward(self, by_side: FloatArray) -> FloatArray:
+        """How the distances (n,) change when the sides (m, 3) change by `by_side`."""
+        if self._refinement is not None:
+            by_side = self._refinement.on_tables(by_side)
+        return np.asarray(self._paths.push_forward(by_side)[self._rows])
+
+
+class _Starts(NamedTuple):
+    """What `sources` are for a query: vertices and points, and the distance at which each starts."""
+
+    vertices: IntArray
+    offsets: FloatArray
+    points: SurfacePoints | None
+    point_offsets: FloatArray | None
+
+    @classmethod
+    def of(cls, sources: SourceSet) -> _Starts:
+        points = sources.points
+        places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
+        return cls(sources.vertices, sources.vertex_offset, places, points.offset if places is not None else None)
+
+
+def from_walks(refinement: Refinement, sources: SourceSet, u: FloatArray) -> PathLengths:
+    """The paths that unfolding finds from vertices and points, in the order of the heat u (n,)."""
+    starts = _Starts.of(sources)
+    offsets = starts.offsets if sources.offsets.any() else None
+    paths = refinement.paths(-u, starts.vertices, offsets, starts.points, starts.point_offsets, TOLERANCE)
+    return PathLengths(refinement.triangulation, paths, refinement.rows_of(paths.distance), refinement)
+
+
+def from_windows(surface: ExactSurface, triangulation: IntrinsicTriangulation, sources: SourceSet) -> PathLengths:
+    """The paths that exact windows on a triangulation find from vertices and points."""
+    starts = _Starts.of(sources)
+    found = surface.solve(starts.vertices, starts.offsets, starts.points, starts.point_offsets)
+    origin, n = found.origin, triangulation.n
+    places = Places.none()
+    begins = np.append(found.distance, 0.0)
+    if starts.points is not None and starts.point_offsets is not None:
+        placed = surface.located(starts.points)
+        places = Places(*placed, starts.point_offsets[placed[2]])
+        begins = np.concatenate([found.distance, starts.point_offsets, [0.0]])
+    length = triangulation.l.ravel()[origin.entered]
+    ways = Ways(found.distance, origin.entered, origin.crossing / length, found.distance - begins[origin.root])
+    is_source = np.zeros(n, bool)
+    is_source[starts.vertices] = found.distance[starts.vertices] >= starts.offsets
+    return PathLengths(triangulation, Paths(half_edge_arrays(triangulation), places, ways, is_source), np.arange(n))
