@@ -41,6 +41,9 @@ class SidesDerivative(Protocol):
     def push_forward(self, by_side: FloatArray) -> FloatArray:
         """How the distances (n,) change when the sides (m, 3) change by `by_side`."""
 
+    def lengths(self) -> FloatArray:
+        """The distances (n,) that are differentiated; any number at unreachable vertices."""
+
 
 class DistanceDerivative:
     """The derivative of one distance: called with a gradient by the distances, it returns that by the positions.
@@ -165,14 +168,9 @@ class DistanceDerivative:
         With ``refine="unfold"`` a few paths became shorter after others had been measured by them, by some 1e-5, and
         some distances are set by bounds instead. The derivative is that of the path as it is.
         """
-        return np.flatnonzero(np.abs(self._lengths - self.distance) > _SAME * self.distance)
-
-    @cached_property
-    def _lengths(self) -> FloatArray:
-        """Lengths (n,) of the paths: distance is homogeneous in the edge lengths (Euler)."""
-        lengths = self._answer.push_forward(self._answer.triangulation.l)
-        lengths[self.unreachable] = np.inf
-        return lengths
+        reached = np.flatnonzero(np.isfinite(self.distance))
+        distance = self.distance[reached]
+        return np.asarray(reached[np.abs(self._answer.lengths()[reached] - distance) > _SAME * distance])
 
     def _positions(self) -> Mesh:
         if self._mesh is None:

@@ -23,7 +23,7 @@ from heat_igl.operators import Operators, operators, point_cloud_operators, poly
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import UnfoldingSolver
 
 __all__ = ["SolverParts", "prepare", "prepare_mesh", "prepare_polygons"]
@@ -52,6 +52,8 @@ class SolverParts:
         Steps 2 and 3, or what takes their place with ``refine``.
     time_steps : (n_components,) float64
         Time step of each component.
+    step_raised : (n_components,) bool
+        Whether that is more than was asked for, so that the heat crosses the component.
     t_damping : float, (n_components,) float64 or None
         Time step for `damping`; None for a field of length 1.
     fitted : bool
@@ -69,6 +71,7 @@ class SolverParts:
     factored: HeatFlow | None
     last_steps: Integration | UnfoldingSolver
     time_steps: FloatArray
+    step_raised: BoolArray
     t_damping: float | FloatArray | None
     fitted: bool
     checker: Checker | None
@@ -202,6 +205,7 @@ def prepare(
         factored=heat_flow,
         last_steps=last_steps,
         time_steps=np.broadcast_to(step, domain.n_components),
+        step_raised=np.broadcast_to(np.asarray(step) > requested, domain.n_components),
         t_damping=t_damping,
         fitted=fitted,
         checker=None if options.refine in ("unfold", "exact") else Checker(domain, V),

@@ -64,6 +64,11 @@ class PathLengths:
             by_side = self._refinement.on_tables(by_side)
         return np.asarray(self._paths.push_forward(by_side)[self._rows])
 
+    def lengths(self) -> FloatArray:
+        """Lengths (n,) of the paths; 0 at unreachable vertices."""
+        # Distance is homogeneous in the sides (Euler), but for the distances at which sources start.
+        return self.push_forward(self.triangulation.l)
+
 
 class _Starts(NamedTuple):
     """What `sources` are for a query: vertices and points, and the distance at which each starts."""

@@ -1,0 +1,86 @@
+"""Derivatives of what the heat method takes of a triangle, by the lengths of the sides: weights, area and masses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heat_igl.operators.matrices import Operators
+from heat_igl.typing import FloatArray
+
+__all__ = ["ElementSlopes", "Elements"]
+
+
+class Elements:
+    """Half the cotangents and areas of the triangles of a domain, as L and M count them.
+
+    A cover of a surface counts each triangle one half.
+
+    Parameters
+    ----------
+    domain : Operators
+        With a surface of m triangles.
+
+    Attributes
+    ----------
+    l : (m, 3) float64
+        Lengths of the sides.
+    weight : (m, 3) float64
+        Half the cotangent opposite each side: the entry of L at the ends of an edge is the sum over its sides.
+    area : (m,) float64
+        Area of each triangle.
+    """
+
+    def __init__(self, domain: Operators) -> None:
+        if domain.surface is None:
+            raise ValueError("derivatives need a surface of triangles")
+        triangulation = domain.surface.triangulation
+        self.l = triangulation.l
+        self.share = 0.5 if triangulation.is_cover else 1.0
+        self.area = self.share * triangulation.areas
+        square = self.l**2
+        self._inner = square.sum(axis=1)[:, None] - 2 * square
+        self.weight = self.share**2 * self._inner / (8 * self.area)[:, None]
+        #: Corners (m, 3) with an obtuse angle.
+        self._is_obtuse = self._inner < 0
+
+    def mass(self) -> FloatArray:
+        """Area (m, 3) of the Voronoi cell of each corner; of an obtuse triangle one half and twice a quarter."""
+        parts = self.weight * self.l**2 / 4
+        cells = parts.sum(axis=1)[:, None] - parts
+        obtuse = self._is_obtuse.any(axis=1)
+        cells[obtuse] = self.area[obtuse, None] * np.where(self._is_obtuse[obtuse], 0.5, 0.25)
+        return np.asarray(cells)
+
+
+class ElementSlopes:
+    """Sums the derivative of a number by the weights, areas, masses and sides of triangles, all zero at first.
+
+    Attributes
+    ----------
+    by_weight, by_mass, by_side : (m, 3) float64
+        By `Elements.weight`, `Elements.mass` and the lengths themselves.
+    by_area : (m,) float64
+        By `Elements.area`.
+    """
+
+    def __init__(self, elements: Elements) -> None:
+        self._elements = elements
+        self.by_weight, self.by_mass, self.by_side = (np.zeros_like(elements.l) for _ in range(3))
+        self.by_area = np.zeros(len(elements.l))
+
+    def total(self) -> FloatArray:
+        """The derivative (m, 3) by the lengths of the sides."""
+        e = self._elements
+        by_weight, by_area, by_side = self.by_weight.copy(), self.by_area.copy(), self.by_side.copy()
+        obtuse = e._is_obtuse.any(axis=1)
+        by_area[obtuse] += (self.by_mass * np.where(e._is_obtuse, 0.5, 0.25)).sum(axis=1)[obtuse]
+        # The cell of a corner has a part for both sides there: for all but the opposite one.
+        by_part = np.where(obtuse[:, None], 0.0, self.by_mass.sum(axis=1)[:, None] - self.by_mass)
+        by_weight += by_part * e.l**2 / 4
+        by_side += by_part * e.weight * e.l / 2
+        # The weight is inner / (8 area), and the area changes by l times the weight.
+        by_area -= (by_weight * e.weight).sum(axis=1) / e.area
+        by_inner = e.share**2 * by_weight / (8 * e.area)[:, None]
+        by_side += 2 * e.l * (by_inner.sum(axis=1)[:, None] - 2 * by_inner)
+        by_side += by_area[:, None] * e.l * e.weight
+        return np.asarray(by_side)
