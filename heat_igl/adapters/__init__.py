@@ -1,0 +1,1 @@
+"""Distance as a function that other libraries differentiate: PyTorch and JAX."""
