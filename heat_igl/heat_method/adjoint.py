@@ -10,16 +10,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from heat_igl.heat_method.levels import PinnedLevels
 from heat_igl.heat_method.integration import Integration
+from heat_igl.heat_method.levels import PinnedLevels
 from heat_igl.heat_method.parts import SolverParts
 from heat_igl.intrinsic import IntrinsicTriangulation
-from heat_igl.operators import Operators
-from heat_igl.operators.element_derivatives import Elements, ElementSlopes
+from heat_igl.operators import ElementSlopes
 from heat_igl.sources import SourceSet, right_hand_side
 from heat_igl.steps.fitted import fit, fit_slope
 from heat_igl.steps.normalization import lowest_full_rate
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import FloatArray
 from heat_igl.unfolding import Change
 
 __all__ = ["HeatAdjoint"]
@@ -53,10 +52,8 @@ class HeatAdjoint:
         assert surface is not None and isinstance(last_steps, Integration)
         self._parts, self._domain = parts, domain
         self.triangulation: IntrinsicTriangulation = surface.triangulation
-        self._elements = Elements(domain)
-        F = self.triangulation.F
-        #: Vertices at the ends of each side.
-        self._i, self._j = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
+        self._elements = parts.elements
+        self._i, self._j = self._elements.i, self._elements.j
         term = parts.assembler.term(sources)
         heat = parts.heat_flow.solve(right_hand_side(domain.n, [term]))
         self._u = heat[:, 0]
@@ -82,8 +79,7 @@ class HeatAdjoint:
             pairs.append(levels.pair)
         self._heat_flow(pairs, slopes, by_t)
         by_side = levels.by_side + slopes.total() + self._time_step(by_t)
-        by_offset = np.zeros(len(g))
-        return Change(by_side, by_offset, None, levels.by_given, float(by_t.sum()))
+        return Change(by_side, None, levels.by_given, float(by_t.sum()))
 
     def push_forward(self, by_side: FloatArray) -> FloatArray:
         """Refused: the heat method's derivative is there in one direction only."""
@@ -162,7 +158,7 @@ class HeatAdjoint:
             return
         # L has one entry for all sides between the same two vertices: its weight is the sum of theirs, not below 0,
         # times the factor of the shortest.
-        pair, first = self._pairs()
+        pair, first = self._elements.pairs
         weight = np.maximum(np.bincount(pair, self._elements.weight.ravel()), 0.0)
         x = (self._elements.l / np.sqrt(step)).ravel()[first]
         factor, by_fitted, t_of_pair = fit(x), by_weight.ravel()[first], step.repeat(3, axis=1).ravel()[first]
@@ -171,17 +167,6 @@ class HeatAdjoint:
         slopes.by_side.ravel()[first] += by_factor / np.sqrt(t_of_pair)
         of_pair = of_face.repeat(3)[first]
         by_t += np.bincount(of_pair, by_fitted * weight * factor - by_factor * x / (2 * t_of_pair), len(by_t))
-
-    def _pairs(self) -> tuple[IntArray, IntArray]:
-        """For each side (3 m,) the number of the pair of vertices at its ends; the shortest side of each pair."""
-        i, j = self._i.ravel(), self._j.ravel()
-        key = np.minimum(i, j) * self._domain.n + np.maximum(i, j)
-        order = np.lexsort((self._elements.l.ravel(), key))
-        is_first = np.ones(len(key), bool)
-        is_first[1:] = key[order][1:] != key[order][:-1]
-        pair = np.empty(len(key), np.int64)
-        pair[order] = np.cumsum(is_first) - 1
-        return pair, order[is_first]
 
     def _time_step(self, by_t: FloatArray) -> FloatArray:
         """The derivative (m, 3) by the sides through t = t_coef h^2, h the mean edge length of each component."""

@@ -13,9 +13,9 @@ from typing import Protocol
 
 import numpy as np
 
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation
-from heat_igl.intrinsic.length_derivatives import carry_lengths, carry_lengths_back, check_carried
+from heat_igl.intrinsic.length_derivatives import PlaceSlopes, carry_lengths, carry_lengths_back, check_carried
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Surface
 from heat_igl.sources import SourceSet
@@ -95,7 +95,7 @@ class DistanceDerivative:
         """
         mesh = self._positions()
         rows = self._rows(g)
-        result = np.stack([self._to_positions(mesh, self._by_sides(row)) for row in rows])
+        result = np.stack([self._to_positions(mesh, self._by_sides(row)[0]) for row in rows])
         return result if np.ndim(g) == 2 else result[0]
 
     def by_lengths(self, g: ArrayLike) -> FloatArray:
@@ -105,23 +105,44 @@ class DistanceDerivative:
         mesh; of faces that are there twice, one has the derivative of both.
         """
         rows = self._rows(g)
-        result = np.stack([self._on_given_faces(self._by_sides(row)) for row in rows])
+        result = np.stack([self._on_given_faces(self._by_sides(row)[0]) for row in rows])
         return result if np.ndim(g) == 2 else result[0]
 
-    def by_offsets(self, g: ArrayLike) -> FloatArray:
-        """The gradient (s,) by the distances at which the s sources start: how much of g (n,) each source feeds.
+    def by_points(self, g: ArrayLike) -> FloatArray:
+        """The gradient by the positions of the sources that are points in faces.
 
-        One number for each source, counted as `HeatMethodSolver.voronoi` labels them.
+        Parameters
+        ----------
+        g : (n,) array_like
+            As for a call.
+
+        Returns
+        -------
+        (p, 3) float64
+            For each point a vector in the plane of its face. The gradient of one distance has length 1 and leads away
+            from the path. Of a point on a side of its face, to paths that leave by this side, the component along the
+            side alone. Source vertices have their gradient among the positions.
+
+        Raises
+        ------
+        ValueError
+            If g has another shape or is not finite.
+        MeshError
+            If the solver has no positions.
         """
+        mesh = self._positions()
         (row,) = self._rows(g, 1)
-        change, sources = self._answer.pull_back(row), self._sources
-        n = len(self.distance)
-        weight = change.by_offset[sources.vertices]
-        total = np.bincount(sources.vertex_label, weight, sources.n_labels)
-        if change.place is not None:
-            point = change.place
-            total += np.bincount(sources.points.label[point], change.by_offset[n:], sources.n_labels)
-        return np.asarray(total)
+        _, by_place = self._by_sides(row)
+        points = self._sources.points
+        if by_place is None:
+            return np.zeros((len(points.faces), 3))
+        corners = mesh.V[mesh.F[points.faces]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        per_area = 1 / np.einsum("px,px->p", normal, normal)
+        opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+        # A coordinate rises by the height of its corner.
+        slopes = np.cross(normal[:, None], opposite) * per_area[:, None, None]
+        return np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
 
     def by_time_step(self, g: ArrayLike) -> float:
         """The derivative by t of the heat method, everything else fixed; 0 with ``refine``, which takes an order alone."""
@@ -158,6 +179,8 @@ class DistanceDerivative:
 
     def push_lengths_forward(self, by_side: FloatArray) -> FloatArray:
         """How the distances (n,) change when the sides (m, 3) of the mesh's faces, each there once, change."""
+        if len(self._sources.points.faces):
+            raise ValueError("directional derivatives are there for source vertices: multiply with the gradient instead")
         on_answer = carry_lengths(self._answer.triangulation, by_side, len(self._faces.history))
         return self._answer.push_forward(on_answer)
 
@@ -194,11 +217,13 @@ class DistanceDerivative:
             raise ValueError(f"g must be finite at reachable vertices, but is {rows[row, vertex]} at vertex {vertex}")
         return rows
 
-    def _by_sides(self, row: FloatArray) -> FloatArray:
-        """The derivative (m, 3) by the sides of the faces before any flip."""
-        change = self._answer.pull_back(row)
-        by_side = carry_lengths_back(self._answer.triangulation, change.by_side, len(self._faces.history))
-        return by_side if change.by_given is None else by_side + change.by_given
+    def _by_sides(self, row: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+        """The derivative (m, 3) by the sides of the faces before any flip, and (p, 3) by the points in given faces."""
+        change, points = self._answer.pull_back(row), self._sources.points
+        places = None if change.by_place is None else PlaceSlopes(points.faces, points.barycentric, change.by_place)
+        triangulation, n_before = self._answer.triangulation, len(self._faces.history)
+        by_side, by_place = carry_lengths_back(triangulation, change.by_side, n_before, places)
+        return by_side if change.by_given is None else by_side + change.by_given, by_place
 
     def _to_positions(self, mesh: Mesh, by_side: FloatArray) -> FloatArray:
         """The derivative (n, 3) by the positions, from that by the sides (m, 3)."""

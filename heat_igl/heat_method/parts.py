@@ -19,7 +19,7 @@ from heat_igl.heat_method.solution import Diagnostics
 from heat_igl.heat_method.time_step import time_step, warn_of_large_step
 from heat_igl.linear import Analysis
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
-from heat_igl.operators import Operators, operators, point_cloud_operators, polygon_operators
+from heat_igl.operators import Elements, Operators, operators, point_cloud_operators, polygon_operators
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
@@ -84,6 +84,11 @@ class SolverParts:
             return self.factored
         options = self.options
         return HeatFlow(self.operators, self.time_steps, options.boundary, options.backend, self.analysis, self.fitted)
+
+    @cached_property
+    def elements(self) -> Elements:
+        """The triangles that are solved on, to differentiate by their sides."""
+        return Elements(self.operators)
 
     @property
     def given_faces(self) -> IntArray | None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from heat_igl.operators.matrices import Operators
-from heat_igl.typing import FloatArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["ElementSlopes", "Elements"]
 
@@ -24,6 +26,8 @@ class Elements:
     ----------
     l : (m, 3) float64
         Lengths of the sides.
+    i, j : (m, 3) int64
+        Vertices at the ends of the sides.
     weight : (m, 3) float64
         Half the cotangent opposite each side: the entry of L at the ends of an edge is the sum over its sides.
     area : (m,) float64
@@ -34,7 +38,8 @@ class Elements:
         if domain.surface is None:
             raise ValueError("derivatives need a surface of triangles")
         triangulation = domain.surface.triangulation
-        self.l = triangulation.l
+        self.l, F, self._n = triangulation.l, triangulation.F, domain.n
+        self.i, self.j = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
         self.share = 0.5 if triangulation.is_cover else 1.0
         self.area = self.share * triangulation.areas
         square = self.l**2
@@ -42,6 +47,18 @@ class Elements:
         self.weight = self.share**2 * self._inner / (8 * self.area)[:, None]
         #: Corners (m, 3) with an obtuse angle.
         self._is_obtuse = self._inner < 0
+
+    @cached_property
+    def pairs(self) -> tuple[IntArray, IntArray]:
+        """For each side (3 m,) the number of the pair of vertices at its ends; the shortest side of each pair."""
+        i, j = self.i.ravel(), self.j.ravel()
+        key = np.minimum(i, j) * self._n + np.maximum(i, j)
+        order = np.lexsort((self.l.ravel(), key))
+        is_first: BoolArray = np.ones(len(key), bool)
+        is_first[1:] = key[order][1:] != key[order][:-1]
+        pair = np.empty(len(key), np.int64)
+        pair[order] = np.cumsum(is_first) - 1
+        return pair, order[is_first]
 
     def mass(self) -> FloatArray:
         """Area (m, 3) of the Voronoi cell of each corner; of an obtuse triangle one half and twice a quarter."""

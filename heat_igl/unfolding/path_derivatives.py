@@ -81,10 +81,8 @@ class Change(NamedTuple):
     ----------
     by_side : (m, 3) float64
         By the length of the side opposite each corner; an edge of two faces changes both of its sides.
-    by_offset : (n + e,) float64
-        By the distance at which each vertex and each entry of `Places` starts, 0 where no path ends.
-    place : (e,) int64 or None
-        Which source point each entry is; None without points.
+    by_place : (e, 3) float64 or None
+        By the coordinates of each entry of `Places`, up to a constant in each row; None without points.
     by_given : (m', 3) float64 or None
         By the sides of the faces before any flip, directly.
     by_t : float
@@ -92,8 +90,7 @@ class Change(NamedTuple):
     """
 
     by_side: FloatArray
-    by_offset: FloatArray
-    place: IntArray | None = None
+    by_place: FloatArray | None = None
     by_given: FloatArray | None = None
     by_t: float = 0.0
 
@@ -149,6 +146,10 @@ class Paths:
         """Length (n,) of each path."""
         return self._ways[0][: self.n]
 
+    def corners(self, faces: IntArray) -> AnyArray:
+        """Vertices (k, 3) of some faces."""
+        return self._triangles.vertex.reshape(-1, 3)[faces]
+
     def pull_back(self, weight: FloatArray) -> Change:
         """The derivative of the sum of all distances times `weight` (n,)."""
         e, size = len(self.places.faces), len(self._triangles.vertex)
@@ -164,8 +165,7 @@ class Paths:
             by_place,
             self.is_lost.view(np.uint8),
         )
-        at_end = np.append(self._ways[1], np.full(e, _AT_SOURCE)) == _AT_SOURCE
-        return Change(by_side.reshape(-1, 3), np.where(at_end, handed_on, 0.0), self.places.point if e else None)
+        return Change(by_side.reshape(-1, 3), by_place if e else None)
 
     def push_forward(self, by_side: FloatArray) -> FloatArray:
         """The derivative (n,) of all distances when the sides (m, 3) change by `by_side`."""

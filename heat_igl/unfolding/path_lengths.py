@@ -28,35 +28,58 @@ class PathLengths:
         On these triangles, or on others that `refinement` made of them.
     rows : (n,) int
         Where each vertex stands in `paths`.
+    points : SurfacePoints or None
+        Source points in the faces of the mesh.
     refinement : Refinement, optional
         Carries sides to the triangles of `paths` and back.
     """
 
     def __init__(
-        self, triangulation: IntrinsicTriangulation, paths: Paths, rows: AnyArray, refinement: Refinement | None = None
+        self,
+        triangulation: IntrinsicTriangulation,
+        paths: Paths,
+        rows: AnyArray,
+        points: SurfacePoints | None,
+        refinement: Refinement | None = None,
     ) -> None:
         self.triangulation, self._paths, self._rows, self._refinement = triangulation, paths, rows, refinement
+        self._points = points
 
     @property
     def lost(self) -> IntArray:
         """Vertices whose path could not be followed to its end: their derivative is 0, or that of a part of the path."""
         return np.flatnonzero(self._paths.is_lost[self._rows])
 
-    @property
-    def places(self) -> Places:
-        """The source points."""
-        return self._paths.places
-
     def pull_back(self, g: FloatArray) -> Change:
         """The derivative of the sum of distances times g (n,), by the sides of the triangulation."""
         weight = np.zeros(self._paths.n)
         weight[self._rows] = g
         change = self._paths.pull_back(weight)
-        by_side, by_offset = change.by_side, change.by_offset
         if self._refinement is not None:
-            by_side = self._refinement.by_given_sides(by_side)
-        on_vertices = np.append(by_offset[self._rows], by_offset[self._paths.n :])
-        return change._replace(by_side=by_side, by_offset=on_vertices)
+            change = change._replace(by_side=self._refinement.by_given_sides(change.by_side))
+        if change.by_place is not None:
+            change = change._replace(by_place=self._by_points(change.by_place))
+        return change
+
+    def _by_points(self, by_place: FloatArray) -> FloatArray:
+        """The derivative (p, 3) by the coordinates of each source point in its own triangle.
+
+        Of a point on a side, the triangle on the other side has a copy: it knows the derivative along the side alone.
+        """
+        places, points = self._paths.places, self._points
+        assert points is not None
+        F = self._paths.corners(places.faces)
+        if self._refinement is not None:
+            F = self._refinement.vertex_of(F)
+        own_faces, _ = self.triangulation.locate(points.faces, points.barycentric)
+        own = self.triangulation.F[own_faces[places.point]]
+        result = np.zeros((len(points), 3))
+        for c in range(3):
+            # The corner of the point's own triangle with the same vertex.
+            same = own == F[:, [c]]
+            known = same.any(axis=1)
+            np.add.at(result, (places.point[known], same.argmax(axis=1)[known]), by_place[known, c])
+        return result
 
     def push_forward(self, by_side: FloatArray) -> FloatArray:
         """How the distances (n,) change when the sides (m, 3) change by `by_side`."""
@@ -90,7 +113,8 @@ def from_walks(refinement: Refinement, sources: SourceSet, u: FloatArray) -> Pat
     starts = _Starts.of(sources)
     offsets = starts.offsets if sources.offsets.any() else None
     paths = refinement.paths(-u, starts.vertices, offsets, starts.points, starts.point_offsets, TOLERANCE)
-    return PathLengths(refinement.triangulation, paths, refinement.rows_of(paths.distance), refinement)
+    rows = refinement.rows_of(paths.distance)
+    return PathLengths(refinement.triangulation, paths, rows, starts.points, refinement)
 
 
 def from_windows(surface: ExactSurface, triangulation: IntrinsicTriangulation, sources: SourceSet) -> PathLengths:
@@ -106,6 +130,5 @@ def from_windows(surface: ExactSurface, triangulation: IntrinsicTriangulation, s
         begins = np.concatenate([found.distance, starts.point_offsets, [0.0]])
     length = triangulation.l.ravel()[origin.entered]
     ways = Ways(found.distance, origin.entered, origin.crossing / length, found.distance - begins[origin.root])
-    is_source = np.zeros(n, bool)
-    is_source[starts.vertices] = found.distance[starts.vertices] >= starts.offsets
-    return PathLengths(triangulation, Paths(half_edge_arrays(triangulation), places, ways, is_source), np.arange(n))
+    paths = Paths(half_edge_arrays(triangulation), places, ways, is_source=origin.root == np.arange(n))
+    return PathLengths(triangulation, paths, np.arange(n), starts.points)

@@ -294,6 +294,12 @@ class Refinement:
         nearer = distance[on_sheets].argmin(axis=0)
         return np.asarray(on_sheets[nearer, np.arange(self.n)])
 
+    def vertex_of(self, rows: AnyArray) -> IntArray:
+        """The vertices that have some numbers in the tables."""
+        vertex = np.empty(len(self._number), np.int64)
+        vertex[self._number] = np.tile(np.arange(self.n), self._n_sheets)
+        return np.asarray(vertex[rows])
+
     def _order(self, key: FloatArray) -> AnyArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
         on_sheets = np.tile(key, self._n_sheets) if self._n_sheets > 1 else np.ascontiguousarray(key)
