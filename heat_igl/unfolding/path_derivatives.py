@@ -169,7 +169,17 @@ class Paths:
 
     def push_forward(self, by_side: FloatArray) -> FloatArray:
         """The derivative (n,) of all distances when the sides (m, 3) change by `by_side`."""
-        change = np.zeros(self.n + len(self.places.faces))
+        return self._summed(by_side, np.zeros(self.n + len(self.places.faces)))
+
+    def lengths(self) -> FloatArray:
+        """Distances (n,) summed along the paths; 0 where there is none."""
+        # A line is homogeneous in the sides (Euler); to it comes the distance at which the source starts.
+        distance, kind = self._ways[:2]
+        starts = np.where(np.append(kind == _AT_SOURCE, np.ones(len(self.places.faces), bool)), distance, 0.0)
+        return self._summed(self._triangles.length, np.where(np.isfinite(starts), starts, 0.0))
+
+    def _summed(self, by_side: FloatArray, change: FloatArray) -> FloatArray:
+        """Changes of distances (n,) when sides change, and distances at the sources by `change` (n + e,)."""
         kernels.push_forward(
             self._triangles,
             self._points,

@@ -89,8 +89,7 @@ class PathLengths:
 
     def lengths(self) -> FloatArray:
         """Lengths (n,) of the paths; 0 at unreachable vertices."""
-        # Distance is homogeneous in the sides (Euler), but for the distances at which sources start.
-        return self.push_forward(self.triangulation.l)
+        return np.asarray(self._paths.lengths()[self._rows])
 
 
 class _Starts(NamedTuple):
