@@ -175,7 +175,7 @@ _EARLIER_NAMES = {
     "closed_forms": "validation.closed_forms",
     "demo": "cli.demo",
     "factorization": "linear",
-    "jax": "adapters.jax",
+    "jax": "applications.jax",
     "metrics": "validation.metrics",
     "paths": "curves.paths",
     "plots": "drawing.plots",
@@ -187,7 +187,7 @@ _EARLIER_NAMES = {
     "speed": "operators.speed",
     "subdivision": "mesh.subdivision",
     "surface_points": "mesh.surface_points",
-    "torch": "adapters.torch",
+    "torch": "applications.torch",
     "viewer": "drawing.viewer",
 }
 alias_modules({f"{__name__}.{name}": f"{__name__}.{target}" for name, target in _EARLIER_NAMES.items()})

@@ -49,7 +49,9 @@ class HeatAdjoint:
     def __init__(self, parts: SolverParts, sources: SourceSet) -> None:
         domain, surface, last_steps = parts.operators, parts.operators.surface, parts.last_steps
         _check(parts, sources)
-        assert surface is not None and isinstance(last_steps, Integration)
+        if surface is None or not isinstance(last_steps, Integration):
+            raise ValueError("the adjoint is that of the heat method on triangles")
+        self._poisson = last_steps.poisson
         self._parts, self._domain = parts, domain
         self.triangulation: IntrinsicTriangulation = surface.triangulation
         self._elements = parts.elements
@@ -71,7 +73,7 @@ class HeatAdjoint:
         by_t = np.zeros(domain.n_components)
         levels = self._levels.pull_back(g)
         # L is symmetric. Rounding aside, each component's sum is 0, as a right-hand side of L needs.
-        p = self._parts.last_steps.poisson.solve(levels.by_phi)
+        p = self._poisson.solve(levels.by_phi)
         slopes.by_weight += self._differences(p) * self._differences(self._phi)
         by_heat = levels.by_heat + self._normalized(p, slopes, by_t)
         pairs = [(self._parts.heat_flow.solve(by_heat), self._u)]
@@ -81,7 +83,7 @@ class HeatAdjoint:
         by_side = levels.by_side + slopes.total() + self._time_step(by_t)
         return Change(by_side, None, levels.by_given, float(by_t.sum()))
 
-    def push_forward(self, by_side: FloatArray) -> FloatArray:
+    def push_forward(self, by_side: FloatArray) -> FloatArray:  # noqa: ARG002
         """Refused: the heat method's derivative is there in one direction only."""
         raise ValueError(
             "directional derivatives are there for distances by paths: take refine='unfold' or 'exact', or multiply "
@@ -95,7 +97,7 @@ class HeatAdjoint:
     def _to_vertices(self, by_difference: FloatArray) -> FloatArray:
         """The derivative (n,) by values, from that by their `_differences`."""
         n, pull = self._domain.n, by_difference.ravel()
-        return np.bincount(self._i.ravel(), pull, n) - np.bincount(self._j.ravel(), pull, n)
+        return np.asarray(np.bincount(self._i.ravel(), pull, n) - np.bincount(self._j.ravel(), pull, n), np.float64)
 
     def _normalized(self, p: FloatArray, slopes: ElementSlopes, by_t: FloatArray) -> FloatArray:
         """The derivative (n,) by the heat of p . b, with b the divergence of the normalized field.
@@ -175,7 +177,7 @@ class HeatAdjoint:
         t = self._parts.time_steps
         if options.t is not None:
             return result.reshape(-1, 3)
-        edges = T.edges
+        edges = self._elements.edges
         component = domain.components[T.F[edges // 3, 0]]
         h = domain.mean_edge_lengths
         by_h = np.where(self._parts.step_raised, 0.0, 2 * t / h * by_t)
@@ -188,9 +190,13 @@ def _check(parts: SolverParts, sources: SourceSet) -> None:
     """Raise a ValueError for what has no derivative here."""
     remedy = ": take refine='unfold' or 'exact', which differentiate paths"
     if not sources.on_vertices_alone:
-        raise ValueError(f"the heat method is differentiated for source vertices, and points are among the sources{remedy}")
+        raise ValueError(
+            f"the heat method is differentiated for source vertices, and points are among the sources{remedy}"
+        )
     if sources.offsets.any():
-        raise ValueError(f"the heat method is differentiated for sources that start at 0, and some have offsets{remedy}")
+        raise ValueError(
+            f"the heat method is differentiated for sources that start at 0, and some have offsets{remedy}"
+        )
     if parts.heat_flow.boundary != "neumann":
         raise ValueError(
             f"the heat method is differentiated for boundary='neumann', not {parts.heat_flow.boundary!r}{remedy}"

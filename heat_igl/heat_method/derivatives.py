@@ -1,8 +1,9 @@
 """Derivatives of an answer by the positions of the vertices, by edge lengths, by the sources and by the time step.
 
-All of them go by the lengths of the sides of the triangles that the answer was found on: from an answer to these lengths
-by paths (`heat_igl.unfolding.path_lengths`) or by the adjoint of the heat method (`heat_igl.heat_method.adjoint`); from
-there over the flips to the edges of the mesh (`heat_igl.intrinsic.length_derivatives`), and on to the positions here.
+All of them go by the lengths of the sides of the triangles that the answer was found on. From the answer to these
+lengths lead paths (`heat_igl.unfolding.path_lengths`) or the adjoint of the heat method
+(`heat_igl.heat_method.adjoint`), from there to the edges of the mesh the flips
+(`heat_igl.intrinsic.length_derivatives`); the positions follow here.
 docs/derivatives.md derives each step.
 """
 
@@ -14,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic import IntrinsicTriangulation
+from heat_igl.intrinsic import IntrinsicTriangulation, Merged
 from heat_igl.intrinsic.length_derivatives import PlaceSlopes, carry_lengths, carry_lengths_back, check_carried
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Surface
@@ -145,7 +146,7 @@ class DistanceDerivative:
         return np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
 
     def by_time_step(self, g: ArrayLike) -> float:
-        """The derivative by t of the heat method, everything else fixed; 0 with ``refine``, which takes an order alone."""
+        """The derivative by the time step t, all else fixed; 0 with ``refine``, which takes an order from the heat."""
         (row,) = self._rows(g, 1)
         return self._answer.pull_back(row).by_t
 
@@ -172,15 +173,19 @@ class DistanceDerivative:
         mesh = self._positions()
         moved = np.asarray(dV, np.float64)
         if moved.shape != mesh.V.shape or not np.isfinite(moved).all():
-            raise ValueError(f"dV must be {mesh.V.shape} finite numbers, one velocity per vertex; it has shape {moved.shape}")
-        directions, following, preceding = self._sides(mesh)
+            raise ValueError(
+                f"dV must be {mesh.V.shape} finite numbers, one velocity per vertex; it has shape {moved.shape}"
+            )
+        directions, following, preceding = self._sides
         by_side = np.einsum("mcx,mcx->mc", directions, moved[preceding] - moved[following])
         return self.push_lengths_forward(by_side)
 
     def push_lengths_forward(self, by_side: FloatArray) -> FloatArray:
         """How the distances (n,) change when the sides (m, 3) of the mesh's faces, each there once, change."""
         if len(self._sources.points.faces):
-            raise ValueError("directional derivatives are there for source vertices: multiply with the gradient instead")
+            raise ValueError(
+                "directional derivatives are there for source vertices: multiply with the gradient instead"
+            )
         on_answer = carry_lengths(self._answer.triangulation, by_side, len(self._faces.history))
         return self._answer.push_forward(on_answer)
 
@@ -227,21 +232,23 @@ class DistanceDerivative:
 
     def _to_positions(self, mesh: Mesh, by_side: FloatArray) -> FloatArray:
         """The derivative (n, 3) by the positions, from that by the sides (m, 3)."""
-        directions, following, preceding = self._sides(mesh)
+        directions, following, preceding = self._sides
         pull = by_side[..., None] * directions
         n = mesh.n_vertices
         columns = [
-            np.bincount(preceding.ravel(), pull[..., k].ravel(), n) - np.bincount(following.ravel(), pull[..., k].ravel(), n)
+            np.bincount(preceding.ravel(), pull[..., k].ravel(), n)
+            - np.bincount(following.ravel(), pull[..., k].ravel(), n)
             for k in range(3)
         ]
         return np.stack(columns, axis=1)
 
-    def _sides(self, mesh: Mesh) -> tuple[FloatArray, IntArray, IntArray]:
+    @cached_property
+    def _sides(self) -> tuple[FloatArray, IntArray, IntArray]:
         """Unit vectors (m, 3, 3) along the sides of the faces, and the vertices (m, 3) that they lead from and to.
 
         A side without length has no direction, and none is taken.
         """
-        F = self._faces.F
+        mesh, F = self._positions(), self._faces.F
         following, preceding = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
         along = mesh.V[preceding] - mesh.V[following]
         length = np.sqrt(np.einsum("mcx,mcx->mc", along, along))
@@ -251,7 +258,9 @@ class DistanceDerivative:
         """The derivative by the sides of the faces that the user gave, some of which may be there twice."""
         if not self._faces.history or self._given is None:
             return by_side
-        (merged,) = self._faces.history
+        merged = self._faces.history[0]
+        if not isinstance(merged, Merged):
+            return by_side
         kept, which = np.unique(merged.face, return_index=True)
         on_given = np.zeros((len(merged.face), 3))
         on_given[which] = np.take_along_axis(by_side[kept], merged.corner[which], axis=1)

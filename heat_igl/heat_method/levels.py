@@ -11,15 +11,15 @@ import numpy as np
 
 from heat_igl.heat_method.parts import SolverParts
 from heat_igl.intrinsic import IntrinsicTriangulation
-from heat_igl.intrinsic.triangulation import half_edge_head, half_edge_tail
-from heat_igl.sources import Seeds, SourceTerm, right_hand_side
+from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
+from heat_igl.sources import SourceTerm, right_hand_side
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["LevelSlopes", "PinnedLevels"]
 
 
 class _Spokes(NamedTuple):
-    """Half-edges (k,) from known vertices: the position of the vertex among the known, the other end, the length."""
+    """Sides (k,) at known vertices: the position of the vertex among the known, the other end, the length."""
 
     side: IntArray
     which: IntArray
@@ -69,6 +69,10 @@ class PinnedLevels:
 
     def __init__(self, parts: SolverParts, term: SourceTerm, phi: FloatArray, u: FloatArray) -> None:
         domain = parts.operators
+        surface = domain.surface
+        if surface is None or surface.faces is None:
+            raise ValueError("levels are differentiated on triangles whose faces before any flip are known")
+        self._triangulations = surface.triangulation, surface.faces
         self._parts, self._term, self._u = parts, term, u
         self._components, self._n_components = domain.components, domain.n_components
         anchors = term.anchors
@@ -102,10 +106,8 @@ class PinnedLevels:
 
     def _bound(self, distance: FloatArray) -> None:
         """Change distances by no more than the lengths of edges from the known ones; remember where that decides."""
-        surface, near = self._parts.operators.surface, self._term.near
-        if surface is None:
-            return
-        spokes = _spokes(surface.triangulation, near.vertex)
+        near = self._term.near
+        spokes = _spokes(self._triangulations[0], near.vertex)
         for sign in (-1.0, 1.0):
             bound = sign * near.value[spokes.which] + spokes.length
             order = np.argsort(-bound, kind="stable")
@@ -123,9 +125,7 @@ class PinnedLevels:
     def pull_back(self, g: FloatArray) -> LevelSlopes:
         """The derivative of the sum of distances times g (n,)."""
         term, anchors = self._term, self._term.anchors
-        surface = self._parts.operators.surface
-        assert surface is not None and surface.faces is not None
-        sides = np.zeros(surface.triangulation.l.size)
+        sides = np.zeros(self._triangulations[0].l.size)
         by_value = g[term.near.vertex].copy()
         is_near = np.zeros(len(g), bool)
         is_near[term.near.vertex] = True
@@ -158,8 +158,7 @@ class PinnedLevels:
 
     def _values_to_sides(self, by_value: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The derivative by the edges that the known distances are the lengths of."""
-        surface, near, sources = self._parts.operators.surface, self._term.near, self._term.sources
-        assert surface is not None and surface.faces is not None
+        near, sources = self._term.near, self._term.sources
         n = len(self._u)
         value = np.full(n, np.nan)
         value[near.vertex] = near.value
@@ -168,7 +167,7 @@ class PinnedLevels:
         place[near.vertex] = np.arange(len(near.vertex))
         found: BoolArray = np.zeros(len(near.vertex), bool)
         result = []
-        for triangulation in (surface.triangulation, surface.faces):
+        for triangulation in self._triangulations:
             sides = np.zeros(triangulation.l.size)
             spokes = _spokes(triangulation, sources.vertices)
             is_it = np.abs(spokes.length - value[spokes.end]) <= 1e-12 * spokes.length
@@ -181,14 +180,13 @@ class PinnedLevels:
 
 
 def _spokes(triangulation: IntrinsicTriangulation, vertices: IntArray) -> _Spokes:
-    """All half-edges with one end among some vertices, an edge once for each of its sides and such ends."""
-    F = triangulation.F
+    """All sides with one end among some vertices, an edge once for each of its sides and such ends."""
     place = np.full(triangulation.n, -1)
     place[vertices] = np.arange(len(vertices))
-    side = np.arange(F.size)
-    tail, head = half_edge_tail(F, side), half_edge_head(F, side)
-    out, back = place[tail] >= 0, place[head] >= 0
-    chosen = np.concatenate([side[out], side[back]])
-    which = np.concatenate([place[tail[out]], place[head[back]]])
-    end = np.concatenate([head[out], tail[back]])
-    return _Spokes(chosen, which, end, triangulation.l.ravel()[chosen])
+    of_corner = place[triangulation.F.ravel()]
+    corner = np.flatnonzero(of_corner >= 0)
+    following, preceding = next_half_edge(corner), previous_half_edge(corner)
+    # The side opposite the next corner joins this one and the previous.
+    side, across = np.concatenate([following, preceding]), np.concatenate([preceding, following])
+    which = np.tile(of_corner[corner], 2)
+    return _Spokes(side, which, triangulation.F.ravel()[across], triangulation.l.ravel()[side])

@@ -370,9 +370,9 @@ class HeatMethodSolver(BatchedSolver):
         return LabelledDistance(distance, labels)
 
     def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
-        """Distance and its derivative: ``phi, pull_back``; ``pull_back(g (n,))`` is dV (n, 3), see `DistanceDerivative`.
+        """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
 
-        Arguments and errors as for `distance`, with a ValueError for what has no derivative here, see `differentiated`.
+        Arguments and errors as for `distance`; a ValueError also for what is not differentiated, see `differentiated`.
         """
         return differentiated(self.distance(sources), self._source_set(sources), self._parts, self._mesh)
 

@@ -187,8 +187,8 @@ def check_carried(triangulation: IntrinsicTriangulation) -> None:
     """Raise a ValueError if vertices were added, whose places change with the lengths."""
     if any(isinstance(change, Refined) for change in triangulation.history):
         raise ValueError(
-            "the triangulation that is solved on has more vertices than the mesh, through which no derivative is carried: "
-            "take laplacian='intrinsic-delaunay', or refine='unfold'"
+            "the triangulation that is solved on has more vertices than the mesh, and no derivative is carried through "
+            "them: take laplacian='intrinsic-delaunay', or refine='unfold'"
         )
 
 

@@ -31,7 +31,7 @@ class _Lines:
     """The triangles, how the path of each vertex begins, and the line that is being followed."""
 
     vertex: cython.const[cython.int][::1]
-    l: cython.const[cython.double][::1]
+    length: cython.const[cython.double][::1]
     twin: cython.const[cython.int][::1]
     ring: cython.const[cython.int][::1]
     aligned: cython.const[cython.uchar][::1]
@@ -51,10 +51,10 @@ class _Lines:
     corner: cython.int
     ux: cython.double
     uy: cython.double
-    length: cython.double
+    extent: cython.double
 
     def __init__(self, triangles, points, ways):
-        self.vertex, self.l, self.twin, self.ring, self.aligned = triangles
+        self.vertex, self.length, self.twin, self.ring, self.aligned = triangles
         self.first_inside, self.following, self.inside = points
         self.distance, self.kind, self.entered, self.share, self.reach = ways
         self.gate = np.zeros(256, _GATE)
@@ -75,13 +75,13 @@ class _Lines:
         self.corner = h % 3
         right: cython.int = next_half_edge(h) - f
         left: cython.int = previous_half_edge(h) - f
-        rx: cython.double = self.l[f + left]
-        lx: cython.double = foot(rx, self.l[f + right], self.l[h])
-        ly: cython.double = 2.0 * _area(rx, self.l[f + right], self.l[h]) / rx
+        rx: cython.double = self.length[f + left]
+        lx: cython.double = foot(rx, self.length[f + right], self.length[h])
+        ly: cython.double = 2.0 * _area(rx, self.length[f + right], self.length[h]) / rx
         x: cython.double = rx + self.share[v] * (lx - rx)
         y: cython.double = self.share[v] * ly
         length: cython.double = sqrt(x * x + y * y)
-        self.ux, self.uy, self.length = x / length, y / length, self.reach[v]
+        self.ux, self.uy, self.extent = x / length, y / length, self.reach[v]
         if self._meets(rx, 0.0, f, right) or self._meets(lx, ly, f, left):
             return 1
         gate = cython.address(self.gate[0])
@@ -150,9 +150,9 @@ class _Lines:
         right: cython.int = previous_half_edge(g) - f
         if not turns_left:
             left, right = right, left
-        base: cython.double = self.l[g]
-        along: cython.double = foot(base, self.l[f + left], self.l[f + right]) / base
-        beyond: cython.double = 2.0 * _area(base, self.l[f + left], self.l[f + right]) / (base * base)
+        base: cython.double = self.length[g]
+        along: cython.double = foot(base, self.length[f + left], self.length[f + right]) / base
+        beyond: cython.double = 2.0 * _area(base, self.length[f + left], self.length[f + right]) / (base * base)
         ex: cython.double = gate.lx - gate.rx
         ey: cython.double = gate.ly - gate.ry
         x: cython.double = gate.rx + along * ex + beyond * ey
@@ -160,7 +160,7 @@ class _Lines:
         if self._meets(x, y, f, g - f) or self._meets_inside(f, g - f, right, left, gate, x, y):
             return 1
         across: cython.double = self.ux * ey - self.uy * ex
-        if gate.rx * ey - gate.ry * ex > self.length * (1.0 + MEETS) * across:
+        if gate.rx * ey - gate.ry * ex > self.extent * (1.0 + MEETS) * across:
             return -1
         # Left of the line, the far corner becomes the left end of the next gate.
         after = cython.address(self.gate[j + 1])
@@ -199,14 +199,14 @@ class _Lines:
         """Whether (x, y), from which a path of length `behind` goes on, is a place on the path of v."""
         if not apart + behind <= self.distance[self.v] * (1.0 + SAME_LENGTH):
             return False
-        dx: cython.double = x - self.ux * self.length
-        dy: cython.double = y - self.uy * self.length
-        near: cython.double = MEETS * self.length
+        dx: cython.double = x - self.ux * self.extent
+        dy: cython.double = y - self.uy * self.extent
+        near: cython.double = MEETS * self.extent
         if dx * dx + dy * dy <= near * near:
             return True
         return (
             self.ux * x + self.uy * y > 0.0
-            and apart < self.length
+            and apart < self.extent
             and fabs(self.ux * y - self.uy * x) <= ON_LINE * apart
             and behind < self.distance[self.v]
         )
@@ -305,16 +305,16 @@ def _area(a: cython.double, b: cython.double, c: cython.double) -> cython.double
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _squared(l: cython.pointer[cython.const[cython.double]], d: cython.pointer[Place]) -> cython.double:
-    """The square of a length in a face with sides l, between places that differ by d."""
-    return -(d.c[1] * d.c[2] * l[0] * l[0] + d.c[2] * d.c[0] * l[1] * l[1] + d.c[0] * d.c[1] * l[2] * l[2])
+def _squared(side: cython.pointer[cython.const[cython.double]], d: cython.pointer[Place]) -> cython.double:
+    """The square of a length in a face with these sides, between places that differ by d."""
+    return -(d.c[1] * d.c[2] * side[0] ** 2 + d.c[2] * d.c[0] * side[1] ** 2 + d.c[0] * d.c[1] * side[2] ** 2)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _piece(
-    l: cython.pointer[cython.const[cython.double]],
+    side: cython.pointer[cython.const[cython.double]],
     one: cython.pointer[Place],
     other: cython.pointer[Place],
     weight: cython.double,
@@ -322,7 +322,7 @@ def _piece(
     tangent: cython.pointer[cython.const[cython.double]],
     at_end: cython.pointer[cython.double],
 ) -> cython.double:
-    """One piece of a line in a face with sides l, from one place to another: the derivative of its length.
+    """One piece of a line in a face with sides `side`, from one place to another: the derivative of its length.
 
     Added to `slope` (3,) by the sides, times `weight`, and to `at_end` (3,) by the coordinates of the other place, if
     they are given; returned for the sides' own derivative, `tangent` (3,), if that is given.
@@ -334,19 +334,19 @@ def _piece(
     total: cython.double = 0.0
     for c in range(3):
         d.c[c] = other.c[c] - one.c[c]
-    squared: cython.double = _squared(l, cython.address(d))
+    squared: cython.double = _squared(side, cython.address(d))
     if not squared > 0.0:
         return 0.0
     per_length: cython.double = 1.0 / sqrt(squared)
     for c in range(3):
         i, k = (c + 1) % 3, (c + 2) % 3
-        by_side: cython.double = -d.c[i] * d.c[k] * l[c] * per_length
+        by_side: cython.double = -d.c[i] * d.c[k] * side[c] * per_length
         if slope != cython.NULL:
             slope[c] += weight * by_side
         if tangent != cython.NULL:
             total += by_side * tangent[c]
         if at_end != cython.NULL:
-            at_end[c] -= 0.5 * weight * per_length * (d.c[i] * l[k] * l[k] + d.c[k] * l[i] * l[i])
+            at_end[c] -= 0.5 * weight * per_length * (d.c[i] * side[k] ** 2 + d.c[k] * side[i] ** 2)
     return total
 
 
@@ -381,10 +381,8 @@ def _along(
             of_face = slope + f
         if tangent != cython.NULL:
             tangent_of_face = tangent + f
-        sides = cython.address(lines.l[f])
-        total += _piece(
-            sides, cython.address(one), cython.address(other), weight, of_face, tangent_of_face, none
-        )
+        sides = cython.address(lines.length[f])
+        total += _piece(sides, cython.address(one), cython.address(other), weight, of_face, tangent_of_face, none)
         # The same place in the face behind.
         f = gate.enter - gate.enter % 3
         one.c[0] = one.c[1] = one.c[2] = 0.0
@@ -401,7 +399,7 @@ def _along(
         place = at_end + 3 * lines.end.entry
         if lines.end.entry < 0:
             place = none
-    sides = cython.address(lines.l[f])
+    sides = cython.address(lines.length[f])
     return total + _piece(
         sides, cython.address(one), cython.address(lines.end.at), weight, of_face, tangent_of_face, place
     )

@@ -54,7 +54,7 @@ def unfold(
 @cython.final
 @cython.cclass
 class _Ways:
-    """How the path of each of n vertices begins, or of none: the arrays of `heat_igl.unfolding.path_derivatives.Ways`."""
+    """How the path of each vertex begins, as `heat_igl.unfolding.path_derivatives.Ways` has it; or empty arrays."""
 
     entered: cython.int[::1]
     share: cython.double[::1]

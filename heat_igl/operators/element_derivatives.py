@@ -38,7 +38,8 @@ class Elements:
         if domain.surface is None:
             raise ValueError("derivatives need a surface of triangles")
         triangulation = domain.surface.triangulation
-        self.l, F, self._n = triangulation.l, triangulation.F, domain.n
+        self._triangulation, self._n = triangulation, domain.n
+        self.l, F = triangulation.l, triangulation.F
         self.i, self.j = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
         self.share = 0.5 if triangulation.is_cover else 1.0
         self.area = self.share * triangulation.areas
@@ -47,6 +48,11 @@ class Elements:
         self.weight = self.share**2 * self._inner / (8 * self.area)[:, None]
         #: Corners (m, 3) with an obtuse angle.
         self._is_obtuse = self._inner < 0
+
+    @cached_property
+    def edges(self) -> IntArray:
+        """One side (k,) of each edge."""
+        return self._triangulation.edges
 
     @cached_property
     def pairs(self) -> tuple[IntArray, IntArray]:

@@ -13,10 +13,12 @@ import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels import path_derivatives as kernels
+from heat_igl.mesh import SurfacePoints
+from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import rings
 
-__all__ = ["Change", "Paths", "Places", "Triangles", "Ways", "half_edge_arrays"]
+__all__ = ["Change", "Paths", "Places", "Starts", "Triangles", "Ways", "half_edge_arrays"]
 
 _AT_SOURCE, _ALONG_EDGE, _IN_FACE, _ACROSS = range(4)
 
@@ -51,6 +53,22 @@ class Places(NamedTuple):
     def none(cls) -> Places:
         """No points."""
         return cls(np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, np.int64), np.empty(0))
+
+
+class Starts(NamedTuple):
+    """What paths start from: vertices and points, and the distance at which each starts."""
+
+    vertices: IntArray
+    offsets: FloatArray
+    points: SurfacePoints | None
+    point_offsets: FloatArray | None
+
+    @classmethod
+    def of(cls, sources: SourceSet) -> Starts:
+        """Those of a set of sources."""
+        points = sources.points
+        places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
+        return cls(sources.vertices, sources.vertex_offset, places, points.offset if places is not None else None)
 
 
 class Ways(NamedTuple):

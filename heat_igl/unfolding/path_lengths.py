@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation
@@ -11,8 +9,8 @@ from heat_igl.mesh import SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSurface
-from heat_igl.unfolding.path_derivatives import Change, Paths, Places, Ways, half_edge_arrays
-from heat_igl.unfolding.refinement import TOLERANCE, Refinement
+from heat_igl.unfolding.path_derivatives import Change, Paths, Places, Starts, Ways, half_edge_arrays
+from heat_igl.unfolding.refinement import Refinement
 
 __all__ = ["PathLengths", "from_walks", "from_windows"]
 
@@ -47,7 +45,7 @@ class PathLengths:
 
     @property
     def lost(self) -> IntArray:
-        """Vertices whose path could not be followed to its end: their derivative is 0, or that of a part of the path."""
+        """Vertices whose path could not be followed to its end: it does not count in the derivative."""
         return np.flatnonzero(self._paths.is_lost[self._rows])
 
     def pull_back(self, g: FloatArray) -> Change:
@@ -67,7 +65,8 @@ class PathLengths:
         Of a point on a side, the triangle on the other side has a copy: it knows the derivative along the side alone.
         """
         places, points = self._paths.places, self._points
-        assert points is not None
+        if points is None:
+            return by_place
         F = self._paths.corners(places.faces)
         if self._refinement is not None:
             F = self._refinement.vertex_of(F)
@@ -92,33 +91,17 @@ class PathLengths:
         return np.asarray(self._paths.lengths()[self._rows])
 
 
-class _Starts(NamedTuple):
-    """What `sources` are for a query: vertices and points, and the distance at which each starts."""
-
-    vertices: IntArray
-    offsets: FloatArray
-    points: SurfacePoints | None
-    point_offsets: FloatArray | None
-
-    @classmethod
-    def of(cls, sources: SourceSet) -> _Starts:
-        points = sources.points
-        places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
-        return cls(sources.vertices, sources.vertex_offset, places, points.offset if places is not None else None)
-
-
 def from_walks(refinement: Refinement, sources: SourceSet, u: FloatArray) -> PathLengths:
     """The paths that unfolding finds from vertices and points, in the order of the heat u (n,)."""
-    starts = _Starts.of(sources)
-    offsets = starts.offsets if sources.offsets.any() else None
-    paths = refinement.paths(-u, starts.vertices, offsets, starts.points, starts.point_offsets, TOLERANCE)
+    starts = Starts.of(sources)
+    paths = refinement.paths(-u, starts)
     rows = refinement.rows_of(paths.distance)
     return PathLengths(refinement.triangulation, paths, rows, starts.points, refinement)
 
 
 def from_windows(surface: ExactSurface, triangulation: IntrinsicTriangulation, sources: SourceSet) -> PathLengths:
     """The paths that exact windows on a triangulation find from vertices and points."""
-    starts = _Starts.of(sources)
+    starts = Starts.of(sources)
     found = surface.solve(starts.vertices, starts.offsets, starts.points, starts.point_offsets)
     origin, n = found.origin, triangulation.n
     places = Places.none()

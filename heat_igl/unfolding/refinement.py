@@ -15,12 +15,12 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
 from heat_igl.intrinsic import IntrinsicTriangulation, double_cover, oriented
-from heat_igl.intrinsic.history import BACK_CORNERS
 from heat_igl.intrinsic.fans import breadth_first, tables
+from heat_igl.intrinsic.history import BACK_CORNERS
 from heat_igl.kernels.ordering import ascending
 from heat_igl.mesh import SurfacePoints
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.unfolding.path_derivatives import Paths, Places, Triangles, Ways, half_edge_arrays
+from heat_igl.unfolding.path_derivatives import Paths, Places, Starts, Triangles, Ways, half_edge_arrays
 from heat_igl.unfolding.walks import INSIDE, Points, sweep, unfold, unknown, views
 
 __all__ = ["TOLERANCE", "Known", "Refine", "Refinement"]
@@ -240,33 +240,25 @@ class Refinement:
         )
         return walk
 
-    def paths(
-        self,
-        key: FloatArray,
-        sources: IntArray,
-        offsets: FloatArray | None = None,
-        points: SurfacePoints | None = None,
-        point_offsets: FloatArray | None = None,
-        tolerance: float = TOLERANCE,
-    ) -> Paths:
+    def paths(self, key: FloatArray, sources: Starts, tolerance: float = TOLERANCE) -> Paths:
         """The paths whose lengths `unfold` returns, on the triangles by the numbers of the tables.
 
-        Arguments as there. Of a surface that cannot be oriented, on both sheets.
+        Of a surface that cannot be oriented, on both sheets.
         """
-        starts = self._starts(sources, offsets, points, point_offsets)
+        vertices, offsets, points, point_offsets = sources
+        starts = self._starts(vertices, offsets if offsets.any() else None, points, point_offsets)
         n = len(self._number)
         entered, share, reach = np.full(n, -1, np.int32), np.zeros(n), np.zeros(n)
         walk = self._walks(key, starts, tolerance, entered=entered, share=share, reach=reach)
-        found = Ways(walk["distance"][:n].copy(), entered, share, reach)
+        found = Ways(walk["distance"][:n].copy(), entered.astype(np.int64), share, reach)
         places = Places.none()
         if points is not None:
             faces, barycentric, point = self._faces_of(points)
             late = np.zeros(len(points)) if point_offsets is None else np.asarray(point_offsets, np.float64)
             places = Places(faces, barycentric, point, late[point])
         is_source = np.zeros(n, bool)
-        on_sheets = self._number[np.concatenate([sources + self.n * sheet for sheet in range(self._n_sheets)])]
-        begin = np.zeros(len(sources)) if offsets is None else offsets
-        is_source[on_sheets] = walk["distance"][on_sheets] >= np.tile(begin, self._n_sheets)
+        on_sheets = self._number[np.concatenate([vertices + self.n * sheet for sheet in range(self._n_sheets)])]
+        is_source[on_sheets] = walk["distance"][on_sheets] >= np.tile(offsets, self._n_sheets)
         return Paths(self._triangles, places, found, is_source)
 
     @cached_property

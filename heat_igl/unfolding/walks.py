@@ -122,8 +122,9 @@ def unfold(
         Filled with how each path begins, see `heat_igl.unfolding.path_derivatives.Ways`.
     """
     first, inside = (np.empty(0, np.int32), np.empty(0, INSIDE)) if points is None else points
-    unfolding.unfold(order, t, walk, first, inside, tolerance, shortfall, max_steps, max_passes, has_holes,
-        entered, share, reach)
+    unfolding.unfold(
+        order, t, walk, first, inside, tolerance, shortfall, max_steps, max_passes, has_holes, entered, share, reach
+    )
 
 
 def views(faces: IntArray, barycentric: FloatArray, F: AnyArray, t: Tables) -> tuple[AnyArray, AnyArray]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.adapters.positions import check_positions, solver_on
+from heat_igl.applications.differentiable import check_positions, solver_on
 from heat_igl.errors import MissingExtraError
 from heat_igl.heat_method import HeatMethodSolver
 
@@ -33,17 +33,8 @@ def geodesic_distance(
     ----------
     V : (n, 3) array of float32 or float64
         Positions of the vertices; may be traced.
-    F : (m, 3) array_like of int
-        Triangles; not traced.
-    sources : sources
-        As for `HeatMethodSolver.distance`; not traced.
-    refine : {"unfold", "exact", None}
-        As for `HeatMethodSolver`; None is the heat method.
-    solver : HeatMethodSolver, optional
-        A solver on the same faces, with its own options: what the faces alone say is not found again. `F` and `refine`
-        are not read then.
-    **options
-        As for `HeatMethodSolver`.
+    F, sources, refine, solver, options
+        As for `heat_igl.torch.geodesic_distance`; not traced.
 
     Returns
     -------

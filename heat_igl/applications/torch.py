@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.adapters.positions import check_positions, solver_on
+from heat_igl.applications.differentiable import check_positions, solver_on
 from heat_igl.errors import MissingExtraError
 from heat_igl.heat_method import HeatMethodSolver
 
@@ -76,7 +76,9 @@ class _Distance(torch.autograd.Function):
     """Keeps the derivative of the answer between the two passes."""
 
     @staticmethod
-    def forward(ctx: Any, V: Any, F: Any, sources: Any, solver: HeatMethodSolver | None, options: dict[str, Any]) -> Any:
+    def forward(
+        ctx: Any, V: Any, F: Any, sources: Any, solver: HeatMethodSolver | None, options: dict[str, Any]
+    ) -> Any:
         on_V = solver_on(V.detach().numpy(), F, solver, options)
         distance, ctx.pull_back = on_V.distance_vjp(sources)
         return torch.from_numpy(distance).to(V.dtype)

@@ -1,1 +1,0 @@
-"""Distance as a function that other libraries differentiate: PyTorch and JAX."""
