@@ -23,6 +23,8 @@ from heat_igl.unfolding import Change
 
 __all__ = ["HeatAdjoint"]
 
+_REMEDY = ": take refine='unfold' or 'exact', which differentiate paths"
+
 
 class HeatAdjoint:
     """The derivative of one answer of the heat method from source vertices.
@@ -57,6 +59,11 @@ class HeatAdjoint:
         self._elements = parts.elements
         self._i, self._j = self._elements.i, self._elements.j
         term = parts.assembler.term(sources)
+        if term.seen.any():
+            raise ValueError(
+                "the heat method is not differentiated from a source next to an edge of more than two faces, where "
+                f"distances are straight lines{_REMEDY}"
+            )
         heat = parts.heat_flow.solve(right_hand_side(domain.n, [term]))
         self._u = heat[:, 0]
         phi = last_steps.poisson.solve(last_steps.divergence([term], heat))[:, 0]
@@ -178,6 +185,9 @@ class HeatAdjoint:
         if options.t is not None:
             return result.reshape(-1, 3)
         edges = self._elements.edges
+        if domain.n_components == 1 and not np.isclose(T.l.ravel()[edges].mean(), domain.mean_edge_length, rtol=1e-12):
+            # On the mesh's own faces an edge of more than two faces counts once.
+            edges = self._elements.pairs[1]
         component = domain.components[T.F[edges // 3, 0]]
         h = domain.mean_edge_lengths
         by_h = np.where(self._parts.step_raised, 0.0, 2 * t / h * by_t)
@@ -188,20 +198,19 @@ class HeatAdjoint:
 
 def _check(parts: SolverParts, sources: SourceSet) -> None:
     """Raise a ValueError for what has no derivative here."""
-    remedy = ": take refine='unfold' or 'exact', which differentiate paths"
     if not sources.on_vertices_alone:
         raise ValueError(
-            f"the heat method is differentiated for source vertices, and points are among the sources{remedy}"
+            f"the heat method is differentiated for source vertices, and points are among the sources{_REMEDY}"
         )
     if sources.offsets.any():
         raise ValueError(
-            f"the heat method is differentiated for sources that start at 0, and some have offsets{remedy}"
+            f"the heat method is differentiated for sources that start at 0, and some have offsets{_REMEDY}"
         )
     if parts.heat_flow.boundary != "neumann":
         raise ValueError(
-            f"the heat method is differentiated for boundary='neumann', not {parts.heat_flow.boundary!r}{remedy}"
+            f"the heat method is differentiated for boundary='neumann', not {parts.heat_flow.boundary!r}{_REMEDY}"
         )
     if parts.heat_flow.backend == "iterative":
-        raise ValueError(f"backend='iterative' cannot solve the adjoint system: take 'multifrontal' or 'scipy'{remedy}")
+        raise ValueError(f"backend='iterative' cannot solve the adjoint system: take 'multifrontal' or 'scipy'{_REMEDY}")
     if parts.t_damping is not None and not parts.fitted:
-        raise ValueError(f"magnitude='damped' is differentiated where heat is fitted to the lengths of edges{remedy}")
+        raise ValueError(f"magnitude='damped' is differentiated where heat is fitted to the lengths of edges{_REMEDY}")
