@@ -65,7 +65,9 @@ class TestTorch:
 
         mesh = sphere()
         V = torch.tensor(mesh.V, requires_grad=True)
-        with pytest.raises(TypeError, match=r"V must hold floating-point numbers to be differentiated, not torch\.int64"):
+        with pytest.raises(
+            TypeError, match=r"V must hold floating-point numbers to be differentiated, not torch\.int64"
+        ):
             geodesic_distance(V.detach().long(), mesh.F, 0)
         with pytest.raises(TypeError, match="V must be a tensor, not ndarray"):
             geodesic_distance(mesh.V, mesh.F, 0)

@@ -80,8 +80,12 @@ def test_paths_against_central_differences(name: str, options: dict[str, Any]) -
         assert smooth.mean() > 0.97
         counted = np.where(smooth, g, 0.0)
         rate = (counted * expected).sum()
-        assert (pull_back(counted) * direction).sum() == pytest.approx(rate, rel=1e-5, abs=1e-7 * np.abs(expected).sum())
-        np.testing.assert_allclose((pull_back.push_forward(direction) * counted).sum(), (pull_back(counted) * direction).sum(), rtol=1e-9)
+        assert (pull_back(counted) * direction).sum() == pytest.approx(
+            rate, rel=1e-5, abs=1e-7 * np.abs(expected).sum()
+        )
+        np.testing.assert_allclose(
+            (pull_back.push_forward(direction) * counted).sum(), (pull_back(counted) * direction).sum(), rtol=1e-9
+        )
 
 
 @pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
@@ -245,7 +249,7 @@ def test_sources_that_start_later() -> None:
 def test_unreachable_vertices_have_no_derivative(options: dict[str, Any]) -> None:
     one = MESHES["grid"]()
     n = one.n_vertices
-    mesh = Mesh(np.concatenate([one.V, one.V + [3, 0, 0]]), np.concatenate([one.F, one.F + n]))
+    mesh = Mesh(np.concatenate([one.V, one.V + 3.0]), np.concatenate([one.F, one.F + n]))
     distance, pull_back = HeatMethodSolver(mesh, **options).distance_vjp(5)
     np.testing.assert_array_equal(pull_back.unreachable, np.arange(n, 2 * n))
     g = np.where(np.isinf(distance), np.nan, 1.0)

@@ -211,6 +211,8 @@ def _check(parts: SolverParts, sources: SourceSet) -> None:
             f"the heat method is differentiated for boundary='neumann', not {parts.heat_flow.boundary!r}{_REMEDY}"
         )
     if parts.heat_flow.backend == "iterative":
-        raise ValueError(f"backend='iterative' cannot solve the adjoint system: take 'multifrontal' or 'scipy'{_REMEDY}")
+        raise ValueError(
+            f"backend='iterative' cannot solve the adjoint system: take 'multifrontal' or 'scipy'{_REMEDY}"
+        )
     if parts.t_damping is not None and not parts.fitted:
         raise ValueError(f"magnitude='damped' is differentiated where heat is fitted to the lengths of edges{_REMEDY}")
