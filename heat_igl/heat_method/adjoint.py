@@ -16,7 +16,6 @@ from heat_igl.heat_method.parts import SolverParts
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.operators import ElementSlopes
 from heat_igl.sources import SourceSet, right_hand_side
-from heat_igl.steps.fitted import fit, fit_slope
 from heat_igl.steps.normalization import lowest_full_rate
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import Change
@@ -121,7 +120,7 @@ class HeatAdjoint:
             d = self._differences(u)
             scale = np.maximum(np.abs(d).max(axis=1), np.finfo(float).tiny)
             d /= scale[:, None]
-        energy = (e.weight * d**2).sum(axis=1)
+        energy = np.einsum("fc,fc,fc->f", e.weight, d, d)
         steep = energy > 0
         rate = np.sqrt(np.where(steep, energy, 1.0) / e.area)
         s = np.where(steep, 1 / rate, 0.0)
@@ -131,7 +130,7 @@ class HeatAdjoint:
             damped = steep & (rate < full)
             s[damped] = 1 / full[damped]
         q = self._differences(p)
-        by_s = (e.weight * q * d).sum(axis=1)
+        by_s = np.einsum("fc,fc,fc->f", e.weight, q, d)
         slopes.by_weight += s[:, None] * q * d
         by_d = s[:, None] * e.weight * q
         by_energy = np.where(steep & ~damped, -0.5 * by_s * s / np.where(steep, energy, 1.0), 0.0)
@@ -163,18 +162,17 @@ class HeatAdjoint:
         step = t[of_face][:, None]
         if not self._parts.fitted:
             slopes.by_weight += step * by_weight
-            by_t += np.bincount(of_face, (self._elements.weight * by_weight).sum(axis=1), len(by_t))
+            by_t += np.bincount(of_face, np.einsum("fc,fc->f", self._elements.weight, by_weight), len(by_t))
             return
         # L has one entry for all sides between the same two vertices: its weight is the sum of theirs, not below 0,
         # times the factor of the shortest.
         pair, first = self._elements.pairs
-        weight = np.maximum(np.bincount(pair, self._elements.weight.ravel()), 0.0)
-        x = (self._elements.l / np.sqrt(step)).ravel()[first]
-        factor, by_fitted, t_of_pair = fit(x), by_weight.ravel()[first], step.repeat(3, axis=1).ravel()[first]
+        weight, x, factor, slope = self._parts.fitted_weights
+        of_pair = of_face[first // 3]
+        by_fitted, t_of_pair = by_weight.ravel()[first], t[of_pair]
         slopes.by_weight += step * by_weight * np.where(weight > 0, factor, 0.0)[pair].reshape(F.shape)
-        by_factor = t_of_pair * by_fitted * weight * fit_slope(x)
+        by_factor = t_of_pair * by_fitted * weight * slope
         slopes.by_side.ravel()[first] += by_factor / np.sqrt(t_of_pair)
-        of_pair = of_face.repeat(3)[first]
         by_t += np.bincount(of_pair, by_fitted * weight * factor - by_factor * x / (2 * t_of_pair), len(by_t))
 
     def _time_step(self, by_t: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -158,6 +159,14 @@ class PinnedLevels:
 
     def _values_to_sides(self, by_value: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The derivative by the edges that the known distances are the lengths of."""
+        one, other = (np.zeros(triangulation.l.size) for triangulation in self._triangulations)
+        for sides, (side, place) in zip((one, other), self._sides_of_values, strict=True):
+            np.add.at(sides, side, by_value[place])
+        return one, other
+
+    @cached_property
+    def _sides_of_values(self) -> list[tuple[IntArray, IntArray]]:
+        """In either triangulation, sides from sources whose lengths are known distances, and which of these."""
         near, sources = self._term.near, self._term.sources
         n = len(self._u)
         value = np.full(n, np.nan)
@@ -168,15 +177,13 @@ class PinnedLevels:
         found: BoolArray = np.zeros(len(near.vertex), bool)
         result = []
         for triangulation in self._triangulations:
-            sides = np.zeros(triangulation.l.size)
             spokes = _spokes(triangulation, sources.vertices)
             is_it = np.abs(spokes.length - value[spokes.end]) <= 1e-12 * spokes.length
             at, first = np.unique(place[spokes.end[is_it]], return_index=True)
             new = ~found[at]
-            np.add.at(sides, spokes.side[is_it][first[new]], by_value[at[new]])
+            result.append((spokes.side[is_it][first[new]], at[new]))
             found[at] = True
-            result.append(sides)
-        return result[0], result[1]
+        return result
 
 
 def _spokes(triangulation: IntrinsicTriangulation, vertices: IntArray) -> _Spokes:

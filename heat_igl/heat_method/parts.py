@@ -23,6 +23,7 @@ from heat_igl.operators import Elements, Operators, operators, point_cloud_opera
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
+from heat_igl.steps.fitted import fit, fit_slope
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import UnfoldingSolver
 
@@ -89,6 +90,19 @@ class SolverParts:
     def elements(self) -> Elements:
         """The triangles that are solved on, to differentiate by their sides."""
         return Elements(self.operators)
+
+    @cached_property
+    def fitted_weights(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """What the fitted flow knows of each of ``elements.pairs``, to be differentiated.
+
+        Its cotangent weight, not below 0; the length x of its shortest side in units of sqrt(t); `fit` and `fit_slope`
+        of x.
+        """
+        elements = self.elements
+        pair, first = elements.pairs
+        t = self.time_steps[self.operators.components[elements.i.ravel()[first]]]
+        x = elements.l.ravel()[first] / np.sqrt(t)
+        return np.maximum(np.bincount(pair, elements.weight.ravel()), 0.0), x, fit(x), fit_slope(x)
 
     @property
     def given_faces(self) -> IntArray | None:

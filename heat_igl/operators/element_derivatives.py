@@ -48,6 +48,7 @@ class Elements:
         self.weight = self.share**2 * self._inner / (8 * self.area)[:, None]
         #: Corners (m, 3) with an obtuse angle.
         self._is_obtuse = self._inner < 0
+        self._has_obtuse = self._is_obtuse.any(axis=1)
 
     @cached_property
     def edges(self) -> IntArray:
@@ -70,7 +71,7 @@ class Elements:
         """Area (m, 3) of the Voronoi cell of each corner; of an obtuse triangle one half and twice a quarter."""
         parts = self.weight * self.l**2 / 4
         cells = parts.sum(axis=1)[:, None] - parts
-        obtuse = self._is_obtuse.any(axis=1)
+        obtuse = self._has_obtuse
         cells[obtuse] = self.area[obtuse, None] * np.where(self._is_obtuse[obtuse], 0.5, 0.25)
         return np.asarray(cells)
 
@@ -94,16 +95,21 @@ class ElementSlopes:
     def total(self) -> FloatArray:
         """The derivative (m, 3) by the lengths of the sides."""
         e = self._elements
-        by_weight, by_area, by_side = self.by_weight.copy(), self.by_area.copy(), self.by_side.copy()
-        obtuse = e._is_obtuse.any(axis=1)
-        by_area[obtuse] += (self.by_mass * np.where(e._is_obtuse, 0.5, 0.25)).sum(axis=1)[obtuse]
+        by_area, obtuse = self.by_area.copy(), e._has_obtuse
+        by_area[obtuse] += (self.by_mass[obtuse] * np.where(e._is_obtuse[obtuse], 0.5, 0.25)).sum(axis=1)
         # The cell of a corner has a part for both sides there: for all but the opposite one.
-        by_part = np.where(obtuse[:, None], 0.0, self.by_mass.sum(axis=1)[:, None] - self.by_mass)
-        by_weight += by_part * e.l**2 / 4
-        by_side += by_part * e.weight * e.l / 2
+        by_part = _sum(self.by_mass)[:, None] - self.by_mass
+        by_part[obtuse] = 0
+        by_weight = self.by_weight + by_part * e.l**2 / 4
+        by_side = self.by_side + by_part * e.weight * e.l / 2
         # The weight is inner / (8 area), and the area changes by l times the weight.
-        by_area -= (by_weight * e.weight).sum(axis=1) / e.area
+        by_area -= np.einsum("fc,fc->f", by_weight, e.weight) / e.area
         by_inner = e.share**2 * by_weight / (8 * e.area)[:, None]
-        by_side += 2 * e.l * (by_inner.sum(axis=1)[:, None] - 2 * by_inner)
+        by_side += 2 * e.l * (_sum(by_inner)[:, None] - 2 * by_inner)
         by_side += by_area[:, None] * e.l * e.weight
         return np.asarray(by_side)
+
+
+def _sum(rows: FloatArray) -> FloatArray:
+    """Sums of rows of three; by columns, which takes a third of the time."""
+    return np.asarray(rows[:, 0] + rows[:, 1] + rows[:, 2])
