@@ -256,11 +256,12 @@ _LAZY = {
     "write_point_cloud": "io",
 }
 
-# Modules that users import by these names: earlier name -> the module in its room.
+# Modules that users import by these names, most of them earlier ones: name -> the module in its room.
 _EARLIER_NAMES = {
     "closed_forms": "validation.closed_forms",
     "demo": "cli.demo",
     "factorization": "linear",
+    "jax": "applications.jax",
     "metrics": "validation.metrics",
     "paths": "curves.paths",
     "plots": "drawing.plots",
@@ -272,6 +273,7 @@ _EARLIER_NAMES = {
     "speed": "operators.speed",
     "subdivision": "mesh.subdivision",
     "surface_points": "mesh.surface_points",
+    "torch": "applications.torch",
     "viewer": "drawing.viewer",
 }
 alias_modules({f"{__name__}.{name}": f"{__name__}.{target}" for name, target in _EARLIER_NAMES.items()})

@@ -11,6 +11,8 @@ from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method.batches import checked_cutoff, cut_off
 from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.construction import PreparedSolver
+from heat_igl.heat_method.derivatives import DistanceDerivative
+from heat_igl.heat_method.differentiation import differentiated
 from heat_igl.heat_method.integration import damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
@@ -220,6 +222,13 @@ class HeatMethodSolver(PreparedSolver):
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
+
+    def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
+        """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
+
+        Arguments and errors as for `distance`; a ValueError also for what is not differentiated, see `differentiated`.
+        """
+        return differentiated(self.distance(sources), self._source_set(sources), self._parts, self._mesh)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""

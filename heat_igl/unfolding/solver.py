@@ -15,6 +15,7 @@ from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSegments, Sou
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.exact import ExactSurface
+from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 
 __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
@@ -165,6 +166,20 @@ class UnfoldingSolver:
         """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 if none is reached."""
         labels = np.empty(len(u), np.int64)
         return self._distance(term, u, labels), labels
+
+    def paths(self, sources: SourceSet, u: FloatArray) -> PathLengths:
+        """The paths whose lengths are the distances from vertices and points, for heat (n,).
+
+        Raises
+        ------
+        ValueError
+            With ``refine="sweep"``, whose distances are not the lengths of paths.
+        """
+        if self._sweeps:
+            raise ValueError('refine="sweep" finds no paths to differentiate: take refine="unfold" or "exact"')
+        if self._refinement is None or self.is_exact:
+            return from_windows(self._exact, self._surface.unfolding, sources)
+        return from_walks(self._refinement, sources, u)
 
     def _distance(self, term: UnfoldingTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
         sources, points, components = term.sources, self._points(term), self._domain.components
