@@ -2,8 +2,10 @@
 
 from heat_igl.operators.connection import connection_laplacian, edge_rotations, with_rotations
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
-from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
+from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators, without_refinement
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
+from heat_igl.operators.metric import fibre_metric, metric_operators
+from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.point_clouds import point_cloud_operators
 from heat_igl.operators.polygons import polygon_operators
 from heat_igl.operators.simplices import cotan_operators
@@ -15,6 +17,7 @@ from heat_igl.operators.triangles import operators, tufted_operators, unfolding_
 __all__ = [
     "EdgeLengths",
     "Laplacian",
+    "MetricSimplices",
     "OnLaplacian",
     "Operators",
     "Surface",
@@ -24,8 +27,10 @@ __all__ = [
     "cotan_operators",
     "edge_length_operators",
     "edge_rotations",
+    "fibre_metric",
     "intrinsic_operators",
     "is_rough_or_narrow",
+    "metric_operators",
     "operators",
     "point_cloud_operators",
     "polygon_operators",
@@ -33,4 +38,5 @@ __all__ = [
     "tufted_operators",
     "unfolding_surface",
     "with_rotations",
+    "without_refinement",
 ]

@@ -2,6 +2,7 @@
 
 from heat_igl.unfolding.distance import distance_from_scratch, unfolded_distance
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
+from heat_igl.unfolding.fronts import FrontSolver
 from heat_igl.unfolding.local import distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 from heat_igl.unfolding.solver import UnfoldingSolver
@@ -9,6 +10,7 @@ from heat_igl.unfolding.solver import UnfoldingSolver
 __all__ = [
     "ExactSolution",
     "ExactSurface",
+    "FrontSolver",
     "Known",
     "Origin",
     "Refine",
