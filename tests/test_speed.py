@@ -134,8 +134,8 @@ def test_refraction_at_a_straight_border(speeds):
         speed = np.where(mesh.V[mesh.F][:, :, 1].mean(axis=1) > 0, *speeds)
         exact = by_fermat(mesh.V[source, :2], mesh.V[:, :2], *speeds)
         errors.append(float(np.nanmean(relative_error(solver(mesh, speed).distance(source), exact))))
-    assert errors[1] < max(0.8 * errors[0], 1e-5)
-    assert errors[2] < max(0.8 * errors[1], 1e-5)
+    assert errors[1] < max(0.8 * errors[0], 5e-5)
+    assert errors[2] < max(0.8 * errors[1], 5e-5)
     assert errors[2] < 5e-4
 
 

@@ -49,7 +49,7 @@ class SolverParts:
     assembler : SourceAssembler
         From sources to right-hand sides.
     factored : HeatFlow or None
-        Step 1; None with ``refine="exact"`` and for fronts, which take no heat: `heat_flow` factors it when asked first.
+        Step 1; None with ``refine="exact"`` and for fronts, which take no heat: `heat_flow` factors it on request.
     last_steps : Integration or UnfoldingSolver
         Steps 2 and 3, or what takes their place with ``refine``.
     time_steps : (n_components,) float64
@@ -214,7 +214,7 @@ def prepare(
 
 
 def _resolved(domain: Operators, options: SolverOptions) -> tuple[Operators, SolverOptions]:
-    """Operators and options that suit each other: exact windows where speeds differ much, no added vertices to unfold."""
+    """Operators and options that suit each other: windows where speeds differ much, no added vertices to unfold."""
     if options.leaves_heat and domain.contrast > _LARGEST_CONTRAST and domain.surface is not None:
         options = replace(options, refine=options.refine or "exact")
     if options.refine is not None and domain.n_given < domain.n:

@@ -1,7 +1,7 @@
 cdef extern from *:
     """
     // A smaller distance is handed on if it is shorter by more than this share of the way from the source.
-    #define GAIN 1e-7
+    #define GAIN 1e-5
     // A front from this many edges away is straight: farther away, its curve is lost in the digits.
     #define STRAIGHT 1e4
     // Height of a triangle over its base below which spheres about the corners lose too many digits where they meet.

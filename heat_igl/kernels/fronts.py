@@ -152,10 +152,16 @@ class _Fronts:
         a: cython.int = (v + 1) % (self.p + 1)
         b: cython.int = (v + 2) % (self.p + 1)
         c: cython.int = (v + 3) % (self.p + 1)
+        # No point of the opposite side is farther than `reach` from all corners.
         near: cython.double = min(self.d[self.corners[s, a]], self.d[self.corners[s, b]])
+        reach: cython.double = 0.5 * self.lengths[s, a, b]
         if self.p == 3:
             near = min(near, self.d[self.corners[s, c]])
-        if not near < self.best:
+            reach = 0.6 * max(self.lengths[s, a, b], self.lengths[s, a, c], self.lengths[s, b, c])
+        if not near - reach < self.best or near == INFINITY:
+            return
+        # Straight through the triangle is the shortest way through the simplex.
+        if self.p == 3 and self.across_triangle(s, v, a, b, c):
             return
         self.along_edge(s, v, a)
         self.along_edge(s, v, b)
@@ -164,7 +170,6 @@ class _Fronts:
             self.along_edge(s, v, c)
             self.across_edge(s, v, a, c)
             self.across_edge(s, v, b, c)
-            self.across_triangle(s, v, a, b, c)
 
     @cython.cfunc
     @cython.inline
@@ -281,9 +286,9 @@ class _Fronts:
         """Through the edge ab: the source lies in the plane of v, a and b, behind the edge."""
         i: cython.int = self.corners[s, a]
         j: cython.int = self.corners[s, b]
-        if not min(self.d[i], self.d[j]) < self.best:
-            return
         base: cython.double = self.lengths[s, a, b]
+        if not min(self.d[i], self.d[j]) - 0.5 * base < self.best or max(self.d[i], self.d[j]) == INFINITY:
+            return
         to_a: cython.double = self.lengths[s, v, a]
         to_b: cython.double = self.lengths[s, v, b]
         start: cython.double = -INFINITY
@@ -309,8 +314,11 @@ class _Fronts:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def across_triangle(self, s: cython.int, v: cython.int, a: cython.int, b: cython.int, c: cython.int) -> cython.void:
-        """Through the triangle abc: the source lies where spheres about its corners meet, on the other side."""
+    def across_triangle(self, s: cython.int, v: cython.int, a: cython.int, b: cython.int, c: cython.int) -> cython.bint:
+        """Through the triangle abc, if the straight line passes there, and whether it does.
+
+        The source lies where spheres about the corners meet, on the other side.
+        """
         i: cython.int = self.corners[s, a]
         j: cython.int = self.corners[s, b]
         k: cython.int = self.corners[s, c]
@@ -320,9 +328,9 @@ class _Fronts:
             start = (self.begins(s, a) + self.begins(s, b) + self.begins(s, c)) / 3
         elif self.sees_source(i) and self.sees_source(j) and self.sees_source(k):
             self.by_lines(s, v, i, j, k)
-            return
+            return False
         elif self.is_source(i) or self.is_source(j) or self.is_source(k):
-            return
+            return False
         start = max(start, min(self.d[i], self.d[j], self.d[k]) - STRAIGHT * (base + self.lengths[s, v, a]))
         da: cython.double = self.d[i] - start
         db: cython.double = self.d[j] - start
@@ -333,12 +341,12 @@ class _Fronts:
         cx: cython.double = 0.5 * ((ac - bc) * (ac + bc) / base + base)
         cy: cython.double = sqrt(max(ac * ac - cx * cx, 0.0))
         if not cy > FLAT * base:
-            return
+            return False
         x: cython.double = 0.5 * ((da - db) * (da + db) / base + base)
         y: cython.double = 0.5 * ((da - dc) * (da + dc) + ac * ac - 2 * cx * x) / cy
         z_squared: cython.double = da * da - x * x - y * y
         if not z_squared >= 0:
-            return
+            return False
         z: cython.double = sqrt(z_squared)
         to_a: cython.double = self.lengths[s, v, a]
         to_b: cython.double = self.lengths[s, v, b]
@@ -355,3 +363,5 @@ class _Fronts:
         if of_c >= 0 and of_b >= 0 and of_b + of_c <= height:
             across: cython.double = sqrt((vx - x) * (vx - x) + (vy - y) * (vy - y) + height * height)
             self.take(self.corners[s, v], start + across, start, self.label[i], s)
+            return True
+        return False
