@@ -7,7 +7,7 @@ cdef extern from *:
     // Height of a triangle over its base below which spheres about the corners lose too many digits where they meet.
     #define FLAT 1e-3
     // Part by which a way may be longer than a straight line and still be one.
-    #define STRAIGHT_LINE 1e-9
+    #define STRAIGHT_LINE 1e-6
     // Part of a triangle by which a straight line may miss it, along its rim.
     #define ON_SIDE 1e-9
     """

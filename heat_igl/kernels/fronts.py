@@ -124,8 +124,14 @@ class _Fronts:
         """Give v the best that its simplices say; returns whether that is news to its neighbours."""
         k: cython.int
         old: cython.double = self.d[v]
+        floor: cython.double = -INFINITY
+        if self.positions.shape[0] > 0 and self.sources.shape[0] == 1:
+            # No way is shorter than the straight line.
+            floor = self.d[self.sources[0]] + self.line(v, 0) * (1 + STRAIGHT_LINE)
         self.best, self.best_simplex = old, -1
         for k in range(self.first[v], self.first[v + 1]):
+            if self.best <= floor:
+                break
             self.through(self.incident[k] // (self.p + 1), self.incident[k] % (self.p + 1))
         if self.best_simplex < 0:
             return False
