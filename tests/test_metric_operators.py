@@ -129,6 +129,22 @@ def cylinder(around: int, rows: int) -> tuple[FloatArray, IntArray]:
     return V, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
+def test_a_piecewise_constant_metric_that_fits_together():
+    """Half of a square is stretched across the border, along which both halves agree: a rectangle."""
+    mesh = shapes.grid(24)
+    moved = flat(mesh).V
+    mesh = Mesh(np.where(mesh.V[:, :1] == 0.5, mesh.V, moved), mesh.F)
+    V = mesh.V.copy()
+    V[:, 0] += 2 * np.maximum(V[:, 0] - 0.5, 0)
+    is_right = mesh.V[mesh.F][:, :, 0].mean(axis=1) > 0.5
+    domain = metric_operators(mesh, np.where(is_right[:, None, None], np.diag([9.0, 1, 1]), np.eye(3)))
+    assert domain.surface is not None
+    exact = np.linalg.norm(V - V[100], axis=1)
+    for refine in ("sweep", "unfold", "exact"):
+        assert error(distance(domain, 100, refine=refine), exact) < 1e-6
+    assert error(distance(domain, 100), exact) < 0.015
+
+
 def test_layers_by_snells_law():
     """Three layers: the time is the least over where the straight pieces cross the two borders."""
     speeds, borders = np.array([1.0, 2.5, 0.5]), (1 / 3, 2 / 3)
