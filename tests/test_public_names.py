@@ -25,6 +25,7 @@ offset_curves pair_distances plots point_cloud_operators polygon_operators read_
 read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
 tangent_frames trace_geodesic
 unfolded_distance validate voronoi_cells write_curves write_mesh write_point_cloud
+fibre_metric metric_operators
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they
@@ -81,6 +82,8 @@ split_long_edges(mesh, longest=None)
 polygon_operators(mesh)
 point_cloud_operators(cloud)
 speed_operators(mesh, speed)
+metric_operators(mesh, metric, laplacian='auto')
+fibre_metric(directions, along, across)
 farthest_points(solver, k, *, start=0)
 farthest_cells(solver, k, *, start=0)
 voronoi_cells(solver, sites)

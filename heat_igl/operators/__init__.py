@@ -3,8 +3,10 @@
 from heat_igl.operators.connection import connection_laplacian, edge_rotations, with_rotations
 from heat_igl.operators.element_derivatives import Elements, ElementSlopes
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
-from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
+from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators, without_refinement
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
+from heat_igl.operators.metric import fibre_metric, metric_operators
+from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.point_clouds import point_cloud_operators
 from heat_igl.operators.polygons import polygon_operators
 from heat_igl.operators.simplices import cotan_operators
@@ -18,6 +20,7 @@ __all__ = [
     "ElementSlopes",
     "Elements",
     "Laplacian",
+    "MetricSimplices",
     "OnLaplacian",
     "Operators",
     "Surface",
@@ -27,8 +30,10 @@ __all__ = [
     "cotan_operators",
     "edge_length_operators",
     "edge_rotations",
+    "fibre_metric",
     "intrinsic_operators",
     "is_rough_or_narrow",
+    "metric_operators",
     "operators",
     "point_cloud_operators",
     "polygon_operators",
@@ -36,4 +41,5 @@ __all__ = [
     "tufted_operators",
     "unfolding_surface",
     "with_rotations",
+    "without_refinement",
 ]
