@@ -3,6 +3,7 @@
 from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.front_door import DistanceMethod, geodesic_distance
 from heat_igl.heat_method.options import Backend, Boundary, Laplacian, Magnitude, Refine, SolverOptions
+from heat_igl.heat_method.signed_heat import Level, SignedHeatSolver
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.heat_method.solver import HeatMethodSolver, heat_method_distance
 from heat_igl.heat_method.time_step import smallest_time_step
@@ -18,8 +19,10 @@ __all__ = [
     "HeatSolution",
     "LabelledDistance",
     "Laplacian",
+    "Level",
     "Magnitude",
     "Refine",
+    "SignedHeatSolver",
     "SolverOptions",
     "geodesic_distance",
     "VectorHeatSolver",
