@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -101,10 +100,13 @@ class SignedHeatSolver:
         self._mesh = as_simplices(mesh)
         self._refines = refine is not None
         domain, surface = _oriented_domain(self._mesh)
-        parts = prepare(domain, replace(options, refine=None), V=self._mesh.V)
-        if not isinstance(parts.last_steps, Integration):
-            raise MeshError("the signed heat method integrates a field, and nothing was factored for that")
-        self._heat_flow, self._poisson = parts.heat_flow, parts.last_steps.poisson
+        parts = prepare(domain, options, V=self._mesh.V)
+        self._heat_flow = parts.heat_flow
+        last_steps = parts.last_steps
+        if isinstance(last_steps, Integration):
+            self._poisson = last_steps.poisson
+        else:
+            self._poisson = PoissonProblem(domain, options.backend, parts.analysis)
         self._vector_flow = VectorHeatFlow(
             domain, edge_rotations(domain), _one_or_all(parts.time_steps), options.backend, parts.fitted
         )
@@ -113,8 +115,6 @@ class SignedHeatSolver:
         triangulation = surface.triangulation
         self._D = divergence_matrix(intrinsic_gradient(triangulation).tocsr(), triangulation.areas)
         self._unsigned = HeatMethodSolver._of(parts)
-        if refine is not None:
-            self._unsigned = HeatMethodSolver._of(prepare(domain, options, parts.analysis, V=self._mesh.V))
 
     @property
     def operators(self) -> Operators:
