@@ -72,7 +72,11 @@ from heat_igl.unfolding import Refinement, distances_within, nearest_vertices, p
 
 if TYPE_CHECKING:
     from heat_igl import baselines, cluster, reference
+    from heat_igl.curves import CutMesh, cut
     from heat_igl.drawing import plots
+    from heat_igl.heat_method import SignedHeatSolver
+    from heat_igl.mesh import region_boundary
+    from heat_igl.sources import OrientedPoints
     from heat_igl.validation import ValidationReport, ValidationRow, closed_forms, metrics, shapes, validate
     from heat_igl.validation.samples import sample_mesh
 
@@ -80,6 +84,7 @@ __all__ = [
     "AccuracyWarning",
     "BatchError",
     "ClosestPoints",
+    "CutMesh",
     "Diagnostics",
     "FactorizationError",
     "HeatMethodSolver",
@@ -92,10 +97,12 @@ __all__ = [
     "MissingExtraError",
     "OffsetSources",
     "Operators",
+    "OrientedPoints",
     "PointCloud",
     "PolygonMesh",
     "ReferenceSolverError",
     "Refinement",
+    "SignedHeatSolver",
     "SourceError",
     "SurfaceCurve",
     "SurfacePoints",
@@ -112,6 +119,7 @@ __all__ = [
     "edge_curve",
     "cluster",
     "connection_laplacian",
+    "cut",
     "diameter",
     "distance_matrix",
     "distances_within",
@@ -137,6 +145,7 @@ __all__ = [
     "read_point_cloud",
     "read_polygon_mesh",
     "reference",
+    "region_boundary",
     "sample_mesh",
     "sampling",
     "shapes",
@@ -157,14 +166,19 @@ __version__ = "0.1.0"
 
 # Lazy attribute -> submodule, imported on first use because a distance does not need it.
 _LAZY = {
+    "CutMesh": "curves.cutting",
+    "OrientedPoints": "sources.oriented",
+    "SignedHeatSolver": "heat_method.signed_heat",
     "ValidationReport": "validation.report",
     "ValidationRow": "validation.report",
     "baselines": "baselines",
     "closed_forms": "validation.closed_forms",
     "cluster": "cluster",
+    "cut": "curves.cutting",
     "metrics": "validation.metrics",
     "plots": "drawing.plots",
     "reference": "reference",
+    "region_boundary": "mesh.regions",
     "sample_mesh": "validation.samples",
     "shapes": "validation.shapes",
     "validate": "validation",

@@ -270,7 +270,7 @@ class _Cut:
         return node
 
     def _cut_face(self, face: int, flat: FloatArray, segments: IntArray) -> list[tuple[int, int, int]]:
-        """The parts of a face, given its corners (3, 2) in the plane and the segments in it; its new vertices and edges on curves are noted."""
+        """The parts of a face with its corners at `flat` (3, 2); its new vertices and edges on curves are noted."""
         mesh = self._mesh
         vertices: list[int] = mesh.F[face].tolist()
         points: list[Point] = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
@@ -350,7 +350,7 @@ class _Cut:
 
 
 def _on_grid(barycentric: FloatArray) -> IntArray:
-    """Barycentric coordinates (p, 3) as integers that sum to `_STEPS`; what is as good as an edge or vertex lies there."""
+    """Barycentric coordinates (p, 3) as integers that sum to `_STEPS`, put on an edge or vertex that is near."""
     kept = np.where(barycentric < _SAME, 0.0, barycentric)
     kept /= kept.sum(axis=1, keepdims=True)
     steps = np.rint(kept * _STEPS).astype(np.int64)

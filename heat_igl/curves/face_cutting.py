@@ -1,4 +1,4 @@
-"""One triangle cut along straight segments: exact arithmetic in integers, so that no rounding decides what crosses what.
+"""One triangle cut along straight segments, in integers, so that no rounding decides which segments cross.
 
 A point is a triple of integers, its barycentric coordinates times any positive number. The sign of the determinant of
 three points is the orientation of their triangle, and the line through two points is their cross product: nothing is

@@ -7,27 +7,27 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from heat_igl.errors import MeshError, SourceError
-from heat_igl.heat_method.broken_curves import has_gaps, is_left, zero_curve_in_gaps
+from heat_igl.heat_method.curve_sides import has_gaps, left_of_closed, left_of_nearest, zero_curve_in_gaps
 from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.parts import prepare
 from heat_igl.heat_method.solver import HeatMethodSolver
-from heat_igl.intrinsic import intrinsic_gradient, lay_out, oriented
+from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_gradient, lay_out, oriented
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
-from heat_igl.operators import Operators, Surface, divergence_matrix, edge_rotations, face_rotations, operators
+from heat_igl.operators import Operators, divergence_matrix, edge_rotations, face_rotations, operators
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set
 from heat_igl.steps import PoissonProblem, VectorHeatFlow
-from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding import Refine
 
 __all__ = ["Level", "SignedHeatSolver"]
 
 Level = Literal["zero", "constant", "none"]
 
-# Normals diffuse over half an edge. Along closed curves that is the best of 0.25, 0.5 and 1 on meshes of the zoo; across
-# gaps all three are alike.
+# Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
+# alike (docs/signed.md).
 _T_COEF = 0.25
 # Normals that sum to less than this share of the length of the curves have cancelled.
 _CANCELLED = 1e-9
@@ -68,8 +68,9 @@ class SignedHeatSolver:
     t : float, optional
         Time step as a squared length; overrides `t_coef`. It is raised where heat would not cross the mesh.
     refine : {"unfold", "exact"}, optional
-        Take the sign from the integrated distance, and the size from `HeatMethodSolver` with the same `refine`,
-        measured from the curves, and in gaps between them from the zero curve of the integrated distance.
+        Take the size from `HeatMethodSolver` with the same `refine`,
+        measured from the curves, and in gaps between them from the zero curve of the integrated distance. The sign is
+        that of the integrated distance, and where no curve has a gap, that of the region, in both cases.
     backend : {"auto", "scipy", "multifrontal"}
         Linear solver, see `factorize`.
 
@@ -99,7 +100,7 @@ class SignedHeatSolver:
         options = SolverOptions(_T_COEF if t_coef is None and t is None else t_coef, t, refine=refine, backend=backend)
         self._mesh = as_simplices(mesh)
         self._refines = refine is not None
-        domain, surface = _oriented_domain(self._mesh)
+        domain, self._faces, self._triangulation = _oriented_domain(self._mesh)
         parts = prepare(domain, options, V=self._mesh.V)
         self._heat_flow = parts.heat_flow
         last_steps = parts.last_steps
@@ -111,9 +112,9 @@ class SignedHeatSolver:
             domain, edge_rotations(domain), _one_or_all(parts.time_steps), options.backend, parts.fitted
         )
         self._rotations = face_rotations(domain)
-        self._surface, self._domain = surface, domain
-        triangulation = surface.triangulation
-        self._D = divergence_matrix(intrinsic_gradient(triangulation).tocsr(), triangulation.areas)
+        self._domain = domain
+        gradient = intrinsic_gradient(self._triangulation).tocsr()
+        self._D = divergence_matrix(gradient, self._triangulation.areas)
         self._unsigned = HeatMethodSolver._of(parts)
 
     @property
@@ -175,8 +176,16 @@ class SignedHeatSolver:
         if not np.isfinite(phi).any():
             raise SourceError("curves reach no vertex: the components that they lie on have no area")
         size, left = np.abs(phi), phi < 0
+        is_broken = has_gaps(self._mesh, chosen)
+        if not is_broken:
+            left = left_of_closed(self._mesh, self._faces, chosen, left)
         if self._refines:
-            size, left = self._refined(chosen, phi, left)
+            size = self._unsigned.distance(chosen.unoriented())
+            if is_broken:
+                left = left_of_nearest(self._faces, chosen, size, left)
+                closing = zero_curve_in_gaps(self._mesh, phi, size, self._domain.mean_edge_length)
+                if closing is not None:
+                    size = np.minimum(size, self._unsigned.distance(closing))
         if unsigned is not None:
             reached = np.isfinite(phi)
             size = np.minimum(size, self._unsigned.distance(unsigned), out=size, where=reached)
@@ -185,10 +194,7 @@ class SignedHeatSolver:
 
     def _pieces(self, chosen: OrientedSet) -> _Pieces:
         """Segments and points with their normals in the planes of their faces."""
-        faces = self._surface.faces
-        if faces is None:
-            raise MeshError("oriented curves need the faces of the mesh, which this domain does not have")
-        flat = lay_out(faces.l[chosen.faces]) @ np.array([1, 1j])
+        flat = lay_out(self._faces.l[chosen.faces]) @ np.array([1, 1j])
         along = np.einsum("sc,sc->s", chosen.end - chosen.start, flat)
         length = np.abs(along)
         corners = self._mesh.V[self._mesh.F[chosen.point_faces]]
@@ -222,11 +228,12 @@ class SignedHeatSolver:
         np.add.at(b, corners, at_corners)
         largest = np.abs(b).max()
         if largest <= _CANCELLED * share.max():
-            raise SourceError("the normals of the curves cancel: two curves run along each other in opposite directions")
+            raise SourceError(
+                "the normals of the curves cancel: two curves run along each other in opposite directions"
+            )
         Y = self._vector_flow.solve(b * (SOURCE_HEAT / largest))
         # Step 2: the unit field in faces.
-        triangulation = self._surface.triangulation
-        at_faces = Y[triangulation.F]
+        at_faces = Y[self._triangulation.F]
         # Dividing by the largest first keeps squares in range.
         size = np.abs(at_faces).max(axis=1, keepdims=True)
         at_faces = np.divide(at_faces, size, out=np.zeros_like(at_faces), where=size > LOWEST_HEAT)
@@ -261,20 +268,9 @@ class SignedHeatSolver:
         extended = np.divide(u, ones, out=np.zeros(n), where=ones > LOWEST_HEAT)
         return np.asarray(at_vertices + largest * np.clip(extended, -1, 1))
 
-    def _refined(self, chosen: OrientedSet, phi: FloatArray, left: BoolArray) -> tuple[FloatArray, BoolArray]:
-        """Size (n,) and side (n,) of the distance: near-exact from the curves, and from what closes their gaps."""
-        places = chosen.unoriented()
-        size = self._unsigned.distance(places)
-        left = is_left(self._surface, chosen, size, left)
-        if has_gaps(self._mesh, chosen):
-            closing = zero_curve_in_gaps(self._mesh, phi, size, self._domain.mean_edge_length)
-            if closing is not None:
-                size = np.minimum(size, self._unsigned.distance(closing))
-        return size, left
 
-
-def _oriented_domain(mesh: Mesh) -> tuple[Operators, Surface]:
-    """The operators of a mesh on which a curve has a left and a right."""
+def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, IntrinsicTriangulation]:
+    """The operators of a mesh on which a curve has a left and a right, its faces, and the triangles solved on."""
     if mesh.is_tetrahedral:
         raise MeshError("curves have a left and a right on triangles, but the mesh is tetrahedral")
     domain = operators(mesh, "intrinsic-delaunay")
@@ -296,7 +292,7 @@ def _oriented_domain(mesh: Mesh) -> tuple[Operators, Surface]:
             f"face {first} and a neighbour are oriented differently: left and right change between them; orient the "
             "faces alike, as igl.bfs_orient does"
         )
-    return domain, surface
+    return domain, faces, surface.triangulation
 
 
 def _one_or_all(steps: FloatArray) -> float | FloatArray:

@@ -7,7 +7,7 @@ from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygons import PolygonMesh, which_repeat_a_vertex
 from heat_igl.mesh.projection import ClosestPoints, closest_points
-from heat_igl.mesh.regions import region_boundary, region_segments
+from heat_igl.mesh.regions import region_boundary
 from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
 from heat_igl.mesh.subdivision import split_long_edges
 from heat_igl.mesh.surface_curves import curve_on, edge_curve
@@ -41,7 +41,6 @@ __all__ = [
     "level_segments",
     "read_paths_with",
     "region_boundary",
-    "region_segments",
     "split_long_edges",
     "triangulated",
     "which_repeat_a_vertex",

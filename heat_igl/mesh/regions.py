@@ -11,7 +11,7 @@ from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import SurfaceCurve, require_triangles
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray
 
-__all__ = ["region_boundary", "region_segments"]
+__all__ = ["region_boundary"]
 
 
 def region_boundary(
@@ -45,27 +45,24 @@ def region_boundary(
     if (faces is None) == (vertices is None):
         raise SourceError("give one mask of the region: faces or vertices")
     if faces is not None:
-        mask = _checked_mask("faces", faces, triangles.n_faces)
-        return joined_segments(region_segments(triangles, faces=mask))
-    mask = _checked_mask("vertices", vertices, triangles.n_vertices)
-    return joined_segments(region_segments(triangles, vertices=mask))
-
-
-def region_segments(mesh: Mesh, *, faces: BoolArray | None = None, vertices: BoolArray | None = None) -> Segments:
-    """The segments of `region_boundary`, for checked masks."""
-    if faces is None:
-        segments = level_segments(mesh, np.where(vertices, 0.0, 1.0), 0.5)
+        segments = _along_edges(triangles, _checked_mask("faces", faces, triangles.n_faces))
     else:
-        edges, n_edges = mesh.facets.of_face, len(mesh.facets.vertices)
-        n_inside = np.bincount(edges[faces].ravel(), minlength=n_edges)
-        leaves = (n_inside > 0) & (n_inside < mesh.facets.n_faces)
-        face, corner = np.nonzero(leaves[edges] & faces[:, None])
-        tail, head = (corner + 1) % 3, (corner + 2) % 3
-        ends = np.stack([mesh.F[face, tail], mesh.F[face, head]], axis=1)
-        segments = Segments(face, np.eye(3)[tail], np.eye(3)[head], ends)
+        mask = _checked_mask("vertices", vertices, triangles.n_vertices)
+        segments = level_segments(triangles, np.where(mask, 0.0, 1.0), 0.5)
     if not len(segments.faces):
         raise SourceError("the region has no boundary inside the mesh: it is empty, or consists of whole components")
-    return segments
+    return joined_segments(segments)
+
+
+def _along_edges(mesh: Mesh, is_inside: BoolArray) -> Segments:
+    """The sides of faces (m,) of a region at which other faces lie, in the direction around the faces."""
+    edges = mesh.facets.of_face
+    n_inside = np.bincount(edges[is_inside].ravel(), minlength=len(mesh.facets.vertices))
+    leaves = (n_inside > 0) & (n_inside < mesh.facets.n_faces)
+    face, corner = np.nonzero(leaves[edges] & is_inside[:, None])
+    tail, head = (corner + 1) % 3, (corner + 2) % 3
+    ends = np.stack([mesh.F[face, tail], mesh.F[face, head]], axis=1)
+    return Segments(face, np.eye(3)[tail], np.eye(3)[head], ends)
 
 
 def _checked_mask(name: str, mask: ArrayLike | None, size: int) -> BoolArray:

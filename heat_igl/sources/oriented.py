@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import SourceError
-from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, region_segments
+from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, region_boundary
 from heat_igl.sources.specification import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -166,10 +166,11 @@ def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray
             + (f", {why}" if n == m else "")
         )
     try:
-        found = region_segments(mesh, vertices=mask) if len(mask) == n else region_segments(mesh, faces=mask)
+        loops = region_boundary(mesh, vertices=mask) if len(mask) == n else region_boundary(mesh, faces=mask)
     except SourceError as error:
         raise SourceError(f"{name}: {error}") from None
-    return found.faces, found.start, found.end
+    faces, start, end = zip(*((loop.faces, loop.start, loop.end) for loop in loops), strict=True)
+    return np.concatenate(faces), np.concatenate(start), np.concatenate(end)
 
 
 def _check_faces(name: str, faces: IntArray, mesh: Mesh) -> None:
