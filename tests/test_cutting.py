@@ -88,7 +88,9 @@ def test_the_surface_stays_and_curves_become_edges(name):
         assert length[found.curve == i].sum() == pytest.approx(drawn_length(mesh, curve), rel=1e-12)
 
 
-@pytest.mark.parametrize("name", ["across faces", "crosses itself", "from boundary to boundary", "straight along a row"])
+@pytest.mark.parametrize(
+    "name", ["across faces", "crosses itself", "from boundary to boundary", "straight along a row"]
+)
 def test_distances_stay(name):
     mesh, curves = CURVES[name]()
     found = cut(mesh, curves).mesh

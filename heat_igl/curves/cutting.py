@@ -277,9 +277,9 @@ class _Cut:
         for edge in mesh.facets.of_face[face].tolist():
             smaller, larger = (vertices.index(v) for v in mesh.facets.vertices[edge].tolist())
             for step, number in self._on_edge.get(edge, ()):
-                point = [0, 0, 0]
-                point[smaller], point[larger] = _STEPS - step, step
-                points.append((point[0], point[1], point[2]))
+                at = [0, 0, 0]
+                at[smaller], at[larger] = _STEPS - step, step
+                points.append((at[0], at[1], at[2]))
                 vertices.append(number)
         pairs, labels = self._inside(face, segments, points, vertices)
         points, triangles, chains = cut_triangle(points, pairs, flat)
@@ -356,4 +356,4 @@ def _on_grid(barycentric: FloatArray) -> IntArray:
     steps = np.rint(kept * _STEPS).astype(np.int64)
     # The largest takes what rounding leaves over.
     steps[np.arange(len(steps)), steps.argmax(axis=1)] += _STEPS - steps.sum(axis=1)
-    return steps
+    return np.asarray(steps)

@@ -147,7 +147,7 @@ def _corner_rotations(triangulation: IntrinsicTriangulation, angles: PolarAngles
     # Half-edge 3 f + c leaves from corner c + 1.
     at_corner = np.roll(leaving.reshape(-1, 3), 1, axis=1)
     in_face = np.stack([np.zeros(len(F)), np.pi - inside[:, 1], 2 * np.pi - inside[:, 1] - inside[:, 2]], axis=1)
-    return np.exp(1j * (in_face + inside / 2 - at_corner - scale[F] * inside / 2))
+    return np.asarray(np.exp(1j * (in_face + inside / 2 - at_corner - scale[F] * inside / 2)))
 
 
 def _triangles(domain: Operators) -> tuple[IntrinsicTriangulation, PolarAngles]:

@@ -139,11 +139,9 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
             segments.append((faces, start, end, np.full(len(faces), i)))
     no_segments = (np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.int64))
     no_points = (np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, np.int64), np.empty((0, 3)))
-    return OrientedSet(
-        *(np.concatenate(column) for column in zip(no_segments, *segments, strict=True)),
-        *(np.concatenate(column) for column in zip(no_points, *points, strict=True)),
-        n_labels=len(parts),
-    )
+    faces, start, end, label = (np.concatenate(column) for column in zip(no_segments, *segments, strict=True))
+    at, barycentric, label_at, normals = (np.concatenate(column) for column in zip(no_points, *points, strict=True))
+    return OrientedSet(faces, start, end, label, at, barycentric, label_at, normals, len(parts))
 
 
 def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -169,8 +167,11 @@ def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray
         loops = region_boundary(mesh, vertices=mask) if len(mask) == n else region_boundary(mesh, faces=mask)
     except SourceError as error:
         raise SourceError(f"{name}: {error}") from None
-    faces, start, end = zip(*((loop.faces, loop.start, loop.end) for loop in loops), strict=True)
-    return np.concatenate(faces), np.concatenate(start), np.concatenate(end)
+    return (
+        np.concatenate([loop.faces for loop in loops]),
+        np.concatenate([loop.start for loop in loops]),
+        np.concatenate([loop.end for loop in loops]),
+    )
 
 
 def _check_faces(name: str, faces: IntArray, mesh: Mesh) -> None:
