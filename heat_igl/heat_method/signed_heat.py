@@ -62,15 +62,15 @@ class SignedHeatSolver:
     ----------
     mesh : mesh
         Triangles, manifold and oriented alike; whatever `as_mesh` takes.
+    refine : {"unfold", "exact"}, optional
+        Take the size from `HeatMethodSolver` with the same `refine`,
+        measured from the curves, and in gaps between them from the zero curve of the integrated distance. The sign is
+        that of the integrated distance, and where no curve has a gap, that of the region, in both cases.
     t_coef : float, optional
         t = t_coef h^2, with h the mean edge length of the intrinsic Delaunay triangulation; 0.25 by default. Larger
         values close wide gaps with rounder curves, and smooth noisy ones.
     t : float, optional
         Time step as a squared length; overrides `t_coef`. It is raised where heat would not cross the mesh.
-    refine : {"unfold", "exact"}, optional
-        Take the size from `HeatMethodSolver` with the same `refine`,
-        measured from the curves, and in gaps between them from the zero curve of the integrated distance. The sign is
-        that of the integrated distance, and where no curve has a gap, that of the region, in both cases.
     backend : {"auto", "scipy", "multifrontal"}
         Linear solver, see `factorize`.
 
@@ -92,9 +92,9 @@ class SignedHeatSolver:
         self,
         mesh: MeshLike,
         *,
+        refine: Refine | None = None,
         t_coef: float | None = None,
         t: float | None = None,
-        refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> None:
         options = SolverOptions(_T_COEF if t_coef is None and t is None else t_coef, t, refine=refine, backend=backend)
