@@ -74,7 +74,7 @@ if TYPE_CHECKING:
     from heat_igl import baselines, cluster, reference
     from heat_igl.curves import CutMesh, cut
     from heat_igl.drawing import plots
-    from heat_igl.heat_method import SignedHeatSolver
+    from heat_igl.heat_method import SignedHeatSolver, VoxelBox, volume_signed_distance
     from heat_igl.mesh import region_boundary
     from heat_igl.sources import OrientedPoints
     from heat_igl.validation import ValidationReport, ValidationRow, closed_forms, metrics, shapes, validate
@@ -111,6 +111,7 @@ __all__ = [
     "ValidationRow",
     "VectorHeatSolver",
     "VoronoiCells",
+    "VoxelBox",
     "as_mesh",
     "baselines",
     "closed_forms",
@@ -157,6 +158,7 @@ __all__ = [
     "trace_geodesic",
     "unfolded_distance",
     "validate",
+    "volume_signed_distance",
     "voronoi_cells",
     "write_curves",
     "write_mesh",
@@ -169,6 +171,7 @@ _LAZY = {
     "CutMesh": "curves.cutting",
     "OrientedPoints": "sources.oriented",
     "SignedHeatSolver": "heat_method.signed_heat",
+    "VoxelBox": "heat_method.signed_volumes",
     "ValidationReport": "validation.report",
     "ValidationRow": "validation.report",
     "baselines": "baselines",
@@ -182,6 +185,7 @@ _LAZY = {
     "sample_mesh": "validation.samples",
     "shapes": "validation.shapes",
     "validate": "validation",
+    "volume_signed_distance": "heat_method.signed_volumes",
 }
 
 # Modules that users import by these names: earlier name -> the module in its room.

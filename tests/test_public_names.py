@@ -25,7 +25,7 @@ offset_curves pair_distances plots point_cloud_operators polygon_operators read_
 read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
 tangent_frames trace_geodesic
 unfolded_distance validate voronoi_cells write_curves write_mesh
-CutMesh OrientedPoints SignedHeatSolver cut region_boundary
+CutMesh OrientedPoints SignedHeatSolver VoxelBox cut region_boundary volume_signed_distance
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they
@@ -77,6 +77,8 @@ SignedHeatSolver(mesh, *, refine=None, t_coef=None, t=None, backend='auto')
 SignedHeatSolver.distance(self, curves, *, unsigned=None, level='zero')
 cut(mesh, curves)
 region_boundary(mesh, *, faces=None, vertices=None)
+VoxelBox(origin, spacing, shape)
+volume_signed_distance(domain, surface, *, t_coef=1.0)
 closest_points(mesh, positions)
 curve_on(mesh, positions, *, closed=False, tolerance=None)
 edge_curve(mesh, vertices, *, closed=False)
