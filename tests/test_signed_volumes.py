@@ -86,7 +86,7 @@ def test_points_with_normals():
 def test_reversed_faces_change_the_sign():
     box = VoxelBox([0, 0, 0], 1 / 16, [17, 17, 17])
     # Off the grid: a grid point in the centre of a sphere has no direction but that of rounding.
-    mesh = Mesh(ball().V + [0.011, 0.017, 0.007], ball().F)
+    mesh = Mesh(ball().V + np.array([0.011, 0.017, 0.007]), ball().F)
     inside_out = Mesh(mesh.V, mesh.F[:, ::-1])
     np.testing.assert_allclose(volume_signed_distance(box, inside_out), -volume_signed_distance(box, mesh), atol=1e-10)
 
