@@ -8,6 +8,8 @@ from heat_igl.runtime.aliases import alias_modules
 if TYPE_CHECKING:
     from heat_igl import baselines, cluster, reference, sampling
     from heat_igl.curves import (
+        CutMesh,
+        cut,
         enclosed_areas,
         exp_map,
         isolines,
@@ -31,9 +33,12 @@ if TYPE_CHECKING:
         HeatMethodSolver,
         HeatSolution,
         LabelledDistance,
+        SignedHeatSolver,
         VectorHeatSolver,
+        VoxelBox,
         geodesic_distance,
         heat_method_distance,
+        volume_signed_distance,
     )
     from heat_igl.intrinsic import TangentFrames, tangent_frames
     from heat_igl.io import (
@@ -59,6 +64,7 @@ if TYPE_CHECKING:
         curve_on,
         edge_curve,
         image_domain,
+        region_boundary,
         split_long_edges,
     )
     from heat_igl.operators import (
@@ -80,7 +86,7 @@ if TYPE_CHECKING:
         geodesic_centre,
         voronoi_cells,
     )
-    from heat_igl.sources import OffsetSources
+    from heat_igl.sources import OffsetSources, OrientedPoints
     from heat_igl.unfolding import Refinement, distances_within, nearest_vertices, pair_distances, unfolded_distance
     from heat_igl.validation import ValidationReport, ValidationRow, closed_forms, metrics, shapes, validate
     from heat_igl.validation.samples import sample_mesh
@@ -89,6 +95,7 @@ __all__ = [
     "AccuracyWarning",
     "BatchError",
     "ClosestPoints",
+    "CutMesh",
     "Diagnostics",
     "FactorizationError",
     "HeatMethodSolver",
@@ -101,10 +108,12 @@ __all__ = [
     "MissingExtraError",
     "OffsetSources",
     "Operators",
+    "OrientedPoints",
     "PointCloud",
     "PolygonMesh",
     "ReferenceSolverError",
     "Refinement",
+    "SignedHeatSolver",
     "SourceError",
     "SurfaceCurve",
     "SurfacePoints",
@@ -113,6 +122,7 @@ __all__ = [
     "ValidationRow",
     "VectorHeatSolver",
     "VoronoiCells",
+    "VoxelBox",
     "as_mesh",
     "baselines",
     "closed_forms",
@@ -120,6 +130,7 @@ __all__ = [
     "cluster",
     "connection_laplacian",
     "curve_on",
+    "cut",
     "diameter",
     "distance_matrix",
     "distances_within",
@@ -148,6 +159,7 @@ __all__ = [
     "read_point_cloud",
     "read_polygon_mesh",
     "reference",
+    "region_boundary",
     "sample_mesh",
     "sampling",
     "shapes",
@@ -159,6 +171,7 @@ __all__ = [
     "trace_geodesic",
     "unfolded_distance",
     "validate",
+    "volume_signed_distance",
     "voronoi_cells",
     "write_curves",
     "write_mesh",
@@ -172,6 +185,7 @@ _LAZY = {
     "AccuracyWarning": "errors",
     "BatchError": "errors",
     "ClosestPoints": "mesh",
+    "CutMesh": "curves",
     "Diagnostics": "heat_method",
     "FactorizationError": "errors",
     "HeatMethodSolver": "heat_method",
@@ -184,10 +198,12 @@ _LAZY = {
     "MissingExtraError": "errors",
     "OffsetSources": "sources",
     "Operators": "operators",
+    "OrientedPoints": "sources",
     "PointCloud": "mesh",
     "PolygonMesh": "mesh",
     "ReferenceSolverError": "errors",
     "Refinement": "unfolding",
+    "SignedHeatSolver": "heat_method",
     "SourceError": "errors",
     "SurfaceCurve": "mesh",
     "SurfacePoints": "mesh",
@@ -196,6 +212,7 @@ _LAZY = {
     "ValidationRow": "validation.report",
     "VectorHeatSolver": "heat_method",
     "VoronoiCells": "sampling",
+    "VoxelBox": "heat_method",
     "as_mesh": "mesh",
     "baselines": "baselines",
     "closed_forms": "validation.closed_forms",
@@ -205,6 +222,7 @@ _LAZY = {
     "connection_laplacian": "operators",
     "curve_on": "mesh",
     "curves": "curves",
+    "cut": "curves",
     "diameter": "sampling",
     "distance_matrix": "sampling",
     "distances_within": "unfolding",
@@ -240,6 +258,7 @@ _LAZY = {
     "read_point_cloud": "io",
     "read_polygon_mesh": "io",
     "reference": "reference",
+    "region_boundary": "mesh",
     "runtime": "runtime",
     "sample_mesh": "validation.samples",
     "sampling": "sampling",
@@ -256,6 +275,7 @@ _LAZY = {
     "unfolded_distance": "unfolding",
     "unfolding": "unfolding",
     "validate": "validation",
+    "volume_signed_distance": "heat_method",
     "voronoi_cells": "sampling",
     "write_curves": "io",
     "write_mesh": "io",

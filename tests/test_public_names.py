@@ -26,6 +26,7 @@ read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_ope
 tangent_frames trace_geodesic
 unfolded_distance validate voronoi_cells write_curves write_mesh write_point_cloud
 fibre_metric metric_operators
+CutMesh OrientedPoints SignedHeatSolver VoxelBox cut region_boundary volume_signed_distance
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they
@@ -74,6 +75,13 @@ VectorHeatSolver(mesh, *, t_coef=None, t=None, refine=None, backend='auto')
 VectorHeatSolver.extend(self, sources, values)
 VectorHeatSolver.transport(self, sources, vectors)
 VectorHeatSolver.log_map(self, source)
+OrientedPoints(points, normals)
+SignedHeatSolver(mesh, *, refine=None, t_coef=None, t=None, backend='auto')
+SignedHeatSolver.distance(self, curves, *, unsigned=None, level='zero')
+cut(mesh, curves)
+region_boundary(mesh, *, faces=None, vertices=None)
+VoxelBox(origin, spacing, shape)
+volume_signed_distance(domain, surface, *, t_coef=1.0)
 closest_points(mesh, positions)
 curve_on(mesh, positions, *, closed=False, tolerance=None)
 edge_curve(mesh, vertices, *, closed=False)
