@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from heat_igl.runtime.aliases import alias_modules
 
 if TYPE_CHECKING:
-    from heat_igl import baselines, cluster, reference, sampling
+    from heat_igl import cluster, reference, sampling
     from heat_igl.curves import (
         CutMesh,
         cut,
@@ -76,6 +76,7 @@ if TYPE_CHECKING:
         polygon_operators,
         speed_operators,
     )
+    from heat_igl.reference import baselines
     from heat_igl.sampling import (
         VoronoiCells,
         diameter,
@@ -214,7 +215,7 @@ _LAZY = {
     "VoronoiCells": "sampling",
     "VoxelBox": "heat_method",
     "as_mesh": "mesh",
-    "baselines": "baselines",
+    "baselines": "reference.baselines",
     "closed_forms": "validation.closed_forms",
     "closest_points": "mesh",
     "cluster": "cluster",
@@ -284,6 +285,7 @@ _LAZY = {
 
 # Modules that users import by these names, most of them earlier ones: name -> the module in its room.
 _EARLIER_NAMES = {
+    "baselines": "reference.baselines",
     "closed_forms": "validation.closed_forms",
     "demo": "cli.demo",
     "factorization": "linear",
