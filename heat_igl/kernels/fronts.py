@@ -112,27 +112,18 @@ class _Fronts:
         """
         n: cython.Py_ssize_t = self.order.shape[0]
         i: cython.Py_ssize_t = 0
-        again: cython.Py_ssize_t = n  # from where to begin once more when the end is reached
-        back: cython.Py_ssize_t
+        behind: cython.Py_ssize_t = n  # lowest rank of what was passed and is stale again
         goes_back: cython.bint = self.positions.shape[0] > 0 and self.sources.shape[0] == 1
         self.n_visits = 0
-        while self.n_visits < MOST_VISITS * n:
-            if i == n:
-                if again == n:
-                    break
-                i, again = again, n
+        while i < n and self.n_visits < MOST_VISITS * n:
             v: cython.int = self.order[i]
             i += 1
-            if not self.is_stale[v]:
-                continue
-            self.is_stale[v] = False
-            self.n_visits += 1
-            back = self.visit(v)
-            if back < i:
-                if goes_back and self.n_visits < GO_BACK * n:
-                    i = back
-                else:
-                    again = min(again, back)
+            if self.is_stale[v]:
+                self.is_stale[v] = False
+                self.n_visits += 1
+                behind = min(behind, self.visit(v))
+            if behind < i and (i == n or (goes_back and self.n_visits < GO_BACK * n)):
+                i, behind = behind, n
 
     @cython.cfunc
     @cython.nogil
