@@ -101,17 +101,19 @@ class SolverParts:
         return Elements(self.operators)
 
     @cached_property
-    def fitted_weights(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def fitted_weights(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """What the fitted flow knows of each of ``elements.pairs``, to be differentiated.
 
         Its cotangent weight, not below 0; the length x of its shortest side in units of sqrt(t); `fit` and `fit_slope`
-        of x.
+        of x. Last, of each side (m, 3) the time step times that factor, 0 where the weight is.
         """
         elements = self.elements
         pair, first = elements.pairs
         t = self.time_steps[self.operators.components[elements.i.ravel()[first]]]
         x = elements.l.ravel()[first] / np.sqrt(t)
-        return np.maximum(np.bincount(pair, elements.weight.ravel()), 0.0), x, fit(x), fit_slope(x)
+        weight, factor = np.maximum(np.bincount(pair, elements.weight.ravel()), 0.0), fit(x)
+        of_side = np.where(weight > 0, t * factor, 0.0)[pair].reshape(-1, 3)
+        return weight, x, factor, fit_slope(x), of_side
 
     @property
     def given_faces(self) -> IntArray | None:
