@@ -58,6 +58,18 @@ def book() -> Picture:
     return plot(mesh, phi, sources=40, view=(35, 35))
 
 
+def scribble() -> Picture:
+    """Signed distance from a loop with four gaps."""
+    mesh = shapes.torus(160, 80)
+    angle = np.linspace(0, 2 * np.pi, 200)
+    x = np.cos(angle) * (0.55 + 0.15 * np.cos(3 * angle))
+    loop = np.stack([0.9 + 0.55 * x, np.sin(angle) * 0.6, np.full(200, 0.39)], axis=1)
+    places = heat_igl.closest_points(mesh, loop).points.positions(mesh)
+    arcs = [heat_igl.curve_on(mesh, places[i : i + 36]) for i in (0, 50, 100, 150)]
+    phi = heat_igl.SignedHeatSolver(mesh, refine="unfold").distance(arcs)
+    return plot_field(mesh, phi, label="signed distance", limits=(-1, 1), spacing=0.1, curves=arcs, view=(10, 60))
+
+
 def asked() -> Page:
     """An interactive page: a click moves the source."""
     mesh = shapes.torus(100, 50)
@@ -65,7 +77,7 @@ def asked() -> Page:
     return page(mesh, phi, sources=0, view=(30, 50), title="Distance on a torus", method="Distance by the heat method.")
 
 
-ENTRIES = (torus, bunny, heat, error, book, asked)
+ENTRIES = (torus, bunny, heat, error, book, scribble, asked)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
