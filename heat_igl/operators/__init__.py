@@ -7,9 +7,12 @@ from heat_igl.operators.connection import (
     face_rotations,
     with_rotations,
 )
+from heat_igl.operators.element_derivatives import Elements, ElementSlopes
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
-from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
+from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators, without_refinement
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian, divergence_matrix
+from heat_igl.operators.metric import fibre_metric, metric_operators
+from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.point_clouds import point_cloud_operators
 from heat_igl.operators.polygons import polygon_operators
 from heat_igl.operators.simplices import cotan_operators
@@ -20,8 +23,11 @@ from heat_igl.operators.triangles import operators, tufted_operators, unfolding_
 
 __all__ = [
     "EdgeLengths",
+    "ElementSlopes",
+    "Elements",
     "FaceRotations",
     "Laplacian",
+    "MetricSimplices",
     "OnLaplacian",
     "Operators",
     "Surface",
@@ -32,9 +38,11 @@ __all__ = [
     "divergence_matrix",
     "edge_length_operators",
     "edge_rotations",
+    "fibre_metric",
     "face_rotations",
     "intrinsic_operators",
     "is_rough_or_narrow",
+    "metric_operators",
     "operators",
     "point_cloud_operators",
     "polygon_operators",
@@ -42,4 +50,5 @@ __all__ = [
     "tufted_operators",
     "unfolding_surface",
     "with_rotations",
+    "without_refinement",
 ]

@@ -28,7 +28,7 @@ class VectorHeatFlow:
     operators : Operators
         The domain.
     rotations : (n, n) csc_matrix of complex128
-        What transport along the edges multiplies by, as `edge_rotations` gives it for triangles.
+        Factors of transport along the edges, as `edge_rotations` gives it for triangles.
     t : float or (n_components,) float64
         Time step, a squared length; one for all components, or one for each.
     backend : {"auto", "scipy", "multifrontal"}
