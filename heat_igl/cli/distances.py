@@ -145,9 +145,7 @@ def isolines(
     mesh: MeshArgument,
     source: Annotated[list[int], typer.Option(help="Source vertex, counted from 0; repeat for several.")],
     spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=positive)],
-    output: Annotated[
-        Path, typer.Option(help="OBJ, SVG or DXF file for the lines; dotted behind, in SVG.")
-    ],
+    output: Annotated[Path, typer.Option(help="OBJ, SVG or DXF file for the lines; dotted behind, in SVG.")],
     refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
     json_file: JsonOption = None,
 ) -> None:
