@@ -425,7 +425,7 @@ def test_labels_have_one_colour_each_and_neighbours_others() -> None:
 def test_between_two_labels_is_no_third() -> None:
     """A square of two triangles; each corner of a triangle has a third of it."""
     mesh = shapes.grid(1)
-    diagonal = [v for v in range(4) if (mesh.F == v).sum() == 2]
+    diagonal = [v for v in range(4) if (v == mesh.F).sum() == 2]
     labels = np.zeros(4, int)
     labels[[diagonal[1], np.setdiff1d(mesh.F[1], diagonal)[0]]] = [2, 1]
     image = surface_image(plot_labels(mesh, labels))
