@@ -241,7 +241,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             result.save(out / f"{name}.png")
             shown = f"![{title}]({name}.png)"
             # The sections below bring the pictures into this folder of the site.
-            thumbnails.append(f'<a href="#{name}"><img src="_images/{name}.png" alt="{title}">{_short(title)}</a>')
+            link, picture = name.replace("_", "-"), f'<img src="_images/{name}.png" alt="{title}">'
+            thumbnails.append(f'<a href="#{link}">{picture}{_short(title)}</a>')
         else:
             result.save(out / "pages" / f"{name}.html")
             shown = f'<iframe src="{name}.html" style="width: 100%; height: 520px; border: 0"></iframe>'
