@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import igl
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
 from heat_igl.curves import tracing
+from heat_igl.curves.places import places, snapped
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
-from heat_igl.intrinsic import corner_angles
-from heat_igl.mesh import ON_SIDE, Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
-from heat_igl.sources import Sources, named_vertices, source_set
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
+from heat_igl.sources import Sources, source_set
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["shortest_paths"]
 
-# Edges are at least this long, in mean edge lengths: the kernel divides by lengths.
-_SHORTEST = 1e-12
 # A path passes a source vertex whose distance is below the offset of the source by more than this share, the rounding
 # of refined distances: the vertex is nearer to another source.
 _SAME_DISTANCE = 1e-9
@@ -81,7 +78,7 @@ def shortest_paths(
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")
     values = _values(mesh, distance, sources)
-    face, barycentric = _points("targets", mesh, targets)
+    face, barycentric = places("targets", mesh, targets)
     goals = tracing.goals(*_goals(mesh, values, sources))
     lost = (goals.escape < 0) & ~_roots(mesh, goals.is_source, goals.first_inside)
     lost = lost[mesh.F[face, 0]]
@@ -92,7 +89,7 @@ def shortest_paths(
             "components): leave out targets at infinite distance"
         )
     most_steps = 4 * mesh.n_faces + 100
-    faces, points, first_segment = tracing.trace(_surface(mesh), values, goals, face, barycentric, most_steps)
+    faces, points, first_segment = tracing.trace(tracing.surface(mesh), values, goals, face, barycentric, most_steps)
     parts = np.split(np.arange(len(faces)), first_segment[1:-1])
     return [SurfaceCurve(faces[part], points[part, 0], points[part, 1]) for part in parts]
 
@@ -121,30 +118,6 @@ def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver | None, sources: 
     return values
 
 
-def _points(name: str, mesh: Mesh, points: Sources) -> tuple[IntArray, FloatArray]:
-    """Faces and barycentric coordinates of points, or of vertices in the order given."""
-    if isinstance(points, SurfacePoints):
-        try:
-            points.positions(mesh)  # which checks the faces
-        except SourceError as error:
-            raise SourceError(f"{name}: {error}") from None
-        return points.faces, _snapped(points.barycentric)
-    vertex = named_vertices(points, mesh.n_vertices, name)
-    corner_at = np.full(mesh.n_vertices, -1)
-    corner_at[mesh.F.ravel()] = np.arange(mesh.F.size)
-    corner = corner_at[vertex]
-    if (corner < 0).any():
-        first = int(np.argmax(corner < 0))
-        raise SourceError(f"{name}[{first}] = {vertex[first]} is a vertex that no face uses: no path starts there")
-    return corner // 3, np.eye(3)[corner % 3]
-
-
-def _snapped(barycentric: FloatArray) -> FloatArray:
-    """Barycentric coordinates with those below `ON_SIDE` set to 0."""
-    weights = np.where(barycentric < ON_SIDE, 0.0, barycentric)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
-
-
 def _goals(
     mesh: Mesh, values: FloatArray, sources: Sources | None
 ) -> tuple[BoolArray, IntArray, FloatArray, FloatArray, IntArray]:
@@ -156,7 +129,7 @@ def _goals(
     found = source_set(sources, mesh.n_vertices, mesh.F)
     points, segments = found.points, found.segments
     face = np.concatenate([points.faces, segments.faces])
-    start, end = (_snapped(np.concatenate([points.barycentric, there])) for there in (segments.start, segments.end))
+    start, end = (snapped(np.concatenate([points.barycentric, there])) for there in (segments.start, segments.end))
     inside, offset = np.stack([start, end], axis=1), np.concatenate([points.offset, segments.offset])
 
     is_source = np.zeros(mesh.n_vertices, bool)
@@ -213,12 +186,3 @@ def _ways_out(mesh: Mesh, values: FloatArray, roots: BoolArray) -> IntArray:
     tree = csgraph.minimum_spanning_tree(graph.tocsr())
     previous = csgraph.breadth_first_order(tree, n, directed=False)[1][:n]
     return np.where((previous < 0) | (previous == n), -1, previous).astype(np.int64)
-
-
-def _surface(mesh: Mesh) -> tracing.Surface:
-    """The tables of the kernel."""
-    # Not mollified: mollification gives a flat triangle some height, and would bend the paths across it.
-    lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
-    return tracing.surface(
-        mesh.F, lengths, corner_angles(lengths), mesh.facets.of_face, mesh.n_vertices, len(mesh.facets.n_faces)
-    )

@@ -1,0 +1,36 @@
+"""Points and vertices as places in faces, for the kernels of paths."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heat_igl.errors import SourceError
+from heat_igl.mesh import ON_SIDE, Mesh, SurfacePoints
+from heat_igl.sources import Sources, named_vertices
+from heat_igl.typing import FloatArray, IntArray
+
+__all__ = ["places", "snapped"]
+
+
+def places(name: str, mesh: Mesh, points: Sources) -> tuple[IntArray, FloatArray]:
+    """Faces (k,) and barycentric coordinates (k, 3) of points, or of vertices in the order given."""
+    if isinstance(points, SurfacePoints):
+        try:
+            points.positions(mesh)  # which checks the faces
+        except SourceError as error:
+            raise SourceError(f"{name}: {error}") from None
+        return points.faces, snapped(points.barycentric)
+    vertex = named_vertices(points, mesh.n_vertices, name)
+    corner_at = np.full(mesh.n_vertices, -1)
+    corner_at[mesh.F.ravel()] = np.arange(mesh.F.size)
+    corner = corner_at[vertex]
+    if (corner < 0).any():
+        first = int(np.argmax(corner < 0))
+        raise SourceError(f"{name}[{first}] = {vertex[first]} is a vertex that no face uses: no path starts there")
+    return corner // 3, np.eye(3)[corner % 3]
+
+
+def snapped(barycentric: FloatArray) -> FloatArray:
+    """Barycentric coordinates with those below `ON_SIDE` set to 0."""
+    weights = np.where(barycentric < ON_SIDE, 0.0, barycentric)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
