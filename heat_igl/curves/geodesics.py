@@ -1,0 +1,171 @@
+"""Geodesics by class: curves straightened, and paths and loops through waypoints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+
+from heat_igl.curves import tracing
+from heat_igl.curves.places import places
+from heat_igl.curves.routes import Router
+from heat_igl.curves.shortening import Course, course_of, shorten
+from heat_igl.errors import MeshError, SourceError
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
+from heat_igl.sources import Sources
+from heat_igl.typing import FloatArray, IntArray
+
+__all__ = ["GeodesicPathSolver", "Waypoints", "geodesic_path", "straighten"]
+
+# Vertices, points, or a sequence of both.
+Waypoints = Sources | Sequence[int | SurfacePoints]
+
+_COLUMNS = ("faces", "start", "end")
+
+
+def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
+    """The locally shortest curve of the class of a curve.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles, also with edges of more than two faces.
+    curve : SurfaceCurve
+        Any curve on the mesh: along edges, through faces, over itself. An open one keeps its ends; a closed one is
+        straightened as a loop, without a fixed point.
+
+    Returns
+    -------
+    SurfaceCurve
+        Never longer than `curve`, and of the same homotopy class: it can be moved there on the surface. It is straight
+        across edges and has angles of at least pi on both sides at each vertex that it touches, where the surface goes
+        on there, so no curve nearby is shorter. A loop that contracts to a point is a single segment of length 0.
+
+    Raises
+    ------
+    MeshError
+        If the mesh is tetrahedral.
+    SourceError
+        If the curve is none of this mesh, a segment does not start where the one before it ends, or a closed curve has
+        no length.
+
+    Notes
+    -----
+    The curve gives a strip of faces, in which a funnel finds the shortest path (Lee and Preparata 1984). Where it bends
+    at a vertex with an angle below pi on the other side, the strip is led there (Xin and Wang 2007). A loop is
+    straightened from one of its points to itself, then from another one, until its length stays the same. On a surface
+    with hills one class can have several locally shortest curves.
+    """
+    return GeodesicPathSolver(mesh).straighten(curve)
+
+
+def geodesic_path(mesh: MeshLike, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
+    """The geodesic through waypoints, or the closed geodesic in the class of the loop through them.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles, also with edges of more than two faces.
+    waypoints : sequence of int, SurfacePoints, or a sequence of both
+        Two or more vertices or points on faces; three or more for a loop.
+    closed : bool
+        Whether a last part leads back to the first waypoint, and the loop is straightened as a whole: then it leaves
+        the waypoints. For a loop that passes them, name the first one at the end again.
+
+    Returns
+    -------
+    SurfaceCurve
+        An open one passes all waypoints in the given order, and is locally shortest from each to the next. A closed one
+        is locally shortest everywhere.
+
+    Raises
+    ------
+    MeshError
+        If the mesh is tetrahedral.
+    SourceError
+        If there are too few waypoints, one is no vertex or point of the mesh or cannot be reached from the one before
+        it, or if the loop contracts to a point.
+
+    Notes
+    -----
+    The first course is the shortest way along edges and straight lines from corner to corner across an edge, and it is
+    shortened as by `straighten`. Between far points with hills in between it may pass a hill on the longer side:
+    for the shortest path of all, pass an exact distance to `shortest_paths`.
+    """
+    return GeodesicPathSolver(mesh).path(waypoints, closed)
+
+
+class GeodesicPathSolver:
+    """Geodesics of one mesh: makes the tables once for many calls of `straighten` and `geodesic_path`.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles, also with edges of more than two faces.
+
+    Raises
+    ------
+    MeshError
+        If the mesh is tetrahedral.
+
+    Notes
+    -----
+    Curves are independent of one another: they may cross, touch and overlap. Threads need a solver each.
+    """
+
+    def __init__(self, mesh: MeshLike) -> None:
+        self._mesh: Mesh = as_simplices(mesh)
+        if self._mesh.is_tetrahedral:
+            raise MeshError("paths need triangles, but the mesh is tetrahedral")
+        self._surface = tracing.surface(self._mesh)
+        self._router: Router | None = None
+
+    def straighten(self, curve: SurfaceCurve) -> SurfaceCurve:
+        """The locally shortest curve of the class of a curve; see `heat_igl.straighten`."""
+        if not isinstance(curve, SurfaceCurve):
+            raise SourceError(f"curve must be a SurfaceCurve, not {type(curve).__name__}: see edge_curve and curve_on")
+        course = course_of(self._mesh, curve)
+        if curve.is_closed and not curve.lengths(self._mesh).any():
+            raise SourceError("curve is closed and has no length: a loop needs two different points")
+        return shorten(self._surface, course, is_closed=curve.is_closed)
+
+    def path(self, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
+        """The geodesic through waypoints, or the closed one of their loop; see `geodesic_path`."""
+        faces, barycentric = _placed(self._mesh, waypoints)
+        needed = 3 if closed else 2
+        if len(faces) < needed:
+            raise SourceError(
+                f"waypoints must be {needed} places or more for a {'loop' if closed else 'path'}, not {len(faces)}"
+            )
+        if self._router is None:
+            self._router = Router(self._mesh, self._surface)
+        if not closed:
+            legs = [shorten(self._surface, leg, is_closed=False) for leg in self._router.legs(faces, barycentric)]
+            return SurfaceCurve(*(np.concatenate([getattr(leg, name) for leg in legs]) for name in _COLUMNS))
+        around = np.append(np.arange(len(faces)), 0)
+        courses = self._router.legs(faces[around], barycentric[around])
+        loop = Course(
+            np.concatenate([course.faces[:-1] for course in courses]),
+            np.concatenate([course.joins for course in courses]),
+            barycentric[[0, 0]],
+        )
+        found = shorten(self._surface, loop, is_closed=True)
+        if not found.lengths(self._mesh).any():
+            raise SourceError(
+                "the loop through the waypoints contracts to a point, so no closed geodesic belongs to it: lead it "
+                "around a handle, or name the first waypoint again at the end for a loop that passes all of them"
+            )
+        return found
+
+
+def _placed(mesh: Mesh, waypoints: Waypoints) -> tuple[IntArray, FloatArray]:
+    """Faces and barycentric coordinates of waypoints."""
+    if not isinstance(waypoints, Sequence) or not any(isinstance(point, SurfacePoints) for point in waypoints):
+        return places("waypoints", mesh, cast(Sources, waypoints))
+    parts = []
+    for i, point in enumerate(waypoints):
+        if not isinstance(point, SurfacePoints | int | np.integer):
+            raise SourceError(f"waypoints[{i}] must be a vertex or SurfacePoints, not {type(point).__name__}")
+        parts.append(places(f"waypoints[{i}]", mesh, point))
+    return np.concatenate([faces for faces, _ in parts]), np.concatenate([weights for _, weights in parts])
