@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl.curves import tracing
 from heat_igl.curves.places import places
 from heat_igl.curves.routes import Router
-from heat_igl.curves.shortening import Course, course_of, shorten
+from heat_igl.curves.shortening import Course, course_of, half_turns, shorten
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
 from heat_igl.sources import Sources
@@ -119,6 +119,7 @@ class GeodesicPathSolver:
         if self._mesh.is_tetrahedral:
             raise MeshError("paths need triangles, but the mesh is tetrahedral")
         self._surface = tracing.surface(self._mesh)
+        self._half_turn = half_turns(self._mesh, self._surface)
         self._router: Router | None = None
 
     def straighten(self, curve: SurfaceCurve) -> SurfaceCurve:
@@ -128,7 +129,7 @@ class GeodesicPathSolver:
         course = course_of(self._mesh, curve)
         if curve.is_closed and not curve.lengths(self._mesh).any():
             raise SourceError("curve is closed and has no length: a loop needs two different points")
-        return shorten(self._surface, course, is_closed=curve.is_closed)
+        return shorten(self._surface, self._half_turn, course, is_closed=curve.is_closed)
 
     def path(self, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
         """The geodesic through waypoints, or the closed one of their loop; see `geodesic_path`."""
@@ -141,7 +142,10 @@ class GeodesicPathSolver:
         if self._router is None:
             self._router = Router(self._mesh, self._surface)
         if not closed:
-            legs = [shorten(self._surface, leg, is_closed=False) for leg in self._router.legs(faces, barycentric)]
+            legs = [
+                shorten(self._surface, self._half_turn, leg, is_closed=False)
+                for leg in self._router.legs(faces, barycentric)
+            ]
             return SurfaceCurve(*(np.concatenate([getattr(leg, name) for leg in legs]) for name in _COLUMNS))
         around = np.append(np.arange(len(faces)), 0)
         courses = self._router.legs(faces[around], barycentric[around])
@@ -150,7 +154,7 @@ class GeodesicPathSolver:
             np.concatenate([course.joins for course in courses]),
             barycentric[[0, 0]],
         )
-        found = shorten(self._surface, loop, is_closed=True)
+        found = shorten(self._surface, self._half_turn, loop, is_closed=True)
         if not found.lengths(self._mesh).any():
             raise SourceError(
                 "the loop through the waypoints contracts to a point, so no closed geodesic belongs to it: lead it "

@@ -13,7 +13,7 @@ from heat_igl.kernels import shortening
 from heat_igl.mesh import Mesh, SurfaceCurve
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Course", "course_of", "shorten"]
+__all__ = ["Course", "course_of", "half_turns", "shorten"]
 
 # The compiled module, whose signatures are those of Cython.
 kernel: Any = shortening
@@ -88,14 +88,25 @@ def _joins(mesh: Mesh, f: IntArray, g: IntArray, at: FloatArray) -> tuple[AnyArr
     return joins, share
 
 
-def shorten(surface: Surface, course: Course, *, is_closed: bool) -> SurfaceCurve:
+def half_turns(mesh: Mesh, surface: Surface) -> FloatArray:
+    """The cosine (n,) of half the sum of the angles at each vertex; -1 at vertices that have one shortest side only.
+
+    These are vertices with angles of 2 pi or more, and those on the boundary and on edges of more than two faces.
+    """
+    triangle = surface.triangle
+    sums = np.bincount(triangle["vertex"].ravel(), triangle["angle"].ravel(), mesh.n_vertices)
+    sums[mesh.facets.vertices[mesh.facets.n_faces != 2]] = np.inf
+    return np.asarray(np.cos(np.minimum(sums, 2 * np.pi) / 2))
+
+
+def shorten(surface: Surface, half_turn: FloatArray, course: Course, *, is_closed: bool) -> SurfaceCurve:
     """The locally shortest curve of the class of a course: between the ends, or as a loop."""
     faces, joins, ends = course
-    stuck, found, points = kernel.shorten(surface, faces, joins, ends, is_closed)
+    stuck, found, points = kernel.shorten(surface, faces, joins, ends, half_turn, is_closed)
     if stuck >= 0:
         # A vertex alone joins two faces: the loop passes there in any case, so it is a path from there to there.
         vertex = joins[stuck, 2]
         faces, joins = np.roll(faces, -stuck - 1), np.roll(joins, -stuck - 1, axis=0)[:-1]
         at = (surface.triangle["vertex"][faces[[0, -1]]] == vertex).astype(float)
-        _, found, points = kernel.shorten(surface, faces, np.ascontiguousarray(joins), at, False)
+        _, found, points = kernel.shorten(surface, faces, np.ascontiguousarray(joins), at, half_turn, False)
     return SurfaceCurve(found, points[:, 0], points[:, 1], is_closed)

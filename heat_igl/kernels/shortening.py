@@ -7,11 +7,11 @@ with every such step unless the loop is locally shortest at the base too.
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.shortening import BOTH_WAYS, GAIN, MOST_BASES
+from cython.cimports.heat_igl.kernels.shortening import BOTH_WAYS, GAIN, LEAST_SAVING, MOST_BASES, MOST_TRIALS
 from cython.cimports.heat_igl.kernels.straightening import Course
-from cython.cimports.heat_igl.kernels.strips import Strip
-from cython.cimports.heat_igl.kernels.surfaces import SNAP, Place, Surface, corner_of, only_corner, side_of
-from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.heat_igl.kernels.strips import Sides, Strip
+from cython.cimports.heat_igl.kernels.surfaces import SNAP, Place, Surface, at_corner, corner_of, only_corner, side_of
+from cython.cimports.libc.math import INFINITY, acos, cos, sqrt
 
 __all__ = ["shorten"]
 
@@ -21,12 +21,14 @@ def shorten(
     face: cython.const[cython.int][::1],
     join: cython.const[cython.int][:, ::1],
     ends: cython.const[cython.double][:, ::1],
+    half_turn: cython.const[cython.double][::1],
     is_closed: cython.bint,
 ):
     """A curve made shortest in its class; see `heat_igl.curves.shortening.shorten`."""
     follower = _Follower()
     follower.course = Course(Surface(surface, np.empty(0)), int(np.diff(surface.first_corner).max()))
-    follower.ring = Strip()
+    follower.kept, follower.tried = Strip(), np.empty(MOST_TRIALS, np.int32)
+    follower.half_turn = half_turn
     stuck: cython.int
     with cython.nogil:
         stuck = follower.follow(face, join, ends, is_closed)
@@ -38,11 +40,15 @@ def shorten(
 @cython.final
 @cython.cclass
 class _Follower:
-    """A curve on its way, and the crossings of a loop from its base on, all the way around."""
+    """A curve on its way."""
 
     course: Course
-    ring: Strip
-    end: Place  # where a loop ends that is based at no vertex: the start in the last face
+    kept: Strip  # the strip before a change
+    half_turn: cython.const[cython.double][::1]
+    # The vertices whose other side was tried since the last that made the path shorter.
+    tried: cython.int[::1]
+    n_tried: cython.int
+    end: Place  # where the curve ends in the last face; for a loop, the start there
 
     @cython.cfunc
     @cython.nogil
@@ -75,7 +81,8 @@ class _Follower:
         if is_closed:
             self.tighten()
         else:
-            self.straighten_to_end()
+            i = self.course.n_segments
+            self.pass_better(i, self.straighten_to_end())
         return -1
 
     @cython.cfunc
@@ -84,13 +91,131 @@ class _Follower:
     def straighten_to_end(self) -> cython.double:
         """Straighten the path to `end`, and append it; returns its length."""
         v: cython.int = self.vertex_at(self.course.last_face(), cython.address(self.end))
+        length: cython.double
         if v >= 0:
-            return self.course.straighten(v, cython.NULL)
+            length = self.course.straighten(v, cython.NULL)
+            self.end = at_corner(corner_of(self.course.s, self.course.last_face(), v))
+            return length
         ends: Place[2]
         ends[0] = ends[1] = self.end
-        length: cython.double = self.course.straighten(-1, ends)
+        length = self.course.straighten(-1, ends)
         self.end = ends[0]
         return length
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def pass_better(self, first: cython.int, length: cython.double) -> cython.double:
+        """Lead a straightened path of this length past vertices on the other side as long as that makes it shorter.
+
+        Its segments begin with `first`. Returns the length.
+        """
+        self.n_tried = 0
+        while self.n_tried < MOST_TRIALS:
+            copy(self.course.strip, self.kept)
+            face: cython.int = self.course.face
+            start: Place = self.course.start
+            end: Place = self.end
+            if not self.change_side():
+                break
+            self.course.n_segments = first
+            trial: cython.double = self.straighten_to_end()
+            if trial < length * (1.0 - GAIN):
+                length = trial
+                self.n_tried = 0
+            else:
+                copy(self.kept, self.course.strip)
+                self.course.face, self.course.start, self.end = face, start, end
+                self.course.n_segments = first
+                self.straighten_to_end()
+        return length
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def change_side(self) -> cython.int:
+        """Lead the strip past the most promising vertex on the other side; 0 if there is none.
+
+        A vertex promises a shorter way if the path, seen from there, spans more than half of the angles around it.
+        """
+        best: cython.double = 0.0
+        at: cython.int = -1
+        side_at: cython.int = 0
+        i: cython.int
+        j: cython.int
+        side: cython.int
+        for i in range(1, self.course.layout.n_bends):
+            p = cython.address(self.course.layout.bend[i - 1])
+            q = cython.address(self.course.layout.bend[i])
+            squared: cython.double = (q.x - p.x) * (q.x - p.x) + (q.y - p.y) * (q.y - p.y)
+            for j in range(p.last + 1, q.first):
+                gate = cython.address(self.course.layout.gate[j])
+                for side in range(2):
+                    v: cython.int = gate.vertex[side]
+                    half: cython.double = self.half_turn[v]
+                    if half <= -1.0 or (j > p.last + 1 and self.course.layout.gate[j - 1].vertex[side] == v):
+                        continue
+                    px: cython.double = p.x - gate.x[side]
+                    py: cython.double = p.y - gate.y[side]
+                    qx: cython.double = q.x - gate.x[side]
+                    qy: cython.double = q.y - gate.y[side]
+                    product: cython.double = sqrt((px * px + py * py) * (qx * qx + qy * qy))
+                    spanned: cython.double = px * qx + py * qy
+                    if not spanned < half * product or self.is_tried(v):
+                        continue
+                    # The angle on the other side is 2 (half turn) - spanned.
+                    turn: cython.double = 2.0 * acos(half) - acos(max(spanned / product, -1.0))
+                    saved: cython.double = 2.0 * (product * cos(turn) - spanned) / squared
+                    if saved > best:
+                        best, at, side_at = saved, j, side
+        if at < 0 or best < LEAST_SAVING:
+            return 0
+        return self.lead_around(at, side_at)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def is_tried(self, v: cython.int) -> cython.bint:
+        """Whether the other side of v has been tried."""
+        i: cython.int
+        for i in range(self.n_tried):
+            if self.tried[i] == v:
+                return True
+        return False
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def lead_around(self, at: cython.int, side: cython.int) -> cython.int:
+        """Lead the strip the other way around the vertex at a side of the crossing `at`, and note that it was tried."""
+        v: cython.int = self.course.layout.gate[at].vertex[side]
+        first: cython.int = at
+        last: cython.int = at
+        j: cython.int
+        self.tried[self.n_tried] = v
+        self.n_tried += 1
+        while first > 0 and self.course.layout.gate[first - 1].vertex[side] == v:
+            first -= 1
+        while last + 1 < self.course.strip.count and self.course.layout.gate[last + 1].vertex[side] == v:
+            last += 1
+        h: cython.int = self.kept.crossing[first].leave
+        g: cython.int = self.kept.crossing[last].enter
+        before: Sides
+        after: Sides
+        before.this, before.other, after.this, after.other = INFINITY, 0.0, 0.0, 0.0
+        count: cython.int = -1
+        if h // 3 != g // 3:
+            count = self.course.detour.find(self.course.s, v, h, before, g // 3, -1, g, after, INFINITY)
+        if count < 0:
+            return 1
+        self.course.strip.count = 0
+        for j in range(first):
+            self.course.strip.push(self.kept.crossing[j].leave, self.kept.crossing[j].enter)
+        for j in range(count):
+            self.course.strip.push(self.course.detour.way[j].leave, self.course.detour.way[j].enter)
+        for j in range(last + 1, self.kept.count):
+            self.course.strip.push(self.kept.crossing[j].leave, self.kept.crossing[j].enter)
+        return 1
 
     @cython.cfunc
     @cython.nogil
@@ -239,12 +364,22 @@ class _Follower:
     def turn_ring(self, at: cython.int) -> cython.int:
         """Make the strip begin after the crossing `at` and end before it."""
         j: cython.int
-        self.ring.count = 0
-        for j in range(at + 1, self.course.strip.count):
-            self.ring.push(self.course.strip.crossing[j].leave, self.course.strip.crossing[j].enter)
-        for j in range(at):
-            self.ring.push(self.course.strip.crossing[j].leave, self.course.strip.crossing[j].enter)
+        copy(self.course.strip, self.kept)
         self.course.strip.count = 0
-        for j in range(self.ring.count):
-            self.course.strip.push(self.ring.crossing[j].leave, self.ring.crossing[j].enter)
+        for j in range(at + 1, self.kept.count):
+            self.course.strip.push(self.kept.crossing[j].leave, self.kept.crossing[j].enter)
+        for j in range(at):
+            self.course.strip.push(self.kept.crossing[j].leave, self.kept.crossing[j].enter)
         return 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(-1, check=False)
+def copy(this: Strip, there: Strip) -> cython.int:
+    """Copy a strip."""
+    j: cython.int
+    there.count = 0
+    for j in range(this.count):
+        there.push(this.crossing[j].leave, this.crossing[j].enter)
+    return 0
