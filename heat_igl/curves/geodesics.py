@@ -7,10 +7,9 @@ from typing import cast
 
 import numpy as np
 
-from heat_igl.curves import tracing
 from heat_igl.curves.places import places
 from heat_igl.curves.routes import Router
-from heat_igl.curves.shortening import Course, course_of, half_turns, shorten
+from heat_igl.curves.shortening import Course, Shortened, as_curve, course_of, shorten, tables
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
 from heat_igl.sources import Sources
@@ -20,8 +19,6 @@ __all__ = ["GeodesicPathSolver", "Waypoints", "geodesic_path", "straighten"]
 
 # Vertices, points, or a sequence of both.
 Waypoints = Sources | Sequence[int | SurfacePoints]
-
-_COLUMNS = ("faces", "start", "end")
 
 
 def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
@@ -118,8 +115,7 @@ class GeodesicPathSolver:
         self._mesh: Mesh = as_simplices(mesh)
         if self._mesh.is_tetrahedral:
             raise MeshError("paths need triangles, but the mesh is tetrahedral")
-        self._surface = tracing.surface(self._mesh)
-        self._half_turn = half_turns(self._mesh, self._surface)
+        self._tables = tables(self._mesh)
         self._router: Router | None = None
 
     def straighten(self, curve: SurfaceCurve) -> SurfaceCurve:
@@ -129,7 +125,7 @@ class GeodesicPathSolver:
         course = course_of(self._mesh, curve)
         if curve.is_closed and not curve.lengths(self._mesh).any():
             raise SourceError("curve is closed and has no length: a loop needs two different points")
-        return shorten(self._surface, self._half_turn, course, is_closed=curve.is_closed)
+        return as_curve([self._shortened(course, is_closed=curve.is_closed)], is_closed=curve.is_closed)
 
     def path(self, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
         """The geodesic through waypoints, or the closed one of their loop; see `geodesic_path`."""
@@ -140,27 +136,32 @@ class GeodesicPathSolver:
                 f"waypoints must be {needed} places or more for a {'loop' if closed else 'path'}, not {len(faces)}"
             )
         if self._router is None:
-            self._router = Router(self._mesh, self._surface)
-        if not closed:
-            legs = [
-                shorten(self._surface, self._half_turn, leg, is_closed=False)
-                for leg in self._router.legs(faces, barycentric)
-            ]
-            return SurfaceCurve(*(np.concatenate([getattr(leg, name) for leg in legs]) for name in _COLUMNS))
-        around = np.append(np.arange(len(faces)), 0)
-        courses = self._router.legs(faces[around], barycentric[around])
+            self._router = Router(self._mesh, self._tables.surface)
+        if closed:
+            around = np.append(np.arange(len(faces)), 0)
+            return self._loop(self._router.legs(faces[around], barycentric[around]))
+        # Each of the two ways may lead past a hill on the longer side.
+        ways = (self._router.legs(faces, barycentric, crosses=crosses) for crosses in (True, False))
+        legs = [min(map(self._shortened, pair), key=lambda found: found.length) for pair in zip(*ways, strict=True)]
+        return as_curve(legs, is_closed=False)
+
+    def _loop(self, legs: list[Course]) -> SurfaceCurve:
+        """The closed geodesic of the loop that these legs make."""
         loop = Course(
-            np.concatenate([course.faces[:-1] for course in courses]),
-            np.concatenate([course.joins for course in courses]),
-            barycentric[[0, 0]],
+            np.concatenate([leg.faces[:-1] for leg in legs]),
+            np.concatenate([leg.joins for leg in legs]),
+            legs[0].ends[[0, 0]],
         )
-        found = shorten(self._surface, self._half_turn, loop, is_closed=True)
-        if not found.lengths(self._mesh).any():
+        found = self._shortened(loop, is_closed=True)
+        if not found.length > 0:
             raise SourceError(
                 "the loop through the waypoints contracts to a point, so no closed geodesic belongs to it: lead it "
                 "around a handle, or name the first waypoint again at the end for a loop that passes all of them"
             )
-        return found
+        return as_curve([found], is_closed=True)
+
+    def _shortened(self, course: Course, *, is_closed: bool = False) -> Shortened:
+        return shorten(self._tables, course, is_closed=is_closed)
 
 
 def _placed(mesh: Mesh, waypoints: Waypoints) -> tuple[IntArray, FloatArray]:

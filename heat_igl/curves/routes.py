@@ -67,8 +67,8 @@ class Router:
         self._surface = surface
         self._roads = kernel.Roads(surface, *_straight_across(surface), mesh.V)
 
-    def legs(self, faces: IntArray, barycentric: FloatArray) -> list[Course]:
-        """The k - 1 courses between places (k,), each from one to the next.
+    def legs(self, faces: IntArray, barycentric: FloatArray, *, crosses: bool = True) -> list[Course]:
+        """The k - 1 courses between places (k,), each from one to the next; without `crosses` along edges only.
 
         Raises
         ------
@@ -77,13 +77,12 @@ class Router:
         """
         found = []
         for i in range(len(faces) - 1):
-            between, joins = self._leg(faces, barycentric, i)
+            between, joins = self._leg(faces, barycentric, i, crosses)
             ends = faces[i : i + 2].astype(np.int32)
-            run = np.concatenate([ends[:1], between, ends[1:]])
-            found.append(Course(run, joins, barycentric[i : i + 2]))
+            found.append(Course(np.concatenate([ends[:1], between, ends[1:]]), joins, barycentric[i : i + 2]))
         return found
 
-    def _leg(self, faces: IntArray, barycentric: FloatArray, i: int) -> tuple[AnyArray, AnyArray]:
+    def _leg(self, faces: IntArray, barycentric: FloatArray, i: int, crosses: bool) -> tuple[AnyArray, AnyArray]:
         """Faces and joins from place i to the next."""
         if faces[i] == faces[i + 1]:
             return np.empty(0, np.int32), np.full((1, 3), -1, np.int32)
@@ -96,7 +95,7 @@ class Router:
             corners.append(vertices[held])
             costs.append(np.linalg.norm(mesh.V[vertices[held]] - point, axis=1))
             points.append(point)
-        found = self._roads.route(corners[0], costs[0], corners[1], costs[1], points[1])
+        found = self._roads.route(corners[0], costs[0], corners[1], costs[1], points[1], crosses)
         if found is None:
             raise SourceError(
                 f"no path leads from waypoints[{i}] to waypoints[{i + 1}]: they lie on different components of the mesh"

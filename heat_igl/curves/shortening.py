@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from heat_igl.curves.places import snapped
-from heat_igl.curves.tracing import Surface
+from heat_igl.curves.tracing import Surface, surface
 from heat_igl.errors import SourceError
 from heat_igl.kernels import shortening
 from heat_igl.mesh import Mesh, SurfaceCurve
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Course", "course_of", "half_turns", "shorten"]
+__all__ = ["Course", "Shortened", "Tables", "as_curve", "course_of", "shorten", "tables"]
 
 # The compiled module, whose signatures are those of Cython.
 kernel: Any = shortening
@@ -39,6 +40,33 @@ class Course(NamedTuple):
     faces: AnyArray
     joins: AnyArray
     ends: FloatArray
+
+
+class Tables(NamedTuple):
+    """What shortening reads of a mesh.
+
+    Attributes
+    ----------
+    surface : Surface
+        The triangles.
+    half_turn : (n,) float64
+        The cosine of half the sum of the angles at each vertex. -1 where a path that is shortest on one side of the
+        vertex is shortest of all: at angles of 2 pi or more, on the boundary, and on edges of more than two faces.
+    most_corners : int
+        The largest number of faces at a vertex.
+    """
+
+    surface: Surface
+    half_turn: FloatArray
+    most_corners: int
+
+
+class Shortened(NamedTuple):
+    """A shortened curve: its length, faces (s,), and barycentric coordinates (s, 2, 3) of both ends of each segment."""
+
+    length: float
+    faces: IntArray
+    points: FloatArray
 
 
 def course_of(mesh: Mesh, curve: SurfaceCurve) -> Course:
@@ -88,25 +116,30 @@ def _joins(mesh: Mesh, f: IntArray, g: IntArray, at: FloatArray) -> tuple[AnyArr
     return joins, share
 
 
-def half_turns(mesh: Mesh, surface: Surface) -> FloatArray:
-    """The cosine (n,) of half the sum of the angles at each vertex; -1 at vertices that have one shortest side only.
-
-    These are vertices with angles of 2 pi or more, and those on the boundary and on edges of more than two faces.
-    """
-    triangle = surface.triangle
+def tables(mesh: Mesh) -> Tables:
+    """The tables of a triangle mesh."""
+    found = surface(mesh)
+    triangle = found.triangle
     sums = np.bincount(triangle["vertex"].ravel(), triangle["angle"].ravel(), mesh.n_vertices)
     sums[mesh.facets.vertices[mesh.facets.n_faces != 2]] = np.inf
-    return np.asarray(np.cos(np.minimum(sums, 2 * np.pi) / 2))
+    most_corners = int(np.diff(found.first_corner).max())
+    return Tables(found, np.cos(np.minimum(sums, 2 * np.pi) / 2), most_corners)
 
 
-def shorten(surface: Surface, half_turn: FloatArray, course: Course, *, is_closed: bool) -> SurfaceCurve:
+def shorten(of: Tables, course: Course, *, is_closed: bool) -> Shortened:
     """The locally shortest curve of the class of a course: between the ends, or as a loop."""
     faces, joins, ends = course
-    stuck, found, points = kernel.shorten(surface, faces, joins, ends, half_turn, is_closed)
+    stuck, *found = kernel.shorten(*of, faces, joins, ends, is_closed)
     if stuck >= 0:
         # A vertex alone joins two faces: the loop passes there in any case, so it is a path from there to there.
         vertex = joins[stuck, 2]
         faces, joins = np.roll(faces, -stuck - 1), np.roll(joins, -stuck - 1, axis=0)[:-1]
-        at = (surface.triangle["vertex"][faces[[0, -1]]] == vertex).astype(float)
-        _, found, points = kernel.shorten(surface, faces, np.ascontiguousarray(joins), at, half_turn, False)
-    return SurfaceCurve(found, points[:, 0], points[:, 1], is_closed)
+        at = (of.surface.triangle["vertex"][faces[[0, -1]]] == vertex).astype(float)
+        _, *found = kernel.shorten(*of, faces, np.ascontiguousarray(joins), at, False)
+    return Shortened(*found)
+
+
+def as_curve(parts: Sequence[Shortened], *, is_closed: bool) -> SurfaceCurve:
+    """One curve of parts that follow one another."""
+    points = np.concatenate([part.points for part in parts])
+    return SurfaceCurve(np.concatenate([part.faces for part in parts]), points[:, 0], points[:, 1], is_closed)

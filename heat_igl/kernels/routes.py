@@ -37,6 +37,7 @@ class Roads:
     heap: Entry[::1]
     n_heap: cython.int
     goal: cython.double[3]
+    crosses: cython.bint
 
     def __init__(self, surface, across, opposite, position):
         self.s = Surface(surface, np.empty(0))
@@ -46,18 +47,19 @@ class Roads:
         self.over, self.done, self.touched = np.empty(n, np.int32), np.zeros(n, np.uint8), np.empty(n, np.int32)
         self.heap = np.empty(1024, _ENTRY)
 
-    def route(self, start, start_cost, goal, goal_cost, point):
+    def route(self, start, start_cost, goal, goal_cost, point, crosses):
         """The best way from one of the vertices `start` to one of `goal`; the costs there are added.
 
         Returns the faces (k,) that it runs in, and the joins (k + 1, 3) before, between and after them: the half-edge
         that is left, the one that is entered, and the vertex to turn around; -1 for none. None if there is no way.
-        `point` is the place in space that `goal_cost` counts from.
+        `point` is the place in space that `goal_cost` counts from. Without `crosses`, the way follows edges only.
         """
         first: cython.const[cython.int][::1] = np.ascontiguousarray(start, np.int32)
         before: cython.const[cython.double][::1] = np.ascontiguousarray(start_cost, np.float64)
         last: cython.const[cython.int][::1] = np.ascontiguousarray(goal, np.int32)
         after: cython.const[cython.double][::1] = np.ascontiguousarray(goal_cost, np.float64)
         self.goal[0], self.goal[1], self.goal[2] = point
+        self.crosses = crosses
         v: cython.int
         with cython.nogil:
             v = self.search(first, before, last, after)
@@ -115,7 +117,7 @@ class Roads:
                 here: cython.double = self.length[v]
                 self.reach(t.vertex[a], here + t.length[b], v, f, -1)
                 self.reach(t.vertex[b], here + t.length[a], v, f, -1)
-                if self.across[h] < INFINITY:
+                if self.crosses and self.across[h] < INFINITY:
                     g: cython.int = self.opposite[h]
                     self.reach(self.s.triangle[g // 3].vertex[g % 3], here + self.across[h], v, f, h)
         return found

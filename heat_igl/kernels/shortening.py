@@ -18,23 +18,22 @@ __all__ = ["shorten"]
 
 def shorten(
     surface,
+    half_turn: cython.const[cython.double][::1],
+    most_corners: cython.int,
     face: cython.const[cython.int][::1],
     join: cython.const[cython.int][:, ::1],
     ends: cython.const[cython.double][:, ::1],
-    half_turn: cython.const[cython.double][::1],
     is_closed: cython.bint,
 ):
     """A curve made shortest in its class; see `heat_igl.curves.shortening.shorten`."""
     follower = _Follower()
-    follower.course = Course(Surface(surface, np.empty(0)), int(np.diff(surface.first_corner).max()))
+    follower.course = Course(Surface(surface, np.empty(0)), most_corners)
     follower.kept, follower.tried = Strip(), np.empty(MOST_TRIALS, np.int32)
     follower.half_turn = half_turn
     stuck: cython.int
     with cython.nogil:
         stuck = follower.follow(face, join, ends, is_closed)
-    if stuck >= 0:
-        return stuck, None, None
-    return -1, *follower.course.segments()
+    return stuck, follower.length, *follower.course.segments()
 
 
 @cython.final
@@ -48,6 +47,7 @@ class _Follower:
     # The vertices whose other side was tried since the last that made the path shorter.
     tried: cython.int[::1]
     n_tried: cython.int
+    length: cython.double
     end: Place  # where the curve ends in the last face; for a loop, the start there
 
     @cython.cfunc
@@ -76,13 +76,13 @@ class _Follower:
                 # Only this vertex joins the two faces.
                 if is_closed:
                     return i
-                self.course.straighten(v, cython.NULL)
+                self.length += self.course.straighten(v, cython.NULL)
                 self.course.begin(f, v, cython.address(x))
         if is_closed:
-            self.tighten()
+            self.length = self.tighten()
         else:
             i = self.course.n_segments
-            self.pass_better(i, self.straighten_to_end())
+            self.length += self.pass_better(i, self.straighten_to_end())
         return -1
 
     @cython.cfunc
@@ -228,14 +228,15 @@ class _Follower:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def tighten(self) -> cython.int:
-        """Append the shortest loop of the class of a loop that begins and ends in the first face."""
+    def tighten(self) -> cython.double:
+        """Append the shortest loop of the class of one that begins and ends in the first face; returns its length."""
         first: cython.int = self.course.n_segments
         shortest: cython.double = INFINITY
         n_stalled: cython.int = 0
+        length: cython.double = 0.0
         for _ in range(MOST_BASES):
             self.course.n_segments = first
-            length: cython.double = self.straighten_to_end()
+            length = self.straighten_to_end()
             if self.slide(length):
                 self.course.n_segments = first
                 length = self.straighten_to_end()
@@ -246,7 +247,7 @@ class _Follower:
                 break
             if not self.move_base():
                 break
-        return 0
+        return length
 
     @cython.cfunc
     @cython.nogil
@@ -280,7 +281,7 @@ class _Follower:
         dy += share * ey
         if not sqrt(dx * dx + dy * dy) < length * (1.0 - GAIN):
             return 0
-        self.place_base(f, a, b, g, a_end, b_end, share)
+        self.place_base(f, a, b, a_end, b_end, share)
         return 1
 
     @cython.cfunc
@@ -291,12 +292,11 @@ class _Follower:
         f: cython.int,
         a: cython.int,
         b: cython.int,
-        g: cython.int,
         a_end: cython.int,
         b_end: cython.int,
         share: cython.double,
     ) -> cython.void:
-        """Put the base `share` of the way from a to b: corners of the first face f, and of the last face g."""
+        """Put the base `share` of the way from a to b: corners of the first face f, and of the last face."""
         c: cython.int
         for c in range(3):
             self.course.start.c[c] = self.end.c[c] = 0.0
@@ -336,7 +336,6 @@ class _Follower:
             f,
             corner_of(self.course.s, f, right),
             corner_of(self.course.s, f, left),
-            g,
             corner_of(self.course.s, g, right),
             corner_of(self.course.s, g, left),
             share,
