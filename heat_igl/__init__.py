@@ -5,11 +5,15 @@ from typing import TYPE_CHECKING, Any
 
 from heat_igl import sampling
 from heat_igl.curves import (
+    GeodesicPathSolver,
     enclosed_areas,
     exp_map,
+    geodesic_path,
+    handle_loops,
     isolines,
     offset_curves,
     shortest_paths,
+    straighten,
     sublevel_areas,
     trace_geodesic,
 )
@@ -82,6 +86,7 @@ __all__ = [
     "ClosestPoints",
     "Diagnostics",
     "FactorizationError",
+    "GeodesicPathSolver",
     "HeatMethodSolver",
     "HeatSolution",
     "ImageDomain",
@@ -122,6 +127,8 @@ __all__ = [
     "farthest_points",
     "geodesic_centre",
     "geodesic_distance",
+    "geodesic_path",
+    "handle_loops",
     "heat_method_distance",
     "image_domain",
     "isolines",
@@ -143,6 +150,7 @@ __all__ = [
     "shortest_paths",
     "speed_operators",
     "split_long_edges",
+    "straighten",
     "sublevel_areas",
     "tangent_frames",
     "trace_geodesic",

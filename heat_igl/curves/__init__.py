@@ -1,15 +1,21 @@
 """Curves from a distance: isolines and the areas that they enclose, shortest paths."""
 
+from heat_igl.curves.geodesics import GeodesicPathSolver, geodesic_path, straighten
+from heat_igl.curves.handles import handle_loops
 from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas
 from heat_igl.curves.paths import shortest_paths
 from heat_igl.curves.straightest import exp_map, trace_geodesic
 
 __all__ = [
+    "GeodesicPathSolver",
     "enclosed_areas",
     "exp_map",
+    "geodesic_path",
+    "handle_loops",
     "isolines",
     "offset_curves",
     "shortest_paths",
+    "straighten",
     "sublevel_areas",
     "trace_geodesic",
 ]

@@ -240,9 +240,11 @@ class _Follower:
             if self.slide(length):
                 self.course.n_segments = first
                 length = self.straighten_to_end()
+            if not length < shortest * (1.0 - GAIN):
+                length = self.pass_better(first, length)
+            # One more base shows whether the loop is straight at the one before.
             n_stalled = 0 if length < shortest * (1.0 - GAIN) else n_stalled + 1
             shortest = min(shortest, length)
-            # One more base shows whether the loop is straight at the one before.
             if n_stalled == BOTH_WAYS or self.course.strip.count == 0:
                 break
             if not self.move_base():
