@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import cast
-
 import numpy as np
 
-from heat_igl.curves.places import places
+from heat_igl.curves.places import Waypoints, mixed_places
 from heat_igl.curves.routes import Router
 from heat_igl.curves.shortening import Course, Shortened, as_curve, course_of, shorten, tables
 from heat_igl.errors import MeshError, SourceError
-from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
-from heat_igl.sources import Sources
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["GeodesicPathSolver", "Waypoints", "geodesic_path", "straighten"]
-
-# Vertices, points, or a sequence of both.
-Waypoints = Sources | Sequence[int | SurfacePoints]
+__all__ = ["GeodesicPathSolver", "geodesic_path", "straighten"]
 
 
 def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
@@ -129,21 +122,48 @@ class GeodesicPathSolver:
 
     def path(self, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
         """The geodesic through waypoints, or the closed one of their loop; see `geodesic_path`."""
-        faces, barycentric = _placed(self._mesh, waypoints)
+        faces, barycentric = mixed_places("waypoints", self._mesh, waypoints)
         needed = 3 if closed else 2
         if len(faces) < needed:
             raise SourceError(
                 f"waypoints must be {needed} places or more for a {'loop' if closed else 'path'}, not {len(faces)}"
             )
-        if self._router is None:
-            self._router = Router(self._mesh, self._tables.surface)
         if closed:
             around = np.append(np.arange(len(faces)), 0)
-            return self._loop(self._router.legs(faces[around], barycentric[around]))
+            return self._loop(self._routes.legs(faces[around], barycentric[around]))
+        return as_curve(self._legs(faces, barycentric), is_closed=False)
+
+    def log_vectors(self, face: int, barycentric: FloatArray, faces: IntArray, ends: FloatArray) -> FloatArray:
+        """The log maps (k, 2) at a place inside a face, of places with barycentric coordinates `ends` (k, 3) in faces.
+
+        The first axis runs from corner 0 to corner 1 of the face, the second to the side of corner 2. A vector
+        has the length of the path to the place, and the direction in which this leaves.
+        """
+        corner = self._mesh.V[self._mesh.F[face]]
+        along, side = corner[1] - corner[0], corner[2] - corner[0]
+        along /= np.linalg.norm(along)
+        across = side - (side @ along) * along
+        axes = np.stack([along, across / np.linalg.norm(across)])
+        vectors = np.zeros((len(faces), 2))
+        for i in range(len(faces)):
+            leg = self._legs(np.array([face, faces[i]]), np.stack([barycentric, ends[i]]))[0]
+            if leg.length > 0:
+                first = int(np.argmax((leg.points[:, 0] != leg.points[:, 1]).any(axis=1)))
+                direction = axes @ ((leg.points[first, 1] - leg.points[first, 0]) @ corner)
+                vectors[i] = leg.length * direction / np.linalg.norm(direction)
+        return vectors
+
+    def _legs(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
+        """The geodesics between places (k,), each from one to the next."""
         # Each of the two ways may lead past a hill on the longer side.
-        ways = (self._router.legs(faces, barycentric, crosses=crosses) for crosses in (True, False))
-        legs = [min(map(self._shortened, pair), key=lambda found: found.length) for pair in zip(*ways, strict=True)]
-        return as_curve(legs, is_closed=False)
+        ways = (self._routes.legs(faces, barycentric, crosses=crosses) for crosses in (True, False))
+        return [min(map(self._shortened, pair), key=lambda found: found.length) for pair in zip(*ways, strict=True)]
+
+    @property
+    def _routes(self) -> Router:
+        if self._router is None:
+            self._router = Router(self._mesh, self._tables.surface)
+        return self._router
 
     def _loop(self, legs: list[Course]) -> SurfaceCurve:
         """The closed geodesic of the loop that these legs make."""
@@ -162,15 +182,3 @@ class GeodesicPathSolver:
 
     def _shortened(self, course: Course, *, is_closed: bool = False) -> Shortened:
         return shorten(self._tables, course, is_closed=is_closed)
-
-
-def _placed(mesh: Mesh, waypoints: Waypoints) -> tuple[IntArray, FloatArray]:
-    """Faces and barycentric coordinates of waypoints."""
-    if not isinstance(waypoints, Sequence) or not any(isinstance(point, SurfacePoints) for point in waypoints):
-        return places("waypoints", mesh, cast(Sources, waypoints))
-    parts = []
-    for i, point in enumerate(waypoints):
-        if not isinstance(point, SurfacePoints | int | np.integer):
-            raise SourceError(f"waypoints[{i}] must be a vertex or SurfacePoints, not {type(point).__name__}")
-        parts.append(places(f"waypoints[{i}]", mesh, point))
-    return np.concatenate([faces for faces, _ in parts]), np.concatenate([weights for _, weights in parts])

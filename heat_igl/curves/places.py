@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import cast
+
 import numpy as np
 
 from heat_igl.errors import SourceError
@@ -9,7 +12,10 @@ from heat_igl.mesh import ON_SIDE, Mesh, SurfacePoints
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["places", "snapped"]
+__all__ = ["Waypoints", "mixed_places", "places", "snapped"]
+
+# Vertices, points, or a sequence of both.
+Waypoints = Sources | Sequence[int | SurfacePoints]
 
 
 def places(name: str, mesh: Mesh, points: Sources) -> tuple[IntArray, FloatArray]:
@@ -28,6 +34,18 @@ def places(name: str, mesh: Mesh, points: Sources) -> tuple[IntArray, FloatArray
         first = int(np.argmax(corner < 0))
         raise SourceError(f"{name}[{first}] = {vertex[first]} is a vertex that no face uses: no path starts there")
     return corner // 3, np.eye(3)[corner % 3]
+
+
+def mixed_places(name: str, mesh: Mesh, points: Waypoints) -> tuple[IntArray, FloatArray]:
+    """The same for a sequence that holds both vertices and `SurfacePoints`."""
+    if not isinstance(points, Sequence) or not any(isinstance(point, SurfacePoints) for point in points):
+        return places(name, mesh, cast(Sources, points))
+    parts = []
+    for i, point in enumerate(points):
+        if not isinstance(point, SurfacePoints | int | np.integer):
+            raise SourceError(f"{name}[{i}] must be a vertex or SurfacePoints, not {type(point).__name__}")
+        parts.append(places(f"{name}[{i}]", mesh, cast(Sources, point)))
+    return np.concatenate([faces for faces, _ in parts]), np.concatenate([weights for _, weights in parts])
 
 
 def snapped(barycentric: FloatArray) -> FloatArray:
