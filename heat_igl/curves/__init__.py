@@ -1,8 +1,10 @@
 """Curves from a distance: isolines and the areas that they enclose, shortest paths."""
 
+from heat_igl.curves.bezier import geodesic_bezier
 from heat_igl.curves.geodesics import GeodesicPathSolver, geodesic_path, straighten
 from heat_igl.curves.handles import handle_loops
 from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas
+from heat_igl.curves.means import karcher_mean
 from heat_igl.curves.paths import shortest_paths
 from heat_igl.curves.straightest import exp_map, trace_geodesic
 
@@ -10,9 +12,11 @@ __all__ = [
     "GeodesicPathSolver",
     "enclosed_areas",
     "exp_map",
+    "geodesic_bezier",
     "geodesic_path",
     "handle_loops",
     "isolines",
+    "karcher_mean",
     "offset_curves",
     "shortest_paths",
     "straighten",

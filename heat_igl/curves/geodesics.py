@@ -131,7 +131,7 @@ class GeodesicPathSolver:
         if closed:
             around = np.append(np.arange(len(faces)), 0)
             return self._loop(self._routes.legs(faces[around], barycentric[around]))
-        return as_curve(self._legs(faces, barycentric), is_closed=False)
+        return as_curve(self.geodesics(faces, barycentric), is_closed=False)
 
     def log_vectors(self, face: int, barycentric: FloatArray, faces: IntArray, ends: FloatArray) -> FloatArray:
         """The log maps (k, 2) at a place inside a face, of places with barycentric coordinates `ends` (k, 3) in faces.
@@ -146,15 +146,15 @@ class GeodesicPathSolver:
         axes = np.stack([along, across / np.linalg.norm(across)])
         vectors = np.zeros((len(faces), 2))
         for i in range(len(faces)):
-            leg = self._legs(np.array([face, faces[i]]), np.stack([barycentric, ends[i]]))[0]
+            leg = self.geodesics(np.array([face, faces[i]]), np.stack([barycentric, ends[i]]))[0]
             if leg.length > 0:
                 first = int(np.argmax((leg.points[:, 0] != leg.points[:, 1]).any(axis=1)))
                 direction = axes @ ((leg.points[first, 1] - leg.points[first, 0]) @ corner)
                 vectors[i] = leg.length * direction / np.linalg.norm(direction)
         return vectors
 
-    def _legs(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
-        """The geodesics between places (k,), each from one to the next."""
+    def geodesics(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
+        """The geodesics between checked places (k,), each from one to the next."""
         # Each of the two ways may lead past a hill on the longer side.
         ways = (self._routes.legs(faces, barycentric, crosses=crosses) for crosses in (True, False))
         return [min(map(self._shortened, pair), key=lambda found: found.length) for pair in zip(*ways, strict=True)]

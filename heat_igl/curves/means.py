@@ -8,7 +8,7 @@ import numpy as np
 
 from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.curves.places import Waypoints, mixed_places
-from heat_igl.curves.straightest import exp_map
+from heat_igl.curves.straightest import Tracer
 from heat_igl.errors import AccuracyWarning, SourceError
 from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices
@@ -65,10 +65,10 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
     -----
     The search starts at the best vertex, by a near-exact distance query for each point: the mean is the global one
     where several places are locally best. Each step goes along the mean of the log maps v_i of the points, weighted
-    by w_i d_i^(p - 2): the Karcher iteration for p = 2 (Karcher 1977) and Weiszfeld's for p = 1. Its length
-    is halved until the sum falls, so the sum falls in every step. A median can be one of the points; it is if the unit
-    vectors to the others, weighted, sum to no more than the weight of this point (Vardi and Zhang 2000). Log maps are the
-    first directions and the lengths of straightened paths.
+    by w_i d_i^(p - 2): the Karcher iteration for p = 2 (Karcher 1977) and Weiszfeld's for p = 1. The step is halved
+    until the sum falls, so the sum falls in every step. A median can be one of the points: it is if the unit vectors to
+    the others, weighted, sum to no more than the weight of this point (Vardi and Zhang 2000). Log maps are the first
+    directions and the lengths of straightened paths.
     """
     triangles = as_simplices(mesh)
     faces, barycentric = mixed_places("points", triangles, points)
@@ -102,6 +102,7 @@ class _Search:
         self._faces, self._barycentric = faces, barycentric
         self._weight, self._power = weight / weight.sum(), power
         self._solver = GeodesicPathSolver(mesh)
+        self._tracer = Tracer(mesh)
 
     def found(self) -> SurfacePoints:
         """The point with the least sum."""
@@ -145,7 +146,7 @@ class _Search:
             step = self._direction(at)
             shortest = _CONVERGED * float(at.distances.max())
             while np.hypot(*step) > shortest:
-                end = exp_map(self._mesh, at.points, step[None])
+                end = self._tracer.exp(at.points, step[None])
                 trial = self._state(int(end.faces[0]), end.barycentric[0])
                 if trial.energy < at.energy:
                     break
