@@ -23,7 +23,8 @@ diameter distance_matrix distances_within dual_triangulation edge_curve enclosed
 farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain isolines metrics nearest_vertices
 offset_curves pair_distances plots point_cloud_operators polygon_operators read_attributes read_mesh read_point_cloud
 read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
-tangent_frames trace_geodesic
+tangent_frames trace_geodesic GeodesicPathSolver centroidal_voronoi geodesic_bezier geodesic_path handle_loops karcher_mean
+straighten
 unfolded_distance validate voronoi_cells write_curves write_mesh
 """.split()
 
@@ -66,6 +67,15 @@ shortest_paths(mesh, distance, targets, sources=None)
 tangent_frames(mesh)
 trace_geodesic(mesh, start, direction, length)
 exp_map(mesh, source, vectors)
+straighten(mesh, curve)
+geodesic_path(mesh, waypoints, closed=False)
+GeodesicPathSolver(mesh)
+GeodesicPathSolver.path(self, waypoints, closed=False)
+GeodesicPathSolver.straighten(self, curve)
+handle_loops(mesh)
+karcher_mean(mesh, points, weights=None, p=2)
+geodesic_bezier(mesh, points, pieces=32)
+centroidal_voronoi(mesh, sites, *, rounds=50)
 connection_laplacian(mesh, laplacian='intrinsic-delaunay')
 VectorHeatSolver(mesh, *, t_coef=None, t=None, refine=None, backend='auto')
 VectorHeatSolver.extend(self, sources, values)
@@ -137,6 +147,7 @@ RESULTS = {
     "HeatSolution": "heat direction distance t diagnostics",
     "LabelledDistance": "distance labels",
     "VoronoiCells": "sites distance labels",
+    "CentroidalSites": "sites labels energies",
 }
 
 
