@@ -8,7 +8,9 @@ from heat_igl.runtime.aliases import alias_modules
 if TYPE_CHECKING:
     from heat_igl import baselines, cluster, reference, sampling
     from heat_igl.curves import (
+        CentroidalSites,
         GeodesicPathSolver,
+        centroidal_voronoi,
         enclosed_areas,
         exp_map,
         geodesic_bezier,
@@ -84,6 +86,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AccuracyWarning",
     "BatchError",
+    "CentroidalSites",
     "ClosestPoints",
     "Diagnostics",
     "FactorizationError",
@@ -112,6 +115,7 @@ __all__ = [
     "VoronoiCells",
     "as_mesh",
     "baselines",
+    "centroidal_voronoi",
     "closed_forms",
     "closest_points",
     "curve_on",
@@ -170,6 +174,7 @@ __version__ = "0.1.0"
 _LAZY = {
     "AccuracyWarning": "errors",
     "BatchError": "errors",
+    "CentroidalSites": "curves",
     "ClosestPoints": "mesh",
     "Diagnostics": "heat_method",
     "FactorizationError": "errors",
@@ -198,6 +203,7 @@ _LAZY = {
     "VoronoiCells": "sampling",
     "as_mesh": "mesh",
     "baselines": "baselines",
+    "centroidal_voronoi": "curves",
     "closed_forms": "validation.closed_forms",
     "closest_points": "mesh",
     "cluster": "cluster",

@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 from conftest import flat_perturbed
 
-from heat_igl import Mesh, MeshError, SourceError, SurfacePoints, geodesic_bezier, karcher_mean, pair_distances, shapes
+from heat_igl import (
+    Mesh,
+    MeshError,
+    SourceError,
+    SurfacePoints,
+    centroidal_voronoi,
+    geodesic_bezier,
+    karcher_mean,
+    pair_distances,
+    shapes,
+    voronoi_cells,
+)
 
 CELLS = 12
 
@@ -152,3 +163,43 @@ def test_bad_arguments_of_means_are_told_apart(sphere):
     with pytest.raises(SourceError, match="two control points or more, not 1"):
         geodesic_bezier(sphere, [0])
     assert len(geodesic_bezier(sphere, [0, 1, 2], 2))
+
+
+def test_sites_become_centroidal():
+    mesh = shapes.grid(21)
+    found = centroidal_voronoi(mesh, [0, 1, 2, 23, 24, 46, 200, 300, 400])
+    assert (np.diff(found.energies) < 0).all()
+    assert len(np.unique(found.sites)) == 9
+    cells = voronoi_cells(mesh, found.sites)
+    np.testing.assert_array_equal(found.labels, cells.labels)
+    areas = np.bincount(mesh.F.ravel(), np.repeat(mesh.measures / 3, 3), mesh.n_vertices)
+    assert found.energies[-1] == pytest.approx(areas @ cells.distance**2, rel=1e-3)
+    # Hexagons are the best cells of a plane, and squares are better than what 9 cells of a square come to by chance.
+    hexagons = 5 / (18 * np.sqrt(3)) / 9
+    assert hexagons < found.energies[-1] < 1.4 * hexagons
+    means = np.stack([areas[found.labels == i] @ mesh.V[found.labels == i] for i in range(9)])
+    means /= np.bincount(found.labels, areas)[:, None]
+    assert np.linalg.norm(means - mesh.V[found.sites], axis=1).max() < 1.5 / 21
+
+
+def test_relaxation_stops_where_no_site_moves():
+    mesh = shapes.icosphere(3)
+    found = centroidal_voronoi(mesh, [0, 1, 2, 3, 4, 5])
+    again = centroidal_voronoi(mesh, found.sites)
+    np.testing.assert_array_equal(again.sites, found.sites)
+    assert len(again.energies) == 1
+    assert len(centroidal_voronoi(mesh, [0, 1, 2], rounds=0).energies) == 1
+
+
+def test_bad_sites_are_told_apart():
+    mesh = shapes.grid(4)
+    with pytest.raises(SourceError, match="sites must be distinct, but vertex 3 is there twice"):
+        centroidal_voronoi(mesh, [3, 3])
+    with pytest.raises(SourceError, match=r"sites\[1\] = 25 is no vertex"):
+        centroidal_voronoi(mesh, [3, 25])
+    with pytest.raises(ValueError, match="rounds must be an integer of at least 0"):
+        centroidal_voronoi(mesh, [3], rounds=-1)
+    loose = Mesh(np.concatenate([mesh.V, [[9, 9, 9]]]), mesh.F)
+    with pytest.raises(SourceError, match=r"sites\[1\] = 25 is a vertex that no face uses"):
+        centroidal_voronoi(loose, [3, 25])
+    assert len(centroidal_voronoi(mesh, [3]).sites) == 1

@@ -23,7 +23,8 @@ diameter distance_matrix distances_within dual_triangulation edge_curve enclosed
 farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain isolines metrics nearest_vertices
 offset_curves pair_distances plots point_cloud_operators polygon_operators read_attributes read_mesh read_point_cloud
 read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
-tangent_frames trace_geodesic GeodesicPathSolver centroidal_voronoi geodesic_bezier geodesic_path handle_loops karcher_mean
+tangent_frames trace_geodesic CentroidalSites GeodesicPathSolver centroidal_voronoi
+geodesic_bezier geodesic_path handle_loops karcher_mean
 straighten
 unfolded_distance validate voronoi_cells write_curves write_mesh
 """.split()

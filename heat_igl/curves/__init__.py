@@ -6,10 +6,13 @@ from heat_igl.curves.handles import handle_loops
 from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas
 from heat_igl.curves.means import karcher_mean
 from heat_igl.curves.paths import shortest_paths
+from heat_igl.curves.relaxation import CentroidalSites, centroidal_voronoi
 from heat_igl.curves.straightest import exp_map, trace_geodesic
 
 __all__ = [
+    "CentroidalSites",
     "GeodesicPathSolver",
+    "centroidal_voronoi",
     "enclosed_areas",
     "exp_map",
     "geodesic_bezier",
