@@ -1,4 +1,4 @@
-"""Commands that measure: a distance, isolines, a shortest path."""
+"""Commands that measure: a distance, isolines."""
 
 from __future__ import annotations
 
@@ -149,24 +149,6 @@ def isolines(
     print_rows([*rows, ("wrote", str(output))])
 
 
-def path(
-    mesh: MeshArgument,
-    start: Annotated[int, typer.Option("--from", help="Vertex where the path begins, counted from 0.")],
-    end: Annotated[int, typer.Option("--to", help="Vertex where it ends.")],
-    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the path.")],
-) -> None:
-    """A locally shortest path between two vertices."""
-    loaded = read_mesh(mesh)
-    for option, vertex in (("--from", start), ("--to", end)):
-        if not 0 <= vertex < loaded.n_vertices:
-            raise SourceError(f"{option} {vertex} is no vertex: the mesh has {loaded.n_vertices}, counted from 0")
-    check_curves(output)
-    found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), start, end)
-    heat_igl.write_curves(output, loaded, found)
-    length = float(found[0].lengths(loaded).sum())
-    print_rows([("length", f"{length:.6g}"), ("segments", str(len(found[0]))), ("wrote", str(output))])
-
-
 def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, picture: Path | None) -> list[Path]:
     drawn = None
     if picture is not None:
@@ -195,4 +177,4 @@ def _summary(path: Path, mesh: Mesh, phi: FloatArray) -> list[tuple[str, str]]:
     return [*rows, ("mean", f"{phi[finite].mean():.6g}")]
 
 
-COMMANDS = (distance, isolines, path)
+COMMANDS = (distance, isolines)

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 import heat_igl
-from heat_igl.cli import collections, comparison, distances, views
+from heat_igl.cli import collections, comparison, distances, paths, views
 from heat_igl.cli.output import say
 from heat_igl.errors import (
     AccuracyWarning,
@@ -33,7 +33,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _commands in (comparison, distances, views, collections):
+for _commands in (comparison, distances, paths, views, collections):
     for _command in _commands.COMMANDS:
         app.command()(_command)
 
