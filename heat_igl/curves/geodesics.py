@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.curves.places import Waypoints, mixed_places
+from heat_igl.curves.places import Waypoints, corners, mixed_places
 from heat_igl.curves.routes import Router
-from heat_igl.curves.shortening import Course, Shortened, as_curve, course_of, shorten, tables
+from heat_igl.curves.shortening import Course, Shortened, Shortener, as_curve, course_of
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.typing import FloatArray, IntArray
@@ -108,7 +108,8 @@ class GeodesicPathSolver:
         self._mesh: Mesh = as_simplices(mesh)
         if self._mesh.is_tetrahedral:
             raise MeshError("paths need triangles, but the mesh is tetrahedral")
-        self._tables = tables(self._mesh)
+        self._shortener = Shortener(self._mesh)
+        self._corner_at = corners(self._mesh)
         self._router: Router | None = None
 
     def straighten(self, curve: SurfaceCurve) -> SurfaceCurve:
@@ -118,11 +119,11 @@ class GeodesicPathSolver:
         course = course_of(self._mesh, curve)
         if curve.is_closed and not curve.lengths(self._mesh).any():
             raise SourceError("curve is closed and has no length: a loop needs two different points")
-        return as_curve([self._shortened(course, is_closed=curve.is_closed)], is_closed=curve.is_closed)
+        return as_curve([self._shortener.shortest(course, is_closed=curve.is_closed)], is_closed=curve.is_closed)
 
     def path(self, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
         """The geodesic through waypoints, or the closed one of their loop; see `geodesic_path`."""
-        faces, barycentric = mixed_places("waypoints", self._mesh, waypoints)
+        faces, barycentric = mixed_places("waypoints", self._mesh, waypoints, self._corner_at)
         needed = 3 if closed else 2
         if len(faces) < needed:
             raise SourceError(
@@ -157,12 +158,14 @@ class GeodesicPathSolver:
         """The geodesics between checked places (k,), each from one to the next."""
         # Each of the two ways may lead past a hill on the longer side.
         ways = (self._routes.legs(faces, barycentric, crosses=crosses) for crosses in (True, False))
-        return [min(map(self._shortened, pair), key=lambda found: found.length) for pair in zip(*ways, strict=True)]
+        return [
+            min(map(self._shortener.shortest, pair), key=lambda found: found.length) for pair in zip(*ways, strict=True)
+        ]
 
     @property
     def _routes(self) -> Router:
         if self._router is None:
-            self._router = Router(self._mesh, self._tables.surface)
+            self._router = Router(self._mesh, self._shortener.surface)
         return self._router
 
     def _loop(self, legs: list[Course]) -> SurfaceCurve:
@@ -172,13 +175,10 @@ class GeodesicPathSolver:
             np.concatenate([leg.joins for leg in legs]),
             legs[0].ends[[0, 0]],
         )
-        found = self._shortened(loop, is_closed=True)
+        found = self._shortener.shortest(loop, is_closed=True)
         if not found.length > 0:
             raise SourceError(
                 "the loop through the waypoints contracts to a point, so no closed geodesic belongs to it: lead it "
                 "around a handle, or name the first waypoint again at the end for a loop that passes all of them"
             )
         return as_curve([found], is_closed=True)
-
-    def _shortened(self, course: Course, *, is_closed: bool = False) -> Shortened:
-        return shorten(self._tables, course, is_closed=is_closed)

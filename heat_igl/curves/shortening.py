@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from heat_igl.curves.places import snapped
-from heat_igl.curves.tracing import Surface, surface
+from heat_igl.curves.tracing import surface
 from heat_igl.errors import SourceError
 from heat_igl.kernels import shortening
 from heat_igl.mesh import Mesh, SurfaceCurve
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Course", "Shortened", "Tables", "as_curve", "course_of", "shorten", "tables"]
+__all__ = ["Course", "Shortened", "Shortener", "as_curve", "course_of"]
 
 # The compiled module, whose signatures are those of Cython.
 kernel: Any = shortening
@@ -40,25 +40,6 @@ class Course(NamedTuple):
     faces: AnyArray
     joins: AnyArray
     ends: FloatArray
-
-
-class Tables(NamedTuple):
-    """What shortening reads of a mesh.
-
-    Attributes
-    ----------
-    surface : Surface
-        The triangles.
-    half_turn : (n,) float64
-        The cosine of half the sum of the angles at each vertex. -1 where a path that is shortest on one side of the
-        vertex is shortest of all: at angles of 2 pi or more, on the boundary, and on edges of more than two faces.
-    most_corners : int
-        The largest number of faces at a vertex.
-    """
-
-    surface: Surface
-    half_turn: FloatArray
-    most_corners: int
 
 
 class Shortened(NamedTuple):
@@ -116,27 +97,36 @@ def _joins(mesh: Mesh, f: IntArray, g: IntArray, at: FloatArray) -> tuple[AnyArr
     return joins, share
 
 
-def tables(mesh: Mesh) -> Tables:
-    """The tables of a triangle mesh."""
-    found = surface(mesh)
-    triangle = found.triangle
-    sums = np.bincount(triangle["vertex"].ravel(), triangle["angle"].ravel(), mesh.n_vertices)
-    sums[mesh.facets.vertices[mesh.facets.n_faces != 2]] = np.inf
-    most_corners = int(np.diff(found.first_corner).max())
-    return Tables(found, np.cos(np.minimum(sums, 2 * np.pi) / 2), most_corners)
+class Shortener:
+    """Shortens curves on a triangle mesh, one after another.
 
+    Attributes
+    ----------
+    surface : Surface
+        The triangles.
+    """
 
-def shorten(of: Tables, course: Course, *, is_closed: bool) -> Shortened:
-    """The locally shortest curve of the class of a course: between the ends, or as a loop."""
-    faces, joins, ends = course
-    stuck, *found = kernel.shorten(*of, faces, joins, ends, is_closed)
-    if stuck >= 0:
-        # A vertex alone joins two faces: the loop passes there in any case, so it is a path from there to there.
-        vertex = joins[stuck, 2]
-        faces, joins = np.roll(faces, -stuck - 1), np.roll(joins, -stuck - 1, axis=0)[:-1]
-        at = (of.surface.triangle["vertex"][faces[[0, -1]]] == vertex).astype(float)
-        _, *found = kernel.shorten(*of, faces, np.ascontiguousarray(joins), at, False)
-    return Shortened(*found)
+    def __init__(self, mesh: Mesh) -> None:
+        self.surface = surface(mesh)
+        triangle = self.surface.triangle
+        sums = np.bincount(triangle["vertex"].ravel(), triangle["angle"].ravel(), mesh.n_vertices)
+        # A path that is shortest on one side of a vertex is shortest of all if the angles sum to 2 pi or more, and on
+        # the boundary. On edges of more than two faces there are more than two sides.
+        sums[mesh.facets.vertices[mesh.facets.n_faces != 2]] = np.inf
+        half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
+        self._kernel = kernel.Shortener(self.surface, half_turn, int(np.diff(self.surface.first_corner).max()))
+
+    def shortest(self, course: Course, *, is_closed: bool = False) -> Shortened:
+        """The locally shortest curve of the class of a course: between the ends, or as a loop."""
+        faces, joins, ends = course
+        stuck, *found = self._kernel.shorten(faces, joins, ends, is_closed)
+        if stuck >= 0:
+            # A vertex alone joins two faces: the loop passes there in any case, so it is a path from there to there.
+            vertex = joins[stuck, 2]
+            faces, joins = np.roll(faces, -stuck - 1), np.roll(joins, -stuck - 1, axis=0)[:-1]
+            at = (self.surface.triangle["vertex"][faces[[0, -1]]] == vertex).astype(float)
+            _, *found = self._kernel.shorten(faces, np.ascontiguousarray(joins), at, False)
+        return Shortened(*found)
 
 
 def as_curve(parts: Sequence[Shortened], *, is_closed: bool) -> SurfaceCurve:

@@ -13,33 +13,13 @@ from cython.cimports.heat_igl.kernels.strips import Sides, Strip
 from cython.cimports.heat_igl.kernels.surfaces import SNAP, Place, Surface, at_corner, corner_of, only_corner, side_of
 from cython.cimports.libc.math import INFINITY, acos, cos, sqrt
 
-__all__ = ["shorten"]
-
-
-def shorten(
-    surface,
-    half_turn: cython.const[cython.double][::1],
-    most_corners: cython.int,
-    face: cython.const[cython.int][::1],
-    join: cython.const[cython.int][:, ::1],
-    ends: cython.const[cython.double][:, ::1],
-    is_closed: cython.bint,
-):
-    """A curve made shortest in its class; see `heat_igl.curves.shortening.shorten`."""
-    follower = _Follower()
-    follower.course = Course(Surface(surface, np.empty(0)), most_corners)
-    follower.kept, follower.tried = Strip(), np.empty(MOST_TRIALS, np.int32)
-    follower.half_turn = half_turn
-    stuck: cython.int
-    with cython.nogil:
-        stuck = follower.follow(face, join, ends, is_closed)
-    return stuck, follower.length, *follower.course.segments()
+__all__ = ["Shortener"]
 
 
 @cython.final
 @cython.cclass
-class _Follower:
-    """A curve on its way."""
+class Shortener:
+    """Shortens curves on one surface, one after another; see `heat_igl.curves.shortening.Shortener`."""
 
     course: Course
     kept: Strip  # the strip before a change
@@ -49,6 +29,28 @@ class _Follower:
     n_tried: cython.int
     length: cython.double
     end: Place  # where the curve ends in the last face; for a loop, the start there
+
+    def __init__(self, surface, half_turn, most_corners):
+        self.course = Course(Surface(surface, np.empty(0)), most_corners)
+        self.kept, self.tried, self.half_turn = Strip(), np.empty(MOST_TRIALS, np.int32), half_turn
+
+    def shorten(
+        self,
+        face: cython.const[cython.int][::1],
+        join: cython.const[cython.int][:, ::1],
+        ends: cython.const[cython.double][:, ::1],
+        is_closed: cython.bint,
+    ):
+        """The shortest curve of a class: its length, faces, and the ends of its segments.
+
+        First comes -1, or the number of the join at which only a vertex holds a loop together; then there is no curve.
+        """
+        stuck: cython.int
+        self.course.n_segments = 0
+        self.length = 0.0
+        with cython.nogil:
+            stuck = self.follow(face, join, ends, is_closed)
+        return stuck, self.length, *self.course.segments()
 
     @cython.cfunc
     @cython.nogil
@@ -60,7 +62,7 @@ class _Follower:
         ends: cython.const[cython.double][:, ::1],
         is_closed: cython.bint,
     ) -> cython.int:
-        """Append the segments of the shortened curve; -1, or the vertex alone that holds a loop together."""
+        """Append the segments of the shortened curve; -1, or the join at which a loop is stuck."""
         x: Place
         c: cython.int
         i: cython.int
