@@ -42,10 +42,12 @@ def path(
         places = [_place(loaded, text) for text in waypoints]
         _write(loaded, heat_igl.geodesic_path(loaded, places, closed), output)
         return
+    ends = []
     for option, vertex in (("--from", start), ("--to", end)):
         if vertex is None or not 0 <= vertex < loaded.n_vertices:
             raise SourceError(f"{option} {vertex} is no vertex: the mesh has {loaded.n_vertices}, counted from 0")
-    found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), start, end)
+        ends.append(vertex)
+    found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), *ends)
     _write(loaded, found[0], output)
 
 

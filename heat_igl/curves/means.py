@@ -91,7 +91,7 @@ class _State(NamedTuple):
     @property
     def points(self) -> SurfacePoints:
         """The place as a point of the surface."""
-        return SurfacePoints([self.face], self.barycentric[None])
+        return SurfacePoints(np.array([self.face]), self.barycentric[None])
 
 
 class _Search:
@@ -121,7 +121,7 @@ class _Search:
 
     def _fields(self) -> FloatArray:
         """Distances (k, n) of all vertices from each point."""
-        places = [SurfacePoints([f], b[None]) for f, b in zip(self._faces, self._barycentric, strict=True)]
+        places = [SurfacePoints(np.array([f]), b[None]) for f, b in zip(self._faces, self._barycentric, strict=True)]
         if len(places) < _MANY:
             return np.stack([geodesic_distance(self._mesh, place) for place in places])
         return np.asarray(HeatMethodSolver(self._mesh, refine="unfold").distances(places))

@@ -100,4 +100,5 @@ class Router:
             raise SourceError(
                 f"no path leads from waypoints[{i}] to waypoints[{i + 1}]: they lie on different components of the mesh"
             )
-        return found
+        between, joins = found
+        return between, joins

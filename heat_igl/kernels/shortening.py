@@ -7,11 +7,11 @@ with every such step unless the loop is locally shortest at the base too.
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.shortening import BOTH_WAYS, GAIN, LEAST_SAVING, MOST_BASES, MOST_TRIALS
+from cython.cimports.heat_igl.kernels.passing import Passing, copy
+from cython.cimports.heat_igl.kernels.shortening import BOTH_WAYS, GAIN, MOST_BASES
 from cython.cimports.heat_igl.kernels.straightening import Course
-from cython.cimports.heat_igl.kernels.strips import Sides, Strip
 from cython.cimports.heat_igl.kernels.surfaces import SNAP, Place, Surface, at_corner, corner_of, only_corner, side_of
-from cython.cimports.libc.math import INFINITY, acos, cos, sqrt
+from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["Shortener"]
 
@@ -22,17 +22,13 @@ class Shortener:
     """Shortens curves on one surface, one after another; see `heat_igl.curves.shortening.Shortener`."""
 
     course: Course
-    kept: Strip  # the strip before a change
-    half_turn: cython.const[cython.double][::1]
-    # The vertices whose other side was tried since the last that made the path shorter.
-    tried: cython.int[::1]
-    n_tried: cython.int
+    passing: Passing
     length: cython.double
     end: Place  # where the curve ends in the last face; for a loop, the start there
 
     def __init__(self, surface, half_turn, most_corners):
         self.course = Course(Surface(surface, np.empty(0)), most_corners)
-        self.kept, self.tried, self.half_turn = Strip(), np.empty(MOST_TRIALS, np.int32), half_turn
+        self.passing = Passing(self.course, half_turn)
 
     def shorten(
         self,
@@ -112,112 +108,28 @@ class Shortener:
 
         Its segments begin with `first`. Returns the length.
         """
-        self.n_tried = 0
-        while self.n_tried < MOST_TRIALS:
-            copy(self.course.strip, self.kept)
-            face: cython.int = self.course.face
-            start: Place = self.course.start
+        i: cython.int
+        self.passing.n_tried = 0
+        is_better: cython.bint = True
+        while is_better and self.passing.propose() > 0:
             end: Place = self.end
-            if not self.change_side():
-                break
-            self.course.n_segments = first
-            trial: cython.double = self.straighten_to_end()
-            if trial < length * (1.0 - GAIN):
-                length = trial
-                self.n_tried = 0
-            else:
-                copy(self.kept, self.course.strip)
-                self.course.face, self.course.start, self.end = face, start, end
+            is_better = False
+            for i in range(self.passing.count):
+                if not self.passing.lead(i):
+                    continue
+                self.end = end
+                self.course.n_segments = first
+                trial: cython.double = self.straighten_to_end()
+                if trial < length * (1.0 - GAIN):
+                    length = trial
+                    is_better = True
+                    break
+            if not is_better:
+                self.passing.restore()
+                self.end = end
                 self.course.n_segments = first
                 self.straighten_to_end()
         return length
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
-    def change_side(self) -> cython.int:
-        """Lead the strip past the most promising vertex on the other side; 0 if there is none.
-
-        A vertex promises a shorter way if the path, seen from there, spans more than half of the angles around it.
-        """
-        best: cython.double = 0.0
-        at: cython.int = -1
-        side_at: cython.int = 0
-        i: cython.int
-        j: cython.int
-        side: cython.int
-        for i in range(1, self.course.layout.n_bends):
-            p = cython.address(self.course.layout.bend[i - 1])
-            q = cython.address(self.course.layout.bend[i])
-            squared: cython.double = (q.x - p.x) * (q.x - p.x) + (q.y - p.y) * (q.y - p.y)
-            for j in range(p.last + 1, q.first):
-                gate = cython.address(self.course.layout.gate[j])
-                for side in range(2):
-                    v: cython.int = gate.vertex[side]
-                    half: cython.double = self.half_turn[v]
-                    if half <= -1.0 or (j > p.last + 1 and self.course.layout.gate[j - 1].vertex[side] == v):
-                        continue
-                    px: cython.double = p.x - gate.x[side]
-                    py: cython.double = p.y - gate.y[side]
-                    qx: cython.double = q.x - gate.x[side]
-                    qy: cython.double = q.y - gate.y[side]
-                    product: cython.double = sqrt((px * px + py * py) * (qx * qx + qy * qy))
-                    spanned: cython.double = px * qx + py * qy
-                    if not spanned < half * product or self.is_tried(v):
-                        continue
-                    # The angle on the other side is 2 (half turn) - spanned.
-                    turn: cython.double = 2.0 * acos(half) - acos(max(spanned / product, -1.0))
-                    saved: cython.double = 2.0 * (product * cos(turn) - spanned) / squared
-                    if saved > best:
-                        best, at, side_at = saved, j, side
-        if at < 0 or best < LEAST_SAVING:
-            return 0
-        return self.lead_around(at, side_at)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def is_tried(self, v: cython.int) -> cython.bint:
-        """Whether the other side of v has been tried."""
-        i: cython.int
-        for i in range(self.n_tried):
-            if self.tried[i] == v:
-                return True
-        return False
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
-    def lead_around(self, at: cython.int, side: cython.int) -> cython.int:
-        """Lead the strip the other way around the vertex at a side of the crossing `at`, and note that it was tried."""
-        v: cython.int = self.course.layout.gate[at].vertex[side]
-        first: cython.int = at
-        last: cython.int = at
-        j: cython.int
-        self.tried[self.n_tried] = v
-        self.n_tried += 1
-        while first > 0 and self.course.layout.gate[first - 1].vertex[side] == v:
-            first -= 1
-        while last + 1 < self.course.strip.count and self.course.layout.gate[last + 1].vertex[side] == v:
-            last += 1
-        h: cython.int = self.kept.crossing[first].leave
-        g: cython.int = self.kept.crossing[last].enter
-        before: Sides
-        after: Sides
-        before.this, before.other, after.this, after.other = INFINITY, 0.0, 0.0, 0.0
-        count: cython.int = -1
-        if h // 3 != g // 3:
-            count = self.course.detour.find(self.course.s, v, h, before, g // 3, -1, g, after, INFINITY)
-        if count < 0:
-            return 1
-        self.course.strip.count = 0
-        for j in range(first):
-            self.course.strip.push(self.kept.crossing[j].leave, self.kept.crossing[j].enter)
-        for j in range(count):
-            self.course.strip.push(self.course.detour.way[j].leave, self.course.detour.way[j].enter)
-        for j in range(last + 1, self.kept.count):
-            self.course.strip.push(self.kept.crossing[j].leave, self.kept.crossing[j].enter)
-        return 1
 
     @cython.cfunc
     @cython.nogil
@@ -367,22 +279,10 @@ class Shortener:
     def turn_ring(self, at: cython.int) -> cython.int:
         """Make the strip begin after the crossing `at` and end before it."""
         j: cython.int
-        copy(self.course.strip, self.kept)
+        copy(self.course.strip, self.passing.kept)
         self.course.strip.count = 0
-        for j in range(at + 1, self.kept.count):
-            self.course.strip.push(self.kept.crossing[j].leave, self.kept.crossing[j].enter)
+        for j in range(at + 1, self.passing.kept.count):
+            self.course.strip.push(self.passing.kept.crossing[j].leave, self.passing.kept.crossing[j].enter)
         for j in range(at):
-            self.course.strip.push(self.kept.crossing[j].leave, self.kept.crossing[j].enter)
+            self.course.strip.push(self.passing.kept.crossing[j].leave, self.passing.kept.crossing[j].enter)
         return 0
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(-1, check=False)
-def copy(this: Strip, there: Strip) -> cython.int:
-    """Copy a strip."""
-    j: cython.int
-    there.count = 0
-    for j in range(this.count):
-        there.push(this.crossing[j].leave, this.crossing[j].enter)
-    return 0
