@@ -116,16 +116,19 @@ class Shortener:
         half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
         self._kernel = kernel.Shortener(self.surface, half_turn, int(np.diff(self.surface.first_corner).max()))
 
-    def shortest(self, course: Course, *, is_closed: bool = False) -> Shortened:
-        """The locally shortest curve of the class of a course: between the ends, or as a loop."""
+    def shortest(self, course: Course, *, is_closed: bool = False, tries_sides: bool = True) -> Shortened:
+        """The locally shortest curve of the class of a course: between the ends, or as a loop.
+
+        With `tries_sides`, vertices are passed on the other side where that makes the curve shorter.
+        """
         faces, joins, ends = course
-        stuck, *found = self._kernel.shorten(faces, joins, ends, is_closed)
+        stuck, *found = self._kernel.shorten(faces, joins, ends, is_closed, tries_sides)
         if stuck >= 0:
             # A vertex alone joins two faces: the loop passes there in any case, so it is a path from there to there.
             vertex = joins[stuck, 2]
             faces, joins = np.roll(faces, -stuck - 1), np.roll(joins, -stuck - 1, axis=0)[:-1]
             at = (self.surface.triangle["vertex"][faces[[0, -1]]] == vertex).astype(float)
-            _, *found = self._kernel.shorten(faces, np.ascontiguousarray(joins), at, False)
+            _, *found = self._kernel.shorten(faces, np.ascontiguousarray(joins), at, False, tries_sides)
         return Shortened(*found)
 
 

@@ -6,9 +6,9 @@ cdef extern from *:
     """
     // The other side of a vertex is tried unless it promises to lose more than this share of the square of a straight
     // part. The promise looks at one vertex alone: other vertices beside it change the length by some percent.
-    #define LARGEST_LOSS 0.02
+    #define LARGEST_LOSS 0.01
     // Cosine by which the angle that a path spans may fall short of half of those around the vertex.
-    #define MARGIN 0.05
+    #define MARGIN 0.03
     """
     double LARGEST_LOSS "LARGEST_LOSS"
     double MARGIN_OF_TURN "MARGIN"

@@ -23,6 +23,7 @@ class Shortener:
 
     course: Course
     passing: Passing
+    tries_sides: cython.bint
     length: cython.double
     end: Place  # where the curve ends in the last face; for a loop, the start there
 
@@ -36,14 +37,17 @@ class Shortener:
         join: cython.const[cython.int][:, ::1],
         ends: cython.const[cython.double][:, ::1],
         is_closed: cython.bint,
+        tries_sides: cython.bint,
     ):
         """The shortest curve of a class: its length, faces, and the ends of its segments.
 
-        First comes -1, or the number of the join at which only a vertex holds a loop together; then there is no curve.
+        With `tries_sides`, vertices are passed on the other side where that makes the curve shorter. First comes -1, or
+        the number of the join at which only a vertex holds a loop together; then there is no curve.
         """
         stuck: cython.int
         self.course.n_segments = 0
         self.length = 0.0
+        self.tries_sides = tries_sides
         with cython.nogil:
             stuck = self.follow(face, join, ends, is_closed)
         return stuck, self.length, *self.course.segments()
@@ -111,7 +115,7 @@ class Shortener:
         i: cython.int
         self.passing.n_tried = 0
         is_better: cython.bint = True
-        while is_better and self.passing.propose() > 0:
+        while is_better and self.tries_sides and self.passing.propose() > 0:
             end: Place = self.end
             is_better = False
             for i in range(self.passing.count):
