@@ -4,8 +4,8 @@ from heat_igl.kernels.surfaces cimport Place
 
 cdef extern from *:
     """
-    // The other side of a vertex is tried unless it promises to lose more than this share of the square of a straight
-    // part. The promise looks at one vertex alone: other vertices beside it change the length by some percent.
+    // The other side of a vertex is tried on open paths unless it promises to lose more than this share of the square of
+    // a straight part. The promise looks at one vertex alone: other vertices beside it change the length by some percent.
     #define LARGEST_LOSS 0.01
     // Cosine by which the angle that a path spans may fall short of half of those around the vertex.
     #define MARGIN 0.03
@@ -32,6 +32,7 @@ cdef class Passing:
     cdef int count
     cdef int[::1] tried
     cdef int n_tried
+    cdef double largest_loss
     cdef int face
     cdef Place start
 

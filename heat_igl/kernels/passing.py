@@ -3,7 +3,6 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.passing import (
-    LARGEST_LOSS,
     MARGIN_OF_TURN,
     MOST_CHOICES,
     MOST_TRIED,
@@ -74,7 +73,7 @@ class Passing:
     def note(self, j: cython.int, side: cython.int, saved: cython.double) -> cython.int:
         """Note the vertex at a side of crossing j, in its place among the choices."""
         v: cython.int = self.course.layout.gate[j].vertex[side]
-        if not saved > -LARGEST_LOSS or self.is_tried(v):
+        if not saved > -self.largest_loss or self.is_tried(v):
             return 0
         if self.count == MOST_CHOICES:
             if not saved > self.choice[self.count - 1].saved:

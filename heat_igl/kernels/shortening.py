@@ -7,7 +7,7 @@ with every such step unless the loop is locally shortest at the base too.
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.passing import Passing, copy
+from cython.cimports.heat_igl.kernels.passing import LARGEST_LOSS, Passing, copy
 from cython.cimports.heat_igl.kernels.shortening import BOTH_WAYS, GAIN, MOST_BASES
 from cython.cimports.heat_igl.kernels.straightening import Course
 from cython.cimports.heat_igl.kernels.surfaces import SNAP, Place, Surface, at_corner, corner_of, only_corner, side_of
@@ -48,6 +48,8 @@ class Shortener:
         self.course.n_segments = 0
         self.length = 0.0
         self.tries_sides = tries_sides
+        # A loop is straightened from many bases.
+        self.passing.largest_loss = 0.0 if is_closed else LARGEST_LOSS
         with cython.nogil:
             stuck = self.follow(face, join, ends, is_closed)
         return stuck, self.length, *self.course.segments()
