@@ -44,7 +44,15 @@ if TYPE_CHECKING:
         heat_method_distance,
     )
     from heat_igl.intrinsic import TangentFrames, tangent_frames
-    from heat_igl.io import read_attributes, read_mesh, read_point_cloud, read_polygon_mesh, write_curves, write_mesh
+    from heat_igl.io import (
+        read_attributes,
+        read_mesh,
+        read_point_cloud,
+        read_polygon_mesh,
+        write_curves,
+        write_mesh,
+        write_point_cloud,
+    )
     from heat_igl.mesh import (
         ClosestPoints,
         ImageDomain,
@@ -166,6 +174,7 @@ __all__ = [
     "voronoi_cells",
     "write_curves",
     "write_mesh",
+    "write_point_cloud",
 ]
 
 __version__ = "0.1.0"
@@ -207,6 +216,7 @@ _LAZY = {
     "closed_forms": "validation.closed_forms",
     "closest_points": "mesh",
     "cluster": "cluster",
+    "compat": "compat",
     "connection_laplacian": "operators",
     "curve_on": "mesh",
     "curves": "curves",
@@ -267,13 +277,15 @@ _LAZY = {
     "voronoi_cells": "sampling",
     "write_curves": "io",
     "write_mesh": "io",
+    "write_point_cloud": "io",
 }
 
-# Modules that users import by these names: earlier name -> the module in its room.
+# Modules that users import by these names, most of them earlier ones: name -> the module in its room.
 _EARLIER_NAMES = {
     "closed_forms": "validation.closed_forms",
     "demo": "cli.demo",
     "factorization": "linear",
+    "jax": "applications.jax",
     "metrics": "validation.metrics",
     "paths": "curves.paths",
     "plots": "drawing.plots",
@@ -285,6 +297,7 @@ _EARLIER_NAMES = {
     "speed": "operators.speed",
     "subdivision": "mesh.subdivision",
     "surface_points": "mesh.surface_points",
+    "torch": "applications.torch",
     "viewer": "drawing.viewer",
 }
 alias_modules({f"{__name__}.{name}": f"{__name__}.{target}" for name, target in _EARLIER_NAMES.items()})

@@ -362,7 +362,7 @@ def path_cases() -> Iterator[Case]:
 
     yield read("missing.off", "missing.off: no such file")
     yield read("missing/a.off", "a.off: no such file")
-    for name in ("a.xyz", "a", "a.obj.gz", "a.blend", ".off"):
+    for name in ("a.xyz", "a", "a.blend", ".off"):
         yield read(name, re.escape(name), "unknown extension", ".off, .obj")
     yield read("nul\0.off", "cannot be a path")
     yield read("surrogate\udc80\ud800.off", "cannot be a path")
@@ -435,7 +435,7 @@ def write_cases() -> Iterator[Case]:
     phi = np.arange(4.0)
     for extension in ("off", "obj", "stl", "mesh", "msh"):
         yield write("neighbour", f"w.{extension}", surface)
-        patterns = (rf"w.{extension}: .*no vertex attributes \(phi\)", ".ply and .vtu")
+        patterns = (rf"w.{extension}: .*no vertex attributes \(phi\)", ".ply, .vtu, .vtp and .gii")
         yield write("attribute", f"w.{extension}", surface, *patterns, phi=phi)
     for extension in ("off", "obj", "stl", "ply"):
         yield write("tetrahedra", f"w.{extension}", solid, rf"w.{extension}.*no tetrahedra", ".mesh, .msh and .vtu")
@@ -479,7 +479,7 @@ def write_cases() -> Iterator[Case]:
         yield Case(
             f"attributes of .{extension}",
             lambda _, extension=extension: heat_igl.read_attributes(f"a.{extension}"),
-            (rf"a.{extension}: .*no vertex attributes; .ply and .vtu do",),
+            (rf"a.{extension}: .*no vertex attributes; .ply, .vtu, .vtp and .gii do",),
         )
 
 

@@ -24,9 +24,8 @@ farthest_points geodesic_centre geodesic_distance heat_method_distance image_dom
 offset_curves pair_distances plots point_cloud_operators polygon_operators read_attributes read_mesh read_point_cloud
 read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
 tangent_frames trace_geodesic CentroidalSites GeodesicPathSolver centroidal_voronoi
-geodesic_bezier geodesic_path handle_loops karcher_mean
-straighten
-unfolded_distance validate voronoi_cells write_curves write_mesh
+geodesic_bezier geodesic_path handle_loops karcher_mean straighten
+unfolded_distance validate voronoi_cells write_curves write_mesh write_point_cloud
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they
@@ -46,6 +45,7 @@ read_polygon_mesh(path)
 read_point_cloud(path)
 write_mesh(path, mesh)
 write_curves(path, mesh, curves, *, projection=None)
+write_point_cloud(path, cloud)
 heat_method_distance(V, F, sources)
 unfolded_distance(V, F=None, sources=None, *, tolerance=4e-05)
 geodesic_distance(mesh, sources, *, method='unfold', cutoff=None)
@@ -60,6 +60,7 @@ HeatMethodSolver.distance(self, sources, cutoff=None)
 HeatMethodSolver.distances(self, source_sets, out=None, progress=False, dtype=None, *, cutoff=None)
 HeatMethodSolver.voronoi(self, sources, *, cutoff=None)
 HeatMethodSolver.solve(self, sources)
+HeatMethodSolver.distance_vjp(self, sources)
 isolines(mesh, values, levels)
 offset_curves(mesh, solver, sources, radius)
 enclosed_areas(mesh, values, level)
@@ -68,15 +69,6 @@ shortest_paths(mesh, distance, targets, sources=None)
 tangent_frames(mesh)
 trace_geodesic(mesh, start, direction, length)
 exp_map(mesh, source, vectors)
-straighten(mesh, curve)
-geodesic_path(mesh, waypoints, closed=False)
-GeodesicPathSolver(mesh)
-GeodesicPathSolver.path(self, waypoints, closed=False)
-GeodesicPathSolver.straighten(self, curve)
-handle_loops(mesh)
-karcher_mean(mesh, points, weights=None, p=2)
-geodesic_bezier(mesh, points, pieces=32)
-centroidal_voronoi(mesh, sites, *, rounds=50)
 connection_laplacian(mesh, laplacian='intrinsic-delaunay')
 VectorHeatSolver(mesh, *, t_coef=None, t=None, refine=None, backend='auto')
 VectorHeatSolver.extend(self, sources, values)
@@ -148,7 +140,6 @@ RESULTS = {
     "HeatSolution": "heat direction distance t diagnostics",
     "LabelledDistance": "distance labels",
     "VoronoiCells": "sites distance labels",
-    "CentroidalSites": "sites labels energies",
 }
 
 

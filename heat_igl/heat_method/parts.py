@@ -19,11 +19,12 @@ from heat_igl.heat_method.solution import Diagnostics
 from heat_igl.heat_method.time_step import time_step, warn_of_large_step
 from heat_igl.linear import Analysis
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
-from heat_igl.operators import Operators, operators, point_cloud_operators, polygon_operators
+from heat_igl.operators import Elements, Operators, operators, point_cloud_operators, polygon_operators
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.steps.fitted import fit, fit_slope
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import UnfoldingSolver
 
 __all__ = ["SolverParts", "prepare", "prepare_mesh", "prepare_polygons"]
@@ -52,6 +53,8 @@ class SolverParts:
         Steps 2 and 3, or the unfolding that takes their place with ``refine``.
     time_steps : (n_components,) float64
         Time step of each component.
+    step_raised : (n_components,) bool
+        Whether that is more than was asked for, so that the heat crosses the component.
     t_damping : float, (n_components,) float64 or None
         Time step for `damping`; None for a field of length 1.
     fitted : bool
@@ -69,6 +72,7 @@ class SolverParts:
     factored: HeatFlow | None
     last_steps: Integration | UnfoldingSolver
     time_steps: FloatArray
+    step_raised: BoolArray
     t_damping: float | FloatArray | None
     fitted: bool
     checker: Checker | None
@@ -81,6 +85,24 @@ class SolverParts:
             return self.factored
         options = self.options
         return HeatFlow(self.operators, self.time_steps, options.boundary, options.backend, self.analysis, self.fitted)
+
+    @cached_property
+    def elements(self) -> Elements:
+        """The triangles that are solved on, to differentiate by their sides."""
+        return Elements(self.operators)
+
+    @cached_property
+    def fitted_weights(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """What the fitted flow knows of each of ``elements.pairs``, to be differentiated.
+
+        Its cotangent weight, not below 0; the length x of its shortest side in units of sqrt(t); `fit` and `fit_slope`
+        of x.
+        """
+        elements = self.elements
+        pair, first = elements.pairs
+        t = self.time_steps[self.operators.components[elements.i.ravel()[first]]]
+        x = elements.l.ravel()[first] / np.sqrt(t)
+        return np.maximum(np.bincount(pair, elements.weight.ravel()), 0.0), x, fit(x), fit_slope(x)
 
     @property
     def given_faces(self) -> IntArray | None:
@@ -202,6 +224,7 @@ def prepare(
         factored=heat_flow,
         last_steps=last_steps,
         time_steps=np.broadcast_to(step, domain.n_components),
+        step_raised=np.broadcast_to(np.asarray(step) > requested, domain.n_components),
         t_damping=t_damping,
         fitted=fitted,
         checker=None if options.refine in ("unfold", "exact") else Checker(domain, V),

@@ -11,6 +11,8 @@ from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method.batches import checked_cutoff, cut_off
 from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.construction import PreparedSolver
+from heat_igl.heat_method.derivatives import DistanceDerivative
+from heat_igl.heat_method.differentiation import differentiated
 from heat_igl.heat_method.integration import damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
@@ -59,9 +61,9 @@ class HeatMethodSolver(PreparedSolver):
     refine : {"sweep", "unfold", "exact"}, optional
         Integrate nothing, and find the distance in the order of the heat by unfolding triangles, two at a time or in
         strips: 0.06 to 0.3 % and 0.0005 to 0.003 % mean error on common meshes, see `Refinement`. Both are exact on
-        meshes of up to 1000 vertices and on rough ones. "exact" is the polyhedral distance by windows: five to eight
-        times the time of "unfold", and from curves as from dense points, see `UnfoldingSolver`. Needs triangles; no
-        Poisson problem is factored, and with "exact" nothing at all until `solve` asks for heat.
+        meshes of up to 1000 vertices and on rough ones. "exact" is the polyhedral distance by windows, in two to three
+        times the time of "unfold". Needs triangles; no Poisson problem is factored, and with "exact" nothing at all
+        until `solve` asks for heat.
     backend : {"auto", "scipy", "multifrontal", "iterative"}
         Linear solver, see `factorize`.
 
@@ -167,8 +169,7 @@ class HeatMethodSolver(PreparedSolver):
 
     def _order(self, terms: list[SourceTerm]) -> FloatArray:
         """Heat at all vertices of the operators, or zeros where the last steps do not read it."""
-        last_steps = self._parts.last_steps
-        if isinstance(last_steps, UnfoldingSolver) and last_steps.is_exact:
+        if self.is_exact:
             return np.zeros((self.operators.n, len(terms)))
         return self._heat(terms)
 
@@ -221,6 +222,13 @@ class HeatMethodSolver(PreparedSolver):
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
+
+    def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
+        """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
+
+        Arguments and errors as for `distance`; a ValueError also for what is not differentiated, see `differentiated`.
+        """
+        return differentiated(self.distance(sources), self._source_set(sources), self._parts, self._mesh)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""

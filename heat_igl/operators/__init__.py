@@ -1,6 +1,7 @@
 """The discrete Laplacian, mass, gradient and divergence of a domain: a function per kind returns `Operators`."""
 
 from heat_igl.operators.connection import connection_laplacian, edge_rotations, with_rotations
+from heat_igl.operators.element_derivatives import Elements, ElementSlopes
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
 from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
@@ -14,6 +15,8 @@ from heat_igl.operators.triangles import operators, tufted_operators, unfolding_
 
 __all__ = [
     "EdgeLengths",
+    "ElementSlopes",
+    "Elements",
     "Laplacian",
     "OnLaplacian",
     "Operators",
