@@ -26,6 +26,8 @@ read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_ope
 tangent_frames trace_geodesic CentroidalSites GeodesicPathSolver centroidal_voronoi
 geodesic_bezier geodesic_path handle_loops karcher_mean straighten
 unfolded_distance validate voronoi_cells write_curves write_mesh write_point_cloud
+fibre_metric metric_operators
+CutMesh OrientedPoints SignedHeatSolver VoxelBox cut region_boundary volume_signed_distance
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they
@@ -74,6 +76,13 @@ VectorHeatSolver(mesh, *, t_coef=None, t=None, refine=None, backend='auto')
 VectorHeatSolver.extend(self, sources, values)
 VectorHeatSolver.transport(self, sources, vectors)
 VectorHeatSolver.log_map(self, source)
+OrientedPoints(points, normals)
+SignedHeatSolver(mesh, *, refine=None, t_coef=None, t=None, backend='auto')
+SignedHeatSolver.distance(self, curves, *, unsigned=None, level='zero')
+cut(mesh, curves)
+region_boundary(mesh, *, faces=None, vertices=None)
+VoxelBox(origin, spacing, shape)
+volume_signed_distance(domain, surface, *, t_coef=1.0)
 closest_points(mesh, positions)
 curve_on(mesh, positions, *, closed=False, tolerance=None)
 edge_curve(mesh, vertices, *, closed=False)
@@ -82,6 +91,8 @@ split_long_edges(mesh, longest=None)
 polygon_operators(mesh)
 point_cloud_operators(cloud)
 speed_operators(mesh, speed)
+metric_operators(mesh, metric, laplacian='auto')
+fibre_metric(directions, along, across)
 farthest_points(solver, k, *, start=0)
 farthest_cells(solver, k, *, start=0)
 voronoi_cells(solver, sites)

@@ -1,6 +1,7 @@
 """Curves from a distance: isolines and the areas that they enclose, shortest paths."""
 
 from heat_igl.curves.bezier import geodesic_bezier
+from heat_igl.curves.cutting import CutMesh, MeshPiece, cut
 from heat_igl.curves.geodesics import GeodesicPathSolver, geodesic_path, straighten
 from heat_igl.curves.handles import handle_loops
 from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas
@@ -11,8 +12,11 @@ from heat_igl.curves.straightest import exp_map, trace_geodesic
 
 __all__ = [
     "CentroidalSites",
+    "CutMesh",
     "GeodesicPathSolver",
+    "MeshPiece",
     "centroidal_voronoi",
+    "cut",
     "enclosed_areas",
     "exp_map",
     "geodesic_bezier",

@@ -36,7 +36,8 @@ class HeatMethodSolver(PreparedSolver):
     ----------
     mesh : mesh or (n, 3) array_like
         Whatever `as_mesh` takes, or the positions V of a mesh whose faces are `F`. Polygons are solved on with
-        `polygon_operators`, and with `refine` on their triangles.
+        `polygon_operators`, and with `refine` on their triangles. Tetrahedra take fronts instead of heat
+        (`FrontSolver`), unless `magnitude`, a time step, a `boundary` or ``laplacian="cotan"`` is named.
     F : (m, 3) or (m, 4) array_like, optional
         Faces, when `mesh` is V.
     t_coef : float, optional

@@ -3,6 +3,7 @@
 from heat_igl.unfolding.distance import distance_from_scratch, unfolded_distance
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
 from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
+from heat_igl.unfolding.fronts import FrontSolver
 from heat_igl.unfolding.local import distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.path_derivatives import Change
 from heat_igl.unfolding.path_lengths import PathLengths
@@ -14,6 +15,7 @@ __all__ = [
     "Change",
     "ExactSolution",
     "ExactSurface",
+    "FrontSolver",
     "Known",
     "Origin",
     "PathLengths",
