@@ -355,6 +355,9 @@ def test_bad_curves_are_told_apart(sphere):
     far = SurfaceCurve([0, 100], [[1, 0, 0], [1, 0, 0]], [[0, 1, 0], [0, 1, 0]])
     with pytest.raises(SourceError, match=r"segment 0 ends in face 0 .* segment 1 starts in face 100"):
         straighten(sphere, far)
+    jumps = SurfaceCurve([0, 0], [[1, 0, 0], [0, 0, 1]], [[0, 1, 0], [1, 0, 0]])
+    with pytest.raises(SourceError, match=r"segment 0 ends in face 0 .* segment 1 starts in face 0"):
+        straighten(sphere, jumps)
     walk = edge_curve(sphere, sphere.F[0])
     unclosed = SurfaceCurve(walk.faces, walk.start, walk.end, is_closed=True)
     with pytest.raises(SourceError, match=r"segment 1 ends .* and segment 0 starts"):

@@ -182,6 +182,15 @@ def test_sites_become_centroidal():
     assert np.linalg.norm(means - mesh.V[found.sites], axis=1).max() < 1.5 / 21
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_energies_fall_on_coarse_meshes_too(seed):
+    mesh = shapes.torus(7, 14)
+    sites = np.random.default_rng(seed).choice(mesh.n_vertices, 12, replace=False)
+    energies = centroidal_voronoi(mesh, sites).energies
+    assert len(energies) > 1
+    assert (np.diff(energies) < 0).all()
+
+
 def test_relaxation_stops_where_no_site_moves():
     mesh = shapes.icosphere(3)
     found = centroidal_voronoi(mesh, [0, 1, 2, 3, 4, 5])
