@@ -283,6 +283,19 @@ def test_loops_of_known_length():
     assert length(torus, slid) == pytest.approx(2 * along * 0.6 * np.sin(np.pi / along), rel=1e-12)
 
 
+def test_loops_slide_down_narrow_cones():
+    cone = shapes.cone(12, 20, 0.002)
+    mesh = Mesh(cone.V, cone.F[(cone.F != 0).all(axis=1)])
+    slant = np.rint(np.linalg.norm(mesh.V, axis=1) * 20).astype(int)
+    rings = []
+    for ring in (1, 11):
+        around = np.flatnonzero(slant == ring)
+        around = around[np.argsort(np.arctan2(mesh.V[around, 1], mesh.V[around, 0]))]
+        rings.append(edge_curve(mesh, around, closed=True))
+    rim, loop = rings
+    assert length(mesh, straighten(mesh, loop)) == pytest.approx(length(mesh, rim), rel=1e-9)
+
+
 def test_paths_are_as_short_as_distances_say(sphere):
     pairs = np.random.default_rng(3).integers(0, sphere.n_vertices, (40, 2))
     solver = GeodesicPathSolver(sphere)

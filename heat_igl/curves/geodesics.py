@@ -84,7 +84,7 @@ def geodesic_path(mesh: MeshLike, waypoints: Waypoints, closed: bool = False) ->
     -----
     The first course is the shortest way along edges and straight lines from corner to corner across an edge, and it is
     shortened as by `straighten`. Between far points with hills in between it may pass a hill on the longer side:
-    for the shortest path of all, pass an exact distance to `shortest_paths`.
+    for the shortest path of all, call `shortest_paths` without a distance.
     """
     return GeodesicPathSolver(mesh).path(waypoints, closed)
 
