@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from heat_igl.runtime.aliases import alias_modules
 
 if TYPE_CHECKING:
-    from heat_igl import baselines, cluster, reference, sampling
+    from heat_igl import cluster, reference, sampling
     from heat_igl.curves import (
         CentroidalSites,
         CutMesh,
@@ -84,6 +84,7 @@ if TYPE_CHECKING:
         polygon_operators,
         speed_operators,
     )
+    from heat_igl.reference import baselines
     from heat_igl.sampling import (
         VoronoiCells,
         diameter,
@@ -232,7 +233,7 @@ _LAZY = {
     "VoronoiCells": "sampling",
     "VoxelBox": "heat_method",
     "as_mesh": "mesh",
-    "baselines": "baselines",
+    "baselines": "reference.baselines",
     "centroidal_voronoi": "curves",
     "closed_forms": "validation.closed_forms",
     "closest_points": "mesh",
@@ -308,6 +309,7 @@ _LAZY = {
 
 # Modules that users import by these names, most of them earlier ones: name -> the module in its room.
 _EARLIER_NAMES = {
+    "baselines": "reference.baselines",
     "closed_forms": "validation.closed_forms",
     "demo": "cli.demo",
     "factorization": "linear",

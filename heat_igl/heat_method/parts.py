@@ -190,13 +190,7 @@ def prepare(
     takes_heat = options.refine != "exact" and front_solver is None
     found = analysis(domain.L, options.backend, known) if takes_heat else None
     analysed = time.perf_counter()
-    makers: list[Callable[[], Any]] = []
-    if takes_heat:
-        makers.append(lambda: HeatFlow(domain, step, options.boundary, options.backend, found, fitted))
-    if options.refine is None and takes_heat:
-        makers.append(lambda: PoissonProblem(domain, options.backend, found))
-    # Both matrices at once: the backends run without the interpreter's lock.
-    problems = list(in_order(lambda make: make(), makers, max(1, min(len(makers), n_threads()))))
+    problems = [] if found is None else _factored(domain, options, step, found, fitted)
     factored = time.perf_counter()
     heat_flow = problems[0] if problems else None
     unfolds = options.refine is not None or front_solver is not None
@@ -241,6 +235,17 @@ def prepare(
         checker=None if options.refine in ("unfold", "exact") else Checker(domain, V),
         diagnostics=diagnostics,
     )
+
+
+def _factored(
+    domain: Operators, options: SolverOptions, step: float | FloatArray, found: Analysis, fitted: bool
+) -> list[Any]:
+    """The heat flow, and the Poisson problem unless `refine` takes the place of it."""
+    makers: list[Callable[[], Any]] = [lambda: HeatFlow(domain, step, options.boundary, options.backend, found, fitted)]
+    if options.refine is None:
+        makers.append(lambda: PoissonProblem(domain, options.backend, found))
+    # Both matrices at once: the backends run without the interpreter's lock.
+    return list(in_order(lambda make: make(), makers, max(1, min(len(makers), n_threads()))))
 
 
 def _resolved(domain: Operators, options: SolverOptions) -> tuple[Operators, SolverOptions]:
