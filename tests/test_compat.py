@@ -250,6 +250,16 @@ def test_paths_are_no_longer_than_theirs(peer: Any, torus: Mesh) -> None:
         path = ours.find_geodesic_path(v_start=start, v_end=end)
         assert np.allclose(path[[0, -1]], V[[start, end]])
         assert lengths(path) <= lengths(theirs.find_geodesic_path(start, end)) * (1 + 1e-9)
+    corners = [0, 97, 200, 13]
+    one, other = (lengths(solver.find_geodesic_path_poly(corners)) for solver in (ours, theirs))
+    assert one <= other * (1 + 1e-9)
+    meridian = np.flatnonzero(np.abs(V[:, 2]) < 1e-9)
+    outer = meridian[np.linalg.norm(V[meridian], axis=1) > 1][::6].tolist()
+    loop = ours.find_geodesic_loop(outer)
+    assert np.allclose(loop[0], loop[-1])
+    assert lengths(loop) <= lengths(theirs.find_geodesic_loop(outer)) * (1 + 1e-9)
+    around = torus.F[0].tolist()
+    assert lengths(ours.find_geodesic_loop(around)) == 0  # which contracts to a point
     with pytest.raises(ValueError, match="v_start and v_end are the same vertex, 4"):
         ours.find_geodesic_path(4, 4)
 

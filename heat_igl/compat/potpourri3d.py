@@ -15,14 +15,14 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.curves import isolines, shortest_paths, trace_geodesic
+from heat_igl.curves import geodesic_path, isolines, shortest_paths, straighten, trace_geodesic
 from heat_igl.heat_method import HeatMethodSolver, VectorHeatSolver
 from heat_igl.io import read_mesh as _read_mesh
 from heat_igl.io import read_point_cloud as _read_point_cloud
 from heat_igl.io import read_polygon_mesh as _read_polygon_mesh
 from heat_igl.io import write_mesh as _write_mesh
 from heat_igl.io import write_point_cloud as _write_point_cloud
-from heat_igl.mesh import Mesh, PointCloud, PolygonMesh, SurfacePoints
+from heat_igl.mesh import Mesh, PointCloud, PolygonMesh, SurfaceCurve, SurfacePoints
 from heat_igl.operators import connection_laplacian
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
@@ -215,10 +215,10 @@ class PolygonMeshHeatSolver:
 
 
 class EdgeFlipGeodesicSolver:
-    """Paths between vertices: `shortest_paths`, down near-exact distances, so no path of another class is taken for
-    the shortest one.
+    """Paths between vertices, and paths and loops in the class of others: `shortest_paths` and `straighten`.
 
-    The last two arguments of its method limit the work of potpourri3d, and are not read.
+    A path between two vertices follows near-exact distances, so no path of another class is taken for the shortest. The
+    last two arguments of the methods limit the work of potpourri3d, and are not read.
     """
 
     def __init__(self, V: ArrayLike, F: ArrayLike, t_coef: float = 1.0) -> None:  # noqa: ARG002
@@ -239,6 +239,26 @@ class EdgeFlipGeodesicSolver:
         if v_start == v_end:
             raise ValueError(f"v_start and v_end are the same vertex, {v_start}")
         return shortest_paths(self._mesh, self._solver, v_start, v_end)[0].positions(self._mesh)
+
+    def find_geodesic_path_poly(
+        self,
+        v_list: Sequence[int],
+        max_iterations: int | None = None,  # noqa: ARG002
+        max_relative_length_decrease: float | None = None,  # noqa: ARG002
+    ) -> FloatArray:
+        """Corners (k, 3) of the geodesic in the class of the shortest paths from vertex to vertex."""
+        return straighten(self._mesh, geodesic_path(self._mesh, v_list)).positions(self._mesh)
+
+    def find_geodesic_loop(
+        self,
+        v_list: Sequence[int],
+        max_iterations: int | None = None,  # noqa: ARG002
+        max_relative_length_decrease: float | None = None,  # noqa: ARG002
+    ) -> FloatArray:
+        """Corners (k, 3) of the closed geodesic in the class of a loop, the last as the first; it may be a point."""
+        around = geodesic_path(self._mesh, [*v_list, v_list[0]])
+        loop = SurfaceCurve(around.faces, around.start, around.end, is_closed=True)
+        return straighten(self._mesh, loop).positions(self._mesh)
 
 
 class GeodesicTracer:
