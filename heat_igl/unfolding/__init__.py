@@ -1,6 +1,6 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
-from heat_igl.unfolding.distance import distance_from_scratch, unfolded_distance
+from heat_igl.unfolding.distance import distance_from_scratch, distance_to_targets, unfolded_distance
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
 from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
 from heat_igl.unfolding.local import distances_within, nearest_vertices, pair_distances
@@ -17,6 +17,7 @@ __all__ = [
     "Refinement",
     "UnfoldingSolver",
     "distance_from_scratch",
+    "distance_to_targets",
     "distances_within",
     "exact_distance",
     "exact_paths",

@@ -54,7 +54,7 @@ def distances_within(mesh: MeshLike, radius: float, sources: Sources | None = No
     SourceError
         If `sources` does not name vertices.
     """
-    limit = _positive(radius)
+    limit = positive("radius", radius)
     triangles = _triangles(mesh)
     chosen = _chosen(sources, triangles)
     edges = from_mesh(triangles, int(chosen[0]))
@@ -276,11 +276,12 @@ def _chosen(sources: Sources | None, mesh: Mesh) -> IntArray:
     return np.arange(mesh.n_vertices) if sources is None else named_vertices(sources, mesh.n_vertices)
 
 
-def _positive(radius: float) -> float:
-    is_number = isinstance(radius, int | float | np.integer | np.floating) and not isinstance(radius, bool)
-    if not is_number or not radius > 0:
-        raise ValueError(f"radius must be a positive number, not {radius!r}")
-    return float(radius)
+def positive(name: str, value: float) -> float:
+    """A number as a float; ValueError naming it if it is not positive."""
+    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if not is_number or not value > 0:
+        raise ValueError(f"{name} must be a positive number, not {value!r}")
+    return float(value)
 
 
 def _checked_pairs(pairs: ArrayLike, n: int) -> IntArray:
