@@ -68,7 +68,15 @@ from heat_igl.sampling import (
     voronoi_cells,
 )
 from heat_igl.sources import OffsetSources
-from heat_igl.unfolding import Refinement, distances_within, nearest_vertices, pair_distances, unfolded_distance
+from heat_igl.unfolding import (
+    Refinement,
+    distances_within,
+    nearest_vertices,
+    pair_distances,
+    read_distances_within,
+    unfolded_distance,
+    write_distances_within,
+)
 
 if TYPE_CHECKING:
     from heat_igl import baselines, cluster, reference
@@ -133,6 +141,7 @@ __all__ = [
     "point_cloud_operators",
     "polygon_operators",
     "read_attributes",
+    "read_distances_within",
     "read_mesh",
     "read_point_cloud",
     "read_polygon_mesh",
@@ -150,6 +159,7 @@ __all__ = [
     "validate",
     "voronoi_cells",
     "write_curves",
+    "write_distances_within",
     "write_mesh",
 ]
 
