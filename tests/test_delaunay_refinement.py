@@ -251,8 +251,13 @@ def test_refine_unfolds_the_triangles_of_the_mesh() -> None:
     assert HeatMethodSolver(mesh, refine="sweep").operators.n == mesh.n_vertices
     with pytest.raises(ValueError, match="leave laplacian='intrinsic-delaunay-refined' away"):
         HeatMethodSolver(mesh, refine="unfold", laplacian="intrinsic-delaunay-refined")
-    with pytest.raises(ValueError, match="pass operators without refinement"):
-        HeatMethodSolver.from_operators(operators(mesh, "intrinsic-delaunay-refined"), refine="unfold")
+    refined = operators(mesh, "intrinsic-delaunay-refined")
+    assert refined.n > mesh.n_vertices
+    for refine in ("sweep", "unfold", "exact"):
+        solver = HeatMethodSolver.from_operators(refined, refine=refine)
+        assert solver.operators.n == mesh.n_vertices
+        expected = HeatMethodSolver(mesh, refine=refine).distance(0)
+        np.testing.assert_allclose(solver.distance(0), expected, rtol=1e-9, atol=1e-12)
 
 
 def test_even_meshes_stay_as_they_are() -> None:
@@ -262,6 +267,32 @@ def test_even_meshes_stay_as_they_are() -> None:
         assert abs(default.M - plain.M).max() == 0
         assert default.surface is not None
         assert default.surface.uncovered is None
+
+
+def beside(one: Mesh, other: Mesh) -> Mesh:
+    aside = other.V + np.array([0, 40, 0])
+    return Mesh(np.concatenate([one.V, aside]), np.concatenate([one.F, other.F + one.n_vertices]))
+
+
+def test_an_uneven_part_is_refined_beside_an_even_one() -> None:
+    sphere, part = shapes.icosphere(4), Mesh(stretched().V / 10, stretched().F)
+    mesh = beside(sphere, part)
+    solver = HeatMethodSolver(mesh)
+    assert mesh.n_vertices < solver.operators.n
+    alone = HeatMethodSolver(part)
+    assert solver.operators.n - mesh.n_vertices < 1.1 * (alone.operators.n - alone.n_vertices)
+    truth = unfolded_distance(part, 7)
+    error = mean_error(solver.distance(sphere.n_vertices + 7)[sphere.n_vertices :], truth)
+    assert error < 1.5 * mean_error(alone.distance(7), truth)
+    # The sphere is as it was.
+    near = solver.distance(7)[: sphere.n_vertices] - HeatMethodSolver(sphere).distance(7)
+    assert np.abs(near).max() < 1e-9
+
+
+def test_stray_triangles_are_left_alone() -> None:
+    needle = Mesh([[0, 0, 0], [1, 0, 0], [0.5, 1e-3, 0]], [[0, 1, 2]])
+    mesh = beside(shapes.icosphere(3), needle)
+    assert operators(mesh, "auto").n == mesh.n_vertices
 
 
 def test_obtuse_triangles_at_the_boundary_take_the_cover() -> None:

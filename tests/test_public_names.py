@@ -25,7 +25,9 @@ offset_curves pair_distances plots point_cloud_operators polygon_operators read_
 read_distances_within read_mesh read_point_cloud
 read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
 tangent_frames trace_geodesic
-unfolded_distance validate voronoi_cells write_curves write_distances_within write_mesh
+unfolded_distance validate voronoi_cells write_curves write_distances_within write_mesh write_point_cloud
+fibre_metric metric_operators
+CutMesh OrientedPoints SignedHeatSolver VoxelBox cut region_boundary volume_signed_distance
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they
@@ -45,6 +47,7 @@ read_polygon_mesh(path)
 read_point_cloud(path)
 write_mesh(path, mesh)
 write_curves(path, mesh, curves, *, projection=None)
+write_point_cloud(path, cloud)
 heat_method_distance(V, F, sources)
 unfolded_distance(V, F=None, sources=None, *, tolerance=4e-05, cutoff=None)
 geodesic_distance(mesh, sources, *, method='unfold', cutoff=None, targets=None)
@@ -59,6 +62,7 @@ HeatMethodSolver.distance(self, sources, cutoff=None)
 HeatMethodSolver.distances(self, source_sets, out=None, progress=False, dtype=None, *, cutoff=None)
 HeatMethodSolver.voronoi(self, sources, *, cutoff=None)
 HeatMethodSolver.solve(self, sources)
+HeatMethodSolver.distance_vjp(self, sources)
 isolines(mesh, values, levels)
 offset_curves(mesh, solver, sources, radius)
 enclosed_areas(mesh, values, level)
@@ -72,6 +76,13 @@ VectorHeatSolver(mesh, *, t_coef=None, t=None, refine=None, backend='auto')
 VectorHeatSolver.extend(self, sources, values)
 VectorHeatSolver.transport(self, sources, vectors)
 VectorHeatSolver.log_map(self, source)
+OrientedPoints(points, normals)
+SignedHeatSolver(mesh, *, refine=None, t_coef=None, t=None, backend='auto')
+SignedHeatSolver.distance(self, curves, *, unsigned=None, level='zero')
+cut(mesh, curves)
+region_boundary(mesh, *, faces=None, vertices=None)
+VoxelBox(origin, spacing, shape)
+volume_signed_distance(domain, surface, *, t_coef=1.0)
 closest_points(mesh, positions)
 curve_on(mesh, positions, *, closed=False, tolerance=None)
 edge_curve(mesh, vertices, *, closed=False)
@@ -80,6 +91,8 @@ split_long_edges(mesh, longest=None)
 polygon_operators(mesh)
 point_cloud_operators(cloud)
 speed_operators(mesh, speed)
+metric_operators(mesh, metric, laplacian='auto')
+fibre_metric(directions, along, across)
 farthest_points(solver, k, *, start=0)
 farthest_cells(solver, k, *, start=0)
 voronoi_cells(solver, sites)

@@ -272,6 +272,7 @@ def _ways_out(mesh: Mesh, values: FloatArray, roots: BoolArray) -> IntArray:
     rank[np.lexsort((mesh.edge_lengths, values[edges].max(axis=1)))] = np.arange(2, len(edges) + 2)
     start = np.flatnonzero(roots)
     rows, columns = np.concatenate([edges[:, 0], np.full(len(start), n)]), np.concatenate([edges[:, 1], start])
+    rows, columns = rows.astype(np.int32), columns.astype(np.int32)  # scipy 1.15 builds no tree from others
     graph = sp.coo_array((np.concatenate([rank, np.ones(len(start))]), (rows, columns)), shape=(n + 1, n + 1))
     tree = csgraph.minimum_spanning_tree(graph.tocsr())
     previous = csgraph.breadth_first_order(tree, n, directed=False)[1][:n]

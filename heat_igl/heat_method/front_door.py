@@ -38,14 +38,15 @@ def geodesic_distance(
         Whatever `as_mesh` takes: `Mesh`, `PolygonMesh`, a pair (V, F), a path, or a mesh of trimesh, pyvista, open3d,
         meshio and others.
     sources : sources
-        A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources` where
+        A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources` if
         distance begins at other values than 0, or a list of such. Faces of points on polygons are counted as those of
         ``PolygonMesh.triangles``.
     method : {"unfold", "sweep", "heat", "exact"}
         "unfold" follows straight lines through strips of triangles: near-exact, see `unfolded_distance`. "sweep"
         unfolds two triangles at a time. Both go through the vertices in the order of Dijkstra's algorithm; polygons are
-        cut into triangles. "heat" is `HeatMethodSolver` with its defaults, the only one for tetrahedra; on polygons it
-        takes `polygon_operators`. "exact" is the polyhedral distance by windows.
+        cut into triangles. "heat" is `HeatMethodSolver` with its defaults; on polygons it takes `polygon_operators`.
+        "exact" is the polyhedral distance by windows. Tetrahedra take "sweep" and "heat", which both are fronts there,
+        see `FrontSolver`.
     cutoff : float, optional
         Distances beyond this are ``inf``. With "unfold" and "exact", the others are exact, and the search ends there.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints, optional
@@ -55,7 +56,7 @@ def geodesic_distance(
     Returns
     -------
     (n,) or (t,) float64
-        In the mesh's unit: 0 at source vertices (their offset where they have one, unless another source is nearer),
+        In the mesh's unit: 0 at source vertices (the offset of those that have one, unless another source is nearer),
         ``inf`` at vertices that no source reaches, never negative or NaN.
 
     Raises
@@ -89,7 +90,12 @@ def geodesic_distance(
         return HeatMethodSolver(as_mesh(mesh)).distance(sources, beyond)
     triangles = as_simplices(mesh)
     if triangles.is_tetrahedral:
-        raise MeshError(f'method={method!r} needs triangles, and the mesh holds tetrahedra: take method="heat"')
+        if method == "sweep":
+            return HeatMethodSolver(triangles, refine="sweep").distance(sources, beyond)
+        raise MeshError(
+            f'method={method!r} needs triangles, and the mesh holds tetrahedra: take method="sweep", exact where the '
+            "way is a straight line"
+        )
     if targets is not None:
         return np.asarray(cut_off(distance_to_targets(triangles, sources, targets), beyond))
     farthest = np.inf if beyond is None else beyond

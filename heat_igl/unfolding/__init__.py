@@ -3,17 +3,23 @@
 from heat_igl.unfolding.distance import distance_from_scratch, distance_to_targets, unfolded_distance
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
 from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
+from heat_igl.unfolding.fronts import FrontSolver
 from heat_igl.unfolding.local import blocks_within, distances_within, nearest_vertices, pair_distances
+from heat_igl.unfolding.path_derivatives import Change
+from heat_igl.unfolding.path_lengths import PathLengths
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 from heat_igl.unfolding.solver import UnfoldingSolver
 from heat_igl.unfolding.within_store import read_distances_within, write_distances_within
 
 __all__ = [
     "ExactPaths",
+    "Change",
     "ExactSolution",
     "ExactSurface",
+    "FrontSolver",
     "Known",
     "Origin",
+    "PathLengths",
     "Refine",
     "Refinement",
     "UnfoldingSolver",

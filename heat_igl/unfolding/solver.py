@@ -15,6 +15,7 @@ from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSegments, Sou
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.exact import ExactSurface
+from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 
 __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
@@ -22,14 +23,15 @@ __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
 # Curves are unfolded from as points, at most so many mean edge lengths s apart. At a distance d that is wrong by the
 # fraction (s / d)^2 / 8 at most: by 0.005 % beyond the 6 edges within which straight lines from the curve itself count.
 _SPACING = 0.125
-# Where a sweep gives less than a straight line by less than this, it is the sweep that is wrong, and no shorter path is
+# If a sweep gives less than a straight line by less than this, it is the sweep that is wrong, and no shorter path is
 # there: sweeps are off by 0.06 to 0.4 % in the mean and by 1.6 % at most (cow, fandisk, camel's head).
 _SWEEP_ERROR = 0.01
-# Up to so many vertices, or with so much curvature at each (radians, in the mean), distance is found by exact windows,
-# whatever was asked for. There walks pass vertices on the wrong side: 0.7 to 3.4 % of the largest distance on plates,
-# beams, voxels and terrain, most of which have 0.5 to 3 radians. Scanned surfaces have 0.005 to 0.15.
+# In components of up to so many vertices distance is found by exact windows, whatever was asked for.
 _FEW = 1000
-_ROUGH = 0.25
+# So it is with so much curvature at each vertex (radians, in the mean). There walks pass vertices on the wrong side:
+# 0.7 to 3.4 % of the largest distance on plates, beams, voxels and terrain, most with 0.5 to 3 radians, and up to
+# 0.46 % on a coarse cow with 0.14, which is too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
+_ROUGH = {"sweep": 0.25, "unfold": 0.1}
 # With this share of flat vertices, and holes that keep walks from proving flatness, windows are as fast as walks.
 _FLAT = 0.5
 # Sweeps from several sources start with the exact distance up to so many mean edge lengths: next to a border of cells
@@ -38,7 +40,7 @@ _KNOWN_RADIUS = 4.0
 
 
 class UnfoldingDomain(Protocol):
-    """What unfolding takes of a domain; `Operators` is one."""
+    """The part of a domain that unfolding uses; `Operators` is one."""
 
     @property
     def surface(self) -> Surface | None:
@@ -76,10 +78,10 @@ class UnfoldingTerm(Protocol):
         """Corners of the sources' own faces that are farther away."""
 
 
-def _costs_little_to_be_exact(refinement: Refinement) -> bool:
+def _costs_little_to_be_exact(refinement: Refinement, rough: float) -> bool:
     """Whether the mesh is small or rough, or flat with holes."""
     return (
-        refinement.n <= _FEW or refinement.curvature > _ROUGH or (refinement.flatness > _FLAT and refinement.has_holes)
+        refinement.n <= _FEW or refinement.curvature > rough or (refinement.flatness > _FLAT and refinement.has_holes)
     )
 
 
@@ -103,11 +105,12 @@ class UnfoldingSolver:
         Triangles.
     refine : {"sweep", "unfold", "exact"}
         Which update. "exact" is the polyhedral distance by windows, see `ExactSurface`; the heat is not read. The other
-        two take it as well where the mesh is small, rough, or flat with holes. It is exact from vertices, points and
-        curves. For the other two, a curve stands for points at most an eighth of a mean edge length apart, and straight
-        lines from the curve itself count up to 6 edges from it: beyond, distance is too long by 0.005 % at most.
+        two take it as well if the mesh is rough or flat with holes, and in small components. It is exact from vertices,
+        points and curves. For the other two, a curve stands for points at most an eighth of a mean edge length apart,
+        and straight lines from the curve itself count up to 6 edges from it: beyond, distance is too long by 0.005 % at
+        most.
     tolerance : float, optional
-        As for `Refinement.unfold`, with its default.
+        As for `Refinement.unfold`, with the same default.
     cutoff : float
         With "exact", what is farther is ``inf``, and the search ends there.
 
@@ -125,7 +128,7 @@ class UnfoldingSolver:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
         self._refinement = None if refine == "exact" else Refinement(surface.unfolding)
         #: Whether distances do not depend on the heat.
-        self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement)
+        self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement, _ROUGH[refine])
         if tolerance is not None and not 0 <= tolerance <= 1:
             raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
         self._tolerance, self._cutoff = tolerance, cutoff
@@ -155,19 +158,33 @@ class UnfoldingSolver:
     def distances(self, terms: Sequence[UnfoldingTerm], u: FloatArray) -> FloatArray:
         """Distances (k, n) for heat (n, k).
 
-        Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
+        If the heat has underflowed the order is arbitrary, which the unfolding corrects.
         """
         return np.stack([self._distance(term, one) for term, one in zip(terms, u.T, strict=True)])
 
     def labelled(self, term: UnfoldingTerm, u: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 where none is reached."""
+        """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 if none is reached."""
         labels = np.empty(len(u), np.int64)
         return self._distance(term, u, labels), labels
+
+    def paths(self, sources: SourceSet, u: FloatArray) -> PathLengths:
+        """The paths whose lengths are the distances from vertices and points, for heat (n,).
+
+        Raises
+        ------
+        ValueError
+            With ``refine="sweep"``, whose distances are not the lengths of paths.
+        """
+        if self._sweeps:
+            raise ValueError('refine="sweep" finds no paths to differentiate: take refine="unfold" or "exact"')
+        if self._refinement is None or self.is_exact:
+            return from_windows(self._exact, self._surface.unfolding, sources)
+        return from_walks(self._refinement, sources, u)
 
     def _distance(self, term: UnfoldingTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
         sources, points, components = term.sources, self._points(term), self._domain.components
         places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
-        # Tolerances are relative to the distance: what all have in common is added afterwards.
+        # Tolerances are relative to the distance: the common part is added afterwards.
         earliest = np.full(self._domain.n_components, np.inf)
         segments = sources.segments if self.is_exact and len(sources.segments.faces) else None
         faces = points.faces if segments is None else np.concatenate([points.faces, segments.faces])
@@ -185,7 +202,8 @@ class UnfoldingSolver:
             None if segments is None else replace(segments, offset=late[k + p :]),
             labels,
         )
-        distance = self._unfolded(u, asked, term, points, earliest)
+        by_windows = self._takes_windows(component)
+        distance = self._unfolded(u, asked, term, points, earliest, by_windows)
         start = self._domain.expand_to_vertices(earliest)
         if offset.any():
             distance += start
@@ -195,20 +213,34 @@ class UnfoldingSolver:
         for seeds in (term.near_seen, term.far):
             if not len(seeds.vertex):
                 continue
-            taken = take_shorter(distance, seeds, self._error, start)
+            taken = take_shorter(distance, seeds, 0.0 if by_windows else self._error, start)
             if labels is not None:
                 labels[seeds.vertex[taken]] = seeds.label[taken]
-        if not self.is_exact:
+        if not by_windows:
             self._bounds.shorten(distance, labels)
             if self._sweeps:
                 self._bounds.lengthen(distance, sources, points)
         return distance
 
+    def _takes_windows(self, component: IntArray) -> bool:
+        """Whether distance from sources in these components is found by exact windows."""
+        return self.is_exact or bool((self._component_sizes[component] <= _FEW).all())
+
+    @cached_property
+    def _component_sizes(self) -> IntArray:
+        return np.bincount(self._domain.components)
+
     def _unfolded(
-        self, u: FloatArray, asked: _Asked, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray
+        self,
+        u: FloatArray,
+        asked: _Asked,
+        term: UnfoldingTerm,
+        points: SourcePoints,
+        earliest: FloatArray,
+        by_windows: bool,
     ) -> FloatArray:
         """Distances (n,) from vertices and points, each component's from where it begins."""
-        if self._refinement is None or self.is_exact:
+        if self._refinement is None or by_windows:
             surface = self._exact if asked.segments is None else self._exact_on_given_faces
             found = surface.solve(
                 asked.vertices, asked.offsets, asked.points, asked.point_offsets, asked.segments, cutoff=self._cutoff
@@ -243,7 +275,7 @@ class UnfoldingSolver:
         return groups
 
     def _known(self, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray, asked: _Asked) -> Known | None:
-        """What straight lines from points reach, and exact windows near several sources."""
+        """Vertices that straight lines from points reach, and exact windows near several sources."""
         near = term.near_seen
         if len(asked.vertices) + len(points.faces) > 1 and not len(term.sources.segments.faces):
             radius = _KNOWN_RADIUS * self._domain.mean_edge_length

@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from heat_igl.baselines.grids import grid_domain, grid_sources, grid_spacing
 from heat_igl.errors import MeshError, MissingExtraError
 from heat_igl.mesh import MeshLike, as_simplices
+from heat_igl.reference.baselines.grids import grid_domain, grid_sources, grid_spacing
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -113,9 +113,7 @@ def fast_marching_grid(
     aligned = [np.moveaxis(mask, axis, 0) for axis in range(mask.ndim)]
     touching = any((lines[1:] & lines[:-1]).any() for lines in aligned)
     found = skfmm.distance(level, dx=steps, order=1 if touching else order)
-    filled: Any = getattr(
-        found, "filled", None
-    )  # a masked array where something is out of reach, a plain one elsewhere
+    filled: Any = getattr(found, "filled", None)  # a masked array if something is out of reach, else a plain one
     return np.asarray(found if filled is None else filled(np.inf), np.float64)
 
 
