@@ -96,7 +96,15 @@ if TYPE_CHECKING:
         voronoi_cells,
     )
     from heat_igl.sources import OffsetSources, OrientedPoints
-    from heat_igl.unfolding import Refinement, distances_within, nearest_vertices, pair_distances, unfolded_distance
+    from heat_igl.unfolding import (
+        Refinement,
+        distances_within,
+        nearest_vertices,
+        pair_distances,
+        read_distances_within,
+        unfolded_distance,
+        write_distances_within,
+    )
     from heat_igl.validation import ValidationReport, ValidationRow, closed_forms, metrics, shapes, validate
     from heat_igl.validation.samples import sample_mesh
 
@@ -171,6 +179,7 @@ __all__ = [
     "point_cloud_operators",
     "polygon_operators",
     "read_attributes",
+    "read_distances_within",
     "read_mesh",
     "read_point_cloud",
     "read_polygon_mesh",
@@ -191,6 +200,7 @@ __all__ = [
     "volume_signed_distance",
     "voronoi_cells",
     "write_curves",
+    "write_distances_within",
     "write_mesh",
     "write_point_cloud",
 ]
@@ -274,6 +284,8 @@ _LAZY = {
     "offset_curves": "curves",
     "operators": "operators",
     "pair_distances": "unfolding",
+    "read_distances_within": "unfolding",
+    "write_distances_within": "unfolding",
     "plots": "drawing.plots",
     "point_cloud_operators": "operators",
     "polygon_operators": "operators",

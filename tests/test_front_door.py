@@ -27,6 +27,8 @@ from heat_igl import (
     shapes,
     unfolded_distance,
 )
+from heat_igl.unfolding import distance
+from heat_igl.unfolding.half_edges import from_mesh
 
 SQUARE = flat_perturbed(shapes.grid(12))
 TORUS = perturbed(shapes.torus(20, 30))
@@ -60,8 +62,6 @@ def in_the_plane() -> dict[str, tuple[Any, np.ndarray]]:
 @pytest.mark.parametrize("method", ["unfold", "sweep", "heat", "exact"])
 def test_distance_in_the_plane(name: str, method: Any) -> None:
     sources, truth = in_the_plane()[name]
-    if method == "exact" and name == "a curve":
-        pytest.skip("exact distance starts at vertices and points")
     found = geodesic_distance(SQUARE, sources, method=method)
     assert found.dtype == np.float64
     allowed = {"unfold": 2e-3, "sweep": 0.02, "heat": 0.1, "exact": 1e-9}[method]
@@ -92,7 +92,8 @@ def test_beyond_the_cutoff_is_infinity() -> None:
     for method in ("unfold", "sweep", "heat", "exact"):
         whole = geodesic_distance(TORUS, 5, method=method)
         near = geodesic_distance(TORUS, 5, method=method, cutoff=1)
-        np.testing.assert_array_equal(near, np.where(whole > 1, np.inf, whole))
+        # Near-exact and exact distances are found on the part of the mesh within the cutoff: equal up to rounding.
+        np.testing.assert_allclose(near, np.where(whole > 1, np.inf, whole), rtol=1e-13)
         np.testing.assert_array_equal(geodesic_distance(TORUS, 5, method=method, cutoff=np.inf), whole)
     assert HeatMethodSolver(TORUS).distance(5, np.inf).max() < np.inf
     assert np.isinf(HeatMethodSolver(TORUS).distance(5, 1.0)).any()
@@ -171,13 +172,48 @@ def test_exact_windows_take_all_kinds_of_sources_and_end_at_the_cutoff() -> None
         d = geodesic_distance(square, sources, method="exact")
         np.testing.assert_allclose(d, truth, atol=1e-12)
         near = geodesic_distance(square, sources, method="exact", cutoff=0.5)
-        np.testing.assert_array_equal(near, np.where(d <= 0.5, d, np.inf))
+        np.testing.assert_allclose(near, np.where(d <= 0.5, d, np.inf), rtol=1e-13)
+
+
+@pytest.mark.parametrize("sources", [5, [5, 300], OffsetSources([5, 300], [0.1, 0.0])], ids=["one", "two", "late"])
+def test_a_cutoff_looks_at_what_is_near_alone(sources: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On the part within the cutoff distances are those on the whole mesh, also beyond its narrow places."""
+    mesh = shapes.torus(60, 40)
+    exact = geodesic_distance(mesh, sources, method="exact")
+    sizes = []
+    monkeypatch.setattr(distance, "from_mesh", lambda part, start: sizes.append(part.n_faces) or from_mesh(part, start))
+    for cutoff in (0.02, 0.2, 0.6):
+        near = np.where(exact <= cutoff, exact, np.inf)
+        np.testing.assert_allclose(geodesic_distance(mesh, sources, cutoff=cutoff), near, rtol=1e-12)
+        np.testing.assert_allclose(unfolded_distance(mesh, sources, cutoff=cutoff), near, rtol=1e-12)
+    assert sizes == sorted(sizes)
+    assert sizes[0] < 0.02 * mesh.n_faces
+
+
+def test_targets_alone() -> None:
+    mesh = shapes.torus(30, 20)
+    places = SurfacePoints([7, 300, 7], [[0.2, 0.5, 0.3], [0, 1, 0], [0.5, 0.5, 0]])
+    curve = edge_curve(mesh, mesh.F[0, :2])
+    for sources in (5, [5, SurfacePoints([40], [[0.2, 0.5, 0.3]])], curve):
+        whole = geodesic_distance(mesh, sources, method="exact")
+        for method in ("unfold", "exact"):
+            some = geodesic_distance(mesh, sources, method=method, targets=[40, 3, 40])
+            np.testing.assert_allclose(some, whole[[40, 3, 40]], rtol=1e-12)
+        near = geodesic_distance(mesh, sources, targets=[40, 3], cutoff=1e-3)
+        assert np.isinf(near).all()
+        at_places = geodesic_distance(mesh, sources, targets=places)
+        np.testing.assert_allclose(at_places[1], whole[mesh.F[300, 1]], rtol=1e-12)
+        back = geodesic_distance(mesh, places, method="exact", targets=[5])
+        if sources == 5:
+            np.testing.assert_allclose(back, at_places.min(), rtol=1e-12)
 
 
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
         ({"method": "guess"}, ValueError, "method must be one of 'unfold', 'sweep', 'heat', 'exact', not 'guess'"),
+        ({"targets": 3, "method": "heat"}, ValueError, "targets end the search with .* not with 'heat'"),
+        ({"targets": 10**6}, SourceError, r"targets\[0\] = 1000000 is no vertex"),
         ({"cutoff": -1}, ValueError, "cutoff must be a positive number, not -1"),
         ({"cutoff": "1"}, ValueError, "cutoff must be a positive number, not '1'"),
         ({"sources": 10**6}, SourceError, r"sources\[0\] = 1000000 is no vertex"),

@@ -6,12 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from conftest import perturbed, shared_path
 from test_exact import bumpy, two_arms
 
 from heat_igl import Mesh, MeshError, SourceError, distances_within, nearest_vertices, pair_distances, read_mesh, shapes
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import local
+from heat_igl.unfolding import blocks_within, local, read_distances_within, within_store, write_distances_within
 from heat_igl.unfolding.exact import ExactSurface, exact_distance
 from heat_igl.unfolding.half_edges import from_mesh
 
@@ -75,6 +76,52 @@ def test_rows_are_those_of_the_sources_in_their_order():
     mask = np.zeros(mesh.n_vertices, bool)
     mask[[7, 40]] = True
     np.testing.assert_array_equal(distances_within(mesh, 0.4, mask).toarray(), within.toarray()[[1, 0]])
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_blocks_are_the_rows_of_the_matrix(name):
+    mesh = MESHES[name]()
+    sources = np.arange(mesh.n_vertices)[::-1]
+    whole = distances_within(mesh, 0.3, sources)
+    blocks = list(blocks_within(mesh, 0.3, sources, most_entries=2 * whole.nnz // 3))
+    assert len(blocks) > 1
+    together = sp.vstack(blocks).tocsr()
+    for part in ("indptr", "indices", "data"):
+        np.testing.assert_array_equal(getattr(together, part), getattr(whole, part))
+
+
+def test_a_store_holds_the_matrix(tmp_path, monkeypatch):
+    pytest.importorskip("zarr")
+    mesh = bumpy()
+    whole, path = distances_within(mesh, 0.5), tmp_path / "near"
+    monkeypatch.setattr(within_store, "_CHUNK", 1000)
+    write_distances_within(path, mesh, 0.5)
+    for rows in (None, slice(100, 200), slice(640, None), slice(5, 5)):
+        some, truth = read_distances_within(path, rows), whole[rows or slice(None)]
+        assert some.shape == truth.shape
+        for part in ("indptr", "indices", "data"):
+            np.testing.assert_array_equal(getattr(some, part), getattr(truth, part))
+    with pytest.raises(FileExistsError, match="near exists: name a new directory"):
+        write_distances_within(path, mesh, 0.5)
+    with pytest.raises(ValueError, match="rows must be consecutive"):
+        read_distances_within(path, slice(0, 10, 2))
+    with pytest.raises(ValueError, match="holds no distances"):
+        read_distances_within(tmp_path)
+
+
+def test_what_fails_leaves_no_store(tmp_path, monkeypatch):
+    pytest.importorskip("zarr")
+    with pytest.raises(ValueError, match="radius must be a positive number"):
+        write_distances_within(tmp_path / "near", bumpy(), -1)
+
+    def two_blocks(*_):
+        yield distances_within(bumpy(), 0.1)
+        raise MemoryError("the second block")
+
+    monkeypatch.setattr(within_store, "blocks_within", two_blocks)
+    with pytest.raises(MemoryError, match="second block"):
+        write_distances_within(tmp_path / "near", bumpy(), 0.1)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_threads_and_room_change_nothing(monkeypatch):

@@ -21,11 +21,12 @@ ReferenceSolverError Refinement SourceError SurfaceCurve SurfacePoints TangentFr
 VectorHeatSolver VoronoiCells as_mesh baselines closed_forms closest_points cluster connection_laplacian curve_on
 diameter distance_matrix distances_within dual_triangulation edge_curve enclosed_areas exp_map farthest_cells
 farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain isolines metrics nearest_vertices
-offset_curves pair_distances plots point_cloud_operators polygon_operators read_attributes read_mesh read_point_cloud
+offset_curves pair_distances plots point_cloud_operators polygon_operators read_attributes
+read_distances_within read_mesh read_point_cloud
 read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
 tangent_frames trace_geodesic CentroidalSites GeodesicPathSolver centroidal_voronoi
 geodesic_bezier geodesic_path handle_loops karcher_mean straighten
-unfolded_distance validate voronoi_cells write_curves write_mesh write_point_cloud
+unfolded_distance validate voronoi_cells write_curves write_distances_within write_mesh write_point_cloud
 fibre_metric metric_operators
 CutMesh OrientedPoints SignedHeatSolver VoxelBox cut region_boundary volume_signed_distance
 """.split()
@@ -49,8 +50,8 @@ write_mesh(path, mesh)
 write_curves(path, mesh, curves, *, projection=None)
 write_point_cloud(path, cloud)
 heat_method_distance(V, F, sources)
-unfolded_distance(V, F=None, sources=None, *, tolerance=4e-05)
-geodesic_distance(mesh, sources, *, method='unfold', cutoff=None)
+unfolded_distance(V, F=None, sources=None, *, tolerance=4e-05, cutoff=None)
+geodesic_distance(mesh, sources, *, method='unfold', cutoff=None, targets=None)
 as_mesh(mesh, F=None)
 sample_mesh()
 HeatMethodSolver(mesh, F=None, *, t_coef=None, t=None, laplacian='auto', boundary='neumann',\
@@ -103,6 +104,8 @@ distance_matrix(solver, indices=None)
 distances_within(mesh, radius, sources=None)
 nearest_vertices(mesh, k, sources=None)
 pair_distances(mesh, pairs)
+write_distances_within(path, mesh, radius, sources=None)
+read_distances_within(path, rows=None)
 validate(mesh, sources, methods=('heat', 'sweep', 'unfold', 'meshlab', 'igl'), reference='exact', *, name='mesh',\
  progress=None)
 validation.draw_sources(mesh, count, seed=0)

@@ -12,7 +12,7 @@ from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.mesh import MeshLike, as_mesh, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import distance_from_scratch
+from heat_igl.unfolding import distance_from_scratch, distance_to_targets
 
 __all__ = ["DistanceMethod", "geodesic_distance"]
 
@@ -20,7 +20,12 @@ DistanceMethod = Literal["unfold", "sweep", "heat", "exact"]
 
 
 def geodesic_distance(
-    mesh: MeshLike, sources: Sources, *, method: DistanceMethod = "unfold", cutoff: float | None = None
+    mesh: MeshLike,
+    sources: Sources,
+    *,
+    method: DistanceMethod = "unfold",
+    cutoff: float | None = None,
+    targets: Sources | None = None,
 ) -> FloatArray:
     """Geodesic distance from the nearest source, from scratch.
 
@@ -40,14 +45,17 @@ def geodesic_distance(
         "unfold" follows straight lines through strips of triangles: near-exact, see `unfolded_distance`. "sweep"
         unfolds two triangles at a time. Both go through the vertices in the order of Dijkstra's algorithm; polygons are
         cut into triangles. "heat" is `HeatMethodSolver` with its defaults; on polygons it takes `polygon_operators`.
-        "exact" is the polyhedral distance by windows, and ends the search at the cutoff; curves stand for dense points,
-        see `UnfoldingSolver`. Tetrahedra take "sweep" and "heat", which both are fronts there, see `FrontSolver`.
+        "exact" is the polyhedral distance by windows. Tetrahedra take "sweep" and "heat", which both are fronts there,
+        see `FrontSolver`.
     cutoff : float, optional
-        Distances beyond this are ``inf``.
+        Distances beyond this are ``inf``. With "unfold" and "exact", the others are exact, and the search ends there.
+    targets : int, sequence of int, (n,) mask of bool, or SurfacePoints, optional
+        The vertices or points whose distance is asked for: only theirs is returned. With "unfold" and "exact" alone,
+        where distances are then exact, and the search ends once they are known.
 
     Returns
     -------
-    (n,) float64
+    (n,) or (t,) float64
         In the mesh's unit: 0 at source vertices (the offset of those that have one, unless another source is nearer),
         ``inf`` at vertices that no source reaches, never negative or NaN.
 
@@ -58,7 +66,7 @@ def geodesic_distance(
     SourceError
         If `sources` does not describe places on the mesh.
     ValueError
-        If there is no such `method`, or `cutoff` is not positive.
+        If there is no such `method`, `cutoff` is not positive, or there are targets and `method` is "heat" or "sweep".
 
     Warns
     -----
@@ -76,6 +84,8 @@ def geodesic_distance(
     if method not in get_args(DistanceMethod):
         raise ValueError(f"method must be one of {', '.join(map(repr, get_args(DistanceMethod)))}, not {method!r}")
     beyond = checked_cutoff(cutoff)
+    if targets is not None and method in ("heat", "sweep"):
+        raise ValueError(f'targets end the search with method="unfold" or "exact", not with {method!r}')
     if method == "heat":
         return HeatMethodSolver(as_mesh(mesh)).distance(sources, beyond)
     triangles = as_simplices(mesh)
@@ -86,8 +96,8 @@ def geodesic_distance(
             f'method={method!r} needs triangles, and the mesh holds tetrahedra: take method="sweep", exact where the '
             "way is a straight line"
         )
-    if method == "exact":
-        # The search ends at the cutoff; points near it, whose straight lines are known, may lie beyond.
-        farthest = np.inf if beyond is None else beyond
-        return np.asarray(cut_off(distance_from_scratch(triangles, sources, method, cutoff=farthest), beyond))
-    return np.asarray(cut_off(distance_from_scratch(triangles, sources, method), beyond))
+    if targets is not None:
+        return np.asarray(cut_off(distance_to_targets(triangles, sources, targets), beyond))
+    farthest = np.inf if beyond is None else beyond
+    # Points near the cutoff, whose straight lines are known, may lie beyond it.
+    return np.asarray(cut_off(distance_from_scratch(triangles, sources, method, cutoff=farthest), beyond))

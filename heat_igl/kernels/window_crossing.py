@@ -3,7 +3,7 @@
 import cython
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_lists import add, more_room
-from cython.cimports.heat_igl.kernels.window_sources import apart, relax
+from cython.cimports.heat_igl.kernels.window_sources import apart, relax, take
 from cython.cimports.heat_igl.kernels.window_structures import (
     AROUND_APEX,
     LEFT_OF_APEX,
@@ -268,13 +268,8 @@ def over_corners(s: cython.pointer(Search), j: cython.int) -> cython.void:
     k: cython.int
     v: cython.int
     corner: cython.double[3]
-    distance: cython.double
     for c in range(3):
         for k in range(3):
             corner[k] = 1.0 if k == c else 0.0
         v = s.vertex[3 * f + c]
-        distance = s.distance[v] + apart(s, f, corner, s.target + 3 * j)
-        if distance < s.target_distance[j]:
-            s.target_distance[j] = distance
-            s.target_root[j] = v
-            s.target_entered[j] = -1
+        take(s, j, s.distance[v] + apart(s, f, corner, s.target + 3 * j), v)

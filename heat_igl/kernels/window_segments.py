@@ -7,7 +7,7 @@ all directions: the ends are source points as well.
 import cython
 from cython.cimports.heat_igl.kernels.triangles import foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_lists import add
-from cython.cimports.heat_igl.kernels.window_sources import apart, relax
+from cython.cimports.heat_igl.kernels.window_sources import apart, relax, take
 from cython.cimports.heat_igl.kernels.window_structures import NARROW, Search, Window, nearest_on
 from cython.cimports.libc.math import fabs, sqrt
 
@@ -24,7 +24,6 @@ def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
     c: cython.int
     k: cython.int
     j: cython.int
-    distance: cython.double
     for c in range(3):
         for k in range(3):
             corner[k] = 1.0 if k == c else 0.0
@@ -34,11 +33,7 @@ def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
             _emit(s, 3 * f + c, ends, root, s.segment_offset[i])
     j = s.first_target[f] if s.first_target != cython.NULL else -1
     while j >= 0:
-        distance = _distance(s, i, s.target + 3 * j)
-        if distance < s.target_distance[j]:
-            s.target_distance[j] = distance
-            s.target_root[j] = root
-            s.target_entered[j] = -1
+        take(s, j, _distance(s, i, s.target + 3 * j), root)
         j = s.next_target[j]
 
 

@@ -228,6 +228,17 @@ def apart(s: cython.pointer(Search), f: cython.int, a: cython.p_double, b: cytho
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def take(s: cython.pointer(Search), j: cython.int, distance: cython.double, root: cython.int) -> cython.void:
+    """Take a distance of target j inside its face if it is shorter than the one known."""
+    if distance < s.target_distance[j]:
+        s.target_distance[j] = distance
+        s.target_root[j] = root
+        s.target_entered[j] = -1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
     """Windows from a source inside a face over its three sides."""
     f: cython.int = s.point_face[p]
@@ -240,7 +251,6 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
     i: cython.int
     j: cython.int
     corner: cython.double[3]
-    distance: cython.double
     length: cython.double
     left_length: cython.double
     right_length: cython.double
@@ -266,11 +276,7 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
             add(s, h, cython.address(one), 1, False)
     j = s.first_target[f] if s.first_target != cython.NULL else -1
     while j >= 0:
-        distance = offset + apart(s, f, s.target + 3 * j, at)
-        if distance < s.target_distance[j]:
-            s.target_distance[j] = distance
-            s.target_root[j] = root
-            s.target_entered[j] = -1
+        take(s, j, offset + apart(s, f, s.target + 3 * j, at), root)
         j = s.next_target[j]
 
 

@@ -1,14 +1,15 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
-from heat_igl.unfolding.distance import distance_from_scratch, unfolded_distance
+from heat_igl.unfolding.distance import distance_from_scratch, distance_to_targets, unfolded_distance
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
 from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
 from heat_igl.unfolding.fronts import FrontSolver
-from heat_igl.unfolding.local import distances_within, nearest_vertices, pair_distances
+from heat_igl.unfolding.local import blocks_within, distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.path_derivatives import Change
 from heat_igl.unfolding.path_lengths import PathLengths
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 from heat_igl.unfolding.solver import UnfoldingSolver
+from heat_igl.unfolding.within_store import read_distances_within, write_distances_within
 
 __all__ = [
     "ExactPaths",
@@ -22,11 +23,15 @@ __all__ = [
     "Refine",
     "Refinement",
     "UnfoldingSolver",
+    "blocks_within",
     "distance_from_scratch",
+    "distance_to_targets",
     "distances_within",
     "exact_distance",
     "exact_paths",
     "nearest_vertices",
     "pair_distances",
+    "read_distances_within",
     "unfolded_distance",
+    "write_distances_within",
 ]

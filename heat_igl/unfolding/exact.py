@@ -13,7 +13,7 @@ from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import Sources, SourceSegments, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh, from_triangulation
-from heat_igl.unfolding.window_search import Found, Searched, search
+from heat_igl.unfolding.window_search import Found, Searched, search, starts_at
 
 __all__ = ["ExactSolution", "ExactSurface", "Origin", "exact_distance"]
 
@@ -143,17 +143,8 @@ class ExactSurface:
         ValueError
             If there are segments or points, and the surface does not know the faces that they refer to.
         """
-        done = search(
-            self._half_edges,
-            sources,
-            offsets,
-            points,
-            point_offsets,
-            segments,
-            cutoff=cutoff,
-            targets=targets,
-            goals=goals,
-        )
+        starts = starts_at(self._half_edges, sources, offsets, points, point_offsets, segments)
+        done = search(self._half_edges, starts, cutoff=cutoff, targets=targets, goals=goals)
         which = done.nearest_copy(0 if targets is None else len(targets))
         return ExactSolution(
             *self._result(done.found, done, self._half_edges.number, cutoff),

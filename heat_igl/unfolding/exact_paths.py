@@ -13,7 +13,7 @@ from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_triangulation
-from heat_igl.unfolding.window_search import Searched, search
+from heat_igl.unfolding.window_search import Searched, search, starts_at
 
 __all__ = ["ExactPaths", "Starts", "exact_paths"]
 
@@ -93,16 +93,16 @@ def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: Fl
     vertex[is_corner] = mesh.F[faces[is_corner], barycentric[is_corner].argmax(axis=1)]
     points, segments = sources.points, sources.segments
     begin = float(sources.offsets.min())
-    done = search(
+    sources_there = starts_at(
         edges,
         sources.vertices,
         sources.vertex_offset - begin,
         SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
         points.offset - begin if len(points.faces) else None,
         replace(segments, offset=segments.offset - begin) if len(segments.faces) else None,
-        targets=SurfacePoints(faces[~is_corner], barycentric[~is_corner]) if not is_corner.all() else None,
-        goals=np.unique(vertex[is_corner]),
     )
+    inside = SurfacePoints(faces[~is_corner], barycentric[~is_corner]) if not is_corner.all() else None
+    done = search(edges, sources_there, targets=inside, goals=np.unique(vertex[is_corner]))
     starts = _starts(edges, done, vertex)
     where, places, ends = _traced(edges, done, starts)
     return ExactPaths(

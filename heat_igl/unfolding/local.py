@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
 from heat_igl.unfolding.window_search import TOLERANCE
 
-__all__ = ["distances_within", "nearest_vertices", "pair_distances"]
+__all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distances", "positive"]
 
 # Sources that a thread takes at a time: few enough that all threads end together.
 _CHUNK = 64
@@ -54,16 +54,49 @@ def distances_within(mesh: MeshLike, radius: float, sources: Sources | None = No
     SourceError
         If `sources` does not name vertices.
     """
-    limit = _positive(radius)
+    limit = positive("radius", radius)
+    triangles = _triangles(mesh)
+    chosen = _chosen(sources, triangles)
+    return _rows_within(from_mesh(triangles, int(chosen[0])), chosen, limit)
+
+
+def blocks_within(
+    mesh: MeshLike, radius: float, sources: Sources | None = None, most_entries: int = 2**24
+) -> Iterator[sp.csr_array]:
+    """The rows of `distances_within`, some after the other, so that not all need fit into memory.
+
+    Parameters
+    ----------
+    mesh, radius, sources
+        As for `distances_within`.
+    most_entries : int
+        About so many distances are in memory at a time: the first block has few rows, and says how many the next has.
+
+    Yields
+    ------
+    scipy.sparse.csr_array
+        Shape (rows, n).
+    """
+    limit = positive("radius", radius)
     triangles = _triangles(mesh)
     chosen = _chosen(sources, triangles)
     edges = from_mesh(triangles, int(chosen[0]))
+    least = _CHUNK * n_threads()
+    start, rows = 0, least
+    while start < len(chosen):
+        block = _rows_within(edges, chosen[start : start + rows], limit)
+        yield block
+        start += rows
+        rows = max(int(most_entries * block.shape[0] / max(block.nnz, 1)) // least, 1) * least
+
+
+def _rows_within(edges: HalfEdges, chosen: IntArray, limit: float) -> sp.csr_array:
     parts = _in_chunks(edges, chosen, lambda work, part: _within(work, part, edges.scaled(limit)))
     counts = np.concatenate([part.counts for part in parts])
     ends = np.concatenate([[0], np.cumsum(counts)])
     columns = np.concatenate([part.vertex for part in parts])
     values = edges.unscaled(np.concatenate([part.distance for part in parts]))
-    found = sp.csr_array((values, columns, ends), shape=(len(chosen), triangles.n_vertices))
+    found = sp.csr_array((values, columns, ends), shape=(len(chosen), edges.n))
     found.sort_indices()
     return found
 
@@ -276,11 +309,12 @@ def _chosen(sources: Sources | None, mesh: Mesh) -> IntArray:
     return np.arange(mesh.n_vertices) if sources is None else named_vertices(sources, mesh.n_vertices)
 
 
-def _positive(radius: float) -> float:
-    is_number = isinstance(radius, int | float | np.integer | np.floating) and not isinstance(radius, bool)
-    if not is_number or not radius > 0:
-        raise ValueError(f"radius must be a positive number, not {radius!r}")
-    return float(radius)
+def positive(name: str, value: float) -> float:
+    """A number as a float; ValueError naming it if it is not positive."""
+    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if not is_number or not value > 0:
+        raise ValueError(f"{name} must be a positive number, not {value!r}")
+    return float(value)
 
 
 def _checked_pairs(pairs: ArrayLike, n: int) -> IntArray:

@@ -12,7 +12,7 @@ from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, Located
 
-__all__ = ["TOLERANCE", "Found", "Searched", "Starts", "search"]
+__all__ = ["TOLERANCE", "Found", "Searched", "Starts", "search", "starts_at"]
 
 #: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds
 #: up to. A larger number keeps a few windows more and changes no result.
@@ -97,18 +97,13 @@ class Searched(NamedTuple):
 
 def search(
     edges: HalfEdges,
-    sources: IntArray = _NO_VERTICES,
-    offsets: FloatArray | None = None,
-    points: SurfacePoints | None = None,
-    point_offsets: FloatArray | None = None,
-    segments: SourceSegments | None = None,
+    starts: Starts,
     *,
     cutoff: float = np.inf,
     targets: SurfacePoints | None = None,
     goals: IntArray | None = None,
 ) -> Searched:
-    """Distances on the tables `edges`; parameters and errors are those of `ExactSurface.solve`."""
-    starts = _starts(edges, sources, offsets, points, point_offsets, segments)
+    """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`."""
     place = edges.located(targets)
     n, t = edges.n, len(place.faces)
     found, at_targets = Found.of(n, n + len(starts.points.faces) + len(starts.segments.faces)), Found.of(t, 0)
@@ -153,7 +148,7 @@ def search(
     return Searched(starts, found, place, at_targets, *(int(count) for count in statistics[1:]))
 
 
-def _starts(
+def starts_at(
     edges: HalfEdges,
     sources: IntArray,
     offsets: FloatArray | None,
@@ -161,7 +156,7 @@ def _starts(
     point_offsets: FloatArray | None,
     segments: SourceSegments | None,
 ) -> Starts:
-    """Sources for the kernel; points and ends of segments at corners become vertices."""
+    """Sources for the kernel, as `ExactSurface.solve` takes them; points at corners become vertices."""
     k, p = len(sources), 0 if points is None else len(points)
     begin = np.zeros(k) if offsets is None else edges.scaled(np.asarray(offsets, np.float64))
     late = np.zeros(p) if point_offsets is None else edges.scaled(np.asarray(point_offsets, np.float64))
