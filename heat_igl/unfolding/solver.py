@@ -26,9 +26,9 @@ _SPACING = 0.125
 _SWEEP_ERROR = 0.01
 # In components of up to so many vertices distance is found by exact windows, whatever was asked for.
 _FEW = 1000
-# So it is with so much curvature at each vertex (radians, in the mean). There walks pass vertices on the wrong side: 0.7
-# to 3.4 % of the largest distance on plates, beams, voxels and terrain, most of which have 0.5 to 3 radians, and up to
-# 0.46 % on a coarse cow with 0.14, which is too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
+# So it is with so much curvature at each vertex (radians, in the mean). There walks pass vertices on the wrong side:
+# 0.7 to 3.4 % of the largest distance on plates, beams, voxels and terrain, most of which have 0.5 to 3 radians, and up
+# to 0.46 % on a coarse cow with 0.14, too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
 _ROUGH = {"sweep": 0.25, "unfold": 0.1}
 # With this share of flat vertices, and holes that keep walks from proving flatness, windows are as fast as walks.
 _FLAT = 0.5
