@@ -18,7 +18,7 @@ from heat_igl.validation.samples import bunny_path
 
 __all__ = ["demonstrate", "sample_mesh"]
 
-_SOURCE = 1234  # on the bunny's haunch: most of the surface is visible from its side
+_SOURCE = 1234  # on the bunny's haunch: most of the surface is visible from there
 _Rows = list[tuple[str, str]]
 
 
@@ -27,7 +27,7 @@ def sample_mesh() -> Path | None:
     return bunny_path()
 
 
-def demonstrate(out: Path) -> list[tuple[str, str]]:
+def demonstrate(out: Path) -> _Rows:
     """Compute distance on the bunny, compare it with exact distance, and write a PLY and a PNG file.
 
     Without pymeshlab, which ships the bunny, the mesh is a sphere.

@@ -12,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 
 from heat_igl.errors import MeshError, SourceError
-from heat_igl.io import MESH_SUFFIXES
+from heat_igl.io import MESH_SUFFIXES, is_mesh_path
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_simplices
 from heat_igl.sources import Sources, vertex_sources
 
@@ -24,7 +24,7 @@ __all__ = ["Item", "SourcePlan", "folder", "items", "read_source_sets"]
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """A mesh of a batch: its name in the store, its label in messages, and the mesh or the path to read it from."""
+    """A mesh of a batch: the name in the store, the label in messages, and the mesh or the path to read it from."""
 
     name: str
     label: str
@@ -42,11 +42,7 @@ def folder(path: str | os.PathLike[str]) -> dict[str, Path]:
     root = Path(path)
     if not root.is_dir():
         raise ValueError(f"{root} is not a folder of meshes")
-    found = {
-        file.relative_to(root).as_posix(): file
-        for file in sorted(root.rglob("*"))
-        if file.suffix.lower() in MESH_SUFFIXES
-    }
+    found = {file.relative_to(root).as_posix(): file for file in sorted(root.rglob("*")) if is_mesh_path(file)}
     if not found:
         raise ValueError(f"{root} holds no mesh: files must end in {', '.join(MESH_SUFFIXES)}")
     return found
@@ -80,7 +76,7 @@ def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike]) -> Iterator[Item]
 
 
 def _held(mesh: MeshLike, label: str) -> Path | Mesh | PointCloud | tuple[Any, Any]:
-    """What a task carries: a path, a mesh, a cloud, or arrays, which are checked where they are used."""
+    """The data that a task carries: a path, a mesh, a cloud, or arrays, which are checked when they are used."""
     if isinstance(mesh, str | os.PathLike):
         return Path(mesh)
     if isinstance(mesh, Mesh | PointCloud) or (isinstance(mesh, tuple) and len(mesh) == 2):

@@ -33,22 +33,22 @@ def geodesic_distance(
         Whatever `as_mesh` takes: `Mesh`, `PolygonMesh`, a pair (V, F), a path, or a mesh of trimesh, pyvista, open3d,
         meshio and others.
     sources : sources
-        A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources` where
+        A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources` if
         distance begins at other values than 0, or a list of such. Faces of points on polygons are counted as those of
         ``PolygonMesh.triangles``.
     method : {"unfold", "sweep", "heat", "exact"}
         "unfold" follows straight lines through strips of triangles: near-exact, see `unfolded_distance`. "sweep"
         unfolds two triangles at a time. Both go through the vertices in the order of Dijkstra's algorithm; polygons are
-        cut into triangles. "heat" is `HeatMethodSolver` with its defaults, the only one for tetrahedra; on polygons it
-        takes `polygon_operators`. "exact" is the polyhedral distance by windows, and ends the search at the cutoff;
-        curves stand for dense points, see `UnfoldingSolver`.
+        cut into triangles. "heat" is `HeatMethodSolver` with its defaults; on polygons it takes `polygon_operators`.
+        "exact" is the polyhedral distance by windows, and ends the search at the cutoff; curves stand for dense points,
+        see `UnfoldingSolver`. Tetrahedra take "sweep" and "heat", which both are fronts there, see `FrontSolver`.
     cutoff : float, optional
         Distances beyond this are ``inf``.
 
     Returns
     -------
     (n,) float64
-        In the mesh's unit: 0 at source vertices (their offset where they have one, unless another source is nearer),
+        In the mesh's unit: 0 at source vertices (the offset of those that have one, unless another source is nearer),
         ``inf`` at vertices that no source reaches, never negative or NaN.
 
     Raises
@@ -56,7 +56,7 @@ def geodesic_distance(
     MeshError
         If the mesh cannot be used or is not understood, or `method` needs triangles and it holds tetrahedra.
     SourceError
-        If `sources` does not describe places on the mesh, or holds a curve and `method` is "exact".
+        If `sources` does not describe places on the mesh.
     ValueError
         If there is no such `method`, or `cutoff` is not positive.
 
@@ -80,7 +80,12 @@ def geodesic_distance(
         return HeatMethodSolver(as_mesh(mesh)).distance(sources, beyond)
     triangles = as_simplices(mesh)
     if triangles.is_tetrahedral:
-        raise MeshError(f'method={method!r} needs triangles, and the mesh holds tetrahedra: take method="heat"')
+        if method == "sweep":
+            return HeatMethodSolver(triangles, refine="sweep").distance(sources, beyond)
+        raise MeshError(
+            f'method={method!r} needs triangles, and the mesh holds tetrahedra: take method="sweep", exact where the '
+            "way is a straight line"
+        )
     if method == "exact":
         # The search ends at the cutoff; points near it, whose straight lines are known, may lie beyond.
         farthest = np.inf if beyond is None else beyond

@@ -1,4 +1,4 @@
-"""`SolverOptions`: what a heat method solver can be asked for, checked once."""
+"""`SolverOptions`: the options of a heat method solver, checked once."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class SolverOptions:
 
     @property
     def triangulation(self) -> Laplacian:
-        """The `laplacian` for `operators`: where the heat is needed for an order alone, any Delaunay one does."""
+        """The `laplacian` for `operators`: if heat is needed for an order alone, any Delaunay one does."""
         return "intrinsic-delaunay" if self.laplacian == "auto" and self.refine is not None else self.laplacian
 
     @property
@@ -70,8 +70,14 @@ class SolverOptions:
         """Whether the time step is left to the solver."""
         return self.t_coef is None and self.t is None
 
+    @property
+    def leaves_heat(self) -> bool:
+        """Whether fronts may take the place of heat: where no magnitude, time step, boundary or Laplacian is named."""
+        is_default = self.magnitude == "auto" and self.boundary == "neumann" and self.laplacian != "cotan"
+        return self.refine == "sweep" or (self.refine is None and is_default and self.default_time_step)
+
     def damps(self, domain: Operators) -> bool:
-        """Whether the field is damped where heat arrives from several sides: ``magnitude="auto"`` resolved."""
+        """Whether the field is damped on faces with heat from several sides: ``magnitude="auto"`` resolved."""
         if self.magnitude == "auto":
             return domain.is_surface and self.laplacian != "cotan"
         return self.magnitude == "damped"

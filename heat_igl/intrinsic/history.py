@@ -2,7 +2,7 @@
 
 Merging, reversing and flipping faces keep the surface, but give a point another face or other barycentric coordinates.
 A flip replaces two triangles, laid out in the plane on either side of their edge, by two others that cover the same
-quadrilateral; a point keeps its place in the plane.
+quadrilateral; a point keeps the same place in the plane.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Turned(NamedTuple):
 
 
 class Covered(NamedTuple):
-    """Faces doubled: face f stays as the front, face m + f is the back, with its corners 1 and 2 swapped.
+    """Faces doubled: face f stays as the front, face m + f is the back, with corners 1 and 2 swapped.
 
     Attributes
     ----------
@@ -100,15 +100,10 @@ class Flipped(NamedTuple):
 
     def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
         """Faces (k,) and barycentric coordinates (k, 3) of points after the change."""
-        sides = np.concatenate([self.half_edge, self.mate])
-        ascending = np.argsort(sides // 3)
-        place = np.searchsorted(sides[ascending] // 3, faces)
-        moved = np.flatnonzero(place < len(sides))
-        moved = moved[sides[ascending[place[moved]]] // 3 == faces[moved]]
+        moved, edge, in_second = self.moved(faces)
         if not len(moved):
             return faces, barycentric
-        side = ascending[place[moved]]
-        edge, in_second = side % len(self.mate), side >= len(self.mate)
+        sides, side = np.concatenate([self.half_edge, self.mate]), edge + len(self.mate) * in_second
         ab, pa, bp, aq, qb = self.lengths[:, edge]
         # a at the origin, b on the first axis, p above the axis and q below.
         (px, py), (qx, qy) = apex(ab, pa, bp), apex(ab, aq, qb)
@@ -131,6 +126,16 @@ class Flipped(NamedTuple):
         )
         return faces, barycentric
 
+    def moved(self, faces: IntArray) -> tuple[IntArray, IntArray, BoolArray]:
+        """The points whose faces (k,) change, which edge is flipped there, and whether the face is its second."""
+        sides = np.concatenate([self.half_edge, self.mate])
+        ascending = np.argsort(sides // 3)
+        place = np.searchsorted(sides[ascending] // 3, faces)
+        moved = np.flatnonzero(place < len(sides))
+        moved = moved[sides[ascending[place[moved]]] // 3 == faces[moved]]
+        side = ascending[place[moved]]
+        return moved, side % len(self.mate), side >= len(self.mate)
+
 
 class Refined(NamedTuple):
     """Faces split at new vertices and edges flipped, one after another.
@@ -142,7 +147,7 @@ class Refined(NamedTuple):
     numbers : (k, 5) float64
         Barycentric coordinates of the new vertex, or the lengths of `Flipped`.
     first, following : (m,) int64, (k, 3) int64
-        Where to look for the next move that concerns a face, see `heat_igl.kernels.carrying`.
+        Tables to find the next move that concerns a face, see `heat_igl.kernels.carrying`.
     """
 
     kind: IntArray

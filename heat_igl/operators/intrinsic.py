@@ -18,7 +18,7 @@ from heat_igl.operators.suitability import fit_for_heat
 from heat_igl.operators.surface import Surface
 from heat_igl.typing import ArrayLike
 
-__all__ = ["changed_operators", "edge_length_operators", "intrinsic_operators"]
+__all__ = ["changed_operators", "edge_length_operators", "intrinsic_operators", "without_refinement"]
 
 
 def intrinsic_operators(
@@ -109,6 +109,16 @@ def changed_operators(
     return replace(domain, L=domain.L / 2, M=domain.M / 2, weights=domain.weights / 2)
 
 
+def without_refinement(domain: Operators) -> Operators:
+    """The operators on the vertices of the mesh alone, of a `domain` to which refinement has added vertices."""
+    surface = domain.surface
+    if surface is None or surface.faces is None or surface.uncovered is None:
+        return domain
+    given = intrinsic_operators(surface.faces)
+    plain = changed_operators(surface.uncovered, surface.faces, surface.uncovered, given)
+    return replace(plain, surface=Surface(surface.uncovered, surface.faces, V=surface.V), contrast=domain.contrast)
+
+
 def edge_length_operators(
     F: ArrayLike,
     lengths: ArrayLike,
@@ -123,11 +133,11 @@ def edge_length_operators(
     F : (m, 3) array_like of int
         Vertices of each triangle.
     lengths : (m, 3) array_like
-        ``lengths[f, c]`` is that of the side of triangle f opposite its corner c.
+        ``lengths[f, c]`` is that of the side of triangle f opposite corner c.
     n : int, optional
         Number of vertices; one more than the largest in `F` if not given.
     laplacian : {"intrinsic-delaunay", "intrinsic-delaunay-refined", "auto", "cotan"}
-        As for `operators`. Where more than two faces meet at an edge, nothing is refined.
+        As for `operators`. If more than two faces meet at an edge, nothing is refined.
     twin : (m, 3) array_like of int, optional
         Which sides are glued, as for `intrinsic.from_gluing`; by default those that have both ends in common.
 

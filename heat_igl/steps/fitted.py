@@ -1,4 +1,4 @@
-"""The Laplacian of the heat flow, its weights fitted to the lengths of edges."""
+"""The Laplacian of the heat flow, with weights fitted to the lengths of edges."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import scipy.sparse as sp
 from heat_igl.operators import Operators
 from heat_igl.typing import FloatArray
 
-__all__ = ["fitted_laplacian"]
+__all__ = ["fit", "fit_slope", "fitted_laplacian"]
 
 
 def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
     """L with the weight of each edge fitted to heat that falls like exp(-d / sqrt(t)), however long the edge.
 
-    Where (1 - t Laplace) u = 0, the mean of u over a circle of radius r is I0(r / sqrt(t)) times its value in the
+    If (1 - t Laplace) u = 0, the mean of u over a circle of radius r is I0(r / sqrt(t)) times the value in the
     centre, I0 the modified Bessel function. Linear elements know the first terms of that series alone, 1 + r^2 / (4 t):
     along an edge much longer than sqrt(t) heat falls by too little, and the front runs ahead there and bends. So an
-    edge of length r gets its weight times (r^2 / (4 t)) / (I0(r / sqrt(t)) - 1), which is 1 for short ones. Negative
+    edge of length r gets the weight times (r^2 / (4 t)) / (I0(r / sqrt(t)) - 1), which is 1 for short ones. Negative
     weights are left out, so that heat is positive and keeps its digits on any triangles.
 
     Parameters
@@ -51,14 +51,15 @@ def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
     if edges is None:
         raise ValueError("weights are fitted to the lengths of edges, which this domain does not have")
     i, j, length = edges
-    fit = _fit(length / np.sqrt(t[domain.components[i]] if isinstance(t, np.ndarray) else t))
-    # Entry 0 takes what L does not couple.
+    fitted = fit(length / np.sqrt(t[domain.components[i]] if isinstance(t, np.ndarray) else t))
+    # Entry 0 takes the pairs that L does not couple.
     entry = sp.csc_matrix((np.arange(1, L.nnz + 1, dtype=L.indices.dtype), L.indices, L.indptr), shape=L.shape)
     factor = np.zeros(L.nnz + 1)
     for rows, columns in ((i, j), (j, i)):
         # L has one entry for all edges between the same two vertices. The largest factor is that of the shortest: heat
-        # arrives along it first, and it has most of the weight, which is the length of the dual edge over its own.
-        np.maximum.at(factor, np.asarray(entry[rows, columns]).ravel(), fit)
+        # arrives along it first, and it has most of the weight, which is the length of the dual edge over the length of
+        # the edge.
+        np.maximum.at(factor, np.asarray(entry[rows, columns]).ravel(), fitted)
     column = np.repeat(np.arange(n), np.diff(L.indptr))
     on_diagonal = np.flatnonzero(L.indices == column)
     weight = np.maximum(L.data, 0.0)
@@ -75,8 +76,8 @@ def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
     return sp.csc_matrix((weight, L.indices, L.indptr), shape=L.shape)
 
 
-def _fit(x: FloatArray) -> FloatArray:
-    """(x^2 / 4) / (I0(x) - 1)."""
+def fit(x: FloatArray) -> FloatArray:
+    """(x^2 / 4) / (I0(x) - 1): the factor of a weight whose edge has length x in units of sqrt(t)."""
     # I0 is the sum of y^k / (k!)^2, and 13 terms give it to 1e-12 up to x = 4; beyond, nothing cancels.
     y = np.minimum(x, 4.0) ** 2 / 4
     over_y = np.zeros_like(x)
@@ -89,3 +90,21 @@ def _fit(x: FloatArray) -> FloatArray:
     beyond = np.minimum(x[far], 600.0)
     fitted[far] = beyond**2 / 4 / (np.i0(beyond) - 1)
     return np.asarray(fitted)
+
+
+def fit_slope(x: FloatArray) -> FloatArray:
+    """The derivative of `fit`."""
+    from scipy.special import i0e, i1e  # not needed for a distance
+
+    # With y = x^2 / 4 the factor is 1 / S(y), S the sum of y^(k - 1) / (k!)^2.
+    y = np.minimum(x, 4.0) ** 2 / 4
+    total, slope = np.zeros_like(x), np.zeros_like(x)
+    for k in range(13, 0, -1):
+        slope = slope * y + total
+        total = total * y + 1 / factorial(k) ** 2
+    result = -slope / total**2 * (x / 2)
+    far = x > 4
+    beyond = np.minimum(x[far], 600.0)
+    less_one = i0e(beyond) - np.exp(-beyond)
+    result[far] = fit(beyond) * (2 / beyond - i1e(beyond) / less_one)
+    return np.asarray(result)

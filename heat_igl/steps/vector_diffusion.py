@@ -28,9 +28,9 @@ class VectorHeatFlow:
     operators : Operators
         The domain.
     rotations : (n, n) csc_matrix of complex128
-        What transport along the edges multiplies by, as `edge_rotations` gives it for triangles.
-    t : float
-        Time step, a squared length.
+        Factors of transport along the edges, as `edge_rotations` gives it for triangles.
+    t : float or (n_components,) float64
+        Time step, a squared length; one for all components, or one for each.
     backend : {"auto", "scipy", "multifrontal"}
         See `factorize`. The iterative backend solves for numbers of one sign only.
     fitted : bool
@@ -46,7 +46,12 @@ class VectorHeatFlow:
     """
 
     def __init__(
-        self, operators: Operators, rotations: sp.csc_matrix, t: float, backend: Backend = "auto", fitted: bool = False
+        self,
+        operators: Operators,
+        rotations: sp.csc_matrix,
+        t: float | FloatArray,
+        backend: Backend = "auto",
+        fitted: bool = False,
     ) -> None:
         if backend == "iterative":
             raise ValueError("backend='iterative' cannot solve for vectors: use 'auto', 'scipy' or 'multifrontal'")
@@ -57,7 +62,8 @@ class VectorHeatFlow:
         self.t, self.mean_mass, self._n = t, operators.mean_mass, operators.n
         L = fitted_laplacian(operators, t) if fitted else operators.L
         mass = operators.M.diagonal() / self.mean_mass
-        matrix = shifted(with_rotations(L, rotations), -t / self.mean_mass, mass)
+        step = operators.expand_to_vertices(t) if isinstance(t, np.ndarray) else t
+        matrix = shifted(with_rotations(L, rotations), -step / self.mean_mass, mass)
         self.factor = factorize(_real(matrix), backend, np.repeat(operators.referenced, 2))
 
     def solve(self, b: AnyArray) -> AnyArray:

@@ -2,21 +2,30 @@
 
 from heat_igl.unfolding.distance import distance_from_scratch, unfolded_distance
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
+from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
+from heat_igl.unfolding.fronts import FrontSolver
 from heat_igl.unfolding.local import distances_within, nearest_vertices, pair_distances
+from heat_igl.unfolding.path_derivatives import Change
+from heat_igl.unfolding.path_lengths import PathLengths
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = [
+    "ExactPaths",
+    "Change",
     "ExactSolution",
     "ExactSurface",
+    "FrontSolver",
     "Known",
     "Origin",
+    "PathLengths",
     "Refine",
     "Refinement",
     "UnfoldingSolver",
     "distance_from_scratch",
     "distances_within",
     "exact_distance",
+    "exact_paths",
     "nearest_vertices",
     "pair_distances",
     "unfolded_distance",

@@ -90,8 +90,8 @@ def distance_from_scratch(
         surface = ExactSurface(from_mesh(mesh, int(chosen.vertices[0])))
         return surface.solve(chosen.vertices, chosen.vertex_offset, cutoff=cutoff).distance
     domain = _Domain(mesh, unfolding_surface(mesh))
-    lines = _Lines(chosen, *_straight_lines(domain, chosen))
     solver = UnfoldingSolver(domain, refine, tolerance, cutoff)
+    lines = _Lines(chosen, *((_NONE, _NONE) if solver.is_exact else _straight_lines(domain, chosen)))
     order = np.zeros(mesh.n_vertices) if solver.is_exact else -_along_edges(domain, chosen)
     return np.asarray(solver.distances([lines], order[:, None])[0])
 

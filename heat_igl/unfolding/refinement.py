@@ -14,20 +14,22 @@ import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation, double_cover, oriented
 from heat_igl.intrinsic.fans import breadth_first, tables
+from heat_igl.intrinsic.history import BACK_CORNERS
 from heat_igl.kernels.ordering import ascending
 from heat_igl.mesh import SurfacePoints
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.path_derivatives import Paths, Places, Starts, Triangles, Ways, half_edge_arrays
 from heat_igl.unfolding.walks import INSIDE, Points, sweep, unfold, unknown, views
 
 __all__ = ["TOLERANCE", "Known", "Refine", "Refinement"]
 
 Refine = Literal["sweep", "unfold", "exact"]
 
-# Relative gain below which a path is not straightened further. What is lost adds up to 0.0003 to 0.003 % on average; 0
+# Relative gain below which a path is not straightened further. The loss adds up to 0.0003 to 0.003 % on average; 0
 # loses nothing and takes up to twice the time.
 TOLERANCE = 4e-5
-# The search starts at vertices that fall short of what a neighbour promised by this many tolerances: by more than the
-# paths that the promise rests on may have been cut short.
+# The search starts at vertices with distances longer than a neighbour promised by this many tolerances: by more than
+# the paths that the promise rests on may have been cut short.
 _SHORTFALL = 15.0
 # Passes over vertices whose neighbours turned out to be nearer than the order said. They are few, and ever fewer.
 _MAX_PASSES = 50
@@ -65,8 +67,8 @@ class Refinement:
 
     Notes
     -----
-    Paths end at the boundary and where more than two faces meet: they run along such edges, not across. A surface that
-    cannot be oriented is replaced by its oriented double cover, with each source on both sheets. Immutable; threads may
+    Paths end at the boundary and at edges of more than two faces: they run along such edges, not across. A surface that
+    cannot be oriented is replaced by the oriented double cover, with each source on both sheets. Immutable; threads may
     share it, and the kernels release the interpreter's lock.
     """
 
@@ -79,9 +81,9 @@ class Refinement:
         if not triangulation.aligned.all():
             self._n_sheets = 2
             F, lengths, twin = double_cover(triangulation)
-        self._triangulation = triangulation
+        self.triangulation = triangulation
         self._number, self._face, F, lengths, twin = breadth_first(F, lengths, twin, self._n_sheets * self.n)
-        self._F = F
+        self._F, self._lengths = F, lengths
         self._tables = tables(F, lengths, twin, len(self._number))
         self._twin = twin
 
@@ -133,7 +135,7 @@ class Refinement:
         ----------
         key : (n,) float64
             Vertices are visited in ascending order of this: ``-heat``, or a rough distance. A wrong order costs
-            time; what it changes is smaller than the sweep's error.
+            time; the change is smaller than the sweep's error.
         sources : (k,) int64
             Vertices that distance starts from.
         offsets : (k,) float64, optional
@@ -146,14 +148,14 @@ class Refinement:
             The distance at which each of them starts; 0 if not given.
         labels : (n,) int64, optional
             Filled with the source that each distance is measured from (geodesic Voronoi cells): 0 to k - 1 for
-            vertices, k to k + p - 1 for points, -1 where none is reached.
+            vertices, k to k + p - 1 for points, -1 if none is reached.
         known : Known, optional
             Distances to begin with, besides those of the sources.
 
         Returns
         -------
         (n,) float64
-            ``inf`` where no source is reached. Neither an upper nor a lower bound on a curved surface; on a flat
+            ``inf`` if no source is reached. Neither an upper nor a lower bound on a curved surface; on a flat
             convex one exact to rounding.
         """
         starts = self._starts(sources, offsets, points, point_offsets)
@@ -191,16 +193,16 @@ class Refinement:
         key, sources
             As for `sweep`.
         tolerance : float
-            A path is taken as it is once straightening it further would shorten it by less than this fraction of its
+            A path is taken as it is once straightening it further would shorten it by less than this fraction of the
             length, and by less than one and a half times this fraction of the way to the next bend. 0 follows every
-            path to its last bend or its source.
+            path to the last bend or the source.
         offsets, points, point_offsets, labels
             As for `sweep`.
 
         Returns
         -------
         (n,) float64
-            ``inf`` where no source is reached. Every value is the length of a path on the surface (to rounding, 1e-9
+            ``inf`` if no source is reached. Every value is the length of a path on the surface (to rounding, 1e-9
             of it), so none is shorter than the exact distance. On a flat convex domain exact to rounding.
 
         Raises
@@ -210,9 +212,11 @@ class Refinement:
         """
         if not 0 <= tolerance <= 1:
             raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
-        # Below 1e-5, forecasts are wrong by as much because of the curvature on the way.
-        shortfall = max(_SHORTFALL * tolerance, 1e-5)
-        starts = self._starts(sources, offsets, points, point_offsets)
+        walk = self._walks(key, self._starts(sources, offsets, points, point_offsets), tolerance)
+        return self._on_base(walk["distance"], walk["label"], labels)
+
+    def _walks(self, key: FloatArray, starts: _Starts, tolerance: float, **ways: AnyArray) -> AnyArray:
+        """What is known of the path of each row after `unfold`; how each path begins is filled into `ways`."""
         walk = unknown(len(self._number) + starts.n_points)
         walk[starts.row] = starts.walk
         unfold(
@@ -221,12 +225,66 @@ class Refinement:
             walk,
             starts.points,
             tolerance=tolerance,
-            shortfall=shortfall,
+            # Below 1e-5, forecasts are wrong by as much because of the curvature on the way.
+            shortfall=max(_SHORTFALL * tolerance, 1e-5),
             max_steps=_MAX_SEARCH,
             max_passes=_MAX_PASSES,
             has_holes=self.has_holes,
+            **ways,
         )
-        return self._on_base(walk["distance"], walk["label"], labels)
+        return walk
+
+    def paths(self, key: FloatArray, sources: Starts, tolerance: float = TOLERANCE) -> Paths:
+        """The paths whose lengths `unfold` returns, on the triangles by the numbers of the tables.
+
+        Of a surface that cannot be oriented, on both sheets.
+        """
+        vertices, offsets, points, point_offsets = sources
+        starts = self._starts(vertices, offsets if offsets.any() else None, points, point_offsets)
+        n = len(self._number)
+        entered, share, reach = np.full(n, -1, np.int32), np.zeros(n), np.zeros(n)
+        walk = self._walks(key, starts, tolerance, entered=entered, share=share, reach=reach)
+        found = Ways(walk["distance"][:n].copy(), entered.astype(np.int64), share, reach)
+        places = Places.none()
+        if points is not None:
+            faces, barycentric, point = self._faces_of(points)
+            late = np.zeros(len(points)) if point_offsets is None else np.asarray(point_offsets, np.float64)
+            places = Places(faces, barycentric, point, late[point])
+        is_source = np.zeros(n, bool)
+        on_sheets = self._number[np.concatenate([vertices + self.n * sheet for sheet in range(self._n_sheets)])]
+        is_source[on_sheets] = walk["distance"][on_sheets] >= np.tile(offsets, self._n_sheets)
+        return Paths(self._triangles, places, found, is_source)
+
+    @cached_property
+    def _triangles(self) -> Triangles:
+        size = self._F.size
+        F, twin = self._F.astype(np.int64), self._twin.ravel().astype(np.int64)
+        return half_edge_arrays(IntrinsicTriangulation(F, self._lengths, twin, np.ones(size, bool), len(self._number)))
+
+    def by_given_sides(self, by_side: FloatArray) -> FloatArray:
+        """Derivatives by the sides (m, 3) of `triangulation`, from those by the numbers of the tables."""
+        sheets = by_side[self._face].reshape(self._n_sheets, -1, 3)
+        return np.asarray(sheets[0] if self._n_sheets == 1 else sheets[0] + sheets[1][:, BACK_CORNERS])
+
+    def on_tables(self, sides: FloatArray) -> FloatArray:
+        """Values by the numbers of the tables, from those on the sides (m, 3) of `triangulation`."""
+        if self._n_sheets == 2:
+            sides = np.concatenate([sides, sides[:, BACK_CORNERS]])
+        ordered = np.empty_like(sides)
+        ordered[self._face] = sides
+        return ordered
+
+    def rows_of(self, distance: FloatArray) -> AnyArray:
+        """The number (n,) in the tables of each vertex, on the sheet on which `distance` by these numbers is less."""
+        on_sheets = self._number.reshape(self._n_sheets, -1)
+        nearer = distance[on_sheets].argmin(axis=0)
+        return np.asarray(on_sheets[nearer, np.arange(self.n)])
+
+    def vertex_of(self, rows: AnyArray) -> IntArray:
+        """The vertices that have some numbers in the tables."""
+        vertex = np.empty(len(self._number), np.int64)
+        vertex[self._number] = np.tile(np.arange(self.n), self._n_sheets)
+        return np.asarray(vertex[rows])
 
     def _order(self, key: FloatArray) -> AnyArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
@@ -240,7 +298,7 @@ class Refinement:
         points: SurfacePoints | None,
         point_offsets: FloatArray | None,
     ) -> _Starts:
-        """What the kernels start from, on all sheets and by the numbers of the tables."""
+        """Initial values of the kernels, on all sheets and by the numbers of the tables."""
         n, k, sheets = len(self._number), len(sources), range(self._n_sheets)
         row = self._number[np.concatenate([sources + self.n * sheet for sheet in sheets])]
         walk = unknown(len(row))
@@ -269,11 +327,11 @@ class Refinement:
 
     def _faces_of(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray]:
         """Triangles of the tables that hold points, coordinates in them, and which point each is."""
-        faces, barycentric = self._triangulation.locate(points.faces, points.barycentric)
+        faces, barycentric = self.triangulation.locate(points.faces, points.barycentric)
         point = np.arange(len(faces))
         if self._n_sheets == 2:
             # On the other sheet faces are turned over: their corners 1 and 2 change places.
-            faces = np.concatenate([faces, faces + len(self._triangulation.F)])
+            faces = np.concatenate([faces, faces + len(self.triangulation.F)])
             barycentric = np.concatenate([barycentric, barycentric[:, [0, 2, 1]]])
             point = np.tile(point, 2)
         faces = self._face[faces]
@@ -284,7 +342,7 @@ class Refinement:
         i, c, beyond = i[there], c[there], beyond[there]
         following = beyond - beyond % 3 + (beyond + 1) % 3
         other = np.zeros((len(i), 3))
-        # Its corner after the far one is at the end, as seen from here, of the side that starts after corner c.
+        # The corner after the far one is at the end, as seen from here, of the side that starts after corner c.
         other[np.arange(len(i)), following % 3] = barycentric[i, (c + 2) % 3]
         other[np.arange(len(i)), (following + 1) % 3] = barycentric[i, (c + 1) % 3]
         return (

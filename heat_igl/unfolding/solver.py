@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import NamedTuple, Protocol
 
@@ -10,10 +11,11 @@ import numpy as np
 
 from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
-from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSet, take_shorter
+from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSegments, SourceSet, take_shorter
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.exact import ExactSurface
+from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 
 __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
@@ -21,14 +23,14 @@ __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
 # Curves are unfolded from as points, at most so many mean edge lengths s apart. At a distance d that is wrong by the
 # fraction (s / d)^2 / 8 at most: by 0.005 % beyond the 6 edges within which straight lines from the curve itself count.
 _SPACING = 0.125
-# Where a sweep gives less than a straight line by less than this, it is the sweep that is wrong, and no shorter path is
+# If a sweep gives less than a straight line by less than this, it is the sweep that is wrong, and no shorter path is
 # there: sweeps are off by 0.06 to 0.4 % in the mean and by 1.6 % at most (cow, fandisk, camel's head).
 _SWEEP_ERROR = 0.01
 # In components of up to so many vertices distance is found by exact windows, whatever was asked for.
 _FEW = 1000
 # So it is with so much curvature at each vertex (radians, in the mean). There walks pass vertices on the wrong side:
-# 0.7 to 3.4 % of the largest distance on plates, beams, voxels and terrain, most of which have 0.5 to 3 radians, and up
-# to 0.46 % on a coarse cow with 0.14, too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
+# 0.7 to 3.4 % of the largest distance on plates, beams, voxels and terrain, most with 0.5 to 3 radians, and up to
+# 0.46 % on a coarse cow with 0.14, which is too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
 _ROUGH = {"sweep": 0.25, "unfold": 0.1}
 # With this share of flat vertices, and holes that keep walks from proving flatness, windows are as fast as walks.
 _FLAT = 0.5
@@ -38,7 +40,7 @@ _KNOWN_RADIUS = 4.0
 
 
 class UnfoldingDomain(Protocol):
-    """What unfolding takes of a domain; `Operators` is one."""
+    """The part of a domain that unfolding uses; `Operators` is one."""
 
     @property
     def surface(self) -> Surface | None:
@@ -84,12 +86,13 @@ def _costs_little_to_be_exact(refinement: Refinement, rough: float) -> bool:
 
 
 class _Asked(NamedTuple):
-    """Vertices and points that distance starts from, and when; `labels` is filled if given."""
+    """What distance starts from, and when; `labels` is filled if given. Without `segments`, points stand for curves."""
 
     vertices: IntArray
     offsets: FloatArray | None
     points: SurfacePoints | None
     point_offsets: FloatArray | None
+    segments: SourceSegments | None
     labels: IntArray | None
 
 
@@ -102,11 +105,12 @@ class UnfoldingSolver:
         Triangles.
     refine : {"sweep", "unfold", "exact"}
         Which update. "exact" is the polyhedral distance by windows, see `ExactSurface`; the heat is not read. The other
-        two take it as well where the mesh is rough or flat with holes, and in small components. It is exact from
-        vertices and points. A curve stands for points at most an eighth of a mean edge length apart, and straight lines
-        from the curve itself count up to 6 edges from it: beyond, distance from it is too long by 0.005 % at most.
+        two take it as well if the mesh is rough or flat with holes, and in small components. It is exact from vertices,
+        points and curves. For the other two, a curve stands for points at most an eighth of a mean edge length apart,
+        and straight lines from the curve itself count up to 6 edges from it: beyond, distance is too long by 0.005 % at
+        most.
     tolerance : float, optional
-        As for `Refinement.unfold`, with its default.
+        As for `Refinement.unfold`, with the same default.
     cutoff : float
         With "exact", what is farther is ``inf``, and the search ends there.
 
@@ -140,6 +144,10 @@ class UnfoldingSolver:
         return ExactSurface(self._surface.unfolding)
 
     @cached_property
+    def _exact_on_given_faces(self) -> ExactSurface:
+        return ExactSurface(self._surface.unfolding if self._surface.faces is None else self._surface.faces)
+
+    @cached_property
     def _bounds(self) -> Bounds:
         return Bounds(self._surface)
 
@@ -150,31 +158,48 @@ class UnfoldingSolver:
     def distances(self, terms: Sequence[UnfoldingTerm], u: FloatArray) -> FloatArray:
         """Distances (k, n) for heat (n, k).
 
-        Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
+        If the heat has underflowed the order is arbitrary, which the unfolding corrects.
         """
         return np.stack([self._distance(term, one) for term, one in zip(terms, u.T, strict=True)])
 
     def labelled(self, term: UnfoldingTerm, u: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 where none is reached."""
+        """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 if none is reached."""
         labels = np.empty(len(u), np.int64)
         return self._distance(term, u, labels), labels
+
+    def paths(self, sources: SourceSet, u: FloatArray) -> PathLengths:
+        """The paths whose lengths are the distances from vertices and points, for heat (n,).
+
+        Raises
+        ------
+        ValueError
+            With ``refine="sweep"``, whose distances are not the lengths of paths.
+        """
+        if self._sweeps:
+            raise ValueError('refine="sweep" finds no paths to differentiate: take refine="unfold" or "exact"')
+        if self._refinement is None or self.is_exact:
+            return from_windows(self._exact, self._surface.unfolding, sources)
+        return from_walks(self._refinement, sources, u)
 
     def _distance(self, term: UnfoldingTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
         sources, points, components = term.sources, self._points(term), self._domain.components
         places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
-        # Tolerances are relative to the distance: what all have in common is added afterwards.
+        # Tolerances are relative to the distance: the common part is added afterwards.
         earliest = np.full(self._domain.n_components, np.inf)
-        component_of_point = components[self._given_faces[points.faces, 0]] if places else np.empty(0, np.int64)
-        component = np.concatenate([components[sources.vertices], component_of_point])
-        offset = np.concatenate([sources.vertex_offset, points.offset])
+        segments = sources.segments if self.is_exact and len(sources.segments.faces) else None
+        faces = points.faces if segments is None else np.concatenate([points.faces, segments.faces])
+        in_faces = components[self._given_faces[faces, 0]] if len(faces) else np.empty(0, np.int64)
+        component = np.concatenate([components[sources.vertices], in_faces])
+        offset = np.concatenate([sources.vertex_offset, points.offset, [] if segments is None else segments.offset])
         np.minimum.at(earliest, component, offset)
         late = offset - earliest[component]
-        k = len(sources.vertices)
+        k, p = len(sources.vertices), len(points.faces)
         asked = _Asked(
             sources.vertices,
             late[:k] if late.any() else None,
             places,
-            late[k:] if late.any() and places else None,
+            late[k : k + p] if late.any() and places else None,
+            None if segments is None else replace(segments, offset=late[k + p :]),
             labels,
         )
         by_windows = self._takes_windows(component)
@@ -183,7 +208,8 @@ class UnfoldingSolver:
         if offset.any():
             distance += start
         if labels is not None:
-            labels[:] = np.concatenate([sources.vertex_label, points.label, [-1]])[labels]
+            of_places = points.label if segments is None else np.concatenate([points.label, segments.label])
+            labels[:] = np.concatenate([sources.vertex_label, of_places, [-1]])[labels]
         for seeds in (term.near_seen, term.far):
             if not len(seeds.vertex):
                 continue
@@ -215,8 +241,9 @@ class UnfoldingSolver:
     ) -> FloatArray:
         """Distances (n,) from vertices and points, each component's from where it begins."""
         if self._refinement is None or by_windows:
-            found = self._exact.solve(
-                asked.vertices, asked.offsets, asked.points, asked.point_offsets, cutoff=self._cutoff
+            surface = self._exact if asked.segments is None else self._exact_on_given_faces
+            found = surface.solve(
+                asked.vertices, asked.offsets, asked.points, asked.point_offsets, asked.segments, cutoff=self._cutoff
             )
             if asked.labels is not None:
                 asked.labels[:] = found.origin.label
@@ -248,7 +275,7 @@ class UnfoldingSolver:
         return groups
 
     def _known(self, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray, asked: _Asked) -> Known | None:
-        """What straight lines from points reach, and exact windows near several sources."""
+        """Vertices that straight lines from points reach, and exact windows near several sources."""
         near = term.near_seen
         if len(asked.vertices) + len(points.faces) > 1 and not len(term.sources.segments.faces):
             radius = _KNOWN_RADIUS * self._domain.mean_edge_length
@@ -271,6 +298,6 @@ class UnfoldingSolver:
 
     def _points(self, term: UnfoldingTerm) -> SourcePoints:
         points, segments = term.sources.points, term.sources.segments
-        if not len(segments.faces) or self._faces is None:
+        if not len(segments.faces) or self._faces is None or self.is_exact:
             return points
         return points.joined(self._faces.samples(segments, self._spacing)[0]).joined(segments.ends())
