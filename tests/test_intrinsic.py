@@ -6,7 +6,7 @@ import pytest
 from conftest import perturbed, shared_path
 
 import heat_igl
-from heat_igl import Mesh, MeshError, shapes
+from heat_igl import HeatMethodSolver, Mesh, MeshError, shapes
 from heat_igl.intrinsic import (
     Adjacency,
     apex,
@@ -17,6 +17,7 @@ from heat_igl.intrinsic import (
     lay_out,
     mollify,
 )
+from heat_igl.unfolding import exact_distance
 
 
 def delaunay(mesh: Mesh):
@@ -294,3 +295,47 @@ def test_spokes_are_the_edges_at_a_vertex(cow):
         edges = cow.edges[(cow.edges == v).any(axis=1)]
         assert set(ends[which == i].tolist()) == set(edges[edges != v].tolist())
     np.testing.assert_allclose(lengths, np.linalg.norm(cow.V[vertices[which]] - cow.V[ends], axis=1), rtol=1e-12)
+
+
+def steep() -> Mesh:
+    """A grid with independent heights, on whose surface flips make edges that join a vertex with itself."""
+    flat = shapes.grid(12)
+    return Mesh(flat.V + [0, 0, 1] * np.random.default_rng(2).random((flat.n_vertices, 1)) * 5, flat.F)
+
+
+def test_edge_lengths_and_gluing_of_triangles_that_meet_themselves():
+    mesh = steep()
+    flipped = intrinsic_delaunay(intrinsic_triangulation(mesh))
+    assert (flipped.tail(np.arange(flipped.F.size)) == flipped.head(np.arange(flipped.F.size))).any()
+    given = {"F": flipped.F, "lengths": flipped.l, "twin": flipped.twin.reshape(-1, 3)}
+    truth = exact_distance(mesh.V, mesh.F, 7)
+    for refine, bound in (("exact", 1e-10), ("unfold", 1e-10), (None, 0.1)):
+        found = HeatMethodSolver.from_edge_lengths(**given, refine=refine).distance(7)
+        assert np.abs(found - truth).max() < bound * truth.max()
+
+
+def test_a_triangle_rolled_up_to_a_cone():
+    """Two of its sides are glued, and the third is a loop at one vertex, the boundary."""
+    solver = HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]])
+    assert solver.distance(0) == pytest.approx([0, 3])
+    assert solver.operators.M.diagonal().sum() == pytest.approx(0.5 * np.sqrt(9 - 0.25))
+    exact = HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]], refine="exact")
+    assert exact.distance(1) == pytest.approx([3, 0])
+
+
+@pytest.mark.parametrize(
+    ("twin", "lengths", "message"),
+    [
+        ([[-1, 2, -1]], [[1, 3, 3]], r"twin\[0, 1\] = 2 is no half-edge .* glued back to 1 \(1 entries"),
+        ([[0, 2, 1]], [[1, 3, 3]], r"twin\[0, 0\] = 0 is no half-edge"),
+        ([[1, 0, -1]], [[1, 3, 3]], r"twin\[0, 0\] = 1 is no half-edge that ends at the same vertices"),
+        ([[-2, 2, 1]], [[1, 3, 3]], r"twin\[0, 0\] = -2 is no half-edge"),
+        ([[7, 2, 1]], [[1, 3, 3]], r"twin\[0, 0\] = 7 is no half-edge"),
+        ([[-1, 2]], [[1, 3, 3]], r"one integer per side of F, shape \(1, 3\), but it has shape \(1, 2\)"),
+        ([[-1.0, 2, 1]], [[1, 3, 3]], "one integer per side of F, .* holds float64"),
+        ([[-1, 2, 1]], [[1, 3, 2.5]], "l gives the edge between faces 0 and 0 two lengths"),
+    ],
+)
+def test_refused_gluing(twin, lengths, message):
+    with pytest.raises(MeshError, match=message):
+        HeatMethodSolver.from_edge_lengths([[0, 1, 1]], lengths, twin=twin)

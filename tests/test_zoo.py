@@ -8,13 +8,23 @@ from functools import cache
 import numpy as np
 import pytest
 
-from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, OffsetSources, SurfacePoints, shapes, unfolded_distance
+from heat_igl import (
+    AccuracyWarning,
+    HeatMethodSolver,
+    Mesh,
+    OffsetSources,
+    SurfacePoints,
+    geodesic_distance,
+    read_mesh,
+    shapes,
+    unfolded_distance,
+)
 from heat_igl.heat_method.several_sources import drop_overtaken
 from heat_igl.intrinsic import mollify
 from heat_igl.sources import SourceAssembler, source_set
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import SHAPES
-from tests.conftest import load_script
+from tests.conftest import load_script, shared_path
 
 # Mean error in percent over three sources as measured; a bound on either side.
 MEASURED = {
@@ -63,6 +73,20 @@ def test_heat_on_shapes_of_the_zoo(name: str) -> None:
             for source in table.seeded_sources(mesh)
         ]
     assert 0.6 * MEASURED[name] < np.mean(errors) < 1.3 * MEASURED[name] + 0.1
+
+
+@pytest.mark.parametrize("name", ["truck.obj", "teapot.obj", "suzanne.obj", "cow.obj", "horse_quads.obj"])
+def test_models_are_answered_without_a_warning(name: str) -> None:
+    """Of the truck these sources are in parts of thin triangles, on which heat was 5 to 6 % off."""
+    mesh = read_mesh(shared_path(name))
+    sources = [81, 183, 124, 17, 58] if name == "truck.obj" else range(0, mesh.n_vertices, mesh.n_vertices // 5)
+    solver = HeatMethodSolver(mesh)
+    for source in sources:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", AccuracyWarning)
+            distance = solver.distance(source)
+        if name == "truck.obj":
+            assert relative_error(distance, geodesic_distance(mesh, source)) < 0.03
 
 
 # Components of different size.
@@ -117,7 +141,7 @@ def test_a_wrong_answer_warns_and_is_raised_to_straight_lines() -> None:
     lines = np.linalg.norm(mesh.V - mesh.V[210], axis=1)
     solver = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay")
     with pytest.warns(
-        AccuracyWarning, match=r"at least \d+\.\d % too short on average, .* most at vertex \d+; use ref"
+        AccuracyWarning, match=r"at least \d+\.\d % too short on average, .* were raised, most at vertex \d+; use ref"
     ):
         distance = solver.distance(210)
     assert (distance >= lines - 1e-12).all()
@@ -128,7 +152,7 @@ def test_a_wrong_answer_warns_and_is_raised_to_straight_lines() -> None:
     assert check.raised
     # The paper's method keeps its answer.
     paper = HeatMethodSolver(mesh, laplacian="cotan")
-    with pytest.warns(AccuracyWarning, match="too short"):
+    with pytest.warns(AccuracyWarning, match="too short on average, below straight lines, most at"):
         assert np.mean(paper.distance(210) < 0.9 * lines) > 0.2
     # So does a time step that was asked for, which may be meant to smooth.
     smooth = HeatMethodSolver(mesh, t_coef=2000)

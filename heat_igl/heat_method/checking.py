@@ -72,9 +72,10 @@ class AnswerCheck(NamedTuple):
 
     def _problem(self, on_average: float, at_worst: float) -> str | None:
         if self.shortfall > on_average:
+            lines = "straight lines, to which they were raised" if self.raised else "straight lines"
             return (
-                f"heat gave distances at least {100 * self.shortfall:.1f} % too short on average, below straight "
-                f"lines, most at vertex {self.shortest_vertex}"
+                f"heat gave distances at least {100 * self.shortfall:.1f} % too short on average, below {lines}, most "
+                f"at vertex {self.shortest_vertex}"
             )
         if self.largest_shortfall > at_worst and not self.raised:
             return (

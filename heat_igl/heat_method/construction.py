@@ -57,6 +57,7 @@ class PreparedSolver(BatchedSolver):
         lengths: ArrayLike,
         *,
         n: int | None = None,
+        twin: ArrayLike | None = None,
         t_coef: float | None = None,
         t: float | None = None,
         laplacian: Laplacian = "auto",
@@ -76,6 +77,10 @@ class PreparedSolver(BatchedSolver):
             both triangles at an edge give it the same length.
         n : int, optional
             Number of vertices; one more than the largest in `F` if not given.
+        twin : (m, 3) array_like of int, optional
+            ``twin[f, c]`` is ``3 g + d`` where side c of triangle f is glued to side d of triangle g, and -1 on the
+            boundary. By default sides with the same ends are glued. It is needed where several edges join the same two
+            vertices, or a vertex with itself, as in intrinsic triangulations; then a triangle may repeat a vertex.
         **options
             As for the class. Where more than two triangles meet at an edge no tufted cover is made, which takes
             positions: such edges are not flipped.
@@ -83,11 +88,11 @@ class PreparedSolver(BatchedSolver):
         Raises
         ------
         MeshError
-            If `F` or `lengths` cannot be used; the message names the first offender.
+            If `F`, `lengths` or `twin` cannot be used; the message names the first offender.
         """
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, refine, backend)
         start = time.perf_counter()
-        domain = edge_length_operators(F, lengths, n, options.triangulation)
+        domain = edge_length_operators(F, lengths, n, options.triangulation, twin)
         return cls._of(prepare(domain, options, seconds_operators=time.perf_counter() - start))
 
     def with_vertices(self: Solver, V: ArrayLike) -> Solver:

@@ -3,7 +3,7 @@
 from heat_igl.intrinsic.adjacency import Adjacency
 from heat_igl.intrinsic.delaunay import intrinsic_delaunay
 from heat_igl.intrinsic.double_cover import double_cover
-from heat_igl.intrinsic.gluing import from_edge_lengths, intrinsic_triangulation, oriented
+from heat_igl.intrinsic.gluing import from_edge_lengths, from_gluing, intrinsic_triangulation, oriented
 from heat_igl.intrinsic.gradient import intrinsic_gradient
 from heat_igl.intrinsic.history import Covered, Flipped, Merged, Refined, Turned
 from heat_igl.intrinsic.layout import apex, corner_angles, lay_out
@@ -32,6 +32,7 @@ __all__ = [
     "delaunay_refinement",
     "double_cover",
     "from_edge_lengths",
+    "from_gluing",
     "has_nonmanifold_edges",
     "intrinsic_delaunay",
     "intrinsic_gradient",

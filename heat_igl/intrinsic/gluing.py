@@ -12,9 +12,9 @@ from heat_igl.intrinsic.history import Turned
 from heat_igl.intrinsic.mollification import mollify
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, half_edge_head, half_edge_tail
 from heat_igl.mesh import Mesh, connectivity
-from heat_igl.typing import ArrayLike, IntArray
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
-__all__ = ["from_edge_lengths", "intrinsic_triangulation", "oriented"]
+__all__ = ["from_edge_lengths", "from_gluing", "intrinsic_triangulation", "oriented"]
 
 # Two lengths of one edge may differ by this share: digits lost when the lengths were written to a file, for instance.
 _SAME_LENGTH = 1e-9
@@ -45,6 +45,71 @@ def from_edge_lengths(
         If `l` has the wrong shape or an entry that is not a length, or gives an edge two lengths.
     """
     found = connectivity.facets(F, n) if facets is None else facets
+    lengths = _checked_lengths(l, F)
+    half_edge = np.arange(F.size)
+    first, last = np.empty((2, len(found.n_faces)), np.int64)
+    # Of several values written to one place, the last stays.
+    last[found.of_face.ravel()] = half_edge
+    first[found.of_face.ravel()[::-1]] = half_edge[::-1]
+    a, b = first[found.n_faces == 2], last[found.n_faces == 2]
+    _require_one_length(lengths, a, b)
+    twin = np.where(found.n_faces[found.of_face.ravel()] == 1, -1, -2)
+    twin[a], twin[b] = b, a
+    aligned = np.ones(F.size, bool)
+    aligned[a] = aligned[b] = half_edge_tail(F, a) == half_edge_head(F, b)
+    added = mollify(lengths, F)
+    return IntrinsicTriangulation(F, lengths + added[:, None], twin, aligned, n, lengthening=float(added.max()))
+
+
+def from_gluing(l: ArrayLike, F: IntArray, n: int, twin: ArrayLike) -> IntrinsicTriangulation:  # noqa: E741
+    """Triangles with given edge lengths that are glued as `twin` says; degenerate ones are mollified.
+
+    Edges may join the same two vertices, or a vertex with itself.
+
+    Parameters
+    ----------
+    l : (m, 3) array_like
+        ``l[f, c]`` is the length of the edge opposite corner ``c`` of face ``f``.
+    F : (m, 3) int64
+        Faces, which may have a vertex at several corners.
+    n : int
+        Number of vertices.
+    twin : (m, 3) array_like of int
+        ``twin[f, c]`` is the half-edge ``3 g + d``, side d of face g, that side c of face f is glued to; -1 on the
+        boundary. An edge that joins a vertex with itself is glued such that the faces are oriented alike.
+
+    Raises
+    ------
+    MeshError
+        If `l` or `twin` has the wrong shape or a wrong entry, or `l` gives an edge two lengths.
+    """
+    lengths, half_edge = _checked_lengths(l, F), np.arange(F.size)
+    glued = np.asarray(twin)
+    if glued.shape != F.shape or glued.dtype.kind not in "iu":
+        raise MeshError(
+            f"twin must hold one integer per side of F, shape {F.shape}, but it has shape {glued.shape} and holds "
+            f"{glued.dtype}"
+        )
+    mate = glued.astype(np.int64).ravel()
+    is_inner = mate != -1
+    wrong = is_inner & ((mate < 0) | (mate >= F.size) | (mate == half_edge))
+    a, b = half_edge[is_inner & ~wrong], mate[is_inner & ~wrong]
+    ends, other = ((half_edge_tail(F, h), half_edge_head(F, h)) for h in (a, b))
+    aligned = np.ones(F.size, bool)
+    aligned[a] = (ends[0] == other[1]) & (ends[1] == other[0])
+    wrong[a] = (mate[b] != a) | ~(aligned[a] | ((ends[0] == other[0]) & (ends[1] == other[1])))
+    if wrong.any():
+        h = int(np.flatnonzero(wrong)[0])
+        raise MeshError(
+            f"twin[{h // 3}, {h % 3}] = {mate[h]} is no half-edge that ends at the same vertices and is glued back to "
+            f"{h} ({int(wrong.sum())} entries are not): twin[f, c] = 3 g + d and twin[g, d] = 3 f + c, or -1"
+        )
+    _require_one_length(lengths, a, b)
+    added = mollify(lengths, F)
+    return IntrinsicTriangulation(F, lengths + added[:, None], mate, aligned, n, lengthening=float(added.max()))
+
+
+def _checked_lengths(l: ArrayLike, F: IntArray) -> FloatArray:  # noqa: E741
     lengths = np.array(l, dtype=np.float64)
     if lengths.shape != F.shape:
         raise MeshError(f"l must have one length per side of F, shape {F.shape}, but it has shape {lengths.shape}")
@@ -52,12 +117,11 @@ def from_edge_lengths(
     if bad.any():
         f, c = (int(i) for i in np.argwhere(bad)[0])
         raise MeshError(f"l[{f}, {c}] = {lengths[f, c]} is not a length ({int(bad.sum())} entries are not)")
-    half_edge = np.arange(F.size)
-    first, last = np.empty((2, len(found.n_faces)), np.int64)
-    # Of several values written to one place, the last stays.
-    last[found.of_face.ravel()] = half_edge
-    first[found.of_face.ravel()[::-1]] = half_edge[::-1]
-    a, b = first[found.n_faces == 2], last[found.n_faces == 2]
+    return lengths
+
+
+def _require_one_length(lengths: FloatArray, a: IntArray, b: IntArray) -> None:
+    """Half-edges a and b (k,), which are glued, have the same length."""
     differs = np.abs(lengths.ravel()[a] - lengths.ravel()[b]) > _SAME_LENGTH * lengths.ravel()[a]
     if differs.any():
         one, other = int(a[differs][0]), int(b[differs][0])
@@ -65,12 +129,6 @@ def from_edge_lengths(
             f"l gives the edge between faces {one // 3} and {other // 3} two lengths, {lengths.flat[one]} and "
             f"{lengths.flat[other]} ({int(differs.sum())} edges differ)"
         )
-    twin = np.where(found.n_faces[found.of_face.ravel()] == 1, -1, -2)
-    twin[a], twin[b] = b, a
-    aligned = np.ones(F.size, bool)
-    aligned[a] = aligned[b] = half_edge_tail(F, a) == half_edge_head(F, b)
-    added = mollify(lengths, F)
-    return IntrinsicTriangulation(F, lengths + added[:, None], twin, aligned, n, lengthening=float(added.max()))
 
 
 def intrinsic_triangulation(mesh: Mesh) -> IntrinsicTriangulation:

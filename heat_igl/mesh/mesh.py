@@ -68,8 +68,10 @@ def checked_positions(V: ArrayLike) -> FloatArray:
     return positions
 
 
-def checked_faces(F: ArrayLike, n: int | None) -> IntArray:
+def checked_faces(F: ArrayLike, n: int | None, *, may_repeat: bool = False) -> IntArray:
     """`F` as a new (m, 3) or (m, 4) int64 array of indices below `n`; without `n`, of any indices.
+
+    With `may_repeat`, a face may have the same vertex at two corners.
 
     Raises
     ------
@@ -103,7 +105,7 @@ def checked_faces(F: ArrayLike, n: int | None) -> IntArray:
     repeats = np.zeros(len(faces), bool)
     for one, other in combinations(faces.T, 2):
         repeats |= one == other
-    if repeats.any():
+    if repeats.any() and not may_repeat:
         row = int(np.flatnonzero(repeats)[0])
         raise MeshError(
             f"F[{row}] = {faces[row].tolist()} repeats a vertex ({int(repeats.sum())} of {len(faces)} faces do): "

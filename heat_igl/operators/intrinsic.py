@@ -8,7 +8,7 @@ import igl
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, intrinsic_delaunay
+from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, from_gluing, intrinsic_delaunay
 from heat_igl.mesh import Mesh, connectivity
 from heat_igl.mesh.mesh import checked_faces
 from heat_igl.operators.elements import TriangleElements
@@ -120,7 +120,11 @@ def without_refinement(domain: Operators) -> Operators:
 
 
 def edge_length_operators(
-    F: ArrayLike, lengths: ArrayLike, n: int | None = None, laplacian: Laplacian = "intrinsic-delaunay"
+    F: ArrayLike,
+    lengths: ArrayLike,
+    n: int | None = None,
+    laplacian: Laplacian = "intrinsic-delaunay",
+    twin: ArrayLike | None = None,
 ) -> Operators:
     """The operators of triangles that are given by their edge lengths.
 
@@ -134,19 +138,22 @@ def edge_length_operators(
         Number of vertices; one more than the largest in `F` if not given.
     laplacian : {"intrinsic-delaunay", "intrinsic-delaunay-refined", "auto", "cotan"}
         As for `operators`. If more than two faces meet at an edge, nothing is refined.
+    twin : (m, 3) array_like of int, optional
+        Which sides are glued, as for `intrinsic.from_gluing`; by default those that have both ends in common.
 
     Raises
     ------
     MeshError
-        If `F` or `lengths` cannot be used.
+        If `F`, `lengths` or `twin` cannot be used.
     ValueError
         If `laplacian` is unknown.
     """
     check_laplacian(laplacian)
-    triangles = checked_faces(F, n)
+    triangles = checked_faces(F, n, may_repeat=twin is not None)
     if triangles.shape[1] != 3:
         raise MeshError(f"F must have shape (m, 3), triangles, but it has shape {triangles.shape}")
-    faces = from_edge_lengths(lengths, triangles, int(triangles.max()) + 1 if n is None else n)
+    n = int(triangles.max()) + 1 if n is None else n
+    faces = from_edge_lengths(lengths, triangles, n) if twin is None else from_gluing(lengths, triangles, n, twin)
     given = intrinsic_operators(faces)
     if laplacian == "cotan":
         return given
