@@ -8,6 +8,7 @@ from heat_igl.curves import (
     enclosed_areas,
     exp_map,
     isolines,
+    log_map,
     offset_curves,
     shortest_paths,
     sublevel_areas,
@@ -24,6 +25,7 @@ from heat_igl.errors import (
 )
 from heat_igl.heat_method import (
     Diagnostics,
+    Directions,
     HeatMethodSolver,
     HeatSolution,
     LabelledDistance,
@@ -81,6 +83,7 @@ __all__ = [
     "BatchError",
     "ClosestPoints",
     "Diagnostics",
+    "Directions",
     "FactorizationError",
     "HeatMethodSolver",
     "HeatSolution",
@@ -125,6 +128,7 @@ __all__ = [
     "heat_method_distance",
     "image_domain",
     "isolines",
+    "log_map",
     "metrics",
     "nearest_vertices",
     "offset_curves",

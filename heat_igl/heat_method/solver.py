@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,13 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
 from heat_igl.heat_method.checking import AnswerCheck
+from heat_igl.heat_method.directions import Directions, directions
 from heat_igl.heat_method.integration import damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
+from heat_igl.intrinsic import TangentFrames, tangent_frames
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, PolygonMesh, as_mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators
@@ -366,6 +369,43 @@ class HeatMethodSolver(BatchedSolver):
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
+
+    def directions(self, sources: Sources, *, tolerance: float | None = None) -> Directions:
+        """Distance, and the directions in which the shortest paths leave the sources and arrive.
+
+        Parameters
+        ----------
+        sources : sources
+            As for `distance`, with its errors; no curves.
+        tolerance : float, optional
+            For ``refine="unfold"``, see `Refinement.unfold`: a smaller one takes longer. With the default the median
+            of the error of the departure is below 0.02 degrees, with 1e-6 it is rounding.
+
+        Returns
+        -------
+        Directions
+            Distances and labels as those of `voronoi`, angles in the frames of `tangent_frames`, and the gradient.
+
+        Raises
+        ------
+        MeshError
+            If the mesh has no tangent frames.
+        ValueError
+            Without ``refine="unfold"`` or ``refine="exact"``, for a solver that was made from operators, and if
+            `tolerance` is not a number from 0 to 1.
+        """
+        last_steps = self._parts.last_steps
+        if not isinstance(last_steps, UnfoldingSolver) or self._parts.options.refine == "sweep":
+            raise ValueError('directions follow paths: make the solver with refine="unfold" or refine="exact"')
+        if not isinstance(self._mesh, Mesh):
+            raise ValueError("directions need the positions of a mesh, which this solver does not have")
+        (term,) = self._source_terms([self._source_set(sources)])
+        found = last_steps.directed(term, self._order([term])[:, 0], tolerance)
+        return directions(*found, self._frames)
+
+    @cached_property
+    def _frames(self) -> TangentFrames:
+        return tangent_frames(self._mesh)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""

@@ -183,8 +183,12 @@ def _trace_one(
             for c in range(3):
                 a = dx * (py[c] - sy) - dy * (px[c] - sx)
                 b = dx * (py[(c + 1) % 3] - sy) - dy * (px[(c + 1) % 3] - sx)
-                if min(-a, b) > best:
-                    best = min(-a, b)
+                share = min(-a, b)
+                if fabs(a) + fabs(b) < ON_SIDE * tables.l[f, (c + 2) % 3]:
+                    # It runs along this side, and leaves at its end: where it crosses would be rounding.
+                    share -= 1e200
+                if share > best:
+                    best = share
                     k = c
         elif not ray.at_tail and not dx * (py[2] - sy) - dy * (px[2] - sx) > 0.0:
             k = 2

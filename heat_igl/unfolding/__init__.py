@@ -1,6 +1,7 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
-from heat_igl.unfolding.distance import distance_from_scratch, unfolded_distance
+from heat_igl.unfolding.directions import PathAngles, in_circle
+from heat_igl.unfolding.distance import directed_from_scratch, distance_from_scratch, unfolded_distance
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
 from heat_igl.unfolding.local import distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
@@ -11,12 +12,15 @@ __all__ = [
     "ExactSurface",
     "Known",
     "Origin",
+    "PathAngles",
     "Refine",
     "Refinement",
     "UnfoldingSolver",
+    "directed_from_scratch",
     "distance_from_scratch",
     "distances_within",
     "exact_distance",
+    "in_circle",
     "nearest_vertices",
     "pair_distances",
     "unfolded_distance",

@@ -14,12 +14,13 @@ from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators import Surface, unfolding_surface
 from heat_igl.sources import NEAR_RADIUS, NearField, Seeds, SourcePoints, Sources, SourceSet, source_set
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.unfolding.directions import PathAngles
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import from_mesh
 from heat_igl.unfolding.refinement import TOLERANCE, Refine
 from heat_igl.unfolding.solver import UnfoldingSolver
 
-__all__ = ["distance_from_scratch", "unfolded_distance"]
+__all__ = ["directed_from_scratch", "distance_from_scratch", "unfolded_distance"]
 
 _NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
 # For the order of the vertices, curves are points at most so many mean edge lengths apart.
@@ -89,11 +90,29 @@ def distance_from_scratch(
     if refine == "exact" and chosen.on_vertices_alone:
         surface = ExactSurface(from_mesh(mesh, int(chosen.vertices[0])))
         return surface.solve(chosen.vertices, chosen.vertex_offset, cutoff=cutoff).distance
+    solver, lines, order = _prepared(mesh, chosen, refine, tolerance, cutoff)
+    return np.asarray(solver.distances([lines], order[:, None])[0])
+
+
+def directed_from_scratch(
+    mesh: Mesh, sources: Sources, refine: Refine, tolerance: float | None = None
+) -> tuple[FloatArray, IntArray, PathAngles]:
+    """As `distance_from_scratch`, with the labels of the sources and the directions of the paths."""
+    if mesh.is_tetrahedral:
+        raise MeshError("directions need triangles, and the mesh holds tetrahedra")
+    chosen = source_set(sources, mesh.n_vertices, mesh.F)
+    solver, lines, order = _prepared(mesh, chosen, refine, tolerance, np.inf)
+    return solver.directed(lines, order)
+
+
+def _prepared(
+    mesh: Mesh, chosen: SourceSet, refine: Refine, tolerance: float | None, cutoff: float
+) -> tuple[UnfoldingSolver, _Lines, FloatArray]:
+    """A solver for one set of sources, that set as the solver takes it, and an order of the vertices."""
     domain = _Domain(mesh, unfolding_surface(mesh))
     lines = _Lines(chosen, *_straight_lines(domain, chosen))
     solver = UnfoldingSolver(domain, refine, tolerance, cutoff)
-    order = np.zeros(mesh.n_vertices) if solver.is_exact else -_along_edges(domain, chosen)
-    return np.asarray(solver.distances([lines], order[:, None])[0])
+    return solver, lines, np.zeros(mesh.n_vertices) if solver.is_exact else -_along_edges(domain, chosen)
 
 
 @dataclass(frozen=True, eq=False)

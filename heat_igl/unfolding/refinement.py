@@ -67,6 +67,13 @@ class Refinement:
     triangulation : IntrinsicTriangulation
         n vertices; an intrinsic Delaunay one, since long thin triangles hide the way from their neighbours.
 
+    Attributes
+    ----------
+    number, face : (n,), (m,) int32
+        Rows of the tables of the vertices (on all sheets) and of the faces.
+    tables : Tables
+        What the kernels read.
+
     Notes
     -----
     Paths end at the boundary and where more than two faces meet: they run along such edges, not across. A surface that
@@ -84,9 +91,9 @@ class Refinement:
             self._n_sheets = 2
             F, lengths, twin = double_cover(triangulation)
         self._triangulation = triangulation
-        self._number, self._face, F, lengths, twin = breadth_first(F, lengths, twin, self._n_sheets * self.n)
+        self.number, self.face, F, lengths, twin = breadth_first(F, lengths, twin, self._n_sheets * self.n)
         self._F = F
-        self._tables = tables(F, lengths, twin, len(self._number))
+        self.tables = tables(F, lengths, twin, len(self.number))
         self._twin = twin
 
     @cached_property
@@ -97,7 +104,7 @@ class Refinement:
         """
         if self.flatness < _HARDLY_FLAT:
             return True
-        m, n = len(self._F), len(self._number)
+        m, n = len(self._F), len(self.number)
         i, j = self._F.ravel(), self._F[:, [1, 2, 0]].ravel()
         graph = sp.coo_array((np.ones(3 * m, np.int8), (i, j)), shape=(n, n))
         component = csgraph.connected_components(graph, directed=False)[1]
@@ -111,7 +118,7 @@ class Refinement:
     @cached_property
     def flatness(self) -> float:
         """The share of vertices without curvature, those on the boundary included."""
-        return float(self._tables.is_flat.mean())
+        return float(self.tables.is_flat.mean())
 
     @cached_property
     def curvature(self) -> float:
@@ -119,7 +126,7 @@ class Refinement:
 
         The sum inside the surface is compared with two pi; on the boundary, a notch with more than pi counts.
         """
-        total = self._tables.total
+        total = self.tables.total
         return float(np.where(total > 0, np.abs(2 * np.pi - total), np.maximum(-total - np.pi, 0.0)).mean())
 
     def sweep(
@@ -162,8 +169,8 @@ class Refinement:
             ``inf`` where no source is reached. Neither an upper nor a lower bound on a curved surface; on a flat
             convex one exact to rounding.
         """
-        starts = self._starts(sources, offsets, points, point_offsets)
-        n = len(self._number)
+        starts = self.starts(sources, offsets, points, point_offsets)
+        n = len(self.number)
         distance = np.full(n + starts.n_points, np.inf)
         distance[starts.row] = starts.walk["distance"]
         label = None
@@ -172,12 +179,12 @@ class Refinement:
             label[starts.row] = starts.walk["label"]
         is_stale = np.ones(n, bool)
         if known is not None:
-            row = self._number[np.concatenate([known.vertex + self.n * sheet for sheet in range(self._n_sheets)])]
+            row = self.number[np.concatenate([known.vertex + self.n * sheet for sheet in range(self._n_sheets)])]
             distance[row], is_stale[row] = np.tile(known.distance, self._n_sheets), False
             if label is not None:
                 label[row] = np.tile(known.source, self._n_sheets)
         group = np.arange(len(starts.offset)) if groups is None else np.ascontiguousarray(groups, np.int64)
-        sweep(self._order(key), self._tables, distance[:n], label, starts.offset, group, is_stale)
+        sweep(self._order(key), self.tables, distance[:n], label, starts.offset, group, is_stale)
         return self._on_base(distance, label, labels)
 
     def unfold(
@@ -216,14 +223,18 @@ class Refinement:
         """
         if not 0 <= tolerance <= 1:
             raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
+        walk = self.walks(key, self.starts(sources, offsets, points, point_offsets), tolerance)
+        return self._on_base(walk["distance"], walk["label"], labels)
+
+    def walks(self, key: FloatArray, starts: Starts, tolerance: float = TOLERANCE) -> AnyArray:
+        """What `unfold` finds of the path of each row of the tables; see `heat_igl.unfolding.walks.WALK`."""
+        walk = unknown(len(self.number) + starts.n_points)
+        walk[starts.row] = starts.walk
         # Below 1e-5, forecasts are wrong by as much because of the curvature on the way.
         shortfall = max(_SHORTFALL * tolerance, 1e-5)
-        starts = self._starts(sources, offsets, points, point_offsets)
-        walk = unknown(len(self._number) + starts.n_points)
-        walk[starts.row] = starts.walk
         unfold(
             self._order(key),
-            self._tables,
+            self.tables,
             walk,
             starts.points,
             tolerance=tolerance,
@@ -232,34 +243,36 @@ class Refinement:
             max_passes=_MAX_PASSES,
             has_holes=self.has_holes,
         )
-        return self._on_base(walk["distance"], walk["label"], labels)
+        return walk
 
     def _order(self, key: FloatArray) -> AnyArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
         on_sheets = np.tile(key, self._n_sheets) if self._n_sheets > 1 else np.ascontiguousarray(key)
-        return np.asarray(self._number[ascending(on_sheets)])
+        return np.asarray(self.number[ascending(on_sheets)])
 
-    def _starts(
+    def starts(
         self,
         sources: IntArray,
         offsets: FloatArray | None,
         points: SurfacePoints | None,
         point_offsets: FloatArray | None,
-    ) -> _Starts:
+    ) -> Starts:
         """What the kernels start from, on all sheets and by the numbers of the tables."""
-        n, k, sheets = len(self._number), len(sources), range(self._n_sheets)
-        row = self._number[np.concatenate([sources + self.n * sheet for sheet in sheets])]
+        n, k, sheets = len(self.number), len(sources), range(self._n_sheets)
+        row = self.number[np.concatenate([sources + self.n * sheet for sheet in sheets])]
         walk = unknown(len(row))
-        walk["label"] = np.tile(np.arange(k), self._n_sheets)
+        walk["label"], walk["root"] = np.tile(np.arange(k), self._n_sheets), row
         begin = np.zeros(k) if offsets is None else np.asarray(offsets, np.float64)
         if points is None:
             walk["distance"] = walk["offset"] = begin[walk["label"]]
             return _ascending(row, walk, begin)
-        faces, barycentric, point = self._faces_of(points)
-        vertex, seen = views(faces, barycentric, self._F, self._tables)
+        faces, barycentric, point, turn = self._faces_of(points)
+        vertex, seen = views(faces, barycentric, self._F, self.tables)
         place = unknown(len(points))
         walk["distance"] = place["distance"] = 0.0
         seen["label"], place["label"] = k + np.repeat(point, 3), k + np.arange(len(points))
+        seen["departure"] += np.repeat(turn, 3)
+        seen["root"], place["root"] = n + np.repeat(point, 3), n + np.arange(len(points))
         row, walk = np.concatenate([row, vertex, n + np.arange(len(points))]), np.concatenate([walk, seen, place])
         begin = np.concatenate([begin, np.zeros(len(points)) if point_offsets is None else point_offsets])
         walk["offset"] = begin[walk["label"]]
@@ -268,13 +281,13 @@ class Refinement:
         first = np.full(len(self._F), -1, np.int32)
         first[faces[by_face][::-1]] = by_face[::-1]
         inside = np.zeros(len(faces), INSIDE)
-        inside["barycentric"], inside["following"], inside["row"] = barycentric, -1, n + point
+        inside["barycentric"], inside["turn"], inside["following"], inside["row"] = barycentric, turn, -1, n + point
         same = faces[by_face][1:] == faces[by_face][:-1]
         inside["following"][by_face[:-1][same]] = by_face[1:][same]
         return _ascending(row, walk, begin, len(points), Points(first, inside))
 
-    def _faces_of(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray]:
-        """Triangles of the tables that hold points, coordinates in them, and which point each is."""
+    def _faces_of(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
+        """Triangles of the tables that hold points, coordinates in them, which point each is, and `Inside.turn`."""
         faces, barycentric = self._triangulation.locate(points.faces, points.barycentric)
         point = np.arange(len(faces))
         if self._n_sheets == 2:
@@ -282,10 +295,10 @@ class Refinement:
             faces = np.concatenate([faces, faces + len(self._triangulation.F)])
             barycentric = np.concatenate([barycentric, barycentric[:, [0, 2, 1]]])
             point = np.tile(point, 2)
-        faces = self._face[faces]
+        faces = self.face[faces]
         # A point on a side also lies in the face beyond it.
         i, c = np.nonzero(barycentric < _ON_SIDE)
-        beyond = self._tables.across(faces[i], c)
+        beyond = self.tables.across(faces[i], c)
         there = np.flatnonzero(beyond >= 0)
         i, c, beyond = i[there], c[there], beyond[there]
         following = beyond - beyond % 3 + (beyond + 1) % 3
@@ -293,25 +306,33 @@ class Refinement:
         # Its corner after the far one is at the end, as seen from here, of the side that starts after corner c.
         other[np.arange(len(i)), following % 3] = barycentric[i, (c + 2) % 3]
         other[np.arange(len(i)), (following + 1) % 3] = barycentric[i, (c + 1) % 3]
+        # The same side runs the other way there.
+        turn = self._direction(3 * faces[i] + c) + np.pi - self._direction(beyond)
         return (
             np.concatenate([faces, following // 3]),
             np.concatenate([barycentric, other]),
             np.concatenate([point, point[i]]),
+            np.concatenate([np.zeros(len(point)), turn]),
         )
 
+    def _direction(self, half_edge: IntArray) -> FloatArray:
+        """The angle (k,) of half-edges in their triangles, from the side of corners 0 and 1."""
+        first, angle = half_edge - half_edge % 3, self.tables.step["angle"]
+        return np.choose(half_edge % 3, [np.pi - angle[first + 1], angle[first] - np.pi, np.zeros(len(half_edge))])
+
     def _on_base(self, distance: FloatArray, label: AnyArray | None, labels: IntArray | None) -> FloatArray:
-        on_sheets = distance[self._number].reshape(self._n_sheets, -1)
+        on_sheets = distance[self.number].reshape(self._n_sheets, -1)
         if self._n_sheets == 1:
             if labels is not None and label is not None:
-                labels[:] = label[self._number]
+                labels[:] = label[self.number]
             return np.asarray(on_sheets[0])
         if labels is not None and label is not None:
             nearest = on_sheets.argmin(axis=0)[None]
-            labels[:] = np.take_along_axis(label[self._number].reshape(self._n_sheets, -1), nearest, axis=0)[0]
+            labels[:] = np.take_along_axis(label[self.number].reshape(self._n_sheets, -1), nearest, axis=0)[0]
         return np.asarray(on_sheets.min(axis=0))
 
 
-class _Starts(NamedTuple):
+class Starts(NamedTuple):
     """Rows of the walks that are known and these, (k,) each, the nearest last; then by label where it begins."""
 
     row: AnyArray
@@ -323,7 +344,7 @@ class _Starts(NamedTuple):
 
 def _ascending(
     row: AnyArray, walk: AnyArray, offset: FloatArray, n_points: int = 0, points: Points | None = None
-) -> _Starts:
+) -> Starts:
     """Far ones first, so that of several for one vertex the nearest is written last."""
     order = np.argsort(-walk["distance"], kind="stable")
-    return _Starts(row[order], walk[order], offset, n_points, points)
+    return Starts(row[order], walk[order], offset, n_points, points)

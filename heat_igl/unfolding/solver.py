@@ -8,13 +8,15 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from heat_igl.errors import SourceError
 from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
 from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSet, take_shorter
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.exact import ExactSurface
-from heat_igl.unfolding.refinement import Known, Refine, Refinement
+from heat_igl.unfolding.directions import PathAngles, PathDirections
+from heat_igl.unfolding.refinement import TOLERANCE, Known, Refine, Refinement, Starts
 
 __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
 
@@ -82,14 +84,21 @@ def _costs_little_to_be_exact(refinement: Refinement) -> bool:
     )
 
 
+def _require_share(tolerance: float | None) -> None:
+    if tolerance is not None and not 0 <= tolerance <= 1:
+        raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
+
+
 class _Asked(NamedTuple):
-    """Vertices and points that distance starts from, and when; `labels` is filled if given."""
+    """Vertices and points that distance starts from, and when; `labels` and `angles` are filled if given."""
 
     vertices: IntArray
     offsets: FloatArray | None
     points: SurfacePoints | None
     point_offsets: FloatArray | None
     labels: IntArray | None
+    angles: FloatArray | None
+    tolerance: float | None
 
 
 class UnfoldingSolver:
@@ -124,8 +133,7 @@ class UnfoldingSolver:
         self._refinement = None if refine == "exact" else Refinement(surface.unfolding)
         #: Whether distances do not depend on the heat.
         self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement)
-        if tolerance is not None and not 0 <= tolerance <= 1:
-            raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
+        _require_share(tolerance)
         self._tolerance, self._cutoff = tolerance, cutoff
         self._sweeps = refine == "sweep" and not self.is_exact
         self._error = _SWEEP_ERROR if self._sweeps else 0.0
@@ -158,7 +166,36 @@ class UnfoldingSolver:
         labels = np.empty(len(u), np.int64)
         return self._distance(term, u, labels), labels
 
-    def _distance(self, term: UnfoldingTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
+    def directed(
+        self, term: UnfoldingTerm, u: FloatArray, tolerance: float | None = None
+    ) -> tuple[FloatArray, IntArray, PathAngles]:
+        """As `labelled`, and the directions of the paths.
+
+        With a smaller `tolerance` than that of the solver they are more accurate.
+
+        Raises
+        ------
+        MeshError
+            If vertices have no tangent plane, see `polar_angles`.
+        SourceError
+            If a curve is among the sources.
+        ValueError
+            If `tolerance` is not a number from 0 to 1.
+        """
+        if len(term.sources.segments.faces):
+            raise SourceError("directions from a curve are not known: name vertices or points of it")
+        _require_share(tolerance)
+        labels, angles = np.empty(len(u), np.int64), np.empty((3, len(u)))
+        return self._distance(term, u, labels, angles, tolerance), labels, PathAngles(*angles)
+
+    def _distance(
+        self,
+        term: UnfoldingTerm,
+        u: FloatArray,
+        labels: IntArray | None = None,
+        angles: FloatArray | None = None,
+        tolerance: float | None = None,
+    ) -> FloatArray:
         sources, points, components = term.sources, self._points(term), self._domain.components
         places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
         # Tolerances are relative to the distance: what all have in common is added afterwards.
@@ -175,6 +212,8 @@ class UnfoldingSolver:
             places,
             late[k:] if late.any() and places else None,
             labels,
+            angles,
+            self._tolerance if tolerance is None else tolerance,
         )
         distance = self._unfolded(u, asked, term, points, earliest)
         start = self._domain.expand_to_vertices(earliest)
@@ -204,13 +243,17 @@ class UnfoldingSolver:
             )
             if asked.labels is not None:
                 asked.labels[:] = found.origin.label
+            if asked.angles is not None:
+                asked.angles[:] = self.path_directions.of_windows(found, self._starts(asked), asked.points)
             return found.distance
+        if asked.angles is not None:
+            return self._directed_walks(u, asked)
         unfolded = self._refinement.unfold
         if self._sweeps:
             known, groups = self._known(term, points, earliest, asked), self._groups(term, points)
             unfolded = partial(self._refinement.sweep, known=known, groups=groups)
-        elif self._tolerance is not None:
-            unfolded = partial(unfolded, tolerance=self._tolerance)
+        elif asked.tolerance is not None:
+            unfolded = partial(unfolded, tolerance=asked.tolerance)
         return unfolded(
             -u,
             asked.vertices,
@@ -219,6 +262,28 @@ class UnfoldingSolver:
             point_offsets=asked.point_offsets,
             labels=asked.labels,
         )
+
+    def _directed_walks(self, u: FloatArray, asked: _Asked) -> FloatArray:
+        refinement, starts = self._walking, self._starts(asked)
+        walk = refinement.walks(-u, starts, TOLERANCE if asked.tolerance is None else asked.tolerance)
+        row = refinement.number
+        if asked.labels is not None:
+            asked.labels[:] = walk["label"][row]
+        if asked.angles is not None:
+            asked.angles[:] = self.path_directions.of_walks(walk, starts, asked.points)
+        return np.asarray(walk["distance"][row])
+
+    def _starts(self, asked: _Asked) -> Starts:
+        return self._walking.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
+
+    @cached_property
+    def _walking(self) -> Refinement:
+        return Refinement(self._surface.unfolding) if self._refinement is None else self._refinement
+
+    @cached_property
+    def path_directions(self) -> PathDirections:
+        """Polar angles of the paths; a `MeshError` where vertices have no tangent plane."""
+        return PathDirections(self._surface, self._walking)
 
     def _groups(self, term: UnfoldingTerm, points: SourcePoints) -> IntArray | None:
         """For each source, which curve it is a point of, or itself."""

@@ -1,0 +1,67 @@
+"""Directions of shortest paths in the frames of the vertices: where they leave their source and how they arrive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from heat_igl.intrinsic import PolarAngles, TangentFrames
+from heat_igl.typing import FloatArray, IntArray
+from heat_igl.unfolding import PathAngles, in_circle
+
+__all__ = ["Directions", "directions"]
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Distance, and the directions of the shortest paths, in the frames of `tangent_frames`.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        Length of the path from the nearest source; ``inf`` where no source is reached.
+    labels : (n,) int64
+        The nearest source, counted as by `HeatMethodSolver.voronoi`; -1 where none is reached.
+    departure : (n,) float64
+        Polar angle in [0, 2 pi) at which the path leaves a source vertex, as `exp_map` takes it: scaled, see
+        `tangent_frames`. From a source inside a face, the angle from the side of corners 0 and 1 of that face, to the
+        side of corner 2.
+    arrival : (n,) float64
+        Angle in [0, 2 pi) in the frame of the vertex of the direction in which the path arrives there, away from the
+        source: ``frames.to_world(frames.from_angles(arrival))`` is `gradient`.
+    turning : (n,) float64
+        Angle in [-pi, pi] by which the path turns at the vertices where it bends, counterclockwise, summed up. A vector
+        of angle ``a`` at a source inside the boundary, transported along the path, has the angle ``a + arrival -
+        departure - turning``.
+    gradient : (n, 3) float64
+        Unit vectors in space, tangent at the vertices: the gradient of the distance.
+
+    Notes
+    -----
+    Departure, arrival, turning and gradient are 0 at sources and where no source is reached. A path that bends at
+    a vertex of negative curvature, or on the boundary, has the departure of the path to the bend.
+    """
+
+    distance: FloatArray
+    labels: IntArray
+    departure: FloatArray
+    arrival: FloatArray
+    turning: FloatArray
+    gradient: FloatArray
+
+
+def directions(distance: FloatArray, labels: IntArray, angles: PathAngles, frames: TangentFrames) -> Directions:
+    """The result for paths whose angles are known."""
+    has_path = ~np.isnan(angles.back)
+    departure, turning = (np.where(has_path, angle, 0.0) for angle in (angles.departure, angles.turning))
+    arrival = np.where(has_path, _arrival(angles.back, frames.angles), 0.0)
+    gradient = np.where(has_path[:, None], frames.to_world(frames.from_angles(arrival)), 0.0)
+    return Directions(distance, labels, departure, arrival, turning, gradient)
+
+
+def _arrival(back: FloatArray, polar: PolarAngles) -> FloatArray:
+    """The angle (n,) in the frame opposite the polar angle `back` (n,)."""
+    # On the boundary in the plane of the faces, as `PolarAngles.rigid`.
+    flat = back / polar.scale + (np.pi - polar.sums) / 2
+    return in_circle(np.where(polar.on_boundary, flat, back) + np.pi)
