@@ -30,7 +30,7 @@ class FactorizationError(RuntimeError):
 
 
 class ReferenceSolverError(RuntimeError):
-    """A reference solver crashed, exceeded its time limit, or returned values that cannot be distances."""
+    """A reference solver crashed, exceeded the time limit, or returned values that cannot be distances."""
 
 
 class BatchError(RuntimeError):

@@ -113,9 +113,7 @@ def fast_marching_grid(
     aligned = [np.moveaxis(mask, axis, 0) for axis in range(mask.ndim)]
     touching = any((lines[1:] & lines[:-1]).any() for lines in aligned)
     found = skfmm.distance(level, dx=steps, order=1 if touching else order)
-    filled: Any = getattr(
-        found, "filled", None
-    )  # a masked array where something is out of reach, a plain one elsewhere
+    filled: Any = getattr(found, "filled", None)  # a masked array if something is out of reach, else a plain one
     return np.asarray(found if filled is None else filled(np.inf), np.float64)
 
 

@@ -1,4 +1,4 @@
-"""The command line ``heat-igl`` and its demonstration: the package's words, one line per error, no half-written files.
+"""The command line ``heat-igl`` and the demonstration: the package's words, one line per error, no half-written files.
 
 Typer and rich (extra ``cli``) are loaded by `run`, and `heat_igl.demo` is there without them.
 """

@@ -18,7 +18,7 @@ from heat_igl.validation.samples import bunny_path
 
 __all__ = ["demonstrate", "sample_mesh"]
 
-_SOURCE = 1234  # on the bunny's haunch: most of the surface is visible from its side
+_SOURCE = 1234  # on the bunny's haunch: most of the surface is visible from there
 _Rows = list[tuple[str, str]]
 
 

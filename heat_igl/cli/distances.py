@@ -1,4 +1,4 @@
-"""Commands that measure: a distance, its isolines, a shortest path."""
+"""Commands that measure: a distance, isolines, a shortest path."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _method(method: str | None, options: SolverOptions, mesh: Mesh) -> DistanceM
 def _measured(
     mesh: Mesh, sources: Any, method: DistanceMethod, options: SolverOptions, cutoff: float | None
 ) -> tuple[FloatArray, list[tuple[str, str]]]:
-    """The distance, and what there is to say about how it was found."""
+    """The distance, and remarks on how it was found."""
     start = time.perf_counter()
     if method != "heat":
         phi = geodesic_distance(mesh, sources, method=method, cutoff=cutoff)

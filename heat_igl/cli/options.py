@@ -35,7 +35,7 @@ def positive(value: float | None) -> float | None:
 
 
 def choice(kind: Any, text: str) -> Any:
-    """An option that takes one of the values of a Literal type; `text` is its help."""
+    """An option that takes one of the values of a Literal type; `text` is the help."""
     choices = get_args(kind)
     return typer.Option(help=text, metavar="|".join(choices), callback=one_of(choices))
 

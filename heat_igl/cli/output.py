@@ -1,4 +1,4 @@
-"""What commands print, and the checks of files before any work is done for them."""
+"""Output of commands, and the checks of files before any work is done for them."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def view(
     refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
 ) -> None:
-    """A window in which a click moves the source and the distance follows; where there is no display, a page."""
+    """A window in which a click moves the source and the distance follows, or a page if there is no display."""
     from heat_igl.drawing.viewer import Exploration, Window, display_problem
 
     loaded = read_mesh(mesh)

@@ -73,7 +73,7 @@ def distances(
     Raises
     ------
     BatchError
-        If the store cannot be written or the cluster is lost. What is finished stays: the same call goes on from there.
+        If the store cannot be written or the cluster is lost. Finished blocks stay: the same call goes on from there.
     ValueError
         If an argument has no meaning, two meshes have one name, or `store` holds anything else.
     MissingExtraError
@@ -155,7 +155,7 @@ class _Run:
 
     def _submit(self, bundle: TaskBundle) -> Any:
         self._priority -= 1
-        # Not pure: a task writes to the store, which its arguments do not show.
+        # Not pure: a task writes to the store, which the arguments do not show.
         return self._client.submit(bundle.function, bundle.tasks, pure=False, priority=self._priority)
 
     def _collect(self, future: Any, bundle: TaskBundle) -> list[TaskBundle]:
@@ -193,7 +193,7 @@ class _Run:
         return remaining
 
     def _close(self, task: Task) -> None:
-        """Mark a mesh as done, or as failed if one of its tasks failed."""
+        """Mark a mesh as done, or as failed if a task failed."""
         name = task.item.name
         reason = self._reason.get(name)
         if reason is None:

@@ -24,7 +24,7 @@ __all__ = ["Item", "SourcePlan", "folder", "items", "read_source_sets"]
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """A mesh of a batch: its name in the store, its label in messages, and the mesh or the path to read it from."""
+    """A mesh of a batch: the name in the store, the label in messages, and the mesh or the path to read it from."""
 
     name: str
     label: str
@@ -80,7 +80,7 @@ def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike]) -> Iterator[Item]
 
 
 def _held(mesh: MeshLike, label: str) -> Path | Mesh | PointCloud | tuple[Any, Any]:
-    """What a task carries: a path, a mesh, a cloud, or arrays, which are checked where they are used."""
+    """The data that a task carries: a path, a mesh, a cloud, or arrays, which are checked when they are used."""
     if isinstance(mesh, str | os.PathLike):
         return Path(mesh)
     if isinstance(mesh, Mesh | PointCloud) or (isinstance(mesh, tuple) and len(mesh) == 2):

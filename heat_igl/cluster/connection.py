@@ -1,4 +1,4 @@
-"""The Dask client of a batch: of a scheduler at an address, or of a cluster on this machine with its own settings."""
+"""The Dask client of a batch: of a scheduler at an address, or of a cluster on this machine with settings of ours."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from heat_igl.runtime import n_threads
 __all__ = ["connected", "dask_modules"]
 
 # - A task carries a whole mesh, about which Dask would warn.
-# - Dask's watch over its event loop wakes every process 50 times a second, and its profiler 100 times.
+# - Dask's watch over its event loop wakes every process 50 times a second, and the profiler 100 times.
 # - A nanny gives a worker the environment "pre-spawn-environ". Dask's own value of it has malloc return every large
 #   array to the system at once, which makes a solver half as slow again.
 _SETTINGS: dict[str, Any] = {
@@ -81,7 +81,7 @@ def connected(scheduler: str | None = None, n_workers: int | None = None, dashbo
 
 @contextmanager
 def _restored_environment() -> Iterator[None]:
-    """Undo the changes that a nanny makes to the environment of its own process when it starts or restarts a worker.
+    """Undo the changes that a nanny makes to the environment of the process when it starts or restarts a worker.
 
     With these variables left set, this process would work with one thread from then on.
     """

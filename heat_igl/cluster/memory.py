@@ -12,10 +12,10 @@ __all__ = ["PROCESS_MEMORY", "memory_for_solvers", "physical_memory", "solver_me
 
 # A worker without a solver: Python, numpy, scipy, libigl, zarr and Dask. Measured 215 MiB.
 PROCESS_MEMORY = 230 * 2**20
-# The mesh, its operators and one block of right-hand sides, measured on spheres of 10k to 164k vertices.
+# The mesh, the operators and one block of right-hand sides, measured on spheres of 10k to 164k vertices.
 _BYTES_PER_VERTEX = 500
 _BYTES_PER_FACE = 500
-# Zarr copies a block to append its checksum. In double precision; measured in single precision, 4.
+# Zarr copies a block to append the checksum. In double precision; measured in single precision, 4.
 _BYTES_PER_WRITTEN_VALUE = 8
 
 
@@ -29,7 +29,7 @@ def solver_memory(mesh: Mesh | PointCloud) -> int:
 
 
 def memory_for_solvers() -> int:
-    """Bytes that the solvers of this worker may take together: its memory limit, less `PROCESS_MEMORY`."""
+    """Bytes that the solvers of this worker may take together: the memory limit, less `PROCESS_MEMORY`."""
     from distributed import get_worker
 
     try:

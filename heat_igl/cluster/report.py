@@ -27,9 +27,9 @@ class BatchRow:
     reason : str
         Why it failed; empty otherwise.
     n_vertices, n_sources : int
-        Size of its distances; 0 if it failed.
+        Size of the distances; 0 if it failed.
     checksum : str
-        Checksum of all its distances; empty unless they are done. Comparable between
+        Checksum of all distances; empty unless they are done. Comparable between
         stores that one version of heat_igl wrote.
     """
 

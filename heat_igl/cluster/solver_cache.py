@@ -88,7 +88,7 @@ class SolverCache:
             entry.n_users += 1
             if self._reserved() > self._highest:
                 # The free pieces that smaller solvers left must not add to the memory of a larger one. One that is no
-                # larger fits into what the process holds already, which then need not be mapped again.
+                # larger fits into memory that the process holds already, which then need not be mapped again.
                 self._highest = self._reserved()
                 release_free_memory()
             return entry

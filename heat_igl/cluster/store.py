@@ -1,7 +1,7 @@
-"""The zarr store of a batch: one group for each mesh, with its distances in blocks of rows.
+"""The zarr store of a batch: one group for each mesh, with distances in blocks of rows.
 
-zarr writes all metadata, chunks and checksums. This module says what a group holds, which blocks are finished, and in
-which order things are written, so that a crash at any moment leaves nothing wrong.
+zarr writes all metadata, chunks and checksums. This module defines what a group holds, which blocks are finished, and
+in which order things are written, so that a crash at any moment leaves nothing wrong.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _COLUMNS = 2**20
 # Format 2 differs in two points: no checksum on the sources, and zeros instead of NaN as padding of the last chunks.
 _FORMAT = 3
 _READABLE_FORMATS = (2, 3)
-# The crc32c codec appends its checksum to the chunk (zarr specification, version 3).
+# The crc32c codec appends the checksum to the chunk (zarr specification, version 3).
 _CHECKSUM_BYTES = 4
 # Zarr writes a file under a name that ends like this, and renames it when it is complete.
 _PARTIAL = ".partial"
@@ -151,7 +151,7 @@ class Store:
                 earlier.attrs.put({})
             shutil.rmtree(path, ignore_errors=True)
             for label, entries in sources.items():
-                # By its own path: through the group, zarr would look at the metadata of all groups above it.
+                # By the path: through the group, zarr would look at the metadata of all groups above it.
                 array = zarr.create_array(
                     path / label,
                     shape=entries.shape,
@@ -181,7 +181,7 @@ class Store:
         return MeshGroup(self, name, group, group["distance"])
 
     def _group(self, name: str) -> Any:
-        """The zarr group of a mesh; None if there is none, or its metadata are damaged."""
+        """The zarr group of a mesh; None if there is none, or the metadata are damaged."""
         try:
             return self._root[name]
         except (KeyError, ValueError):
@@ -192,7 +192,7 @@ class MeshGroup:
     """The distances of one mesh in a store, in blocks of rows.
 
     A block is one row of zarr's chunks. zarr appends a checksum to each chunk and replaces files only by complete ones,
-    so a block is finished when all its chunks can be read.
+    so a block is finished when all chunks of it can be read.
 
     Attributes
     ----------
@@ -237,7 +237,7 @@ class MeshGroup:
         try:
             self._distance[self.rows(block)]
         except Exception:
-            # Each of zarr's codecs has its own exception for bytes that it cannot decode.
+            # Each of zarr's codecs has an exception of its own for bytes that it cannot decode.
             return False
         return True
 
@@ -253,7 +253,7 @@ class MeshGroup:
             self._distance[self.rows(block)] = distances
 
     def finish(self) -> None:
-        """Mark a mesh whose blocks are all written as done, with one checksum over the checksums of its chunks."""
+        """Mark a mesh whose blocks are all written as done, with one checksum over the checksums of the chunks."""
         whole = 0
         for block in range(self._n_blocks):
             for path in self._chunks(block):

@@ -1,7 +1,7 @@
 """The tasks that run on a worker: factor a mesh once, solve blocks of sources, write them to the store.
 
-A task carries the mesh, never its factors. A worker keeps the solver of its current mesh, and several solvers only
-while several of its threads need them.
+A task carries the mesh, never its factors. A worker keeps the solver of the current mesh, and several solvers only
+while several threads need them.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Outcome:
 
 
 def begin(tasks: Sequence[Task]) -> list[Outcome]:
-    """Begin meshes one after the other, and stop after the first that leaves blocks: this worker has its solver."""
+    """Begin meshes one after the other, and stop after the first that leaves blocks: this worker has the solver."""
     store = _opened(tasks[0].store)
     outcomes = []
     for task in tasks:
@@ -96,7 +96,7 @@ def _opened(path: Path) -> Store:
 
 
 def _guarded(work: Callable[[Task, Store], Outcome], task: Task, store: Store) -> Outcome:
-    """The outcome of a task. Whatever is wrong with its mesh becomes the reason; only a lost store ends the batch."""
+    """The outcome of a task. An error of its mesh becomes the reason; only a lost store ends the batch."""
     try:
         return work(task, store)
     except BatchError:
@@ -113,7 +113,7 @@ def _reason(error: Exception) -> str:
 
 
 def _begin(task: Task, store: Store) -> Outcome:
-    """Read, validate and factor a mesh, make its group or continue an earlier one, and solve the first blocks."""
+    """Read, validate and factor a mesh, make the group or continue an earlier one, and solve the first blocks."""
     name = task.item.name
     mesh = _loaded(task.item)
     fingerprint = _fingerprint(mesh)
@@ -145,7 +145,7 @@ def _resume(task: Task, store: Store) -> Outcome:
 def _continued(
     name: str, store: Store, known: Mapping[str, Any], identity: Mapping[str, Any]
 ) -> tuple[MeshGroup, list[IntArray]] | None:
-    """The group that an earlier batch made of the same mesh by the same solver, with its sources; None without one."""
+    """The group that an earlier batch made of the same mesh by the same solver, with the sources; None without one."""
     if any(known.get(key) != value for key, value in identity.items()):
         return None
     try:
@@ -160,7 +160,7 @@ def _continued(
 def _new(
     task: Task, store: Store, mesh: Mesh | PointCloud, solver: HeatMethodSolver, identity: Mapping[str, Any]
 ) -> tuple[MeshGroup, list[IntArray]]:
-    """A new group for a mesh, with its sources."""
+    """A new group for a mesh, with the sources."""
     source_sets = _source_sets(task.plan, mesh, solver)
     report = {key: _json_value(value) for key, value in asdict(mesh.report()).items()}
     attributes = {"mesh": task.item.label, **identity, "versions": _versions(), "report": report}
@@ -188,7 +188,7 @@ def _versions() -> dict[str, str]:
 def _source_sets(plan: SourcePlan, mesh: Mesh | PointCloud, solver: HeatMethodSolver) -> list[IntArray]:
     n = mesh.n_vertices
     if plan.source_sets is not None:
-        # A set is sorted, so its last vertex tells whether the mesh has all of them.
+        # A set is sorted, so the last vertex tells whether the mesh has all of them.
         return [
             vertex_sources(list(vertices), n) if vertices[-1] >= n else np.array(vertices)
             for vertices in plan.source_sets

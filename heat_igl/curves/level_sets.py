@@ -39,7 +39,8 @@ def isolines(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> list[list[
     list of k lists of SurfaceCurve
         The curves of each level, in the order of their first faces. A curve is closed, or it ends on the boundary, at
         an edge of more than two faces, or at a face with an infinite value. Lower values lie on the left of a curve,
-        seen from outside (from where the corners of faces run counter-clockwise), as long as faces are oriented alike.
+        seen from outside (the side from which the corners of faces run counter-clockwise), as long as faces are
+        oriented alike.
 
     Raises
     ------
@@ -99,7 +100,7 @@ def sublevel_areas(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> Floa
     Parameters
     ----------
     mesh, values, levels
-        As for `isolines`, with its errors.
+        As for `isolines`, with the same errors.
 
     Returns
     -------
@@ -112,12 +113,12 @@ def sublevel_areas(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> Floa
 
 
 def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArray:
-    """Area of the region below the level that each of its curves borders.
+    """Area of the region below the level that each curve borders.
 
     Parameters
     ----------
     mesh, values, level
-        As for `isolines`, with its errors; one level.
+        As for `isolines`, with the same errors; one level.
 
     Returns
     -------
@@ -134,7 +135,7 @@ def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArra
     inner = mesh.edges[below[mesh.edges].all(axis=1)]
     graph = sp.coo_array((np.ones(len(inner), np.int8), (inner[:, 0], inner[:, 1])), shape=2 * (mesh.n_vertices,))
     part = csgraph.connected_components(graph, directed=False)[1]
-    # The edges of a face join all its vertices below the level.
+    # The edges of a face join all vertices below the level.
     one_below = mesh.F[np.arange(mesh.n_faces), np.argmax(below[mesh.F], axis=1)]
     area = np.bincount(part[one_below], weights=_areas_below(mesh, checked, wanted[0]), minlength=mesh.n_vertices)
     first = np.array([curve.faces[0] for curve in curves], np.int64)
@@ -204,7 +205,7 @@ def _crossings(mesh: Mesh, values: FloatArray, level: float) -> _Crossings:
 
 
 def _areas_below(mesh: Mesh, values: FloatArray, level: float) -> FloatArray:
-    """Area (m,) of the part of each face where values are below the level."""
+    """Area (m,) of the part of each face with values below the level."""
     area = np.where((values[mesh.F] < level).all(axis=1), mesh.measures, 0.0)
     found = _crossings(mesh, values, level)
     corner = found.toward[:, 0] * found.toward[:, 1]

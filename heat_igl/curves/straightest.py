@@ -33,7 +33,7 @@ def trace_geodesic(mesh: Mesh, start: Sources, direction: ArrayLike, length: flo
     start : int or SurfacePoints
         A vertex, or one point in a face.
     direction : (2,) or (3,) array_like
-        Its length does not matter. Two components are those of the frame: at a vertex see `tangent_frames`; in a face
+        The length does not matter. Two components are those of the frame: at a vertex see `tangent_frames`; in a face
         the first axis runs from corner 0 to corner 1, and the second to the side of corner 2. Three components are a
         vector in space, whose part along the normal of the vertex or face is left out.
     length : float
@@ -59,11 +59,11 @@ def trace_geodesic(mesh: Mesh, start: Sources, direction: ArrayLike, length: flo
     -----
     The geodesic is straight in each face, and across each edge in the plane of the two faces unfolded. At a vertex
     inside it goes on so that the angles on both sides, as sums of angles in faces, are equal; this defines a unique
-    continuation also where the angles do not sum to 2 pi. A geodesic is at a vertex if it meets a side within 1e-10 of
-    its length from the end. It ends where it meets the boundary, and has length 0 if it starts on the boundary and
-    points off the surface. At a vertex of the boundary it goes on if the faces have an angle of pi or more on exactly
-    one side of it: then it leaves at pi on this side, as a straight line in the plane does along a straight boundary
-    or past a corner. It is not the shortest path to its end in general.
+    continuation also if the angles do not sum to 2 pi. A geodesic is at a vertex if it meets a side within 1e-10 of
+    the length of the side from an end. It ends when it meets the boundary, and has length 0 if it starts on the
+    boundary and points off the surface. At a vertex of the boundary it goes on if the faces have an angle of pi or more
+    on exactly one side of it: then it leaves at pi on this side, as a straight line in the plane does along a straight
+    boundary or past a corner. It is not the shortest path in general.
     """
     tracer = _Tracer(mesh)
     begin = tracer.starts("start", start)
@@ -79,7 +79,7 @@ def trace_geodesic(mesh: Mesh, start: Sources, direction: ArrayLike, length: flo
 
 
 def exp_map(mesh: Mesh, source: Sources, vectors: ArrayLike) -> SurfacePoints:
-    """The exponential map: where straightest geodesics from a point along tangent vectors end.
+    """The exponential map: the ends of straightest geodesics from a point along tangent vectors.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def exp_map(mesh: Mesh, source: Sources, vectors: ArrayLike) -> SurfacePoints:
         A vertex or point for all vectors, or one for each.
     vectors : (k, 2) or (k, 3) array_like
         In the frame of the source, or in space, as the directions of `trace_geodesic`; the length of a vector in the
-        tangent plane is that of its geodesic. The vector 0 leads to the source itself.
+        tangent plane is that of the geodesic. The vector 0 leads to the source itself.
 
     Returns
     -------
@@ -154,7 +154,7 @@ class _Tracer:
         )
 
     def starts(self, name: str, points: Sources) -> _Starts:
-        """Where geodesics begin: vertices in the order given, or points in faces."""
+        """Starts of geodesics: vertices in the order given, or points in faces."""
         if isinstance(points, SurfacePoints):
             points.positions(self._mesh)  # which checks the faces
             weights = np.where(points.barycentric < ON_SIDE, 0.0, points.barycentric)
@@ -170,7 +170,7 @@ class _Tracer:
         return _Starts(corner // 3, np.eye(3)[corner % 3], vertices)
 
     def directions(self, name: str, starts: _Starts, vectors: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """The angle (k,) of each vector in the face of its start, from corner 0 to corner 1, and its length.
+        """Angle (k,) of each vector in the face of the start, from corner 0 to corner 1, and length.
 
         At vertices the start is moved to the face into which the vector points.
         """
@@ -218,7 +218,7 @@ class _Tracer:
         return found
 
     def curve(self, start: _Starts, turn: FloatArray, length: FloatArray) -> SurfaceCurve:
-        """Trace one geodesic, twice: for the number of its segments, then to store them."""
+        """Trace one geodesic, twice: for the number of segments, then to store them."""
         found = self.ends(start, turn, length)
         n = int(found.counts[0])
         faces, points = np.empty(n, np.int64), np.empty((n, 2, 3))

@@ -140,12 +140,12 @@ def plot_field(
 
 
 def picture(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **options: Any) -> None:
-    """Draw a distance and write the picture to `path`: `plot` with its options, then `Picture.save`."""
+    """Draw a distance and write the picture to `path`: `plot` with the same options, then `Picture.save`."""
     plot(mesh, distance, **options).save(path)
 
 
 def write_html(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **options: Any) -> None:
-    """Write an interactive page to `path`: `page` with its options, then `Page.save`."""
+    """Write an interactive page to `path`: `page` with the same options, then `Page.save`."""
     page(mesh, distance, **options).save(path)
 
 

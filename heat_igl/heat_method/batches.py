@@ -68,7 +68,7 @@ class BatchedSolver(ABC):
         source_sets : sequence of sources
             k entries, each as for `distance`.
         out : (k, n) array of float, optional
-            Where to write: an array, a `numpy.memmap`, a zarr array, or whatever has a shape and a dtype and takes
+            Destination: an array, a `numpy.memmap`, a zarr array, or whatever has a shape and a dtype and takes
             ``out[start:stop] = rows``. A chunked array is written a whole row of chunks at a time.
         progress : bool
             Show a progress bar on standard error (extra ``cli``).
@@ -93,7 +93,7 @@ class BatchedSolver(ABC):
 
         Notes
         -----
-        Beside the result and one row of chunks of `out`, it holds at most 2 GiB, or what one query takes where that is
+        Beside the result and one row of chunks of `out`, it holds at most 2 GiB, or the memory of one query if that is
         more: 40 bytes per face. For sources inside faces it may be three times as much. The number of threads is that
         of the processors, or ``HEAT_IGL_NUM_THREADS``.
         """
@@ -121,7 +121,7 @@ class BatchedSolver(ABC):
         return out
 
     def iter_distances(self, source_sets: Iterable[Sources], dtype: npt.DTypeLike | None = None) -> Iterator[AnyArray]:
-        """Distance from each of several sets of sources, a row as soon as its block is solved.
+        """Distance from each of several sets of sources, a row as soon as the block is solved.
 
         Parameters
         ----------
@@ -177,7 +177,7 @@ class BatchedSolver(ABC):
             for warning in held:
                 warn_caller(*warning)
             for i, complaint in enumerate(complaints):
-                # Once for the batch: where one answer is wrong, many are.
+                # Once for the batch: if one answer is wrong, many are.
                 if complaint is not None and not has_complained:
                     has_complained = True
                     warn_caller(f"source_sets[{solved_before + i}]: {complaint}", AccuracyWarning)

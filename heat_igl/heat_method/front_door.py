@@ -33,14 +33,14 @@ def geodesic_distance(
         Whatever `as_mesh` takes: `Mesh`, `PolygonMesh`, a pair (V, F), a path, or a mesh of trimesh, pyvista, open3d,
         meshio and others.
     sources : sources
-        A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources` where
+        A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources` if
         distance begins at other values than 0, or a list of such. Faces of points on polygons are counted as those of
         ``PolygonMesh.triangles``.
     method : {"unfold", "sweep", "heat", "exact"}
         "unfold" follows straight lines through strips of triangles: near-exact, see `unfolded_distance`. "sweep"
         unfolds two triangles at a time. Both go through the vertices in the order of Dijkstra's algorithm; polygons are
-        cut into triangles. "heat" is `HeatMethodSolver` with its defaults, the only one for tetrahedra; on polygons it
-        takes `polygon_operators`. "exact" is the polyhedral distance by windows, and ends the search at the cutoff;
+        cut into triangles. "heat" is `HeatMethodSolver` with default options, the only one for tetrahedra; on polygons
+        it takes `polygon_operators`. "exact" is the polyhedral distance by windows, and ends the search at the cutoff;
         curves stand for dense points, see `UnfoldingSolver`.
     cutoff : float, optional
         Distances beyond this are ``inf``.
@@ -48,7 +48,7 @@ def geodesic_distance(
     Returns
     -------
     (n,) float64
-        In the mesh's unit: 0 at source vertices (their offset where they have one, unless another source is nearer),
+        In the mesh's unit: 0 at source vertices (the offset of those that have one, unless another source is nearer),
         ``inf`` at vertices that no source reaches, never negative or NaN.
 
     Raises

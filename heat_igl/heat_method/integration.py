@@ -64,11 +64,11 @@ class Integration:
     heat_flow : HeatFlow
         Step 1 on it.
     divergence : NormalizedDivergence
-        Step 2 on it, for the field without what is known near the sources.
+        Step 2 on it, for the field without known distances near the sources.
     poisson : PoissonProblem
         Step 3 on it.
     t : float or (n_components,) float64, optional
-        Time step for `damping`; the field has length 1 if it is None, and where sources are vertices, no distance but
+        Time step for `damping`; the field has length 1 if it is None, and if sources are vertices, no distance but
         theirs is known beforehand, as in the paper.
     fitted : bool
         Whether the heat flow is fitted to the lengths of edges.
@@ -113,7 +113,7 @@ class Integration:
         return np.stack([self._pin_level(*row) for row in rows])
 
     def _pin_level(self, term: SourceTerm, phi: FloatArray, u: FloatArray) -> FloatArray:
-        """Distance (n,) from phi (n,) and heat (n,): of the right level, and exact where it is known.
+        """Distance (n,) from phi (n,) and heat (n,): at the right level, and equal to known distances.
 
         The level of a component is the mean by which phi exceeds the known distances there. A component without a
         source gets ``inf``.
@@ -139,11 +139,11 @@ class Integration:
         return np.asarray(distance)
 
     def _level_of_source(self, term: SourceTerm, excess: FloatArray, u: FloatArray) -> FloatArray:
-        """The value (n,) that phi has at the source from which a vertex got its heat, less that source's offset.
+        """The value (n,) that phi has at the source from which a vertex got heat, less that source's offset.
 
         It is a little different at each source: the error of a path between them. Shifting by the mean would move
-        the whole cell of each source by its difference. Here every vertex is shifted by the values of the sources
-        weighted by its heat from each, one more solve; the weights change from 0 to 1 within sqrt(t) of the border
+        the whole cell of each source by the difference. Here every vertex is shifted by the values of the sources
+        weighted by the heat from each, one more solve; the weights change from 0 to 1 within sqrt(t) of the border
         between two cells.
         """
         n_labels = term.sources.n_labels
@@ -168,7 +168,7 @@ class Integration:
         np.minimum.at(distance, ends, value + lengths)
 
     def _warn_if_cold(self, term: SourceTerm, u: FloatArray) -> None:
-        """Heat that has underflowed has no gradient, and distance does not grow where X is 0: say so."""
+        """Heat that has underflowed has no gradient, and distance does not grow on faces with X = 0: warn."""
         domain = self._domain
         components = domain.components
         cold = (np.abs(u) < LOWEST_HEAT) & np.isin(components, components[term.near.vertex])

@@ -1,4 +1,4 @@
-"""`SolverOptions`: what a heat method solver can be asked for, checked once."""
+"""`SolverOptions`: the options of a heat method solver, checked once."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class SolverOptions:
 
     @property
     def triangulation(self) -> Laplacian:
-        """The `laplacian` for `operators`: where the heat is needed for an order alone, any Delaunay one does."""
+        """The `laplacian` for `operators`: if heat is needed for an order alone, any Delaunay one does."""
         return "intrinsic-delaunay" if self.laplacian == "auto" and self.refine is not None else self.laplacian
 
     @property
@@ -71,7 +71,7 @@ class SolverOptions:
         return self.t_coef is None and self.t is None
 
     def damps(self, domain: Operators) -> bool:
-        """Whether the field is damped where heat arrives from several sides: ``magnitude="auto"`` resolved."""
+        """Whether the field is damped on faces with heat from several sides: ``magnitude="auto"`` resolved."""
         if self.magnitude == "auto":
             return domain.is_surface and self.laplacian != "cotan"
         return self.magnitude == "damped"

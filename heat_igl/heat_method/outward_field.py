@@ -1,4 +1,4 @@
-"""The radial field around a vertex: vectors in its triangles whose heat flow points away from it."""
+"""The radial field around a vertex: vectors in the triangles around it whose heat flow points away from it."""
 
 from __future__ import annotations
 

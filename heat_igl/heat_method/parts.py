@@ -1,4 +1,4 @@
-"""What a solver prepares before its first query: operators, options resolved on them, and all that is factored."""
+"""Preparation of a solver before the first query: operators, options resolved on them, and factors."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class SolverParts:
     factored : HeatFlow or None
         Step 1; None with ``refine="exact"``, which takes no heat: `heat_flow` factors it when it is asked for first.
     last_steps : Integration or UnfoldingSolver
-        Steps 2 and 3, or what takes their place with ``refine``.
+        Steps 2 and 3, or the unfolding that takes their place with ``refine``.
     time_steps : (n_components,) float64
         Time step of each component.
     t_damping : float, (n_components,) float64 or None
@@ -57,7 +57,7 @@ class SolverParts:
     fitted : bool
         Whether the heat flow is fitted to the lengths of edges.
     checker : Checker or None
-        Checks answers against bounds that need no reference; None where they need no check.
+        Checks answers against bounds that need no reference; None if they need no check.
     diagnostics : Diagnostics
         For the user.
     """
@@ -132,14 +132,14 @@ def prepare(
     seconds_analysis: float = 0.0,
     V: FloatArray | None = None,
 ) -> SolverParts:
-    """The parts of a solver on `domain`: resolve the options, then factor what they ask for.
+    """The parts of a solver on `domain`: resolve the options, then factor the matrices.
 
     Parameters
     ----------
     domain : Operators
         The domain.
     options : SolverOptions
-        What is asked for.
+        The options.
     known : Analysis, optional
         An order of elimination, taken if it fits.
     seconds_operators, seconds_analysis : float

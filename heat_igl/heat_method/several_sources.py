@@ -12,7 +12,7 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["drop_overtaken", "warmest_sources"]
 
-# A source is overtaken if heat there is more than so many times what it would be if all began as late as this one. A
+# A source is overtaken if heat there is more than so many times the heat there if all began as late as this one. A
 # front that has come before the source by a time x, as long as its way of x, is exp(x / sqrt(t)) times as warm as one
 # that comes with it: 5 times after 1.1 mean edge lengths at the default t = h^2 / 2, and 2 or so since heat also falls
 # as it spreads. Up to there the distance from either source is the same to within the error of the method.
@@ -24,7 +24,7 @@ _BLOCK = 8
 def drop_overtaken(term: SourceTerm, heat_flow: HeatFlow, n: int) -> SourceTerm:
     """`term` without the sources that others overtake before they begin, and the values that others come before.
 
-    Two solves tell: there the heat is many times what it would be if all began as late as this source does.
+    Two solves tell: there the heat is many times the heat there if all began as late as this source does.
     """
     offsets = term.sources.offsets
     if offsets.min() == offsets.max():
@@ -46,7 +46,7 @@ def drop_overtaken(term: SourceTerm, heat_flow: HeatFlow, n: int) -> SourceTerm:
 
 
 def warmest_sources(term: SourceTerm, heat_flow: HeatFlow, n: int) -> IntArray:
-    """The source (n,) from which each vertex gets most of its heat, -1 if it gets none; a solve for each source."""
+    """The source (n,) from which each vertex gets most heat, -1 if it gets none; a solve for each source."""
     labels = np.full(n, -1)
     most = np.zeros(n)
     present = np.unique(term.label)

@@ -1,4 +1,4 @@
-"""What a solver answers with: a frozen result and its diagnostics, in place of printed status."""
+"""Results of a solver: a frozen solution with diagnostics, in place of printed status."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ __all__ = ["Diagnostics", "HeatSolution", "LabelledDistance"]
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """What a solver did, and what it rests on.
+    """Choices and measurements of a solver.
 
     Attributes
     ----------
     t : float
         Time step used, a squared length.
     t_requested : float
-        What was asked for: `t`, or ``t_coef * h**2``.
+        As requested: `t`, or ``t_coef * h**2``.
     mean_edge_length : float
         h, of the triangulation that was solved on.
     edges_across : float
@@ -32,14 +32,14 @@ class Diagnostics:
     lengthening : float
         The most that was added to an edge length because of degenerate triangles; 0 on other meshes.
     backend : str
-        What holds the factors; "none" where nothing is factored, with ``refine="exact"``.
+        Storage of the factors; "none" if nothing is factored, with ``refine="exact"``.
     factor_nonzeros, factor_bytes : int
         Entries of all factors, and the memory that a query reads twice, indices included.
     seconds_operators, seconds_analysis, seconds_factorization : float
         Wall-clock time of the stages of the constructor: operators; order of elimination, which begins beside them, as
         far as it takes longer; factors.
     check : AnswerCheck or None
-        Of a `HeatSolution`, by how much its distance leaves bounds that need no reference. None for the solver.
+        Of a `HeatSolution`, by how much the distance leaves bounds that need no reference. None for the solver.
     """
 
     t: float
@@ -71,7 +71,7 @@ class LabelledDistance(NamedTuple):
     distance : (n,) float64
         As `HeatMethodSolver.distance` returns it.
     labels : (n,) int64
-        The nearest source of each vertex; -1 where none reaches, or none within the cutoff.
+        The nearest source of each vertex; -1 if none reaches it, or none within the cutoff.
     """
 
     distance: FloatArray
@@ -85,13 +85,13 @@ class HeatSolution:
     Attributes
     ----------
     heat : (n,) float64
-        u of step 1 for a unit of heat on each source (of a region of sources: on those at its rim), per area. Where it
+        u of step 1 for a unit of heat on each source (of a region of sources: on those at its rim), per area. If it
         falls below 1e-308 it reads 0; the steps themselves run on a multiple that does not.
     direction : (m, d) float64
         Unit vectors X of step 2, per face of the triangulation that was solved on, d = 3 components in space or
-        d = 2 in the face's own frame (`intrinsic_gradient`); 0 where no heat arrives.
+        d = 2 in the face's own frame (`intrinsic_gradient`); 0 on faces without heat.
     magnitude : (m,) float64
-        Length that X was given for step 3: 1, or `damping` where heat arrives from several sides.
+        Length that X was given for step 3: 1, or `damping` if heat arrives from several sides.
     distance : (n,) float64
         As `HeatMethodSolver.distance` returns it.
     t : float

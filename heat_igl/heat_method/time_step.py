@@ -13,7 +13,7 @@ from heat_igl.typing import FloatArray
 __all__ = ["smallest_time_step", "time_step", "warn_of_large_step"]
 
 # Between two aims, see the tables of docs/heat_path.md: on scans the error falls further with t, on a regular grid of
-# squares, where heat prefers diagonals, it grows.
+# squares, on which heat prefers diagonals, it grows.
 _T_COEF_FITTED = 0.5
 # On rough and on narrow surfaces fronts bend at every vertex, and the less heat spreads the less it cuts corners: on
 # voxels, noise and a maze the error at 0.15 is 0.2 to 0.8 of that at 0.5.
@@ -25,7 +25,7 @@ _T_COEF = 1.0
 def time_step(options: SolverOptions, domain: Operators, fitted: bool) -> tuple[float | FloatArray, float | FloatArray]:
     """The time step for `domain`, and the one that was asked for: ``options.t``, or ``t_coef * h**2``.
 
-    Each is a number, or one (n_components,) for each component where their mean edge lengths h differ.
+    Each is a number, or one (n_components,) for each component if their mean edge lengths h differ.
 
     Warns
     -----
@@ -79,7 +79,7 @@ def _smallest(longest: float, h: float, fitted: bool) -> float:
 
 
 def warn_of_large_step(options: SolverOptions, domain: Operators) -> None:
-    """Warn where the step that was asked for is so large that heat is nearly level over the whole domain.
+    """Warn if the step that was asked for is so large that heat is nearly level over the whole domain.
 
     Heat falls like exp(-d / sqrt(t)). With sqrt(t) above the longest distance it falls by less than a factor of e
     altogether, and distances follow the shape of the domain more than the way to the source.

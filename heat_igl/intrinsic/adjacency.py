@@ -14,7 +14,7 @@ __all__ = ["Adjacency"]
 
 
 class Adjacency:
-    """Neighbours of vertices and half-edges, also where more than two faces meet at an edge.
+    """Neighbours of vertices and half-edges, also if more than two faces meet at an edge.
 
     The tables are made on first use.
 
@@ -54,7 +54,7 @@ class Adjacency:
     def spokes(self, vertices: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
         """Edges from the given vertices: position of the vertex in `vertices`, the other end, and the length.
 
-        An edge comes once for each of its faces.
+        An edge comes once for each face at it.
         """
         tri = self.triangulation
         corner, which = self.corners_at(vertices)

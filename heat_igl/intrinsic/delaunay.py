@@ -30,7 +30,7 @@ def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriang
 
     An edge is flipped when the two cotangents opposite it sum to less than zero. Each round flips many edges at once,
     no two in one face, those with the smallest sums first; the next round checks only the faces that changed. Edges
-    stay on the boundary, where more than two faces meet, and along the seam of a surface that cannot be oriented.
+    stay on the boundary, at edges of more than two faces, and along the seam of a surface that cannot be oriented.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriang
 
 
 class _Flips:
-    """The arrays of a triangulation while its edges are being flipped."""
+    """The arrays of a triangulation while edges are being flipped."""
 
     def __init__(self, start: IntrinsicTriangulation) -> None:
         self.F, self.l = start.F.copy(), start.l.copy()
@@ -106,7 +106,7 @@ class _Flips:
     def flip(self, half_edge: IntArray) -> IntArray:
         """Flip these edges, which share no face; return the faces that changed.
 
-        Before: f = (p, a, b) and g = (q, b, a), where corner 0 is opposite the shared edge ab. After: f = (p, a, q) and
+        Before: f = (p, a, b) and g = (q, b, a), with corner 0 opposite the shared edge ab. After: f = (p, a, q) and
         g = (q, b, p), at the same corners, with the new edge pq opposite a in f and opposite b in g.
         """
         f, c = np.divmod(half_edge, 3)
@@ -140,7 +140,7 @@ class _Flips:
 
 
 def _cotangents(l: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: E741
-    """Cotangent (k, 3) at each corner of triangles with edge lengths `l` (k, 3), and a bound (k,) on its rounding."""
+    """Cotangent (k, 3) at each corner of triangles with edge lengths `l` (k, 3), and a bound (k,) on the rounding."""
     square = l * l
     total = np.asarray(sum(square.T))
     four_areas = 2 * igl.doublearea(l, 0.0)

@@ -13,17 +13,17 @@ __all__ = ["double_cover"]
 
 
 def double_cover(triangulation: IntrinsicTriangulation) -> tuple[IntArray, FloatArray, IntArray]:
-    """The oriented double cover: each face on one sheet as it is and on the other turned over, glued where sides agree.
+    """The oriented double cover: each face as it is on one sheet and turned over on the other, glued along equal sides.
 
-    Vertex v becomes v and v + n, one for each orientation of the faces around it. Turning a face over swaps its corners
-    1 and 2. Fans that meet in v alone are assigned to its two copies arbitrarily: in v, a path may change sheets.
+    Vertex v becomes v and v + n, one for each orientation of the faces around it. Turning a face over swaps corners
+    1 and 2. Fans that meet in v alone are assigned to the two copies arbitrarily: in v, a path may change sheets.
     """
     F, n = triangulation.F, triangulation.n
     size = F.size
     corner = np.arange(size)
     turned = np.where(corner % 3 == 0, corner, corner + np.where(corner % 3 == 1, 1, -1))
     # Half-edges, and corners, of the second sheet are numbered after those of the first.
-    sheet_of_first = np.concatenate([corner, size + turned])  # by original half-edge: where it lies on either sheet
+    sheet_of_first = np.concatenate([corner, size + turned])  # by original half-edge: the position on either sheet
     twin = np.full(2 * size, -1)
     glued = np.flatnonzero(triangulation.twin >= 0)
     mate = triangulation.twin[glued]

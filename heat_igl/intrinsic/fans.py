@@ -1,8 +1,8 @@
-"""Half-edge tables for walks over a triangulation: what lies across an edge, and where edges leave a vertex.
+"""Half-edge tables for walks over a triangulation: faces across edges, and directions of edges at vertices.
 
-The faces are oriented alike. Half-edge ``3 f + c`` is the side of face ``f`` opposite its corner ``c``, and a *corner*
+The faces are oriented alike. Half-edge ``3 f + c`` is the side of face ``f`` opposite corner ``c``, and a *corner*
 carries the same number. A *fan* is a set of corners around a vertex that are glued to one another; directions at a
-vertex are angles in its fan, counted counter-clockwise from the first spoke.
+vertex are angles in the fan, counted counter-clockwise from the first spoke.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _STEP = np.dtype([*_record("x y direction angle", "vertex fan to_right to_left")
 
 
 class Tables(NamedTuple):
-    """What a walk reads, one structure for each visit of a spoke and one for each step, so that it reads little memory.
+    """Data that a walk reads: one structure for each visit of a spoke and one for each step, to read little memory.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Tables(NamedTuple):
     spoke : (s,) structures
         `length`. Of the triangle to the left of the spoke: v's place over the opposite side, `along` it from the
         spoke's end and in `height`; the length of that side, `base`; and the place of the vertex beyond it,
-        `beyond_along` it and in `beyond_depth`. Past the end of an open fan, where there is no triangle, these are 0
+        `beyond_along` it and in `beyond_depth`. Past the end of an open fan, without a triangle, these are 0
         and the height is nan, so that whatever is computed from them compares false. The `neighbour`; the one at the
         next spoke, `next_neighbour`; the vertex `beyond` the side between them, -1 if none; the `next` spoke, on the
         other side of that triangle (or the spoke itself).
@@ -46,14 +46,14 @@ class Tables(NamedTuple):
         fan, `fan_here`; the neighbour's, `fan_there`; the half-edge opposite v in the triangle to the left, `corner`,
         -1 if none; the half-edge `across` that one, -1 if none, -2 if more than one.
     step : (3 m,) structures
-        For a half-edge through which a triangle is entered, where the far `vertex` lies, `x` and `y` in units of the
-        half-edge; in its `fan` the `direction` of the edge to the right end of the half-edge (seen in the walk: to b),
-        and the `angle` of the corner. The half-edge to enter the next triangle by when passing right of it, `to_right`,
-        and when passing left of it, `to_left`; -1 on the boundary, -2 where more than two faces meet.
+        For a half-edge through which a triangle is entered, the position of the far `vertex`, `x` and `y` in units of
+        the half-edge; in its `fan` the `direction` of the edge to the right end of the half-edge (seen in the walk: to
+        b), and the `angle` of the corner. The half-edge to enter the next triangle by when passing right of it,
+        `to_right`, and when passing left of it, `to_left`; -1 on the boundary, -2 at edges of more than two faces.
     total : (k,) float64
         Sum of the angles of each fan, negative for a fan that is open.
     is_flat : (n,) bool
-        Whether a vertex, or its first fan, has no curvature; true on the boundary.
+        Whether a vertex, or the first fan of it, has no curvature; true on the boundary.
     """
 
     first: AnyArray
@@ -87,7 +87,7 @@ def breadth_first(
 
 
 def tables(F: AnyArray, l: FloatArray, twin: AnyArray, n: int) -> Tables:  # noqa: E741
-    """The tables of m oriented triangles on n vertices; `twin` is -1 on the boundary, -2 where more than two meet.
+    """The tables of m oriented triangles on n vertices; `twin` is -1 on the boundary, -2 at edges of more than two.
 
     Faces and half-edges as `breadth_first` returns them.
     """

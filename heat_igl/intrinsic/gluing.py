@@ -26,7 +26,7 @@ def from_edge_lengths(
     n: int,
     facets: connectivity.Facets | None = None,
 ) -> IntrinsicTriangulation:
-    """Triangles with given edge lengths, glued where they share two vertices; degenerate ones are mollified.
+    """Triangles with given edge lengths, glued along sides with the same two vertices; degenerate ones are mollified.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def oriented(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
     turned = (igl.bfs_orient(F)[0] != F).any(axis=1)
     # libigl reverses the row of a face, so corner c becomes 2 - c.
     corner = np.where(turned[:, None], np.arange(3)[::-1], np.arange(3))
-    new_of = (3 * np.arange(len(F))[:, None] + corner).ravel()  # new half-edge of old; the map is its own inverse
+    new_of = (3 * np.arange(len(F))[:, None] + corner).ravel()  # new half-edge of old; the map is an involution
     twin = triangulation.twin[new_of]
     twin[twin >= 0] = new_of[twin[twin >= 0]]
     F, lengths = np.take_along_axis(F, corner, 1), np.take_along_axis(triangulation.l, corner, 1)

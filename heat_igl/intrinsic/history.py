@@ -2,7 +2,7 @@
 
 Merging, reversing and flipping faces keep the surface, but give a point another face or other barycentric coordinates.
 A flip replaces two triangles, laid out in the plane on either side of their edge, by two others that cover the same
-quadrilateral; a point keeps its place in the plane.
+quadrilateral; a point keeps the same place in the plane.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Turned(NamedTuple):
 
 
 class Covered(NamedTuple):
-    """Faces doubled: face f stays as the front, face m + f is the back, with its corners 1 and 2 swapped.
+    """Faces doubled: face f stays as the front, face m + f is the back, with corners 1 and 2 swapped.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ class Refined(NamedTuple):
     numbers : (k, 5) float64
         Barycentric coordinates of the new vertex, or the lengths of `Flipped`.
     first, following : (m,) int64, (k, 3) int64
-        Where to look for the next move that concerns a face, see `heat_igl.kernels.carrying`.
+        Tables to find the next move that concerns a face, see `heat_igl.kernels.carrying`.
     """
 
     kind: IntArray

@@ -21,13 +21,13 @@ def mollify(l: FloatArray, F: IntArray) -> FloatArray:  # noqa: E741
     l : (m, 3) float64
         Edge lengths, opposite each corner.
     F : (m, 3) int64
-        Faces: each component has its own mean edge length, and its own length to add.
+        Faces: each component has a mean edge length and an added length of its own.
 
     Returns
     -------
     (m,) float64
-        For each face, the smallest ``e >= 0`` for which the triangle inequalities of ``l + e`` hold in its component by
-        1e-8 of the mean edge length there; exactly 0 where they already do, so that the lengths of a good mesh keep
+        For each face, the smallest ``e >= 0`` for which the triangle inequalities of ``l + e`` hold in that component
+        by 1e-8 of the mean edge length there; exactly 0 if they already do, so that the lengths of a good mesh keep
         every bit.
     """
     # By columns: sums and maxima over rows of three take ten times as long.

@@ -1,4 +1,4 @@
-"""Polar angles around vertices: the direction of every half-edge in the tangent plane of its tail.
+"""Polar angles around vertices: the direction of every half-edge in the tangent plane of the tail.
 
 The faces around a vertex seldom have angles that sum to 2 pi. All angles there are multiplied by one factor, so that
 they do (to pi on the boundary): this defines the tangent plane of the vertex (Knoeppel, Crane, Pinkall, Schroeder
@@ -28,17 +28,17 @@ class PolarAngles:
     Attributes
     ----------
     leaving : (3 m,) float64
-        Angle of each half-edge in the tangent plane of its tail, counterclockwise from the reference edge.
+        Angle of each half-edge in the tangent plane of the tail, counterclockwise from the reference edge.
     corners : (m, 3) float64
         Angle at each corner, as it is in the face.
     sums : (n,) float64
-        Sum of `corners` around each vertex; 0 where no face is.
+        Sum of `corners` around each vertex; 0 at a vertex without a face.
     scale : (n,) float64
         Angle in the tangent plane over angle in a face: 2 pi / sum, and pi / sum on the boundary; 1 without faces.
     on_boundary : (n,) bool
         Vertices whose faces do not close up around them.
     first : (n,) int64
-        Corner at which `leaving` is 0, -1 where no face is.
+        Corner with `leaving` = 0, -1 at a vertex without a face.
     """
 
     leaving: FloatArray
@@ -66,7 +66,7 @@ class PolarAngles:
     def to_polar(self, vertices: IntArray, angles: FloatArray) -> FloatArray:
         """The polar angle (k,) of directions at vertices that have the given angles (k,) for transport.
 
-        The same inside. Beyond the boundary, and where the faces have no angle, the angle stays.
+        The same inside. Beyond the boundary, and if the faces have no angle, the angle stays.
         """
         sums = self.sums[vertices]
         whole = 2 * np.pi
@@ -80,7 +80,7 @@ class PolarAngles:
 def polar_angles(triangulation: IntrinsicTriangulation) -> PolarAngles:
     """The polar angles of a triangulation without flips.
 
-    The reference edge of an inner vertex leaves from its corner of the smallest number ``3 f + c``: it leads to the
+    The reference edge of an inner vertex leaves from the corner with the smallest number ``3 f + c``: it leads to the
     next corner of that face. On the boundary it is the boundary edge at which the faces begin counterclockwise, so
     that angles run from 0 to pi.
 
@@ -135,14 +135,14 @@ def _require_oriented_manifold(triangulation: IntrinsicTriangulation) -> None:
 
 
 def carried_angles(angles: PolarAngles, flipped: IntrinsicTriangulation) -> PolarAngles:
-    """The polar angles of a triangulation after the flips of its history; reference directions stay.
+    """The polar angles of a triangulation after the flips of the history; reference directions stay.
 
     Parameters
     ----------
     angles : PolarAngles
         Of the triangulation before all flips.
     flipped : IntrinsicTriangulation
-        The triangulation now. Its history holds flips only.
+        The triangulation now. The history holds flips only.
     """
     leaving, scale = angles.leaving.copy(), angles.scale
     flips = [change for change in flipped.history if isinstance(change, Flipped)]
@@ -177,7 +177,7 @@ def _replay(leaving: FloatArray, scale: FloatArray, F: IntArray, change: Flipped
     (ab, bp, pa), (ba, aq, qb) = _corner_slots(change.half_edge), _corner_slots(change.mate)
     p, q = F[ab], F[ba]
     length_ab, length_pa, length_bp, length_aq, length_qb = change.lengths
-    # The quadrilateral p a q b: its angles at p and q, on the sides of a and b, from the new diagonal.
+    # The quadrilateral p a q b: the angles at p and q, on the sides of a and b, from the new diagonal.
     at_p, at_q = _angles_at_diagonal(length_ab, length_pa, length_bp, length_aq, length_qb)
     leaving_qp = leaving[qb] + scale[q] * at_q
     leaving_pq = leaving[pa] + scale[p] * at_p

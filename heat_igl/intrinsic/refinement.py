@@ -28,8 +28,8 @@ def delaunay_refinement(
     """Add circumcenters as vertices until all angles are large enough (Sharp, Soliman, Crane 2019, section 4.2).
 
     The triangle with the largest circumcircle among the bad ones is first. Edges are flipped after each new vertex, so
-    that the triangulation stays intrinsic Delaunay. The surface stays the same, and so do its vertices, which come
-    before the new ones.
+    that the triangulation stays intrinsic Delaunay. The surface stays the same, and so do the given vertices, which
+    come before the new ones.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def delaunay_refinement(
     most_vertices : int
         No vertex is added when there are so many.
     least_angle : float
-        Smallest angle in degrees, at most 30. Where the angles around a vertex of the mesh sum to less than 60 degrees,
+        Smallest angle in degrees, at most 30. If the angles around a vertex of the mesh sum to less than 60 degrees,
         the angles at the vertex are left as they are.
     largest_radius : float
         Largest circumradius, in the `unit` of the face.

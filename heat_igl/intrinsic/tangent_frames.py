@@ -24,7 +24,7 @@ _SHORTEST = 1e-12
 class TangentFrames:
     """An orthonormal frame at every vertex of a triangle mesh.
 
-    A tangent vector at a vertex has two components, along `x` and `y`. Its angle counts counterclockwise from x, seen
+    A tangent vector at a vertex has two components, along `x` and `y`. The angle counts counterclockwise from x, seen
     from the side to which the normal points. Directions of edges, of vectors in faces and of geodesics have their polar
     angles: those of the faces, scaled to sum to 2 pi (to pi on the boundary), see `tangent_frames`. Vectors in space
     and transported vectors are turned without a scale; at a boundary vertex whose faces do not sum to pi, that gives
@@ -35,13 +35,13 @@ class TangentFrames:
     x, y, normal : (n, 3) float64
         Unit vectors in space; ``y = normal x x``.
     angles : PolarAngles
-        The angle of every half-edge in the frame of its tail.
+        The angle of every half-edge in the frame of the tail.
     triangulation : IntrinsicTriangulation
         The faces of the mesh by their edge lengths.
     sides : (m, 3, 3) float64
         Unit vector in space along the half-edge that leaves from corner c of face f, to the next corner.
     face_normals : (m, 3) float64
-        Unit normals of the faces, 0 where a face has no area.
+        Unit normals of the faces, 0 for a face without area.
     """
 
     x: FloatArray
@@ -76,7 +76,7 @@ class TangentFrames:
         Parameters
         ----------
         faces, corners : (k,) array_like of int
-            A face, and one of its corners 0 to 2.
+            A face, and one of the corners 0 to 2.
         vectors : (k, 3) array_like
             Parts along the normal of the face are left out.
         """
@@ -99,7 +99,7 @@ class TangentFrames:
         """The face into which each tangent vector (k, 2) at a vertex points, the corner, and the vector (k, 3) in it.
 
         The inverse of `from_faces`. On the boundary, vectors that point off the surface get the face next to them, and
-        lie in its plane beyond the boundary.
+        lie in the plane of the face beyond the boundary.
         """
         at = self._vertices(vertices)
         found = checked_vectors("vectors", vectors, len(at), 2)
@@ -124,7 +124,7 @@ class TangentFrames:
         return np.stack([length * np.cos(angle), length * np.sin(angle)], axis=-1)
 
     def corner_towards(self, vertices: IntArray, angles: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The corner (k,) into which directions at vertices point, and the angle (k,) in its face.
+        """The corner (k,) into which directions at vertices point, and the angle (k,) in that face.
 
         Parameters
         ----------
@@ -179,7 +179,7 @@ def tangent_frames(mesh: Mesh) -> TangentFrames:
 
     The normal is the mean of the normals of the faces, weighted by their angles. The axis x lies in the plane across
     the normal, in the direction that fits the polar angles of all edges best: the sum of the edges as vectors, each
-    turned back by its angle; on the boundary by its angle in the faces, with the middle of the faces at pi / 2.
+    turned back by the angle; on the boundary by the angle in the faces, with the middle of the faces at pi / 2.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def _first_axes(
 
 
 def checked_vectors(name: str, vectors: ArrayLike, k: int | None, size: int) -> FloatArray:
-    """`vectors` as (k, size) float64; one vector may come without its row.
+    """`vectors` as (k, size) float64; one vector may come without a row.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Triangulations known by their edge lengths and the gluing of their faces.
 
-Half-edge ``3 * f + c`` is the side of face ``f`` opposite its corner ``c``; ``l[f, c]`` is its length, as in libigl.
+Half-edge ``3 * f + c`` is the side of face ``f`` opposite corner ``c``; ``l[f, c]`` is the length, as in libigl.
 After flips, an edge may join a vertex to itself, and several edges may join the same two vertices. The vertices of the
 faces then do not determine the gluing, so it is stored (`IntrinsicTriangulation.twin`).
 """
@@ -19,18 +19,18 @@ __all__ = ["IntrinsicTriangulation", "half_edge_head", "half_edge_tail", "next_h
 
 
 def next_half_edge(half_edge: IntArray) -> IntArray:
-    """The half-edge after each in its face; of corners, the next corner."""
+    """The half-edge after each in the same face; of corners, the next corner."""
     # Twice as fast as by face and corner.
     return np.asarray(half_edge + 1 - 3 * (half_edge % 3 == 2))
 
 
 def previous_half_edge(half_edge: IntArray) -> IntArray:
-    """The half-edge before each in its face; of corners, the previous corner."""
+    """The half-edge before each in the same face; of corners, the previous corner."""
     return np.asarray(half_edge - 1 + 3 * (half_edge % 3 == 0))
 
 
 def half_edge_tail(F: IntArray, half_edge: IntArray) -> IntArray:
-    """Vertex at which each half-edge starts, in the direction around its face."""
+    """Vertex at the tail of each half-edge, in the direction around the face."""
     return np.asarray(F.ravel()[next_half_edge(half_edge)])
 
 
@@ -50,7 +50,7 @@ class IntrinsicTriangulation:
     l : (m, 3) float64
         ``l[f, c]`` is the length of the edge opposite corner ``c``, in the mesh's unit.
     twin : (3 m,) int64
-        The half-edge glued to half-edge ``3 f + c``; -1 on the boundary, -2 where more than two faces meet.
+        The half-edge glued to half-edge ``3 f + c``; -1 on the boundary, -2 at edges of more than two faces.
     aligned : (3 m,) bool
         Whether the two faces at a glued half-edge run along it in opposite directions, as on an oriented surface.
     n : int
@@ -81,7 +81,7 @@ class IntrinsicTriangulation:
         return mask
 
     def tail(self, half_edge: IntArray) -> IntArray:
-        """Vertex at which each half-edge starts, in the direction around its face."""
+        """Vertex at the tail of each half-edge, in the direction around the face."""
         return half_edge_tail(self.F, half_edge)
 
     def head(self, half_edge: IntArray) -> IntArray:
@@ -90,7 +90,7 @@ class IntrinsicTriangulation:
 
     @property
     def edges(self) -> IntArray:
-        """One half-edge (k,) of each edge; where more than two faces meet, one per face."""
+        """One half-edge (k,) of each edge; one per face at edges of more than two."""
         return np.flatnonzero((self.twin < 0) | (self.twin > np.arange(len(self.twin))))
 
     @property

@@ -3,7 +3,7 @@
 An edge of more than two faces cannot be flipped. It may keep a negative weight, and then heat may be negative. The
 cover has two copies of each face, a front and a back, on the same vertices. Around an edge, the copy that looks towards
 the next face is glued to the copy of that face which looks back; at a boundary edge, the front is glued to the back.
-The result is a closed oriented surface of triangles, and all its edges can be flipped.
+The result is a closed oriented surface of triangles, and all edges can be flipped.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def tufted_cover(mesh: Mesh) -> IntrinsicTriangulation:
     back = 3 * (m + face) + BACK_CORNERS[corner]
     edge = mesh.facets.of_face.ravel()
     along = F[face, (corner + 1) % 3] == mesh.facets.vertices[edge, 0]
-    # Seen along the edge from its lower to its higher vertex: the copy of the face that faces counterclockwise.
+    # Seen along the edge from the lower to the higher vertex: the copy of the face that faces counterclockwise.
     counterclockwise, clockwise = np.where(along, front, back), np.where(along, back, front)
 
     order = np.lexsort((_angles(mesh), edge))
@@ -86,7 +86,7 @@ def closed_cover(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulatio
     Returns
     -------
     IntrinsicTriangulation
-        As `tufted_cover` makes it: inner edges are glued front to front and back to back, or front to back where the
+        As `tufted_cover` makes it: inner edges are glued front to front and back to back, or front to back if the
         two faces are not aligned, and boundary edges front to back.
     """
     F, lengths, m = triangulation.F, triangulation.l, len(triangulation.F)

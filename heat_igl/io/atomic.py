@@ -18,7 +18,7 @@ __all__ = ["complete_file", "replacing"]
 def complete_file(path: Path) -> Iterator[Path]:
     """A temporary file in the folder of `path`; it replaces `path` if the block succeeds and is removed otherwise.
 
-    An existing file keeps its permissions. If `path` is a symbolic link, the file that it points to is replaced.
+    An existing file keeps the permissions. If `path` is a symbolic link, the file that it points to is replaced.
 
     Raises
     ------

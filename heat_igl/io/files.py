@@ -79,7 +79,7 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
 
     Notes
     -----
-    A polygon is split into the fan of triangles around the first corner, a concave one by clipping its ears;
+    A polygon is split into the fan of triangles around the first corner, a concave one by clipping ears;
     `read_polygon_mesh` keeps polygons. STL has no shared vertices: equal positions are merged, and triangles
     that collapse by this are removed. Materials, normals, texture coordinates, colours and line elements are ignored.
     OBJ has neither counts nor an end mark, so a file that is truncated between two lines cannot be detected.

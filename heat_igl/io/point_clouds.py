@@ -40,7 +40,7 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
     Raises
     ------
     MeshError
-        If the file is missing, unreadable or damaged, or its points cannot be used. Normals that are all 0, as some
+        If the file is missing, unreadable or damaged, or the points cannot be used. Normals that are all 0, as some
         programs write them, count as none.
     """
     path = checked_path(path, POINT_CLOUD_SUFFIXES)

@@ -13,7 +13,7 @@ __all__ = ["builds"]
 
 
 def _require_extensions() -> None:
-    """Refuse to go on where the sources lie without what is compiled from them, such as in a fresh checkout.
+    """Refuse to go on if the kernels have not been compiled, such as in a fresh checkout.
 
     Python would import the sources instead, and run them slowly or not at all.
     """

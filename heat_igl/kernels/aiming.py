@@ -1,4 +1,4 @@
-"""Ways straight at a source, from what the distance says ahead: where descent makes a path too long."""
+"""Straight ways to a source, from the distances at vertices ahead: for paths that descent makes too long."""
 
 import cython
 from cython.cimports.heat_igl.kernels.aiming import Aim, Apex
@@ -21,9 +21,9 @@ def aim(
     """Of ways to a source, from point x of face f over a side of it, the one whose length is nearest to `left`.
 
     They go straight to a corner, or straight over a side to the far corner of a face beyond it, and are as long as the
-    distance says from there; or straight over a side to where the distances of its ends place the source, in the plane
-    of the face. If the length differs from `left` by less than `best`, the difference is returned and `out` set to the
-    point where the way leaves the face; `best` otherwise.
+    distance says from there; or straight over a side to the point at which the distances at both ends place the source,
+    in the plane of the face. If the length differs from `left` by less than `best`, the difference is returned and
+    `out` set to the point at which the way leaves the face; `best` otherwise.
     """
     t = cython.address(s.triangle[f])
     one: Aim
@@ -63,7 +63,7 @@ def aim(
 @cython.nogil
 @cython.exceptval(check=False)
 def aim_from_vertex(s: Surface, v: cython.int) -> Departure:
-    """Where the way from vertex v leads whose length is nearest to its distance."""
+    """The start of the way from vertex v with the length nearest to the distance there."""
     best: Departure = nowhere()
     out: Place = best.at
     off: cython.double = INFINITY
@@ -98,7 +98,7 @@ def _nearer(
 @cython.nogil
 @cython.exceptval(check=False)
 def _apex(a: cython.double, b: cython.double, side: cython.double) -> Apex:
-    """The third corner of a triangle on a side along the axis, from its distances to both ends."""
+    """The third corner of a triangle on a side along the axis, from the distances to both ends."""
     found: Apex
     found.along = 0.5 * ((a - b) * (a + b) / side + side)
     found.height = sqrt(max(a * a - found.along * found.along, 0.0))
@@ -110,7 +110,7 @@ def _apex(a: cython.double, b: cython.double, side: cython.double) -> Apex:
 @cython.nogil
 @cython.exceptval(check=False)
 def _over(px: cython.double, py: cython.double, q: Apex, side: cython.double) -> Aim:
-    """A straight line over a side, from p above it to q below; its length is inf if it passes the side by."""
+    """A straight line over a side, from p above it to q below; the length is inf if it passes the side by."""
     found: Aim
     found.share = (px + (q.along - px) * py / (py + q.height)) / side if py + q.height > 0.0 else 0.0
     found.length = hypot(q.along - px, q.height + py) if SNAP < found.share < 1.0 - SNAP else INFINITY

@@ -22,7 +22,7 @@ def index_moves(kind: cython.longlong[:, ::1], n_faces):
     first : (n_faces,) int64
         The first move that changes each face; -1 for none.
     following : (k, 3) int64
-        For each move, the next one that changes its first, second and third face.
+        For each move, the next one that changes the first, second and third face.
     """
     k = kind.shape[0]
     first_array, following_array = np.full(n_faces, -1), np.full((k, 3), -1)
@@ -72,8 +72,8 @@ def carry(
 def _split(at: cython.double[::1], b: cython.double[::1]) -> cython.longlong:
     """Which of the three faces around a new vertex with coordinates `at` holds a point, whose coordinates are changed.
 
-    Face c lacks the old corner c and has the new vertex in its place. The point is in the face whose lacking corner
-    has the least share of the point in proportion to its share of the new vertex.
+    Face c lacks the old corner c and has the new vertex instead. The point is in the face whose lacking corner
+    has the least share of the point in proportion to the share of the new vertex.
     """
     c: cython.int = 0
     k: cython.int
@@ -93,7 +93,7 @@ def _split(at: cython.double[::1], b: cython.double[::1]) -> cython.longlong:
 def _flip(
     edge: cython.longlong[::1], lengths: cython.double[::1], face: cython.longlong, b: cython.double[::1]
 ) -> cython.longlong:
-    """Whether the first (0) or the second (1) face holds a point after a flip; its coordinates are changed.
+    """Whether the first (0) or the second (1) face holds a point after a flip; the coordinates are changed.
 
     As `Flipped.carry`: before, the faces are pab and qba; after, the first is paq and the second qbp.
     """

@@ -18,14 +18,14 @@ def edge_excess(
     Parameters
     ----------
     distance : (n,) float64
-        Distances; edges where one is not finite are left out.
+        Distances; edges with one that is not finite are left out.
     i, j, length : (e,) int64, (e,) int64, (e,) float64
-        Edges, each with the vertices at its ends.
+        Edges, each with the vertices at the ends.
 
     Returns
     -------
     total, excess : float
-        Sum of the lengths, and of what the differences exceed them by.
+        Sum of the lengths, and of the excess of the differences over them.
     worst : int
         Edge with the largest excess; -1 if there is none.
     """
@@ -87,7 +87,7 @@ def line_shortfall(
     count : int
         Vertices looked at.
     shortfall : float
-        Sum of ``(line - distance) / (line - start)`` over the vertices where it is positive.
+        Sum of ``(line - distance) / (line - start)`` over the vertices at which it is positive.
     largest : float
         Largest ``line - distance``.
     farthest : float

@@ -10,7 +10,7 @@ from cython.cimports.libc.math import INFINITY, isfinite, sqrt
 @cython.nogil
 @cython.exceptval(check=False)
 def steepest(s: Surface, f: cython.int) -> Descent:
-    """The steepest descent in face f; its slope is -1 where a corner has no finite value."""
+    """The steepest descent in face f; the slope is -1 if a corner has no finite value."""
     found: Descent
     t = cython.address(s.triangle[f])
     d0: cython.double = s.d[t.vertex[0]]
@@ -42,7 +42,7 @@ def steepest(s: Surface, f: cython.int) -> Descent:
 @cython.nogil
 @cython.exceptval(check=False)
 def leave_vertex(s: Surface, v: cython.int) -> Departure:
-    """Where the steepest descent leads from vertex v."""
+    """Start of the steepest descent from vertex v."""
     best: Departure = nowhere()
     steepest_slope: cython.double = 0.0
     k: cython.int
@@ -71,7 +71,7 @@ def leave_vertex(s: Surface, v: cython.int) -> Departure:
 @cython.nogil
 @cython.exceptval(check=False)
 def leave_face(x: cython.pointer[Place], rate: cython.pointer[cython.const[cython.double]]) -> cython.void:
-    """Move x in its face as far as the face reaches."""
+    """Move x along `rate` to the border of the face."""
     out: cython.int = 0
     way: cython.double = INFINITY
     c: cython.int

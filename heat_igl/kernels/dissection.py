@@ -19,8 +19,8 @@ def dissect_pieces(
 ):
     """Dissect a graph, but for pieces of more than `large` vertices that were cut off from it.
 
-    `order` (n,) holds all vertices and is rearranged; `is_start` is set where a block starts in it, and `parent` there
-    to the start of its parent, or -1. Returns the large pieces, (r, 3) int64: first, end, start of the parent.
+    `order` (n,) holds all vertices and is rearranged; `is_start` is set at the start of each block in it, and `parent`
+    there to the start of its parent, or -1. Returns the large pieces, (r, 3) int64: first, end, start of the parent.
     """
     n: cython.Py_ssize_t = order.shape[0]
     rest = np.empty((int(n / max(large, 1.0)) + 2, 3), np.int64)
@@ -57,12 +57,12 @@ class Dissecting:
     position: cython.int[::1]  # of each vertex in the order
     piece: cython.int[::1]  # that a vertex is in, -1 in separators
     n_pieces: cython.int
-    stack: Piece[::1]  # what is left to do
+    stack: Piece[::1]  # the pieces left to do
     depth: cython.Py_ssize_t
     near: cython.int[::1]  # distance from one end of the piece; then buckets, then parts as -1 - part
     far: cython.int[::1]  # distance from the other end
     queue: cython.int[::1]
-    f: cython.float[::1]  # what the vertices are lined up by
+    f: cython.float[::1]  # the function that the vertices are sorted by
     smooth: cython.float[::1]
 
     def __init__(self, ends, neighbours, order, is_start, parent):
@@ -95,7 +95,7 @@ def _push(
 @cython.nogil
 @cython.exceptval(check=False)
 def _dissect_piece(d: Dissecting, piece: Piece) -> cython.void:
-    """Cut a piece in two, or make it a block; its parts wait on the stack."""
+    """Cut a piece in two, or make it a block; the parts wait on the stack."""
     i: cython.Py_ssize_t
     low: cython.Py_ssize_t = piece.low
     high: cython.Py_ssize_t = piece.high
@@ -147,7 +147,7 @@ def _line_up(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t) -> 
     size: cython.Py_ssize_t = high - low
     for i in range(low, high):
         d.near[d.order[i]] = d.far[d.order[i]] = -1
-    # The last vertex is one of the farthest from where the numbering began.
+    # The last vertex is one of the farthest from the first.
     reached: cython.Py_ssize_t = _breadth_first(d, d.order[high - 1], d.far)
     if reached < size:
         return reached
@@ -212,7 +212,7 @@ def _split_off(d: Dissecting, low: cython.Py_ssize_t, count: cython.Py_ssize_t) 
 def _average(
     d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, f: cython.float[::1], smooth: cython.float[::1]
 ) -> cython.void:
-    """The mean of f over each vertex and its neighbours in the piece."""
+    """The mean of f over each vertex and the neighbours in the piece."""
     i: cython.Py_ssize_t
     p: cython.Py_ssize_t
     for i in range(low, high):
@@ -231,7 +231,7 @@ def _average(
 @cython.nogil
 @cython.exceptval(check=False)
 def _fill_buckets(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
-    """Divide the range of f evenly; false where f is constant. `near` takes the buckets."""
+    """Divide the range of f evenly; false if f is constant. `near` takes the buckets."""
     i: cython.Py_ssize_t
     low: cython.float = d.f[d.order[first]]
     high: cython.float = low
@@ -251,8 +251,8 @@ def _fill_buckets(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_
 def _best_cut(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> Cut:
     """The cut whose separator is smallest for how evenly it divides the piece.
 
-    A vertex is in the left rim of every cut between its own bucket and the highest among its neighbours, so counting
-    where such intervals begin and end gives the rims of all cuts in one pass.
+    A vertex is in the left rim of every cut between the vertex's bucket and the highest among its neighbours, so
+    counting the begins and ends of such intervals gives the rims of all cuts in one pass.
     """
     i: cython.Py_ssize_t
     p: cython.Py_ssize_t
@@ -321,7 +321,7 @@ def _assign(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, cut:
 @cython.nogil
 @cython.exceptval(check=False)
 def _side(code: cython.int, cut: Cut) -> cython.int:
-    """The side of a vertex by its bucket, or by its part; a separator is on the side that gives it."""
+    """The side of a vertex by bucket, or by part; a separator is on the side that gives it."""
     if code >= 0:
         return code > cut.bucket
     return cut.side if code == -1 - SEPARATOR else -1 - code
@@ -333,7 +333,7 @@ def _side(code: cython.int, cut: Cut) -> cython.int:
 def _arrange(
     d: Dissecting, position: cython.Py_ssize_t, low: cython.Py_ssize_t, high: cython.Py_ssize_t, part: cython.int
 ) -> cython.Py_ssize_t:
-    """Collect the vertices of a part in the queue, in their old order; return where they end in the new one."""
+    """Collect the vertices of a part in the queue, in their old order; return their end in the new one."""
     i: cython.Py_ssize_t
     for i in range(low, high):
         v: cython.int = d.order[i]
@@ -380,7 +380,7 @@ def subgraph(
     neighbours: cython.const[cython.int][::1],
     some: cython.const[cython.int][::1],
 ):
-    """The graph among some vertices, numbered as they come: its ends and neighbours, int32."""
+    """The graph among some vertices, numbered as they come: `ends` and `neighbours`, int32."""
     n: cython.Py_ssize_t = some.shape[0]
     number: cython.int[::1] = np.full(ends.shape[0] - 1, -1, np.int32)
     i: cython.Py_ssize_t

@@ -1,4 +1,4 @@
-"""From heat to the divergence of its normalized gradient, in one pass over the faces."""
+"""From heat to the divergence of the normalized gradient, in one pass over the faces."""
 
 import cython
 import numpy as np
@@ -15,11 +15,11 @@ def divergence_of_descent(
     smallest: cython.double,
     of_log: cython.bint,
 ):
-    """Integrated divergence (n,) of -grad u / |grad u|, damped where the rate |grad log u| of decay is low.
+    """Integrated divergence (n,) of -grad u / |grad u|, damped on faces with a low rate |grad log u| of decay.
 
-    `corners` (m, 3) and `numbers` (m, 5) are those of `heat_igl.steps.descending.Triangles`, u (n,) and its logarithm
-    in their order. The field is 0 where no component of grad u reaches `smallest`. It follows the gradient of log u if
-    `of_log`, where no corner is below `smallest`.
+    `corners` (m, 3) and `numbers` (m, 5) are those of `heat_igl.steps.descending.Triangles`, u (n,) and the logarithm
+    in their order. The field is 0 on faces on which no component of grad u reaches `smallest`. It follows the gradient
+    of log u if `of_log`, on faces with no corner below `smallest`.
     """
     divergence = np.zeros(u.shape[0])
     total: cython.double[::1] = divergence
@@ -66,7 +66,7 @@ def _add_faces(
             largest = max(fabs(x), fabs(y))
             if not largest >= smallest:
                 continue
-        # The direction is damped where heat decays slower than it does in a front.
+        # The field is damped if heat decays slower than in a front.
         share: cython.double = (x_of_log * x_of_log + y_of_log * y_of_log) * numbers[f, PER_RATE]
         if not share < 1.0:
             share = 1.0

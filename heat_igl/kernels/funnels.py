@@ -19,7 +19,7 @@ class Layout:
     """The crossings of a strip in the plane, `gate`, and the corners of the shortest path through them, `bend`.
 
     Side "left" is the side of the second of a half-edge's ends for the first crossing, and carried along from there.
-    (x, y) is where the path starts.
+    (x, y) is the start of the path.
     """
 
     def __init__(self):
@@ -67,7 +67,7 @@ class Layout:
             there = cython.address(s.triangle[f])
             a, b, c = there.length[left], there.length[right], there.length[entered]
             half = 0.5 * (a + b + c)
-            # The far corner over the crossing: a is its distance from the right end, b from the left.
+            # The far corner over the crossing: a is the distance from the right end, b from the left.
             x: cython.double = 0.5 * ((a - b) * (a + b) / c + c) / c
             y: cython.double = 2.0 * sqrt(max(half * (half - a) * (half - b) * (half - c), 0.0)) / (c * c)
             ux: cython.double = gate.x[0] - gate.x[1]
@@ -87,7 +87,7 @@ class Layout:
         count: cython.int = 1
         ax: cython.double = self.x
         ay: cython.double = self.y
-        # For each side the limit of what the apex sees, and the crossing that set it; -1 for none yet.
+        # For each side the limit of the apex's view, and the crossing that set it; -1 for none yet.
         limit_x: cython.double[2]
         limit_y: cython.double[2]
         by: cython.int[2]
@@ -134,7 +134,7 @@ class Layout:
             last += 1
         bend = cython.address(self.bend[count])
         bend.x, bend.y, bend.side = self.gate[at].x[side], self.gate[at].y[side], side
-        # What lies before the last bend is crossed before it, though this vertex may be in sight already.
+        # Crossings before the last bend come before it, though this vertex may be in sight already.
         bend.first, bend.last = max(first, self.bend[count - 1].last), last
 
     @cython.cfunc
@@ -152,7 +152,7 @@ class Layout:
     @cython.nogil
     @cython.exceptval(check=False)
     def share(self, j: cython.int, i: cython.int) -> cython.double:
-        """How far from its right end (0) to its left end (1) the path passes crossing j on the way to its bend i."""
+        """The share from right end (0) to left end (1) at which the path passes crossing j on the way to bend i."""
         gate = cython.address(self.gate[j])
         if self.bend[i].side >= 0 and self.bend[i].first <= j:
             return 1.0 - self.bend[i].side
@@ -163,7 +163,7 @@ class Layout:
         to_left: cython.double = ux * (gate.y[0] - p.y) - uy * (gate.x[0] - p.x)
         to_right: cython.double = ux * (gate.y[1] - p.y) - uy * (gate.x[1] - p.x)
         share: cython.double = to_right / (to_right - to_left) if to_right != to_left else 0.5
-        # Between the feet of p and q, which is all that is left to say where the line runs along the crossing.
+        # Between the feet of p and q, the only choice left if the line runs along the crossing.
         ex: cython.double = gate.x[0] - gate.x[1]
         ey: cython.double = gate.y[0] - gate.y[1]
         squared: cython.double = ex * ex + ey * ey

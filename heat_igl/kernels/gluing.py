@@ -150,102 +150,133 @@ def flip(
 ) -> int:
     """Flip edges in place until the triangulation is intrinsic Delaunay (Fisher et al. 2007); how many were flipped.
 
-    All glued faces must run along their edge in opposite directions. An edge is flipped where the cotangents opposite
+    All glued faces must run along their edge in opposite directions. An edge is flipped if the cotangents opposite
     it sum to less than `-tolerance`, and by more than their rounding.
     """
-    m: cython.int = twin.shape[0] // 3
-    area: cython.double[::1] = np.empty(m)
-    waiting: cython.int[::1] = np.empty(3 * m, np.int32)
-    is_waiting: cython.uchar[::1] = np.zeros(3 * m, np.uint8)
-    n_waiting: cython.int = 0
+    flips = _Flips()
+    flips.vertex, flips.twin, flips.ring, flips.length = vertex, twin, ring, length
+    flips.area = np.empty(twin.shape[0] // 3)
+    flips.waiting, flips.is_waiting = np.empty(twin.shape[0], np.int32), np.zeros(twin.shape[0], np.uint8)
     n_flips: cython.longlong = 0
     f: cython.int
-    g: cython.int
     h: cython.int
-    t: cython.int
-    k: cython.int
-    i: cython.int
     first: cython.int
-    ab: cython.double
-    bp: cython.double
-    pa: cython.double
-    aq: cython.double
-    qb: cython.double
-    pq: cython.double
-    p: cython.double
-    q: cython.double
-    x: cython.double
-    y: cython.double
-    around: cython.int[4]
     with cython.nogil:
-        for f in range(m):
-            area[f] = _double_area(length[3 * f], length[3 * f + 1], length[3 * f + 2])
-        for first in range(3 * m):
+        for f in range(twin.shape[0] // 3):
+            flips.area[f] = _double_area(length[3 * f], length[3 * f + 1], length[3 * f + 2])
+        for first in range(twin.shape[0]):
             if twin[first] < first:
                 continue
-            waiting[0] = first
-            n_waiting = 1
-            is_waiting[first] = True
-            while n_waiting > 0:
-                n_waiting -= 1
-                h = waiting[n_waiting]
-                is_waiting[h] = False
-                t = twin[h]
-                if t < 0:
-                    continue
-                f, g = h // 3, t // 3
-                if f == g:
-                    continue
-                ab, bp, pa = length[h], length[next_half_edge(h)], length[previous_half_edge(h)]
-                aq, qb = length[next_half_edge(t)], length[previous_half_edge(t)]
-                p, q = bp * bp + pa * pa, aq * aq + qb * qb
-                # The cotangents, both multiplied by twice the areas.
-                x = (p - ab * ab) * area[g] + (q - ab * ab) * area[f]
-                if x >= 0.0 or n_flips >= most:
-                    continue
-                y = 1e-12 * ((p + ab * ab) * area[g] + (q + ab * ab) * area[f])
-                if x >= -y - 2.0 * tolerance * area[f] * area[g]:
-                    continue
-                # f = (p, a, b) and g = (q, b, a) become f = (p, a, q) and g = (q, b, p), in the same places.
-                x = 0.5 * ((pa - bp) * (pa + bp) - (aq - qb) * (aq + qb)) / ab
-                y = (area[f] + area[g]) / ab
-                pq = sqrt(x * x + y * y)
-                x, y = _double_area(pa, aq, pq), _double_area(qb, bp, pq)
-                if x <= 0.0 or y <= 0.0:
-                    continue
-                n_flips += 1
-                area[f], area[g] = x, y
-                vertex[previous_half_edge(h)] = vertex[t]
-                vertex[previous_half_edge(t)] = vertex[h]
-                k, i = twin[next_half_edge(t)], twin[next_half_edge(h)]
-                # aq moves to the place of h, bp to that of t; each may be glued to the other.
-                if k == next_half_edge(h):
-                    k = t
-                if i == next_half_edge(t):
-                    i = h
-                length[h], length[t] = aq, bp
-                length[next_half_edge(h)] = length[next_half_edge(t)] = pq
-                twin[next_half_edge(h)], twin[next_half_edge(t)] = next_half_edge(t), next_half_edge(h)
-                twin[h] = k
-                if k >= 0:
-                    twin[k] = h
-                elif k == -2:
-                    _move(ring, next_half_edge(t), h)
-                twin[t] = i
-                if i >= 0:
-                    twin[i] = t
-                elif i == -2:
-                    _move(ring, next_half_edge(h), t)
-                around[0], around[1], around[2], around[3] = h, previous_half_edge(h), t, previous_half_edge(t)
-                for i in range(4):
-                    k = around[i]
-                    if twin[k] > k:
-                        k = twin[k]
-                    if twin[k] >= 0 and not is_waiting[k]:
-                        is_waiting[k] = True
-                        waiting[n_waiting] = k
-                        n_waiting += 1
+            flips.waiting[0], flips.is_waiting[first] = first, True
+            flips.n_waiting = 1
+            while flips.n_waiting > 0:
+                flips.n_waiting -= 1
+                h = flips.waiting[flips.n_waiting]
+                flips.is_waiting[h] = False
+                if n_flips < most and flips.improves(h, tolerance):
+                    flips.flip(h)
+                    n_flips += 1
     return n_flips
+
+
+@cython.final
+@cython.cclass
+class _Flips:
+    """A triangulation of which edges are being flipped, and the edges that wait to be looked at again."""
+
+    vertex: cython.int[::1]
+    twin: cython.int[::1]
+    ring: cython.int[::1]
+    length: cython.double[::1]
+    area: cython.double[::1]  # twice that of each face
+    waiting: cython.int[::1]
+    is_waiting: cython.uchar[::1]
+    n_waiting: cython.int
+    # Of the flip that was found to improve: the new edge, and twice the areas of both new faces.
+    diagonal: cython.double
+    area_of_f: cython.double
+    area_of_g: cython.double
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def wait(self, h: cython.int) -> cython.void:
+        """Let the edge of half-edge h wait, unless it does already or has one face."""
+        if self.twin[h] > h:
+            h = self.twin[h]
+        if self.twin[h] >= 0 and not self.is_waiting[h]:
+            self.is_waiting[h] = True
+            self.waiting[self.n_waiting] = h
+            self.n_waiting += 1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def improves(self, h: cython.int, tolerance: cython.double) -> cython.bint:
+        """Whether the edge of half-edge h is to be flipped; keeps the measures of the new faces."""
+        t: cython.int = self.twin[h]
+        if t < 0:
+            return False
+        f: cython.int = h // 3
+        g: cython.int = t // 3
+        if f == g:
+            return False
+        ab: cython.double = self.length[h]
+        bp: cython.double = self.length[next_half_edge(h)]
+        pa: cython.double = self.length[previous_half_edge(h)]
+        aq: cython.double = self.length[next_half_edge(t)]
+        qb: cython.double = self.length[previous_half_edge(t)]
+        p: cython.double = bp * bp + pa * pa
+        q: cython.double = aq * aq + qb * qb
+        # The cotangents, both multiplied by twice the areas.
+        x: cython.double = (p - ab * ab) * self.area[g] + (q - ab * ab) * self.area[f]
+        if x >= 0.0:
+            return False
+        y: cython.double = 1e-12 * ((p + ab * ab) * self.area[g] + (q + ab * ab) * self.area[f])
+        if x >= -y - 2.0 * tolerance * self.area[f] * self.area[g]:
+            return False
+        x = 0.5 * ((pa - bp) * (pa + bp) - (aq - qb) * (aq + qb)) / ab
+        y = (self.area[f] + self.area[g]) / ab
+        self.diagonal = sqrt(x * x + y * y)
+        self.area_of_f = _double_area(pa, aq, self.diagonal)
+        self.area_of_g = _double_area(qb, bp, self.diagonal)
+        return self.area_of_f > 0.0 and self.area_of_g > 0.0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def flip(self, h: cython.int) -> cython.void:
+        """Flip the edge of half-edge h, and let the four edges around it wait."""
+        t: cython.int = self.twin[h]
+        after_h: cython.int = next_half_edge(h)
+        after_t: cython.int = next_half_edge(t)
+        # f = (p, a, b) and g = (q, b, a) become f = (p, a, q) and g = (q, b, p), in the same places.
+        self.vertex[previous_half_edge(h)] = self.vertex[t]
+        self.vertex[previous_half_edge(t)] = self.vertex[h]
+        self.area[h // 3], self.area[t // 3] = self.area_of_f, self.area_of_g
+        # aq moves to the place of h, bp to that of t; each may be glued to the other.
+        of_aq: cython.int = t if self.twin[after_t] == after_h else self.twin[after_t]
+        of_bp: cython.int = h if self.twin[after_h] == after_t else self.twin[after_h]
+        self.length[h], self.length[t] = self.length[after_t], self.length[after_h]
+        self.length[after_h] = self.length[after_t] = self.diagonal
+        self.twin[after_h], self.twin[after_t] = after_t, after_h
+        self.glue(after_t, h, of_aq)
+        self.glue(after_h, t, of_bp)
+        self.wait(h)
+        self.wait(previous_half_edge(h))
+        self.wait(t)
+        self.wait(previous_half_edge(t))
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def glue(self, old: cython.int, new: cython.int, twin: cython.int) -> cython.void:
+        """Give half-edge `new` what half-edge `old` was glued to."""
+        self.twin[new] = twin
+        if twin >= 0:
+            self.twin[twin] = new
+        elif twin == -2:
+            _move(self.ring, old, new)
 
 
 def breadth_first(

@@ -58,8 +58,8 @@ def _star(
 ) -> cython.Py_ssize_t:
     """Append the triangles of point i to the m that are found; return how many there are then.
 
-    The inversion p / |p|^2 takes circles through the point to straight lines: its star is the part of the convex hull
-    of the inverted neighbours that it sees, found by Graham's scan.
+    The inversion p / |p|^2 takes circles through the point to straight lines: the star of the point is the part of the
+    convex hull of the inverted neighbours that it sees, found by Graham's scan.
     """
     a: cython.Py_ssize_t
     b: cython.Py_ssize_t
@@ -183,7 +183,7 @@ def fitting_triangles(
 ):
     """Mask (m,) of `triangles` that overlap none before them: the first `n_accepted`, and those accepted one by one.
 
-    Two triangles overlap where they have a corner in common and, in the tangent plane of that corner, their angles
+    Two triangles overlap if they have a corner in common and, in the tangent plane of that corner, their angles
     do. So no edge keeps more than two triangles.
     """
     m: cython.Py_ssize_t = triangles.shape[0]
@@ -224,7 +224,7 @@ def _find_sector(
     c: cython.Py_ssize_t,
     sector: cython.double[:, :, ::1],
 ) -> cython.bint:
-    """Where the angle of triangle f at corner c begins, counterclockwise, and its size; False if it has none."""
+    """Start of the angle of triangle f at corner c, counterclockwise, and size; False if it has none."""
     at: cython.Py_ssize_t = triangles[f, c]
     begin: cython.double = _direction(P, axes, at, triangles[f, (c + 1) % 3])
     end: cython.double = _direction(P, axes, at, triangles[f, (c + 2) % 3])
@@ -268,7 +268,7 @@ def _overlaps(
     following: cython.int[:, ::1],
     sector: cython.double[:, :, ::1],
 ) -> cython.bint:
-    """Whether the angle of triangle f at its corner c overlaps one that was accepted at the same vertex."""
+    """Whether the angle of triangle f at corner c overlaps one that was accepted at the same vertex."""
     other: cython.Py_ssize_t = head[vertex]
     while other >= 0:
         g: cython.Py_ssize_t = other // 3

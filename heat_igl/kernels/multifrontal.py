@@ -1,4 +1,4 @@
-"""Multifrontal LDL^T: assemble the front of every block, eliminate its columns, and keep the update for its parent."""
+"""Multifrontal LDL^T: assemble the front of every block, eliminate the columns, and keep the update for the parent."""
 
 import cython
 import numpy as np
@@ -34,9 +34,9 @@ def factor(
 
 @cython.cclass
 class Elimination:
-    """What the elimination has done so far. `heat_igl.linear.multifrontal.Fronts` describes the arrays of the factor.
+    """State of the elimination. `heat_igl.linear.multifrontal.Fronts` describes the arrays of the factor.
 
-    Updates wait on a stack until their parent takes them, each a full square by columns with its lower half in use.
+    Updates wait on a stack until their parent takes them, each a full square by columns with the lower half in use.
     """
 
     ends: cython.const[cython.int][::1]
@@ -56,8 +56,8 @@ class Elimination:
     local: cython.int[::1]  # rows of the front at hand, numbered
     child_rows: cython.int[::1]  # rows of a child in that numbering
     stack: cython.double[::1]
-    top: cython.Py_ssize_t  # where the stack ends
-    waiting: cython.longlong[::1]  # fronts whose updates are on the stack, in its order
+    top: cython.Py_ssize_t  # the end of the stack
+    waiting: cython.longlong[::1]  # fronts whose updates are on the stack, in order
     n_waiting: cython.Py_ssize_t
     n_children: cython.int[::1]  # of those, the children of each front
 
@@ -177,7 +177,7 @@ def _add_child(
     panel: numbers,
     update: numbers,
 ) -> cython.Py_ssize_t:
-    """Add a child's update, which ends at `end` of the stack, to a front; return where it begins."""
+    """Add a child's update, which ends at `end` of the stack, to a front; return the start of it."""
     i: cython.Py_ssize_t
     j: cython.Py_ssize_t
     size: cython.Py_ssize_t = columns + left
@@ -248,7 +248,7 @@ def _divide(column: numbers, n: cython.Py_ssize_t) -> cython.bint:
 def _subtract_from_update(
     update: numbers, left: cython.Py_ssize_t, panel: entries, columns: cython.Py_ssize_t
 ) -> cython.void:
-    """Subtract what the eliminated columns of a front take from its other rows."""
+    """Subtract the contribution of the eliminated columns of a front from the other rows."""
     j: cython.Py_ssize_t
     top: cython.Py_ssize_t
     size: cython.Py_ssize_t = columns + left

@@ -27,7 +27,7 @@ def ascending(key: cython.double[::1]):
 def _sort(
     key: cython.double[::1], digits: cython.ulonglong[:, ::1], order: cython.int[:, ::1], place: cython.longlong[:, ::1]
 ) -> cython.void:
-    """Sort by three digits, least significant first; `place` counts the keys of each digit, then says where they go."""
+    """Sort by three digits, least significant first; `place` counts the keys of each digit, then holds their places."""
     i: cython.Py_ssize_t
     n: cython.Py_ssize_t = key.shape[0]
     p: cython.int

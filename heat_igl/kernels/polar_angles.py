@@ -9,9 +9,9 @@ __all__ = ["polar_angles"]
 def polar_angles(
     angle: cython.double[::1], twin: cython.longlong[::1], first: cython.longlong[::1], leaving: cython.double[::1]
 ):
-    """Fill `leaving` (3 m,) with the angle from the reference edge of its tail to each half-edge, counterclockwise.
+    """Fill `leaving` (3 m,) with the angle from the reference edge of the tail to each half-edge, counterclockwise.
 
-    `angle` (3 m,) are the angles at the corners, `first` (n,) is one corner at each vertex, -1 where there is none. The
+    `angle` (3 m,) are the angles at the corners, `first` (n,) is one corner at each vertex, -1 if there is none. The
     reference edge of an inner vertex leaves from that corner. On the boundary it is the edge at which the faces begin.
 
     Returns the sum of the angles (n,), the number of corners that were visited (n,), and whether the faces close up

@@ -111,7 +111,7 @@ class _Triangulation(_Queue):
     @cython.nogil
     @cython.exceptval(check=False)
     def _judge(self, f: cython.longlong) -> cython.void:
-        """Put a triangle that has changed in its place in the heap, or out of it."""
+        """Put a triangle that has changed in the right place in the heap, or out of it."""
         self._set_key(f, self._shape(f))
 
     @cython.cfunc
@@ -136,7 +136,7 @@ class _Triangulation(_Queue):
             shortest = 2
         if self.l[f, shortest] >= 2.0 * radius * self.least_sine:
             return 0.0
-        # The angle at the tip of a sharp cone stays what it is.
+        # The angle at the tip of a sharp cone stays as it is.
         if self.F[f, shortest] < self.n_given and self._total_angle(3 * f + shortest) < SHARPEST:
             return 0.0
         return priority
@@ -314,7 +314,7 @@ class _Refinement(_Triangulation):
         dx: cython.double = tx - ox
         dy: cython.double = ty - oy
         h: cython.longlong = 3 * f + 2
-        # The side by which the ray leaves: its ends lie on either side of the ray.
+        # The side by which the ray leaves: the ends of that side lie on either side of the ray.
         px: cython.double[3]
         py: cython.double[3]
         px[0], py[0], px[1], py[1], px[2], py[2] = 0.0, 0.0, c, 0.0, x2, y2
@@ -324,7 +324,7 @@ class _Refinement(_Triangulation):
             j: cython.int = (corner + 2) % 3
             if dx * (py[i] - oy) - dy * (px[i] - ox) <= 0.0 and dx * (py[j] - oy) - dy * (px[j] - ox) > 0.0:
                 h = 3 * f + corner
-        # In its face, a half-edge runs from the right (r) to the left (s) of the ray.
+        # In a face, a half-edge runs from the right (r) to the left (s) of the ray.
         rx: cython.double
         ry: cython.double
         sx: cython.double
@@ -340,7 +340,7 @@ class _Refinement(_Triangulation):
                 return self._give_up(f)
             g: cython.longlong = t // 3
             e: cython.int = t % 3
-            # Seen from g, the side runs from s to r; its apex lies beyond.
+            # Seen from g, the side runs from s to r; the apex lies beyond.
             base: cython.double = self.l[g, e]
             along: cython.double = foot(base, self.l[g, (e + 2) % 3], self.l[g, (e + 1) % 3]) / base
             across: cython.double = 2.0 * _area(base, self.l[g, (e + 1) % 3], self.l[g, (e + 2) % 3]) / (base * base)
@@ -348,7 +348,7 @@ class _Refinement(_Triangulation):
             ey: cython.double = ry - sy
             qx: cython.double = sx + along * ex - across * ey
             qy: cython.double = sy + along * ey + across * ex
-            # Barycentric coordinates of the target in g: at its corner e (the apex), after it (s) and before it (r).
+            # Barycentric coordinates of the target in g: at corner e (the apex), after it (s) and before it (r).
             area2: cython.double = ex * (qy - sy) - ey * (qx - sx)
             at_q: cython.double = (ex * (ty - sy) - ey * (tx - sx)) / area2
             at_s: cython.double = ((qx - rx) * (ty - ry) - (qy - ry) * (tx - rx)) / area2
@@ -405,7 +405,7 @@ class _Refinement(_Triangulation):
         v2: cython.longlong = self.F[f, 2]
         beyond_1: cython.longlong = self.twin[3 * f + 1]
         beyond_2: cython.longlong = self.twin[3 * f + 2]
-        # f = (p, 1, 2), g = (0, p, 2), k = (0, 1, p): each keeps one side of the old face in its old corner.
+        # f = (p, 1, 2), g = (0, p, 2), k = (0, 1, p): each keeps one side of the old face at the same corner.
         self.unit[g] = self.unit[k] = self.unit[f]
         self.F[f, 0] = p
         self.F[g, 0], self.F[g, 1], self.F[g, 2] = v0, p, v2
@@ -438,7 +438,7 @@ class _Refinement(_Triangulation):
 @cython.nogil
 @cython.exceptval(check=False)
 def _area(a: cython.double, b: cython.double, c: cython.double) -> cython.double:
-    """Area of a triangle by its sides, in Kahan's order."""
+    """Area of a triangle from the sides, in Kahan's order."""
     if a < b:
         a, b = b, a
     if b < c:
@@ -472,7 +472,7 @@ def refine(
     least_angle : float
         A triangle with a smaller angle, in radians, is bad.
     largest_radius : float
-        A triangle with a larger circumradius, in its unit, is bad.
+        A triangle with a larger circumradius, in the unit of the component, is bad.
     most_vertices : int
         No vertex is added when there are so many.
 

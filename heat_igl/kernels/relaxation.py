@@ -14,9 +14,9 @@ def relax(
     tolerance: cython.double,
     most_sweeps: cython.Py_ssize_t,
 ):
-    """Solve A x = b >= 0 by Gauss-Seidel in breadth-first order from where b > 0, with x zero at first.
+    """Solve A x = b >= 0 by Gauss-Seidel in breadth-first order from the entries b > 0, with x zero at first.
 
-    A sweep goes over a band of levels, outward. Its outer end moves on by one level per sweep; its inner end follows,
+    A sweep goes over a band of levels, outward. The outer end moves on by one level per sweep; the inner end follows,
     one level behind the first unknown that changed by more than `tolerance` of itself. The result is accepted by a
     sweep over all unknowns that changes none. Returns x (n,) and the number of sweeps, -1 if they did not suffice.
     """
@@ -55,7 +55,7 @@ def _breadth_first(
     start: cython.int[::1],
     place: cython.int[::1],
 ) -> cython.Py_ssize_t:
-    """Order the unknowns that b reaches outward from its entries; return the number of levels, none for b = 0.
+    """Order the unknowns that b reaches outward from the entries of b; return the number of levels, none for b = 0.
 
     Level i is ``order[start[i]:start[i + 1]]``; `place`, -1 at first, is the inverse of `order`.
     """

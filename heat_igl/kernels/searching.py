@@ -1,4 +1,4 @@
-"""Kernel of the unfolding, the search: all cones from a vertex, best first, where no walk found what was promised."""
+"""Kernel of the search: all cones from a vertex, best first, if no walk found the promised distance."""
 
 import cython
 from cython.cimports.heat_igl.kernels.walks import (
@@ -20,10 +20,10 @@ from cython.cimports.libc.math import INFINITY, atan2, sqrt
 @cython.nogil
 @cython.exceptval(check=False)
 def search(q: Query, v: cython.int) -> cython.void:
-    """Look for a shorter path from v among all cones whose forecast is better than what is known, best first.
+    """Look for a shorter path from v among all cones whose forecast is better than the known distance, best first.
 
     The cone splits at every vertex in it, so that both sides are tried; the circles about the ends of an edge tell
-    what lies behind it.
+    the faces behind it.
     """
     top: cython.int = _first_cones(q, v)
     steps: cython.int = 0
@@ -134,7 +134,7 @@ def _push(
     a: cython.int,
     b: cython.int,
 ) -> cython.int:
-    """Put a cone on the stack unless that is full; returns its new height."""
+    """Put a cone on the stack unless that is full; returns the new height."""
     if top == q.cone.shape[0]:
         return top
     cone = cython.address(q.cone[top])

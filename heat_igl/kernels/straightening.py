@@ -1,6 +1,6 @@
 """The strip of a path, led past vertices the other way until the shortest path in it is locally shortest.
 
-Where the path bends at a vertex although another way around it has an angle of less than pi, the strip is led that way,
+If the path bends at a vertex although another way around it has an angle of less than pi, the strip is led that way,
 which makes the path shorter (Xin and Wang 2007); it is repeated until no such bend is left. At most vertices the other
 way is the other side.
 """
@@ -21,7 +21,7 @@ _SEGMENT = np.dtype([("start", "f8", 3), ("end", "f8", 3), ("face", "i4")], alig
 @cython.final
 @cython.cclass
 class Course:
-    """A path on its way: the strip from where it starts, and the segments of all paths so far.
+    """A path on its way: the strip from the start, and the segments of all paths so far.
 
     It starts in `face`: at `vertex`, or at `start` if that is -1.
     """
@@ -74,9 +74,9 @@ class Course:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def straighten(self, end_vertex: cython.int, ends_on: cython.pointer[cython.const[Place]]) -> cython.double:
-        """Append the segments of a locally shortest path through the strip; returns its length.
+        """Append the segments of a locally shortest path through the strip; returns the length.
 
-        It ends at `end_vertex`, or, if that is -1, where it is nearest on the segment between two places `ends_on` in
+        It ends at `end_vertex`, or, if that is -1, at the nearest point of the segment between two places `ends_on` in
         the last face.
         """
         c: cython.int
@@ -135,7 +135,7 @@ class Course:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def _repair(self) -> cython.int:
-        """Lead the strip the other way around the bends where that is shorter; 0 if there are none."""
+        """Lead the strip the other way around the bends if that is shorter; 0 if there are none."""
         self.straighter.count = 0
         copied: cython.int = 0
         has_changed: cython.bint = False
@@ -167,7 +167,7 @@ class Course:
     @cython.nogil
     @cython.exceptval(check=False)
     def _shorter_way(self, i: cython.int) -> cython.int:
-        """Find a shorter way around the i-th bend; returns its number of crossings in ``detour.way``, -1 if none."""
+        """Find a shorter way around the i-th bend; returns the number of crossings in ``detour.way``, -1 if none."""
         bend = cython.address(self.layout.bend[i])
         first = cython.address(self.layout.gate[bend.first])
         last = cython.address(self.layout.gate[bend.last])

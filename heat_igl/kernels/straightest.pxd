@@ -14,3 +14,22 @@ cdef extern from *:
 cdef enum:
     # Steps without length, one after another, after which a geodesic ends: only in places where all edges have length 0.
     MOST_IDLE = 10000
+
+
+# A point on the base of a face, and the direction in which it moves.
+# The base is half-edge `h`, from the tail in the origin to the head on the first axis; the face is above it. The point
+# is the share `s` of the base from the tail, unless it `is_inside` the face. `is_at_tail`: it is the tail, and leaves
+# across the side opposite.
+cdef struct Ray:
+    long long h
+    double s, dx, dy
+    bint is_inside, is_at_tail
+
+# Face `f` in the plane, with its corners (x, y) from the tail of side `side` on; the ray starts at (start_x, start_y),
+# and leaves at the share `share` of the side from point `k` to the next.
+cdef struct Layout:
+    long long f
+    int side, k
+    double x[3]
+    double y[3]
+    double start_x, start_y, share

@@ -1,6 +1,6 @@
 """Strips of faces, and the shortest way around a vertex from one face to another.
 
-A strip is a sequence of crossings. Where more than two faces meet at an edge, it crosses the edge from any of them into
+A strip is a sequence of crossings. If more than two faces meet at an edge, it crosses the edge from any of them into
 any other, and the ways around the ends of the edge branch, so the shortest is searched for. Nothing here needs faces
 that are oriented alike.
 """
@@ -81,7 +81,7 @@ class Detour:
     ) -> cython.int:
         """The shortest way around v from the face of half-edge h to face `goal`, or to one with vertex `other`.
 
-        Its length is the sum of the angles at v: in the first face `before`, of h; in the last face `after`, of
+        The length is the sum of the angles at v: in the first face `before`, of h; in the last face `after`, of
         half-edge `end`; and those of the faces between. Returns how many crossings, in `way`; -1 if there is no way, or
         none below `limit`.
         """

@@ -1,4 +1,4 @@
-"""Solves with a multifrontal factor, piece by piece of its tree: forward from the leaves, and back from the roots."""
+"""Solves with a multifrontal factor, piece by piece of the tree: forward from the leaves, and back from the roots."""
 
 import cython
 import numpy as np
@@ -12,7 +12,7 @@ width = WIDTH
 
 @cython.cclass
 class Substitution:
-    """A factor and where everything is in it; `heat_igl.linear.multifrontal.Fronts` says what the arrays are.
+    """A factor and the index arrays of it, which `heat_igl.linear.multifrontal.Fronts` describes.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Substitution:
     ):
         """Eliminate the columns of the pieces `first` to `until` from x (n,).
 
-        ``sums[piece]`` takes what a piece subtracts from the rows above all pieces.
+        ``sums[piece]`` takes the amount that a piece subtracts from the rows above all pieces.
         """
         room: cython.double[::1] = np.empty(self.most_rows)
         piece: cython.Py_ssize_t
@@ -109,7 +109,7 @@ def _forward_one(
         # Of a source's heat, most fronts have none on the way forward.
         if _all_zero(own, columns):
             continue
-        column: entries = cython.address(f.L[f.first_entry[b]])  # from its diagonal on
+        column: entries = cython.address(f.L[f.first_entry[b]])  # from the diagonal on
         ahead: cython.p_char = cython.cast(cython.p_char, column) - AHEAD
         for i in range(left):
             below[i] = 0.0

@@ -1,4 +1,4 @@
-"""What kernels of paths read: triangles, what lies around edges and vertices, a distance, and places in faces."""
+"""Input of the path kernels: triangles, the faces around edges and vertices, a distance, and places in faces."""
 
 import cython
 
@@ -8,7 +8,7 @@ __all__ = ["Surface"]
 @cython.final
 @cython.cclass
 class Surface:
-    """Views of the arrays of `heat_igl.curves.tracing.Surface`, and of a distance (n,) on its vertices."""
+    """Views of the arrays of `heat_igl.curves.tracing.Surface`, and of a distance (n,) on the vertices."""
 
     def __init__(self, surface, d):
         self.triangle = surface.triangle

@@ -1,7 +1,7 @@
 """Kernel of the sweep: distance by unfolding two triangles at a time, in a given order.
 
-Seen from a vertex v, a source lies behind the side ab of one of its triangles, where circles about a and b meet. The
-triangle beyond ab has the third corner w, which is nearer to the source and so knows better where it is.
+Seen from a vertex v, a source lies behind the side ab of a triangle at v, at the intersection of circles about a and b.
+The triangle beyond ab has the third corner w, which is nearer to the source and so places it more accurately.
 """
 
 import cython
@@ -25,12 +25,12 @@ def sweep(
 ):
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, in the given order.
 
-    Where a vertex turns out to be nearer than one that came before it, the sweep goes back to that one at once, before
-    what is wrong there spreads. Returns the number of visits per vertex. Vertices that are not in `is_stale` (n,) bool
-    are visited only if what they depend on changes.
+    If a vertex turns out to be nearer than one that came before it, the sweep goes back to that one at once, before
+    the error there spreads. Returns the number of visits per vertex. Vertices that are not in `is_stale` (n,) bool
+    are visited only if a value that they depend on changes.
 
     `label` (n,) int32, None unless there is more than one source, is handed on with the distance: the source that it is
-    measured from, -1 where none is reached; ``offset[label]`` is the distance at which that source begins. Circles
+    measured from, -1 if none is reached; ``offset[label]`` is the distance at which that source begins. Circles
     about the ends of a side meet in a source if both ends are measured from it. Between ends of two sources of one
     ``group[label]``, points of a curve, a straight front comes in, from the source of the end that it passes nearer to.
     Between ends of other sources, one end and the corner beyond the side have to be measured from the same.
@@ -52,7 +52,7 @@ def sweep(
 @cython.final
 @cython.cclass
 class _Sweep:
-    """What a sweep reads and writes; by vertex but for `order`, the vertices, and `offset`, by source."""
+    """Arrays that a sweep reads and writes; by vertex but for `order`, the vertices, and `offset`, by source."""
 
     t: HalfEdges
     order: cython.const[cython.int][::1]
@@ -73,7 +73,7 @@ class _Sweep:
         """Visit all that is stale, in order, going back where need be."""
         n: cython.Py_ssize_t = self.order.shape[0]
         i: cython.Py_ssize_t = 0
-        again: cython.Py_ssize_t = n  # from where to begin once more when the end is reached
+        again: cython.Py_ssize_t = n  # rank to begin at once more when the end is reached
         back: cython.Py_ssize_t
         v: cython.int
         is_large: cython.bint = self.t.spoke.shape[0] > CACHED
@@ -103,7 +103,7 @@ class _Sweep:
     @cython.nogil
     @cython.exceptval(check=False)
     def read_ahead(self, i: cython.Py_ssize_t) -> cython.void:
-        """Have what the next visits read fetched: on large meshes that takes longer than the visits."""
+        """Prefetch the data of the next visits: on large meshes that takes longer than the visits."""
         n: cython.Py_ssize_t = self.order.shape[0]
         k: cython.int
         v: cython.int
@@ -123,14 +123,14 @@ class _Sweep:
     @cython.nogil
     @cython.exceptval(check=False)
     def visit(self, v: cython.int) -> cython.Py_ssize_t:
-        """Give v the best that its triangles say; returns the lowest rank of what that makes stale, or n."""
+        """Give v the best value from the triangles at it; returns the lowest rank that becomes stale, or n."""
         k: cython.int
         old: cython.double = self.d[v]
         best: cython.double = old
         across: cython.double = INFINITY  # squared
         squared: cython.double
         begin: cython.double = 0.0
-        # Where the best of either kind comes from.
+        # The triangle of the best value of either kind.
         nearest: cython.int = -1
         ignored: cython.int = -1
         along_edge: cython.int = v
@@ -180,9 +180,9 @@ class _Sweep:
     def seen_from_beyond(
         self, k: cython.int, across: cython.double, source: cython.pointer[cython.int]
     ) -> cython.double:
-        """Distance across the triangle left of spoke k, `across` by its own corners, and by the one beyond.
+        """Distance across the triangle left of spoke k, `across` from the corners of it, and from the one beyond.
 
-        Where the corners are not measured from the same source the distance stays. `source` is set to where it comes
+        If the corners are not measured from the same source the distance stays. `source` is set to the one it comes
         from, if there are labels.
         """
         s = cython.address(self.t.spoke[k])
@@ -219,8 +219,8 @@ class _Sweep:
     def between_cells(self, k: cython.int, below: cython.double, source: cython.pointer[cython.int]) -> cython.double:
         """Distance across the triangle left of spoke k, whose ends are measured from different sources.
 
-        As one of them knows its source together with the corner beyond, if that is measured from the same. `source` is
-        set to the one it comes from; ``inf`` if there is none, or none below `below`.
+        From one corner and the source of it together with the corner beyond, if that is measured from the same.
+        `source` is set to the one it comes from; ``inf`` if there is none, or none below `below`.
         """
         s = cython.address(self.t.spoke[k])
         best: cython.double = INFINITY
@@ -250,7 +250,7 @@ class _Sweep:
                 back = self.mark_farther(v)
                 back = min(back, self.mark_nearer(v, begin))
         elif self.d[v] < old * (1 - NEGLIGIBLE):
-            # With curvature around, what `mark_nearer` finds is less than the sweep's error.
+            # With curvature around, the gain that `mark_nearer` finds is less than the sweep's error.
             back = self.mark_farther(v)
         return back
 
@@ -278,7 +278,7 @@ class _Sweep:
         """Mark the nearer neighbours that a smaller d[v] can improve.
 
         The path of such a one crosses the edge between v and a vertex that is nearer still. That takes an angle there
-        whose cosine is below L / (2 d), L the length of the spoke and d counted from `begin`, where the source begins.
+        whose cosine is below L / (2 d), L the length of the spoke and d counted from `begin`, the offset of the source.
         """
         lowest: cython.Py_ssize_t = self.order.shape[0]
         k: cython.int
@@ -375,8 +375,8 @@ def _across_two(
     """Squared distance from v of the source behind ab, as the corner w beyond ab and one of a and b know it.
 
     The line to the source as a and b know it leaves the farther triangle between w and p, one of them; it is drawn anew
-    to where circles about p and w meet. If that is on the other side of w, the path bends at w. ``inf`` if a and b know
-    better: the source lies in the farther triangle, or hidden by p.
+    to the intersection of circles about p and w. If that is on the other side of w, the path bends at w. ``inf`` if a
+    and b know better: the source lies in the farther triangle, or hidden by p.
     """
     # a in the origin, b on the first axis, v above it, w at (wx, -wy).
     wx: cython.double = s.beyond_along

@@ -1,4 +1,4 @@
-"""Symbolic factorization: where the fronts of a multifrontal factor have entries, and how their tree is cut up."""
+"""Symbolic factorization: the rows of the fronts of a multifrontal factor, and a partition of the tree of fronts."""
 
 import cython
 import numpy as np
@@ -14,7 +14,7 @@ def front_rows(
     start: cython.const[cython.longlong][::1],
     parent: cython.const[cython.longlong][::1],
 ):
-    """The rows of every front: neighbours of its columns, and rows of its children, that are eliminated later.
+    """The rows of every front: neighbours of the columns, and rows of the children, that are eliminated later.
 
     Returns first_row (k + 1,) int64 and rows int32, ascending within each front.
     """
@@ -61,7 +61,7 @@ def _rows_of_front(
     sibling: cython.longlong[::1],
     seen_by: cython.longlong[::1],
 ) -> cython.Py_ssize_t:
-    """Append the rows of front b, in no order, after those of the fronts before it; return where they end."""
+    """Append the rows of front b, in no order, after those of the fronts before it; return the end."""
     i: cython.Py_ssize_t
     p: cython.Py_ssize_t
     row: cython.int
@@ -112,7 +112,7 @@ def _sort_rows(
             for p in range(first_row[b], first_row[b + 1]):
                 fronts[first_front[rows[p]]] = b
                 first_front[rows[p]] += 1
-        # Each entry has moved on to where the next row's fronts begin.
+        # Each entry now holds the start of the next row's fronts.
         p = 0
         for row in range(n):
             while p < first_front[row]:
@@ -128,7 +128,7 @@ def tree_pieces(
 ):
     """Cut a tree of fronts into subtrees of at most `most` entries, small ones together.
 
-    Returns the number of pieces, and that of each front (k,) int64; what is above them all is numbered as one more.
+    Returns the number of pieces, and that of each front (k,) int64; fronts above all pieces get the next number.
     """
     k: cython.Py_ssize_t = parent.shape[0]
     number = np.full(k, -1, np.int64)

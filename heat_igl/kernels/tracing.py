@@ -1,4 +1,4 @@
-"""Paths to sources: down a distance by its steepest descent, or by aiming at what it says ahead, then straightened."""
+"""Paths to sources: by steepest descent of a distance, or by aiming with the distances ahead, then straightened."""
 
 import cython
 import numpy as np
@@ -54,7 +54,7 @@ def trace(
 @cython.final
 @cython.cclass
 class _Tracer:
-    """A surface with a distance, the goals of paths, and the path on its way."""
+    """A surface with a distance, the goals of paths, and the path being traced."""
 
     s: Surface
     course: Course
@@ -63,7 +63,7 @@ class _Tracer:
     inside: cython.const[Goal][::1]
     escape: cython.const[cython.int][::1]
     max_steps: cython.longlong
-    # Of the path on its way: whether it aims, and which part of the distance is left.
+    # Of the path being traced: whether it aims, and which part of the distance is left.
     aims: cython.bint
     left: cython.double
 
@@ -71,7 +71,7 @@ class _Tracer:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def best_path(self, face: cython.int, x: cython.pointer[cython.const[Place]]) -> cython.int:
-        """Append the path from a point by descent, or, if that is too long, by aiming where it is shorter."""
+        """Append the path from a point by descent, or, if that is too long, by aiming if that is shorter."""
         i: cython.int
         first: cython.int = self.course.n_segments
         value: cython.double = self.value(face, x)
@@ -98,7 +98,7 @@ class _Tracer:
     def path(self, face: cython.int, target: cython.pointer[cython.const[Place]]) -> cython.double:
         """Go down from a point of a face to a source and append the straightened path.
 
-        Returns its length and what the distance at its end is; inf if there is no way.
+        Returns the length plus the distance at the end; inf if there is no way.
         """
         x: Place = target[0]
         corner: Place
@@ -156,7 +156,7 @@ class _Tracer:
                 self.left = self.s.d[v] - apart(self.s, f, cython.address(corner), cython.address(way.at))
                 x = way.at
                 v = -1
-            # At a point of face f that is no vertex: on one of its sides, or (at the start) inside.
+            # At a point of face f that is no vertex: on a side of it, or (at the start) inside.
             out: Place
             on: WayOn = self.way_on(f, cython.address(x), steps == 1, cython.address(out))
             h: cython.int = 3 * f + side_of(cython.address(x))
@@ -183,7 +183,7 @@ class _Tracer:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def end_on(self, goal: cython.int) -> cython.double:
-        """Straighten the path to a goal; its length and the distance at which the goal begins."""
+        """Straighten the path to a goal; returns the length plus the offset of the goal."""
         c: cython.int
         ends: Place[2]
         row = cython.address(self.inside[goal])
@@ -211,12 +211,12 @@ class _Tracer:
     def way_on(
         self, f: cython.int, x: cython.pointer[cython.const[Place]], is_first: cython.bint, out: cython.pointer[Place]
     ) -> WayOn:
-        """How the way goes on from a point of face f. When aiming, `out` is where the way leaves the face."""
+        """How the way goes on from a point of face f. When aiming, the way leaves the face at point `out`."""
         way: WayOn
         goal: Nearest
         down: Descent
         way.face = way.enter = way.goal = -1
-        # The steeper the descent the better, and the less a way misses what is left of the length.
+        # The steeper the descent the better, and the less a way misses the rest of the length.
         best: cython.double = -INFINITY if self.aims else 0.0
         better: cython.double
         k: cython.int
@@ -257,7 +257,7 @@ class _Tracer:
     @cython.nogil
     @cython.exceptval(check=False)
     def value(self, f: cython.int, x: cython.pointer[cython.const[Place]]) -> cython.double:
-        """The distance at point x of face f, where it is linear."""
+        """The distance at point x of face f, linear in the face."""
         total: cython.double = 0.0
         c: cython.int
         for c in range(3):
@@ -282,7 +282,7 @@ class _Tracer:
     @cython.nogil
     @cython.exceptval(check=False)
     def goal_in(self, f: cython.int, x: cython.pointer[cython.const[Place]], at_any_cost: cython.bint) -> Nearest:
-        """The nearest goal inside face f from its point x; none if the distance at x is less, unless `at_any_cost`."""
+        """The nearest goal inside face f from point x; none if the distance at x is less, unless `at_any_cost`."""
         best: Nearest
         best.goal, best.face, best.distance = -1, f, INFINITY
         i: cython.int

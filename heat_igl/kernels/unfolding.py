@@ -1,7 +1,7 @@
-"""Kernel of the unfolding: every vertex by the straightest path that its neighbours' paths lead to.
+"""Kernel of the unfolding: the straightest path of every vertex from the paths of its neighbours.
 
 `walking` follows a path through a strip of triangles, `searching` tries all; here vertices are visited in order and
-take the best that these find. What a vertex then knows of its path is a `Walk`.
+take the best that these find. The record of a path at a vertex is a `Walk`.
 """
 
 import cython
@@ -96,7 +96,7 @@ def _run(
 @cython.nogil
 @cython.exceptval(check=False)
 def _read_ahead(q: Query, order: cython.const[cython.int][::1], i: cython.Py_ssize_t) -> cython.void:
-    """Have what the next visits begin with fetched: a third of the time would go by waiting for it."""
+    """Prefetch the data of the next visits: a third of the time would go by waiting for it."""
     n: cython.Py_ssize_t = order.shape[0]
     k: cython.int
     v: cython.int
@@ -119,7 +119,7 @@ def _read_ahead(q: Query, order: cython.const[cython.int][::1], i: cython.Py_ssi
 @cython.nogil
 @cython.exceptval(check=False)
 def _visit(q: Query, v: cython.int, may_wait: cython.bint) -> cython.int:
-    """Give v the best path that can be found from its neighbours', or name a vertex to visit first; -1 if none."""
+    """Give v the best path found from the neighbours' paths, or name a vertex to visit first; -1 if none."""
     first: cython.int = q.t.first[v]
     k: cython.int
     old: cython.double = q.walk[v].distance
@@ -134,7 +134,8 @@ def _visit(q: Query, v: cython.int, may_wait: cython.bint) -> cython.int:
                 continue
             if turn.across < -1:
                 cross_crowded(q, k)
-            # A way in lies where one neighbour says left and the next one right (or is not known yet).
+            # A way in lies between spokes of which one neighbour says left and the next one right (or is not known
+            # yet).
             right = cython.address(q.advice[k - first])
             left = cython.address(q.advice[q.t.spoke[k].next - first])
             if right.side > 0 and (left.side == SAYS_RIGHT or left.side == NOT_VISITED):
@@ -175,7 +176,7 @@ def _settle(q: Query, v: cython.int) -> cython.void:
     departure: cython.double = found.there
     root: cython.int = found.end
     if found.saving != REAL_BEND and end.reach > 0.0:
-        # On to the last bend of that path, in the direction in which it is seen from its end.
+        # On to the last bend of that path, in the direction in which it is seen from the end.
         c: cython.double = cos(found.saving)
         s: cython.double = sin(found.saving)
         further: cython.double = end.reach / reach

@@ -1,8 +1,8 @@
 """Which linear solver factors a matrix.
 
-`analyse` looks at the pattern alone; what it returns factors every matrix of that pattern, and principal submatrices,
+`analyse` looks at the pattern alone; the result factors every matrix of that pattern, and principal submatrices,
 so that the heat and the Poisson problem share one ordering. Each backend is one small class of analysis and one of
-factorization in a file of its own; scripts/tune_backends.py measures them.
+factorization in a separate file; scripts/tune_backends.py measures them.
 
 Libraries that were tried and left: cholespy holds the interpreter's lock and orders each matrix anew; cvxopt and
 scikit-sparse are GPL; MKL's PARDISO is proprietary and for one kind of processor.
@@ -43,7 +43,7 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
         Both triangles stored, indices sorted or not; the values do not matter.
     backend : {"auto", "scipy", "multifrontal", "iterative"}
         SuperLU; the package's own factorization; or no factors at all, see `iterative`, which needs pyamg. "auto" takes
-        the second where the matrix is not small, and the third where pyamg is installed and factors would not fit into
+        the second if the matrix is not small, and the third if pyamg is installed and factors would not fit into
         memory, by an estimate made before.
 
     Raises

@@ -3,7 +3,7 @@
 George (1973) with separators from a sweep: in each piece of the graph two vertices far apart are found by breadth-first
 searches, and the vertices are lined up by how much nearer they are to one than to the other. Every threshold along that
 line cuts the piece in two; all of them are weighed at once. On meshes this leaves somewhat more nonzeros than
-METIS's multilevel scheme, in a fraction of its time: METIS (pymetis) uses one processor and holds the interpreter's
+METIS's multilevel scheme, in a fraction of the time: METIS (pymetis) uses one processor and holds the interpreter's
 lock.
 """
 
@@ -61,7 +61,7 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
         Threads to work with. The result does not depend on them.
     """
     n = len(ends) - 1
-    # What has very many neighbours belongs to every separator.
+    # A vertex with very many neighbours belongs to every separator.
     is_hub = np.diff(ends) > max(10 * np.sqrt(n), 64)
     others = kernel.along_surface(ends, neighbours, is_hub.view(np.uint8))
     order = np.concatenate([others, np.flatnonzero(is_hub).astype(np.int32)])
@@ -71,7 +71,7 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
     large = max(_LARGE, _SHARE * n)
 
     def cut(graph: tuple[IntArray, IntArray], low: int, high: int, above: int) -> list[Any]:
-        """Dissect order[low:high], or cut it once if it is large, and return what is then left to dissect."""
+        """Dissect order[low:high], or cut it once if it is large, and return the pieces left to dissect."""
         some = np.arange(high - low, dtype=np.int32)
         parent_here = parent[low:high]
         rest = kernel.dissect_pieces(*graph, some, is_start[low:high], parent_here, large)
@@ -100,10 +100,10 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
 
 
 def _apart(ends: IntArray, neighbours: IntArray) -> list[tuple[tuple[IntArray, IntArray], int, int]]:
-    """Parts of a graph in breadth-first order that no edge joins, each with its first vertex and its end.
+    """Parts of a graph in breadth-first order that no edge joins, each with the first vertex and the end.
 
     A part is looked through again for each component that is split off from it, so there are no more than `_TOGETHER`
-    vertices before its last component.
+    vertices before the last component.
     """
     n = len(ends) - 1
     vertex = np.repeat(np.arange(n), np.diff(ends))

@@ -1,6 +1,6 @@
-"""Symbolic factorization: where everything is in a multifrontal factor, and the pieces in which it is solved.
+"""Symbolic factorization: the layout of a multifrontal factor, and the pieces in which it is solved.
 
-The factor is stored by fronts, one row index for all columns of a front, so that a solve reads little else than its
+The factor is stored by fronts, one row index for all columns of a front, so that a solve reads little else than the
 numbers.
 """
 
@@ -22,7 +22,7 @@ _SMALLEST_PIECE = 1_500_000
 
 
 class Fronts(NamedTuple):
-    """Where everything is in a factor: all that the pattern determines.
+    """Layout of a factor: all that the pattern determines.
 
     Attributes
     ----------
@@ -33,22 +33,22 @@ class Fronts(NamedTuple):
     parent : (k,) int64
         The front that takes the update; -1 at roots.
     first_row : (k + 1,) int64
-        The rows of front b below its own columns are ``rows[first_row[b]:first_row[b + 1]]``, ascending.
+        The rows of front b below the columns of it are ``rows[first_row[b]:first_row[b + 1]]``, ascending.
     rows : (r,) int32
         Places in the order.
     first_entry : (k,) int64
-        Where the columns of a front begin in the factor, one after the other, each from its diagonal on down. The
+        Start of each column in the factor, front after front, each from the diagonal on down. The
         fronts lie there in the order back from the roots, as ascending memory is read fastest, and a single source's
         heat skips most of the way forward.
     pieces : (k,) int64
         Fronts by piece of the tree, ascending within each.
     piece_end : (p + 2,) int64
-        Piece i is ``pieces[piece_end[i]:piece_end[i + 1]]``; neighbours of its columns are in it or in the last one,
+        Piece i is ``pieces[piece_end[i]:piece_end[i + 1]]``; neighbours of these columns are in it or in the last one,
         piece p, which holds the fronts above all others.
     end_entry : (p + 2,) int64
         Entries of the factor before each piece, and all of them.
     own_rows : (k,) int64
-        How many of a front's rows are in its own piece; the rest are in piece p.
+        Number of a front's rows in the same piece; the rest are in piece p.
     above : (n,) int32
         Numbers the columns of piece p; -1 elsewhere.
     """

@@ -33,7 +33,7 @@ __all__ = [
     "iterative",
 ]
 
-# Relative change per sweep below which an unknown is left alone. What it still lacks adds up along the way from the
+# Relative change per sweep below which an unknown is left alone. The remaining error adds up along the way from the
 # source, to at most some 1e-8 on slivers; distances see the differences of neighbours only.
 _TOLERANCE = 1e-11
 # A sweep goes out by one level of unknowns at a time; slivers need a thousand more.
@@ -103,7 +103,7 @@ class Relaxation:
         return self._rising(b)
 
     def _rising(self, b: FloatArray) -> FloatArray:
-        A = self._part.matrix  # symmetric: its columns are its rows
+        A = self._part.matrix  # symmetric: columns are rows
         x, sweeps = relax(
             A.indptr.astype(np.int32, copy=False),
             A.indices.astype(np.int32, copy=False),
@@ -154,7 +154,7 @@ class Multigrid:
             raise MissingExtraError.of('backend="iterative"', "pyamg", "fast") from None
         self._arguments = A, free
         self._part = _Part(A, free)
-        part = self._part.matrix  # symmetric: its columns are its rows
+        part = self._part.matrix  # symmetric: columns are rows
         rows = sp.csr_matrix((part.data, part.indices, part.indptr), shape=part.shape)
         self._levels: Any = pyamg.ruge_stuben_solver(rows, max_coarse=500)
         self.n_bytes = int(self._part.n_bytes * self._levels.operator_complexity())
@@ -205,8 +205,8 @@ class _Part:
 
 
 def iterative(A: sp.csc_matrix, free: BoolArray | None = None) -> Relaxation | Multigrid:
-    """What solves with `A` without factors: `Relaxation` where each diagonal entry exceeds the rest of its row, as in
-    a step of heat flow, and `Multigrid` where rows sum to zero, as in a Poisson problem.
+    """A solver for `A` without factors: `Relaxation` if each diagonal entry exceeds the rest of its row, as in
+    a step of heat flow, and `Multigrid` if rows sum to zero, as in a Poisson problem.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def factor_bytes(n: int, n_entries: int) -> float:
 
 
 def available_memory() -> float:
-    """Bytes that can be allocated without swapping, as far as the system tells; infinite where it does not."""
+    """Bytes that can be allocated without swapping, as far as the system tells; infinite if it does not."""
     try:
         with open("/proc/meminfo") as lines:
             for line in lines:

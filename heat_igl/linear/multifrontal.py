@@ -1,8 +1,8 @@
 """The package's own factorization: multifrontal LDL^T (Duff and Reid 1983; Liu 1992) on a nested dissection.
 
-Every block of the dissection is a *front*, a dense matrix over its own columns and the rows below that they reach. The
-columns are eliminated in place and kept; what is left over, the update, is added to the parent's front. No pivoting,
-for the reason that `SuperLUFactorization` gives.
+Every block of the dissection is a *front*, a dense matrix over the columns of the block and the rows below that they
+reach. The columns are eliminated in place and kept; the remainder, the update, is added to the parent's front. No
+pivoting, for the reason that `SuperLUFactorization` gives.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class MultifrontalAnalysis:
         return all(a is b or np.array_equal(a, b) for a, b in zip(own, (A.indptr, A.indices), strict=True))
 
     def factorize(self, A: sp.csc_matrix, free: BoolArray | None = None) -> MultifrontalFactorization:
-        """Factor `A`, or its principal submatrix on the vertices that are `free`."""
+        """Factor `A`, or the principal submatrix on the vertices that are `free`."""
         if not self.fits(A):
             raise ValueError("A has another pattern than the matrix that was analysed: analyse A")
         return MultifrontalFactorization(self, A, free)
@@ -70,7 +70,7 @@ class MultifrontalAnalysis:
 
 
 class MultifrontalFactorization:
-    """LDL^T of a matrix; its entries are stored front by front, as `Fronts` says."""
+    """LDL^T of a matrix; entries are stored front by front, as `Fronts` says."""
 
     backend = "multifrontal"
 
@@ -94,7 +94,7 @@ class MultifrontalFactorization:
         width = self._substitution.width
         for first in range(0, b.shape[1], width):
             columns = b[:, first : first + width]
-            # A block costs as much as a few single columns, however many of its columns are used.
+            # A block costs as much as a few single columns, however many columns are used.
             if columns.shape[1] < self._substitution.few:
                 for i in range(columns.shape[1]):
                     x[:, first + i] = self._solve_one(columns[:, i])

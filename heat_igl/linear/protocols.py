@@ -1,4 +1,4 @@
-"""What a linear solver is: an analysis of a pattern, and a factorization of a matrix; what holds for all of them."""
+"""Interfaces of a linear solver: an analysis of a pattern, and a factorization of a matrix."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Factorization(Protocol):
     Attributes
     ----------
     backend : str
-        What holds the factor.
+        Storage of the factor.
     nonzeros : int
         Entries of the factor.
     n_bytes : int
@@ -36,12 +36,12 @@ class Factorization(Protocol):
 
 
 class Analysis(Protocol):
-    """What the pattern of a matrix alone determines: an order of elimination, and where the factor has entries.
+    """Data from the pattern of a matrix alone: an order of elimination, and the pattern of the factor.
 
     Attributes
     ----------
     backend : str
-        What factors the matrices.
+        The solver that factors the matrices.
     order : (n,) int32, optional
         ``order[i]`` is eliminated as the i-th; neighbours mostly are near each other in it. None if that is not known.
     """
@@ -54,7 +54,7 @@ class Analysis(Protocol):
         ...
 
     def factorize(self, A: sp.csc_matrix, free: BoolArray | None = None) -> Factorization:
-        """Factor `A`, or its principal submatrix on the vertices that are `free`; errors as for the function."""
+        """Factor `A`, or the principal submatrix on the vertices that are `free`; errors as for the function."""
         ...
 
 

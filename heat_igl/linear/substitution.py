@@ -1,8 +1,8 @@
-"""Solves with a multifrontal factor: forward from the leaves of the tree of fronts to its roots, and back.
+"""Solves with a multifrontal factor: forward from the leaves of the tree of fronts to the roots, and back.
 
-The tree is cut into pieces, subtrees, and the few fronts above them. Pieces know nothing of one another: what one
-subtracts from the rows above, it keeps to itself, and the sum is taken in the order of the pieces. So they run side by
-side, and the bits of a solution do not depend on the number of threads.
+The tree is cut into pieces, subtrees, and the few fronts above them. Pieces know nothing of one another: the amount
+that one subtracts from the rows above, it keeps to itself, and the sum is taken in the order of the pieces. So they run
+side by side, and the bits of a solution do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Substitution:
     Parameters
     ----------
     fronts : Fronts
-        Where everything is in the factor.
+        Layout of the factor.
     L : (entries,) float64
         The factor.
 

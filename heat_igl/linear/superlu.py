@@ -27,7 +27,7 @@ class SuperLUAnalysis:
         return True
 
     def factorize(self, A: sp.csc_matrix, free: BoolArray | None = None) -> SuperLUFactorization:
-        """Factor `A`, or its principal submatrix on the vertices that are `free`."""
+        """Factor `A`, or the principal submatrix on the vertices that are `free`."""
         return SuperLUFactorization(A, free)
 
 

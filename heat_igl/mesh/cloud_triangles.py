@@ -1,9 +1,9 @@
 """The triangles of a point cloud: Delaunay triangles of tangent planes, as far as they fit together to a surface.
 
 In the union of the local triangulations (Sharp and Crane 2020, section 6), nearly all triangles are in the stars of all
-three corners. These never overlap, since each star is planar. Where stars differ, on four points near a circle or on
-noisy points, triangles of more stars come first, and of these the smaller ones; what does not fit is left out. Then
-small gaps are closed, and points in no triangle are inserted into the nearest one.
+three corners. These never overlap, since each star is planar. If stars differ, on four points near a circle or on
+noisy points, triangles of more stars come first, and of these the smaller ones; others that do not fit are left out.
+Then small gaps are closed, and points in no triangle are inserted into the nearest one.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def _ears(P: FloatArray, F: IntArray, largest: FloatArray) -> IntArray:
     outer = found.vertices[found.n_faces == 1]
     ends = group_by_label(np.concatenate([outer[:, 0], outer[:, 1]]), len(P))
     other = np.concatenate([outer[:, 1], outer[:, 0]])
-    # More than two boundary edges meet where gaps touch; an ear may be cut there in a later round.
+    # More than two boundary edges meet at touching gaps; an ear may be cut there in a later round.
     at = np.flatnonzero(np.diff(ends.first) == 2)
     before, after = other[ends.members[ends.first[at]]], other[ends.members[ends.first[at] + 1]]
     ears = np.stack([before, at, after], axis=1)
@@ -134,7 +134,7 @@ def with_points(P: FloatArray, F: IntArray, axes: FloatArray, points: IntArray, 
 
 
 def _facing(P: FloatArray, F: IntArray, axes: FloatArray, points: IntArray, vertices: IntArray) -> IntArray:
-    """For each point the triangle (k,) around its vertex whose middle lies most in the direction of the point."""
+    """For each point the triangle (k,) around the vertex whose middle lies most in the direction of the point."""
     corner, which = group_by_label(F.ravel(), len(P)).of(vertices)
     face = corner // 3
 

@@ -41,7 +41,7 @@ class Facets(NamedTuple):
     vertices : (k, d) int64
         Vertices of each facet, ascending within a row.
     of_face : (m, d + 1) int64
-        ``of_face[f, c]`` is the facet of face ``f`` opposite its corner ``c``.
+        ``of_face[f, c]`` is the facet of face ``f`` opposite corner ``c``.
     n_faces : (k,) int64
         Number of faces at the facet: 1 on the boundary, 2 inside, more if the mesh is not manifold.
     """
@@ -147,7 +147,7 @@ def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
     """Vertices whose faces do not form one fan: two cones that touch in a point, or more than two faces on an edge.
 
     For triangle meshes. The nodes of a graph are the ends of all edges. Each corner of a face joins two nodes: the ends
-    there of its two sides. The nodes at a manifold vertex form one connected component.
+    there of the two sides. The nodes at a manifold vertex form one connected component.
     """
     edge = found.of_face.T.astype(np.int32)  # opposite each corner
     joined = []

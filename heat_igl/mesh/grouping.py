@@ -27,7 +27,7 @@ class Groups(NamedTuple):
     members: IntArray
 
     def of(self, labels: IntArray) -> tuple[IntArray, IntArray]:
-        """The members of several groups, and for each the position of its label in `labels`."""
+        """The members of several groups, and for each the position of the label in `labels`."""
         first = self.first[labels]
         which, within = enumerate_runs(self.first[labels + 1] - first)
         return self.members[first[which] + within], which
@@ -58,7 +58,7 @@ def enumerate_runs(counts: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def next_in_run(elements: IntArray, counts: IntArray) -> IntArray:
-    """The element after each of `elements` in its run, and the first of the run after the last.
+    """The element after each of `elements` in the same run, and the first of the run after the last.
 
     The runs follow one another and have `counts` (r,) elements each, at least one.
     """

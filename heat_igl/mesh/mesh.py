@@ -1,6 +1,6 @@
 """Meshes of triangles or tetrahedra, validated on construction and read-only afterwards.
 
-libigl trusts its input: a face index out of range corrupts memory. So every array is validated before libigl sees it.
+libigl trusts the input: a face index out of range corrupts memory. So every array is validated before libigl sees it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = ["Mesh", "checked_faces", "checked_positions"]
 _LARGEST_EXTENT = 1e60
 _SMALLEST_EXTENT = 1e-60
 
-# Cached properties of a mesh that do not depend on its positions.
+# Cached properties of a mesh that do not depend on positions.
 _OF_THE_FACES = {"facets", "edges", "components", "referenced", "boundary"}
 
 ArrayT = TypeVar("ArrayT", bound=AnyArray)
@@ -230,7 +230,7 @@ class Mesh:
 
     @property
     def edge_graph(self) -> sp.csr_array:
-        """The edge lengths as a graph (n, n), each edge once, from its smaller vertex to its larger; not cached."""
+        """The edge lengths as a graph (n, n), each edge once, from the smaller vertex to the larger; not cached."""
         return sp.csr_array((self.edge_lengths, tuple(self.edges.T)), shape=(self.n_vertices, self.n_vertices))
 
     @cached_property

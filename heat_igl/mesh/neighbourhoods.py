@@ -31,13 +31,13 @@ _MOST_PASSES = 8
 # Noise is looked for at this many points.
 _SAMPLE = 4000
 # Deviations from a quadric of half as many neighbours, in shares of those from the quadric of all: noise deviates from
-# both alike, 0.68 to 1 where measured, detail from the smaller one by less, 0.14 to 0.58.
+# both alike, 0.68 to 1 in measurements, detail from the smaller one by less, 0.14 to 0.58.
 _NOISE_NOT_DETAIL = 0.63
 
 
 @dataclass(frozen=True, eq=False)
 class Neighbourhoods:
-    """The nearest points of each of n points, and its tangent plane.
+    """The nearest points of each of n points, and the tangent plane.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     mesh : mesh or array_like
         `Mesh`, `PolygonMesh` and `PointCloud` are returned as they are. Besides: a pair (V, F); a path, read by
         `read_mesh`; meshes of trimesh, pyvista and vtk (PolyData, UnstructuredGrid), open3d, meshio, pymeshlab (also a
-        MeshSet: its current mesh), vedo, and nibabel (surfaces in GIFTI). With `F`, the positions V (n, 3).
+        MeshSet: the current mesh), vedo, and nibabel (surfaces in GIFTI). With `F`, the positions V (n, 3).
     F : (m, 3) or (m, 4) array_like of int, optional
         Triangles or tetrahedra, when `mesh` is V.
 
@@ -56,7 +56,7 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     Raises
     ------
     MeshError
-        If the object is not understood (the message lists what is), or its mesh cannot be used.
+        If the object is not understood (the message lists the known kinds), or the mesh cannot be used.
 
     Notes
     -----
@@ -123,7 +123,7 @@ def _cells(mesh: Any) -> Mesh | PolygonMesh | None:
 
 
 def _poly_data(mesh: Any) -> Mesh | PolygonMesh | None:
-    """PolyData of pyvista and vtk: polygons one after the other, each behind the number of its corners."""
+    """PolyData of pyvista and vtk: polygons one after the other, each after the number of corners."""
     if hasattr(mesh, "points") and hasattr(mesh, "faces") and hasattr(mesh, "n_points"):
         return _of_polygons(mesh.points, [_unpadded(np.asarray(mesh.faces))])
     if hasattr(mesh, "GetPoints") and hasattr(mesh, "GetPolys"):
@@ -151,7 +151,7 @@ def _tensors(mesh: Any) -> Mesh | PolygonMesh | None:
 
 
 def _gifti(mesh: Any) -> Mesh | PolygonMesh | None:
-    """Nibabel's GiftiImage, with coordinates and triangles among its arrays."""
+    """Nibabel's GiftiImage, with coordinates and triangles among the arrays."""
     if not hasattr(mesh, "agg_data"):
         return None
     V, F = mesh.agg_data(("pointset", "triangle"))
@@ -160,7 +160,7 @@ def _gifti(mesh: Any) -> Mesh | PolygonMesh | None:
     return Mesh(V, F)
 
 
-# The more telling attributes first: pyvista's PolyData also has what the later ones look for.
+# The more telling attributes first: pyvista's PolyData also has the attributes that the later ones look for.
 _CONVERSIONS: tuple[Callable[[Any], Mesh | PolygonMesh | None], ...] = (
     _pymeshlab,
     _cells,
@@ -172,7 +172,7 @@ _CONVERSIONS: tuple[Callable[[Any], Mesh | PolygonMesh | None], ...] = (
 
 
 def _rows(faces: Any) -> AnyArray | list[IntArray]:
-    """Faces as an array (m, d), or as a list where they differ in degree."""
+    """Faces as an array (m, d), or as a list if they differ in degree."""
     try:
         return np.asarray(faces)
     except ValueError:
@@ -180,7 +180,7 @@ def _rows(faces: Any) -> AnyArray | list[IntArray]:
 
 
 def _unpadded(faces: IntArray) -> list[IntArray] | IntArray:
-    """The polygons of an array in which each stands behind the number of its corners."""
+    """The polygons of an array in which each stands after the number of corners."""
     if not len(faces):
         return np.empty((0, 3), np.int64)
     degree = int(faces[0])
@@ -196,7 +196,7 @@ def _unpadded(faces: IntArray) -> list[IntArray] | IntArray:
 
 
 def _of_polygons(V: AnyArray, blocks: Iterable[AnyArray | list[IntArray]]) -> Mesh | PolygonMesh:
-    """Triangles where all faces are, polygons otherwise."""
+    """Triangles if all faces are, polygons otherwise."""
     blocks = [block for block in blocks if len(block)]
     if not blocks:
         raise MeshError("the mesh has no faces: a distance needs triangles, polygons or tetrahedra")

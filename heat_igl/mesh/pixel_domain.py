@@ -88,7 +88,7 @@ class ImageDomain:
 def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> ImageDomain:
     """A flat mesh of the pixels of `mask`.
 
-    Every pixel is a rectangle, cut into four triangles around its centre: no diagonal direction is preferred, no pixel
+    Every pixel is a rectangle, cut into four triangles around the centre: no diagonal direction is preferred, no pixel
     is lost, and the area of the mesh is that of the pixels. Pixels that touch only in a corner are connected through
     this point, as with skimage's ``connectivity=2``, and a stroke one pixel wide becomes a strip one pixel wide.
 
@@ -103,7 +103,7 @@ def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> Ima
     Returns
     -------
     ImageDomain
-        Its mesh has a vertex for each pixel and one for each corner of pixels.
+        The mesh has a vertex for each pixel and one for each corner of pixels.
 
     Raises
     ------

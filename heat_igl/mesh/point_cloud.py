@@ -49,8 +49,8 @@ class PointCloud:
     Notes
     -----
     Copies of a point are kept: they are at distance 0 from each other. A point that is farther from all others than
-    these are from their neighbours, an outlier, belongs to no triangle, and its distance is ``inf``. If the points are
-    noisy, distance is measured on a surface through the noise, see `triangles`. Arrays are read-only.
+    these are from their neighbours, an outlier, belongs to no triangle, and the distance there is ``inf``. If the
+    points are noisy, distance is measured on a surface through the noise, see `triangles`. Arrays are read-only.
 
     Examples
     --------
@@ -108,7 +108,7 @@ class PointCloud:
     def triangles(self) -> Mesh:
         """The surface on which distance is measured: a mesh whose vertices are the points, with a boundary or without.
 
-        Its triangles are Delaunay in the tangent planes of their corners; an edge has at most two of them. Its vertices
+        The triangles are Delaunay in the tangent planes of their corners; an edge has at most two of them. The vertices
         are `P`, unless the points are noisy: if at half of them the neighbours deviate from a quadric by more than
         1 / 20 of their spacing, and that is not detail, all are moved onto such quadrics.
 
@@ -149,7 +149,7 @@ class PointCloud:
         return moved
 
     def report(self) -> MeshReport:
-        """The report of `triangles`: outliers are its unreferenced vertices."""
+        """The report of `triangles`: outliers are unreferenced vertices."""
         return self.triangles.report()
 
 

@@ -37,14 +37,14 @@ class PolygonMesh:
     degree : (m,) int64
         Number of corners of each polygon.
     triangles : Mesh
-        The same vertices. Each polygon is cut into the fan of triangles around its first corner, or, where it is
-        concave and the fan would leave it, by clipping its ears.
+        The same vertices. Each polygon is cut into the fan of triangles around the first corner, or, if it is
+        concave and the fan would leave it, by clipping ears.
 
     Raises
     ------
     MeshError
-        As for `Mesh`; also if a polygon has fewer than three corners, or its sides cross each other. The message names
-        the first offender.
+        As for `Mesh`; also if a polygon has fewer than three corners, or the sides of one cross each other. The message
+        names the first offender.
 
     Notes
     -----
@@ -93,7 +93,7 @@ class PolygonMesh:
 
     @property
     def following(self) -> IntArray:
-        """The vertex (sum of degree,) after each of `corners` around its polygon."""
+        """The vertex (sum of degree,) after each of `corners` around the polygon."""
         return next_in_run(self.corners, self.degree)
 
 

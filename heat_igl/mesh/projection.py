@@ -15,7 +15,7 @@ from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["ClosestPoints", "Projector", "checked_points", "closest_points"]
 
-# A face is flat when twice its area is at most this share of the square of its longest side.
+# A face is flat when twice its area is at most this share of the square of the longest side.
 _FLAT = 1e-12
 
 
@@ -27,7 +27,7 @@ class ClosestPoints(NamedTuple):
     points : SurfacePoints
         k points.
     gap : (k,) float64
-        Distance in space between each point and its position.
+        Distance in space between each point and the position found.
     """
 
     points: SurfacePoints

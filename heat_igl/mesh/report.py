@@ -23,7 +23,7 @@ __all__ = ["DELAUNAY_TOLERANCE", "MeshReport", "mesh_report"]
 # Rounding is 1e-9 when a mesh lies 1e7 edge lengths from the origin, so 1e-7 keeps the same diagonals there too.
 DELAUNAY_TOLERANCE = -1e-7
 
-# A face is degenerate when its area (volume) is at most this share of the square (cube) of its longest edge.
+# A face is degenerate when its area (volume) is at most this share of the square (cube) of the longest edge.
 _DEGENERATE = 1e-12
 
 

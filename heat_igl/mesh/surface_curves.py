@@ -29,7 +29,7 @@ class _Place(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """A straight segment in a face, by the barycentric coordinates (3,) of its ends."""
+    """A straight segment in a face, by the barycentric coordinates (3,) of both ends."""
 
     face: int
     start: FloatArray
@@ -51,7 +51,7 @@ def curve_on(
     closed : bool
         Whether a last line leads back to the first corner.
     tolerance : float, optional
-        Largest distance of the polyline from the surface, at its corners and between them; a mean edge length if not
+        Largest distance of the polyline from the surface, at the corners and between them; a mean edge length if not
         given.
 
     Returns
@@ -137,7 +137,7 @@ class _Samples:
         self.positions, self.places, self.lines = list(positions), places, list(lines)
 
     def add(self, position: FloatArray, place: _Place, line: int) -> int:
-        """Add a sample; return its number."""
+        """Add a sample; return the number of it."""
         self.positions.append(position)
         self.places.append(place)
         self.lines.append(line)
@@ -201,7 +201,7 @@ class _PolylineJoiner:
         return {pair: samples.add(*sample) for pair, sample in zip(pairs, new, strict=True)}
 
     def _joined(self, samples: _Samples, a: int, b: int) -> list[_Piece] | None:
-        """The pieces between two samples; None where another sample is needed between them."""
+        """The pieces between two samples; None if another sample is needed between them."""
         p, q = samples.places[a], samples.places[b]
         direct = self._direct(p, q)
         if direct is not None:

@@ -13,7 +13,7 @@ from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["ON_SIDE", "ON_SIDE_COMPUTED", "SurfaceCurve", "SurfacePoints", "require_triangles"]
 
-# A point lies on a side of its face if its barycentric coordinate is below this. For given coordinates: numbers of
+# A point lies on a side of the face if a barycentric coordinate is below this. For given coordinates: numbers of
 # order 1, rounded by some 1e-16 in each operation; 1e-12 allows for thousands of these.
 ON_SIDE = 1e-12
 # The same for coordinates computed from positions or lengths. A position at the distance R from the origin is rounded
@@ -67,7 +67,7 @@ class SurfacePoints:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SurfaceCurve:
-    """A polyline on a triangle mesh, each of its straight segments inside one face.
+    """A polyline on a triangle mesh, each straight segment inside one face.
 
     Parameters
     ----------

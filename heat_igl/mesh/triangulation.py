@@ -1,4 +1,4 @@
-"""Polygons in space cut into triangles: fans around the first corner, or ears where a fan does not fit."""
+"""Polygons in space cut into triangles: fans around the first corner, or ears if a fan does not fit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["triangulated", "triangle_fans"]
 
-# Twice the area of a triangle is rounded by some 1e-16 of the square of its polygon's extent; below this share of it a
+# Twice the area of a triangle is rounded by some 1e-16 of the square of the polygon's extent; below this share of it a
 # triangle has no orientation.
 _ROUNDING = 1e-12
 # Distance from a plane, as a share of the extent, up to which a polygon that crosses itself in the plane is refused. A
@@ -21,7 +21,7 @@ _NEARLY_PLANAR = 1e-2
 
 
 def triangle_fans(corners: IntArray, degree: IntArray) -> IntArray:
-    """Triangles (sum of (degree - 2), 3): each polygon as a fan around its first corner."""
+    """Triangles (sum of (degree - 2), 3): each polygon as a fan around the first corner."""
     if (degree == 3).all():
         return corners.reshape(-1, 3)
     begin = np.repeat(np.cumsum(degree) - degree, degree)
@@ -47,10 +47,10 @@ def triangulated(V: FloatArray, corners: IntArray, degree: IntArray, shown: Call
     Returns
     -------
     (sum of (degree - 2), 3) int64
-        The fan of each polygon around its first corner. Where a triangle of the fan is turned over, or the fan goes
-        around its corner more than once, the polygon is concave, and its ears are clipped instead (Meisters 1975), in
+        The fan of each polygon around the first corner. If a triangle of the fan is turned over, or the fan goes
+        around that corner more than once, the polygon is concave, and ears are clipped instead (Meisters 1975), in
         the plane that its vector area is normal to. A polygon that is far from planar and crosses itself there keeps
-        its fan.
+        the fan.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def triangulated(V: FloatArray, corners: IntArray, degree: IntArray, shown: Call
         flat, height = _flattened(V[polygon])
         found = _ears(flat)
         if found is None and height > _NEARLY_PLANAR:
-            continue  # what crosses seen from one side may well not do so in space
+            continue  # sides that cross in one projection may not do so in space
         if found is None:
             raise MeshError(
                 f"{shown(i)}: sides of this polygon cross each other, so it has no inside: give its corners in order "
@@ -78,7 +78,7 @@ def triangulated(V: FloatArray, corners: IntArray, degree: IntArray, shown: Call
 
 
 def _vector_areas(V: FloatArray, corners: IntArray, degree: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Twice the vector area (m, 3) of each polygon, and the square (m,) of its extent."""
+    """Twice the vector area (m, 3) of each polygon, and the square (m,) of the extent."""
     begin = np.cumsum(degree) - degree
     following = next_in_run(corners, degree)
     origin = np.repeat(V[corners[begin]], degree, axis=0)
@@ -110,7 +110,7 @@ def _without_fan(V: FloatArray, F: IntArray, corners: IntArray, degree: IntArray
 def _flattened(P: FloatArray) -> tuple[FloatArray, float]:
     """Corners (d, 2) in a plane, counter-clockwise, and the largest distance from it as a share of the extent.
 
-    The plane is normal to the vector area, or, where that is small, the best one.
+    The plane is normal to the vector area, or, if that is small, the best one.
     """
     following = np.roll(P, -1, axis=0)
     normal = np.cross(P - P[0], following - P[0]).sum(axis=0)
@@ -173,7 +173,7 @@ def _ears(p: FloatArray) -> IntArray | None:
                 inside &= (q != corner).any(axis=1)
             is_ear[k] = not inside.any()
         if not is_ear.any():
-            # What is left has no area: corners on a line.
+            # The rest has no area: corners on a line.
             is_ear = np.abs(area) <= room
             if not is_ear.any():
                 return None

@@ -39,8 +39,8 @@ def connection_laplacian(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay"
     Returns
     -------
     (n, n) csc_matrix of complex128
-        Hermitian, integrated like L; negative semidefinite where no weight is negative, so always with the default.
-        Entry (j, i) of an edge is its weight in L times exp(i rho), where rho is the angle by which components turn
+        Hermitian, integrated like L; negative semidefinite if no weight is negative, so always with the default.
+        Entry (j, i) of an edge is the weight in L times exp(i rho), with rho the angle by which components turn
         from i to j. Applied to the numbers a + i b of tangent vectors, row j is the sum over the edges of weight times
         (the vector at i, transported to j, less the vector at j).
 
@@ -62,14 +62,14 @@ def with_rotations(L: sp.csc_matrix, rotations: sp.csc_matrix) -> sp.csc_matrix:
 
 
 def edge_rotations(domain: Operators) -> sp.csc_matrix:
-    """What the entries of L are multiplied by for the connection Laplacian of triangles.
+    """Factors of the entries of L for the connection Laplacian of triangles.
 
     Returns
     -------
     (n, n) csc_matrix of complex128
         Hermitian, in the pattern of L. Entry (j, i) is exp(i rho), with rho the angle by which components turn from i
-        to j; of several edges between the same two vertices, the mean by weight. The diagonal is 1, and more by what
-        edges from a vertex to itself cost.
+        to j; of several edges between the same two vertices, the mean by weight. The diagonal is 1, and more by the
+        amount that edges from a vertex to itself cost.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def _triangles(domain: Operators) -> tuple[IntrinsicTriangulation, PolarAngles]:
 
 
 def _half_weights(triangulation: IntrinsicTriangulation) -> FloatArray:
-    """Half the cotangent (3 m,) opposite each half-edge: what its face adds to the weight of the edge."""
+    """Half the cotangent (3 m,) opposite each half-edge: the contribution of the face to the weight of the edge."""
     square = triangulation.l**2
     eight_areas = 8 * triangulation.areas[:, None]
     cotangent = np.divide(

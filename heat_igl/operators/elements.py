@@ -17,7 +17,7 @@ __all__ = ["EdgeLengths", "TriangleElements"]
 
 
 class EdgeLengths(NamedTuple):
-    """Edges, each with the vertices `i`, `j` (k,) at its ends and its `length` (k,).
+    """Edges, each with the vertices `i`, `j` (k,) at the ends and the `length` (k,).
 
     Several edges may join the same two vertices, and one may join a vertex to itself.
     """
@@ -66,7 +66,7 @@ class TriangleElements:
         -------
         per_base, foot, per_height : (m,) float64
             One over the length of the side from corner 0 to corner 1; the foot of corner 2 on that side, from 0 to 1
-            between its ends; one over the height of corner 2.
+            between the ends; one over the height of corner 2.
         """
         lengths = self.triangulation.l
         base = lengths[:, 2]

@@ -119,11 +119,11 @@ def edge_length_operators(
     F : (m, 3) array_like of int
         Vertices of each triangle.
     lengths : (m, 3) array_like
-        ``lengths[f, c]`` is that of the side of triangle f opposite its corner c.
+        ``lengths[f, c]`` is that of the side of triangle f opposite corner c.
     n : int, optional
         Number of vertices; one more than the largest in `F` if not given.
     laplacian : {"intrinsic-delaunay", "intrinsic-delaunay-refined", "auto", "cotan"}
-        As for `operators`. Where more than two faces meet at an edge, nothing is refined.
+        As for `operators`. If more than two faces meet at an edge, nothing is refined.
 
     Raises
     ------

@@ -19,7 +19,7 @@ __all__ = ["Laplacian", "OnLaplacian", "Operators", "check_laplacian", "divergen
 # Which triangulation of a triangle mesh the operators belong to.
 Laplacian = Literal["auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"]
 
-# Called with L, or a multiple of it, as soon as it is known: the order of elimination needs no more than its pattern.
+# Called with L, or a multiple of it, as soon as it is known: the order of elimination needs no more than the pattern.
 OnLaplacian = Callable[[sp.csc_matrix], None]
 
 
@@ -27,10 +27,10 @@ OnLaplacian = Callable[[sp.csc_matrix], None]
 class Operators:
     """The operators of a domain with n vertices and m faces (triangles, or tetrahedra).
 
-    Where refinement has added vertices, they come after those of the mesh, which are the first `n_given`.
+    If refinement has added vertices, they come after those of the mesh, which are the first `n_given`.
 
-    Lengths are in the domain's own unit, d is the number of gradient components per face: 3 where faces lie in space,
-    2 where each has a plane of its own.
+    Lengths are in the domain's own unit, d is the number of gradient components per face: 3 if faces lie in space,
+    2 if each has a plane of its own.
 
     Attributes
     ----------
@@ -66,9 +66,9 @@ class Operators:
         Whether the domain has two dimensions; tetrahedra have three.
     lengths : (n, n) csc_matrix, TriangleElements or None
         Distance of the vertices that an entry of L couples, symmetric, or the elements whose edges these are; None
-        where it is not known, and heat is not fitted to it (`fitted_laplacian`).
+        if it is not known, and heat is not fitted to it (`fitted_laplacian`).
     surface : Surface or None
-        The triangles, for exact distance near sources and for unfolding; None where distance is not measured along
+        The triangles, for exact distance near sources and for unfolding; None if distance is not measured along
         triangles. The three steps never read it.
     """
 
@@ -99,7 +99,7 @@ class Operators:
 
     @property
     def n_given(self) -> int:
-        """Number of vertices of the mesh; n where refinement has added none."""
+        """Number of vertices of the mesh; n if refinement has added none."""
         return self.n if self.surface is None or self.surface.faces is None else self.surface.faces.n
 
     @property
@@ -143,7 +143,7 @@ class Operators:
 
     @cached_property
     def mean_masses(self) -> FloatArray:
-        """Mean mass (n_components,) of the vertices that a face uses, in each component; that of all where none is."""
+        """Mean mass (n_components,) of the vertices that a face uses, in each component; that of all if it has none."""
         component = self.components[self.referenced]
         count = np.bincount(component, minlength=self.n_components)
         total = np.bincount(component, self.M.diagonal()[self.referenced], self.n_components)
@@ -177,7 +177,7 @@ class Operators:
         return np.asarray(np.unique(self.G[:, self.boundary].indices % len(self.weights)))
 
     def edge_lengths(self) -> EdgeLengths | None:
-        """Pairs of vertices that L couples and their distance, each edge once; None where `lengths` is."""
+        """Pairs of vertices that L couples and their distance, each edge once; None if `lengths` is."""
         if isinstance(self.lengths, TriangleElements):
             return self.lengths.edge_lengths()
         if self.lengths is None:

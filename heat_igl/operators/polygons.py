@@ -31,13 +31,13 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
     -------
     Operators
         With n vertices, the faces those triangles, d = 3. h is the mean distance between two vertices of one polygon,
-        which is what L couples: edges alone are too short for hexagons. No `surface`, since the vertices of those
+        the same pairs as in L: edges alone are too short for hexagons. No `surface`, since the vertices of those
         triangles are not those of the mesh: nothing to refine by unfolding.
 
     Raises
     ------
     MeshError
-        If a polygon has no area, or one so concave that its virtual vertex leaves a vertex of the mesh without mass.
+        If a polygon has no area, or one so concave that the virtual vertex leaves a vertex of the mesh without mass.
 
     Examples
     --------

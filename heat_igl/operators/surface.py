@@ -1,4 +1,4 @@
-"""`Surface`: the triangles of a domain, for what is laid out in the plane or walks from face to face."""
+"""`Surface`: the triangles of a domain, for layouts in the plane and walks from face to face."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Surface:
     faces : IntrinsicTriangulation or None
         The triangles before any flip, but each once: points and curves are carried to them. None if not known.
     uncovered : IntrinsicTriangulation or None
-        The surface itself, each face once and without added vertices, where `triangulation` is its tufted cover, which
+        The surface itself, each face once and without added vertices, if `triangulation` is the tufted cover, which
         has each face twice, or a refinement.
     V : (n, 3) float64 or None
         Positions of the vertices; None if not known.

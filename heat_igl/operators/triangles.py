@@ -1,4 +1,4 @@
-"""Operators of a mesh: on its intrinsic Delaunay triangulation, refined or not, its faces, or its tetrahedra."""
+"""Operators of a mesh: on its intrinsic Delaunay triangulation, refined or not, on the faces, or on the tetrahedra."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def operators(
     laplacian : {"intrinsic-delaunay", "intrinsic-delaunay-refined", "auto", "cotan"}
         On which triangulation of a triangle mesh. Tetrahedra always keep their own.
 
-        - "intrinsic-delaunay": on the mesh's vertices, no inner edge with a negative weight. Where more than two faces
+        - "intrinsic-delaunay": on the mesh's vertices, no inner edge with a negative weight. If more than two faces
           meet at an edge, faces that are there twice are taken once, and if such edges remain, the tufted cover.
         - "intrinsic-delaunay-refined": with more vertices, until no angle is below 25 degrees (`delaunay_refinement`),
           at most four times as many and 4000 more; of a surface with a boundary or without an orientation, on the
@@ -82,7 +82,7 @@ def tufted_operators(
     on_laplacian: OnLaplacian | None = None,
     laplacian: Laplacian = "intrinsic-delaunay",
 ) -> Operators:
-    """The operators of any triangle mesh by way of its tufted cover, made intrinsic Delaunay (see `changed_operators`).
+    """The operators of any triangle mesh by way of the tufted cover, made intrinsic Delaunay (see `changed_operators`).
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["require_between_bounds", "require_finite", "require_manifold"]
 
-# An exact distance outside its bounds by more than this fraction is wrong. Rounding is near 1e-15.
+# An exact distance outside the bounds by more than this fraction is wrong. Rounding is near 1e-15.
 _TOLERANCE = 1e-9
 
 

@@ -20,7 +20,7 @@ __all__ = ["LONGEST_ALARM", "serve"]
 #: The longest time, in seconds, that both the system's alarm and a timer of Python take.
 LONGEST_ALARM = 2.0**20
 
-# Seconds that an abandoned child outlives its timeout.
+# Seconds that an abandoned child outlives the timeout.
 _GRACE = 5.0
 
 

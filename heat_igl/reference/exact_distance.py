@@ -26,12 +26,12 @@ def exact(
     solver : {"windows", "pygeodesic", "gdist", "igl"}
         The windows of this package (``"auto"`` means them too), or for a second opinion one of `EXACT_SOLVERS`. Those
         three are one implementation of Mitchell, Mount and Papadimitriou (1987) by Kirsanov and agree to rounding;
-        libigl's traces a path from every vertex and takes its length, which makes it slow, and a check of the others.
+        libigl's traces a path from every vertex and takes the length, which makes it slow, and a check of the others.
         They need components of the sources that are manifold.
     timeout : float
         Seconds after which a solver of another package is stopped.
     memory : float
-        Bytes by which its child process may grow (on Linux).
+        Bytes by which the child process may grow (on Linux).
 
     Returns
     -------

@@ -4,7 +4,7 @@ One child serves all calls, one after the other, until it fails; the next call s
 are single lines of JSON on the child's standard streams. Arrays cross as ``.npy`` files that the child maps into
 memory: written once by the caller, shared through the page cache, never pickled. `child` is the other side.
 
-A child started with `multiprocessing` would import the caller's main script again and, on some systems, inherit its
+A child started with `multiprocessing` would import the caller's main script again and, on some systems, inherit the
 threads and locks; a plain Python process does neither.
 """
 
@@ -59,12 +59,12 @@ class Reply(NamedTuple):
 class GuardedProcess:
     """A child process that is started at the first `call` and serves until it fails or is closed.
 
-    Several threads may use it; they wait for each other. After a fork, each process has its own child.
+    Several threads may use it; they wait for each other. After a fork, each process has a child of its own.
 
     Parameters
     ----------
     growth : float
-        Bytes of resident memory beyond those after its first call with which a child is replaced: MeshLab's filters
+        Bytes of resident memory beyond those after the first call with which a child is replaced: MeshLab's filters
         leak some 30 to 600 bytes per vertex and call.
     """
 

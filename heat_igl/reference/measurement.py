@@ -1,4 +1,4 @@
-"""Run a solver on a mesh: choose it by name, check its distance, measure its cost; native ones in a child process.
+"""Run a solver on a mesh: choose it by name, check the distance, measure the cost; native ones in a child process.
 
 A native solver runs on one connected component at a time. So sources in several components work, and a vertex that no
 source reaches is ``inf``, whatever number the solver would write there.
@@ -37,7 +37,7 @@ _MOLLIFIED = 1e-7
 
 @dataclass(frozen=True)
 class _Solver:
-    """A native solver: its function in `native`, and the package and the extra that it needs."""
+    """A native solver: the function in `native`, and the package and the extra that it needs."""
 
     function: str
     module: str
@@ -63,7 +63,7 @@ _SOLVERS = {
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A distance and its cost.
+    """A distance and the cost of it.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ def exact_solver() -> str:
 def measured(
     solver: str, mesh: MeshLike, sources: Sources, *, timeout: float = TIMEOUT, memory: float = MEMORY, **options: Any
 ) -> Measured:
-    """Distance by a named solver, with its cost in time and memory.
+    """Distance by a named solver, with the cost in time and memory.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def _by_windows(mesh: Mesh, seeds: IntArray) -> Measured:
     there = np.isin(mesh.components, mesh.components[seeds])
     if not (np.isfinite(distance) == there).all():
         raise ReferenceSolverError(f"{WINDOWS} did not reach the components of the sources: report this as a bug")
-    # Where triangles have no height, all edges were made longer; see `mollify`.
+    # If triangles have no height, all edges were made longer; see `mollify`.
     slack = _MOLLIFIED * float(mesh.edge_lengths.mean())
     require_between_bounds(WINDOWS, mesh, seeds, distance, tolerance=_MOLLIFIED, slack=slack)
     return Measured(distance, 0.0, seconds, peak.bytes)
@@ -177,7 +177,7 @@ def _by_windows(mesh: Mesh, seeds: IntArray) -> Measured:
 def _over_components(mesh: Mesh, seeds: IntArray, run: Callable[[Mesh, IntArray], guarded.Reply]) -> Measured:
     """Run on each component that holds a seed: solvers fail at vertices without faces and on other components."""
     distance = np.full(mesh.n_vertices, np.inf)
-    distance[seeds] = 0.0  # also where no face uses the seed
+    distance[seeds] = 0.0  # also if no face uses the seed
     costs = np.zeros(2)
     peaks: list[int | None] = [0]
     labels = np.unique(mesh.components[seeds])

@@ -14,8 +14,8 @@ __all__ = ["meshlab", "meshlab_border", "meshlab_heat"]
 def meshlab(mesh: Mesh, sources: Sources, *, timeout: float = TIMEOUT, memory: float = MEMORY) -> FloatArray:
     """MeshLab's geodesic distance from selected vertices: a front that unfolds one triangle per step (pymeshlab).
 
-    Neither exact nor a bound; 0.05 to 1 % from exact in the mean on ordinary meshes. Its time explodes on some
-    meshes with slivers. Parameters, result and errors are those of `exact`, without its check of the result and its
+    Neither exact nor a bound; 0.05 to 1 % from exact in the mean on ordinary meshes. The time explodes on some
+    meshes with slivers. Parameters, result and errors are those of `exact`, without the check of the result and its
     demand for manifold surfaces.
     """
     return measured("meshlab", mesh, sources, timeout=timeout, memory=memory).distance
@@ -24,8 +24,9 @@ def meshlab(mesh: Mesh, sources: Sources, *, timeout: float = TIMEOUT, memory: f
 def meshlab_border(mesh: MeshLike, *, timeout: float = TIMEOUT, memory: float = MEMORY) -> FloatArray:
     """MeshLab's distance to the boundary (n,), through pymeshlab; ``inf`` on components without boundary.
 
-    The sources are all boundary vertices, each with a front of its own; where fronts of different sources meet, it
-    falls back to lengths of edges. Compare with ``exact(mesh, mesh.boundary)``. Errors are those of `meshlab`.
+    The sources are all boundary vertices, each with a front of its own; at vertices at which fronts of different
+    sources meet, it falls back to lengths of edges. Compare with ``exact(mesh, mesh.boundary)``. Errors are those of
+    `meshlab`.
     """
     mesh = as_simplices(mesh)
     return measured("meshlab_border", mesh, mesh.boundary, timeout=timeout, memory=memory).distance

@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 # The exact solvers compare areas and volumes with multiples of a length, so that in large units they drop wavefronts
-# that matter: with its lengths divided by a thousand the cow is wrong by 0.2 %. With edges of about a thousand units
+# that matter: with lengths divided by a thousand the cow is wrong by 0.2 %. With edges of about a thousand units
 # all thresholds are below rounding. A power of two keeps every bit.
 _EDGE_OF_EXACT = 1024.0
 
@@ -56,7 +56,7 @@ def pygeodesic_exact(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str,
 
     start = time.perf_counter()
     scale = _binary_scale(V, F, _EDGE_OF_EXACT)
-    # It prints what is wrong and returns None.
+    # It prints an error message and returns None.
     with contextlib.redirect_stdout(io.StringIO()) as said:
         solver = PyGeodesicAlgorithmExact(V * scale, F)
         ready = time.perf_counter()
@@ -122,7 +122,7 @@ def potpourri3d_heat(V: FloatArray, F: IntArray, sources: IntArray, t_coef: floa
 
 
 def meshlab_front(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str, Any]:
-    """MeshLab's front from selected vertices, without its cutoff."""
+    """MeshLab's front from selected vertices, without the cutoff."""
     import pymeshlab
 
     cutoff = pymeshlab.PureValue(_NO_CUTOFF)
@@ -148,13 +148,13 @@ def _filtered(
     import pymeshlab
 
     start = time.perf_counter()
-    # Centred in its bounding box and with edges of about 1, the mesh survives the filters that go through float32.
+    # Centred in the bounding box and with edges of about 1, the mesh survives the filters that go through float32.
     scale = _binary_scale(V, F, 1.0)
     positions = (V - (V.min(axis=0) + V.max(axis=0)) / 2) * scale
     marks = np.zeros(len(V))
     if sources is not None:
         marks[sources] = 1.0
-    # A new mesh set for every call: the heat filter caches its factors under the parameter m alone.
+    # A new mesh set for every call: the heat filter caches factors under the parameter m alone.
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(positions, F, v_scalar_array=marks))
     if sources is not None:

@@ -1,6 +1,6 @@
 """Distances on any triangle mesh, manifold or not, from a graph with extra points on the edges.
 
-Exact solvers crash where more than two faces share an edge. A graph needs no manifold: every two points on the border
+Exact solvers crash if more than two faces share an edge. A graph needs no manifold: every two points on the border
 of a face are joined by the straight line between them, so a shortest path in it is a path on the surface, never
 shorter than the true distance, and as close to it as the points on the edges are dense.
 """
@@ -25,8 +25,8 @@ def steiner_distance(mesh: MeshLike, sources: ArrayLike, tolerance: float = 2e-3
     """Distance (k, n) from each of k sources, by shortest paths in denser and denser graphs.
 
     The number of points on every edge is doubled until distances change by less than `tolerance` of themselves, on
-    average over the vertices; what is left is less than the last change. As many points on a short edge as on a long
-    one measured better than even spacing: on the cow, 16 points per edge leave 0.08 % on average and 0.5 % at the
+    average over the vertices; the remaining error is less than the last change. As many points on a short edge as on a
+    long one measured better than even spacing: on the cow, 16 points per edge leave 0.08 % on average and 0.5 % at the
     worst vertex, and as many in even spacing 0.09 % and 1.3 %.
     """
     mesh = as_simplices(mesh)
@@ -51,7 +51,7 @@ def graph_distance(mesh: Mesh, sources: ArrayLike, points: int) -> FloatArray:
     share = np.arange(1, points + 1)[:, None] / (points + 1)
     inside = (1 - share) * mesh.V[tail, None] + share * mesh.V[head, None]
     nodes = np.concatenate([mesh.V, inside.reshape(-1, 3)])
-    # Node numbers: vertices, then the points of edge 0 from its lower to its higher vertex, of edge 1, and so on.
+    # Node numbers: vertices, then the points of edge 0 from the lower to the higher vertex, of edge 1, and so on.
     on_edge = mesh.n_vertices + np.arange(len(tail) * points).reshape(-1, points)
 
     along = np.column_stack([tail, on_edge, head])

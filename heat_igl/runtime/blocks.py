@@ -120,7 +120,7 @@ def float_type(dtype: npt.DTypeLike | None) -> np.dtype[Any]:
 
 @contextmanager
 def progress_bar(description: str, total: int, shown: bool = True) -> Iterator[Callable[[int], None]]:
-    """A context with a progress bar on standard error; its value is a function that advances the bar by n rows.
+    """A context with a progress bar on standard error; the value is a function that advances the bar by n rows.
 
     With ``shown=False`` there is no bar, and the function does nothing.
 

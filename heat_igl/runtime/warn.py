@@ -31,7 +31,7 @@ def warn_caller(message: str, category: type[Warning]) -> None:
 
 @contextmanager
 def held_warnings() -> Iterator[list[tuple[str, type[Warning]]]]:
-    """Collect what `warn_caller` is given on this thread, so that another thread, which has a caller, can warn."""
+    """Collect the warnings of `warn_caller` on this thread, so that another thread, which has a caller, can warn."""
     before, collected = getattr(_held, "warnings", None), list[tuple[str, type[Warning]]]()
     _held.warnings = collected
     try:

@@ -126,7 +126,7 @@ def _least_inside(corner: FloatArray, value: FloatArray, weight: float) -> Float
     """The minimum in the plane of each triangle, barycentric (m, 3); the first corner if it lies outside."""
     e, g = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     ee, eg, gg = (e * e).sum(axis=1), (e * g).sum(axis=1), (g * g).sum(axis=1)
-    # grad f = 0 at corner 0 plus s e + r g, where f = f0 + b . (s, r) + W |s e + r g|^2.
+    # grad f = 0 at corner 0 plus s e + r g, with f = f0 + b . (s, r) + W |s e + r g|^2.
     b1 = (value[:, 1] - value[:, 0]) / weight - ee
     b2 = (value[:, 2] - value[:, 0]) / weight - gg
     with np.errstate(divide="ignore", invalid="ignore"):

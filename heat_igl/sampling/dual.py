@@ -25,7 +25,7 @@ def dual_triangulation(mesh: MeshLike, cells: VoronoiCells) -> Mesh:
     Returns
     -------
     Mesh
-        A manifold mesh oriented like `mesh`, with the positions of ``cells.sites`` in that order. Its Euler
+        A manifold mesh oriented like `mesh`, with the positions of ``cells.sites`` in that order. The Euler
         characteristic is that of `mesh` if every cell is a disk, any two cells meet along at most one line, and any
         three in at most one point; holes and handles inside one cell are lost.
 
@@ -37,7 +37,7 @@ def dual_triangulation(mesh: MeshLike, cells: VoronoiCells) -> Mesh:
 
     Notes
     -----
-    Replacing each vertex by the site of its cell maps every face of the mesh to a triangle, an edge or a vertex. The
+    Replacing each vertex by the site of the cell maps every face of the mesh to a triangle, an edge or a vertex. The
     result has the triangles that an odd number of faces are mapped to. So a zigzag border between cells, or an island
     in a cell, changes nothing, and the boundary of the mesh is mapped to the boundary of the result.
     """

@@ -46,7 +46,7 @@ def checked_vertices(name: str, vertices: ArrayLike, n: int, distinct: bool = Tr
 
 
 def as_solver(solver: HeatMethodSolver | MeshLike) -> HeatMethodSolver:
-    """The solver itself, or what is asked like one; on a mesh a near-exact one, by heat on tetrahedra."""
+    """The solver itself, or an object with the same methods; on a mesh a near-exact one, by heat on tetrahedra."""
     if hasattr(solver, "distance") and hasattr(solver, "n_vertices"):
         return cast(HeatMethodSolver, solver)
     mesh = as_simplices(solver)

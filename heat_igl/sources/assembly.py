@@ -45,7 +45,7 @@ class SourceTerm:
     mass : (e,) float64
         Mass of those vertices, in units of the mean mass.
     largest_heat : float
-        What heat may reach anywhere.
+        Largest value that heat may reach.
     anchors : Seeds
         Known distances that fix the level of the integrated phi.
     near : Seeds
@@ -129,7 +129,7 @@ class SourceAssembler:
     plain : bool
         Around source vertices take every distance from heat, as the paper does, and none from edges.
     unfolds : bool
-        Distance will come by unfolding, which finds what is around source vertices by itself.
+        Distance will come by unfolding, which finds distances around source vertices by itself.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class SourceAssembler:
         self._domain, self._t = domain, t
         self._plain, self._unfolds = plain, unfolds
         self._mass = domain.M.diagonal() / mass_unit
-        # Of each component, where each has its time step.
+        # Of each component, if each has a time step.
         self._h = domain.mean_edge_lengths if np.ndim(t) else np.full(domain.n_components, domain.mean_edge_length)
         surface = domain.surface
         self.edges = None if surface is None else NearField(surface.triangulation)
@@ -157,7 +157,7 @@ class SourceAssembler:
         if surface is not None and domain.n_given < domain.n and not surface.triangulation.is_cover:
             # Added vertices see sources too.
             self._visible = self.edges
-        # In edges of the mesh: where vertices were added, the operators have shorter ones.
+        # In edges of the mesh: if vertices were added, the operators have shorter ones.
         self._radius = NEAR_RADIUS
         if surface is not None and surface.faces is not None and domain.n_given < domain.n:
             self._radius *= max(1.0, surface.faces.mean_edge_length / domain.mean_edge_length)
@@ -185,7 +185,7 @@ class SourceAssembler:
             share=share,
             delay=self._delay(vertex, offset),
             mass=self._mass[vertex],
-            # Heat is measured in units of h, so that its gradient has none.
+            # Heat is measured in units of h, so that the gradient has none.
             largest_heat=SOURCE_HEAT * min(self._h_at(vertex).min(initial=1e10), 1e10),
             # Inside a region of sources there is no heat flow, and phi says nothing.
             anchors=near.at(~np.isin(near.vertex, sources.vertices[~rim])),
@@ -232,7 +232,7 @@ class SourceAssembler:
     def _straight_lines(self, sources: SourceSet, rim: BoolArray) -> tuple[Seeds, Seeds]:
         """Distance of the vertices that see a source in a straight line, as `NearField.seeds` has it.
 
-        Only where there are points or curves; for vertices alone, the ring of edges is enough, but beside an edge of
+        Only if there are points or curves; for vertices alone, the ring of edges is enough, but beside an edge of
         more than two faces it is not: the tufted cover leads over it from a face to two of the others alone.
         """
         surface = self._domain.surface
@@ -277,7 +277,7 @@ class SourceAssembler:
         return vertex[used], share[used], label[used], offset[used]
 
     def _delay(self, vertex: IntArray, offset: FloatArray) -> FloatArray:
-        """Heat falls by exp(-d / sqrt(t)) over a distance d, so that is what a later source has less of."""
+        """Heat falls by exp(-d / sqrt(t)) over a distance d, so a later source has less heat by this factor."""
         if offset.min(initial=np.inf) == offset.max(initial=0.0):
             return np.zeros(len(offset))
         components = self._domain.components
@@ -292,9 +292,9 @@ class SourceAssembler:
 
 
 def take_shorter(distance: FloatArray, seeds: Seeds, error: float, start: FloatArray) -> BoolArray:
-    """Set known values where they are shorter, or longer by less than the error of `distance`; which were.
+    """Set known values if they are shorter, or longer by less than the error of `distance`; which were.
 
-    The error is relative to the distance from where it begins, `start` (n,).
+    The error is relative to the distance from `start` (n,), the value at the source.
     """
     begin = start[seeds.vertex]
     taken = seeds.value - begin < (distance[seeds.vertex] - begin) * (1 + error)

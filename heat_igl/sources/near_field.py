@@ -77,10 +77,10 @@ class NearField:
         -------
         near : Seeds
             Vertices within `radius`, ascending, with the length of the straight line. Almost always that is the
-            shortest path. Vertices where a path around curvature is shorter are left out, as far as a detour along one
+            shortest path. Vertices with a shorter path around curvature are left out, as far as a detour along one
             edge reveals them.
         far : Seeds
-            Corners of the sources' own faces beyond `radius`, where another source may be nearer.
+            Corners of the sources' own faces beyond `radius`, at which another source may be nearer.
         """
         points, segments = self._carried(points, segments)
         radius = np.broadcast_to(radius, self.triangulation.n)
@@ -117,7 +117,7 @@ class NearField:
     def samples(self, segments: SourceSegments, spacing: float | FloatArray) -> tuple[SourcePoints, FloatArray]:
         """Points along segments, at most `spacing` apart, and the length of the piece around each.
 
-        A point lies in the middle of its piece: there a linear function takes its mean over the piece.
+        A point lies in the middle of the piece: there a linear function takes the mean over the piece.
         """
         _, carried = self._carried(segments.ends(), segments)
         along = np.einsum("kc,kcx->kx", carried.end - carried.start, lay_out(self.triangulation.l[carried.faces]))
@@ -165,7 +165,7 @@ class _Nearest:
         self._value[at], self._label[at], self._offset[at] = value[better], label[better], offset[better]
 
     def at(self, vertex: IntArray) -> FloatArray:
-        """The values at some vertices, ``inf`` where there is none yet."""
+        """The values at some vertices, ``inf`` for those without one."""
         return np.asarray(self._value[vertex])
 
     def seeds(self, radius: float | FloatArray = np.inf) -> Seeds:

@@ -107,7 +107,7 @@ def _strip_through(
     """Interval of the edge opposite corner `c` through which the strip on one `side` of a segment leaves the face.
 
     As shares of the edge; the interval is empty if the edge does not face the strip. `u` and `v` (k, 3) are the
-    coordinates of the corners along the segment, from its start, and across.
+    coordinates of the corners along the segment, from the start, and across.
     """
     tail, head = (c + 1) % 3, (c + 2) % 3
     span = u[:, head] - u[:, tail]

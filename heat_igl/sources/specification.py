@@ -1,4 +1,4 @@
-"""What a source is: where distance begins, and at which value.
+"""Sources: the places at which distance begins, and the values there.
 
 `source_set` reads all that a user may pass and returns one clean object, `SourceSet`.
 """
@@ -46,7 +46,7 @@ class OffsetSources:
     Raises
     ------
     SourceError
-        If an offset is negative or not finite. That their number fits is checked where the sources are used.
+        If an offset is negative or not finite. That their number fits is checked when the sources are used.
     """
 
     sources: Sources
@@ -91,7 +91,7 @@ class SourceSegments:
     offset: FloatArray
 
     def ends(self) -> SourcePoints:
-        """Where segments begin and end."""
+        """Starts and ends of segments."""
         return SourcePoints(
             np.tile(self.faces, 2),
             np.concatenate([self.start, self.end]),
@@ -155,7 +155,7 @@ def source_set(sources: Sources, n: int, F: IntArray | None) -> SourceSet:
     n : int
         Number of vertices of the domain.
     F : (m, 3) int64 or None
-        The triangles that points and curves refer to; None where there are none.
+        The triangles that points and curves refer to; None if there are none.
 
     Raises
     ------
@@ -250,7 +250,7 @@ def _checked_offsets(offsets: ArrayLike) -> FloatArray:
 
 
 class _Builder:
-    """Collects the parts of a set and counts its sources."""
+    """Collects the parts of a set and counts the sources."""
 
     def __init__(self, n: int, F: IntArray | None) -> None:
         self._n, self._F = n, F
@@ -346,7 +346,7 @@ def nearest_first(vertex: IntArray, value: FloatArray, label: IntArray) -> IntAr
 
 
 def on_simplex(barycentric: FloatArray) -> FloatArray:
-    """The same, with what is as good as an edge or a vertex put there."""
+    """The same, with places that are as good as an edge or a vertex put there."""
     kept = np.where(barycentric < _ON_RIM, 0.0, barycentric)
     return np.asarray(kept / kept.sum(axis=1, keepdims=True))
 

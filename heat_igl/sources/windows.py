@@ -139,7 +139,7 @@ def enter(leaving: Windows, corners: FloatArray, adjacency: Adjacency) -> Window
         low=length * np.where(aligned, 1 - high, low),
         high=length * np.where(aligned, 1 - low, high),
     )
-    # A ray along the edge reaches only the vertices at its ends, and the corners already see those.
+    # A ray along the edge reaches only the vertices at the ends, and the corners already see those.
     return windows.at((high - low > ROUNDING) & (windows.y < 0))
 
 

@@ -1,4 +1,4 @@
-"""Step 2 on triangles in one pass over the faces: from heat to the divergence of its normalized gradient."""
+"""Step 2 on triangles in one pass over the faces: from heat to the divergence of the normalized gradient."""
 
 from __future__ import annotations
 
@@ -57,10 +57,10 @@ def triangles(
 
 
 def normalized_divergence(t: Triangles, u: FloatArray, smallest: float, of_log: bool = False) -> FloatArray:
-    """Integrated divergence (n, k) of -grad u / |grad u|, times |grad log u| / full_rate where that is below 1.
+    """Integrated divergence (n, k) of -grad u / |grad u|, times |grad log u| / full_rate if that is below 1.
 
-    It follows the gradient of log u if `of_log`, on faces where no corner is below `smallest`. It is 0 where no
-    component of grad u reaches `smallest`, and of length 1 where u is not positive.
+    It follows the gradient of log u if `of_log`, on faces with no corner below `smallest`. It is 0 if no
+    component of grad u reaches `smallest`, and of length 1 if u is not positive.
     """
     divergence = np.zeros(u.shape)
     for column, of_column in zip(u.T, divergence.T, strict=True):

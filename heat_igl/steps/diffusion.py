@@ -27,7 +27,7 @@ class HeatFlow:
     """One backward Euler step of heat flow, (M - t L) u = mean_mass * b, factored.
 
     Dividing by the mean vertex mass leaves a matrix without a unit, so that a very large right-hand side `b` overflows
-    in no unit of length. Where each component has its time step, it is divided by its own mean mass.
+    in no unit of length. If each component has a time step, it is divided by the mean mass of that component.
 
     Parameters
     ----------
@@ -37,11 +37,11 @@ class HeatFlow:
         Time step, a squared length; one for all components, or one for each.
     boundary : {"neumann", "dirichlet", "average"}
         Insulated boundary, boundary held at zero, or the mean of both solutions. Under "dirichlet" heat that is put on
-        a boundary vertex stays there as its fixed value.
+        a boundary vertex stays there as a fixed value.
     backend : {"auto", "scipy", "multifrontal", "iterative"}
         See `factorize`.
     analysis : Analysis, optional
-        As `analysis` makes it for a domain with the same pattern of L, to be shared; made anew where it does not fit.
+        As `analysis` makes it for a domain with the same pattern of L, to be shared; made anew if it does not fit.
     fitted : bool
         Whether to take `fitted_laplacian` for L, with which heat falls by the right factor over long edges too.
 
@@ -95,7 +95,7 @@ class HeatFlow:
 
     @property
     def factors(self) -> list[Factorization]:
-        """The factored matrices, for what they hold."""
+        """The factored matrices, for their sizes."""
         return [part for part in (self._neumann, self._dirichlet) if part is not None]
 
     def solve(self, b: FloatArray) -> FloatArray:
@@ -112,7 +112,7 @@ class HeatFlow:
 
 
 def mass_unit(operators: Operators, t: float | FloatArray) -> float | FloatArray:
-    """The mean mass by which `HeatFlow` divides: a number, or one (n,) for each vertex where each component has a t."""
+    """The mean mass by which `HeatFlow` divides: a number, or one (n,) for each vertex if each component has a t."""
     return operators.expand_to_vertices(operators.mean_masses) if np.ndim(t) else operators.mean_mass
 
 
@@ -135,7 +135,7 @@ def diffuse(operators: Operators, u0: FloatArray, t: float, boundary: Boundary =
     Returns
     -------
     (n,) or (n, k) float64
-        Heat per area, u. Not negative where `operators.L` has no negative weight; 0 at unreferenced vertices.
+        Heat per area, u. Not negative if `operators.L` has no negative weight; 0 at unreferenced vertices.
     """
     flow = HeatFlow(operators, t, boundary)
     return flow.solve(np.asarray(u0, dtype=np.float64) / flow.mean_mass)

@@ -1,4 +1,4 @@
-"""The Laplacian of the heat flow, its weights fitted to the lengths of edges."""
+"""The Laplacian of the heat flow, with weights fitted to the lengths of edges."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ __all__ = ["fitted_laplacian"]
 def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
     """L with the weight of each edge fitted to heat that falls like exp(-d / sqrt(t)), however long the edge.
 
-    Where (1 - t Laplace) u = 0, the mean of u over a circle of radius r is I0(r / sqrt(t)) times its value in the
+    If (1 - t Laplace) u = 0, the mean of u over a circle of radius r is I0(r / sqrt(t)) times the value in the
     centre, I0 the modified Bessel function. Linear elements know the first terms of that series alone, 1 + r^2 / (4 t):
     along an edge much longer than sqrt(t) heat falls by too little, and the front runs ahead there and bends. So an
-    edge of length r gets its weight times (r^2 / (4 t)) / (I0(r / sqrt(t)) - 1), which is 1 for short ones. Negative
+    edge of length r gets the weight times (r^2 / (4 t)) / (I0(r / sqrt(t)) - 1), which is 1 for short ones. Negative
     weights are left out, so that heat is positive and keeps its digits on any triangles.
 
     Parameters
@@ -52,12 +52,13 @@ def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
         raise ValueError("weights are fitted to the lengths of edges, which this domain does not have")
     i, j, length = edges
     fit = _fit(length / np.sqrt(t[domain.components[i]] if isinstance(t, np.ndarray) else t))
-    # Entry 0 takes what L does not couple.
+    # Entry 0 takes the pairs that L does not couple.
     entry = sp.csc_matrix((np.arange(1, L.nnz + 1, dtype=L.indices.dtype), L.indices, L.indptr), shape=L.shape)
     factor = np.zeros(L.nnz + 1)
     for rows, columns in ((i, j), (j, i)):
         # L has one entry for all edges between the same two vertices. The largest factor is that of the shortest: heat
-        # arrives along it first, and it has most of the weight, which is the length of the dual edge over its own.
+        # arrives along it first, and it has most of the weight, which is the length of the dual edge over the length of
+        # the edge.
         np.maximum.at(factor, np.asarray(entry[rows, columns]).ravel(), fit)
     column = np.repeat(np.arange(n), np.diff(L.indptr))
     on_diagonal = np.flatnonzero(L.indices == column)

@@ -1,4 +1,4 @@
-"""Step 2: the direction of the heat's gradient, its magnitude, and the divergence of the field that both make."""
+"""Step 2: the direction of the heat's gradient, the magnitude, and the divergence of the field that both make."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ __all__ = ["NormalizedDivergence", "damping", "normalize"]
 # Share of a front's rate of decay from which on a direction is trusted fully; docs/heat_path.md compares values. Fronts
 # of a fitted flow scatter less.
 _FULL_RATE, _FULL_RATE_FITTED = 0.9, 0.95
-# At an insulated boundary a front meets its own mirror image and falls a little more slowly. A fitted flow is damped
-# there from this share of the rate; without damping a regular grid is 1.84 % wrong instead of 1.68.
+# At an insulated boundary a front meets the mirror image of itself and falls a little more slowly. A fitted flow is
+# damped there from this share of the rate; without damping a regular grid is 1.84 % wrong instead of 1.68.
 _AT_BOUNDARY = 0.8
 
 
@@ -27,15 +27,15 @@ def normalize(operators: Operators, u: FloatArray, of_log: bool = False) -> Floa
     operators : Operators
         The domain.
     u : (n,) or (n, k) float64
-        Heat; only its direction of descent matters.
+        Heat; only the direction of descent matters.
     of_log : bool
-        Take the direction of grad log u instead, where u is not below 1e-300. Both are the same but for interpolation:
-        log u is nearly linear where u is nearly exponential.
+        Take the direction of grad log u instead, on faces with u not below 1e-300. Both are the same but for
+        interpolation: log u is nearly linear if u is nearly exponential.
 
     Returns
     -------
     (d m,) or (d m, k) float64
-        Unit vectors; 0 on faces where the gradient is zero or below 1e-300, which have no direction.
+        Unit vectors; 0 on faces with a gradient of zero or below 1e-300, which have no direction.
     """
     gradient = operators.gradient_rows @ u
     components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
@@ -55,10 +55,10 @@ def normalize(operators: Operators, u: FloatArray, of_log: bool = False) -> Floa
 def damping(
     operators: Operators, u: FloatArray, t: float | FloatArray, full_rate: float | None = None, fitted: bool = False
 ) -> FloatArray:
-    """How sure the direction of X is on each face: 1 almost everywhere, less where heat arrives from several sides.
+    """How sure the direction of X is on each face: 1 almost everywhere, less if heat arrives from several sides.
 
     A front of heat falls by the same factor over each length, |grad log u| = 1 / sqrt(t) for small faces and in a
-    fitted flow, else by arccosh(1 + l^2 / (2 t)) over an edge of length l on large ones. Where fronts meet, at the cut
+    fitted flow, else by arccosh(1 + l^2 / (2 t)) over an edge of length l on large ones. If fronts meet, at the cut
     locus and between two sources, it falls more slowly, and the distance has no gradient of length 1 there either.
     Integrating a unit field all the same overestimates distance on both sides.
 
@@ -79,15 +79,15 @@ def damping(
     Returns
     -------
     (m,) or (m, k) float64
-        Factor of X on each face, between 0 and 1; 1 where u is not positive. On faces with a corner on the boundary,
-        where an insulated boundary turns the front into its own mirror image, a slower rate is enough, and the factor
+        Factor of X on each face, between 0 and 1; 1 if u is not positive. On faces with a corner on the boundary,
+        at which an insulated boundary mirrors the front, a slower rate is enough, and the factor
         is 1 if the flow is not `fitted`.
     """
     return _share_of_rate(operators, u, _lowest_full_rate(operators, t, fitted, full_rate))
 
 
 def _share_of_rate(operators: Operators, u: FloatArray, full_rate: FloatArray) -> FloatArray:
-    """|grad log u| over `full_rate` (m,), 1 where it is more or `full_rate` is 0, and where u is not positive."""
+    """|grad log u| over `full_rate` (m,), 1 if it is more, `full_rate` is 0 or u is not positive."""
     with np.errstate(divide="ignore", invalid="ignore"):
         gradient = operators.gradient_rows @ np.log(u)
         components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
@@ -110,9 +110,9 @@ def _lowest_full_rate(
 
 
 def _front_rate(operators: Operators, t: float | FloatArray) -> FloatArray:
-    """How fast a front of heat falls on each face (m,), in e-foldings per length, where the flow is not fitted."""
+    """How fast a front of heat falls on each face (m,), in e-foldings per length, if the flow is not fitted."""
     size = operators.face_sizes
-    # The same as arccosh(1 + size^2 / (2 t)) / size, which is 0 where size^2 is lost beside 1: faces of no size at all.
+    # The same as arccosh(1 + size^2 / (2 t)) / size, which is 0 if size^2 is lost beside 1: faces of no size at all.
     return np.asarray(2 * np.arcsinh(size / (2 * np.sqrt(t))) / size)
 
 
@@ -120,7 +120,7 @@ class NormalizedDivergence:
     """The right-hand side of step 3: the divergence of the field X of step 2.
 
     The same as ``D @ (damping(...) * normalize(...))`` to rounding. For triangles there is a compiled kernel, one pass
-    over the faces that stores no field; its tables are made once.
+    over the faces that stores no field; the tables are made once.
 
     Parameters
     ----------

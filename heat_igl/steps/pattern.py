@@ -1,4 +1,4 @@
-"""The pattern that the matrices of steps 1 and 3 have in common: that of L, and its whole diagonal."""
+"""The pattern that the matrices of steps 1 and 3 have in common: that of L, and the whole diagonal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def analysis(L: sp.csc_matrix, backend: Backend = "auto", known: Analysis | None
 
 
 def shifted(L: sp.csc_matrix, factor: float | FloatArray, diagonal: FloatArray) -> sp.csc_matrix:
-    """``L * factor + diag(diagonal)`` with the pattern of L and its whole diagonal, zeros stored.
+    """``L * factor + diag(diagonal)`` with the pattern of L and the whole diagonal, zeros stored.
 
     `factor` is a number, or one (n,) for each column.
     """

@@ -28,7 +28,7 @@ class VectorHeatFlow:
     operators : Operators
         The domain.
     rotations : (n, n) csc_matrix of complex128
-        What transport along the edges multiplies by, as `edge_rotations` gives it for triangles.
+        Factors of transport along the edges, as `edge_rotations` gives it for triangles.
     t : float
         Time step, a squared length.
     backend : {"auto", "scipy", "multifrontal"}

@@ -25,11 +25,11 @@ __all__ = ["TOLERANCE", "Known", "Refine", "Refinement"]
 
 Refine = Literal["sweep", "unfold", "exact"]
 
-# Relative gain below which a path is not straightened further. What is lost adds up to 0.0003 to 0.003 % on average; 0
+# Relative gain below which a path is not straightened further. The loss adds up to 0.0003 to 0.003 % on average; 0
 # loses nothing and takes up to twice the time.
 TOLERANCE = 4e-5
-# The search starts at vertices that fall short of what a neighbour promised by this many tolerances: by more than the
-# paths that the promise rests on may have been cut short.
+# The search starts at vertices with distances longer than a neighbour promised by this many tolerances: by more than
+# the paths that the promise rests on may have been cut short.
 _SHORTFALL = 15.0
 # Passes over vertices whose neighbours turned out to be nearer than the order said. They are few, and ever fewer.
 _MAX_PASSES = 50
@@ -37,7 +37,7 @@ _MAX_PASSES = 50
 _MAX_SEARCH = 500
 # Up to this share of flat vertices, holes are not counted.
 _HARDLY_FLAT = 0.05
-# A point whose barycentric coordinate is below this lies on the side of its face.
+# A point whose barycentric coordinate is below this lies on the side of the face.
 _ON_SIDE = 1e-8
 
 
@@ -76,8 +76,8 @@ class Refinement:
 
     Notes
     -----
-    Paths end at the boundary and where more than two faces meet: they run along such edges, not across. A surface that
-    cannot be oriented is replaced by its oriented double cover, with each source on both sheets. Immutable; threads may
+    Paths end at the boundary and at edges of more than two faces: they run along such edges, not across. A surface that
+    cannot be oriented is replaced by the oriented double cover, with each source on both sheets. Immutable; threads may
     share it, and the kernels release the interpreter's lock.
     """
 
@@ -100,7 +100,7 @@ class Refinement:
     def has_holes(self) -> bool:
         """Whether some component is neither a disk nor a sphere, so that a closed curve may enclose no surface.
 
-        True without counting where hardly a vertex is flat: two paths seldom prove anything there.
+        True without counting if hardly a vertex is flat: two paths seldom prove anything there.
         """
         if self.flatness < _HARDLY_FLAT:
             return True
@@ -109,7 +109,7 @@ class Refinement:
         graph = sp.coo_array((np.ones(3 * m, np.int8), (i, j)), shape=(n, n))
         component = csgraph.connected_components(graph, directed=False)[1]
         of_face = component[self._F[:, 0]]
-        # Each edge is shared by two half-edges, or has one alone; where more than two faces meet, they are cut apart.
+        # Each edge is shared by two half-edges, or has one alone; edges of more than two faces are cut apart.
         edges = np.bincount(np.repeat(of_face, 3), np.where(self._twin.ravel() >= 0, 0.5, 1.0))
         fans = np.bincount(component[np.unique(self._F)], minlength=len(edges))
         characteristic = fans - edges + np.bincount(of_face, minlength=len(edges))
@@ -146,7 +146,7 @@ class Refinement:
         ----------
         key : (n,) float64
             Vertices are visited in ascending order of this: ``-heat``, or a rough distance. A wrong order costs
-            time; what it changes is smaller than the sweep's error.
+            time; the change is smaller than the sweep's error.
         sources : (k,) int64
             Vertices that distance starts from.
         offsets : (k,) float64, optional
@@ -159,14 +159,14 @@ class Refinement:
             The distance at which each of them starts; 0 if not given.
         labels : (n,) int64, optional
             Filled with the source that each distance is measured from (geodesic Voronoi cells): 0 to k - 1 for
-            vertices, k to k + p - 1 for points, -1 where none is reached.
+            vertices, k to k + p - 1 for points, -1 if none is reached.
         known : Known, optional
             Distances to begin with, besides those of the sources.
 
         Returns
         -------
         (n,) float64
-            ``inf`` where no source is reached. Neither an upper nor a lower bound on a curved surface; on a flat
+            ``inf`` if no source is reached. Neither an upper nor a lower bound on a curved surface; on a flat
             convex one exact to rounding.
         """
         starts = self.starts(sources, offsets, points, point_offsets)
@@ -204,16 +204,16 @@ class Refinement:
         key, sources
             As for `sweep`.
         tolerance : float
-            A path is taken as it is once straightening it further would shorten it by less than this fraction of its
+            A path is taken as it is once straightening it further would shorten it by less than this fraction of the
             length, and by less than one and a half times this fraction of the way to the next bend. 0 follows every
-            path to its last bend or its source.
+            path to the last bend or the source.
         offsets, points, point_offsets, labels
             As for `sweep`.
 
         Returns
         -------
         (n,) float64
-            ``inf`` where no source is reached. Every value is the length of a path on the surface (to rounding, 1e-9
+            ``inf`` if no source is reached. Every value is the length of a path on the surface (to rounding, 1e-9
             of it), so none is shorter than the exact distance. On a flat convex domain exact to rounding.
 
         Raises
@@ -257,7 +257,7 @@ class Refinement:
         points: SurfacePoints | None,
         point_offsets: FloatArray | None,
     ) -> Starts:
-        """What the kernels start from, on all sheets and by the numbers of the tables."""
+        """Initial values of the kernels, on all sheets and by the numbers of the tables."""
         n, k, sheets = len(self.number), len(sources), range(self._n_sheets)
         row = self.number[np.concatenate([sources + self.n * sheet for sheet in sheets])]
         walk = unknown(len(row))
@@ -303,7 +303,7 @@ class Refinement:
         i, c, beyond = i[there], c[there], beyond[there]
         following = beyond - beyond % 3 + (beyond + 1) % 3
         other = np.zeros((len(i), 3))
-        # Its corner after the far one is at the end, as seen from here, of the side that starts after corner c.
+        # The corner after the far one is at the end, as seen from here, of the side that starts after corner c.
         other[np.arange(len(i)), following % 3] = barycentric[i, (c + 2) % 3]
         other[np.arange(len(i)), (following + 1) % 3] = barycentric[i, (c + 1) % 3]
         # The same side runs the other way there.

@@ -23,7 +23,7 @@ __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
 # Curves are unfolded from as points, at most so many mean edge lengths s apart. At a distance d that is wrong by the
 # fraction (s / d)^2 / 8 at most: by 0.005 % beyond the 6 edges within which straight lines from the curve itself count.
 _SPACING = 0.125
-# Where a sweep gives less than a straight line by less than this, it is the sweep that is wrong, and no shorter path is
+# If a sweep gives less than a straight line by less than this, it is the sweep that is wrong, and no shorter path is
 # there: sweeps are off by 0.06 to 0.4 % in the mean and by 1.6 % at most (cow, fandisk, camel's head).
 _SWEEP_ERROR = 0.01
 # Up to so many vertices, or with so much curvature at each (radians, in the mean), distance is found by exact windows,
@@ -39,7 +39,7 @@ _KNOWN_RADIUS = 4.0
 
 
 class UnfoldingDomain(Protocol):
-    """What unfolding takes of a domain; `Operators` is one."""
+    """The part of a domain that unfolding uses; `Operators` is one."""
 
     @property
     def surface(self) -> Surface | None:
@@ -110,11 +110,11 @@ class UnfoldingSolver:
         Triangles.
     refine : {"sweep", "unfold", "exact"}
         Which update. "exact" is the polyhedral distance by windows, see `ExactSurface`; the heat is not read. The other
-        two take it as well where the mesh is small, rough, or flat with holes. It is exact from vertices and points. A
+        two take it as well if the mesh is small, rough, or flat with holes. It is exact from vertices and points. A
         curve stands for points at most an eighth of a mean edge length apart, and straight lines from the curve itself
         count up to 6 edges from it: beyond, distance from it is too long by 0.005 % at most.
     tolerance : float, optional
-        As for `Refinement.unfold`, with its default.
+        As for `Refinement.unfold`, with the same default.
     cutoff : float
         With "exact", what is farther is ``inf``, and the search ends there.
 
@@ -157,12 +157,12 @@ class UnfoldingSolver:
     def distances(self, terms: Sequence[UnfoldingTerm], u: FloatArray) -> FloatArray:
         """Distances (k, n) for heat (n, k).
 
-        Where the heat has underflowed the order is arbitrary, which the unfolding makes up for.
+        If the heat has underflowed the order is arbitrary, which the unfolding corrects.
         """
         return np.stack([self._distance(term, one) for term, one in zip(terms, u.T, strict=True)])
 
     def labelled(self, term: UnfoldingTerm, u: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 where none is reached."""
+        """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 if none is reached."""
         labels = np.empty(len(u), np.int64)
         return self._distance(term, u, labels), labels
 
@@ -198,7 +198,7 @@ class UnfoldingSolver:
     ) -> FloatArray:
         sources, points, components = term.sources, self._points(term), self._domain.components
         places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
-        # Tolerances are relative to the distance: what all have in common is added afterwards.
+        # Tolerances are relative to the distance: the common part is added afterwards.
         earliest = np.full(self._domain.n_components, np.inf)
         component_of_point = components[self._given_faces[points.faces, 0]] if places else np.empty(0, np.int64)
         component = np.concatenate([components[sources.vertices], component_of_point])
@@ -236,7 +236,7 @@ class UnfoldingSolver:
     def _unfolded(
         self, u: FloatArray, asked: _Asked, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray
     ) -> FloatArray:
-        """Distances (n,) from vertices and points, each component's from where it begins."""
+        """Distances (n,) from vertices and points, each component's from the smallest offset."""
         if self._refinement is None or self.is_exact:
             found = self._exact.solve(
                 asked.vertices, asked.offsets, asked.points, asked.point_offsets, cutoff=self._cutoff
@@ -297,7 +297,7 @@ class UnfoldingSolver:
         return groups
 
     def _known(self, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray, asked: _Asked) -> Known | None:
-        """What straight lines from points reach, and exact windows near several sources."""
+        """Vertices that straight lines from points reach, and exact windows near several sources."""
         near = term.near_seen
         if len(asked.vertices) + len(points.faces) > 1 and not len(term.sources.segments.faces):
             radius = _KNOWN_RADIUS * self._domain.mean_edge_length

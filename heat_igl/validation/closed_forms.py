@@ -122,7 +122,7 @@ def cone(mesh: MeshLike, sources: Sources, *, apex: ArrayLike = (0.0, 0.0, 0.0))
     Parameters
     ----------
     mesh : mesh
-        Vertices on a cone, up to and including its apex: around a hole at the tip, paths would be longer.
+        Vertices on a cone, up to and including the apex: around a hole at the tip, paths would be longer.
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices.
     apex : (3,) array_like
@@ -219,7 +219,7 @@ def _common(name: str, values: FloatArray) -> float:
 
 
 def _require_convex(points: FloatArray, content: float) -> None:
-    """Refuse a mesh that does not fill the convex hull of its vertices: straight lines would leave it."""
+    """Refuse a mesh that does not fill the convex hull of the vertices: straight lines would leave it."""
     from scipy.spatial import ConvexHull, QhullError  # takes as long to import as the rest of the package
 
     try:

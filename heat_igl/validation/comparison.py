@@ -136,7 +136,7 @@ def _truths(
     bounds: Mapping[str, float],
     counter: Counter,
 ) -> tuple[str | None, FloatArray | None, Run | None]:
-    """Name and distances of the reference, and its run if it is a method."""
+    """Name and distances of the reference, and the run if it is a method."""
     if reference is None:
         return None, None, None
     if isinstance(reference, str):
@@ -174,7 +174,7 @@ def _row(
     if len(sets) > 1 and all(len(sources) == 1 for sources in sets):
         single = np.array([sources[0] for sources in sets])
         difference, between = metrics.asymmetry(found.distances, single), found.distances[:, single]
-        # Where both ways are 0 or infinite, their difference is 0.
+        # If both ways are 0 or infinite, their difference is 0.
         mean = np.where(np.isfinite(between + between.T) & (between + between.T > 0), (between + between.T) / 2, 1.0)
         asymmetry = float(np.abs(difference / mean).max())
         triangle = metrics.triangle_violations(found.distances, single).largest

@@ -133,7 +133,7 @@ class ValidationReport:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """The report without its arrays, as values that JSON can carry."""
+        """The report without the arrays, as values that JSON can carry."""
         return {
             "name": self.name,
             "n_vertices": self.mesh.n_vertices,

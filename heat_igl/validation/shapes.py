@@ -1,6 +1,6 @@
 """Generated domains, most with a known distance, for tests, benchmarks and notebooks.
 
-Every function returns a `Mesh`, except `flat_torus`: its triangles are known by their edge lengths only.
+Every function returns a `Mesh`, except `flat_torus`: the triangles are known by their edge lengths only.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def icosphere(subdivisions: int) -> Mesh:
 
 
 def blob(subdivisions: int) -> Mesh:
-    """A smooth closed surface with bumps and hollows: `icosphere` with each vertex moved along its direction.
+    """A smooth closed surface with bumps and hollows: `icosphere` with each vertex moved along the radius.
 
     The radius in a direction (x, y, z) is 1 + 0.3 (sin 4x cos 3y + sin 3z).
     """
@@ -122,7 +122,7 @@ def blob(subdivisions: int) -> Mesh:
 
 
 def cylinder(around: int, along: int, length: float = 2 * np.pi) -> Mesh:
-    """An open cylinder of radius 1 about the z axis, `around` vertices per ring, `along` cells in its `length`.
+    """An open cylinder of radius 1 about the z axis, `around` vertices per ring, `along` cells over the `length`.
 
     Vertex ``ring * around + k`` lies at the angle 2 pi k / around. Distance is Euclidean on the unrolled cylinder.
     """
@@ -193,7 +193,7 @@ def flat_torus(n: int) -> IntrinsicTriangulation:
 
 
 def box(n: int, size: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Mesh:
-    """A box of n by n by n cells, each cut into six tetrahedra around its diagonal (Kuhn). Distance is Euclidean.
+    """A box of n by n by n cells, each cut into six tetrahedra around the diagonal (Kuhn). Distance is Euclidean.
 
     Vertex ``(layer * (n + 1) + row) * (n + 1) + column`` lies at (column, row, layer) * size / n.
     """

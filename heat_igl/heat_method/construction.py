@@ -1,0 +1,169 @@
+"""Construction of a heat method solver from a mesh, operators or edge lengths, and the state that it keeps."""
+
+from __future__ import annotations
+
+import time
+from typing import TypeVar
+
+from heat_igl.heat_method.batches import BatchedSolver
+from heat_igl.heat_method.options import Magnitude, SolverOptions
+from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
+from heat_igl.heat_method.solution import Diagnostics
+from heat_igl.linear import Backend
+from heat_igl.mesh import Mesh, MeshLike, PointCloud, PolygonMesh, as_mesh
+from heat_igl.operators import Laplacian, Operators, edge_length_operators
+from heat_igl.steps import Boundary
+from heat_igl.typing import ArrayLike, FloatArray
+from heat_igl.unfolding import Refine
+
+__all__ = ["PreparedSolver"]
+
+Solver = TypeVar("Solver", bound="PreparedSolver")
+
+
+class PreparedSolver(BatchedSolver):
+    """A solver that has prepared operators and factors; `HeatMethodSolver` adds the method."""
+
+    _mesh: Mesh | PointCloud | None = None
+    _parts: SolverParts
+
+    @classmethod
+    def from_options(cls: type[Solver], mesh: MeshLike, options: SolverOptions) -> Solver:
+        """A solver on `mesh` with options that were put together before."""
+        solver = cls.__new__(cls)
+        solver._set_up(as_mesh(mesh), options)
+        return solver
+
+    @classmethod
+    def from_operators(
+        cls: type[Solver],
+        domain: Operators,
+        *,
+        t_coef: float | None = None,
+        t: float | None = None,
+        boundary: Boundary = "neumann",
+        magnitude: Magnitude = "auto",
+        refine: Refine | None = None,
+        backend: Backend = "auto",
+    ) -> Solver:
+        """A solver on any domain that has operators; parameters as for the class."""
+        options = SolverOptions(t_coef, t, "intrinsic-delaunay", boundary, magnitude, refine, backend)
+        return cls._of(prepare(domain, options))
+
+    @classmethod
+    def from_edge_lengths(
+        cls: type[Solver],
+        F: ArrayLike,
+        lengths: ArrayLike,
+        *,
+        n: int | None = None,
+        t_coef: float | None = None,
+        t: float | None = None,
+        laplacian: Laplacian = "auto",
+        boundary: Boundary = "neumann",
+        magnitude: Magnitude = "auto",
+        refine: Refine | None = None,
+        backend: Backend = "auto",
+    ) -> Solver:
+        """A solver on triangles that are known by their edge lengths alone; positions are not needed.
+
+        Parameters
+        ----------
+        F : (m, 3) array_like of int
+            Vertices of each triangle.
+        lengths : (m, 3) array_like
+            ``lengths[f, c]`` is that of the side of triangle f opposite its corner c, as `igl.edge_lengths` gives it;
+            both triangles at an edge give it the same length.
+        n : int, optional
+            Number of vertices; one more than the largest in `F` if not given.
+        **options
+            As for the class. Where more than two triangles meet at an edge no tufted cover is made, which takes
+            positions: such edges are not flipped.
+
+        Raises
+        ------
+        MeshError
+            If `F` or `lengths` cannot be used; the message names the first offender.
+        """
+        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, refine, backend)
+        start = time.perf_counter()
+        domain = edge_length_operators(F, lengths, n, options.triangulation)
+        return cls._of(prepare(domain, options, seconds_operators=time.perf_counter() - start))
+
+    def with_vertices(self: Solver, V: ArrayLike) -> Solver:
+        """A new solver after the vertices have moved; this one stays as it is.
+
+        Parameters
+        ----------
+        V : (n, 3) array_like
+            New positions of all vertices.
+
+        Returns
+        -------
+        HeatMethodSolver
+            With the same faces and options, and the same results as one made anew. The time step follows `t_coef`,
+            unless `t` was given. What the faces alone say is shared: they are not validated, and edges, boundary and
+            components not found again; nor is the order of elimination, unless other edges are flipped.
+
+        Raises
+        ------
+        MeshError
+            If `V` cannot be used; the message names the first offender.
+        ValueError
+            If the solver was made from operators.
+        """
+        if self._mesh is None:
+            raise ValueError(
+                "this solver was made from operators and has no vertices to move: use from_operators again"
+            )
+        moved = self._mesh.with_vertices(V)
+        return self._of(prepare_mesh(moved, self._parts.options, self._parts.analysis), moved)
+
+    def _set_up(self, mesh: Mesh | PolygonMesh | PointCloud, options: SolverOptions) -> None:
+        if not isinstance(mesh, PolygonMesh):
+            self._mesh, self._parts = mesh, prepare_mesh(mesh, options)
+        elif options.refine is not None:
+            self._mesh, self._parts = mesh.triangles, prepare_mesh(mesh.triangles, options)
+        else:
+            self._mesh, self._parts = None, prepare_polygons(mesh, options)
+
+    @classmethod
+    def _of(cls: type[Solver], parts: SolverParts, mesh: Mesh | PointCloud | None = None) -> Solver:
+        solver = cls.__new__(cls)
+        solver._mesh, solver._parts = mesh, parts
+        return solver
+
+    def __repr__(self) -> str:
+        options = self._parts.options
+        refined = "" if options.refine is None else f", refine={options.refine!r}"
+        backend = self.diagnostics.backend
+        return f"{type(self).__name__}({self.n_vertices} vertices, t={self.t:.4g}{refined}, backend={backend!r})"
+
+    @property
+    def operators(self) -> Operators:
+        """L, M, G and D of the triangulation that is solved on."""
+        return self._parts.operators
+
+    @property
+    def t(self) -> float:
+        """The time step in use, a squared length; of several (`time_steps`), that of the largest component."""
+        return self.diagnostics.t
+
+    @property
+    def time_steps(self) -> FloatArray:
+        """The time step of each component, by their labels in ``operators.components``."""
+        return self._parts.time_steps
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """What the solver did and rests on."""
+        return self._parts.diagnostics
+
+    @property
+    def n_vertices(self) -> int:
+        """Length of a distance array: the vertices of the mesh. The operators may have more."""
+        return self.operators.n_given
+
+    @property
+    def _n_faces(self) -> int:
+        return len(self.operators.weights)
