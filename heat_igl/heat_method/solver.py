@@ -233,8 +233,9 @@ class HeatMethodSolver(PreparedSolver):
         sources : sources
             As for `distance`, with its errors; no curves.
         tolerance : float, optional
-            For ``refine="unfold"``, see `Refinement.unfold`: a smaller one takes longer. With the default the median
-            of the error of the departure is below 0.02 degrees, with 1e-6 it is rounding.
+            For ``refine="unfold"``, see `Refinement.unfold`. With the default, departures are wrong by 0.1 to 0.2
+            degrees in the mean, and by less than 0.02 degrees in the median. 0 takes about twice the time, and nine
+            of ten departures and more are exact.
 
         Returns
         -------
@@ -252,14 +253,14 @@ class HeatMethodSolver(PreparedSolver):
         last_steps = self._parts.last_steps
         if not isinstance(last_steps, UnfoldingSolver) or self._parts.options.refine == "sweep":
             raise ValueError('directions follow paths: make the solver with refine="unfold" or refine="exact"')
-        if not isinstance(self._mesh, Mesh):
-            raise ValueError("directions need the positions of a mesh, which this solver does not have")
         (term,) = self._source_terms([self._source_set(sources)])
-        found = last_steps.directed(term, self._order([term])[:, 0], tolerance)
-        return directions(*found, self._frames)
+        frames = self._frames
+        return directions(*last_steps.directed(term, self._order([term])[:, 0], tolerance), frames)
 
     @cached_property
     def _frames(self) -> TangentFrames:
+        if not isinstance(self._mesh, Mesh):
+            raise ValueError("directions need the positions of a mesh, which this solver does not have")
         return tangent_frames(self._mesh)
 
     def solve(self, sources: Sources) -> HeatSolution:

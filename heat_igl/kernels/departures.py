@@ -1,4 +1,4 @@
-"""Where straight paths leave their last bend: laid out from their ends, triangle by triangle."""
+"""Straight paths laid out from their ends, triangle by triangle: where they leave their last bend."""
 
 import cython
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
@@ -15,85 +15,87 @@ def depart(
     inside,
     entered: cython.const[cython.int][::1],
     crossing: cython.const[cython.double][::1],
-    max_steps: cython.int,
 ):
     """Fill the fan, angle and departure of the walks (n + p,) whose reach and root are known.
 
     Parameters
     ----------
     tables, walk, first_inside, inside
-        As for `heat_igl.kernels.walks.Query`. Only vertices with a root are followed: others must have the root -1.
+        As for `heat_igl.kernels.walks.Query`. Only vertices with a root are followed: others must have the root -1. A
+        departure is nan if the root is not met.
     entered : (n,) int32
-        The half-edge opposite each vertex over which its straight path comes; -1 if it begins inside a face there.
+        The half-edge opposite each vertex over which its straight path comes; -1 if the path lies inside one face.
     crossing : (n,) float64
         How far from the tail of that half-edge.
-    max_steps : int
-        Triangles that one path may cross.
     """
     q = Query(tables, walk, first_inside, inside, 0.0, 0.0, 0)
     v: cython.int
+    k: cython.int
     with cython.nogil:
         for v in range(entered.shape[0]):
-            if q.walk[v].root < 0:
+            one = cython.address(q.walk[v])
+            if one.root < 0:
                 continue
-            if entered[v] >= 0:
-                _follow(q, v, entered[v], crossing[v], max_steps)
-            else:
-                q.walk[v].departure = q.walk[v].angle = NAN
+            one.angle = one.departure = NAN
+            if entered[v] < 0:
+                continue
+            k = q.t.first[v]
+            while q.t.turn[k].corner != entered[v]:
+                k += 1
+            spoke = cython.address(q.t.spoke[k])
+            x: cython.double = crossing[v] - spoke.along
+            y: cython.double = -spoke.height
+            size: cython.double = sqrt(x * x + y * y)
+            one.fan, one.total = q.t.turn[k].fan_here, q.t.total[q.t.turn[k].fan_here]
+            one.angle = q.t.turn[k].here + atan2(
+                -spoke.along * y + spoke.height * x, spoke.height * spoke.height - spoke.along * x
+            )
+            one.departure = _follow(q, k, one.root, x / size, y / size, one.reach, 1e-6 * one.reach)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _follow(
-    q: Query, v: cython.int, entered: cython.int, crossing: cython.double, max_steps: cython.int
-) -> cython.void:
-    """Lay out the strip of triangles from v to the root; the departure is nan if the root is not met."""
-    walk = cython.address(q.walk[v])
-    k: cython.int = q.t.first[v]
-    while q.t.turn[k].corner != entered:
-        k += 1
+    q: Query,
+    k: cython.int,
+    root: cython.int,
+    dx: cython.double,
+    dy: cython.double,
+    reach: cython.double,
+    near: cython.double,
+) -> cython.double:
+    """Lay out the triangles along the direction (dx, dy), left of spoke k, until the root is met `reach` away.
+
+    Returns the direction back at the root, an angle in its fan or in its face; nan if it is not met within `near`.
+    """
     spoke = cython.address(q.t.spoke[k])
-    turn = cython.address(q.t.turn[k])
     view: View
     view.ax, view.ay = -spoke.along, -spoke.height
     view.bx, view.by = view.ax + spoke.base, view.ay
-    view.h, view.spoke = turn.across, k
-    # The direction of the path, back from v.
-    dx: cython.double = view.ax + crossing
-    dy: cython.double = view.ay
-    size: cython.double = sqrt(dx * dx + dy * dy)
-    walk.fan, walk.total = turn.fan_here, q.t.total[turn.fan_here]
-    walk.angle = turn.here + atan2(view.ax * dy - view.ay * dx, view.ax * dx + view.ay * dy)
-    walk.departure = NAN
-    if not size > 0.0:
-        return
-    dx, dy = dx / size, dy / size
-    near: cython.double = 1e-6 * walk.reach
-    if spoke.neighbour == walk.root and _is_near(view.ax, view.ay, dx, dy, walk.reach, near):
-        walk.departure = turn.there
-        return
-    if spoke.next_neighbour == walk.root and _is_near(view.bx, view.by, dx, dy, walk.reach, near):
-        walk.departure = q.t.turn[spoke.next].there
-        return
-    for _ in range(max_steps):
-        if view.h < 0:
-            return
+    view.h, view.spoke = q.t.turn[k].across, k
+    there: cython.double = NAN
+    far: cython.double = reach + near
+    aim_x: cython.double = reach * dx
+    aim_y: cython.double = reach * dy
+    if spoke.neighbour == root and _is_near(view.ax, view.ay, aim_x, aim_y, near):
+        return q.t.turn[k].there
+    if spoke.next_neighbour == root and _is_near(view.bx, view.by, aim_x, aim_y, near):
+        return q.t.turn[spoke.next].there
+    while view.h >= 0 and (view.ax * dx + view.ay * dy < far or view.bx * dx + view.by * dy < far):
         step = cython.address(q.t.step[view.h])
-        # Where the path goes next is known late, but both ways are known now.
-        prefetch(cython.address(q.t.step[max(step.to_right, 0)]))
+        # Both triangles that may come next, before it is known which.
         prefetch(cython.address(q.t.step[max(step.to_left, 0)]))
-        ux: cython.double = view.ax - view.bx
-        uy: cython.double = view.ay - view.by
-        wx: cython.double = view.bx + step.x * ux - step.y * uy
-        wy: cython.double = view.by + step.x * uy + step.y * ux
-        if step.vertex == walk.root and _is_near(wx, wy, dx, dy, walk.reach, near):
-            walk.departure = step.direction + atan2(
-                wx * view.by - wy * view.bx, wx * (wx - view.bx) + wy * (wy - view.by)
-            )
-            return
-        if q.first_inside.shape[0] > 0 and _meets_point(q, walk.root, view, wx, wy, dx, dy, walk.reach, near, v):
-            return
+        prefetch(cython.address(q.t.step[max(step.to_right, 0)]))
+        wx: cython.double = view.bx + step.x * (view.ax - view.bx) - step.y * (view.ay - view.by)
+        wy: cython.double = view.by + step.x * (view.ay - view.by) + step.y * (view.ax - view.bx)
+        if step.vertex == root and _is_near(wx, wy, aim_x, aim_y, near):
+            back: cython.double = atan2(wx * view.by - wy * view.bx, wx * (wx - view.bx) + wy * (wy - view.by))
+            return step.direction + back
+        if q.first_inside.shape[0] > 0 and _meets_point(
+            q, root, view, wx, wy, aim_x, aim_y, near, cython.address(there)
+        ):
+            return there
         # Past the vertex; where rounding leads over the boundary, on the other side.
         passes_right: cython.bint = dx * wy - dy * wx > 0.0
         if (step.to_right if passes_right else step.to_left) < 0:
@@ -102,6 +104,7 @@ def _follow(
             view.bx, view.by, view.h = wx, wy, step.to_right
         else:
             view.ax, view.ay, view.h = wx, wy, step.to_left
+    return there
 
 
 @cython.cfunc
@@ -109,15 +112,9 @@ def _follow(
 @cython.nogil
 @cython.exceptval(check=False)
 def _is_near(
-    x: cython.double,
-    y: cython.double,
-    dx: cython.double,
-    dy: cython.double,
-    reach: cython.double,
-    near: cython.double,
+    x: cython.double, y: cython.double, aim_x: cython.double, aim_y: cython.double, near: cython.double
 ) -> cython.bint:
-    """Whether a point of the plane is the end of the path."""
-    return fabs(x - reach * dx) <= near and fabs(y - reach * dy) <= near
+    return fabs(x - aim_x) <= near and fabs(y - aim_y) <= near
 
 
 @cython.cfunc
@@ -129,13 +126,12 @@ def _meets_point(
     view: View,
     wx: cython.double,
     wy: cython.double,
-    dx: cython.double,
-    dy: cython.double,
-    reach: cython.double,
+    aim_x: cython.double,
+    aim_y: cython.double,
     near: cython.double,
-    v: cython.int,
+    there: cython.p_double,
 ) -> cython.bint:
-    """Whether the face behind a view holds the root, a source point, at the end of the path of v."""
+    """Whether the face behind a view holds the root, a source point, within `near` of the aim."""
     at_w: cython.int = view.h % 3
     entry: cython.int = q.first_inside[view.h // 3]
     while entry >= 0:
@@ -145,8 +141,8 @@ def _meets_point(
         w: cython.double = point.barycentric[at_w]
         x: cython.double = w * wx + a * view.ax + b * view.bx
         y: cython.double = w * wy + a * view.ay + b * view.by
-        if point.row == root and _is_near(x, y, dx, dy, reach, near):
-            q.walk[v].departure = seen_from_point(view, wx, wy, x, y) + point.turn
+        if point.row == root and _is_near(x, y, aim_x, aim_y, near):
+            there[0] = seen_from_point(view, wx, wy, x, y) + point.turn
             return True
         entry = point.following
     return False

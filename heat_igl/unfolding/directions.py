@@ -86,8 +86,8 @@ class PathDirections:
         self._scale[refinement.number] = self.angles.scale
         self._on_boundary[refinement.number] = self.angles.on_boundary
 
-    def of_walks(self, walk: AnyArray, starts: Starts, points: SurfacePoints | None = None) -> PathAngles:
-        """The angles of walks (n + p,) from sources that begin at `starts`, p of them at `points` in faces."""
+    def of_walks(self, walk: AnyArray, points: SurfacePoints | None = None) -> PathAngles:
+        """The angles of walks (n + p,), with p sources at `points` in faces."""
         n = len(self._begin)
         row = np.flatnonzero(np.isfinite(walk["distance"][:n]) & (walk["fan"][:n] >= 0))
         root = walk["root"].astype(np.int64)
@@ -124,14 +124,14 @@ class PathDirections:
         half_edge = origin.entered
         entered[number] = np.where(half_edge >= 0, 3 * refinement.face[half_edge // 3] + half_edge % 3, -1)
         crossing[number] = origin.crossing
-        inside = (np.empty(0, np.int32), np.empty(0, INSIDE)) if starts.points is None else starts.points
-        departures.depart(refinement.tables, walk, *inside, entered, crossing, len(refinement.face))
+        first, inside = (np.empty(0, np.int32), np.empty(0, INSIDE)) if starts.points is None else starts.points
+        departures.depart(refinement.tables, walk, first, inside, entered, crossing)
         # Paths inside the face of a source point.
         seen = np.flatnonzero(starts.walk["fan"] >= 0)
         seen = seen[walk["root"][starts.row[seen]] == starts.walk["root"][seen]]
         for name in ("fan", "angle", "total", "departure"):
             walk[name][starts.row[seen]] = starts.walk[name][seen]
-        return self.of_walks(walk, starts, points)
+        return self.of_walks(walk, points)
 
     def _polar(self, rows: IntArray, angles: FloatArray) -> FloatArray:
         """Polar angles (k,) of angles in the fans of vertices; at the boundary no further than the faces."""
@@ -141,7 +141,7 @@ class PathDirections:
     def _turns(self, points: SurfacePoints) -> FloatArray:
         """The angle (p,) of corners 0 and 1 of the triangles that hold points, in the given faces.
 
-        Flips have turned the triangles. A second point nearby, in the given face and in the triangle, tells by how much.
+        Flips have turned the triangles. A second point nearby, in the given face and in the triangle, shows how far.
         """
         given, triangulation = self._faces, self._triangulation
         place, l = lay_out(given.l[points.faces]), given.l[points.faces]  # noqa: E741

@@ -14,8 +14,8 @@ from heat_igl.operators import Surface
 from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSet, take_shorter
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
-from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.directions import PathAngles, PathDirections
+from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.refinement import TOLERANCE, Known, Refine, Refinement, Starts
 
 __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
@@ -270,7 +270,7 @@ class UnfoldingSolver:
         if asked.labels is not None:
             asked.labels[:] = walk["label"][row]
         if asked.angles is not None:
-            asked.angles[:] = self.path_directions.of_walks(walk, starts, asked.points)
+            asked.angles[:] = self.path_directions.of_walks(walk, asked.points)
         return np.asarray(walk["distance"][row])
 
     def _starts(self, asked: _Asked) -> Starts:
