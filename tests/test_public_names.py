@@ -15,16 +15,16 @@ import heat_igl
 
 # All that `heat_igl.__all__` has ever held.
 EXPORTED = """
-AccuracyWarning BatchError ClosestPoints Diagnostics Directions FactorizationError HeatMethodSolver HeatSolution
-ImageDomain LabelledDistance Mesh MeshError MeshReport MissingExtraError OffsetSources Operators PointCloud
-PolygonMesh ReferenceSolverError Refinement SourceError SurfaceCurve SurfacePoints TangentFrames ValidationReport
-ValidationRow VectorHeatSolver VoronoiCells as_mesh baselines closed_forms closest_points cluster connection_laplacian
-curve_on diameter distance_matrix distances_within dual_triangulation edge_curve enclosed_areas exp_map farthest_cells
-farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain isolines log_map metrics
-nearest_vertices offset_curves pair_distances plots point_cloud_operators polygon_operators read_attributes read_mesh
-read_point_cloud read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators
-split_long_edges sublevel_areas tangent_frames trace_geodesic unfolded_distance validate voronoi_cells write_curves
-write_mesh
+AccuracyWarning BatchError ClosestPoints Diagnostics FactorizationError HeatMethodSolver HeatSolution ImageDomain
+LabelledDistance Mesh MeshError MeshReport MissingExtraError OffsetSources Operators PointCloud PolygonMesh
+ReferenceSolverError Refinement SourceError SurfaceCurve SurfacePoints TangentFrames ValidationReport ValidationRow
+VectorHeatSolver VoronoiCells as_mesh baselines closed_forms closest_points cluster connection_laplacian curve_on
+diameter distance_matrix distances_within dual_triangulation edge_curve enclosed_areas exp_map farthest_cells
+farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain isolines metrics nearest_vertices
+offset_curves pair_distances plots point_cloud_operators polygon_operators read_attributes read_mesh read_point_cloud
+read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
+tangent_frames trace_geodesic Directions log_map
+unfolded_distance validate voronoi_cells write_curves write_mesh
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they

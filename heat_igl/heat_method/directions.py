@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from heat_igl.intrinsic import PolarAngles, TangentFrames
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding import PathAngles, in_circle
 
-__all__ = ["Directions", "directions"]
+__all__ = ["Directions", "carried", "directions"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +58,26 @@ def directions(distance: FloatArray, labels: IntArray, angles: PathAngles, frame
     arrival = np.where(has_path, _arrival(angles.back, frames.angles), 0.0)
     gradient = np.where(has_path[:, None], frames.to_world(frames.from_angles(arrival)), 0.0)
     return Directions(distance, labels, departure, arrival, turning, gradient)
+
+
+def carried(angles: PathAngles, labels: IntArray, sources: IntArray, polar: PolarAngles) -> AnyArray:
+    """Unit numbers (n,) that components are multiplied by on the way from the source; 1 at sources, 0 without a path.
+
+    Parameters
+    ----------
+    angles, labels : PathAngles, (n,) int64
+        Of paths from vertices.
+    sources : (k,) int64
+        The vertex of each label.
+    polar : PolarAngles
+        Around the vertices.
+    """
+    start = sources[np.maximum(labels, 0)]
+    # As transport has it, see `PolarAngles.rigid`.
+    flat = angles.departure / polar.scale[start] + (np.pi - polar.sums[start]) / 2
+    departure = np.where(polar.on_boundary[start], flat, angles.departure)
+    turn = _arrival(angles.back, polar) - departure - angles.turning
+    return np.where(labels < 0, 0.0, np.exp(1j * np.where(np.isnan(turn), 0.0, turn)))
 
 
 def _arrival(back: FloatArray, polar: PolarAngles) -> FloatArray:

@@ -24,8 +24,8 @@ from heat_igl.operators import Laplacian
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
 from heat_igl.steps import Boundary
-from heat_igl.typing import ArrayLike, FloatArray
-from heat_igl.unfolding import Refine, UnfoldingSolver
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
+from heat_igl.unfolding import PathAngles, Refine, UnfoldingSolver
 
 __all__ = ["HeatMethodSolver", "heat_method_distance"]
 
@@ -250,12 +250,16 @@ class HeatMethodSolver(PreparedSolver):
             Without ``refine="unfold"`` or ``refine="exact"``, for a solver that was made from operators, and if
             `tolerance` is not a number from 0 to 1.
         """
+        found = self._paths(sources, tolerance)
+        return directions(*found, self._frames)
+
+    def _paths(self, sources: Sources, tolerance: float | None) -> tuple[FloatArray, IntArray, PathAngles]:
+        """Distance, labels, and the angles of the shortest paths in the triangles."""
         last_steps = self._parts.last_steps
         if not isinstance(last_steps, UnfoldingSolver) or self._parts.options.refine == "sweep":
             raise ValueError('directions follow paths: make the solver with refine="unfold" or refine="exact"')
         (term,) = self._source_terms([self._source_set(sources)])
-        frames = self._frames
-        return directions(*last_steps.directed(term, self._order([term])[:, 0], tolerance), frames)
+        return last_steps.directed(term, self._order([term])[:, 0], tolerance)
 
     @cached_property
     def _frames(self) -> TangentFrames:

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import AccuracyWarning, MeshError, SourceError
+from heat_igl.heat_method.directions import carried
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.outward_field import OutwardField
 from heat_igl.heat_method.parts import prepare
@@ -24,6 +25,8 @@ __all__ = ["VectorHeatSolver"]
 
 # Vectors shorter than this share of the heat around them are rounding: those that arrive cancel.
 _CANCELLED = 1e-12
+# Tolerance of walks that are followed to their ends.
+_STRAIGHT = 0.0
 
 
 class VectorHeatSolver:
@@ -39,8 +42,10 @@ class VectorHeatSolver:
         transport along the shortest geodesic.
     t : float, optional
         Time step as a squared length; overrides `t_coef`. It is raised where heat would not cross the mesh.
-    refine : {"sweep", "unfold"}, optional
-        How `log_map` finds the radial distance, see `HeatMethodSolver`.
+    refine : {"sweep", "unfold", "exact"}, optional
+        With "unfold" and "exact" nothing flows: every vertex takes the value or the vector of the nearest source, along
+        the shortest path, and `log_map` has the direction in which that path departs; see
+        `HeatMethodSolver.directions`. "sweep" is for the distance in `log_map` alone.
     backend : {"auto", "scipy", "multifrontal"}
         Linear solver, see `factorize`.
 
@@ -117,9 +122,11 @@ class VectorHeatSolver:
 
     def _prepare(self, domain: Operators, rotations: sp.csc_matrix, options: SolverOptions) -> None:
         parts = prepare(domain, options)
-        self._heat_flow = parts.heat_flow
         self._distance_solver = HeatMethodSolver._of(parts)
-        self._vector_flow = VectorHeatFlow(domain, rotations, parts.diagnostics.t, options.backend, parts.fitted)
+        self._follows_paths = options.refine in ("unfold", "exact")
+        if not self._follows_paths:
+            self._heat_flow = parts.heat_flow
+            self._vector_flow = VectorHeatFlow(domain, rotations, parts.diagnostics.t, options.backend, parts.fitted)
 
     @property
     def frames(self) -> TangentFrames:
@@ -171,6 +178,8 @@ class VectorHeatSolver:
         """
         vertices = self._vertices(sources)
         given = checked_vectors("values", np.reshape(values, (-1, 1)), len(vertices), 1)[:, 0]
+        if self._follows_paths:
+            return self._along_paths(vertices, given)
         return self._extended(vertices, given)[0]
 
     def transport(self, sources: Sources, vectors: ArrayLike) -> FloatArray:
@@ -203,6 +212,9 @@ class VectorHeatSolver:
         """
         vertices = self._vertices(sources)
         given = checked_vectors("vectors", vectors, len(vertices), 2)
+        if self._follows_paths:
+            found = self._along_paths(vertices, given @ [1, 1j], turned=True)
+            return np.stack([found.real, found.imag], axis=1)
         lengths, heat = self._extended(vertices, np.hypot(*given.T))
         found = self._directions(vertices, given[:, 0] + 1j * given[:, 1], heat) * lengths
         return np.stack([found.real, found.imag], axis=1)
@@ -239,6 +251,11 @@ class VectorHeatSolver:
         vertices = self._vertices(source)
         if len(vertices) != 1:
             raise SourceError(f"source must be one vertex, not {len(vertices)}")
+        if self._follows_paths:
+            distance, _, angles = self._distance_solver._paths(source, _STRAIGHT)
+            return TangentFrames.from_angles(
+                np.nan_to_num(angles.departure), np.where(np.isfinite(distance), distance, 0.0)
+            )
         if self._outward is None:
             raise MeshError("the log map needs the triangles around the source, which this domain does not have")
         v = int(vertices[0])
@@ -256,6 +273,16 @@ class VectorHeatSolver:
         reached = np.isfinite(distance)
         length = np.where(reached, distance, 0.0)
         return np.stack([length * direction.real, length * direction.imag], axis=1)
+
+    def _along_paths(self, vertices: IntArray, numbers: AnyArray, turned: bool = False) -> AnyArray:
+        """The number (n,) of the nearest source, `turned` as a tangent vector on the way; 0 without a source."""
+        _, labels, angles = self._distance_solver._paths(vertices, _STRAIGHT)
+        # A source that is named twice has the mean of the numbers.
+        _, which, count = np.unique(vertices, return_inverse=True, return_counts=True)
+        total = np.zeros(len(count), numbers.dtype)
+        np.add.at(total, which, numbers)
+        nearest = np.where(labels < 0, 0.0, (total / count)[which][labels])
+        return nearest * carried(angles, labels, vertices, self.frames.angles) if turned else nearest
 
     def _vertices(self, sources: Sources) -> IntArray:
         return ordered_vertices(sources, self.operators.n)
