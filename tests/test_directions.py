@@ -181,3 +181,15 @@ def test_bad_arguments_are_one_clear_error(sphere):
     fan = Mesh(np.random.default_rng(0).random((5, 3)), [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     with pytest.raises(heat_igl.MeshError, match="is one of more than two faces"):
         HeatMethodSolver(fan, refine="exact").directions(0)
+
+
+def test_pairs_and_polygons_are_meshes_too(sphere):
+    pair = (sphere.V, sphere.F)
+    np.testing.assert_array_equal(tangent_frames(pair).x, tangent_frames(sphere).x)
+    assert abs(heat_igl.connection_laplacian(pair) - heat_igl.connection_laplacian(sphere)).max() == 0
+    ends = (exp_map(mesh, 3, [[0.5, 0.2]]).barycentric for mesh in (pair, sphere))
+    np.testing.assert_array_equal(*ends)
+    lengths = (heat_igl.trace_geodesic(mesh, 3, [1, 0], 0.7).lengths(sphere) for mesh in (pair, sphere))
+    np.testing.assert_array_equal(*lengths)
+    squares = heat_igl.PolygonMesh(np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]]), [[0, 1, 2, 3]])
+    np.testing.assert_allclose(np.hypot(*log_map(squares, 0).T), [0, 1, np.sqrt(2), 1])

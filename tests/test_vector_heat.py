@@ -306,3 +306,17 @@ def test_along_paths_the_nearest_source_alone_counts(sphere):
     length = np.hypot(*solver.transport(sources, [[1, 0], [3, 4], [0, 1]]).T)
     np.testing.assert_allclose(length, np.where(labels == 0, np.sqrt(0.5), 5.0))
     np.testing.assert_allclose(solver.log_map(7), heat_igl.log_map(sphere, 7, method="exact"), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", [name for name, mesh in SHAPES.items() if not mesh.boundary.any()])
+def test_transport_on_closed_surfaces_is_that_of_potpourri3d(name):
+    """With the same time step, weights and masses; at a boundary the connections differ."""
+    potpourri3d = pytest.importorskip("potpourri3d")
+    mesh = SHAPES[name]
+    theirs = potpourri3d.MeshVectorHeatSolver(mesh.V, mesh.F)
+    X, Y, _ = theirs.get_tangent_frames()
+    solver = VectorHeatSolver(mesh)
+    vector = solver.frames.to_world([[1.0, 0]], [3])[0]
+    found = theirs.transport_tangent_vector(3, [X[3] @ vector, Y[3] @ vector])
+    expected = solver.frames.from_world(found[:, :1] * X + found[:, 1:] * Y)
+    assert np.median(angle_between(solver.transport(3, [1, 0]), expected)) < 1e-6

@@ -7,7 +7,6 @@ import scipy.sparse as sp
 
 from heat_igl.linear import Backend, factorize
 from heat_igl.operators import Operators, with_rotations
-from heat_igl.steps.fitted import fitted_laplacian
 from heat_igl.steps.pattern import shifted
 from heat_igl.typing import AnyArray, FloatArray
 
@@ -33,9 +32,8 @@ class VectorHeatFlow:
         Time step, a squared length.
     backend : {"auto", "scipy", "multifrontal"}
         See `factorize`. The iterative backend solves for numbers of one sign only.
-    fitted : bool
-        As for `HeatFlow`. No weight is negative then, and Y is nowhere longer than heat that starts with the lengths
-        of b.
+    mass : (n,) float64, optional
+        In place of the diagonal of M.
 
     Raises
     ------
@@ -46,7 +44,12 @@ class VectorHeatFlow:
     """
 
     def __init__(
-        self, operators: Operators, rotations: sp.csc_matrix, t: float, backend: Backend = "auto", fitted: bool = False
+        self,
+        operators: Operators,
+        rotations: sp.csc_matrix,
+        t: float,
+        backend: Backend = "auto",
+        mass: FloatArray | None = None,
     ) -> None:
         if backend == "iterative":
             raise ValueError("backend='iterative' cannot solve for vectors: use 'auto', 'scipy' or 'multifrontal'")
@@ -55,9 +58,8 @@ class VectorHeatFlow:
             is_large = 2 * operators.n >= _SMALLEST_MULTIFRONTAL
             backend = "multifrontal" if is_large else "scipy"
         self.t, self.mean_mass, self._n = t, operators.mean_mass, operators.n
-        L = fitted_laplacian(operators, t) if fitted else operators.L
-        mass = operators.M.diagonal() / self.mean_mass
-        matrix = shifted(with_rotations(L, rotations), -t / self.mean_mass, mass)
+        lumped = operators.M.diagonal() if mass is None else mass
+        matrix = shifted(with_rotations(operators.L, rotations), -t / self.mean_mass, lumped / self.mean_mass)
         self.factor = factorize(_real(matrix), backend, np.repeat(operators.referenced, 2))
 
     def solve(self, b: AnyArray) -> AnyArray:
