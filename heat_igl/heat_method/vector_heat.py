@@ -28,8 +28,8 @@ _CANCELLED = 1e-10
 # The time step of vectors in that of heat, for t = h^2. At h^2 / 2, transport on spheres is wrong by 1.5 to 2 times as
 # much; vectors are farther from their shortest paths with longer steps.
 _VECTOR_STEP = 2.0
-# Tolerance of walks that are followed to their ends.
-_STRAIGHT = 0.0
+# Tolerance of the walks, for directions.
+_STRAIGHT = 1e-6
 
 
 class VectorHeatSolver:
