@@ -62,7 +62,7 @@ def errors(distance: FloatArray, truth: FloatArray) -> tuple[float, float, float
     """Mean and 99th percentile of the relative error, and the largest error in largest distances; in percent."""
     relative = 100 * _relative(distance, truth)
     there = np.isfinite(truth) & (truth > 0)
-    largest = 100 * np.abs(distance - truth)[there].max() / truth[there].max()
+    largest = 100 * np.abs(distance[there] - truth[there]).max() / truth[there].max()
     return float(relative.mean()), float(np.percentile(relative, 99)), float(largest)
 
 

@@ -115,7 +115,7 @@ def errors_of(
         reached = np.isfinite(truth) & (truth > 0)
         # A component of a single vertex has no error.
         if reached.any():
-            below = 100 * float((truth - distance)[reached].max() / truth[reached].max())
+            below = 100 * float((truth[reached] - distance[reached]).max() / truth[reached].max())
             found.append((*errors(distance, truth), below))
     columns = np.array(found)
     return {

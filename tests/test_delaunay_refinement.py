@@ -264,6 +264,32 @@ def test_even_meshes_stay_as_they_are() -> None:
         assert default.surface.uncovered is None
 
 
+def beside(one: Mesh, other: Mesh) -> Mesh:
+    aside = other.V + np.array([0, 40, 0])
+    return Mesh(np.concatenate([one.V, aside]), np.concatenate([one.F, other.F + one.n_vertices]))
+
+
+def test_an_uneven_part_is_refined_beside_an_even_one() -> None:
+    sphere, part = shapes.icosphere(4), Mesh(stretched().V / 10, stretched().F)
+    mesh = beside(sphere, part)
+    solver = HeatMethodSolver(mesh)
+    assert mesh.n_vertices < solver.operators.n
+    alone = HeatMethodSolver(part)
+    assert solver.operators.n - mesh.n_vertices < 1.1 * (alone.operators.n - alone.n_vertices)
+    truth = unfolded_distance(part, 7)
+    error = mean_error(solver.distance(sphere.n_vertices + 7)[sphere.n_vertices :], truth)
+    assert error < 1.5 * mean_error(alone.distance(7), truth)
+    # The sphere is as it was.
+    near = solver.distance(7)[: sphere.n_vertices] - HeatMethodSolver(sphere).distance(7)
+    assert np.abs(near).max() < 1e-9
+
+
+def test_stray_triangles_are_left_alone() -> None:
+    needle = Mesh([[0, 0, 0], [1, 0, 0], [0.5, 1e-3, 0]], [[0, 1, 2]])
+    mesh = beside(shapes.icosphere(3), needle)
+    assert operators(mesh, "auto").n == mesh.n_vertices
+
+
 def test_obtuse_triangles_at_the_boundary_take_the_cover() -> None:
     flat = shapes.grid(20)
     mesh = Mesh(flat.V @ [[1, 0, 0], [3, 1, 0], [0, 0, 1]], flat.F)

@@ -21,7 +21,7 @@ def walking(mesh: Mesh, refine: str) -> HeatMethodSolver:
     """A solver that does not take exact windows because the mesh is small."""
     solver = HeatMethodSolver(mesh, refine=refine)
     if refine == "unfold":
-        solver._parts.last_steps.is_exact = False
+        solver._parts.last_steps._takes_windows = lambda _: False
         solver._parts.last_steps._is_straight = lambda _: False
     return solver
 

@@ -29,7 +29,9 @@ def test_two_paths_around_a_hole_prove_no_flatness():
     mesh = shape("sponge")
     surface = Refinement(unfolding_surface(mesh).unfolding)
     assert surface.has_holes
-    assert not Refinement(unfolding_surface(shapes.grid(5)).unfolding).has_holes
+    for without in (shapes.grid(5), shapes.icosphere(2), shape("two spheres 1 to 10")):
+        assert not Refinement(unfolding_surface(without).unfolding).has_holes
+    assert Refinement(unfolding_surface(TORUS).unfolding).has_holes
     for source in range(0, mesh.n_vertices, 9):
         truth = exact_distance(mesh.V, mesh.F, source)
         d = surface.unfold(connectivity.edge_distance(mesh.edge_graph, np.array([source])), np.array([source]))
@@ -120,3 +122,17 @@ def test_what_leaves_the_bounds_is_brought_back():
     d = straight / 2
     Bounds(surface).lengthen(d, sources, sources.points)
     np.testing.assert_allclose(d, straight, rtol=1e-9)
+
+
+@pytest.mark.parametrize("refine", ["unfold", "sweep"])
+def test_small_components_are_exact_beside_large_ones(refine):
+    rough, ball = shape("height field coarse"), shapes.icosphere(4)
+    V, F = np.concatenate([rough.V + 9, ball.V]), np.concatenate([rough.F, ball.F + rough.n_vertices])
+    solver = HeatMethodSolver(Mesh(V, F), refine=refine)
+    for source in (0, 20, 40):
+        found = solver.distance(source)
+        np.testing.assert_allclose(found[: rough.n_vertices], exact_distance(rough.V, rough.F, source), atol=1e-10)
+        assert np.isinf(found[rough.n_vertices :]).all()
+    np.testing.assert_allclose(
+        solver.distance(rough.n_vertices + 5)[rough.n_vertices :], HeatMethodSolver(ball, refine=refine).distance(5)
+    )

@@ -47,7 +47,7 @@ def relative_error(distance: FloatArray, truth: FloatArray) -> float:
 
 def test_a_third_is_held_out() -> None:
     assert len(SHAPES) >= 60
-    assert 0.3 < np.mean([shape.held_out for shape in SHAPES]) < 0.4
+    assert 0.33 < np.mean([shape.held_out for shape in SHAPES]) < 0.5
     assert len(BY_NAME) == len(SHAPES)
 
 

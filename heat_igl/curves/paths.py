@@ -1,4 +1,4 @@
-"""Shortest paths: traced down a distance, then straightened until they are locally shortest."""
+"""Shortest paths: exact ones, or traced down a distance and straightened until they are locally shortest."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
 from heat_igl.intrinsic import corner_angles
 from heat_igl.mesh import ON_SIDE, Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
-from heat_igl.sources import Sources, named_vertices, source_set
+from heat_igl.sources import Sources, SourceSet, named_vertices, source_set
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.unfolding import exact_paths
 
 __all__ = ["shortest_paths"]
 
@@ -22,6 +23,9 @@ _SHORTEST = 1e-12
 # A path passes a source vertex whose distance is below the offset of the source by more than this share, the rounding
 # of refined distances: the vertex is nearer to another source.
 _SAME_DISTANCE = 1e-9
+# A path that is longer than the distance by this share is replaced by an exact one: more than distances by heat are off
+# in the mean.
+_EXCESS = 0.01
 
 
 def shortest_paths(
@@ -37,9 +41,9 @@ def shortest_paths(
     mesh : mesh
         Triangles.
     distance : (n,) array_like, HeatMethodSolver or None
-        Distance from the sources, or a solver to compute it; None for `geodesic_distance`. It decides which way around
-        the surface a path takes: the more accurate the distance (``refine="exact"``), the more often this is the
-        shortest way. A second path is traced if the first is longer than the distance by a thousandth.
+        None, or a solver with exact distances (``refine="exact"``), for exact shortest paths. Otherwise a distance from
+        the sources, or a solver to compute it. It decides which way around the surface a path takes: the more accurate
+        the distance, the more often this is the shortest way.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints
         Start of each path: vertices, in the order given and with repetitions, or points on faces.
     sources : optional
@@ -65,47 +69,106 @@ def shortest_paths(
 
     Notes
     -----
-    The steepest descent of the distance, linear in each face, gives a strip of faces. A funnel finds the shortest path
-    in the strip. Where this path bends at a vertex with an angle below pi on the other side, the strip is moved to the
-    other side, until no such vertex is left (Xin and Wang 2007). At an edge of three faces or more, a strip may go from
-    any of them into any other, and around a vertex of this edge there are several ways; the shortest is taken. If the
-    descent ends at a vertex that is no source, it goes on along the edges that rise least. A path is not moved past two
-    vertices in one place.
+    Exact paths are followed back through the windows of the exact distance, see `exact_paths`. The others are
+    straightened. The steepest descent of the distance, linear in each face, gives a strip of faces. A funnel finds the
+    shortest path in the strip. Where this path bends at a vertex with an angle below pi on the other side, the strip is
+    moved to the other side, until no such vertex is left (Xin and Wang 2007). At an edge of three faces or more, a
+    strip may go from any of them into any other, and around a vertex of this edge there are several ways; the shortest
+    is taken. If the descent ends at a vertex that is no source, it goes on along the edges that rise least. A path is
+    not moved past two vertices in one place.
 
     Across large faces distance is far from linear, and the descent may pass a vertex on the wrong side. So if a path is
     longer than the distance, a second path is traced: straight from edge to edge, either towards a vertex or towards
     the source as the distances at the ends of an edge place it in the plane of the face, whichever agrees best with the
-    distance left. The shorter of the two paths is returned.
+    distance left. The shorter of the two paths is taken. If it is still longer than the distance by one percent, as on
+    rough surfaces, an exact path takes its place.
     """
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")
-    values = _values(mesh, distance, sources)
     face, barycentric = _points("targets", mesh, targets)
+    solver = distance if isinstance(distance, HeatMethodSolver) else None
+    if distance is None or (solver is not None and solver.is_exact):
+        named = _required(solver, sources)
+        paths = _exact(mesh, _source_set(mesh, named), face, barycentric, np.arange(len(face)))
+        lost = np.setdiff1d(np.arange(len(face)), list(paths))
+        if len(lost):
+            paths |= _straightened(mesh, geodesic_distance(mesh, named), named, face, barycentric, lost)
+    else:
+        values = _values(mesh, distance, sources)
+        paths = _straightened(mesh, values, sources, face, barycentric, np.arange(len(face)))
+        chosen = _source_set(mesh, values == 0 if sources is None else sources)
+        longer = _too_long(mesh, values - chosen.offsets.min(), paths, face, barycentric)
+        if len(longer):
+            paths |= _exact(mesh, chosen, face, barycentric, longer)
+    return [paths[i] for i in range(len(face))]
+
+
+def _straightened(
+    mesh: Mesh, values: FloatArray, sources: Sources | None, face: IntArray, barycentric: FloatArray, which: IntArray
+) -> dict[int, SurfaceCurve]:
+    """Paths traced down a distance (n,) from `which` of the places, and straightened."""
     goals = tracing.goals(*_goals(mesh, values, sources))
     lost = (goals.escape < 0) & ~_roots(mesh, goals.is_source, goals.first_inside)
-    lost = lost[mesh.F[face, 0]]
+    _refuse_lost(lost[mesh.F[face[which], 0]])
+    most_steps = 4 * mesh.n_faces + 100
+    found = tracing.trace(_surface(mesh), values, goals, face[which], barycentric[which], most_steps)
+    return _curves(which, *found)
+
+
+def _exact(
+    mesh: Mesh, sources: SourceSet, face: IntArray, barycentric: FloatArray, which: IntArray
+) -> dict[int, SurfaceCurve]:
+    """Exact paths from `which` of the places, without those that are lost."""
+    found = exact_paths(mesh, sources, face[which], barycentric[which])
+    _refuse_lost(np.isinf(found.distance))
+    return _curves(which, found.faces, found.points, found.first)
+
+
+def _curves(which: IntArray, faces: IntArray, points: FloatArray, first: IntArray) -> dict[int, SurfaceCurve]:
+    """Paths by the numbers `which`; segments of the i-th path are ``first[i]`` to ``first[i + 1]``."""
+    parts = np.split(np.arange(len(faces)), first[1:-1])
+    curves = {}
+    for number, part in zip(which, parts, strict=True):
+        if len(part):
+            curves[int(number)] = SurfaceCurve(faces[part], points[part, 0], points[part, 1])
+    return curves
+
+
+def _refuse_lost(lost: BoolArray) -> None:
     if lost.any():
         first = int(np.argmax(lost))
         raise SourceError(
             f"from targets[{first}] no source can be reached ({int(lost.sum())} of {len(lost)} lie on other "
             "components): leave out targets at infinite distance"
         )
-    most_steps = 4 * mesh.n_faces + 100
-    faces, points, first_segment = tracing.trace(_surface(mesh), values, goals, face, barycentric, most_steps)
-    parts = np.split(np.arange(len(faces)), first_segment[1:-1])
-    return [SurfaceCurve(faces[part], points[part, 0], points[part, 1]) for part in parts]
 
 
-def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver | None, sources: Sources | None) -> FloatArray:
+def _too_long(
+    mesh: Mesh, values: FloatArray, paths: dict[int, SurfaceCurve], face: IntArray, barycentric: FloatArray
+) -> IntArray:
+    """Which paths are longer than the distance (n,) at their target, linear in its face, by more than `_EXCESS`."""
+    length = np.array([paths[i].lengths(mesh).sum() for i in range(len(face))])
+    with np.errstate(invalid="ignore"):  # 0 times infinity, beyond a cutoff
+        at_target = (values[mesh.F[face]] * barycentric).sum(axis=1)
+    return np.flatnonzero(length > (1 + _EXCESS) * at_target)
+
+
+def _required(solver: HeatMethodSolver | None, sources: Sources | None) -> Sources:
+    if sources is not None:
+        return sources
+    if solver is None:
+        raise SourceError("sources are missing: name them, or pass a distance that is 0 at them")
+    raise SourceError("a solver needs sources: name them, or pass a distance in its place")
+
+
+def _source_set(mesh: Mesh, sources: Sources) -> SourceSet:
+    return source_set(sources, mesh.n_vertices, mesh.F)
+
+
+def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver, sources: Sources | None) -> FloatArray:
     if isinstance(distance, HeatMethodSolver):
-        if sources is None:
-            raise SourceError("a solver needs sources: name them, or pass a distance in its place")
-        distance = distance.distance(sources)
-    elif distance is None:
-        if sources is None:
-            raise SourceError("sources are missing: name them, or pass a distance that is 0 at them")
-        distance = geodesic_distance(mesh, sources)
+        distance = distance.distance(_required(distance, sources))
     array: AnyArray = np.asarray(distance)
     if array.dtype.kind not in "iuf" or array.shape != (mesh.n_vertices,):
         raise ValueError(
@@ -153,7 +216,7 @@ def _goals(
         if values.min() > 0:
             raise SourceError("distance is 0 at no vertex: name the sources, where paths may end")
         sources = values == 0
-    found = source_set(sources, mesh.n_vertices, mesh.F)
+    found = _source_set(mesh, sources)
     points, segments = found.points, found.segments
     face = np.concatenate([points.faces, segments.faces])
     start, end = (_snapped(np.concatenate([points.barycentric, there])) for there in (segments.start, segments.end))
@@ -209,6 +272,7 @@ def _ways_out(mesh: Mesh, values: FloatArray, roots: BoolArray) -> IntArray:
     rank[np.lexsort((mesh.edge_lengths, values[edges].max(axis=1)))] = np.arange(2, len(edges) + 2)
     start = np.flatnonzero(roots)
     rows, columns = np.concatenate([edges[:, 0], np.full(len(start), n)]), np.concatenate([edges[:, 1], start])
+    rows, columns = rows.astype(np.int32), columns.astype(np.int32)  # scipy 1.15 builds no tree from others
     graph = sp.coo_array((np.concatenate([rank, np.ones(len(start))]), (rows, columns)), shape=(n + 1, n + 1))
     tree = csgraph.minimum_spanning_tree(graph.tocsr())
     previous = csgraph.breadth_first_order(tree, n, directed=False)[1][:n]

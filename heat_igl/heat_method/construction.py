@@ -14,7 +14,7 @@ from heat_igl.mesh import Mesh, MeshLike, PointCloud, PolygonMesh, as_mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators
 from heat_igl.steps import Boundary
 from heat_igl.typing import ArrayLike, FloatArray
-from heat_igl.unfolding import Refine
+from heat_igl.unfolding import Refine, UnfoldingSolver
 
 __all__ = ["PreparedSolver"]
 
@@ -138,6 +138,12 @@ class PreparedSolver(BatchedSolver):
         refined = "" if options.refine is None else f", refine={options.refine!r}"
         backend = self.diagnostics.backend
         return f"{type(self).__name__}({self.n_vertices} vertices, t={self.t:.4g}{refined}, backend={backend!r})"
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether distances are exact: with ``refine="exact"``, and on small or rough meshes with another `refine`."""
+        last_steps = self._parts.last_steps
+        return isinstance(last_steps, UnfoldingSolver) and last_steps.is_exact
 
     @property
     def operators(self) -> Operators:

@@ -39,9 +39,8 @@ def geodesic_distance(
     method : {"unfold", "sweep", "heat", "exact"}
         "unfold" follows straight lines through strips of triangles: near-exact, see `unfolded_distance`. "sweep"
         unfolds two triangles at a time. Both go through the vertices in the order of Dijkstra's algorithm; polygons are
-        cut into triangles. "heat" is `HeatMethodSolver` with default options, the only one for tetrahedra; on polygons
-        it takes `polygon_operators`. "exact" is the polyhedral distance by windows, and ends the search at the cutoff;
-        curves stand for dense points, see `UnfoldingSolver`.
+        cut into triangles. "heat" is `HeatMethodSolver` with its defaults, the only one for tetrahedra; on polygons it
+        takes `polygon_operators`. "exact" is the polyhedral distance by windows, and ends the search at the cutoff.
     cutoff : float, optional
         Distances beyond this are ``inf``.
 
@@ -56,7 +55,7 @@ def geodesic_distance(
     MeshError
         If the mesh cannot be used or is not understood, or `method` needs triangles and it holds tetrahedra.
     SourceError
-        If `sources` does not describe places on the mesh, or holds a curve and `method` is "exact".
+        If `sources` does not describe places on the mesh.
     ValueError
         If there is no such `method`, or `cutoff` is not positive.
 

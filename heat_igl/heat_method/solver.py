@@ -62,9 +62,9 @@ class HeatMethodSolver(PreparedSolver):
     refine : {"sweep", "unfold", "exact"}, optional
         Integrate nothing, and find the distance in the order of the heat by unfolding triangles, two at a time or in
         strips: 0.06 to 0.3 % and 0.0005 to 0.003 % mean error on common meshes, see `Refinement`. Both are exact on
-        meshes of up to 1000 vertices and on rough ones. "exact" is the polyhedral distance by windows: five to eight
-        times the time of "unfold", and from curves as from dense points, see `UnfoldingSolver`. Needs triangles; no
-        Poisson problem is factored, and with "exact" nothing at all until `solve` asks for heat.
+        meshes of up to 1000 vertices and on rough ones. "exact" is the polyhedral distance by windows, in two to three
+        times the time of "unfold". Needs triangles; no Poisson problem is factored, and with "exact" nothing at all
+        until `solve` asks for heat.
     backend : {"auto", "scipy", "multifrontal", "iterative"}
         Linear solver, see `factorize`.
 
@@ -170,8 +170,7 @@ class HeatMethodSolver(PreparedSolver):
 
     def _order(self, terms: list[SourceTerm]) -> FloatArray:
         """Heat at all vertices of the operators, or zeros where the last steps do not read it."""
-        last_steps = self._parts.last_steps
-        if isinstance(last_steps, UnfoldingSolver) and last_steps.is_exact:
+        if self.is_exact:
             return np.zeros((self.operators.n, len(terms)))
         return self._heat(terms)
 

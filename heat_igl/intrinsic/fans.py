@@ -103,6 +103,7 @@ def tables(F: AnyArray, l: FloatArray, twin: AnyArray, n: int) -> Tables:  # noq
 
 def aligned(n: int, record: np.dtype[np.void]) -> AnyArray:
     """Structures of zeros whose first address is a multiple of a cache line, 64 bytes."""
-    room = np.zeros(n * record.itemsize + 64, np.uint8)
+    size = int(n) * record.itemsize  # beyond 32 bits from 11 million vertices on, unlike n
+    room = np.zeros(size + 64, np.uint8)
     start = -room.ctypes.data % 64
-    return room[start : start + n * record.itemsize].view(record)
+    return room[start : start + size].view(record)

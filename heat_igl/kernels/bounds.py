@@ -1,7 +1,8 @@
 """Bounds of a distance that take no search: paths along edges from above, straight lines from below."""
 
 import cython
-from cython.cimports.libc.math import sqrt
+import numpy as np
+from cython.cimports.libc.math import fabs, sqrt
 
 __all__ = ["lengthen", "shorten"]
 
@@ -9,37 +10,72 @@ __all__ = ["lengthen", "shorten"]
 def shorten(
     ends: cython.const[cython.int][:, ::1],
     length: cython.const[cython.double][::1],
+    first: cython.const[cython.longlong][::1],
+    incident: cython.const[cython.int][::1],
     d: cython.double[::1],
     labels: cython.longlong[::1],
 ):
     """Lower `d` (n,) to the paths along edges, in place; `labels` (n,), or none at all, are handed on with it.
 
-    The pairs (e, 2) of `ends` are edges of those lengths (e,).
+    The pairs (e, 2) of `ends` are edges of those lengths (e,); ``incident[first[v] : first[v + 1]]`` are the edges of
+    vertex v. One pass over all edges, and then only over those of vertices that were lowered.
     """
+    n: cython.Py_ssize_t = d.shape[0]
+    # A ring: no vertex waits twice, so n places suffice.
+    waiting: cython.int[::1] = np.empty(n, np.int32)
+    is_waiting: cython.uchar[::1] = np.zeros(n, np.uint8)
+    begin: cython.Py_ssize_t = 0
+    count: cython.Py_ssize_t = 0
+    end: cython.Py_ssize_t
     e: cython.Py_ssize_t
-    i: cython.Py_ssize_t
-    n_edges: cython.Py_ssize_t = length.shape[0]
-    backward: cython.bint = True
-    far: cython.int
-    near: cython.int
-    is_lower: cython.bint = True
-    has_labels: cython.bint = labels.shape[0] > 0
+    k: cython.Py_ssize_t
+    lowered: cython.int
     with cython.nogil:
-        while is_lower:
-            is_lower = False
-            # Back and forth, which takes fewer passes along a row of edges.
-            backward = not backward
-            for i in range(n_edges):
-                e = n_edges - 1 - i if backward else i
-                near, far = ends[e, 0], ends[e, 1]
-                if d[far] < d[near]:
-                    near, far = far, near
-                # Not by rounding, which would take passes of its own.
-                if d[near] + length[e] < d[far] * (1 - 1e-12):
-                    d[far] = d[near] + length[e]
-                    if has_labels:
-                        labels[far] = labels[near]
-                    is_lower = True
+        for e in range(length.shape[0]):
+            # Nearly always false, and so cheaper than to ask which end is nearer.
+            if fabs(d[ends[e, 0]] - d[ends[e, 1]]) > length[e]:
+                lowered = _lowered(ends, length, d, labels, e)
+                if lowered >= 0 and not is_waiting[lowered]:
+                    is_waiting[lowered] = True
+                    waiting[count] = lowered
+                    count += 1
+        while count > 0:
+            v: cython.int = waiting[begin]
+            is_waiting[v] = False
+            begin = begin + 1 if begin + 1 < n else 0
+            count -= 1
+            for k in range(first[v], first[v + 1]):
+                lowered = _lowered(ends, length, d, labels, incident[k])
+                if lowered >= 0 and not is_waiting[lowered]:
+                    is_waiting[lowered] = True
+                    end = begin + count
+                    waiting[end if end < n else end - n] = lowered
+                    count += 1
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _lowered(
+    ends: cython.const[cython.int][:, ::1],
+    length: cython.const[cython.double][::1],
+    d: cython.double[::1],
+    labels: cython.longlong[::1],
+    e: cython.Py_ssize_t,
+) -> cython.int:
+    """The end of edge e whose distance was lowered to the path along it; -1 if that is not shorter."""
+    near: cython.int = ends[e, 0]
+    far: cython.int = ends[e, 1]
+    if d[far] < d[near]:
+        near, far = far, near
+    # Not by rounding, which would pass along many edges.
+    if d[near] + length[e] < d[far] * (1 - 1e-12):
+        d[far] = d[near] + length[e]
+        if labels.shape[0] > 0:
+            labels[far] = labels[near]
+        return far
+    return -1
 
 
 def lengthen(V: cython.const[cython.double][:, ::1], place: cython.const[cython.double][::1], d: cython.double[::1]):
@@ -50,6 +86,9 @@ def lengthen(V: cython.const[cython.double][:, ::1], place: cython.const[cython.
             x: cython.double = V[i, 0] - place[0]
             y: cython.double = V[i, 1] - place[1]
             z: cython.double = V[i, 2] - place[2]
-            straight: cython.double = sqrt(x * x + y * y + z * z) * (1 - 1e-12)
-            if d[i] < straight:
-                d[i] = straight
+            squared: cython.double = x * x + y * y + z * z
+            # Few are shorter, and only those need a root.
+            if squared > d[i] * d[i]:
+                straight: cython.double = sqrt(squared) * (1 - 1e-12)
+                if d[i] < straight:
+                    d[i] = straight

@@ -12,9 +12,9 @@ from heat_igl.intrinsic import (
     intrinsic_delaunay,
 )
 from heat_igl.operators.matrices import Laplacian, Operators
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["fit_for_heat", "has_negative_boundary", "is_rough_or_narrow", "is_uneven", "refined"]
+__all__ = ["fit_for_heat", "has_negative_boundary", "is_rough_or_narrow", "refined", "uneven_components"]
 
 # A boundary edge opposite an obtuse angle keeps a negative weight, the cotangent of the angle. A few small ones do no
 # harm: on scans their sum is at most 0.0012 of the number of vertices and none is below -1; on the shapes of the zoo
@@ -29,6 +29,9 @@ _THIN_SHARE = 0.3
 # have 0.62. Shares of the area are at most 0.43 on scans and models, and at least 0.67 on such shapes of the zoo.
 _LARGE_RADIUS = 1.5
 _LARGE_SHARE = 0.55
+# Share of triangles in components with many of these kinds, from which on the components are refined: a scan with a few
+# stray triangles stays as it is.
+_UNEVEN_SHARE = 0.01
 # With so few vertices a triangle is large beside the distances that are asked for, and a thousand cost nothing.
 _FEW_VERTICES = 64
 _ENOUGH_VERTICES = 1000
@@ -66,8 +69,13 @@ def fit_for_heat(
     IntrinsicTriangulation
         `triangulation` itself, its tufted cover, or a refinement of one of them.
     """
-    if laplacian == "intrinsic-delaunay-refined" or (laplacian == "auto" and is_uneven(triangulation, component)):
-        return refined(triangulation, component)
+    n_components = int(component.max(initial=-1)) + 1
+    if laplacian == "intrinsic-delaunay-refined":
+        return refined(triangulation, component, np.ones(n_components, bool))
+    if laplacian == "auto":
+        is_uneven = uneven_components(triangulation, component)
+        if is_uneven[component[triangulation.F[:, 0]]].mean() > _UNEVEN_SHARE:
+            return refined(triangulation, component, is_uneven)
     if laplacian == "auto" and has_negative_boundary(triangulation):
         return intrinsic_delaunay(closed_cover(triangulation))
     return triangulation
@@ -83,26 +91,29 @@ def has_negative_boundary(triangulation: IntrinsicTriangulation) -> bool:
     return bool(weight.min() < _STEEPEST_WEIGHT or -weight.sum() > _NEGATIVE_SHARE * triangulation.n)
 
 
-def is_uneven(triangulation: IntrinsicTriangulation, component: IntArray) -> bool:
-    """Whether thin triangles, or ones that are large for their component, cover much of the surface.
+def uneven_components(triangulation: IntrinsicTriangulation, component: IntArray) -> BoolArray:
+    """Components (k,) of which thin triangles, or ones that are large for the component, cover much.
 
-    So they do where there are few triangles at all.
+    All, where there are few triangles at all.
     """
+    n_components = int(component.max(initial=-1)) + 1
     if triangulation.n < _FEW_VERTICES:
-        return True
+        return np.ones(n_components, bool)
     area, lengths = triangulation.areas, triangulation.l
     a, b, c = lengths.T
     # Twice the circumradius; the shortest side is this times the sine of the smallest angle.
     with np.errstate(divide="ignore", invalid="ignore"):
         diameter = a * b * c / (2 * area)
         is_thin = ~(np.minimum(np.minimum(a, b), c) >= _THIN_SINE * diameter)
-    if area[is_thin].sum() > _THIN_SHARE * area.sum():
-        return True
     is_large = diameter > 2 * _LARGE_RADIUS * _area_per_vertex(triangulation, component) ** 0.5
-    return bool(area[is_large].sum() > _LARGE_SHARE * area.sum())
+    of_face = component[triangulation.F[:, 0]]
+    total, thin, large = (
+        np.bincount(of_face, counted, n_components) for counted in (area, area * is_thin, area * is_large)
+    )
+    return np.asarray((thin > _THIN_SHARE * total) | (large > _LARGE_SHARE * total))
 
 
-def refined(triangulation: IntrinsicTriangulation, component: IntArray) -> IntrinsicTriangulation:
+def refined(triangulation: IntrinsicTriangulation, component: IntArray, is_chosen: BoolArray) -> IntrinsicTriangulation:
     """Triangles fit for heat, by `delaunay_refinement`; of the tufted cover where the surface is not closed.
 
     Parameters
@@ -111,11 +122,16 @@ def refined(triangulation: IntrinsicTriangulation, component: IntArray) -> Intri
         Intrinsic Delaunay, no three faces at an edge.
     component : (n,) int64
         Component of each vertex.
+    is_chosen : (k,) bool
+        Components that are refined.
     """
     if (triangulation.twin < 0).any() or not triangulation.aligned.all():
         triangulation = intrinsic_delaunay(closed_cover(triangulation))
     sheets = 2 if triangulation.is_cover else 1
-    unit = _area_per_vertex(triangulation, component) ** 0.5
+    # In an infinite unit no triangle is large.
+    unit = np.where(
+        is_chosen[component[triangulation.F[:, 0]]], _area_per_vertex(triangulation, component) ** 0.5, np.inf
+    )
     scale = min(1.0, (triangulation.n / _ENOUGH_VERTICES) ** 0.5)
     return delaunay_refinement(
         triangulation,

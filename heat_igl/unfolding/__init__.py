@@ -3,11 +3,13 @@
 from heat_igl.unfolding.directions import PathAngles, in_circle
 from heat_igl.unfolding.distance import directed_from_scratch, distance_from_scratch, unfolded_distance
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
+from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
 from heat_igl.unfolding.local import distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = [
+    "ExactPaths",
     "ExactSolution",
     "ExactSurface",
     "Known",
@@ -20,6 +22,7 @@ __all__ = [
     "distance_from_scratch",
     "distances_within",
     "exact_distance",
+    "exact_paths",
     "in_circle",
     "nearest_vertices",
     "pair_distances",

@@ -8,6 +8,7 @@ import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels import bounds as kernels
+from heat_igl.mesh import grouping
 from heat_igl.operators import Surface
 from heat_igl.sources import SourcePoints, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -46,9 +47,16 @@ class Bounds:
             length = np.concatenate([length, their_length[is_flipped]])
         return ends, length
 
+    @cached_property
+    def _incident(self) -> tuple[IntArray, AnyArray]:
+        """Edges by vertex: those of v are ``edges[first[v] : first[v + 1]]``."""
+        ends = self._edges[0]
+        first, members = grouping.group_by_label(ends.T.ravel(), self._surface.unfolding.n)
+        return first, (members % len(ends)).astype(np.int32)
+
     def shorten(self, distance: FloatArray, labels: IntArray | None = None) -> None:
         """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them."""
-        kernels.shorten(*self._edges, distance, _NO_LABELS if labels is None else labels)
+        kernels.shorten(*self._edges, *self._incident, distance, _NO_LABELS if labels is None else labels)
 
     def lengthen(self, distance: FloatArray, sources: SourceSet, points: SourcePoints) -> None:
         """Raise distances (n,) to the straight lines from the nearest source, in place.

@@ -110,8 +110,8 @@ def _prepared(
 ) -> tuple[UnfoldingSolver, _Lines, FloatArray]:
     """A solver for one set of sources, that set as the solver takes it, and an order of the vertices."""
     domain = _Domain(mesh, unfolding_surface(mesh))
-    lines = _Lines(chosen, *_straight_lines(domain, chosen))
     solver = UnfoldingSolver(domain, refine, tolerance, cutoff)
+    lines = _Lines(chosen, *((_NONE, _NONE) if solver.is_exact else _straight_lines(domain, chosen)))
     return solver, lines, np.zeros(mesh.n_vertices) if solver.is_exact else -_along_edges(domain, chosen)
 
 

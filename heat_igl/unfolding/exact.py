@@ -9,17 +9,14 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation
-from heat_igl.kernels import windows
 from heat_igl.mesh import Mesh, SurfacePoints
-from heat_igl.sources import Sources, vertex_sources
+from heat_igl.sources import Sources, SourceSegments, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
-from heat_igl.unfolding.half_edges import HalfEdges, Located, from_mesh, from_triangulation
+from heat_igl.unfolding.half_edges import HalfEdges, from_mesh, from_triangulation
+from heat_igl.unfolding.window_search import Found, Searched, search
 
-__all__ = ["TOLERANCE", "ExactSolution", "ExactSurface", "Origin", "exact_distance"]
+__all__ = ["ExactSolution", "ExactSurface", "Origin", "exact_distance"]
 
-#: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds
-#: up to. A larger number keeps a few windows more and changes no result.
-TOLERANCE = 1e-11
 _NO_VERTICES = np.empty(0, np.int64)
 
 
@@ -29,9 +26,10 @@ class Origin(NamedTuple):
     Attributes
     ----------
     label : (k,) int64
-        The source that the distance is measured from, counted vertices first, then points; -1 for none.
+        The source that the distance is measured from, counted vertices first, then points, then segments; -1 for none.
     root : (k,) int64
-        The last vertex at which the path bends, or its source: n + p for source point p; -1 for none.
+        The last vertex at which the path bends, or its source: n + i for source point i, and after all points likewise
+        for segments; -1 for none.
     entered : (k,) int64
         The half-edge of the triangulation over which the straight last part of the path enters its last face; -1 where
         the path starts in the place or runs inside one face.
@@ -104,6 +102,7 @@ class ExactSurface:
         offsets: FloatArray | None = None,
         points: SurfacePoints | None = None,
         point_offsets: FloatArray | None = None,
+        segments: SourceSegments | None = None,
         *,
         cutoff: float = np.inf,
         targets: SurfacePoints | None = None,
@@ -121,6 +120,9 @@ class ExactSurface:
             p sources in the faces that the triangulation was made from.
         point_offsets : (p,) float64, optional
             The distance at which each of them starts; 0 if not given.
+        segments : SourceSegments, optional
+            Segments with their offsets, every point of which is a source; their labels are not read. They need a
+            triangulation that was not flipped.
         cutoff : float
             What is farther is ``inf``, and the search ends there.
         targets : SurfacePoints, optional
@@ -138,89 +140,36 @@ class ExactSurface:
         ------
         MemoryError
             If the windows do not fit into memory.
+        ValueError
+            If there are segments or points, and the surface does not know the faces that they refer to.
         """
-        edges = self._half_edges
-        starts = self._starts(sources, offsets, points, point_offsets)
-        place = edges.located(targets)
-        n, p, t = self.n, len(starts.points.faces), len(place.faces)
-        found, at_targets = _Found.of(n, n + p), _Found.of(t, 0)
-        statistics = np.zeros(3, np.int64)
-        front = windows.Front(
-            *edges.tables,
-            found.distance,
-            np.full(n, np.inf),
-            found.root,
-            found.label,
-            found.entered,
-            found.crossing,
-            np.empty(n, np.int32),
-            np.full(len(edges.tables.vertex), -1, np.int32),
-            TOLERANCE,
+        done = search(
+            self._half_edges,
+            sources,
+            offsets,
+            points,
+            point_offsets,
+            segments,
+            cutoff=cutoff,
+            targets=targets,
+            goals=goals,
         )
-        done = windows.search(
-            front,
-            starts.vertices,
-            starts.offset,
-            starts.points.faces,
-            np.ascontiguousarray(starts.points.barycentric).ravel(),
-            starts.point_offset,
-            edges.number[_NO_VERTICES if goals is None else goals],
-            *edges.by_face(place),
-            place.faces,
-            np.ascontiguousarray(place.barycentric).ravel(),
-            at_targets.distance,
-            at_targets.root,
-            at_targets.entered,
-            at_targets.crossing,
-            edges.largest_circle(place),
-            goals is not None,
-            float(edges.scaled(cutoff)),
-            statistics,
-        )
-        if not done:
-            raise MemoryError("the windows of the exact distance do not fit into memory")
-        which = _nearest(place, at_targets.distance, 0 if targets is None else len(targets))
+        which = done.nearest_copy(0 if targets is None else len(targets))
         return ExactSolution(
-            *self._result(found, found.label, starts, edges.number, cutoff),
-            *self._result(at_targets, found.label, starts, which, cutoff),
-            *(int(count) for count in statistics[1:]),
+            *self._result(done.found, done, self._half_edges.number, cutoff),
+            *self._result(done.at_targets, done, which, cutoff),
+            done.n_windows,
+            done.n_crossings,
         )
 
-    def _starts(
-        self,
-        sources: IntArray,
-        offsets: FloatArray | None,
-        points: SurfacePoints | None,
-        point_offsets: FloatArray | None,
-    ) -> _Starts:
-        """Source vertices and source points for the kernel; points at corners become vertices."""
-        edges, k = self._half_edges, len(sources)
-        place = edges.located(points)
-        begin = np.zeros(k) if offsets is None else edges.scaled(np.asarray(offsets, np.float64))
-        late = np.zeros(len(place.point))
-        if point_offsets is not None:
-            late = edges.scaled(np.asarray(point_offsets, np.float64))[place.point]
-        is_corner = (place.barycentric == 0).sum(axis=1) == 2
-        inside = Located(*(column[~is_corner] for column in place))
-        corner = 3 * place.faces[is_corner] + place.barycentric[is_corner].argmax(axis=1)
-        return _Starts(
-            np.concatenate([edges.number[sources], edges.tables.vertex[corner]]),
-            np.concatenate([begin, late[is_corner]]),
-            inside,
-            late[~is_corner],
-            np.concatenate([np.arange(k), k + place.point[is_corner], k + inside.point, [-1]]),
-        )
-
-    def _result(
-        self, found: _Found, label: AnyArray, starts: _Starts, which: AnyArray, cutoff: float
-    ) -> tuple[FloatArray, Origin]:
+    def _result(self, found: Found, done: Searched, which: AnyArray, cutoff: float) -> tuple[FloatArray, Origin]:
         """Distance and origin of some of the places that the kernel found, in the caller's numbers and unit."""
-        edges = self._half_edges
+        edges, starts, label = self._half_edges, done.starts, done.found.label
         distance = edges.unscaled(found.distance[which])
         within: BoolArray = (distance <= cutoff) & (found.root[which] >= 0)
         root = np.where(within, found.root[which], -1)
-        # Copies of a source point on a side are one point.
-        names = np.concatenate([edges.old_vertex, self.n + starts.points.point, [-1]])
+        # Copies of a point or segment on a side are one, and the ends of a segment belong to it.
+        names = np.concatenate([edges.old_vertex, np.where(starts.place < 0, -1, self.n + starts.place)])
         # Roots are labelled as vertices are.
         first = found.label[which] if len(found.label) else label[root]
         origin = Origin(
@@ -230,40 +179,6 @@ class ExactSurface:
             edges.unscaled(found.crossing[which]),
         )
         return np.where(within, distance, np.inf), origin
-
-
-class _Starts(NamedTuple):
-    """Sources by the numbers of the tables; `label` names vertices, then points, then nothing."""
-
-    vertices: AnyArray
-    offset: FloatArray
-    points: Located
-    point_offset: FloatArray
-    label: IntArray
-
-
-class _Found(NamedTuple):
-    """What the kernel fills for each of some places."""
-
-    distance: FloatArray
-    root: AnyArray
-    label: AnyArray
-    entered: AnyArray
-    crossing: FloatArray
-
-    @classmethod
-    def of(cls, k: int, n_labels: int) -> _Found:
-        """Nothing found yet, at k places."""
-        nothing = np.full((2, k), -1, np.int32)
-        return cls(np.full(k, np.inf), nothing[0], np.full(n_labels, -1, np.int32), nothing[1], np.zeros(k))
-
-
-def _nearest(place: Located, distance: FloatArray, n_points: int) -> IntArray:
-    """Of the copies of each point, the one with the smallest distance."""
-    order = np.lexsort((-distance, place.point))
-    which = np.empty(n_points, np.int64)
-    which[place.point[order]] = order
-    return which
 
 
 def exact_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, cutoff: float = np.inf) -> FloatArray:

@@ -8,8 +8,9 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, mollify
-from heat_igl.kernels import gluing, windows
+from heat_igl.kernels import gluing, window_surface
 from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
+from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 __all__ = ["HalfEdges", "Located", "Tables", "from_mesh", "from_triangulation"]
@@ -21,7 +22,7 @@ _MOST_FLIPS_PER_FACE = 100
 
 
 class Tables(NamedTuple):
-    """What the kernel reads, in its order; see `heat_igl.kernels.windows.shapes`."""
+    """What the kernel reads, in its order; see `heat_igl.kernels.window_surface.shapes`."""
 
     vertex: AnyArray
     length: FloatArray
@@ -110,7 +111,7 @@ class HalfEdges:
             np.empty(3 * m, np.int32),
             np.zeros(n, np.uint8),
         )
-        is_delaunay = windows.shapes(vertex, length, twin, *derived)
+        is_delaunay = window_surface.shapes(vertex, length, twin, *derived)
         self.tables = Tables(vertex, length, twin, aligned, ring, *derived, is_delaunay)
         self.old_vertex = np.empty(n, np.int64)
         self.old_vertex[self.number] = np.arange(n)
@@ -141,18 +142,35 @@ class HalfEdges:
         if self._triangulation is None:
             raise ValueError("this surface knows vertices only: make it from a triangulation")
         faces, barycentric = self._triangulation.locate(points.faces, points.barycentric)
-        new_face = np.empty(len(self.face), np.int64)
-        new_face[self.face] = np.arange(len(self.face))
-        barycentric = np.where(barycentric < _ON_SIDE, 0.0, barycentric)
-        barycentric /= barycentric.sum(axis=1, keepdims=True)
-        return self._on_all_faces(new_face[faces], barycentric)
+        located = self._on_all_faces(faces, barycentric[:, None])
+        return located._replace(barycentric=located.barycentric[:, 0])
+
+    def located_segments(self, segments: SourceSegments | None) -> Located:
+        """Segments in the triangles: as `located`, with coordinates (q, 2, 3) of both ends.
+
+        Raises
+        ------
+        ValueError
+            If the triangles are not those that the segments were given in.
+        """
+        if segments is None:
+            return Located(np.empty(0, np.int32), np.empty((0, 2, 3)), np.empty(0, np.int64))
+        if self._triangulation is None or self._triangulation.n_flips:
+            raise ValueError("segments need triangles that were not flipped: make this surface from those of the mesh")
+        ends = [self._triangulation.locate(segments.faces, end) for end in (segments.start, segments.end)]
+        return self._on_all_faces(ends[0][0], np.stack([end[1] for end in ends], axis=1))
 
     def _on_all_faces(self, faces: IntArray, barycentric: FloatArray) -> Located:
-        """Points, and those on a side once more for every other face there."""
+        """Sets of places (k, e, 3), by new numbers; those on a side, once more for every other face there."""
         t = self.tables
+        new_face = np.empty(len(self.face), np.int64)
+        new_face[self.face] = np.arange(len(self.face))
+        faces = new_face[faces]
+        barycentric = np.where(barycentric < _ON_SIDE, 0.0, barycentric)
+        barycentric /= barycentric.sum(axis=-1, keepdims=True)
         point = np.arange(len(faces))
         rows = [(faces, barycentric, point)]
-        is_zero = barycentric == 0
+        is_zero = (barycentric == 0).all(axis=1)
         i, c = np.nonzero(is_zero & (is_zero.sum(axis=1) == 1)[:, None])
         start = here = 3 * faces[i] + c
         while len(here):
@@ -161,11 +179,11 @@ class HalfEdges:
             go_on = there != start
             i, c, start, here = i[go_on], c[go_on], start[go_on], there[go_on]
             same_vertex = t.vertex[_following(start)] == t.vertex[_following(here)]
-            same_way = np.where(t.twin[start] >= 0, t.aligned[start] == 0, same_vertex)
-            tail, head = barycentric[i, (c + 1) % 3], barycentric[i, (c + 2) % 3]
-            other, k = np.zeros((len(i), 3)), np.arange(len(i))
-            other[k, (here + 1) % 3] = np.where(same_way, tail, head)
-            other[k, (here + 2) % 3] = np.where(same_way, head, tail)
+            same_way = np.where(t.twin[start] >= 0, t.aligned[start] == 0, same_vertex)[:, None]
+            tail, head = barycentric[i, :, (c + 1) % 3], barycentric[i, :, (c + 2) % 3]
+            other, k = np.zeros((len(i), *barycentric.shape[1:])), np.arange(len(i))
+            other[k, :, (here + 1) % 3] = np.where(same_way, tail, head)
+            other[k, :, (here + 2) % 3] = np.where(same_way, head, tail)
             rows.append((here // 3, other, point[i]))
         faces, barycentric, point = (np.concatenate(column) for column in zip(*rows, strict=True))
         return Located(faces.astype(np.int32), barycentric, point)

@@ -15,8 +15,8 @@ from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
-from heat_igl.unfolding.exact import TOLERANCE
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
+from heat_igl.unfolding.window_search import TOLERANCE
 
 __all__ = ["distances_within", "nearest_vertices", "pair_distances"]
 

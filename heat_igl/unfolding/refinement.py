@@ -11,8 +11,6 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 
 from heat_igl.intrinsic import IntrinsicTriangulation, double_cover, oriented
 from heat_igl.intrinsic.fans import breadth_first, tables
@@ -35,9 +33,7 @@ _SHORTFALL = 15.0
 _MAX_PASSES = 50
 # Steps that the search from one vertex may take; a walk takes 20 to 50.
 _MAX_SEARCH = 500
-# Up to this share of flat vertices, holes are not counted.
-_HARDLY_FLAT = 0.05
-# A point whose barycentric coordinate is below this lies on the side of the face.
+# A point whose barycentric coordinate is below this lies on the side of its face.
 _ON_SIDE = 1e-8
 
 
@@ -98,22 +94,20 @@ class Refinement:
 
     @cached_property
     def has_holes(self) -> bool:
-        """Whether some component is neither a disk nor a sphere, so that a closed curve may enclose no surface.
-
-        True without counting if hardly a vertex is flat: two paths seldom prove anything there.
-        """
-        if self.flatness < _HARDLY_FLAT:
-            return True
-        m, n = len(self._F), len(self.number)
-        i, j = self._F.ravel(), self._F[:, [1, 2, 0]].ravel()
-        graph = sp.coo_array((np.ones(3 * m, np.int8), (i, j)), shape=(n, n))
-        component = csgraph.connected_components(graph, directed=False)[1]
-        of_face = component[self._F[:, 0]]
-        # Each edge is shared by two half-edges, or has one alone; edges of more than two faces are cut apart.
-        edges = np.bincount(np.repeat(of_face, 3), np.where(self._twin.ravel() >= 0, 0.5, 1.0))
-        fans = np.bincount(component[np.unique(self._F)], minlength=len(edges))
-        characteristic = fans - edges + np.bincount(of_face, minlength=len(edges))
-        return bool((characteristic[np.bincount(of_face, minlength=len(edges)) > 0] < 1).any())
+        """Whether some component is neither a disk nor a sphere, so that a closed curve may enclose no surface."""
+        m = len(self._F)
+        is_first, n_shared, side = np.ones(m, bool), np.zeros(m), np.arange(0, 3 * m, 3, dtype=np.int32)
+        for beyond in self._twin.reshape(-1, 3).T:
+            # In breadth-first order a face without an earlier neighbour begins a component.
+            is_first &= (beyond < 0) | (beyond >= side)
+            n_shared += beyond >= 0
+        of_face = np.cumsum(is_first) - 1
+        of_vertex = np.full(len(self.number), -1)
+        of_vertex[self._F] = of_face[:, None]
+        # Where more than two faces meet, they are cut apart: an edge is shared by two faces, or belongs to one.
+        edges = np.bincount(of_face, 3 - n_shared / 2)
+        vertices = np.bincount(of_vertex[of_vertex >= 0], minlength=len(edges))
+        return bool((vertices - edges + np.bincount(of_face) < 1).any())
 
     @cached_property
     def flatness(self) -> float:

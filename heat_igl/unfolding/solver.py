@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import NamedTuple, Protocol
 
@@ -11,7 +12,7 @@ import numpy as np
 from heat_igl.errors import SourceError
 from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
-from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSet, take_shorter
+from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSegments, SourceSet, take_shorter
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.directions import PathAngles, PathDirections
@@ -26,11 +27,12 @@ _SPACING = 0.125
 # If a sweep gives less than a straight line by less than this, it is the sweep that is wrong, and no shorter path is
 # there: sweeps are off by 0.06 to 0.4 % in the mean and by 1.6 % at most (cow, fandisk, camel's head).
 _SWEEP_ERROR = 0.01
-# Up to so many vertices, or with so much curvature at each (radians, in the mean), distance is found by exact windows,
-# whatever was asked for. There walks pass vertices on the wrong side: 0.7 to 3.4 % of the largest distance on plates,
-# beams, voxels and terrain, most of which have 0.5 to 3 radians. Scanned surfaces have 0.005 to 0.15.
+# In components of up to so many vertices distance is found by exact windows, whatever was asked for.
 _FEW = 1000
-_ROUGH = 0.25
+# So it is with so much curvature at each vertex (radians, in the mean). There walks pass vertices on the wrong side:
+# 0.7 to 3.4 % of the largest distance on plates, beams, voxels and terrain, most with 0.5 to 3 radians, and up to
+# 0.46 % on a coarse cow with 0.14, which is too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
+_ROUGH = {"sweep": 0.25, "unfold": 0.1}
 # Up to so many vertices directions are found by windows, if the tolerance is smaller than the default. Walks of the
 # tolerance 1e-6 take 0.8 times as long there, and at some vertices depart to the other side of a hill.
 _FEW_FOR_DIRECTIONS = 10_000
@@ -80,10 +82,10 @@ class UnfoldingTerm(Protocol):
         """Corners of the sources' own faces that are farther away."""
 
 
-def _costs_little_to_be_exact(refinement: Refinement) -> bool:
+def _costs_little_to_be_exact(refinement: Refinement, rough: float) -> bool:
     """Whether the mesh is small or rough, or flat with holes."""
     return (
-        refinement.n <= _FEW or refinement.curvature > _ROUGH or (refinement.flatness > _FLAT and refinement.has_holes)
+        refinement.n <= _FEW or refinement.curvature > rough or (refinement.flatness > _FLAT and refinement.has_holes)
     )
 
 
@@ -93,12 +95,16 @@ def _require_share(tolerance: float | None) -> None:
 
 
 class _Asked(NamedTuple):
-    """Vertices and points that distance starts from, and when; `labels` and `angles` are filled if given."""
+    """What distance starts from, and when; `labels` and `angles` are filled if given.
+
+    Without `segments`, points stand for curves.
+    """
 
     vertices: IntArray
     offsets: FloatArray | None
     points: SurfacePoints | None
     point_offsets: FloatArray | None
+    segments: SourceSegments | None
     labels: IntArray | None
     angles: FloatArray | None
     tolerance: float | None
@@ -113,9 +119,10 @@ class UnfoldingSolver:
         Triangles.
     refine : {"sweep", "unfold", "exact"}
         Which update. "exact" is the polyhedral distance by windows, see `ExactSurface`; the heat is not read. The other
-        two take it as well if the mesh is small, rough, or flat with holes. It is exact from vertices and points. A
-        curve stands for points at most an eighth of a mean edge length apart, and straight lines from the curve itself
-        count up to 6 edges from it: beyond, distance from it is too long by 0.005 % at most.
+        two take it as well if the mesh is rough or flat with holes, and in small components. It is exact from vertices,
+        points and curves. For the other two, a curve stands for points at most an eighth of a mean edge length apart,
+        and straight lines from the curve itself count up to 6 edges from it: beyond, distance is too long by 0.005 % at
+        most.
     tolerance : float, optional
         As for `Refinement.unfold`, with the same default.
     cutoff : float
@@ -135,7 +142,7 @@ class UnfoldingSolver:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
         self._refinement = None if refine == "exact" else Refinement(surface.unfolding)
         #: Whether distances do not depend on the heat.
-        self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement)
+        self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement, _ROUGH[refine])
         _require_share(tolerance)
         self._tolerance, self._cutoff = tolerance, cutoff
         self._sweeps = refine == "sweep" and not self.is_exact
@@ -148,6 +155,10 @@ class UnfoldingSolver:
     @cached_property
     def _exact(self) -> ExactSurface:
         return ExactSurface(self._surface.unfolding)
+
+    @cached_property
+    def _exact_on_given_faces(self) -> ExactSurface:
+        return ExactSurface(self._surface.unfolding if self._surface.faces is None else self._surface.faces)
 
     @cached_property
     def _bounds(self) -> Bounds:
@@ -204,46 +215,66 @@ class UnfoldingSolver:
         places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
         # Tolerances are relative to the distance: the common part is added afterwards.
         earliest = np.full(self._domain.n_components, np.inf)
-        component_of_point = components[self._given_faces[points.faces, 0]] if places else np.empty(0, np.int64)
-        component = np.concatenate([components[sources.vertices], component_of_point])
-        offset = np.concatenate([sources.vertex_offset, points.offset])
+        segments = sources.segments if self.is_exact and len(sources.segments.faces) else None
+        faces = points.faces if segments is None else np.concatenate([points.faces, segments.faces])
+        in_faces = components[self._given_faces[faces, 0]] if len(faces) else np.empty(0, np.int64)
+        component = np.concatenate([components[sources.vertices], in_faces])
+        offset = np.concatenate([sources.vertex_offset, points.offset, [] if segments is None else segments.offset])
         np.minimum.at(earliest, component, offset)
         late = offset - earliest[component]
-        k = len(sources.vertices)
+        k, p = len(sources.vertices), len(points.faces)
         asked = _Asked(
             sources.vertices,
             late[:k] if late.any() else None,
             places,
-            late[k:] if late.any() and places else None,
+            late[k : k + p] if late.any() and places else None,
+            None if segments is None else replace(segments, offset=late[k + p :]),
             labels,
             angles,
             self._tolerance if tolerance is None else tolerance,
         )
-        distance = self._unfolded(u, asked, term, points, earliest)
+        by_windows = self._takes_windows(component) or self._is_straight(asked)
+        distance = self._unfolded(u, asked, term, points, earliest, by_windows)
         start = self._domain.expand_to_vertices(earliest)
         if offset.any():
             distance += start
         if labels is not None:
-            labels[:] = np.concatenate([sources.vertex_label, points.label, [-1]])[labels]
+            of_places = points.label if segments is None else np.concatenate([points.label, segments.label])
+            labels[:] = np.concatenate([sources.vertex_label, of_places, [-1]])[labels]
         for seeds in (term.near_seen, term.far):
             if not len(seeds.vertex):
                 continue
-            taken = take_shorter(distance, seeds, self._error, start)
+            taken = take_shorter(distance, seeds, 0.0 if by_windows else self._error, start)
             if labels is not None:
                 labels[seeds.vertex[taken]] = seeds.label[taken]
-        if not self.is_exact:
+        if not by_windows:
             self._bounds.shorten(distance, labels)
             if self._sweeps:
                 self._bounds.lengthen(distance, sources, points)
         return distance
 
+    def _takes_windows(self, component: IntArray) -> bool:
+        """Whether distance from sources in these components is found by exact windows."""
+        return self.is_exact or bool((self._component_sizes[component] <= _FEW).all())
+
+    @cached_property
+    def _component_sizes(self) -> IntArray:
+        return np.bincount(self._domain.components)
+
     def _unfolded(
-        self, u: FloatArray, asked: _Asked, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray
+        self,
+        u: FloatArray,
+        asked: _Asked,
+        term: UnfoldingTerm,
+        points: SourcePoints,
+        earliest: FloatArray,
+        by_windows: bool,
     ) -> FloatArray:
-        """Distances (n,) from vertices and points, each component's from the smallest offset."""
-        if self._refinement is None or self.is_exact or self._is_straight(asked):
-            found = self._exact.solve(
-                asked.vertices, asked.offsets, asked.points, asked.point_offsets, cutoff=self._cutoff
+        """Distances (n,) from vertices and points, each component's from where it begins."""
+        if self._refinement is None or by_windows:
+            surface = self._exact if asked.segments is None else self._exact_on_given_faces
+            found = surface.solve(
+                asked.vertices, asked.offsets, asked.points, asked.point_offsets, asked.segments, cutoff=self._cutoff
             )
             if asked.labels is not None:
                 asked.labels[:] = found.origin.label
@@ -330,6 +361,6 @@ class UnfoldingSolver:
 
     def _points(self, term: UnfoldingTerm) -> SourcePoints:
         points, segments = term.sources.points, term.sources.segments
-        if not len(segments.faces) or self._faces is None:
+        if not len(segments.faces) or self._faces is None or self.is_exact:
             return points
         return points.joined(self._faces.samples(segments, self._spacing)[0]).joined(segments.ends())

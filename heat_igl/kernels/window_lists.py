@@ -1,0 +1,266 @@
+"""Windows that wait: lists at half-edges, each with a key, and the queue of the keys.
+
+The square of the key of a list is the power of the root with respect to the circle around the face that is entered
+next. On a Delaunay triangulation that power grows along every straight line from the root, it is no larger than the
+square of the distance of any vertex ahead, and it sorts faces from front to back. So a list is nearly always complete
+when its turn comes, a face is crossed once from each side, and no vertex can come nearer than the key. On other
+triangulations the key is the distance of the nearest point of the windows.
+"""
+
+import cython
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge
+from cython.cimports.heat_igl.kernels.window_structures import Entry, List, Search, Window
+from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.libc.stdlib import free, malloc, realloc
+from cython.cimports.libc.string import memcpy, memmove
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cython.void:
+    """Add to the queue, a binary heap."""
+    i: cython.int
+    above: cython.int
+    if s.n_heap == s.n_all_heap:
+        more: cython.pointer(Entry) = cython.cast(
+            cython.pointer(Entry), realloc(s.heap, 2 * s.n_all_heap * cython.sizeof(Entry))
+        )
+        if more == cython.NULL:
+            s.failed = True
+            return
+        s.heap = more
+        s.n_all_heap *= 2
+    i = s.n_heap
+    s.n_heap += 1
+    while i > 0:
+        above = (i - 1) // 2
+        if s.heap[above].key <= key:
+            break
+        s.heap[i] = s.heap[above]
+        i = above
+    s.heap[i].key = key
+    s.heap[i].what = what
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def pop(s: cython.pointer(Search)) -> Entry:
+    """Take the entry with the smallest key."""
+    top: Entry = s.heap[0]
+    last: Entry
+    i: cython.int = 0
+    below: cython.int
+    s.n_heap -= 1
+    last = s.heap[s.n_heap]
+    while True:
+        below = 2 * i + 1
+        if below >= s.n_heap:
+            break
+        if below + 1 < s.n_heap and s.heap[below + 1].key < s.heap[below].key:
+            below += 1
+        if s.heap[below].key >= last.key:
+            break
+        s.heap[i] = s.heap[below]
+        i = below
+    s.heap[i] = last
+    return top
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _key(
+    s: cython.pointer(Search), w: cython.pointer(Window), length: cython.double, bulge: cython.double
+) -> cython.double:
+    """When a window has its turn. A plane is a root at infinity: the power becomes the distance of the centre."""
+    key: cython.double
+    x: cython.double = 0.0
+    if w.is_plane:
+        if s.is_delaunay:
+            return w.offset + 0.5 * (w.x * length + w.depth * bulge)
+        return w.offset + w.x * (w.start if w.x > 0.0 else w.stop)
+    if s.is_delaunay:
+        key = w.x * (w.x - length) + w.depth * (w.depth + bulge)
+        return w.offset + (sqrt(key) if key > 0.0 else 0.0)
+    if w.x < w.start:
+        x = w.start - w.x
+    elif w.x > w.stop:
+        x = w.x - w.stop
+    return w.offset + sqrt(x * x + w.depth * w.depth)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _append(
+    s: cython.pointer(Search),
+    t: cython.int,
+    run: cython.pointer(Window),
+    n: cython.int,
+    in_front: cython.bint,
+    mirrored: cython.bint,
+) -> cython.void:
+    """Add windows to those that wait at half-edge t."""
+    i: cython.int
+    place: cython.int = s.slot[t]
+    capacity: cython.int
+    one: cython.pointer(List)
+    to: cython.pointer(Window)
+    length: cython.double = s.length[t]
+    bulge: cython.double = s.bulge[t]
+    key: cython.double
+    lowest: cython.double = INFINITY
+    x: cython.double
+    if place < 0:
+        place = _free_list(s)
+        if place < 0:
+            return
+        s.slot[t] = place
+        s.lists[place].half_edge = t
+        s.lists[place].count = 0
+        s.lists[place].key = INFINITY
+    one = cython.address(s.lists[place])
+    if one.count + n > one.capacity:
+        capacity = 2 * (one.count + n) + 4
+        to = cython.cast(cython.pointer(Window), realloc(one.windows, capacity * cython.sizeof(Window)))
+        if to == cython.NULL:
+            s.failed = True
+            return
+        one.windows = to
+        one.capacity = capacity
+    if in_front != mirrored:
+        if one.count > 0:
+            memmove(one.windows + n, one.windows, one.count * cython.sizeof(Window))
+        to = one.windows
+    else:
+        to = one.windows + one.count
+    one.count += n
+    s.n_windows += n
+    if mirrored:
+        for i in range(n):
+            to[i] = run[n - 1 - i]
+            if to[i].is_plane:
+                to[i].offset += to[i].x * length
+                to[i].x = -to[i].x
+            else:
+                to[i].x = length - to[i].x
+            x = to[i].start
+            to[i].start = length - to[i].stop
+            to[i].stop = length - x
+    else:
+        memcpy(to, run, n * cython.sizeof(Window))
+    for i in range(n):
+        key = _key(s, to + i, length, bulge)
+        if key < lowest:
+            lowest = key
+    if lowest < one.key:
+        one.key = lowest
+        push(s, lowest, t)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _free_list(s: cython.pointer(Search)) -> cython.int:
+    """A list that is not in use, with the room that it had before; -1 without memory."""
+    place: cython.int = s.free_list
+    more: cython.pointer(List)
+    if place >= 0:
+        s.free_list = s.lists[place].count
+        return place
+    if s.n_lists == s.n_all_lists:
+        more = cython.cast(cython.pointer(List), realloc(s.lists, 2 * s.n_all_lists * cython.sizeof(List)))
+        if more == cython.NULL:
+            s.failed = True
+            return -1
+        s.lists = more
+        s.n_all_lists *= 2
+    place = s.n_lists
+    s.n_lists += 1
+    if place == s.n_made_lists:
+        s.n_made_lists += 1
+        s.lists[place].windows = cython.NULL
+        s.lists[place].capacity = 0
+    return place
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def add(
+    s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int, in_front: cython.bint
+) -> cython.void:
+    """Windows over half-edge e, out of its face; their frame runs from the head of e to its tail."""
+    t: cython.int = s.twin[e]
+    if t >= 0:
+        _append(s, t, run, n, in_front, not s.aligned[e])
+    elif t == -2:
+        t = s.ring[e]
+        while t != e:
+            _append(s, t, run, n, in_front, s.vertex[next_half_edge(t)] == s.vertex[next_half_edge(e)])
+            t = s.ring[t]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def more_room(s: cython.pointer(Search), n: cython.int) -> cython.void:
+    """Room for n windows on each side of an apex."""
+    s.n_out = 2 * n
+    free(s.to_left)
+    free(s.to_right)
+    s.to_left = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
+    s.to_right = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
+    if s.to_left == cython.NULL or s.to_right == cython.NULL:
+        s.failed = True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def allocate(s: cython.pointer(Search)) -> cython.void:
+    """Room for a front."""
+    s.n_lists = s.n_made_lists = s.n_heap = s.n_touched = s.n_found = 0
+    s.n_all_lists, s.n_all_heap, s.n_out = 256, 1024, 256
+    s.free_list = -1
+    s.failed = False
+    s.n_windows = s.n_lists_done = 0
+    s.n_nearest = s.n_all_ranked = 0
+    s.ranked = cython.NULL
+    s.lists = cython.cast(cython.pointer(List), malloc(s.n_all_lists * cython.sizeof(List)))
+    s.heap = cython.cast(cython.pointer(Entry), malloc(s.n_all_heap * cython.sizeof(Entry)))
+    s.to_left = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
+    s.to_right = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
+    if s.lists == cython.NULL or s.heap == cython.NULL or s.to_left == cython.NULL or s.to_right == cython.NULL:
+        s.failed = True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def free_front(s: cython.pointer(Search)) -> cython.void:
+    """Return the memory of a front."""
+    i: cython.int
+    for i in range(s.n_made_lists):
+        free(s.lists[i].windows)
+    free(s.lists)
+    free(s.heap)
+    free(s.to_left)
+    free(s.to_right)
+    free(s.ranked)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def empty_front(s: cython.pointer(Search)) -> cython.void:
+    """Drop all that waits; lists and queue keep their room."""
+    i: cython.int
+    for i in range(s.n_lists):
+        if s.lists[i].half_edge >= 0:
+            s.slot[s.lists[i].half_edge] = -1
+    s.n_lists = s.n_heap = 0
+    s.free_list = -1

@@ -1,0 +1,123 @@
+"""Continuous Dijkstra: lists of windows cross their faces in ascending order, until what is asked for is known."""
+
+import cython
+from cython.cimports.heat_igl.kernels.window_crossing import cross, over_corners
+from cython.cimports.heat_igl.kernels.window_lists import empty_front, pop
+from cython.cimports.heat_igl.kernels.window_segments import emit_segment
+from cython.cimports.heat_igl.kernels.window_sources import emit_point, shed
+from cython.cimports.heat_igl.kernels.window_structures import MARGIN, Entry, Search
+from cython.cimports.libc.math import INFINITY
+from cython.cimports.libc.stdlib import free, malloc
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
+    """Whether no window with this key or a later one can come nearer to what is asked for."""
+    j: cython.int
+    while s.n_found < s.n_goals:
+        if s.distance[s.goal[s.n_found]] > key:
+            return False
+        s.n_found += 1
+    while s.n_found < s.n_goals + s.n_targets:
+        j = s.n_found - s.n_goals
+        over_corners(s, j)
+        # A window may lead to a point of a face before it has left the circle around the face.
+        if s.target_distance[j] + s.slack > key:
+            return False
+        s.n_found += 1
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def run(s: cython.pointer(Search)) -> cython.void:
+    """Carry lists, and let vertices and points shed windows, in ascending order of their keys."""
+    entry: Entry
+    v: cython.int
+    j: cython.int
+    place: cython.int
+    while s.n_heap > 0 and not s.failed:
+        if s.n_nearest > 0 and s.n_touched >= s.n_next:
+            narrow(s)
+        entry = pop(s)
+        if entry.key > s.cutoff * (1.0 + MARGIN) + s.slack:
+            break
+        if s.stops_early and _all_found(s, entry.key):
+            break
+        if entry.what < s.n_half_edges:
+            place = s.slot[entry.what]
+            if place >= 0 and s.lists[place].key == entry.key:
+                cross(s, entry.what)
+            continue
+        v = entry.what - s.n_half_edges
+        if v >= s.n + s.n_points:
+            emit_segment(s, v - s.n - s.n_points)
+        elif v >= s.n:
+            emit_point(s, v - s.n)
+        elif entry.key == s.distance[v] and s.emitted[v] > entry.key:
+            shed(s, v)
+    for j in range(s.n_targets):
+        over_corners(s, j)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def narrow(s: cython.pointer(Search)) -> cython.void:
+    """End the search at the distance within which as many vertices as asked for are known to lie."""
+    i: cython.int
+    j: cython.int
+    low: cython.int = 0
+    high: cython.int = s.n_touched - 1
+    wanted: cython.int = s.n_nearest - 1
+    pivot: cython.double
+    if s.n_touched > s.n_all_ranked:
+        free(s.ranked)
+        s.n_all_ranked = 2 * s.n_touched
+        s.ranked = cython.cast(cython.p_double, malloc(s.n_all_ranked * cython.sizeof(cython.double)))
+        if s.ranked == cython.NULL:
+            s.n_all_ranked = 0
+            s.failed = True
+            return
+    for i in range(s.n_touched):
+        s.ranked[i] = s.distance[s.touched[i]]
+    # Quickselect, Hoare 1961.
+    while low < high:
+        pivot = s.ranked[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while s.ranked[i] < pivot:
+                i += 1
+            while s.ranked[j] > pivot:
+                j -= 1
+            if i <= j:
+                s.ranked[i], s.ranked[j] = s.ranked[j], s.ranked[i]
+                i += 1
+                j -= 1
+        if wanted <= j:
+            high = j
+        elif wanted >= i:
+            low = i
+        else:
+            break
+    if s.ranked[wanted] < s.cutoff:
+        s.cutoff = s.ranked[wanted]
+    s.n_next = s.n_touched + s.n_nearest // 4 + 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def forget(s: cython.pointer(Search)) -> cython.void:
+    """Make all that a search wrote what it was before."""
+    i: cython.int
+    v: cython.int
+    empty_front(s)
+    for i in range(s.n_touched):
+        v = s.touched[i]
+        s.distance[v] = s.emitted[v] = INFINITY
+        s.root[v] = s.label[v] = s.entered[v] = -1
+    s.n_touched = s.n_found = 0

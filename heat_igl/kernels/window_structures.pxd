@@ -1,0 +1,190 @@
+from libc.math cimport sqrt
+
+cdef struct Window:
+    # The part of a half-edge that straight lines from one root cross, in the frame of the half-edge: its tail is the
+    # origin, its head lies at (length, 0), the face that the lines enter above. If it is a plane, the lines are
+    # parallel, and the root is a segment all of whose points are sources (Bommes and Kobbelt 2007).
+    double x, depth      # the root laid out in the plane lies at (x, -depth); of a plane, the direction of the lines
+    double start, stop   # from where to where along the half-edge
+    double offset        # distance of the root; of a plane, the distance that it gives the tail
+    int root             # vertex, n + p for source point p, or after those, n + p + i for source segment i
+    short side           # of the apex: see the sides below
+    bint is_plane
+
+cdef struct Apex:
+    # The corner opposite a half-edge in its frame, the directions of the two sides there, and how it is reached.
+    double x, y
+    double length, left_length, right_length
+    double cos_left, sin_left, cos_right, sin_right
+    int best             # the window through which the apex is nearest, -1 if none sees it
+    double best_at       # where the path crosses the half-edge
+    double nearest
+
+cdef struct List:
+    # Windows that wait at one half-edge, from its tail to its head.
+    Window* windows
+    int count, capacity
+    int half_edge
+    double key
+
+cdef struct Entry:
+    double key
+    int what             # a half-edge, or 3 m + v for vertex v
+
+cdef struct Ray:
+    # A direction at a vertex: in a corner, at an angle from one of its sides.
+    int corner, side
+    double cosine, sine
+
+cdef struct Search:
+    # The surface: see `shapes`.
+    int* vertex
+    double* length
+    int* twin
+    unsigned char* aligned
+    int* ring
+    double* double_area
+    double* bulge
+    int* corner_of_vertex
+    int* next_corner
+    unsigned char* kind
+    bint is_delaunay
+    int n, n_half_edges
+    # What is found.
+    double* distance
+    int* root
+    int* label
+    int* entered
+    double* crossing
+    double* emitted
+    int* touched
+    int n_touched
+    # Sources inside faces.
+    int n_points
+    int* point_face
+    double* point
+    double* point_offset
+    # Segments inside faces.
+    int n_segments
+    int* segment_face
+    double* segment      # both ends, one after the other
+    double* segment_offset
+    # Vertices, and points inside faces, whose distance is asked for.
+    int n_goals, n_targets, n_found
+    int* goal
+    bint stops_early
+    double slack
+    int* target_face
+    int* first_target
+    int* next_target
+    double* target
+    double* target_distance
+    int* target_root
+    int* target_entered
+    double* target_crossing
+    # The front.
+    int* slot
+    List* lists
+    int n_lists, n_all_lists, n_made_lists
+    int free_list
+    int* next_free
+    Entry* heap
+    int n_heap, n_all_heap
+    Window* to_left
+    Window* to_right
+    int n_out
+    bint failed
+    long long n_windows, n_lists_done
+    double tolerance
+    # Where the search ends: at a distance, or, if so many vertices are asked for, once the nearest are known.
+    double cutoff
+    int n_nearest, n_next
+    double* ranked
+    int n_all_ranked
+
+cdef enum Kind:
+    UNKNOWN = 0
+    PASSED = 1           # no shortest path runs through
+    BENDS = 2            # total angle above 2 pi: paths bend here
+    ENDS = 3             # on the boundary
+    JOINS = 4            # several fans, or an edge of more than two faces: paths leave into all faces
+
+cdef enum Order:
+    UNDECIDED = 0        # which of two windows is nearer
+    U_NEARER = 1
+    W_NEARER = 2
+    U_THEN_W = 3
+    W_THEN_U = 4
+
+cdef enum Side:
+    RIGHT_OF_APEX = 0
+    LEFT_OF_APEX = 1
+    AROUND_APEX = 2
+
+
+# Scalar product of two differences of barycentric coordinates, in a face with these sides opposite its corners.
+cdef inline double product(const double* side, const double* u, const double* v) noexcept nogil:
+    return -0.5 * (
+        side[0] * side[0] * (u[1] * v[2] + u[2] * v[1])
+        + side[1] * side[1] * (u[2] * v[0] + u[0] * v[2])
+        + side[2] * side[2] * (u[0] * v[1] + u[1] * v[0])
+    )
+
+
+# The point of a segment, given by the coordinates of its two ends, that is nearest to a point.
+cdef inline void nearest_on(const double* side, const double* ends, const double* point, double* found) noexcept nogil:
+    cdef double along[3]
+    cdef double off[3]
+    cdef double share = 0.0, square
+    cdef int c
+    for c in range(3):
+        along[c] = ends[3 + c] - ends[c]
+        off[c] = point[c] - ends[c]
+    square = product(side, along, along)
+    if square > 0.0:
+        share = min(max(product(side, off, along) / square, 0.0), 1.0)
+    for c in range(3):
+        found[c] = ends[c] + share * along[c]
+
+
+# What a window adds to its offset at a point of its half-edge.
+cdef inline double reach(const Window* w, double at) noexcept nogil:
+    if w.is_plane:
+        return w.x * at
+    return sqrt((at - w.x) * (at - w.x) + w.depth * w.depth)
+
+
+# How far the line of a window through a point of its half-edge goes along it while it rises by `depth`.
+cdef inline double lateral(const Window* w, double at) noexcept nogil:
+    return w.x if w.is_plane else at - w.x
+
+
+# Where the line of a window through a point of the face meets the half-edge.
+cdef inline double backward(const Window* w, double x, double y) noexcept nogil:
+    if w.is_plane:
+        return x - y * w.x / w.depth
+    return w.x + w.depth * (x - w.x) / (y + w.depth)
+
+
+cdef extern from *:
+    """
+    // Windows from a bend are this fraction of a side wider, so that none is missed between them and their neighbours.
+    #define SHADOW_MARGIN 1e-9
+    // What is narrower, as a fraction of a side, is no window.
+    #define NARROW 1e-14
+    // A vertex missed by less than this fraction of a side is reached over the end of the window, which is longer by
+    // the square of that.
+    #define NEAR 1e-7
+    // Windows whose roots are closer than this fraction of their distance have the same root.
+    #define SAME 2e-14
+    // Windows that overlap by less than this fraction of both are left as they are.
+    #define OVERLAP 0.2
+    // A search goes on beyond its cutoff by this fraction, more than rounding of a key.
+    #define MARGIN 1e-12
+    """
+    double SHADOW_MARGIN
+    double NARROW
+    double NEAR
+    double SAME
+    double OVERLAP
+    double MARGIN

@@ -1,0 +1,167 @@
+"""The surface as windows read it: shapes of faces, corners of vertices, and whether paths may bend at a vertex.
+
+Half-edge ``3 f + c`` is the side of face f opposite its corner c; the corner carries the same number.
+"""
+
+import cython
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.window_structures import BENDS, ENDS, JOINS, PASSED, Ray, Search
+from cython.cimports.libc.math import sqrt
+
+__all__ = ["shapes"]
+
+
+def shapes(
+    vertex: cython.int[::1],
+    length: cython.double[::1],
+    twin: cython.int[::1],
+    double_area: cython.double[::1],
+    bulge: cython.double[::1],
+    corner_of_vertex: cython.int[::1],
+    next_corner: cython.int[::1],
+    kind: cython.uchar[::1],
+) -> bool:
+    """Fill what `search` reads of a surface, and say whether it is intrinsic Delaunay.
+
+    Parameters
+    ----------
+    vertex, length, twin : (3 m,)
+        Vertex of each corner, length of each half-edge, and the half-edge glued to it: -1 on the boundary, -2 where
+        more than two faces meet.
+    double_area : (m,)
+        Takes twice the area of each face.
+    bulge : (3 m,)
+        Takes the length of each half-edge times the cotangent of the angle opposite: the circle around the face has the
+        power ``x (x - length) + y (y + bulge)`` at the point (x, -y) of the frame of the half-edge.
+    corner_of_vertex, next_corner : (n,), (3 m,)
+        Take the corners of each vertex as linked lists that end with -1; the first must come full of -1.
+    kind : (n,)
+        Takes JOINS at the ends of edges of more than two faces; the rest must come as UNKNOWN.
+    """
+    m: cython.int = double_area.shape[0]
+    f: cython.int
+    h: cython.int
+    c: cython.int
+    v: cython.int
+    a: cython.double
+    b: cython.double
+    d: cython.double
+    area: cython.double
+    is_delaunay: cython.bint = True
+    with cython.nogil:
+        for f in range(m):
+            h = 3 * f
+            a, b, d = length[h], length[h + 1], length[h + 2]
+            # A needle without height would have no circle.
+            area = _double_area(a, b, d) + 1e-20 * a * a
+            double_area[f] = area
+            bulge[h] = a * (b * b + d * d - a * a) / (2.0 * area)
+            bulge[h + 1] = b * (a * a + d * d - b * b) / (2.0 * area)
+            bulge[h + 2] = d * (a * a + b * b - d * d) / (2.0 * area)
+            for c in range(3):
+                v = vertex[h + c]
+                next_corner[h + c] = corner_of_vertex[v]
+                corner_of_vertex[v] = h + c
+        for h in range(3 * m):
+            if twin[h] > h and bulge[h] + bulge[twin[h]] < -1e-6 * length[h]:
+                is_delaunay = False
+            elif twin[h] == -2:
+                kind[vertex[next_half_edge(h)]] = kind[vertex[previous_half_edge(h)]] = JOINS
+                is_delaunay = False
+    return is_delaunay
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _double_area(a: cython.double, b: cython.double, c: cython.double) -> cython.double:
+    """Twice the area of a triangle by its sides: Heron's formula as a product of differences, which needles need."""
+    s: cython.double = 0.5 * (a + b + c)
+    product: cython.double = s * (s - a) * (s - b) * (s - c)
+    return 2.0 * sqrt(product) if product > 0.0 else 0.0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def third(k: cython.int, side: cython.int) -> cython.int:
+    """The half-edge of the face that is neither of two others."""
+    return 9 * (k // 3) + 3 - k - side
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def beyond(s: cython.pointer(Search), k: cython.int, side: cython.int) -> cython.int:
+    """The corner of the same vertex beyond a side of corner k; -1 where there is not just one face."""
+    t: cython.int = s.twin[side]
+    is_tail: cython.bint = side == previous_half_edge(k)
+    if t < 0:
+        return -1
+    if s.aligned[side]:
+        is_tail = not is_tail
+    return next_half_edge(t) if is_tail else previous_half_edge(t)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Ray)) -> cython.void:
+    """Turn a direction by the angle of corner k, which has the side `side`."""
+    p: cython.double = s.length[side]
+    q: cython.double = s.length[third(k, side)]
+    scale: cython.double = 0.5 / (p * q)
+    cosine: cython.double = (p * p + q * q - s.length[k] * s.length[k]) * scale
+    sine: cython.double = 2.0 * s.double_area[k // 3] * scale
+    ray.cosine, ray.sine = ray.cosine * cosine - ray.sine * sine, ray.cosine * sine + ray.sine * cosine
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
+    """Walk around v: whether its faces are one fan, and whether the angles exceed 2 pi."""
+    start: cython.int = s.corner_of_vertex[v]
+    k: cython.int = start
+    side: cython.int = previous_half_edge(start)
+    ahead: cython.int
+    n_corners: cython.int = 0
+    n_seen: cython.int = 0
+    n_half_turns: cython.int = 0
+    was_below: cython.bint
+    ray: Ray
+    while k >= 0:
+        n_corners += 1
+        k = s.next_corner[k]
+    k = start
+    ray.cosine, ray.sine = 1.0, 0.0
+    while n_seen < n_corners:
+        n_seen += 1
+        was_below = ray.sine < 0.0
+        turn(s, k, side, cython.address(ray))
+        if was_below != (ray.sine < 0.0):
+            n_half_turns += 1
+        side = third(k, side)
+        ahead = beyond(s, k, side)
+        if ahead < 0:
+            break
+        k = ahead
+        side = s.twin[side]
+        if k == start:
+            if n_seen < n_corners:
+                return JOINS
+            # Less than 1e-8 above 2 pi is flat: what a path loses there is the square of it.
+            if n_half_turns < 2 or (n_half_turns == 2 and ray.cosine > 0.0 and ray.sine < 1e-8):
+                return PASSED
+            return BENDS
+    # An open fan: from the start to its other end.
+    k = start
+    side = previous_half_edge(start)
+    while n_seen < n_corners:
+        k = beyond(s, k, side)
+        if k < 0:
+            return JOINS
+        n_seen += 1
+        side = third(k, s.twin[side])
+    return ENDS

@@ -1,0 +1,298 @@
+"""Windows lose the parts of their half-edge that another path reaches sooner.
+
+That path leads over an end of the half-edge (Xin and Wang 2009), or through another window of the list.
+"""
+
+import cython
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.window_structures import (
+    NARROW,
+    OVERLAP,
+    SAME,
+    U_NEARER,
+    U_THEN_W,
+    UNDECIDED,
+    W_NEARER,
+    W_THEN_U,
+    Search,
+    Window,
+    reach,
+)
+from cython.cimports.libc.math import fabs
+from cython.cimports.libc.string import memmove
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
+    """How fast what a window adds to its offset, `reached` there, grows along the half-edge."""
+    return w.x if w.is_plane else (at - w.x) / reached
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _excess(
+    u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, slope: cython.p_double
+) -> cython.double:
+    """By how much u is farther than w; `slope` takes a number of the sign of its derivative."""
+    a: cython.double = reach(u, at)
+    b: cython.double = reach(w, at)
+    if u.is_plane or w.is_plane:
+        slope[0] = _slope(u, at, a) - _slope(w, at, b)
+    else:
+        slope[0] = (at - u.x) * b - (at - w.x) * a
+    return (u.offset - w.offset) + a - b
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _meeting(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    at_low: cython.double,
+    at_high: cython.double,
+) -> cython.double:
+    """Where two windows are equally far: a few steps of Newton's method inside a bracket."""
+    x: cython.double = low + (high - low) * at_low / (at_low - at_high)
+    y: cython.double
+    a: cython.double
+    b: cython.double
+    _: cython.int
+    for _ in range(8):
+        a = reach(u, x)
+        b = reach(w, x)
+        y = (u.offset - w.offset) + a - b
+        if (y < 0.0) == (at_low < 0.0):
+            low = x
+        else:
+            high = x
+        if fabs(y) <= 1e-15 * (fabs(a) + fabs(u.offset)):
+            break
+        a = _slope(u, x, a) - _slope(w, x, b)
+        if a != 0.0:
+            x -= y / a
+        if not (low < x < high):
+            x = 0.5 * (low + high)
+    return x
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _compare(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    meeting: cython.p_double,
+) -> cython.int:
+    """Which of two windows is nearer between two points; `meeting` takes where they are equally far."""
+    a: cython.double
+    b: cython.double
+    at_low: cython.double
+    at_high: cython.double
+    slope_low: cython.double
+    slope_high: cython.double
+    is_point: cython.bint = not (u.is_plane or w.is_plane)
+    difference: cython.double = u.offset - w.offset
+    if difference == 0.0 and is_point:
+        # |x - u|^2 - |x - w|^2 = b - a x
+        a = 2.0 * (u.x - w.x)
+        b = (u.x - w.x) * (u.x + w.x) + (u.depth - w.depth) * (u.depth + w.depth)
+        at_low = b - a * low
+        at_high = b - a * high
+        if at_low <= 0.0 and at_high <= 0.0:
+            return U_NEARER
+        if at_low >= 0.0 and at_high >= 0.0:
+            return W_NEARER
+        meeting[0] = b / a
+        return U_THEN_W if at_low < 0.0 else W_THEN_U
+    at_low = _excess(u, w, low, cython.address(slope_low))
+    at_high = _excess(u, w, high, cython.address(slope_high))
+    # The difference has at most one extremum: for two roots, where the line through both meets the half-edge.
+    if at_low <= 0.0 and at_high <= 0.0:
+        if slope_low <= 0.0 or slope_high >= 0.0:
+            return U_NEARER
+        a = u.x - w.x
+        b = u.depth - w.depth
+        return U_NEARER if is_point and difference <= 0.0 and a * a + b * b <= difference * difference else UNDECIDED
+    if at_low >= 0.0 and at_high >= 0.0:
+        if slope_low >= 0.0 or slope_high <= 0.0:
+            return W_NEARER
+        a = u.x - w.x
+        b = u.depth - w.depth
+        return W_NEARER if is_point and difference >= 0.0 and a * a + b * b <= difference * difference else UNDECIDED
+    meeting[0] = _meeting(u, w, low, high, at_low, at_high)
+    return U_THEN_W if at_low < 0.0 else W_THEN_U
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _settle(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.int:
+    """Cut two windows of one half-edge where the other is nearer. 1: u is gone, 2: w is gone, 4: w comes before u."""
+    low: cython.double = u.start if u.start > w.start else w.start
+    high: cython.double = u.stop if u.stop < w.stop else w.stop
+    x: cython.double = 0.0
+    order: cython.int
+    if low >= high:
+        return 4 if w.stop <= u.start else 0
+    if high - low < OVERLAP * (u.stop - u.start) and high - low < OVERLAP * (w.stop - w.start):
+        return 0
+    order = _compare(u, w, low, high, cython.address(x))
+    if order == U_NEARER:
+        if low <= w.start:
+            if high >= w.stop:
+                return 2
+            w.start = high
+            return 0
+        if high >= w.stop:
+            w.stop = low
+            return 4
+    elif order == W_NEARER:
+        if low <= u.start:
+            if high >= u.stop:
+                return 1
+            u.start = high
+            return 4
+        if high >= u.stop:
+            u.stop = low
+    elif order == U_THEN_W:
+        if high >= u.stop:
+            u.stop = x
+        if low <= w.start:
+            w.start = x
+    elif order == W_THEN_U:
+        if high >= w.stop:
+            w.stop = x
+        if low <= u.start:
+            u.start = x
+        return 4
+    return 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) -> cython.bint:
+    """Cut what is nearer over the ends of the half-edge; whether anything is left.
+
+    The way over the tail is longer than the offset of the window by `a` plus the place on the half-edge, the one over
+    the head by `b` minus the place.
+    """
+    p: cython.double
+    q: cython.double
+    r: cython.double
+    square: cython.double
+    if w.is_plane:
+        if w.x * w.stop > a + w.stop or w.x * w.start > b - w.start:
+            return False
+        if w.x * w.start > a + w.start:
+            w.start = a / (w.x - 1.0)
+        if w.x * w.stop > b - w.stop:
+            w.stop = b / (w.x + 1.0)
+        return True
+    square = w.depth * w.depth
+    p = (w.start - w.x) * (w.start - w.x) + square
+    q = (w.stop - w.x) * (w.stop - w.x) + square
+    r = a + w.stop
+    if r < 0.0 or q > r * r:
+        return False
+    r = b - w.start
+    if r < 0.0 or p > r * r:
+        return False
+    r = a + w.start
+    if r < 0.0 or p > r * r:
+        r = 2.0 * (a + w.x)
+        if r > 0.0:
+            r = (w.x * w.x + square - a * a) / r
+            if r > w.start:
+                w.start = r
+    r = b - w.stop
+    if r < 0.0 or q > r * r:
+        r = 2.0 * (b - w.x)
+        if r > 0.0:
+            r = (b * b - w.x * w.x - square) / r
+            if r < w.stop:
+                w.stop = r
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cython.double) -> cython.bint:
+    """Whether w continues u: two halves that passed a flat vertex."""
+    return (
+        fabs(u.x - w.x) <= SAME * (fabs(w.x) + w.depth)
+        and u.root == w.root
+        and fabs(u.offset - w.offset) <= (SAME * (fabs(w.offset) + length) if w.is_plane else 0.0)
+        and fabs(u.depth - w.depth) <= SAME * (fabs(w.x) + w.depth)
+        and u.start <= w.start <= u.stop + NARROW * length
+    )
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _insert(
+    windows: cython.pointer(Window), k: cython.int, w: cython.pointer(Window), length: cython.double
+) -> cython.int:
+    """Add a window to k that lie side by side, after cutting all where another is nearer; how many there are then."""
+    j: cython.int = k
+    outcome: cython.int
+    narrow: cython.double = NARROW * length
+    while j > 0:
+        outcome = _settle(cython.address(windows[j - 1]), w)
+        if outcome == 1 or windows[j - 1].stop - windows[j - 1].start <= narrow:
+            # remove j - 1
+            if j < k:
+                memmove(windows + (j - 1), windows + j, (k - j) * cython.sizeof(Window))
+            k -= 1
+            j -= 1
+            if outcome == 2:
+                return k
+            continue
+        if outcome == 2 or w.stop - w.start <= narrow:
+            return k
+        if outcome == 4:
+            j -= 1
+            continue
+        break
+    if j < k:
+        memmove(windows + (j + 1), windows + j, (k - j) * cython.sizeof(Window))
+    elif j > 0 and _goes_on(cython.address(windows[j - 1]), w, length):
+        if w.stop > windows[j - 1].stop:
+            windows[j - 1].stop = w.stop
+        return k
+    windows[j] = w[0]
+    return k + 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int) -> cython.int:
+    """Cut from windows what a path over an end of the half-edge or another window makes useless; how many are left."""
+    i: cython.int
+    k: cython.int = 0
+    w: Window
+    length: cython.double = s.length[h]
+    from_tail: cython.double = s.distance[s.vertex[next_half_edge(h)]]
+    from_head: cython.double = s.distance[s.vertex[previous_half_edge(h)]]
+    from_tail += s.tolerance * from_tail
+    from_head += s.tolerance * from_head
+    from_head += length
+    for i in range(n):
+        w = windows[i]
+        if not _cut_by_ends(cython.address(w), from_tail - w.offset, from_head - w.offset):
+            continue
+        if w.stop - w.start > NARROW * length:
+            k = _insert(windows, k, cython.address(w), length)
+    return k

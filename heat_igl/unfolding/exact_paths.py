@@ -1,0 +1,160 @@
+"""Exact shortest paths: the windows that arrived first, followed back to the sources."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.intrinsic import intrinsic_triangulation
+from heat_igl.kernels import window_paths
+from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.sources import SourceSet
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.half_edges import HalfEdges, from_triangulation
+from heat_igl.unfolding.window_search import Searched, search
+
+__all__ = ["ExactPaths", "Starts", "exact_paths"]
+
+# Segments that there is room for at first.
+_ROOM = 2**14
+
+
+class Starts(NamedTuple):
+    """Where k paths begin, by the numbers of the tables: at a vertex, or where that is -1, at a target of the search.
+
+    Attributes
+    ----------
+    vertex : (k,) int32
+        The vertex, or -1.
+    face, barycentric : (k,) int32, (k, 3) float64
+        The target, or a corner at the vertex.
+    distance, root, entered, crossing : (k,)
+        What the search found there.
+    """
+
+    vertex: AnyArray
+    face: AnyArray
+    barycentric: FloatArray
+    distance: FloatArray
+    root: AnyArray
+    entered: AnyArray
+    crossing: FloatArray
+
+
+class ExactPaths(NamedTuple):
+    """Shortest paths from k places to the nearest source.
+
+    Attributes
+    ----------
+    faces : (s,) int64
+        Face of each segment, path after path.
+    points : (s, 2, 3) float64
+        Barycentric coordinates of its start and end.
+    first : (k + 1,) int64
+        Segments of path i are ``first[i]`` to ``first[i + 1]``; none where no source is reached, or where the path was
+        lost at needles.
+    distance : (k,) float64
+        Exact distance of each place.
+    """
+
+    faces: IntArray
+    points: FloatArray
+    first: IntArray
+    distance: FloatArray
+
+
+def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: FloatArray) -> ExactPaths:
+    """Shortest paths on the faces of a mesh, by windows on the triangles as they are given.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles.
+    sources : SourceSet
+        Vertices, points and segments.
+    faces, barycentric : (k,) int64, (k, 3) float64
+        Where the paths begin. The search ends when the distance of all these places is known.
+
+    Returns
+    -------
+    ExactPaths
+        Of the length of the distance to rounding. A path that passes a vertex closer than rounding goes through it.
+
+    Raises
+    ------
+    MemoryError
+        If the windows do not fit into memory.
+    """
+    edges = from_triangulation(intrinsic_triangulation(mesh))
+    is_corner = barycentric.max(axis=1) == 1
+    vertex = np.full(len(faces), -1)
+    vertex[is_corner] = mesh.F[faces[is_corner], barycentric[is_corner].argmax(axis=1)]
+    points, segments = sources.points, sources.segments
+    begin = float(sources.offsets.min())
+    done = search(
+        edges,
+        sources.vertices,
+        sources.vertex_offset - begin,
+        SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
+        points.offset - begin if len(points.faces) else None,
+        replace(segments, offset=segments.offset - begin) if len(segments.faces) else None,
+        targets=SurfacePoints(faces[~is_corner], barycentric[~is_corner]) if not is_corner.all() else None,
+        goals=np.unique(vertex[is_corner]),
+    )
+    starts = _starts(edges, done, vertex)
+    where, places, ends = _traced(edges, done, starts)
+    return ExactPaths(
+        edges.face[where].astype(np.int64), places, np.append(0, ends), edges.unscaled(starts.distance) + begin
+    )
+
+
+def _starts(edges: HalfEdges, done: Searched, vertex: IntArray) -> Starts:
+    """Where paths begin: at vertices by the caller's number, or where that is -1, at one target after the other."""
+    at, place = done.at_targets, done.place
+    k, of_target = len(vertex), np.flatnonzero(vertex < 0)
+    which = done.nearest_copy(len(of_target))
+    number = edges.number[vertex]
+    corner = edges.tables.corner_of_vertex[number]
+    starts = Starts(
+        np.where(vertex < 0, -1, number).astype(np.int32),
+        (corner // 3).astype(np.int32),
+        np.eye(3)[corner % 3],
+        done.found.distance[number],
+        np.full(k, -1, np.int32),
+        np.full(k, -1, np.int32),
+        np.zeros(k),
+    )
+    found = (place.faces, place.barycentric, at.distance, at.root, at.entered, at.crossing)
+    for column, values in zip(starts[1:], found, strict=True):
+        column[of_target] = values[which]
+    return starts
+
+
+def _traced(edges: HalfEdges, done: Searched, starts: Starts) -> tuple[AnyArray, FloatArray, IntArray]:
+    """Faces and ends of all segments, and where the segments of each path end; room is doubled until they fit."""
+    room, found, sources = _ROOM, done.found, done.starts
+    while True:
+        face, place, ends = np.empty(room, np.int32), np.empty((room, 2, 3)), np.zeros(len(starts.vertex), np.int64)
+        n_done = window_paths.trace_back(
+            edges.tables,
+            found.distance,
+            found.root,
+            found.entered,
+            found.crossing,
+            sources.points.faces,
+            np.ascontiguousarray(sources.points.barycentric),
+            sources.point_offset,
+            sources.segments.faces,
+            np.ascontiguousarray(sources.segments.barycentric),
+            sources.segment_offset,
+            starts,
+            face,
+            place,
+            ends,
+        )
+        if n_done == len(starts.vertex):
+            n = ends[-1] if n_done else 0
+            return face[:n], place[:n], ends
+        room *= 2

@@ -1,0 +1,189 @@
+"""One search by windows on the tables of a surface: what the kernel is given, and what it leaves behind."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.kernels import windows
+from heat_igl.mesh import SurfacePoints
+from heat_igl.sources import SourceSegments
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.half_edges import HalfEdges, Located
+
+__all__ = ["TOLERANCE", "Found", "Searched", "Starts", "search"]
+
+#: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds
+#: up to. A larger number keeps a few windows more and changes no result.
+TOLERANCE = 1e-11
+_NO_VERTICES = np.empty(0, np.int64)
+
+
+class Starts(NamedTuple):
+    """Sources by the numbers of the tables.
+
+    Attributes
+    ----------
+    vertices, offset : (k,)
+        Vertices, and when each starts.
+    points, point_offset : (p,)
+        Points inside faces; ends of segments are among them.
+    segments, segment_offset : (q,)
+        Segments inside faces.
+    place : (p + q + 1,) int64
+        The number of each point and segment, counted as the caller does: points, then segments; then -1 for nothing.
+    label : (k + p + q + 1,) int64
+        The same after those of the vertices.
+    """
+
+    vertices: AnyArray
+    offset: FloatArray
+    points: Located
+    point_offset: FloatArray
+    segments: Located
+    segment_offset: FloatArray
+    place: IntArray
+    label: IntArray
+
+
+class Found(NamedTuple):
+    """What the kernel fills for each of some places."""
+
+    distance: FloatArray
+    root: AnyArray
+    label: AnyArray
+    entered: AnyArray
+    crossing: FloatArray
+
+    @classmethod
+    def of(cls, k: int, n_labels: int) -> Found:
+        """Nothing found yet, at k places."""
+        nothing = np.full((2, k), -1, np.int32)
+        return cls(np.full(k, np.inf), nothing[0], np.full(n_labels, -1, np.int32), nothing[1], np.zeros(k))
+
+
+class Searched(NamedTuple):
+    """A search that is done.
+
+    Attributes
+    ----------
+    starts : Starts
+        The sources.
+    found : Found
+        At the vertices.
+    place : Located
+        The targets.
+    at_targets : Found
+        At each of `place`.
+    n_windows, n_crossings : int
+        As in `ExactSolution`.
+    """
+
+    starts: Starts
+    found: Found
+    place: Located
+    at_targets: Found
+    n_windows: int
+    n_crossings: int
+
+    def nearest_copy(self, n_targets: int) -> IntArray:
+        """Of the copies of each target, the one with the smallest distance."""
+        order = np.lexsort((-self.at_targets.distance, self.place.point))
+        which = np.empty(n_targets, np.int64)
+        which[self.place.point[order]] = order
+        return which
+
+
+def search(
+    edges: HalfEdges,
+    sources: IntArray = _NO_VERTICES,
+    offsets: FloatArray | None = None,
+    points: SurfacePoints | None = None,
+    point_offsets: FloatArray | None = None,
+    segments: SourceSegments | None = None,
+    *,
+    cutoff: float = np.inf,
+    targets: SurfacePoints | None = None,
+    goals: IntArray | None = None,
+) -> Searched:
+    """Distances on the tables `edges`; parameters and errors are those of `ExactSurface.solve`."""
+    starts = _starts(edges, sources, offsets, points, point_offsets, segments)
+    place = edges.located(targets)
+    n, t = edges.n, len(place.faces)
+    found, at_targets = Found.of(n, n + len(starts.points.faces) + len(starts.segments.faces)), Found.of(t, 0)
+    statistics = np.zeros(3, np.int64)
+    front = windows.Front(
+        *edges.tables,
+        found.distance,
+        np.full(n, np.inf),
+        found.root,
+        found.label,
+        found.entered,
+        found.crossing,
+        np.empty(n, np.int32),
+        np.full(len(edges.tables.vertex), -1, np.int32),
+        TOLERANCE,
+    )
+    done = windows.search(
+        front,
+        starts.vertices,
+        starts.offset,
+        starts.points.faces,
+        np.ascontiguousarray(starts.points.barycentric).ravel(),
+        starts.point_offset,
+        starts.segments.faces,
+        np.ascontiguousarray(starts.segments.barycentric).ravel(),
+        starts.segment_offset,
+        edges.number[_NO_VERTICES if goals is None else goals],
+        *edges.by_face(place),
+        place.faces,
+        np.ascontiguousarray(place.barycentric).ravel(),
+        at_targets.distance,
+        at_targets.root,
+        at_targets.entered,
+        at_targets.crossing,
+        edges.largest_circle(place),
+        goals is not None,
+        float(edges.scaled(cutoff)),
+        statistics,
+    )
+    if not done:
+        raise MemoryError("the windows of the exact distance do not fit into memory")
+    return Searched(starts, found, place, at_targets, *(int(count) for count in statistics[1:]))
+
+
+def _starts(
+    edges: HalfEdges,
+    sources: IntArray,
+    offsets: FloatArray | None,
+    points: SurfacePoints | None,
+    point_offsets: FloatArray | None,
+    segments: SourceSegments | None,
+) -> Starts:
+    """Sources for the kernel; points and ends of segments at corners become vertices."""
+    k, p = len(sources), 0 if points is None else len(points)
+    begin = np.zeros(k) if offsets is None else edges.scaled(np.asarray(offsets, np.float64))
+    late = np.zeros(p) if point_offsets is None else edges.scaled(np.asarray(point_offsets, np.float64))
+    counted = np.arange(p)
+    if segments is not None:
+        ends, number = segments.ends(), p + np.arange(len(segments.faces))
+        all_faces = np.concatenate([np.empty(0, np.int64) if points is None else points.faces, ends.faces])
+        all_places = np.concatenate([np.empty((0, 3)) if points is None else points.barycentric, ends.barycentric])
+        points = SurfacePoints(all_faces, all_places)
+        late, counted = np.concatenate([late, edges.scaled(ends.offset)]), np.concatenate([counted, number, number])
+    place, lines = edges.located(points), edges.located_segments(segments)
+    late, counted = late[place.point], counted[place.point]
+    is_corner = (place.barycentric == 0).sum(axis=1) == 2
+    corner = 3 * place.faces[is_corner] + place.barycentric[is_corner].argmax(axis=1)
+    numbers = np.concatenate([counted[~is_corner], p + lines.point, [-1]])
+    return Starts(
+        np.concatenate([edges.number[sources], edges.tables.vertex[corner]]),
+        np.concatenate([begin, late[is_corner]]),
+        Located(*(column[~is_corner] for column in place)),
+        late[~is_corner],
+        lines,
+        np.zeros(0) if segments is None else edges.scaled(segments.offset)[lines.point],
+        numbers,
+        np.concatenate([np.arange(k), k + counted[is_corner], np.where(numbers < 0, -1, k + numbers)]),
+    )

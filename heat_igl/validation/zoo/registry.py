@@ -1,0 +1,145 @@
+"""What a shape of the zoo is, the list of all, and what several of them are made with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from heat_igl.mesh import Mesh
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+__all__ = [
+    "SHAPES",
+    "Shape",
+    "boxes",
+    "compact",
+    "delaunay",
+    "hull",
+    "joined",
+    "merged",
+    "raised",
+    "seeded",
+    "shape",
+]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A shape of the zoo.
+
+    Attributes
+    ----------
+    name, family : str
+        Its name, and the kind of shapes that it belongs to.
+    make : callable
+        Returns the `Mesh`; the same bits at every call.
+    held_out : bool
+        Whether it is one of those that no default may be tuned on.
+    """
+
+    name: str
+    family: str
+    make: Callable[[], Mesh]
+    held_out: bool
+
+
+SHAPES: list[Shape] = []
+"""All shapes, family after family."""
+
+
+def shape(
+    family: str, *, held_out: bool = False, **variants: Any
+) -> Callable[[Callable[..., Mesh]], Callable[..., Mesh]]:
+    """Register a function as a shape, or as one for each of `variants`: name suffix -> arguments."""
+
+    def register(make: Callable[..., Mesh]) -> Callable[..., Mesh]:
+        name = make.__name__.strip("_").replace("_", " ")
+        for suffix, arguments in (variants or {"": ()}).items():
+            full = f"{name} {suffix.strip('_').replace('_', ' ')}".strip()
+            given = arguments if isinstance(arguments, tuple) else (arguments,)
+            SHAPES.append(Shape(full, family, lambda given=given: make(*given), held_out))  # type: ignore[misc]
+        return make
+
+    return register
+
+
+def seeded(seed: int) -> np.random.Generator:
+    """A generator that always gives the same numbers."""
+    return np.random.default_rng([20240815, seed])
+
+
+def delaunay(points: FloatArray) -> IntArray:
+    """The Delaunay triangles of points (k, 2) in the plane, all counter-clockwise."""
+    from scipy.spatial import Delaunay  # takes as long to import as the rest of the package
+
+    return np.asarray(Delaunay(points).simplices, np.int64)
+
+
+def raised(points: FloatArray, height: AnyArray | float = 0.0) -> FloatArray:
+    """Positions (k, 3) of points (k, 2) at heights (k,), or at one height."""
+    return np.column_stack([points, np.broadcast_to(height, len(points))])
+
+
+def compact(V: FloatArray, F: IntArray) -> Mesh:
+    """The mesh without the vertices that no face uses."""
+    used, F = np.unique(F, return_inverse=True)
+    return Mesh(V[used], F.reshape(-1, 3))
+
+
+def joined(*parts: Mesh) -> Mesh:
+    """Several meshes as components of one."""
+    first = np.cumsum([0, *(part.n_vertices for part in parts)])
+    return Mesh(
+        np.concatenate([part.V for part in parts]),
+        np.concatenate([part.F + begin for part, begin in zip(parts, first, strict=False)]),
+    )
+
+
+def merged(V: FloatArray, F: IntArray) -> Mesh:
+    """The mesh with equal positions made one vertex, and without the triangles that this collapses."""
+    scale = 1e-9 * float(np.ptp(V, axis=0).max())
+    _, first, which = np.unique(np.round(V / scale), axis=0, return_index=True, return_inverse=True)
+    F = which.reshape(-1)[F]
+    kept = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
+    return Mesh(V[first], F[kept])
+
+
+def hull(points: FloatArray) -> Mesh:
+    """The convex hull of points (k, 3), its faces turned outward."""
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(points)
+    F = np.asarray(hull.simplices, np.int64)
+    normal = np.cross(points[F[:, 1]] - points[F[:, 0]], points[F[:, 2]] - points[F[:, 0]])
+    inward = np.einsum("kx,kx->k", normal, hull.equations[:, :3]) < 0
+    F[inward] = F[inward][:, ::-1]
+    return compact(points, F)
+
+
+def boxes(cells: IntArray, size: FloatArray | float = 1.0) -> Mesh:
+    """The surface of a union of unit cells (k, 3), scaled by `size`: squares between a cell and what is none."""
+    occupied = {tuple(cell) for cell in cells.tolist()}
+    corners: list[list[int]] = []
+    for cell in sorted(occupied):
+        for axis in range(3):
+            for side in (0, 1):
+                beyond = list(cell)
+                beyond[axis] += 2 * side - 1
+                if tuple(beyond) in occupied:
+                    continue
+                u, v = (axis + 1) % 3, (axis + 2) % 3
+                square = []
+                for du, dv in ((0, 0), (1, 0), (1, 1), (0, 1)):
+                    corner = list(cell)
+                    corner[axis] += side
+                    corner[u] += du
+                    corner[v] += dv
+                    square.append(corner)
+                corners.extend(square if side else square[::-1])
+    unique, which = np.unique(np.array(corners), axis=0, return_inverse=True)
+    a, b, c, d = which.reshape(-1, 4).T
+    F = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Mesh(unique * np.asarray(size, float), F)

@@ -1,0 +1,146 @@
+"""Exact distance from curves, every point of which is a source: closed forms, dense points, and paths to curves."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from conftest import flat_perturbed
+from test_exact import cube, delaunay
+from test_exact_paths import MESHES
+from test_paths import assert_on_surface, lengths
+
+from heat_igl import (
+    HeatMethodSolver,
+    Mesh,
+    OffsetSources,
+    SurfaceCurve,
+    SurfacePoints,
+    geodesic_distance,
+    isolines,
+    shapes,
+    shortest_paths,
+)
+from heat_igl.intrinsic import intrinsic_triangulation
+from heat_igl.sources import source_set
+from heat_igl.typing import FloatArray
+from heat_igl.unfolding import ExactSurface
+
+
+def to_polyline(P: FloatArray, corners: FloatArray) -> FloatArray:
+    """Distance of points from a polyline in their plane."""
+    nearest = np.full(len(P), np.inf)
+    for start, end in pairwise(corners):
+        along = end - start
+        share = np.clip((P - start) @ along / max(along @ along, 1e-300), 0, 1)
+        nearest = np.minimum(nearest, np.linalg.norm(P - start - share[:, None] * along, axis=1))
+    return nearest
+
+
+@pytest.mark.parametrize("mesh", [shapes.grid(12), flat_perturbed(shapes.grid(40))], ids=["grid", "perturbed"])
+def test_curves_in_the_plane(mesh):
+    from_point = np.linalg.norm(mesh.V - [0.4, 0.45, 0], axis=1)
+    for curve in (
+        isolines(mesh, mesh.V[:, 0] + 0.2 * mesh.V[:, 1], 0.43)[0][0],
+        isolines(mesh, from_point, 0.2)[0][0],
+        shortest_paths(mesh, None, 5, mesh.n_vertices // 2 + 3)[0],
+    ):
+        truth = to_polyline(mesh.V, curve.positions(mesh))
+        for distance in (
+            geodesic_distance(mesh, curve, method="exact"),
+            HeatMethodSolver(mesh, refine="exact").distance(curve),
+        ):
+            np.testing.assert_allclose(distance, truth, rtol=1e-12, atol=1e-14)
+
+
+def test_curves_on_a_prism():
+    """A ring around it, and a screw line, which is straight on the prism rolled out."""
+    mesh = shapes.cylinder(24, 20)
+    ring, k = np.divmod(np.arange(mesh.n_vertices), 24)
+    around = 48 * np.sin(np.pi / 24)
+    rolled_out = np.column_stack([k * around / 24, ring * (2 * np.pi / 20)])
+    z = rolled_out[:, 1]
+    (level,) = isolines(mesh, z, 0.43 * z.max())[0]
+    np.testing.assert_allclose(
+        geodesic_distance(mesh, level, method="exact"), np.abs(z - 0.43 * z.max()), rtol=1e-12, atol=1e-14
+    )
+    start, end = 3 + 24 * 2, 10 + 24 * 9
+    (screw,) = shortest_paths(mesh, None, start, end)
+    truth = np.min(
+        [to_polyline(rolled_out + np.array([shift * around, 0]), rolled_out[[start, end]]) for shift in (-1, 0, 1)],
+        axis=0,
+    )
+    np.testing.assert_allclose(geodesic_distance(mesh, screw, method="exact"), truth, rtol=1e-12, atol=1e-14)
+
+
+def test_curves_on_a_cube():
+    mesh = cube()
+    x, _, z = mesh.V.T
+    (level,) = isolines(mesh, z, 0.3)[0]
+    np.testing.assert_allclose(geodesic_distance(mesh, level, method="exact"), np.abs(z - 0.3), rtol=1e-14)
+    # A segment at the bottom, from (0.2, 0.5) to (0.5, 0.5): to the top over the walls at x = 0, x = 1 and y = 0 or 1.
+    f = int(np.flatnonzero((z[mesh.F] == 0).all(axis=1) & (mesh.V[mesh.F].mean(axis=1)[:, 0] < 0.5))[0])
+    corners = np.vstack([mesh.V[mesh.F[f], :2].T, np.ones(3)])
+    start, end = np.linalg.solve(corners, [[0.2, 0.5], [0.5, 0.5], [1, 1]]).T
+    distance = geodesic_distance(mesh, SurfaceCurve([f], [start], [end]), method="exact")
+    at_bottom = np.hypot(np.where(x == 0, 0.2, 0.5), 0.5)
+    at_top = np.where(x == 0, np.hypot(1.2, 0.5), np.hypot(1.5, 0.5))
+    np.testing.assert_allclose(distance, np.where(z == 0, at_bottom, at_top), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["terrain", "rough sphere", "moebius", "book", "torus", "two arms"])
+def test_curves_are_nearer_than_points_on_them_by_no_more_than_the_gaps(name):
+    mesh = MESHES[name]()
+    used = np.unique(mesh.F)
+    (along,) = shortest_paths(mesh, None, int(used[0]), int(used[len(used) // 2]))
+    height = np.linalg.norm(mesh.V - mesh.V[used[3]], axis=1)
+    level = isolines(mesh, height, 0.37 * height.max())[0][0]
+    surface = ExactSurface(intrinsic_triangulation(mesh))
+    for sources in (along, level, [OffsetSources(along, 0.1), level, 7]):
+        chosen = source_set(sources, mesh.n_vertices, mesh.F)
+        segments = chosen.segments
+        found = surface.solve(chosen.vertices, chosen.vertex_offset, segments=segments).distance[used]
+        share = np.linspace(0, 1, 40)[:, None, None]
+        points = (segments.start * (1 - share) + segments.end * share).reshape(-1, 3)
+        dense, offsets = SurfacePoints(np.tile(segments.faces, 40), points), np.tile(segments.offset, 40)
+        excess = surface.solve(chosen.vertices, chosen.vertex_offset, dense, offsets).distance[used] - found
+        gap = max(curve.lengths(mesh).max() for curve in (along, level)) / 39
+        assert excess.min() > -1e-13
+        assert excess.max() <= gap / 2
+        assert np.median(excess) <= gap**2
+
+
+@pytest.mark.parametrize("name", ["terrain", "moebius", "book"])
+def test_exact_paths_end_on_curves(name):
+    mesh = MESHES[name]()
+    used = np.unique(mesh.F)
+    height = np.linalg.norm(mesh.V - mesh.V[used[3]], axis=1)
+    level = isolines(mesh, height, 0.37 * height.max())[0][0]
+    paths = shortest_paths(mesh, None, used, level)
+    distance = geodesic_distance(mesh, level, method="exact")[used]
+    np.testing.assert_allclose(lengths(mesh, paths), distance, rtol=1e-12, atol=1e-14)
+    assert_on_surface(mesh, paths)
+
+
+def test_labels_offsets_and_targets():
+    mesh = flat_perturbed(shapes.grid(16))
+    curve = isolines(mesh, mesh.V[:, 0], 0.43)[0][0]
+    solver = HeatMethodSolver(mesh, refine="exact")
+    cells = solver.voronoi([curve, OffsetSources([0], 0.05)])
+    each = np.array([np.abs(mesh.V[:, 0] - 0.43), np.linalg.norm(mesh.V - mesh.V[0], axis=1) + 0.05])
+    np.testing.assert_allclose(cells.distance, each.min(axis=0), rtol=1e-12, atol=1e-14)
+    np.testing.assert_array_equal(cells.labels, each.argmin(axis=0))
+    targets = SurfacePoints(np.arange(mesh.n_faces), np.tile([0.2, 0.5, 0.3], (mesh.n_faces, 1)))
+    surface = ExactSurface(intrinsic_triangulation(mesh))
+    found = surface.solve(segments=source_set(curve, mesh.n_vertices, mesh.F).segments, targets=targets)
+    truth = np.abs(targets.positions(mesh)[:, 0] - 0.43)
+    np.testing.assert_allclose(found.target_distance, truth, rtol=1e-12, atol=1e-14)
+
+
+def test_segments_need_the_faces_of_the_mesh():
+    stretched = Mesh(shapes.grid(6).V * [4, 1, 1], shapes.grid(6).F)
+    sheared = Mesh(stretched.V + np.outer(stretched.V[:, 0], [0, 0.9, 0]), stretched.F)
+    segments = source_set(isolines(sheared, sheared.V[:, 0], 0.43)[0][0], sheared.n_vertices, sheared.F).segments
+    with pytest.raises(ValueError, match="were not flipped"):
+        delaunay(sheared).solve(segments=segments)
