@@ -56,7 +56,8 @@ def directions(distance: FloatArray, labels: IntArray, angles: PathAngles, frame
     has_path = ~np.isnan(angles.back)
     departure, turning = (np.where(has_path, angle, 0.0) for angle in (angles.departure, angles.turning))
     arrival = np.where(has_path, _arrival(angles.back, frames.angles), 0.0)
-    gradient = np.where(has_path[:, None], frames.to_world(frames.from_angles(arrival)), 0.0)
+    along, across = (np.where(has_path, part, 0.0)[:, None] for part in (np.cos(arrival), np.sin(arrival)))
+    gradient = along * frames.x + across * frames.y
     return Directions(distance, labels, departure, arrival, turning, gradient)
 
 
