@@ -86,11 +86,15 @@ class VectorHeatSolver:
         domain = operators(triangles, "intrinsic-delaunay")
         if domain.surface is None:
             raise MeshError("tangent vectors need triangles, and the mesh holds tetrahedra")
-        self._outward: OutwardField | None = OutwardField(domain.surface)
+        self._outward: OutwardField | None = None
+        self._prepare(domain, SolverOptions(t_coef, t, refine=refine, backend=backend))
+        if self._follows_paths:
+            return
+        self._outward = OutwardField(domain.surface)
         triangulation = domain.surface.triangulation
         # Thirds of the triangles: with Voronoi areas, transport on spheres is wrong by 5 to 10 % more.
-        mass = np.bincount(triangulation.F.ravel(), np.repeat(triangulation.areas / 3, 3), domain.n).astype(np.float64)
-        self._prepare(domain, edge_rotations(domain), SolverOptions(t_coef, t, refine=refine, backend=backend), mass)
+        mass = np.bincount(triangulation.F.ravel(), np.repeat(triangulation.areas / 3, 3), domain.n)
+        self._factor(domain, edge_rotations(domain), mass.astype(np.float64))
 
     @classmethod
     def from_operators(
@@ -123,20 +127,20 @@ class VectorHeatSolver:
             raise ValueError(f"rotations must have the shape of L, {domain.L.shape}, not {rotations.shape}")
         solver = cls.__new__(cls)
         solver._frames = solver._outward = None
-        solver._prepare(domain, rotations, SolverOptions(t_coef, t, backend=backend))
+        solver._prepare(domain, SolverOptions(t_coef, t, backend=backend))
+        solver._factor(domain, rotations)
         return solver
 
-    def _prepare(
-        self, domain: Operators, rotations: sp.csc_matrix, options: SolverOptions, mass: FloatArray | None = None
-    ) -> None:
-        parts = prepare(domain, options)
-        self._distance_solver = HeatMethodSolver._of(parts)
+    def _prepare(self, domain: Operators, options: SolverOptions) -> None:
+        self._distance_solver = HeatMethodSolver._of(prepare(domain, options))
         self._follows_paths = options.refine in ("unfold", "exact")
-        if not self._follows_paths:
-            self._heat_flow = parts.heat_flow
-            t = parts.diagnostics.t * (_VECTOR_STEP if options.default_time_step else 1.0)
-            self._vector_flow = VectorHeatFlow(domain, rotations, t, options.backend, mass)
-            self._pattern = abs(rotations).tocsr()
+
+    def _factor(self, domain: Operators, rotations: sp.csc_matrix, mass: FloatArray | None = None) -> None:
+        parts = self._distance_solver._parts
+        self._heat_flow = parts.heat_flow
+        t = parts.diagnostics.t * (_VECTOR_STEP if parts.options.default_time_step else 1.0)
+        self._vector_flow = VectorHeatFlow(domain, rotations, t, parts.options.backend, mass)
+        self._pattern = abs(rotations).tocsr()
 
     @property
     def frames(self) -> TangentFrames:
