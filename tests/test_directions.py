@@ -158,6 +158,27 @@ def test_labels_and_departures_of_several_sources(sphere):
         assert np.quantile(angle_between(together.departure, departure), 0.9) < 1e-3
 
 
+@pytest.mark.parametrize("refine", REFINES)
+def test_paths_from_a_curve_start_at_the_nearest_place_on_it(refine):
+    mesh = flat_perturbed(shapes.grid(8))
+    curve = heat_igl.curve_on(mesh, [[0.2, 0.33, 0], [0.8, 0.33, 0]])
+    found = walking(mesh, refine).directions([curve, 0])
+    assert set(found.labels) == {0, 1}
+    place = found.start.positions(mesh)
+    of_curve = found.labels == 0
+    nearest = np.stack([np.clip(mesh.V[:, 0], 0.2, 0.8), np.full(mesh.n_vertices, 0.33), mesh.V[:, 2]], axis=1)
+    # Walks within the tolerance of the shortest may start some points beside it.
+    beside = (0.07 if refine == "exact" else 0.4) * mesh.edge_lengths.mean()
+    np.testing.assert_allclose(place[of_curve], nearest[of_curve], atol=beside)
+    np.testing.assert_array_equal(place[~of_curve], np.broadcast_to(mesh.V[0], place[~of_curve].shape))
+    # The departure counts from the first side of the face of the start.
+    a, b = (mesh.V[mesh.F[found.start.faces, k]] for k in (0, 1))
+    side = np.arctan2(*(b - a).T[1::-1])
+    line = mesh.V - place
+    off = angle_between(found.departure + side, np.arctan2(line[:, 1], line[:, 0]))
+    assert off[of_curve].max() < 1e-6
+
+
 def test_unreachable_vertices_have_no_direction():
     one = shapes.icosphere(1)
     mesh = Mesh(np.concatenate([one.V, one.V + 5]), np.concatenate([one.F, one.F + one.n_vertices]))
@@ -185,8 +206,6 @@ def test_bad_arguments_are_one_clear_error(sphere):
         HeatMethodSolver(sphere, refine="sweep").directions(0)
     with pytest.raises(ValueError, match="tolerance must lie between 0 and 1, not -1"):
         exact.directions(0, tolerance=-1)
-    with pytest.raises(heat_igl.SourceError, match="directions from a curve are not known"):
-        exact.directions(heat_igl.edge_curve(sphere, list(sphere.edges[0])))
     with pytest.raises(heat_igl.SourceError, match="source must be one vertex or point, not 2"):
         log_map(sphere, [1, 2])
     with pytest.raises(heat_igl.SourceError, match="source must be one vertex or point, not 2"):

@@ -73,7 +73,7 @@ def log_map(
     if method == "vector-heat":
         return VectorHeatSolver(triangles).log_map(_one_vertex(source, triangles.n_vertices))
     _require_one(source, triangles.n_vertices)
-    distance, _, angles = directed_from_scratch(triangles, source, method, _TOLERANCE)
+    distance, _, angles, _ = directed_from_scratch(triangles, source, method, _TOLERANCE)
     return _vectors(distance, np.nan_to_num(angles.departure))
 
 

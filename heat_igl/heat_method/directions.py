@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from heat_igl.intrinsic import PolarAngles, TangentFrames
+from heat_igl.mesh import SurfacePoints
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding import PathAngles, in_circle
 
@@ -36,6 +37,9 @@ class Directions:
         departure - turning``.
     gradient : (n, 3) float64
         Unit vectors in space, tangent at the vertices: the gradient of the distance.
+    start : SurfacePoints
+        The n places at which the paths start: the source, or the place on a curve, in the face in which `departure`
+        counts. Any place where no source is reached.
 
     Notes
     -----
@@ -49,16 +53,19 @@ class Directions:
     arrival: FloatArray
     turning: FloatArray
     gradient: FloatArray
+    start: SurfacePoints
 
 
-def directions(distance: FloatArray, labels: IntArray, angles: PathAngles, frames: TangentFrames) -> Directions:
+def directions(
+    distance: FloatArray, labels: IntArray, angles: PathAngles, start: SurfacePoints, frames: TangentFrames
+) -> Directions:
     """The result for paths whose angles are known."""
     has_path = ~np.isnan(angles.back)
     departure, turning = (np.where(has_path, angle, 0.0) for angle in (angles.departure, angles.turning))
     arrival = np.where(has_path, _arrival(angles.back, frames.angles), 0.0)
     along, across = (np.where(has_path, part, 0.0)[:, None] for part in (np.cos(arrival), np.sin(arrival)))
     gradient = along * frames.x + across * frames.y
-    return Directions(distance, labels, departure, arrival, turning, gradient)
+    return Directions(distance, labels, departure, arrival, turning, gradient, start)
 
 
 def carried(angles: PathAngles, labels: IntArray, sources: IntArray, polar: PolarAngles) -> AnyArray:

@@ -266,7 +266,7 @@ class VectorHeatSolver:
         if len(vertices) != 1:
             raise SourceError(f"source must be one vertex, not {len(vertices)}")
         if self._follows_paths:
-            distance, _, angles = self._distance_solver._paths(source, _STRAIGHT)
+            distance, _, angles, _ = self._distance_solver._paths(source, _STRAIGHT)
             return TangentFrames.from_angles(
                 np.nan_to_num(angles.departure), np.where(np.isfinite(distance), distance, 0.0)
             )
@@ -290,7 +290,7 @@ class VectorHeatSolver:
 
     def _along_paths(self, vertices: IntArray, numbers: AnyArray, turned: bool = False) -> AnyArray:
         """The number (n,) of the nearest source, `turned` as a tangent vector on the way; 0 without a source."""
-        _, labels, angles = self._distance_solver._paths(vertices, _STRAIGHT)
+        _, labels, angles, _ = self._distance_solver._paths(vertices, _STRAIGHT)
         # A source that is named twice has the mean of the numbers.
         _, which, count = np.unique(vertices, return_inverse=True, return_counts=True)
         total = np.zeros(len(count), numbers.dtype)

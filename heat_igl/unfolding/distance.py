@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError
-from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
+from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices, connectivity
 from heat_igl.operators import Surface, unfolding_surface
 from heat_igl.sources import NEAR_RADIUS, NearField, Seeds, SourcePoints, Sources, SourceSet, source_set
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
@@ -96,8 +96,8 @@ def distance_from_scratch(
 
 def directed_from_scratch(
     mesh: Mesh, sources: Sources, refine: Refine, tolerance: float | None = None
-) -> tuple[FloatArray, IntArray, PathAngles]:
-    """As `distance_from_scratch`, with the labels of the sources and the directions of the paths."""
+) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
+    """As `distance_from_scratch`, with labels, directions and starts of the paths: see `UnfoldingSolver.directed`."""
     if mesh.is_tetrahedral:
         raise MeshError("directions need triangles, and the mesh holds tetrahedra")
     chosen = source_set(sources, mesh.n_vertices, mesh.F)

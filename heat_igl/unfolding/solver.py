@@ -9,7 +9,6 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from heat_igl.errors import SourceError
 from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
 from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSegments, SourceSet, take_shorter
@@ -182,26 +181,35 @@ class UnfoldingSolver:
 
     def directed(
         self, term: UnfoldingTerm, u: FloatArray, tolerance: float | None = None
-    ) -> tuple[FloatArray, IntArray, PathAngles]:
-        """As `labelled`, and the directions of the paths.
+    ) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
+        """As `labelled`, and of each path the directions and the place at which it starts.
 
-        With a smaller `tolerance` than that of the solver they are more accurate. Windows give them, which are exact,
-        if it is 0, or if it is smaller than the default and the mesh has at most 10 000 vertices.
+        Points stand for curves. With a smaller `tolerance` than that of the solver the directions are more accurate.
+        Windows give them, which are exact, if it is 0, or if it is smaller than the default and the mesh has at most
+        10 000 vertices.
 
         Raises
         ------
         MeshError
             If vertices have no tangent plane, see `polar_angles`.
-        SourceError
-            If a curve is among the sources.
         ValueError
             If `tolerance` is not a number from 0 to 1.
         """
-        if len(term.sources.segments.faces):
-            raise SourceError("directions from a curve are not known: name vertices or points of it")
         _require_share(tolerance)
-        labels, angles = np.empty(len(u), np.int64), np.empty((3, len(u)))
-        return self._distance(term, u, labels, angles, tolerance), labels, PathAngles(*angles)
+        labels, angles = np.empty((2, len(u)), np.int64), np.empty((3, len(u)))
+        distance = self._distance(term, u, labels[0], angles, tolerance, labels[1])
+        return distance, labels[0], PathAngles(*angles), self._places(term, labels[1])
+
+    def _places(self, term: UnfoldingTerm, origin: IntArray) -> SurfacePoints:
+        """Sources (n,), counted vertices first; a corner of face 0 where there is none."""
+        F, points, vertices = self._given_faces, self._points(term, sampled=True), term.sources.vertices
+        corner_at = np.zeros(self._domain.components.size, np.int64)
+        corner_at[F.ravel()[::-1]] = np.arange(F.size)[::-1]
+        corner = np.append(corner_at[vertices], 0)
+        # After the vertices, points and nothing: the last one is nothing for an origin of -1.
+        faces = np.concatenate([corner[:-1] // 3, points.faces, corner[-1:] // 3])
+        barycentric = np.concatenate([np.eye(3)[corner[:-1] % 3], points.barycentric, np.eye(3)[:1]])
+        return SurfacePoints(faces[origin], barycentric[origin])
 
     def _distance(
         self,
@@ -210,12 +218,14 @@ class UnfoldingSolver:
         labels: IntArray | None = None,
         angles: FloatArray | None = None,
         tolerance: float | None = None,
+        origin: IntArray | None = None,
     ) -> FloatArray:
-        sources, points, components = term.sources, self._points(term), self._domain.components
+        sources, components = term.sources, self._domain.components
+        points = self._points(term, sampled=angles is not None)
         places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
         # Tolerances are relative to the distance: the common part is added afterwards.
         earliest = np.full(self._domain.n_components, np.inf)
-        segments = sources.segments if self.is_exact and len(sources.segments.faces) else None
+        segments = sources.segments if self.is_exact and angles is None and len(sources.segments.faces) else None
         faces = points.faces if segments is None else np.concatenate([points.faces, segments.faces])
         in_faces = components[self._given_faces[faces, 0]] if len(faces) else np.empty(0, np.int64)
         component = np.concatenate([components[sources.vertices], in_faces])
@@ -238,6 +248,8 @@ class UnfoldingSolver:
         start = self._domain.expand_to_vertices(earliest)
         if offset.any():
             distance += start
+        if origin is not None and labels is not None:
+            origin[:] = labels
         if labels is not None:
             of_places = points.label if segments is None else np.concatenate([points.label, segments.label])
             labels[:] = np.concatenate([sources.vertex_label, of_places, [-1]])[labels]
@@ -359,8 +371,9 @@ class UnfoldingSolver:
         near, source = near.at(count[at] == 1), first[at][count[at] == 1]
         return Known(near.vertex, near.value - earliest[self._domain.components[near.vertex]], source)
 
-    def _points(self, term: UnfoldingTerm) -> SourcePoints:
+    def _points(self, term: UnfoldingTerm, sampled: bool = False) -> SourcePoints:
+        """The points of a term, and those that stand for curves, unless windows take curves as they are."""
         points, segments = term.sources.points, term.sources.segments
-        if not len(segments.faces) or self._faces is None or self.is_exact:
+        if not len(segments.faces) or self._faces is None or (self.is_exact and not sampled):
             return points
         return points.joined(self._faces.samples(segments, self._spacing)[0]).joined(segments.ends())
