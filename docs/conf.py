@@ -3,31 +3,45 @@
 from __future__ import annotations
 
 import importlib
-import inspect
+import importlib.util
 import re
 import sys
 import types
 from pathlib import Path
+
+from sphinx.ext.autosummary.generate import generate_autosummary_docs
 
 import heat_igl
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
+import reference_pages  # noqa: E402
+
 project = "heat_igl"
 author = "the heat_igl developers"
 version = release = heat_igl.__version__
 html_title = f"heat_igl {release}"
+html_theme_options = {
+    "source_repository": "https://github.com/heat-igl/heat_igl",
+    "source_branch": "main",
+    "source_directory": "docs/",
+    "footer_icons": [],
+}
 
 extensions = [
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
+    # Formulas as MathML; without the converter, by a script from the network.
+    "mathml" if importlib.util.find_spec("latex2mathml") else "sphinx.ext.mathjax",
     "sphinxcontrib.bibtex",
 ]
+html_math_renderer = extensions[-2].rpartition(".")[2]
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_extra_path = ["_parts/pages"]  # interactive pages, copied unchanged
 templates_path = ["_templates"]
 exclude_patterns = ["_build", "_parts"]
@@ -41,28 +55,28 @@ bibtex_default_style = "plain"
 bibtex_reference_style = "author_year"
 numpydoc_show_class_members = False
 autodoc_typehints = "none"  # the docstrings give types and shapes
-autosummary_generate = True
-autosummary_generate_overwrite = True
-
-
-def _public_names() -> str:
-    """One line per public name of the package: a link and the summary."""
-    lines = []
-    for name in heat_igl.__all__:
-        thing = getattr(heat_igl, name)
-        target = thing.__name__ if inspect.ismodule(thing) else f"{thing.__module__}.{thing.__qualname__}"
-        summary = (inspect.getdoc(thing) or "").split("\n\n")[0].replace("\n", " ")
-        # Literals of reStructuredText become literals of Markdown.
-        lines.append(f"{{py:obj}}`heat_igl.{name} <{target}>`\n: {summary.replace('``', '`')}\n")
-    return "\n".join(lines)
+autosummary_generate = False  # see _generate_pages
 
 
 def _write_parts(*_: object) -> None:
-    """Write the list of public names and the pictures of the gallery."""
+    """Write the tables of public names and the pictures of the gallery."""
     parts = HERE / "_parts"
     parts.mkdir(exist_ok=True)
-    (parts / "names.md").write_text(_public_names(), encoding="utf8")
+    (parts / "names.md").write_text(reference_pages.page(), encoding="utf8")
     importlib.import_module("gallery").main(["--out", str(parts)])
+
+
+def _generate_pages(app) -> None:
+    """Write a page for each name of the reference: autosummary does not look into included files by itself."""
+    names = HERE / "_parts" / "names.md"
+    generate_autosummary_docs([str(names)], output_dir=str(HERE / "api"), app=app, overwrite=True)
+
+
+def _drop_missing_pages(app, docname: str, source: list[str]) -> None:
+    """In lists of pages, ``name?`` is a page that may be missing."""
+    source[0] = re.sub(
+        r"^(\w+)\?\n", lambda page: f"{page[1]}\n" if (HERE / f"{page[1]}.md").exists() else "", source[0], flags=re.M
+    )
 
 
 def _escape_bars(app, what, name, obj, options, lines) -> None:
@@ -72,25 +86,41 @@ def _escape_bars(app, what, name, obj, options, lines) -> None:
         lines[i] = "".join(part if part.startswith("``") else part.replace("|", r"\|") for part in parts)
 
 
-def _skip_aliases(app, what, name, obj, skip, options) -> bool | None:
-    """A generic alias such as tuple[int, ...] looks like a class and has no signature."""
-    return True if isinstance(obj, types.GenericAlias) else None
+def _skip_members(app, what, name, obj, skip, options) -> bool | None:
+    """Leave out of the page of a module what has a page of its own.
+
+    A generic alias such as tuple[int, ...] looks like a class and has no signature.
+    """
+    has_page = what == "module" and any(obj is getattr(heat_igl, public) for public in heat_igl.__all__)
+    return True if has_page or isinstance(obj, types.GenericAlias) else None
 
 
-def _resolve_room_names(app, env, node, contnode):
-    """Link a name that a package hands on, such as heat_igl.io.read_mesh, to the module that defines it."""
-    module, _, name = node.get("reftarget", "").rpartition(".")
-    try:
-        found = getattr(importlib.import_module(module), name)
-        target = f"{found.__module__}.{found.__qualname__}"
-    except (ImportError, AttributeError, ValueError):
-        return None
+def _resolve_names(app, env, node, contnode):
+    """Link a name in a docstring, such as `Mesh` or `heat_igl.io.read_mesh`, to its page in the reference."""
+    target = node.get("reftarget", "").removeprefix("~")
+    head, _, name = target.rpartition(".")
+    candidates = [f"heat_igl.{target}"]
+    if head and not head.startswith("heat_igl"):
+        candidates.append(f"heat_igl.{head}.{name}")
+    for place in [head] if head.startswith("heat_igl") else []:
+        try:
+            found = getattr(importlib.import_module(place), name)
+        except (ImportError, AttributeError):
+            continue
+        candidates += [f"heat_igl.{name}"] if name in heat_igl.__all__ else []
+        candidates.append(f"{getattr(found, '__module__', place)}.{getattr(found, '__qualname__', name)}")
     python = env.get_domain("py")
-    return python.resolve_xref(env, node["refdoc"], app.builder, "obj", target, node, contnode)
+    for candidate in candidates:
+        link = python.resolve_xref(env, node["refdoc"], app.builder, "obj", candidate, node, contnode)
+        if link is not None:
+            return link
+    return None
 
 
 def setup(app) -> None:
-    app.connect("missing-reference", _resolve_room_names)
+    app.connect("missing-reference", _resolve_names)
     app.connect("config-inited", _write_parts)
-    app.connect("autodoc-skip-member", _skip_aliases)
+    app.connect("builder-inited", _generate_pages)
+    app.connect("source-read", _drop_missing_pages)
+    app.connect("autodoc-skip-member", _skip_members)
     app.connect("autodoc-process-docstring", _escape_bars, priority=900)  # after numpydoc

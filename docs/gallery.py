@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import inspect
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import numpy as np
 import heat_igl
 from heat_igl import shapes
 from heat_igl.demo import sample_mesh
-from heat_igl.drawing import Page, Picture, page, plot, plot_field
+from heat_igl.drawing import Page, Picture, page, plot, plot_field, plot_labels
 
 
 def torus() -> Picture:
@@ -65,7 +66,155 @@ def asked() -> Page:
     return page(mesh, phi, sources=0, view=(30, 50), title="Distance on a torus", method="Distance by the heat method.")
 
 
-ENTRIES = (torus, bunny, heat, error, book, asked)
+def near() -> Picture:
+    """Exact distance, searched no farther than a cutoff: the rest of the surface costs nothing."""
+    mesh = heat_igl.sample_mesh()
+    phi = heat_igl.geodesic_distance(mesh, 1234, method="exact", cutoff=0.2 * mesh.longest_distance)
+    return plot(mesh, phi, sources=1234)
+
+
+def paths() -> Picture:
+    """Shortest paths from one vertex to the farthest points of the surface."""
+    mesh = heat_igl.sample_mesh()
+    solver = heat_igl.HeatMethodSolver(mesh, refine="unfold")
+    ends = heat_igl.farthest_points(solver, 40, start=1234)[1:]
+    return plot(mesh, solver.distance(1234), sources=1234, curves=heat_igl.shortest_paths(mesh, solver, ends, 1234))
+
+
+def cells() -> Picture:
+    """Geodesic Voronoi cells of farthest points."""
+    mesh = heat_igl.sample_mesh()
+    found = heat_igl.farthest_cells(mesh, 40)
+    return plot_labels(mesh, found.labels, sources=found.sites)
+
+
+def samples() -> Picture:
+    """Three hundred farthest points, and the distance from the nearest."""
+    mesh = shapes.blob(5)
+    cells = heat_igl.farthest_cells(mesh, 300)
+    return plot(mesh, cells.distance, sources=cells.sites, style="plain")
+
+
+def dual() -> Picture:
+    """The dual triangulation of geodesic Voronoi cells: a coarse mesh with the shape of the fine one."""
+    mesh = shapes.torus(120, 60)
+    coarse = heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(mesh, 400))
+    return plot(coarse, heat_igl.geodesic_distance(coarse, 0), sources=0, view=(30, 50))
+
+
+def curve() -> Picture:
+    """Distance from a closed curve that is projected onto the surface."""
+    mesh = shapes.icosphere(5)
+    angle = np.linspace(0, 2 * np.pi, 200)[:-1]
+    ring = np.stack([np.cos(angle), np.sin(angle), 0.4 * np.sin(3 * angle)], axis=1)
+    source = heat_igl.curve_on(mesh, ring / np.linalg.norm(ring, axis=1, keepdims=True), closed=True)
+    return plot(mesh, heat_igl.geodesic_distance(mesh, source), sources=source)
+
+
+def region() -> Picture:
+    """Distance from a region, given as a mask of vertices."""
+    mesh = shapes.blob(5)
+    region = mesh.V[:, 1] > 0.6 * mesh.V[:, 1].max()
+    return plot(mesh, heat_igl.geodesic_distance(mesh, region))
+
+
+def offsets() -> Picture:
+    """Curves at a given distance from two vertices."""
+    mesh = heat_igl.sample_mesh()
+    solver = heat_igl.HeatMethodSolver(mesh, refine="unfold")
+    phi = solver.distance([1234, 9000])
+    found = heat_igl.offset_curves(mesh, solver, [1234, 9000], 0.3 * phi.max())
+    return plot(mesh, phi, sources=[1234, 9000], style="plain", curves=found)
+
+
+def tetrahedra() -> Picture:
+    """Distance through a solid, by the heat method on tetrahedra."""
+    mesh = shapes.box(12, (2.0, 1.0, 1.0))
+    return plot(mesh, heat_igl.HeatMethodSolver(mesh).distance(0), sources=0, view=(215, -30))
+
+
+def polygons() -> Picture:
+    """Distance on quadrilaterals, which stay as they are."""
+    rows, columns = np.mgrid[:60, :60]
+    V = np.stack([columns / 59, 0.1 * np.sin(columns / 8) * np.cos(rows / 8), rows / 59], axis=-1).reshape(-1, 3)
+    at = np.arange(3600).reshape(60, 60)
+    F = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
+    mesh = heat_igl.PolygonMesh(V, F)
+    return plot(mesh, heat_igl.HeatMethodSolver(mesh).distance(1830), sources=1830, view=(30, 45))
+
+
+def cloud() -> Picture:
+    """Distance on points without faces, drawn on the triangles that the cloud finds for itself."""
+    P = np.random.default_rng(0).standard_normal((4000, 3))
+    cloud = heat_igl.PointCloud(P / np.linalg.norm(P, axis=1, keepdims=True) * [1.0, 0.6, 0.8])
+    phi = heat_igl.HeatMethodSolver(cloud).distance(0)
+    return plot(cloud.triangles, phi, sources=0)
+
+
+def directions() -> Picture:
+    """The first coordinate of the log map: how far along one direction of the tangent plane each vertex lies."""
+    mesh = shapes.blob(5)
+    x, _ = heat_igl.VectorHeatSolver(mesh).log_map(0).T
+    return plot_field(mesh, x, spacing=0.2, label="x of the log map", sources=0)
+
+
+def straightest() -> Picture:
+    """Straightest geodesics in all directions from one vertex."""
+    mesh = shapes.torus(120, 60)
+    angles = np.linspace(0, 2 * np.pi, 25)[:-1]
+    rays = [heat_igl.trace_geodesic(mesh, 0, (np.cos(angle), np.sin(angle)), 2.0) for angle in angles]
+    return plot(mesh, heat_igl.geodesic_distance(mesh, 0), sources=0, style="plain", curves=rays, view=(30, 50))
+
+
+def extended() -> Picture:
+    """Values at five vertices, extended to all others by the vector heat method."""
+    mesh = shapes.blob(5)
+    sites = heat_igl.farthest_points(mesh, 5)
+    values = heat_igl.VectorHeatSolver(mesh).extend(sites, [1.0, 4.0, 2.0, 5.0, 3.0])
+    return plot_field(mesh, values, label="value", sources=sites, limits=(1, 5))
+
+
+def travel_time() -> Picture:
+    """Travel time where one half of a square is four times as fast."""
+    mesh = shapes.grid(80)
+    fast = mesh.V[mesh.F].mean(axis=1)[:, 0] > mesh.V[:, 0].mean()
+    domain = heat_igl.speed_operators(mesh, np.where(fast, 4.0, 1.0))
+    time = heat_igl.HeatMethodSolver.from_operators(domain).distance(41)
+    return plot(mesh, time, sources=41, label="time")
+
+
+def maze() -> Picture:
+    """Distance in the white pixels of an image."""
+    mask = np.ones((60, 60), bool)
+    for k in range(1, 5):
+        mask[12 * k, slice(10, None) if k % 2 else slice(None, 50)] = False
+    domain = heat_igl.image_domain(mask)
+    source = domain.index[4, 55]
+    return plot(domain.mesh, heat_igl.geodesic_distance(domain.mesh, source), sources=source)
+
+
+def cut_locus() -> Picture:
+    """Where fronts from two sides meet: the gradient of the distance is shorter than 1 there."""
+    mesh = shapes.blob(5)
+    phi = heat_igl.geodesic_distance(mesh, 0)
+    residual = heat_igl.metrics.eikonal_residual(mesh, phi)
+    largest = np.zeros(mesh.n_vertices)
+    np.maximum.at(largest, mesh.F, residual[:, None])
+    return plot_field(mesh, largest, label="| |grad d| - 1 |", limits=(0, 0.5), view=(180, 20))
+
+
+def unfolded() -> Picture:
+    """The error of unfolding, near-exact, on a logarithmic scale."""
+    mesh = shapes.blob(5)
+    exact = heat_igl.geodesic_distance(mesh, 0, method="exact")
+    error = np.abs(heat_igl.geodesic_distance(mesh, 0) - exact) / exact.max()
+    return plot_field(mesh, np.log10(np.maximum(error, 1e-9)), label="log10 of error", limits=(-9, -3), sources=0)
+
+
+ENTRIES = (
+    torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, heat, error, unfolded, cut_locus, book,
+    tetrahedra, polygons, cloud, maze, travel_time, directions, straightest, extended, asked,
+)  # fmt: skip
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -73,18 +222,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("gallery"), help="directory for the results; made if missing")
     out: Path = parser.parse_args(argv).out
     (out / "pages").mkdir(parents=True, exist_ok=True)
-    text = []
+    thumbnails, sections = [], []
     for entry in ENTRIES:
-        result = entry()
+        name, title, result = entry.__name__, str(entry.__doc__), entry()
         if isinstance(result, Picture):
-            result.save(out / f"{entry.__name__}.png")
-            shown = f"![{entry.__doc__}]({entry.__name__}.png)"
+            result.save(out / f"{name}.png")
+            shown = f"![{title}]({name}.png)"
+            # The sections below bring the pictures into this folder of the site.
+            thumbnails.append(f'<a href="#{name}"><img src="_images/{name}.png" alt="{title}">{_short(title)}</a>')
         else:
-            result.save(out / "pages" / f"{entry.__name__}.html")
-            shown = f'<iframe src="{entry.__name__}.html" style="width: 100%; height: 520px; border: 0"></iframe>'
-        text.append(f"## {entry.__doc__}\n\n{shown}\n\n```python\n{_body(entry)}```\n")
-    (out / "gallery.md").write_text("\n".join(text), encoding="utf8")
+            result.save(out / "pages" / f"{name}.html")
+            shown = f'<iframe src="{name}.html" style="width: 100%; height: 520px; border: 0"></iframe>'
+        sections.append(f"({name})=\n\n## {title}\n\n{shown}\n\n```python\n{_body(entry)}```\n")
+    grid = "\n".join(['<div class="thumbnails">', *thumbnails, "</div>", ""])
+    (out / "gallery.md").write_text("\n".join([grid, *sections]), encoding="utf8")
     return 0
+
+
+def _short(title: str) -> str:
+    """The beginning of a sentence, up to the first mark."""
+    return re.split("[,.:]", title)[0]
 
 
 def _body(entry: Callable[[], object]) -> str:

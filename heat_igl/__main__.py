@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import sys
 
-from heat_igl.errors import MissingExtraError
+from heat_igl.cli import run
 
 __all__ = ["main"]
 
 
 def main() -> int:
     """Run the command line on ``sys.argv`` and return the exit status."""
-    try:
-        from heat_igl.cli.program import run_program
-    except ImportError as error:
-        # Any other import error is a fault of the installation; the traceback identifies it.
-        if (error.name or "").split(".")[0] not in ("typer", "rich", "click"):
-            raise
-        print(f"heat-igl: {MissingExtraError.of('the command line', 'typer and rich', 'cli')}", file=sys.stderr)
-        return 1
-    return run_program(sys.argv[1:])
+    return run(sys.argv[1:])
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ ezdxf
 gdist
 matplotlib
 meshio
+nibabel
 numba
 polyscope
 potpourri3d

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import typer
 
 import heat_igl
 from heat_igl import cli, demo, drawing, io, reference, shapes
 from heat_igl.cli import comparison, distances
+from heat_igl.cli.examples import EXAMPLES
+from heat_igl.cli.program import app
 
 ENVIRONMENT = {
     **os.environ,
@@ -262,7 +268,7 @@ def test_a_warning_of_the_package_is_one_line(sphere: Path, capsys: pytest.Captu
         (["--method=guess"], 2, ("--method", "'guess' is not one of unfold, sweep, heat, exact")),
         (["--method=unfold", "--t-coef=2"], 1, ("--t-coef is an option of the heat method", "--method is unfold")),
         (["--backend=abacus"], 2, ("abacus", "auto, scipy, multifrontal")),
-        (["--output=out.obj"], 1, ("out.obj", ".ply or .vtu")),
+        (["--output=out.obj"], 1, ("out.obj", ".ply, .vtu, .vtp, .gii, .npy or .csv")),
         (["--picture=out.gif"], 1, ("out.gif", ".png, .pdf, .svg")),
         (["--output=.ply/out.ply"], 1, (".ply",)),
         (["--picture=folder.png"], 1, ("folder.png is a directory",)),
@@ -289,7 +295,7 @@ def test_tetrahedra_go_to_vtu_only(tmp_path: Path, capsys: pytest.CaptureFixture
     box = tmp_path / "box.mesh"
     io.write_mesh(box, shapes.box(2))
     assert cli.run(["distance", str(box), "--source", "0", "--output", str(tmp_path / "out.ply")]) == 1
-    assert_one_line(capsys.readouterr().err, "tetrahedra with distances go to .vtu files")
+    assert_one_line(capsys.readouterr().err, "tetrahedra with distances go to .vtu, .npy or .csv files")
     assert cli.run(["distance", str(box), "--source", "0", "--output", str(tmp_path / "out.vtu")]) == 0
     distance = io.read_attributes(tmp_path / "out.vtu")["distance"]
     np.testing.assert_array_equal(distance, heat_igl.HeatMethodSolver(shapes.box(2)).distance(0))
@@ -349,3 +355,115 @@ def test_a_fault_of_the_package_is_not_hidden(sphere: Path, monkeypatch: pytest.
     monkeypatch.setattr(comparison, "read_mesh", broken)
     with pytest.raises(TypeError, match="a bug"):
         cli.run(["info", str(sphere)])
+
+
+# --- JSON, arrays, help and completion --------------------------------------------------------------------------------
+
+
+def commands() -> list[str]:
+    return [each.callback.__name__ for each in app.registered_commands]
+
+
+@pytest.mark.parametrize("name", commands())
+def test_every_command_has_json_and_examples(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert cli.run([name, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert "--json FILE" in out
+    assert f"  heat-igl {EXAMPLES[name][0]}\n" in out
+
+
+@pytest.mark.parametrize("example", [example for examples in EXAMPLES.values() for example in examples])
+def test_examples_are_understood(example: str) -> None:
+    command = typer.main.get_command(app)
+    name, *arguments = example.split()
+    context = command.commands[name].make_context(name, arguments)
+    assert all(value is not None for key, value in context.params.items() if key in ("mesh", "folder", "store"))
+
+
+def test_json_holds_what_the_lines_say(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["distance", str(sphere), "--source=12", "--method=heat", f"--output={sphere.with_name('d.npy')}"]
+    assert cli.run([*arguments, "--json=-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    distance = heat_igl.HeatMethodSolver(sphere).distance(12)
+    assert np.array_equal(np.load(sphere.with_name("d.npy")), distance)
+    assert found["mesh"] == {"path": str(sphere), "n_vertices": 162, "n_triangles": 320}
+    assert found["farthest"] == {"distance": distance.max(), "vertex": distance.argmax()}
+    assert (found["method"], found["mean"]) == ("heat", distance.mean())
+    assert found["wrote"] == [str(sphere.with_name("d.npy"))]
+    assert found["seconds"]["per_distance"] > 0
+    file = sphere.with_name("d.json")
+    assert cli.run([*arguments, f"--json={file}"]) == 0
+    assert re.search(r"farthest +\S+ at vertex", capsys.readouterr().out)
+    assert json.loads(file.read_text())["farthest"] == found["farthest"]
+
+
+def test_json_of_the_other_commands(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def printed(*arguments: str) -> dict[str, Any]:
+        assert cli.run([arguments[0], str(sphere), *arguments[1:], "--json=-"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    report = shapes.icosphere(2).report()
+    assert printed("info")["mean_edge"] == report.mean_edge
+    lines = printed("isolines", "--source=0", "--spacing=0.5", f"--output={sphere.with_name('l.obj')}")
+    assert (lines["lines"], lines["distances"]) == (5, [0.5, 1.0, 1.5, 2.0, 2.5])
+    path = printed("path", "--from=0", "--to=5", f"--output={sphere.with_name('p.obj')}")
+    assert path["length"] == pytest.approx(heat_igl.geodesic_distance(sphere, 0, method="exact")[5], rel=1e-3)
+    page = printed("view", f"--html={sphere.with_name('v.html')}")
+    assert page["wrote"] == [str(sphere.with_name("v.html"))]
+    validation = printed("validate", "--methods=heat")
+    assert validation["rows"][0]["errors"]["mean"] < 0.05
+
+
+def test_json_that_cannot_be_written_stops_at_once(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["info", str(sphere), "--json=nowhere/a.json"]) == 1
+    assert_one_line(capsys.readouterr().err, "nowhere/a.json cannot be written")
+
+
+def test_distances_as_text(two_spheres: Path) -> None:
+    file = two_spheres.with_name("d.csv")
+    assert cli.run(["distance", str(two_spheres), "--source=3", f"--output={file}"]) == 0
+    first, *lines = file.read_text().splitlines()
+    assert first == "vertex,distance"
+    vertex, distance = np.array([line.split(",") for line in lines], float).T
+    assert np.array_equal(vertex, np.arange(84))
+    assert np.array_equal(distance, heat_igl.geodesic_distance(two_spheres, 3))
+
+
+def test_the_table_of_errors_fits_the_terminal(
+    sphere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heads = {}
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    for width in (60, 80, 140):
+        monkeypatch.setenv("COLUMNS", str(width))
+        assert cli.run(["validate", str(sphere), "--methods=heat,sweep"]) == 0
+        lines = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
+        assert "162 vertices" in lines[0]
+        table = lines[[line.startswith("method") for line in lines].index(True) :]
+        assert max(map(len, table[:3])) <= width
+        assert [line.split()[0] for line in table[1:3]] == ["heat", "sweep"]
+        assert not any("…" in line for line in table)
+        heads[width] = table[0].split()
+        assert all(any(line.startswith(head) for line in table[3:]) for head in ("mean", "max", "ms"))
+    assert len(heads[60]) < len(heads[80]) < len(heads[140])
+
+
+def test_a_shell_is_told_how_commands_go_on(tmp_path: Path) -> None:
+    def completed(words: str, place: int) -> str:
+        asked = {"_HEAT_IGL_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(place)}
+        return subprocess.run(
+            [sys.executable, "-m", "heat_igl"], cwd=tmp_path, env={**ENVIRONMENT, **asked}, capture_output=True,
+            text=True, check=False,
+        ).stdout.strip()  # fmt: skip
+
+    assert completed("heat-igl dist", 1) == "distance"
+    assert completed("heat-igl distance --cut", 2) == "--cutoff"
+
+
+def test_isolines_of_a_surface_are_drawn_with_hidden_lines_dotted(sphere: Path) -> None:
+    file = sphere.with_name("lines.svg")
+    assert cli.run(["isolines", str(sphere), "--source=0", "--spacing=0.5", f"--output={file}"]) == 0
+    text = file.read_text()
+    assert 'id="visible"' in text
+    assert 'id="hidden" stroke-dasharray=' in text

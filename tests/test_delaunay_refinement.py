@@ -251,8 +251,13 @@ def test_refine_unfolds_the_triangles_of_the_mesh() -> None:
     assert HeatMethodSolver(mesh, refine="sweep").operators.n == mesh.n_vertices
     with pytest.raises(ValueError, match="leave laplacian='intrinsic-delaunay-refined' away"):
         HeatMethodSolver(mesh, refine="unfold", laplacian="intrinsic-delaunay-refined")
-    with pytest.raises(ValueError, match="pass operators without refinement"):
-        HeatMethodSolver.from_operators(operators(mesh, "intrinsic-delaunay-refined"), refine="unfold")
+    refined = operators(mesh, "intrinsic-delaunay-refined")
+    assert refined.n > mesh.n_vertices
+    for refine in ("sweep", "unfold", "exact"):
+        solver = HeatMethodSolver.from_operators(refined, refine=refine)
+        assert solver.operators.n == mesh.n_vertices
+        expected = HeatMethodSolver(mesh, refine=refine).distance(0)
+        np.testing.assert_allclose(solver.distance(0), expected, rtol=1e-9, atol=1e-12)
 
 
 def test_even_meshes_stay_as_they_are() -> None:

@@ -216,6 +216,9 @@ def test_bad_arguments_are_one_clear_error(sphere):
         log_map(sphere, 0, method="heat")
     with pytest.raises(heat_igl.MeshError, match="directions need triangles, and the mesh holds tetrahedra"):
         log_map((np.eye(4, 3), [[0, 1, 2, 3]]), 0)
+    solid = HeatMethodSolver(shapes.box(2))
+    with pytest.raises(heat_igl.MeshError, match="directions need triangles that fit together"):
+        solid.directions(0)
     fan = Mesh(np.random.default_rng(0).random((5, 3)), [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     with pytest.raises(heat_igl.MeshError, match="is one of more than two faces"):
         HeatMethodSolver(fan, refine="exact").directions(0)

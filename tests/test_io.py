@@ -19,7 +19,7 @@ from heat_igl.io import files
 
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="needs meshio")
 VTU = pytest.param(".vtu", marks=needs_meshio)
-SURFACE_FORMATS = [".off", ".obj", ".ply", ".mesh", ".msh", VTU]
+SURFACE_FORMATS = [".off", ".obj", ".ply", ".mesh", ".msh", ".vtp", VTU]
 
 V4 = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 F4 = np.array([[0, 1, 2], [0, 1, 3]])
@@ -85,7 +85,7 @@ def test_any_coordinate_comes_back_exactly(tmp_path: Path, extension: str, numbe
     assert same(read_mesh(tmp_path / f"a{extension}"), V, F4)
 
 
-@pytest.mark.parametrize("extension", [".ply", VTU])
+@pytest.mark.parametrize("extension", [".ply", ".vtp", VTU])
 def test_attributes_come_back_bit_for_bit(tmp_path: Path, extension: str) -> None:
     mesh = grid(4)
     distance = np.linspace(0, np.pi, 16)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -12,7 +13,8 @@ import pytest
 import heat_igl
 from heat_igl import shapes
 from heat_igl.drawing import camera, figure, raster, shading
-from heat_igl.drawing.plots import Picture, picture, plot, plot_field
+from heat_igl.drawing.line_drawing import write_line_drawing
+from heat_igl.drawing.plots import Picture, picture, plot, plot_field, plot_labels
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, colours
 from heat_igl.drawing.surface_image import LINE
 
@@ -398,3 +400,80 @@ def test_without_matplotlib_the_message_names_the_extra(monkeypatch: pytest.Monk
 @pytest.mark.parametrize(("largest", "spacing"), [(1.0, 0.05), (0.85, 0.05), (635.0, 50.0), (3e-8, 2e-9), (0.0, 1.0)])
 def test_spacing_is_a_round_number(largest: float, spacing: float) -> None:
     assert shading.isoline_spacing(largest) == pytest.approx(spacing)
+
+
+# --- labels -----------------------------------------------------------------------------------------------------------
+
+
+def test_labels_have_one_colour_each_and_neighbours_others() -> None:
+    mesh = shapes.grid(12)
+    cells = heat_igl.voronoi_cells(heat_igl.HeatMethodSolver(mesh), [0, 12, 84, 100, 168])
+    numbers = shading.colour_numbers(cells.labels, mesh.edges, 10)
+    assert len({(label, number) for label, number in zip(cells.labels, numbers, strict=True)}) == 5
+    across = cells.labels[mesh.edges[:, 0]] != cells.labels[mesh.edges[:, 1]]
+    assert across.any()
+    assert (numbers[mesh.edges[across, 0]] != numbers[mesh.edges[across, 1]]).all()
+    # On a flat mesh the light is the same everywhere: no other colours than those of the labels.
+    drawn = plot_labels(mesh, cells.labels)
+    assert len(drawn.figure.axes) == 1  # no colour bar
+    image = surface_image(drawn)
+    inside = image[image[..., 3] == 1][:, :3].round(4)
+    _, counts = np.unique(inside, axis=0, return_counts=True)
+    assert counts[np.argsort(counts)][-len(set(numbers)) :].sum() > 0.95 * len(inside)
+
+
+def test_vertices_without_a_label_are_grey() -> None:
+    mesh = shapes.grid(4)
+    image = surface_image(plot_labels(mesh, np.full(25, -1) + (mesh.V[:, 0] > mesh.V[:, 0].mean())))
+    grey = np.ptp(image[..., :3], axis=2) < 1e-6
+    assert 0.3 < (grey & (image[..., 3] == 1)).sum() / (image[..., 3] == 1).sum() < 0.95
+
+
+@pytest.mark.parametrize(
+    ("labels", "said"),
+    [(np.zeros(25), "labels must be integers, not float64"), (np.zeros(3, int), r"labels must have shape \(25,\)")],
+)
+def test_what_are_no_labels(labels: np.ndarray, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        plot_labels(shapes.grid(4), labels)
+
+
+# --- line drawings ----------------------------------------------------------------------------------------------------
+
+
+def drawn_lines(path: Path) -> dict[str, list[np.ndarray]]:
+    """The polylines of each group, with y upwards."""
+    found = {}
+    for name, group in re.findall(r'<g id="(\w+)"[^>]*>\n(.*?)</g>', path.read_text(), re.DOTALL):
+        points = re.findall(r'points="([^"]*)"', group)
+        found[name] = [np.array([pair.split(",") for pair in text.split()], float) * [1, -1] for text in points]
+    return found
+
+
+@pytest.mark.parametrize("hidden", ["dotted", "omitted"])
+def test_lines_behind_the_surface_are_hidden(tmp_path: Path, hidden: str) -> None:
+    """Circles of latitude on a sphere, seen at right angles to the axis: the near half of each is visible."""
+    sphere = shapes.icosphere(4)
+    mesh = heat_igl.Mesh(10 * sphere.V + 3, sphere.F)
+    levels = heat_igl.isolines(mesh, mesh.V[:, 1], [0.0, 3.0, 7.0])
+    path = tmp_path / "a.svg"
+    write_line_drawing(path, mesh, levels, hidden=hidden, view=(0, 0))
+    found = drawn_lines(path)
+    assert set(found) == ({"visible", "hidden"} if hidden == "dotted" else {"visible"})
+    for group in found.values():
+        across = sum(np.abs(np.diff(line[:, 0])).sum() for line in group)
+        radii = np.sqrt(100 - np.array([-3.0, 0.0, 4.0]) ** 2)
+        assert across == pytest.approx(2 * radii.sum(), rel=0.03)
+        heights = np.concatenate([line[:, 1] for line in group])
+        assert np.abs(heights[:, None] - [-3, 0, 4]).min(axis=1).max() < 0.05
+    assert ("stroke-dasharray" in path.read_text()) == (hidden == "dotted")
+
+
+def test_a_line_drawing_goes_to_svg(tmp_path: Path) -> None:
+    mesh = shapes.icosphere(1)
+    with pytest.raises(ValueError, match=r"a\.png: line drawings go to \.svg files"):
+        write_line_drawing(tmp_path / "a.png", mesh, [])
+    with pytest.raises(ValueError, match="hidden must be one of 'dotted', 'omitted', not 'grey'"):
+        write_line_drawing(tmp_path / "a.svg", mesh, [], hidden="grey")
+    with pytest.raises(TypeError, match="curves must be a SurfaceCurve or a list of such, not int"):
+        write_line_drawing(tmp_path / "a.svg", mesh, 3)

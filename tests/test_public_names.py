@@ -24,7 +24,9 @@ farthest_points geodesic_centre geodesic_distance heat_method_distance image_dom
 offset_curves pair_distances plots point_cloud_operators polygon_operators read_attributes read_mesh read_point_cloud
 read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
 tangent_frames trace_geodesic Directions log_map
-unfolded_distance validate voronoi_cells write_curves write_mesh
+unfolded_distance validate voronoi_cells write_curves write_mesh write_point_cloud
+fibre_metric metric_operators
+CutMesh OrientedPoints SignedHeatSolver VoxelBox cut region_boundary volume_signed_distance
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they
@@ -44,6 +46,7 @@ read_polygon_mesh(path)
 read_point_cloud(path)
 write_mesh(path, mesh)
 write_curves(path, mesh, curves, *, projection=None)
+write_point_cloud(path, cloud)
 heat_method_distance(V, F, sources)
 unfolded_distance(V, F=None, sources=None, *, tolerance=4e-05)
 geodesic_distance(mesh, sources, *, method='unfold', cutoff=None)
@@ -59,6 +62,7 @@ HeatMethodSolver.distances(self, source_sets, out=None, progress=False, dtype=No
 HeatMethodSolver.voronoi(self, sources, *, cutoff=None)
 HeatMethodSolver.solve(self, sources)
 HeatMethodSolver.directions(self, sources, *, tolerance=None)
+HeatMethodSolver.distance_vjp(self, sources)
 isolines(mesh, values, levels)
 offset_curves(mesh, solver, sources, radius)
 enclosed_areas(mesh, values, level)
@@ -73,6 +77,13 @@ VectorHeatSolver(mesh, *, t_coef=None, t=None, refine=None, backend='auto')
 VectorHeatSolver.extend(self, sources, values)
 VectorHeatSolver.transport(self, sources, vectors)
 VectorHeatSolver.log_map(self, source)
+OrientedPoints(points, normals)
+SignedHeatSolver(mesh, *, refine=None, t_coef=None, t=None, backend='auto')
+SignedHeatSolver.distance(self, curves, *, unsigned=None, level='zero')
+cut(mesh, curves)
+region_boundary(mesh, *, faces=None, vertices=None)
+VoxelBox(origin, spacing, shape)
+volume_signed_distance(domain, surface, *, t_coef=1.0)
 closest_points(mesh, positions)
 curve_on(mesh, positions, *, closed=False, tolerance=None)
 edge_curve(mesh, vertices, *, closed=False)
@@ -81,6 +92,8 @@ split_long_edges(mesh, longest=None)
 polygon_operators(mesh)
 point_cloud_operators(cloud)
 speed_operators(mesh, speed)
+metric_operators(mesh, metric, laplacian='auto')
+fibre_metric(directions, along, across)
 farthest_points(solver, k, *, start=0)
 farthest_cells(solver, k, *, start=0)
 voronoi_cells(solver, sites)

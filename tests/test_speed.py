@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from conftest import perturbed
 
 import heat_igl
-from heat_igl import shapes, speed_operators
-from heat_igl.mesh import Mesh
+from heat_igl import metric_operators, shapes, speed_operators
+from heat_igl.mesh import Mesh, connectivity
 from heat_igl.operators import operators
 from heat_igl.typing import FloatArray
 from heat_igl.validation import relative_error
@@ -23,17 +23,18 @@ def flat(mesh: Mesh, seed: int = 0) -> Mesh:
     return Mesh(V, mesh.F)
 
 
-def solver(mesh: Mesh, speed: FloatArray, **options: float) -> heat_igl.HeatMethodSolver:
+def solver(mesh: Mesh, speed: FloatArray, **options: Any) -> heat_igl.HeatMethodSolver:
     return heat_igl.HeatMethodSolver.from_operators(speed_operators(mesh, speed), **options)
 
 
 @pytest.mark.parametrize("mesh", [perturbed(shapes.torus(12, 30)), perturbed(shapes.box(4))], ids=["torus", "box"])
 def test_identities(mesh):
-    speed = np.random.default_rng(0).uniform(0.5, 3, mesh.n_faces)
-    domain = speed_operators(mesh, speed)
+    p = mesh.F.shape[1] - 1
+    speed = np.random.default_rng(0).choice([0.5, 1, 3], mesh.n_faces)
+    # On the mesh's own faces: those of one speed are flipped otherwise.
+    domain = metric_operators(mesh, np.eye(3) / speed[:, None, None] ** 2, "cotan")
     assert abs(domain.D @ domain.G - domain.L).max() < 1e-12 * abs(domain.L).max()
     assert abs(domain.L - domain.L.T).max() < 1e-12 * abs(domain.L).max()
-    p = mesh.F.shape[1] - 1
     assert domain.weights == pytest.approx(mesh.measures / speed**p)
     assert domain.M.diagonal().sum() == pytest.approx(domain.weights.sum(), rel=1e-12)
     assert np.array_equal(domain.boundary, mesh.boundary)
@@ -44,9 +45,7 @@ def test_identities(mesh):
 
 @pytest.mark.parametrize("mesh", [shapes.icosphere(3), shapes.box(6)], ids=["sphere", "box"])
 def test_one_speed_divides_all_distances(mesh):
-    # Without triangles there is no near field of straight lines around the source, as there is none with a speed.
-    plain = heat_igl.HeatMethodSolver.from_operators(replace(operators(mesh), lengths=None, surface=None))
-    expected = plain.distance(5) / 2.5
+    expected = heat_igl.HeatMethodSolver(mesh).distance(5) / 2.5
     found = solver(mesh, np.full(mesh.n_faces, 2.5)).distance(5)
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
     across = speed_operators(mesh, np.full(mesh.n_faces, 2.5)).longest_distance
@@ -83,11 +82,12 @@ def test_stereographic_projection_of_a_hemisphere():
         source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0, 0], axis=1)))
         exact = np.arccos(np.clip(on_sphere @ on_sphere[source], -1, 1))
         speed = (1 + (mesh.V[mesh.F].mean(axis=1) ** 2).sum(axis=1)) / 2
-        time = solver(mesh, speed, t_coef=4.0).distance(source)
-        errors.append(np.abs(time - exact).mean() / exact.mean())
-    assert errors[1] < 0.6 * errors[0]
-    assert errors[2] < 0.6 * errors[1]
-    assert errors[2] < 0.005
+        by_heat, unfolded = (solver(mesh, speed, refine=refine).distance(source) for refine in (None, "unfold"))
+        errors.append([np.abs(time - exact).mean() / exact.mean() for time in (by_heat, unfolded)])
+    assert (np.array(errors[1]) < 0.65 * np.array(errors[0])).all()
+    assert (np.array(errors[2]) < 0.65 * np.array(errors[1])).all()
+    assert errors[2][0] < 0.004
+    assert errors[2][1] < 0.0003
 
 
 def test_hyperbolic_space_on_tetrahedra():
@@ -104,10 +104,7 @@ def test_hyperbolic_space_on_tetrahedra():
         errors.append(np.abs(solver(mesh, speed).distance(source) - exact).mean() / exact.mean())
     assert errors[1] < 0.7 * errors[0]
     assert errors[2] < 0.7 * errors[1]
-    # No worse than Euclidean distance by much on the same tetrahedra, all of them seen at the same speed.
-    apart = np.sqrt(apart)
-    euclidean = np.abs(heat_igl.HeatMethodSolver(mesh).distance(source) - apart).mean() / apart.mean()
-    assert errors[2] < 1.5 * euclidean
+    assert errors[2] < 0.005
 
 
 def by_fermat(source: FloatArray, points: FloatArray, above: float, below: float) -> FloatArray:
@@ -124,7 +121,7 @@ def by_fermat(source: FloatArray, points: FloatArray, above: float, below: float
     return np.where(points[:, 1] < 0, refracted, straight)
 
 
-@pytest.mark.parametrize("speeds", [(1.0, 2.0), (2.0, 1.0), (1.0, 4.0)])
+@pytest.mark.parametrize("speeds", [(1.0, 2.0), (2.0, 1.0), (1.0, 1e3), (1e3, 1.0), (1.0, 1e6), (1e6, 1.0)])
 def test_refraction_at_a_straight_border(speeds):
     errors = []
     for n in (16, 32, 64):
@@ -137,15 +134,23 @@ def test_refraction_at_a_straight_border(speeds):
         speed = np.where(mesh.V[mesh.F][:, :, 1].mean(axis=1) > 0, *speeds)
         exact = by_fermat(mesh.V[source, :2], mesh.V[:, :2], *speeds)
         errors.append(float(np.nanmean(relative_error(solver(mesh, speed).distance(source), exact))))
-    assert errors[1] < 0.8 * errors[0]
-    assert errors[2] < 0.8 * errors[1]
-    assert errors[2] < 0.03
+    assert errors[1] < max(0.8 * errors[0], 5e-5)
+    assert errors[2] < max(0.8 * errors[1], 5e-5)
+    assert errors[2] < 5e-4
 
 
-def test_refinement_is_refused():
+def test_what_needs_triangles_that_fit_is_refused_at_jumps():
     mesh = shapes.grid(3)
-    with pytest.raises(ValueError, match="unfolds triangles by their edge lengths, and this domain has none"):
-        heat_igl.HeatMethodSolver.from_operators(speed_operators(mesh, np.ones(18)), refine="unfold")
+    jump = speed_operators(mesh, np.where(np.arange(18) < 9, 1.0, 5.0))
+    for refine in ("unfold", "exact"):
+        with pytest.raises(ValueError, match="unfolds triangles by their edge lengths, and this domain has none"):
+            heat_igl.HeatMethodSolver.from_operators(jump, refine=refine)
+    np.testing.assert_array_equal(
+        heat_igl.HeatMethodSolver.from_operators(jump, refine="sweep").distance(0),
+        heat_igl.HeatMethodSolver.from_operators(jump).distance(0),
+    )
+    smooth = speed_operators(mesh, np.linspace(1, 1.05, 18))
+    assert heat_igl.HeatMethodSolver.from_operators(smooth, refine="exact").distance(0)[0] == 0
 
 
 @pytest.mark.parametrize(
@@ -161,3 +166,43 @@ def test_refinement_is_refused():
 def test_wrong_speeds_are_refused(speed, message):
     with pytest.raises(ValueError, match=message):
         speed_operators(shapes.grid(3), speed)
+
+
+def test_speed_that_grows_exponentially():
+    """In the metric exp(-2 k x) |dz|^2 exp(-k z) / k unrolls the plane: every way is a straight line."""
+    k = np.log(1e6) / 120
+    mesh = flat(shapes.strip(120, 12))
+    w = np.exp(-k * (mesh.V[:, 0] + 1j * mesh.V[:, 1])) / k
+    source = int(np.argmin(np.linalg.norm(mesh.V - [60, 6, 0], axis=1)))
+    exact = abs(w - w[source])
+    speed = np.exp(k * mesh.V[mesh.F][:, :, 0].mean(axis=1))
+    domain = speed_operators(mesh, speed)
+    assert domain.contrast > 9e5
+    found = {refine: solver(mesh, speed, refine=refine).distance(source) for refine in (None, "sweep", "unfold")}
+    for refine, time in found.items():
+        assert np.nanmean(relative_error(time, exact)) < 0.003, refine
+
+
+def test_checkerboard_of_speeds():
+    """Shortest paths in a graph with 20 points on every edge, at most 0.1 % above the fastest ways."""
+    mesh = flat(shapes.grid(12))
+    column, row, _ = np.floor(mesh.V[mesh.F].mean(axis=1) * 4).astype(int).T
+    for contrast in (2.0, 1e6):
+        speed = np.where((column + row) % 2, contrast, 1.0)
+        exact = on_graph(mesh, speed, 80, points=20)
+        assert np.nanmean(relative_error(solver(mesh, speed).distance(80), exact)) < 0.025
+
+
+def on_graph(mesh: Mesh, speed: FloatArray, source: int, points: int) -> FloatArray:
+    """Travel times along straight lines between points on the edges of one face."""
+    share = (1 - np.cos(np.pi * np.arange(1, points + 1) / (points + 1)))[:, None] / 2
+    tail, head = mesh.edges.T
+    inside = (1 - share) * mesh.V[tail, None] + share * mesh.V[head, None]
+    nodes = np.concatenate([mesh.V, inside.reshape(-1, 3)])
+    of_edge = mesh.n_vertices + np.arange(len(tail) * points).reshape(-1, points)
+    i, j = np.triu_indices(3 + 3 * points, 1)
+    of_face = np.concatenate([mesh.F, of_edge[mesh.facets.of_face].reshape(mesh.n_faces, -1)], axis=1)
+    pairs = np.stack([of_face[:, i], of_face[:, j]], axis=-1).reshape(-1, 2)
+    times = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1) / np.repeat(speed, len(i))
+    graph = connectivity.shortest_edge_graph(pairs, times, len(nodes))
+    return connectivity.edge_distance(graph, np.array([source]))[: mesh.n_vertices]

@@ -1,6 +1,7 @@
 """Applications of geodesic distance: landmark-guided search on edges, and analysis of particles in binary images.
 
-notebooks/10_applications.ipynb shows them.
+notebooks/10_applications.ipynb shows them. `heat_igl.torch` and `heat_igl.jax`, distance as a function that PyTorch and
+JAX differentiate, are imported by these names alone.
 """
 
 from __future__ import annotations

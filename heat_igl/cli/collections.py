@@ -11,8 +11,8 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from heat_igl.cli.options import choice, one_of
-from heat_igl.cli.output import say
+from heat_igl.cli.options import JsonOption, choice, one_of
+from heat_igl.cli.output import check_json, print_json, prints_json, say
 from heat_igl.heat_method import Refine
 
 __all__ = ["COMMANDS"]
@@ -30,10 +30,12 @@ def batch(
     dtype: Annotated[str, typer.Option(help="Of the distances.", callback=one_of(("float32", "float64")))] = "float32",
     log: Annotated[Path | None, typer.Option(help="File for a log of meshes and blocks.")] = None,
     dashboard: Annotated[bool, typer.Option(help="Serve Dask's dashboard (needs bokeh).")] = False,
+    json_file: JsonOption = None,
 ) -> None:
     """Distances on every mesh of a folder, written to a store; resumes if it was interrupted."""
     from heat_igl import cluster
 
+    check_json(json_file)
     meshes = cluster.folder(folder)
     plan = sources if sources == "all" or sources.startswith("farthest:") else cluster.read_source_sets(sources)
     options: dict[str, Any] = {"refine": refine, "dtype": dtype, "progress": Console(stderr=True).is_terminal}
@@ -41,7 +43,10 @@ def batch(
         if dashboard:
             say(f"dashboard: {client.dashboard_link}")
         report = cluster.distances(meshes, plan, store, client=client, **options)
-    print(report.to_markdown(), end="")
+    if json_file is not None:
+        print_json(report.to_dict(), json_file)
+    if not prints_json(json_file):
+        print(report.to_markdown(), end="")
     if report.failed:
         raise typer.Exit(1)
 

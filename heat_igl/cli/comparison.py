@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import json
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import Progress
 
 import heat_igl
-from heat_igl.cli.options import MeshArgument, positive
-from heat_igl.cli.output import check_outputs, check_writable, print_rows, say
+from heat_igl.cli.error_table import print_report
+from heat_igl.cli.options import JsonOption, MeshArgument, positive
+from heat_igl.cli.output import check_json, check_outputs, print_json, print_rows, prints_json, say
 from heat_igl.drawing.output import Picture
-from heat_igl.io import complete_file, read_mesh
+from heat_igl.io import read_mesh
 from heat_igl.reference.guarded import TIMEOUT
 from heat_igl.validation import METHODS, draw_sources
 
@@ -23,9 +25,13 @@ __all__ = ["COMMANDS"]
 _DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
 
 
-def info(mesh: MeshArgument) -> None:
+def info(mesh: MeshArgument, json_file: JsonOption = None) -> None:
     """Describe a mesh: sizes, defects, and properties that affect distances."""
-    print_rows(read_mesh(mesh).report().rows())
+    check_json(json_file)
+    report = read_mesh(mesh).report()
+    values = [getattr(report, field.name) for field in fields(report)]
+    plain = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
+    print_rows([(*row, value) for row, value in zip(report.rows(), plain, strict=True)], json_file)
 
 
 def validate(
@@ -35,7 +41,7 @@ def validate(
     methods: Annotated[str, typer.Option(help=f"Separated by commas: {', '.join(METHODS)}.")] = _DEFAULT_METHODS,
     reference: Annotated[str, typer.Option(help="Method to measure errors against.")] = "exact",
     timeout: Annotated[float, typer.Option(help="Seconds for one native solve.", callback=positive)] = TIMEOUT,
-    json_file: Annotated[Path | None, typer.Option("--json", help="JSON file for the report.")] = None,
+    json_file: JsonOption = None,
     picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for errors on the surface.")] = None,
     fail_above: Annotated[
         float | None,
@@ -46,8 +52,7 @@ def validate(
     loaded = read_mesh(mesh)
     drawn_sources = draw_sources(loaded, sources, seed)
     check_outputs(loaded, None, picture)
-    if json_file is not None:
-        check_writable(json_file)
+    check_json(json_file)
     console = Console(stderr=True)
     # Without a terminal there is no bar, not even the empty line after a finished one.
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
@@ -62,9 +67,9 @@ def validate(
     elif picture is not None:
         Picture(report.plot()).save(picture)
     if json_file is not None:
-        with complete_file(json_file) as temporary:
-            temporary.write_bytes((json.dumps(report.to_dict(), indent=1, allow_nan=False) + "\n").encode("utf8"))
-    print(report.to_markdown(), end="")
+        print_json(report.to_dict(), json_file)
+    if not prints_json(json_file):
+        print_report(report)
     exceeding = report.exceeding(fail_above) if fail_above is not None else ()
     if exceeding:
         names = ", ".join(row.method for row in exceeding)

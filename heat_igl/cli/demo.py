@@ -27,7 +27,7 @@ def sample_mesh() -> Path | None:
     return bunny_path()
 
 
-def demonstrate(out: Path) -> list[tuple[str, str]]:
+def demonstrate(out: Path) -> _Rows:
     """Compute distance on the bunny, compare it with exact distance, and write a PLY and a PNG file.
 
     Without pymeshlab, which ships the bunny, the mesh is a sphere.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -12,8 +13,9 @@ import typer
 from rich.console import Console
 
 import heat_igl
-from heat_igl.cli.options import MeshArgument, choice, position, positive
-from heat_igl.cli.output import check_curves, check_outputs, print_rows
+from heat_igl.cli.options import JsonOption, MeshArgument, choice, position, positive
+from heat_igl.cli.output import Row, check_curves, check_json, check_outputs, print_rows, write_distance
+from heat_igl.drawing import write_line_drawing
 from heat_igl.errors import SourceError
 from heat_igl.heat_method import (
     Backend,
@@ -26,10 +28,11 @@ from heat_igl.heat_method import (
     SolverOptions,
     geodesic_distance,
 )
-from heat_igl.io import read_mesh, write_mesh
+from heat_igl.io import is_flat, read_mesh
 from heat_igl.mesh import Mesh, closest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import FloatArray
+from heat_igl.validation import shapes
 
 __all__ = ["COMMANDS"]
 
@@ -48,7 +51,9 @@ def distance(
         choice(DistanceMethod, "Default: unfold, near-exact; heat on tetrahedra and with one of the options of heat."),
     ] = None,
     cutoff: Annotated[float | None, typer.Option(help="Distances beyond this are inf.", callback=positive)] = None,
-    output: Annotated[Path | None, typer.Option(help="PLY or VTU file for mesh and distance.")] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="PLY, VTU, VTP or GIFTI file for mesh and distance, or NPY or CSV file for it.")
+    ] = None,
     picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for a picture.")] = None,
     t_coef: Annotated[
         float | None, typer.Option(help="Heat: time step in squared mean edge lengths.", callback=positive)
@@ -59,6 +64,7 @@ def distance(
     magnitude: Annotated[str, choice(Magnitude, "Heat: length of the field that is integrated.")] = "auto",
     refine: Annotated[str | None, choice(Refine, "Heat: unfold triangles in its order, near-exact; or exact.")] = None,
     backend: Annotated[str, choice(Backend, "Heat: linear solver.")] = "auto",
+    json_file: JsonOption = None,
 ) -> None:
     """Distance from one or more sources: vertices, or points of the surface."""
     loaded = read_mesh(mesh)
@@ -66,12 +72,13 @@ def distance(
         raise SourceError("no source: name vertices with --source, or positions with --at x,y,z")
     vertices = vertex_sources(np.array(source), loaded.n_vertices) if source else None
     sources: Any = vertices
-    gaps: list[tuple[str, str]] = []
+    gaps: list[Row] = []
     if at:
         points, gap = closest_points(loaded, [position(text) for text in at])
         sources = points if vertices is None else [vertices, points]
-        gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap))]
+        gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap), gap.tolist())]
     check_outputs(loaded, output, picture)
+    check_json(json_file)
     options = SolverOptions(
         t_coef,
         t,
@@ -83,10 +90,11 @@ def distance(
     )
     chosen = _method(method, options, loaded)
     with Console(stderr=True).status("measuring"):
+        _warm_up(loaded, chosen, options)
         phi, about = _measured(loaded, sources, chosen, options, cutoff)
     written = _write(loaded, phi, vertices, output, picture)
     rows = [*_summary(mesh, loaded, phi), ("method", chosen), *about, *gaps]
-    print_rows([*rows, *(("wrote", str(path)) for path in written)])
+    print_rows([*rows, *(("wrote", str(path)) for path in written)], json_file)
 
 
 def _method(method: str | None, options: SolverOptions, mesh: Mesh) -> DistanceMethod:
@@ -104,36 +112,48 @@ def _method(method: str | None, options: SolverOptions, mesh: Mesh) -> DistanceM
 
 def _measured(
     mesh: Mesh, sources: Any, method: DistanceMethod, options: SolverOptions, cutoff: float | None
-) -> tuple[FloatArray, list[tuple[str, str]]]:
+) -> tuple[FloatArray, list[Row]]:
     """The distance, and remarks on how it was found."""
     start = time.perf_counter()
     if method != "heat":
         phi = geodesic_distance(mesh, sources, method=method, cutoff=cutoff)
-        return phi, [("seconds", f"{time.perf_counter() - start:.3f}")]
+        seconds = time.perf_counter() - start
+        return phi, [("seconds", f"{seconds:.3f}", seconds)]
     solver = HeatMethodSolver.from_options(mesh, options)
     start = time.perf_counter()
     phi = solver.distance(sources, cutoff)
     seconds = time.perf_counter() - start
     found = solver.diagnostics
     raised = " (raised, so that heat crosses the mesh in double precision)" if found.t_raised else ""
+    once = found.seconds_operators + found.seconds_factorization
     return phi, [
-        ("time step", f"{found.t:.6g}{raised}"),
-        ("flipped edges", str(found.n_flips)),
-        ("seconds", f"{found.seconds_operators + found.seconds_factorization:.3f} once, {seconds:.3f} per distance"),
+        ("time step", f"{found.t:.6g}{raised}", found.t),
+        ("flipped edges", str(found.n_flips), found.n_flips),
+        ("seconds", f"{once:.3f} once, {seconds:.3f} per distance", {"once": once, "per_distance": seconds}),
     ]
+
+
+def _warm_up(mesh: Mesh, method: DistanceMethod, options: SolverOptions) -> None:
+    """Measure on a small mesh, so that times are of the work alone, without loading libraries for the first time."""
+    small = shapes.box(2) if mesh.is_tetrahedral else shapes.icosphere(4)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        _measured(small, 0, method, options, None)
 
 
 def isolines(
     mesh: MeshArgument,
     source: Annotated[list[int], typer.Option(help="Source vertex, counted from 0; repeat for several.")],
     spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=positive)],
-    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the lines.")],
+    output: Annotated[Path, typer.Option(help="OBJ, SVG or DXF file for the lines; dotted behind, in SVG.")],
     refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
+    json_file: JsonOption = None,
 ) -> None:
     """Curves of equal distance from one or more source vertices."""
     loaded = read_mesh(mesh)
     sources = vertex_sources(np.array(source), loaded.n_vertices)
     check_curves(output)
+    check_json(json_file)
     phi = HeatMethodSolver(loaded, refine=cast(Refine | None, refine)).distance(sources)
     farthest = float(phi[np.isfinite(phi)].max())
     if farthest < spacing:
@@ -144,9 +164,13 @@ def isolines(
         )
     levels = spacing * np.arange(1, int(farthest / spacing) + 1)
     curves = heat_igl.isolines(loaded, phi, levels)
-    heat_igl.write_curves(output, loaded, {f"{level:g}": each for level, each in zip(levels, curves, strict=True)})
-    rows = [("farthest", f"{farthest:.6g}"), ("lines", f"{sum(map(len, curves))} at {len(levels)} distances")]
-    print_rows([*rows, ("wrote", str(output))])
+    if output.suffix.lower() == ".svg" and not is_flat(loaded):
+        write_line_drawing(output, loaded, curves)
+    else:
+        heat_igl.write_curves(output, loaded, {f"{level:g}": each for level, each in zip(levels, curves, strict=True)})
+    n = sum(map(len, curves))
+    rows: list[Row] = [("farthest", f"{farthest:.6g}", farthest), ("lines", f"{n} at {len(levels)} distances", n)]
+    print_rows([*rows, ("distances", f"{spacing:g} apart", levels.tolist()), ("wrote", str(output))], json_file)
 
 
 def path(
@@ -154,6 +178,7 @@ def path(
     start: Annotated[int, typer.Option("--from", help="Vertex where the path begins, counted from 0.")],
     end: Annotated[int, typer.Option("--to", help="Vertex where it ends.")],
     output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the path.")],
+    json_file: JsonOption = None,
 ) -> None:
     """A locally shortest path between two vertices."""
     loaded = read_mesh(mesh)
@@ -161,10 +186,14 @@ def path(
         if not 0 <= vertex < loaded.n_vertices:
             raise SourceError(f"{option} {vertex} is no vertex: the mesh has {loaded.n_vertices}, counted from 0")
     check_curves(output)
+    check_json(json_file)
     found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), start, end)
     heat_igl.write_curves(output, loaded, found)
     length = float(found[0].lengths(loaded).sum())
-    print_rows([("length", f"{length:.6g}"), ("segments", str(len(found[0]))), ("wrote", str(output))])
+    segments = len(found[0])
+    print_rows(
+        [("length", f"{length:.6g}", length), ("segments", str(segments), segments), ("wrote", str(output))], json_file
+    )
 
 
 def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, picture: Path | None) -> list[Path]:
@@ -176,23 +205,25 @@ def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, pictu
         with Console(stderr=True).status("drawing"):
             drawn = plot(mesh, phi, sources=sources)
     if output is not None:
-        write_mesh(output, mesh, distance=phi)
+        write_distance(output, mesh, phi)
     if drawn is not None and picture is not None:
         drawn.save(picture)
     return [path for path in (output, picture) if path is not None]
 
 
-def _summary(path: Path, mesh: Mesh, phi: FloatArray) -> list[tuple[str, str]]:
+def _summary(path: Path, mesh: Mesh, phi: FloatArray) -> list[Row]:
     finite = np.isfinite(phi)
     farthest = int(np.argmax(np.where(finite, phi, -1.0)))
     kind = "tetrahedra" if mesh.is_tetrahedral else "triangles"
-    rows = [
-        ("mesh", f"{path}: {mesh.n_vertices} vertices, {mesh.n_faces} {kind}"),
-        ("farthest", f"{phi[farthest]:.6g} at vertex {farthest}"),
+    counts = {"path": str(path), "n_vertices": mesh.n_vertices, f"n_{kind}": mesh.n_faces}
+    greatest, mean, unreachable = float(phi[farthest]), float(phi[finite].mean()), int((~finite).sum())
+    rows: list[Row] = [
+        ("mesh", f"{path}: {mesh.n_vertices} vertices, {mesh.n_faces} {kind}", counts),
+        ("farthest", f"{greatest:.6g} at vertex {farthest}", {"distance": greatest, "vertex": farthest}),
     ]
-    if not finite.all():
-        rows.append(("unreachable", f"{int((~finite).sum())} vertices"))
-    return [*rows, ("mean", f"{phi[finite].mean():.6g}")]
+    if unreachable:
+        rows.append(("unreachable", f"{unreachable} vertices", unreachable))
+    return [*rows, ("mean", f"{mean:.6g}", mean)]
 
 
 COMMANDS = (distance, isolines, path)

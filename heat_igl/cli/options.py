@@ -11,9 +11,16 @@ import typer
 
 from heat_igl.errors import SourceError
 
-__all__ = ["MeshArgument", "choice", "one_of", "position", "positive"]
+__all__ = ["JsonOption", "MeshArgument", "choice", "one_of", "position", "positive"]
 
-MeshArgument = Annotated[Path, typer.Argument(metavar="MESH", help="OFF, OBJ, PLY, STL, MESH, MSH or VTU file.")]
+MeshArgument = Annotated[
+    Path,
+    typer.Argument(metavar="MESH", help="OFF, OBJ, PLY, STL, MESH, MSH, VTU, VTP, GIFTI or FreeSurfer file."),
+]
+JsonOption = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="JSON file for what is printed; - prints JSON in place of it."),
+]
 
 
 def one_of(choices: tuple[str, ...]) -> Callable[[str | None], str | None]:

@@ -2,20 +2,40 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.text import Text
 
 from heat_igl.drawing.output import PAGE_SUFFIXES, PICTURE_SUFFIXES
 from heat_igl.errors import MeshError, MissingExtraError
-from heat_igl.io import CURVE_SUFFIXES
+from heat_igl.io import CURVE_SUFFIXES, complete_file, write_mesh
 from heat_igl.mesh import Mesh
+from heat_igl.typing import FloatArray
 
-__all__ = ["check_curves", "check_outputs", "check_page", "check_writable", "print_rows", "say"]
+__all__ = [
+    "Row",
+    "check_curves",
+    "check_json",
+    "check_outputs",
+    "check_page",
+    "check_writable",
+    "print_json",
+    "print_rows",
+    "prints_json",
+    "say",
+    "write_distance",
+]
+
+# For distances alone: an array of numpy, and text with a line per vertex.
+ARRAY_SUFFIXES = (".npy", ".csv")
+_STANDARD_OUTPUT = Path("-")
 
 
 def say(message: str) -> None:
@@ -23,12 +43,50 @@ def say(message: str) -> None:
     print(f"heat-igl: {' '.join(message.split())}", file=sys.stderr)
 
 
-def print_rows(rows: Sequence[tuple[str, str]]) -> None:
-    """Print names and values as two columns."""
-    width = max(len(name) for name, _ in rows)
+# Name and text of a line, and what JSON holds in place of the text, if anything.
+Row = tuple[str, str] | tuple[str, str, Any]
+
+
+def print_rows(rows: Sequence[Row], json_file: Path | None = None) -> None:
+    """Print names and texts as two columns; also as JSON to a file, or to standard output in their place."""
+    if json_file == _STANDARD_OUTPUT:
+        print_json(as_dictionary(rows), json_file)
+        return
+    width = max(len(row[0]) for row in rows)
     console = Console(highlight=False, soft_wrap=True)  # no wrapping, so that pipes receive one line per row
-    for name, value in rows:
-        console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {value}"))
+    for name, text, *_ in rows:
+        console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {text}"))
+    if json_file is not None:
+        print_json(as_dictionary(rows), json_file)
+
+
+def as_dictionary(rows: Sequence[Row]) -> dict[str, Any]:
+    """The rows by name, with _ for spaces; what stands in several rows, and all files written, as lists."""
+    found: dict[str, list[Any]] = {}
+    for name, text, *value in rows:
+        found.setdefault(name.replace(" ", "_"), []).append(value[0] if value else text)
+    return {name: values if len(values) > 1 or name == "wrote" else values[0] for name, values in found.items()}
+
+
+def print_json(content: Mapping[str, Any], json_file: Path) -> None:
+    """Write JSON to a file, or print it where the file is called ``-``."""
+    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+    if json_file == _STANDARD_OUTPUT:
+        print(text, end="")
+        return
+    with complete_file(json_file) as temporary:
+        temporary.write_bytes(text.encode("utf8"))
+
+
+def prints_json(json_file: Path | None) -> bool:
+    """Whether standard output is for JSON alone."""
+    return json_file == _STANDARD_OUTPUT
+
+
+def check_json(json_file: Path | None) -> None:
+    """Check that JSON can be written to `json_file`."""
+    if json_file is not None and json_file != _STANDARD_OUTPUT:
+        check_writable(json_file)
 
 
 def check_writable(path: Path) -> None:
@@ -62,18 +120,33 @@ def check_page(path: Path) -> None:
 def check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> None:
     """Check that mesh and distance can be written to `output`, and a picture to `picture`."""
     if output is not None:
-        accepted = (".vtu",) if mesh.is_tetrahedral else (".ply", ".vtu")
+        accepted = ((".vtu",) if mesh.is_tetrahedral else (".ply", ".vtu", ".vtp", ".gii")) + ARRAY_SUFFIXES
         if output.suffix.lower() not in accepted:
             kind = "tetrahedra with distances" if mesh.is_tetrahedral else "distances"
-            raise MeshError(f"--output {output}: {kind} go to {' or '.join(accepted)} files")
-        if output.suffix.lower() == ".vtu":
-            MissingExtraError.check("a .vtu file", "meshio", "io")
+            raise MeshError(f"--output {output}: {kind} go to {', '.join(accepted[:-1])} or {accepted[-1]} files")
+        for suffix, package, extra in ((".vtu", "meshio", "io"), (".gii", "nibabel", "neuro")):
+            if output.suffix.lower() == suffix:
+                MissingExtraError.check(f"a {suffix} file", package, extra)
         check_writable(output)
     if picture is not None:
         if picture.suffix.lower() not in PICTURE_SUFFIXES:
             raise ValueError(f"--picture {picture}: pictures go to {', '.join(PICTURE_SUFFIXES)} files")
         MissingExtraError.check("a picture", "matplotlib", "view")
         check_writable(picture)
+
+
+def write_distance(path: Path, mesh: Mesh, distance: FloatArray) -> None:
+    """Write a distance: with the mesh, or alone to one of the `ARRAY_SUFFIXES`."""
+    suffix = path.suffix.lower()
+    if suffix not in ARRAY_SUFFIXES:
+        write_mesh(path, mesh, distance=distance)
+        return
+    with complete_file(path) as temporary, temporary.open("wb") as file:
+        if suffix == ".npy":
+            np.save(file, distance)
+        else:
+            lines = [f"{vertex},{value!r}" for vertex, value in enumerate(distance.tolist())]
+            file.write("\n".join(["vertex,distance", *lines, ""]).encode("ascii"))
 
 
 def check_curves(output: Path) -> None:

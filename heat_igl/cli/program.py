@@ -12,7 +12,8 @@ from typing import Annotated, Any
 import typer
 
 import heat_igl
-from heat_igl.cli import collections, comparison, distances, views
+from heat_igl.cli import collections, comparison, distances, regions, views
+from heat_igl.cli.examples import epilog
 from heat_igl.cli.output import say
 from heat_igl.errors import (
     AccuracyWarning,
@@ -27,20 +28,25 @@ __all__ = ["app", "run_program"]
 # Errors that a user can cause. Any other exception is a fault of the package and shows a traceback.
 _EXPECTED = (OSError, ValueError, BatchError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
 
+# Set by the shell that asks for completions.
+_COMPLETION = "_HEAT_IGL_COMPLETE"
+
 app = typer.Typer(
     help="Geodesic distance on meshes by the heat method.",
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _commands in (comparison, distances, views, collections):
+for _commands in (comparison, distances, regions, views, collections):
     for _command in _commands.COMMANDS:
-        app.command()(_command)
+        app.command(epilog=epilog(_command.__name__))(_command)
 
 
 def run_program(arguments: Sequence[str]) -> int:
     """Run one command and return the exit status: 0, 1 for errors, 2 for wrong usage, 130 when interrupted."""
     command = typer.main.get_command(app)
+    if _COMPLETION in os.environ:
+        # A shell asks for completions, in the environment; this prints them and exits.
+        command(prog_name="heat-igl")
     try:
         # command.main is not used: the handling of errors and of Ctrl-C differs between versions of typer.
         with (

@@ -10,8 +10,8 @@ import typer
 from rich.console import Console
 
 from heat_igl.cli.demo import demonstrate
-from heat_igl.cli.options import MeshArgument, choice, positive
-from heat_igl.cli.output import check_page, check_writable, print_rows, say
+from heat_igl.cli.options import JsonOption, MeshArgument, choice, positive
+from heat_igl.cli.output import Row, check_json, check_page, check_writable, print_rows, say
 from heat_igl.heat_method import Boundary, Refine, SolverOptions
 from heat_igl.io import read_mesh
 from heat_igl.sources import vertex_sources
@@ -28,10 +28,12 @@ def view(
     boundary: Annotated[str, choice(Boundary, "What heat does at the boundary.")] = "neumann",
     refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
+    json_file: JsonOption = None,
 ) -> None:
     """A window in which a click moves the source and the distance follows, or a page if there is no display."""
     from heat_igl.drawing.viewer import Exploration, Window, display_problem
 
+    check_json(json_file)
     loaded = read_mesh(mesh)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
     options = SolverOptions(t_coef, boundary=cast(Boundary, boundary), refine=cast(Refine | None, refine))
@@ -59,16 +61,20 @@ def view(
     )  # fmt: skip
     if problem:
         say(f"no window: {problem}")
-    print_rows([("mesh", f"{mesh}: {loaded.n_vertices} vertices"), ("wrote", f"{target} (open it in a browser)")])
+    counts = {"path": str(mesh), "n_vertices": loaded.n_vertices}
+    rows: list[Row] = [("mesh", f"{mesh}: {loaded.n_vertices} vertices", counts)]
+    print_rows([*rows, ("wrote", f"{target} (open it in a browser)", str(target))], json_file)
 
 
 def demo(
     out: Annotated[Path, typer.Option(help="Directory for the results; made if missing.")] = Path("heat-igl-demo"),
+    json_file: JsonOption = None,
 ) -> None:
     """Distance on a real mesh, with errors against exact distance, files and a picture."""
     out.mkdir(parents=True, exist_ok=True)
     check_writable(out / "demo.png")
-    print_rows(demonstrate(out))
+    check_json(json_file)
+    print_rows(demonstrate(out), json_file)
 
 
 COMMANDS = (view, demo)

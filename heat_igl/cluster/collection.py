@@ -12,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 
 from heat_igl.errors import MeshError, SourceError
-from heat_igl.io import MESH_SUFFIXES
+from heat_igl.io import MESH_SUFFIXES, is_mesh_path
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_simplices
 from heat_igl.sources import Sources, vertex_sources
 
@@ -42,11 +42,7 @@ def folder(path: str | os.PathLike[str]) -> dict[str, Path]:
     root = Path(path)
     if not root.is_dir():
         raise ValueError(f"{root} is not a folder of meshes")
-    found = {
-        file.relative_to(root).as_posix(): file
-        for file in sorted(root.rglob("*"))
-        if file.suffix.lower() in MESH_SUFFIXES
-    }
+    found = {file.relative_to(root).as_posix(): file for file in sorted(root.rglob("*")) if is_mesh_path(file)}
     if not found:
         raise ValueError(f"{root} holds no mesh: files must end in {', '.join(MESH_SUFFIXES)}")
     return found

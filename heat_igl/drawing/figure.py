@@ -50,8 +50,9 @@ def lay_out(seen: Scene, lines: list[FloatArray], style: Style, table: Any, labe
     for colour, drawn in ((_CURVE, lines), (SOURCE, list(seen.lines @ seen.turn.T))):
         _draw_curves(axes, [to_pixels(line, scale, centre) for line in drawn], depth, colour)
     hidden = mark_dots(axes, to_pixels(seen.dots @ seen.turn.T, scale, centre), depth)
-    bar = figure.add_axes(((left + across + 0.08) / _WIDTH, bottom / height, 0.09 / _WIDTH, tall / height))
-    _colour_bar(bar, seen, style, table, label)
+    if not seen.is_categorical:
+        bar = figure.add_axes(((left + across + 0.08) / _WIDTH, bottom / height, 0.09 / _WIDTH, tall / height))
+        _colour_bar(bar, seen, style, table, label)
     lacking = without_value if bool(np.isinf(seen.values[seen.used]).any()) else None
     _legend(figure, seen, hidden, style, len(lines), lacking, left / _WIDTH)
     return Picture(figure)

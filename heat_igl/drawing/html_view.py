@@ -20,7 +20,16 @@ from typing import Any, get_args
 import numpy as np
 
 from heat_igl.drawing.output import PAGE_SUFFIXES
-from heat_igl.drawing.scene import DISTANCE_LABEL, LINE_INK, STRIPE_INK, Style, check_style, colours, scene
+from heat_igl.drawing.scene import (
+    DISTANCE_COLOURS,
+    DISTANCE_LABEL,
+    LINE_INK,
+    STRIPE_INK,
+    Style,
+    check_style,
+    colours,
+    scene,
+)
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.io import complete_file
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
@@ -76,7 +85,7 @@ def page(
     style: Style = "lines",
     view: tuple[float, float] | None = None,
     up: str = "y",
-    colormap: str = "viridis_r",
+    colormap: str = DISTANCE_COLOURS,
     label: str = DISTANCE_LABEL,
     title: str = "Geodesic distance",
     method: str = _AS_GIVEN,

@@ -9,19 +9,27 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from heat_igl.drawing.figure import lay_out
 from heat_igl.drawing.html_view import Page, page
+from heat_igl.drawing.line_drawing import write_line_drawing
 from heat_igl.drawing.output import Picture
-from heat_igl.drawing.scene import DISTANCE_LABEL, Scene, Style, check_style, colours, scene
+from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, Scene, Style, check_style, colours, scene
+from heat_igl.drawing.shading import colour_numbers
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.sources import Sources
-from heat_igl.typing import ArrayLike, FloatArray
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = ["Page", "Picture", "page", "picture", "plot", "plot_field", "write_html"]
+__all__ = [
+    "Page", "Picture", "page", "picture", "plot", "plot_field", "plot_labels", "write_html", "write_line_drawing",
+]  # fmt: skip
+
+# Of matplotlib's "tab10".
+_N_COLOURS = 10
 
 
 def plot(
@@ -34,7 +42,7 @@ def plot(
     curves: Sequence[SurfaceCurve] = (),
     view: tuple[float, float] | None = None,
     up: str = "y",
-    colormap: str = "viridis_r",
+    colormap: str = DISTANCE_COLOURS,
     label: str = DISTANCE_LABEL,
 ) -> Picture:
     """Draw a distance on a mesh with colours, isolines and sources.
@@ -137,6 +145,54 @@ def plot_field(
     )  # fmt: skip
     style: Style = "plain" if spacing is None else "lines"
     return lay_out(seen, _lines_in_space(mesh, curves, seen), style, table, label, "no value")
+
+
+def plot_labels(
+    mesh: MeshLike,
+    labels: ArrayLike,
+    *,
+    sources: Sources | None = None,
+    curves: Sequence[SurfaceCurve] = (),
+    view: tuple[float, float] | None = None,
+    up: str = "y",
+) -> Picture:
+    """Draw labels of vertices, such as those of Voronoi cells: a colour each, and others for neighbours.
+
+    Parameters
+    ----------
+    labels : (n,) array_like of int
+        A label for each vertex; -1, for vertices without one, is drawn grey.
+    mesh, sources, curves, view, up
+        As for `plot`.
+
+    Returns
+    -------
+    Picture
+        As that of `plot`.
+
+    Raises
+    ------
+    ValueError
+        If `labels` are not integers of shape (n,), or an option is invalid.
+    SourceError, MissingExtraError
+        As for `plot`.
+
+    Notes
+    -----
+    Ten colours that differ in hue are given out in the order of the labels, each label the first colour that no
+    neighbour has; where all ten are taken, the one that comes next.
+    """
+    mesh = as_simplices(mesh)
+    given: AnyArray = np.asarray(labels)
+    if given.dtype.kind not in "iu":
+        raise ValueError(f"labels must be integers, not {given.dtype}")
+    table = colours("tab10", is_trimmed=False)
+    if given.shape != (mesh.n_vertices,):
+        raise ValueError(f"labels must have shape ({mesh.n_vertices},), one per vertex, but they have {given.shape}")
+    values = np.where(given < 0, np.inf, colour_numbers(given, mesh.edges, _N_COLOURS) + 0.5)
+    seen = scene(mesh, values, name="labels", sources=sources, limits=(0, _N_COLOURS), view=view, up=up)
+    seen = replace(seen, is_categorical=True)
+    return lay_out(seen, _lines_in_space(mesh, curves, seen), "plain", table, "", "no label")
 
 
 def picture(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **options: Any) -> None:

@@ -15,6 +15,7 @@ from heat_igl.sources import Sources, source_set
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = [
+    "DISTANCE_COLOURS",
     "DISTANCE_LABEL",
     "LINE_INK",
     "STRIPE_INK",
@@ -28,6 +29,8 @@ __all__ = [
 
 Style = Literal["lines", "stripes", "plain"]
 
+#: Near is light, far is dark: in pictures, pages and windows.
+DISTANCE_COLOURS = "viridis_r"
 DISTANCE_LABEL = "distance, in the mesh's unit"
 UNREACHABLE = (0.72, 0.72, 0.72)
 #: Fraction by which an isoline reduces the brightness.
@@ -68,6 +71,8 @@ class Scene:
         Positions of sources that are vertices or points in faces, in the coordinates of `V`.
     lines : (l, 2, 3) float64
         Segments of sources that are curves, in the coordinates of `V`.
+    is_categorical : bool
+        Whether the values are numbers of categories, between which there is nothing: no interpolation, no colour bar.
     """
 
     V: FloatArray
@@ -82,6 +87,7 @@ class Scene:
     vertices: IntArray
     dots: FloatArray
     lines: FloatArray
+    is_categorical: bool = False
 
     @property
     def turned(self) -> FloatArray:

@@ -7,7 +7,22 @@ import numpy as np
 from heat_igl.drawing.raster import Pixels
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["isoline_coverage", "isoline_spacing", "screen_gradient", "shading", "stripe_coverage"]
+__all__ = ["colour_numbers", "isoline_coverage", "isoline_spacing", "screen_gradient", "shading", "stripe_coverage"]
+
+
+def colour_numbers(labels: IntArray, edges: IntArray, n_colours: int) -> IntArray:
+    """A colour (n,) for the label (n,) of each vertex: the first that none of its earlier neighbours has."""
+    names, rank = np.unique(labels, return_inverse=True)
+    pairs = np.unique(np.sort(rank[edges], axis=1), axis=0)
+    colour = np.full(len(names), -1)
+    earlier: list[list[int]] = [[] for _ in names]
+    for low, high in pairs[pairs[:, 0] != pairs[:, 1]].tolist():
+        earlier[high].append(low)
+    for label, neighbours in enumerate(earlier):
+        taken = {int(colour[other]) for other in neighbours}
+        free = (number for number in range(n_colours) if number not in taken)
+        colour[label] = next(free, label % n_colours)
+    return np.asarray(colour[rank])
 
 
 def isoline_spacing(largest: float) -> float:

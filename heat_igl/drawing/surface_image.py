@@ -37,7 +37,11 @@ def surface_image(
     pixels = rasterize(fine, F, columns * OVERSAMPLING, rows * OVERSAMPLING)
     reached: BoolArray = np.asarray(np.isfinite(values[F]).all(axis=1))
     finite = np.where(np.isfinite(values), values, 0.0)
-    here = np.einsum("pk,pk->p", pixels.weights, finite[F[pixels.face]])
+    if seen.is_categorical:
+        # The category of the nearest corner.
+        here = finite[F[pixels.face, np.argmax(pixels.weights, axis=1)]]
+    else:
+        here = np.einsum("pk,pk->p", pixels.weights, finite[F[pixels.face]])
     known: BoolArray = reached[pixels.face]
 
     low, high = seen.limits

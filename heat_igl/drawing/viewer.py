@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 
 from heat_igl.drawing.exploration import Exploration
+from heat_igl.drawing.scene import DISTANCE_COLOURS, colours
 from heat_igl.drawing.shading import isoline_spacing
 from heat_igl.errors import MissingExtraError
 from heat_igl.heat_method import Boundary, Refine
@@ -53,7 +56,7 @@ class Window:
         If no window can be opened.
     """
 
-    _MESH, _SOURCES = "mesh", "sources"
+    _MESH, _SOURCES, _COLOURS = "mesh", "sources", "distance"
 
     def __init__(self, exploration: Exploration, title: str = "heat-igl") -> None:
         with MissingExtraError.guard("a window", "polyscope", "view"):
@@ -70,11 +73,22 @@ class Window:
         ps.set_verbosity(0)
         ps.init()
         ps.set_ground_plane_mode("none")
+        self._load_colours()
         F = mesh.facets.vertices[mesh.facets.n_faces == 1] if mesh.is_tetrahedral else mesh.F
         self._surface = ps.register_surface_mesh(self._MESH, mesh.V, F, smooth_shade=True)
         self._surface.set_selection_mode("vertices_only")
         ps.set_user_callback(self.frame)
         self._show()
+
+    def _load_colours(self) -> None:
+        """Give polyscope the colours of pictures and pages, near and far alike: it reads them from an image."""
+        from matplotlib.image import imsave
+
+        table = colours(DISTANCE_COLOURS)(np.linspace(0, 1, 256))
+        with tempfile.TemporaryDirectory() as folder:
+            image = Path(folder) / "colours.png"
+            imsave(image, table[None])
+            self._ps.load_color_map(self._COLOURS, str(image))
 
     def run(self) -> None:
         """Show the window until it is closed."""
@@ -143,7 +157,7 @@ class Window:
         # Unreachable vertices take the colour of the farthest; the message counts them.
         self._surface.add_distance_quantity(
             "distance", np.where(finite, now.distance, largest), enabled=not self._shows_error, vminmax=(0.0, largest),
-            stripe_size=isoline_spacing(largest), stripe_size_relative=False, cmap="viridis",
+            stripe_size=isoline_spacing(largest), stripe_size_relative=False, cmap=self._COLOURS,
         )  # fmt: skip
         if now.error is not None:
             known = np.where(np.isfinite(now.error), now.error, 0.0)

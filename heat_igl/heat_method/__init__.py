@@ -4,6 +4,8 @@ from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.directions import Directions
 from heat_igl.heat_method.front_door import DistanceMethod, geodesic_distance
 from heat_igl.heat_method.options import Backend, Boundary, Laplacian, Magnitude, Refine, SolverOptions
+from heat_igl.heat_method.signed_heat import Level, SignedHeatSolver
+from heat_igl.heat_method.signed_volumes import VoxelBox, volume_signed_distance
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.heat_method.solver import HeatMethodSolver, heat_method_distance
 from heat_igl.heat_method.time_step import smallest_time_step
@@ -20,11 +22,15 @@ __all__ = [
     "HeatSolution",
     "LabelledDistance",
     "Laplacian",
+    "Level",
     "Magnitude",
     "Refine",
+    "SignedHeatSolver",
     "SolverOptions",
     "geodesic_distance",
     "VectorHeatSolver",
+    "VoxelBox",
     "heat_method_distance",
     "smallest_time_step",
+    "volume_signed_distance",
 ]

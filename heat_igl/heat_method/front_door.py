@@ -39,8 +39,9 @@ def geodesic_distance(
     method : {"unfold", "sweep", "heat", "exact"}
         "unfold" follows straight lines through strips of triangles: near-exact, see `unfolded_distance`. "sweep"
         unfolds two triangles at a time. Both go through the vertices in the order of Dijkstra's algorithm; polygons are
-        cut into triangles. "heat" is `HeatMethodSolver` with its defaults, the only one for tetrahedra; on polygons it
-        takes `polygon_operators`. "exact" is the polyhedral distance by windows, and ends the search at the cutoff.
+        cut into triangles. "heat" is `HeatMethodSolver` with its defaults; on polygons it takes `polygon_operators`.
+        "exact" is the polyhedral distance by windows, and ends the search at the cutoff; curves stand for dense points,
+        see `UnfoldingSolver`. Tetrahedra take "sweep" and "heat", which both are fronts there, see `FrontSolver`.
     cutoff : float, optional
         Distances beyond this are ``inf``.
 
@@ -79,7 +80,12 @@ def geodesic_distance(
         return HeatMethodSolver(as_mesh(mesh)).distance(sources, beyond)
     triangles = as_simplices(mesh)
     if triangles.is_tetrahedral:
-        raise MeshError(f'method={method!r} needs triangles, and the mesh holds tetrahedra: take method="heat"')
+        if method == "sweep":
+            return HeatMethodSolver(triangles, refine="sweep").distance(sources, beyond)
+        raise MeshError(
+            f'method={method!r} needs triangles, and the mesh holds tetrahedra: take method="sweep", exact where the '
+            "way is a straight line"
+        )
     if method == "exact":
         # The search ends at the cutoff; points near it, whose straight lines are known, may lie beyond.
         farthest = np.inf if beyond is None else beyond

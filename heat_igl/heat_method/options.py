@@ -70,6 +70,12 @@ class SolverOptions:
         """Whether the time step is left to the solver."""
         return self.t_coef is None and self.t is None
 
+    @property
+    def leaves_heat(self) -> bool:
+        """Whether fronts may take the place of heat: where no magnitude, time step, boundary or Laplacian is named."""
+        is_default = self.magnitude == "auto" and self.boundary == "neumann" and self.laplacian != "cotan"
+        return self.refine == "sweep" or (self.refine is None and is_default and self.default_time_step)
+
     def damps(self, domain: Operators) -> bool:
         """Whether the field is damped on faces with heat from several sides: ``magnitude="auto"`` resolved."""
         if self.magnitude == "auto":

@@ -19,17 +19,27 @@ from heat_igl.heat_method.solution import Diagnostics
 from heat_igl.heat_method.time_step import time_step, warn_of_large_step
 from heat_igl.linear import Analysis
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
-from heat_igl.operators import Operators, operators, point_cloud_operators, polygon_operators
+from heat_igl.operators import (
+    Elements,
+    Operators,
+    operators,
+    point_cloud_operators,
+    polygon_operators,
+    without_refinement,
+)
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
-from heat_igl.typing import FloatArray, IntArray
-from heat_igl.unfolding import UnfoldingSolver
+from heat_igl.steps.fitted import fit, fit_slope
+from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.unfolding import FrontSolver, UnfoldingSolver
 
 __all__ = ["SolverParts", "prepare", "prepare_mesh", "prepare_polygons"]
 
 # For scattered points, whose triangles differ more in size than those of a mesh: between two aims, see docs/clouds.md.
 _T_COEF_OF_POINTS = 1.0
+# Ratio of speeds from which on heat, with one time step for all, is worse than 2 %: docs/metrics.md.
+_LARGEST_CONTRAST = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +57,13 @@ class SolverParts:
     assembler : SourceAssembler
         From sources to right-hand sides.
     factored : HeatFlow or None
-        Step 1; None with ``refine="exact"``, which takes no heat: `heat_flow` factors it when it is asked for first.
+        Step 1; None with ``refine="exact"`` and for fronts, which take no heat: `heat_flow` factors it on request.
     last_steps : Integration or UnfoldingSolver
         Steps 2 and 3, or the unfolding that takes their place with ``refine``.
     time_steps : (n_components,) float64
         Time step of each component.
+    step_raised : (n_components,) bool
+        Whether that is more than was asked for, so that the heat crosses the component.
     t_damping : float, (n_components,) float64 or None
         Time step for `damping`; None for a field of length 1.
     fitted : bool
@@ -69,6 +81,7 @@ class SolverParts:
     factored: HeatFlow | None
     last_steps: Integration | UnfoldingSolver
     time_steps: FloatArray
+    step_raised: BoolArray
     t_damping: float | FloatArray | None
     fitted: bool
     checker: Checker | None
@@ -81,6 +94,24 @@ class SolverParts:
             return self.factored
         options = self.options
         return HeatFlow(self.operators, self.time_steps, options.boundary, options.backend, self.analysis, self.fitted)
+
+    @cached_property
+    def elements(self) -> Elements:
+        """The triangles that are solved on, to differentiate by their sides."""
+        return Elements(self.operators)
+
+    @cached_property
+    def fitted_weights(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """What the fitted flow knows of each of ``elements.pairs``, to be differentiated.
+
+        Its cotangent weight, not below 0; the length x of its shortest side in units of sqrt(t); `fit` and `fit_slope`
+        of x.
+        """
+        elements = self.elements
+        pair, first = elements.pairs
+        t = self.time_steps[self.operators.components[elements.i.ravel()[first]]]
+        x = elements.l.ravel()[first] / np.sqrt(t)
+        return np.maximum(np.bincount(pair, elements.weight.ravel()), 0.0), x, fit(x), fit_slope(x)
 
     @property
     def given_faces(self) -> IntArray | None:
@@ -100,7 +131,8 @@ def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysi
             begun.append(beside.submit(analysis, L, options.backend))
 
         # The order of elimination takes a third of the time and needs no more than the pattern of L.
-        is_factored = options.refine != "exact"
+        follows_fronts = isinstance(mesh, Mesh) and mesh.is_tetrahedral and options.leaves_heat
+        is_factored = options.refine != "exact" and not follows_fronts
         on_laplacian = analyse if known is None and is_factored and n_threads() > 1 else None
         if isinstance(mesh, PointCloud):
             domain = point_cloud_operators(mesh, options.triangulation, on_laplacian)
@@ -148,31 +180,32 @@ def prepare(
         Positions, to check answers against straight lines.
     """
     start = time.perf_counter()
-    if options.refine is not None and domain.n_given < domain.n:
-        raise ValueError(
-            f"refine={options.refine!r} unfolds the triangles of the mesh: pass operators without refinement"
-        )
+    domain, options = _resolved(domain, options)
     damped = options.damps(domain)
     fitted = damped and domain.lengths is not None
     step, requested = time_step(options, domain, fitted)
     warn_of_large_step(options, domain)
     t_damping = step if damped else None
-    found = None if options.refine == "exact" else analysis(domain.L, options.backend, known)
+    front_solver = None if domain.simplices is None or not options.leaves_heat else FrontSolver(domain.simplices)
+    takes_heat = options.refine != "exact" and front_solver is None
+    found = analysis(domain.L, options.backend, known) if takes_heat else None
     analysed = time.perf_counter()
     makers: list[Callable[[], Any]] = []
-    if options.refine != "exact":
+    if takes_heat:
         makers.append(lambda: HeatFlow(domain, step, options.boundary, options.backend, found, fitted))
-    if options.refine is None:
+    if options.refine is None and takes_heat:
         makers.append(lambda: PoissonProblem(domain, options.backend, found))
     # Both matrices at once: the backends run without the interpreter's lock.
     problems = list(in_order(lambda make: make(), makers, max(1, min(len(makers), n_threads()))))
     factored = time.perf_counter()
     heat_flow = problems[0] if problems else None
-    unfolds = options.refine is not None
+    unfolds = options.refine is not None or front_solver is not None
     mass_unit = domain.mean_mass if heat_flow is None else heat_flow.mean_mass
     assembler = SourceAssembler(domain, step, mass_unit, plain=not damped, unfolds=unfolds)
     last_steps: Integration | UnfoldingSolver
-    if options.refine is not None or found is None:
+    if front_solver is not None:
+        last_steps = front_solver
+    elif options.refine is not None or found is None:
         last_steps = UnfoldingSolver(domain, options.refine or "exact")
     else:
         divergence = NormalizedDivergence(domain, t_damping, found.order, fitted)
@@ -202,11 +235,21 @@ def prepare(
         factored=heat_flow,
         last_steps=last_steps,
         time_steps=np.broadcast_to(step, domain.n_components),
+        step_raised=np.broadcast_to(np.asarray(step) > requested, domain.n_components),
         t_damping=t_damping,
         fitted=fitted,
         checker=None if options.refine in ("unfold", "exact") else Checker(domain, V),
         diagnostics=diagnostics,
     )
+
+
+def _resolved(domain: Operators, options: SolverOptions) -> tuple[Operators, SolverOptions]:
+    """Operators and options that suit each other: windows where speeds differ much, no added vertices to unfold."""
+    if options.leaves_heat and domain.contrast > _LARGEST_CONTRAST and domain.surface is not None:
+        options = replace(options, refine=options.refine or "exact")
+    if options.refine is not None and domain.n_given < domain.n:
+        domain = without_refinement(domain)
+    return domain, options
 
 
 def _of_largest(step: float | FloatArray, domain: Operators) -> float:

@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import AccuracyWarning
+from heat_igl.errors import AccuracyWarning, MeshError
 from heat_igl.heat_method.batches import checked_cutoff, cut_off
 from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.construction import PreparedSolver
+from heat_igl.heat_method.derivatives import DistanceDerivative
+from heat_igl.heat_method.differentiation import differentiated
 from heat_igl.heat_method.directions import Directions, directions
 from heat_igl.heat_method.integration import damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
@@ -25,7 +27,7 @@ from heat_igl.runtime import warn_caller
 from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
 from heat_igl.steps import Boundary
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
-from heat_igl.unfolding import PathAngles, Refine, UnfoldingSolver
+from heat_igl.unfolding import FrontSolver, PathAngles, Refine, UnfoldingSolver
 
 __all__ = ["HeatMethodSolver", "heat_method_distance"]
 
@@ -37,7 +39,8 @@ class HeatMethodSolver(PreparedSolver):
     ----------
     mesh : mesh or (n, 3) array_like
         Whatever `as_mesh` takes, or the positions V of a mesh whose faces are `F`. Polygons are solved on with
-        `polygon_operators`, and with `refine` on their triangles.
+        `polygon_operators`, and with `refine` on their triangles. Tetrahedra take fronts instead of heat
+        (`FrontSolver`), unless `magnitude`, a time step, a `boundary` or ``laplacian="cotan"`` is named.
     F : (m, 3) or (m, 4) array_like, optional
         Faces, when `mesh` is V.
     t_coef : float, optional
@@ -261,6 +264,8 @@ class HeatMethodSolver(PreparedSolver):
         last_steps = self._parts.last_steps
         if not isinstance(last_steps, UnfoldingSolver) or self._parts.options.refine == "sweep":
             raise ValueError('directions follow paths: make the solver with refine="unfold" or refine="exact"')
+        if isinstance(last_steps, FrontSolver):
+            raise MeshError("directions need triangles that fit together: fronts through this domain follow no paths")
         (term,) = self._source_terms([self._source_set(sources)])
         return last_steps.directed(term, self._order([term])[:, 0], tolerance)
 
@@ -269,6 +274,13 @@ class HeatMethodSolver(PreparedSolver):
         if not isinstance(self._mesh, Mesh):
             raise ValueError("directions need the positions of a mesh, which this solver does not have")
         return tangent_frames(self._mesh)
+
+    def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
+        """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
+
+        Arguments and errors as for `distance`; a ValueError also for what is not differentiated, see `differentiated`.
+        """
+        return differentiated(self.distance(sources), self._source_set(sources), self._parts, self._mesh)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""

@@ -139,7 +139,7 @@ class VectorHeatSolver:
         parts = self._distance_solver._parts
         self._heat_flow = parts.heat_flow
         t = parts.diagnostics.t * (_VECTOR_STEP if parts.options.default_time_step else 1.0)
-        self._vector_flow = VectorHeatFlow(domain, rotations, t, parts.options.backend, mass)
+        self._vector_flow = VectorHeatFlow(domain, rotations, t, parts.options.backend, mass=mass)
         self._pattern = abs(rotations).tocsr()
 
     @property

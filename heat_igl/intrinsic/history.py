@@ -100,15 +100,10 @@ class Flipped(NamedTuple):
 
     def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
         """Faces (k,) and barycentric coordinates (k, 3) of points after the change."""
-        sides = np.concatenate([self.half_edge, self.mate])
-        ascending = np.argsort(sides // 3)
-        place = np.searchsorted(sides[ascending] // 3, faces)
-        moved = np.flatnonzero(place < len(sides))
-        moved = moved[sides[ascending[place[moved]]] // 3 == faces[moved]]
+        moved, edge, in_second = self.moved(faces)
         if not len(moved):
             return faces, barycentric
-        side = ascending[place[moved]]
-        edge, in_second = side % len(self.mate), side >= len(self.mate)
+        sides, side = np.concatenate([self.half_edge, self.mate]), edge + len(self.mate) * in_second
         ab, pa, bp, aq, qb = self.lengths[:, edge]
         # a at the origin, b on the first axis, p above the axis and q below.
         (px, py), (qx, qy) = apex(ab, pa, bp), apex(ab, aq, qb)
@@ -130,6 +125,16 @@ class Flipped(NamedTuple):
             [np.where(in_first, at_p, at_q), third, np.where(in_first, at_q, at_p)], axis=1
         )
         return faces, barycentric
+
+    def moved(self, faces: IntArray) -> tuple[IntArray, IntArray, BoolArray]:
+        """The points whose faces (k,) change, which edge is flipped there, and whether the face is its second."""
+        sides = np.concatenate([self.half_edge, self.mate])
+        ascending = np.argsort(sides // 3)
+        place = np.searchsorted(sides[ascending] // 3, faces)
+        moved = np.flatnonzero(place < len(sides))
+        moved = moved[sides[ascending[place[moved]]] // 3 == faces[moved]]
+        side = ascending[place[moved]]
+        return moved, side % len(self.mate), side >= len(self.mate)
 
 
 class Refined(NamedTuple):

@@ -14,7 +14,7 @@ from heat_igl.io.text import format_rows
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["CURVE_SUFFIXES", "write_curves"]
+__all__ = ["CURVE_SUFFIXES", "flat_curves", "is_flat", "write_curves", "write_svg"]
 
 # A mesh is flat if all vertices are at most this far from a plane, as a fraction of the extent.
 _FLAT = 1e-9
@@ -69,30 +69,30 @@ def write_curves(
     write = _FORMATS.get(target.suffix.lower())
     if write is None:
         raise ValueError(f"{target}: curves go to {', '.join(CURVE_SUFFIXES)} files, not '{target.suffix}'")
-    if projection is not None and write is not _write_svg:
+    if projection is not None and write is not write_svg:
         raise ValueError(f"{target}: projection is for .svg files; this format holds positions in space")
     groups = curves if isinstance(curves, Mapping) else {"": curves}
     lines = {
         name: [
             (curve.positions(mesh), curve.is_closed)
-            for curve in _flat(group, f"curves[{name!r}]" if name else "curves")
+            for curve in flat_curves(group, f"curves[{name!r}]" if name else "curves")
         ]
         for name, group in groups.items()
     }
-    if write is _write_svg:
+    if write is write_svg:
         matrix = _plane(mesh, target) if projection is None else _checked_projection(projection)
         lines = {name: [(P @ matrix.T, closed) for P, closed in group] for name, group in lines.items()}
     with replacing(target) as temporary:
         write(temporary, lines)
 
 
-def _flat(curves: NestedCurves, place: str) -> list[SurfaceCurve]:
+def flat_curves(curves: NestedCurves, place: str = "curves") -> list[SurfaceCurve]:
     """The curves of nested lists, one after the other; `place` names the list for errors."""
     if isinstance(curves, SurfaceCurve):
         return [curves]
     if isinstance(curves, str) or not isinstance(curves, Sequence):
         raise TypeError(f"{place} must be a SurfaceCurve or a list of such, not {type(curves).__name__}")
-    return [curve for i, part in enumerate(curves) for curve in _flat(part, f"{place}[{i}]")]
+    return [curve for i, part in enumerate(curves) for curve in flat_curves(part, f"{place}[{i}]")]
 
 
 def _checked_projection(projection: ArrayLike) -> FloatArray:
@@ -133,7 +133,15 @@ def _write_obj(path: Path, lines: _Lines) -> None:
     path.write_text("".join(text), encoding="utf8")
 
 
-def _write_svg(path: Path, lines: _Lines) -> None:
+def is_flat(mesh: Mesh) -> bool:
+    """Whether all vertices that faces use lie in one plane."""
+    used = mesh.V[mesh.referenced]
+    smallest = np.linalg.svd(used - used.mean(axis=0), compute_uv=False)[2]
+    return bool(smallest <= _FLAT * np.linalg.norm(np.ptp(used, axis=0)))
+
+
+def write_svg(path: Path, lines: _Lines, dotted: str | None = None) -> None:
+    """Write lines in the plane, (k, 2) each and whether it is closed, in groups by name; one group may be dotted."""
     from xml.sax.saxutils import quoteattr  # imported here, since it loads a web client
 
     points = np.concatenate([P for group in lines.values() for P, _ in group] or [np.zeros((1, 2))])
@@ -147,7 +155,8 @@ def _write_svg(path: Path, lines: _Lines) -> None:
         f'<g fill="none" stroke="black" stroke-linejoin="round" stroke-width="{margin / 2:.6g}">\n',
     ]
     for name, group in lines.items():
-        text.append(f"<g id={quoteattr(name)}>\n" if name else "<g>\n")
+        style = f' stroke-dasharray="{margin / 2:.6g} {margin:.6g}"' if name and name == dotted else ""
+        text.append(f"<g id={quoteattr(name)}{style}>\n" if name else "<g>\n")
         for P, is_closed in group:
             drawn = P[:-1] if is_closed else P
             element = "polygon" if is_closed else "polyline"
@@ -171,5 +180,5 @@ def _write_dxf(path: Path, lines: _Lines) -> None:
     document.saveas(path)
 
 
-_FORMATS: dict[str, Callable[[Path, _Lines], None]] = {".obj": _write_obj, ".svg": _write_svg, ".dxf": _write_dxf}
+_FORMATS: dict[str, Callable[[Path, _Lines], None]] = {".obj": _write_obj, ".svg": write_svg, ".dxf": _write_dxf}
 CURVE_SUFFIXES = tuple(_FORMATS)

@@ -1,4 +1,4 @@
-"""Reading and writing mesh files: OFF, OBJ, PLY, STL, MESH, MSH and VTU, selected by the extension.
+"""Reading and writing mesh files: OFF, OBJ, PLY, STL, MESH, MSH, VTU, VTP, GIFTI, FreeSurfer, chosen by the extension.
 
 Every defect of a file raises a `MeshError` that names the file, the position and the remedy. Counts in headers are
 compared with the size of the file before memory is allocated.
@@ -16,9 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io import medit, msh, obj, off, ply, stl, vtu
+from heat_igl.io import freesurfer, gifti, medit, msh, obj, off, ply, stl, vtp, vtu
 from heat_igl.io.atomic import replacing
 from heat_igl.io.contents import Contents
+from heat_igl.io.packed import form_suffix, is_packed, pack, unpacked
 from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_simplices, read_paths_with
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
@@ -26,6 +27,7 @@ __all__ = [
     "MESH_SUFFIXES",
     "checked_path",
     "file_bytes",
+    "is_mesh_path",
     "read_attributes",
     "read_mesh",
     "read_polygon_mesh",
@@ -36,21 +38,25 @@ __all__ = [
 class _Format(NamedTuple):
     read: Callable[[Path, bytes], Contents]
     write: Callable[[Path, Mesh, dict[str, FloatArray]], None]
-    tetrahedra: bool
-    attributes: bool
+    tetrahedra: bool = False
+    attributes: bool = False
+    packed: bool = True  # whether a further .gz is understood
 
 
 _FORMATS = {
-    ".off": _Format(off.read, off.write, tetrahedra=False, attributes=False),
-    ".obj": _Format(obj.read, obj.write, tetrahedra=False, attributes=False),
-    ".ply": _Format(ply.read, ply.write, tetrahedra=False, attributes=True),
-    ".stl": _Format(stl.read, stl.write, tetrahedra=False, attributes=False),
-    ".mesh": _Format(medit.read, medit.write, tetrahedra=True, attributes=False),
-    ".msh": _Format(msh.read, msh.write, tetrahedra=True, attributes=False),
-    ".vtu": _Format(vtu.read, vtu.write, tetrahedra=True, attributes=True),
-}
+    ".off": _Format(off.read, off.write),
+    ".obj": _Format(obj.read, obj.write),
+    ".ply": _Format(ply.read, ply.write, attributes=True),
+    ".stl": _Format(stl.read, stl.write),
+    ".mesh": _Format(medit.read, medit.write, tetrahedra=True),
+    ".msh": _Format(msh.read, msh.write, tetrahedra=True),
+    ".vtu": _Format(vtu.read, vtu.write, tetrahedra=True, attributes=True, packed=False),
+    ".vtp": _Format(vtp.read, vtp.write, attributes=True, packed=False),
+    ".gii": _Format(gifti.read, gifti.write, attributes=True),
+} | dict.fromkeys(freesurfer.SUFFIXES, _Format(freesurfer.read, freesurfer.write, packed=False))
 
 MESH_SUFFIXES = tuple(_FORMATS)
+_PACKED = tuple(suffix for suffix, form in _FORMATS.items() if form.packed)
 
 _ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
 
@@ -61,7 +67,9 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     Parameters
     ----------
     path : path-like
-        The extension, in upper or lower case, selects the format: .off, .obj, .ply, .stl, .mesh, .msh or .vtu.
+        The extension, in upper or lower case, selects the format: .off, .obj, .ply, .stl, .mesh, .msh, .vtu, .vtp, .gii
+        (GIFTI), or the name of a FreeSurfer surface: .white, .pial, .inflated, .sphere, .smoothwm, .midthickness.
+        A further .gz stands for a file packed by gzip, in all of these but VTK's and FreeSurfer's.
 
     Returns
     -------
@@ -75,7 +83,7 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
         If the file is missing, unreadable or damaged, or contains no mesh. ``__cause__`` is the error of the operating
         system, if there is one.
     MissingExtraError
-        For .vtu without meshio.
+        For .vtu without meshio, for GIFTI and FreeSurfer without nibabel.
 
     Notes
     -----
@@ -113,7 +121,7 @@ def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
     MeshError
         As `read_mesh`; also if the file holds tetrahedra.
     MissingExtraError
-        For .vtu without meshio.
+        For .vtu without meshio, for GIFTI and FreeSurfer without nibabel.
     """
     path, contents = _load(path)
     cells = contents.cells
@@ -126,7 +134,7 @@ def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
 
 
 def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
-    """Read the vertex attributes of a PLY or VTU file.
+    """Read the vertex attributes of a PLY, VTU, VTP or GIFTI file.
 
     Parameters
     ----------
@@ -144,7 +152,7 @@ def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
         As `read_mesh`, and for formats without attributes.
     """
     path = _checked(path)
-    if not _FORMATS[path.suffix.lower()].attributes:
+    if not _FORMATS[form_suffix(path)].attributes:
         raise MeshError(f"{path}: this format holds no vertex attributes; {_those_with('attributes')} do")
     path, contents = _load(path)
     _mesh(path, contents)
@@ -162,8 +170,9 @@ def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, /, **attributes: Ar
     mesh : mesh
         Triangles, or (.mesh, .msh, .vtu) tetrahedra, as `as_mesh` takes them; polygons are written as triangles.
     **attributes : (n,) or (n, k) array_like of real numbers
-        Arrays per vertex, stored in .ply and .vtu files in double precision, including infinite values. In PLY an array
-        (n, k) becomes properties ``name_0``, ``name_1``, ..., which `read_attributes` combines again.
+        Arrays per vertex, stored in .ply, .vtu and .vtp files in double precision, including infinite values. In PLY an
+        array (n, k) becomes properties ``name_0``, ``name_1``, ..., which `read_attributes` combines again. GIFTI
+        holds arrays (n,) in single precision.
 
     Raises
     ------
@@ -171,20 +180,20 @@ def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, /, **attributes: Ar
         If the format cannot hold the mesh or the attributes, an attribute has the wrong shape or type, or the file
         cannot be written.
     MissingExtraError
-        For .vtu without meshio.
+        For .vtu without meshio, for GIFTI and FreeSurfer without nibabel.
 
     Notes
     -----
     Coordinates are read back exactly: text formats contain the shortest decimal number that rounds to the same double.
     STL is written as text, since binary STL has single precision. STL files lose the order of the vertices and all
-    unreferenced vertices.
+    unreferenced vertices. GIFTI and FreeSurfer have single precision: a mesh whose coordinates do not fit is rounded.
 
     Examples
     --------
     >>> write_mesh("bunny.ply", mesh, distance=phi)  # doctest: +SKIP
     """
     path = _checked(path)
-    form = _FORMATS[path.suffix.lower()]
+    form = _FORMATS[form_suffix(path)]
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral and not form.tetrahedra:
         raise MeshError(f"{path}: this format holds no tetrahedra; {_those_with('tetrahedra')} do")
@@ -195,6 +204,7 @@ def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, /, **attributes: Ar
     arrays = _arrays(attributes, mesh.n_vertices)
     with replacing(path) as temporary:
         form.write(temporary, mesh, arrays)
+        pack(path, temporary)
 
 
 def _those_with(capability: str) -> str:
@@ -203,11 +213,11 @@ def _those_with(capability: str) -> str:
 
 
 def _checked(path: str | os.PathLike[str]) -> Path:
-    return checked_path(path, MESH_SUFFIXES)
+    return checked_path(path, MESH_SUFFIXES, _PACKED)
 
 
-def checked_path(path: str | os.PathLike[str], suffixes: Collection[str]) -> Path:
-    """`path` as a Path; a MeshError if it cannot be one, or has none of the suffixes."""
+def checked_path(path: str | os.PathLike[str], suffixes: Collection[str], packed: Collection[str] = ()) -> Path:
+    """`path` as a Path; a MeshError if it cannot be one, or has none of the suffixes, or of those `packed` and .gz."""
     try:
         found = Path(os.fspath(path))
     except TypeError:
@@ -218,27 +228,35 @@ def checked_path(path: str | os.PathLike[str], suffixes: Collection[str]) -> Pat
         printable = False
     if not printable:
         raise MeshError(f"{str(path)!r} cannot be a path: it holds characters that no file name may have")
-    if found.suffix.lower() not in suffixes:
+    suffix = form_suffix(found)
+    if is_packed(found) and suffix not in packed:
+        raise MeshError(f"{found}: '{suffix}' is not read or written with .gz; {', '.join(packed)} are")
+    if suffix not in suffixes:
         if found.is_dir():
             raise MeshError(f"{found} is a directory: name a mesh file in it")
         raise MeshError(f"{found}: unknown extension '{found.suffix}'; the formats are {', '.join(suffixes)}")
     return found
 
 
+def is_mesh_path(path: Path) -> bool:
+    """Whether `read_mesh` knows the extension of `path`."""
+    return form_suffix(path) in (_PACKED if is_packed(path) else MESH_SUFFIXES)
+
+
 def _load(path: str | os.PathLike[str]) -> tuple[Path, Contents]:
     path = _checked(path)
-    return path, _FORMATS[path.suffix.lower()].read(path, file_bytes(path))
+    return path, _FORMATS[form_suffix(path)].read(path, file_bytes(path))
 
 
 def file_bytes(path: Path) -> bytes:
-    """The contents of a regular file; a MeshError if it cannot be read."""
+    """The contents of a regular file, unpacked if it ends in .gz; a MeshError if it cannot be read."""
     try:
         mode = path.stat().st_mode
         # Reading a pipe or a device might not terminate.
         if not stat.S_ISREG(mode):
             kind = "a directory" if stat.S_ISDIR(mode) else "not a regular file"
             raise MeshError(f"{path} is {kind}: pass the path of a mesh file")
-        return path.read_bytes()
+        return unpacked(path, path.read_bytes())
     except FileNotFoundError as error:
         raise MeshError(f"{path}: no such file (looked in {path.absolute().parent})") from error
     except OSError as error:

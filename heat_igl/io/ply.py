@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ from heat_igl.io.text import Text, ragged
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["read", "read_vertices", "write"]
+__all__ = ["read", "read_vertices", "write", "write_vertices"]
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -297,23 +297,36 @@ def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
     PLY has no vectors: an array (n, k) becomes the properties name_0 to name_(k-1), and a comment records k.
     """
     columns: dict[str, FloatArray] = dict(zip("xyz", mesh.V.T, strict=True))
-    header = ["ply", "format binary_little_endian 1.0"]
+    comments = []
     for name, values in attributes.items():
         if values.ndim == 1:
             parts = {name: values}
         else:
             parts = {f"{name}_{i}": column for i, column in enumerate(values.T)}
-            header.append(f"comment vector {name} {values.shape[1]}")
+            comments.append(f"comment vector {name} {values.shape[1]}")
         for part, column in parts.items():
             if part in columns:
                 raise MeshError(f"{path}: PLY would hold two properties named {part}: rename the attribute {name}")
             columns[part] = column
-    header += [f"element vertex {mesh.n_vertices}", *(f"property double {name}" for name in columns)]
-    header += [f"element face {mesh.n_faces}", "property list uchar int vertex_indices", "end_header", ""]
     faces = np.empty(mesh.n_faces, [("degree", "u1"), ("corners", "<i4", 3)])
     faces["degree"] = 3
     faces["corners"] = mesh.F
+    _write(path, columns, comments, faces)
+
+
+def write_vertices(path: Path, columns: Mapping[str, FloatArray]) -> None:
+    """Write vertices without faces: properties of the same length by name, x, y and z among them."""
+    _write(path, columns, [], None)
+
+
+def _write(path: Path, columns: Mapping[str, FloatArray], comments: Sequence[str], faces: AnyArray | None) -> None:
+    rows = np.stack(list(columns.values()), axis=1).astype("<f8")
+    header = ["ply", "format binary_little_endian 1.0", *comments, f"element vertex {len(rows)}"]
+    header += [f"property double {name}" for name in columns]
+    if faces is not None:
+        header += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
     with path.open("wb") as file:
-        file.write("\n".join(header).encode("ascii"))
-        file.write(np.stack(list(columns.values()), axis=1).astype("<f8").tobytes())
-        file.write(faces.tobytes())
+        file.write("\n".join([*header, "end_header", ""]).encode("ascii"))
+        file.write(rows.tobytes())
+        if faces is not None:
+            file.write(faces.tobytes())

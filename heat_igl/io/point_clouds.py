@@ -1,4 +1,4 @@
-"""Reading point clouds: PLY, OBJ, XYZ, NPY and PCD, selected by the extension."""
+"""Reading and writing point clouds: PLY, OBJ, XYZ, NPY and PCD, selected by the extension."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.io import pcd, ply
+from heat_igl.io.atomic import replacing
 from heat_igl.io.files import checked_path, file_bytes
-from heat_igl.io.text import Text
+from heat_igl.io.packed import form_suffix, pack
+from heat_igl.io.text import Text, format_rows
 from heat_igl.mesh import PointCloud
 from heat_igl.typing import FloatArray
 
-__all__ = ["POINT_CLOUD_SUFFIXES", "read_point_cloud"]
+__all__ = ["POINT_CLOUD_SUFFIXES", "read_point_cloud", "write_point_cloud"]
 
 _Points = tuple[FloatArray, FloatArray | None]
 
@@ -31,6 +33,7 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
         as normals. .obj: the lines v, and the lines vn as normals if there are as many. .xyz: a point in each line,
         three coordinates or three and a normal; separated by white space or commas, "#" starts a comment. .npy: an
         array (n, 3), or (n, 6) with normals. .pcd: the fields x, y, z and normal_x, normal_y, normal_z, text or binary.
+        A further .gz stands for a file packed by gzip.
 
     Returns
     -------
@@ -43,14 +46,36 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
         If the file is missing, unreadable or damaged, or the points cannot be used. Normals that are all 0, as some
         programs write them, count as none.
     """
-    path = checked_path(path, POINT_CLOUD_SUFFIXES)
-    P, normals = _FORMATS[path.suffix.lower()](path, file_bytes(path))
+    path = checked_path(path, POINT_CLOUD_SUFFIXES, POINT_CLOUD_SUFFIXES)
+    P, normals = _FORMATS[form_suffix(path)](path, file_bytes(path))
     if normals is not None and not normals.any():
         normals = None
     try:
         return PointCloud(P, normals)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
+
+
+def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud) -> None:
+    """Write a point cloud, with its normals if it has any, to a file.
+
+    Parameters
+    ----------
+    path : path-like
+        The extension selects the format, as for `read_point_cloud`: .ply, .obj, .xyz or .npy, or one of these and .gz.
+        An existing file is replaced only when the new one is complete.
+    cloud : PointCloud
+        Points are read back exactly.
+
+    Raises
+    ------
+    MeshError
+        If the extension is another, or the file cannot be written.
+    """
+    path = checked_path(path, tuple(_WRITERS), tuple(_WRITERS))
+    with replacing(path) as temporary:
+        _WRITERS[form_suffix(path)](temporary, cloud)
+        pack(path, temporary)
 
 
 def _from_ply(path: Path, data: bytes) -> _Points:
@@ -112,3 +137,35 @@ _FORMATS: dict[str, Callable[[Path, bytes], _Points]] = {
 }
 
 POINT_CLOUD_SUFFIXES = tuple(_FORMATS)
+
+
+def _to_ply(path: Path, cloud: PointCloud) -> None:
+    ply.write_vertices(path, dict(zip(("x", "y", "z", "nx", "ny", "nz"), _rows(cloud).T, strict=False)))
+
+
+def _to_obj(path: Path, cloud: PointCloud) -> None:
+    normals = "" if cloud.normals is None else format_rows("vn %r %r %r\n", cloud.normals)
+    path.write_text(format_rows("v %r %r %r\n", cloud.P) + normals)
+
+
+def _to_xyz(path: Path, cloud: PointCloud) -> None:
+    rows = _rows(cloud)
+    path.write_text(format_rows(" ".join(["%r"] * rows.shape[1]) + "\n", rows))
+
+
+def _to_npy(path: Path, cloud: PointCloud) -> None:
+    with path.open("wb") as file:
+        np.save(file, _rows(cloud))
+
+
+def _rows(cloud: PointCloud) -> FloatArray:
+    """Positions (n, 3), or (n, 6) with normals."""
+    return cloud.P if cloud.normals is None else np.hstack([cloud.P, cloud.normals])
+
+
+_WRITERS: dict[str, Callable[[Path, PointCloud], None]] = {
+    ".ply": _to_ply,
+    ".obj": _to_obj,
+    ".xyz": _to_xyz,
+    ".npy": _to_npy,
+}

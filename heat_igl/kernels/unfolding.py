@@ -28,8 +28,16 @@ def unfold(
     max_steps: cython.int,
     max_passes: cython.int,
     has_holes: cython.bint,
+    entered,
+    share,
+    reach,
 ):
-    """Pass over the vertices `order` (n,) until nothing is stale; see `heat_igl.unfolding.walks.unfold`."""
+    """Pass over the vertices `order` (n,) until nothing is stale; see `heat_igl.unfolding.walks.unfold`.
+
+    The last three are filled with how each path begins, unless they are empty.
+    """
+    ways = _Ways()
+    ways.entered, ways.share, ways.reach = entered, share, reach
     q = Query(tables, walk, first_inside, inside, tolerance, shortfall, max_steps)
     q.has_holes = has_holes
     v: cython.int
@@ -40,14 +48,50 @@ def unfold(
             # A source that begins later may be overtaken; a corner that sees a source in its face hardly is.
             known: cython.double = q.walk[v].distance
             is_stale[v] = known == INFINITY or (known > 0.0 and q.walk[v].fan == NO_FAN)
-        _run(q, order, is_stale, max_passes)
+        _run(q, order, is_stale, max_passes, ways)
+
+
+@cython.final
+@cython.cclass
+class _Ways:
+    """How the path of each vertex begins, as `heat_igl.unfolding.path_derivatives.Ways` has it; or empty arrays."""
+
+    entered: cython.int[::1]
+    share: cython.double[::1]
+    reach: cython.double[::1]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def note(self, q: Query, v: cython.int, behind: cython.double) -> cython.void:
+        """Note the path that was found for v, whose end has a path of length `behind`."""
+        found = cython.address(q.found)
+        x: cython.double = found.x
+        y: cython.double = found.y
+        reach: cython.double = sqrt(x * x + y * y)
+        if found.distance < (reach + behind) * (1 - 1e-12):
+            # Straight past that vertex, to the last bend of its path.
+            c: cython.double = cos(found.saving)
+            s: cython.double = sin(found.saving)
+            further: cython.double = q.walk[found.end].reach / reach
+            x, y = x + further * (x * c - y * s), y + further * (x * s + y * c)
+            reach = sqrt(x * x + y * y)
+        self.entered[v], self.reach[v] = -1, reach
+        if found.y != 0.0:
+            spoke = cython.address(q.t.spoke[found.spoke])
+            self.entered[v] = q.t.turn[found.spoke].corner
+            self.share[v] = (spoke.along - x * spoke.height / y) / spoke.base
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _run(
-    q: Query, order: cython.const[cython.int][::1], is_stale: cython.uchar[::1], max_passes: cython.int
+    q: Query,
+    order: cython.const[cython.int][::1],
+    is_stale: cython.uchar[::1],
+    max_passes: cython.int,
+    ways: _Ways,
 ) -> cython.void:
     i: cython.Py_ssize_t
     j: cython.int
@@ -81,6 +125,8 @@ def _run(
                 # One that stays without a path must not be waited for again.
                 may_wait = distance < INFINITY
                 is_stale[v] = False
+                if distance < old and ways.entered.shape[0] > 0:
+                    ways.note(q, v, q.walk[q.found.end].distance)
                 if distance < old * (1 - 1e-9):
                     for k in range(q.t.first[v], q.t.first[v + 1]):
                         w: cython.int = q.t.spoke[k].neighbour

@@ -1,11 +1,13 @@
 """What distance is measured on: meshes, images and point clouds, and points and curves on them."""
 
+from heat_igl.mesh.level_segments import Segments, crossings, joined_segments, level_segments
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with
 from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygons import PolygonMesh, which_repeat_a_vertex
 from heat_igl.mesh.projection import ClosestPoints, closest_points
+from heat_igl.mesh.regions import region_boundary
 from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
 from heat_igl.mesh.subdivision import split_long_edges
 from heat_igl.mesh.surface_curves import curve_on, edge_curve
@@ -23,6 +25,7 @@ __all__ = [
     "ON_SIDE_COMPUTED",
     "PointCloud",
     "PolygonMesh",
+    "Segments",
     "SurfaceCurve",
     "SurfacePoints",
     "as_mesh",
@@ -30,10 +33,14 @@ __all__ = [
     "checked_faces",
     "checked_positions",
     "closest_points",
+    "crossings",
     "curve_on",
     "edge_curve",
     "image_domain",
+    "joined_segments",
+    "level_segments",
     "read_paths_with",
+    "region_boundary",
     "split_long_edges",
     "triangulated",
     "which_repeat_a_vertex",

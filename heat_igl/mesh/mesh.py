@@ -38,7 +38,7 @@ def _frozen(array: ArrayT) -> ArrayT:
 
 
 def checked_positions(V: ArrayLike) -> FloatArray:
-    """`V` as a new (n, 3) float64 array.
+    """`V`, of shape (n, 3), or (n, 2) in the plane z = 0, as a new (n, 3) float64 array.
 
     Raises
     ------
@@ -51,13 +51,13 @@ def checked_positions(V: ArrayLike) -> FloatArray:
         raise MeshError(f"V must be an array of shape (n, 3): {error}") from None
     if array.dtype.kind not in "iuf":
         raise MeshError(f"V must hold real numbers, not {array.dtype}: pass an (n, 3) array of positions")
-    if array.ndim != 2 or array.shape[1] != 3:
-        remedy = "; append a zero column to planar positions" if array.ndim == 2 and array.shape[1] == 2 else ""
-        raise MeshError(f"V must have shape (n, 3), but it has shape {array.shape}{remedy}")
+    if array.ndim != 2 or array.shape[1] not in (2, 3):
+        raise MeshError(f"V must have shape (n, 3), or (n, 2) in the plane, but it has shape {array.shape}")
     if not len(array):
         raise MeshError("V is empty: a mesh needs vertices")
     with np.errstate(over="ignore"):
-        positions = np.array(array, dtype=np.float64, order="C", copy=True)
+        positions = np.zeros((len(array), 3))
+        positions[:, : array.shape[1]] = array
     bad = ~np.isfinite(positions)
     if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
@@ -118,8 +118,8 @@ class Mesh:
 
     Parameters
     ----------
-    V : (n, 3) array_like of real numbers
-        Vertex positions, in any unit of length; copied to float64.
+    V : (n, 3) or (n, 2) array_like of real numbers
+        Vertex positions, in any unit of length; copied to float64. Two columns are x and y in the plane z = 0.
     F : (m, 3) or (m, 4) array_like of integers
         Vertex indices of each triangle or tetrahedron, counted from 0; copied to int64. "Face" stands for
         both kinds throughout the package.

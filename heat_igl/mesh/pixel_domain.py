@@ -1,4 +1,4 @@
-"""Planar images: the pixels of a mask as a flat mesh, and values per vertex as an image again."""
+"""Images of two or three dimensions: the pixels of a mask as a mesh, and values per vertex as an image again."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.mesh.mesh import Mesh
+from heat_igl.mesh.voxels import TETRAHEDRA_PER_VOXEL, voxel_tetrahedra
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, IntArray
 
 __all__ = ["ImageDomain", "image_domain"]
@@ -18,13 +19,13 @@ _FACES_PER_PIXEL = 4
 
 @dataclass(frozen=True, eq=False)
 class ImageDomain:
-    """The pixels of a mask as a flat triangle mesh, made by `image_domain`.
+    """The pixels of a mask as a flat triangle mesh, or the voxels as tetrahedra, made by `image_domain`.
 
     Attributes
     ----------
     mesh : Mesh
-        In the plane z = 0: x runs along the columns, y down the rows.
-    index : (rows, columns) int64
+        Triangles in the plane z = 0, or tetrahedra: x runs along the columns, y down the rows, z along the slices.
+    index : (rows, columns) or (slices, rows, columns) int64
         Vertex at the centre of each pixel; -1 outside the mask. They count up from 0 row by row, and the corners of the
         pixels follow.
     """
@@ -37,8 +38,8 @@ class ImageDomain:
 
         Parameters
         ----------
-        pixels : (rows, columns) array_like of bool
-            Pixels outside the domain are ignored.
+        pixels : array_like of bool
+            Of the shape of `index`. Pixels outside the domain are ignored.
 
         Raises
         ------
@@ -56,7 +57,7 @@ class ImageDomain:
         return found
 
     def image(self, values: ArrayLike, outside: float = np.inf) -> AnyArray:
-        """Values per vertex (n,), such as a distance, as an image (rows, columns); `outside` off the domain.
+        """Values per vertex (n,), such as a distance, as an image; `outside` off the domain.
 
         Raises
         ------
@@ -72,7 +73,7 @@ class ImageDomain:
         return image
 
     def per_face(self, image: ArrayLike) -> AnyArray:
-        """Values per pixel (rows, columns), such as a speed, as values per face of `mesh` (m,).
+        """Values per pixel, such as a speed, as values per face of `mesh` (m,).
 
         Raises
         ------
@@ -82,11 +83,11 @@ class ImageDomain:
         array = np.asarray(image)
         if array.shape != self.index.shape:
             raise ValueError(f"image must have shape {self.index.shape}, not {array.shape}")
-        return np.repeat(array[self.index >= 0], _FACES_PER_PIXEL)
+        return np.repeat(array[self.index >= 0], TETRAHEDRA_PER_VOXEL if self.index.ndim == 3 else _FACES_PER_PIXEL)
 
 
 def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> ImageDomain:
-    """A flat mesh of the pixels of `mask`.
+    """A flat mesh of the pixels of `mask`, or tetrahedra of its voxels.
 
     Every pixel is a rectangle, cut into four triangles around the centre: no diagonal direction is preferred, no pixel
     is lost, and the area of the mesh is that of the pixels. Pixels that touch only in a corner are connected through
@@ -94,23 +95,24 @@ def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> Ima
 
     Parameters
     ----------
-    mask : (rows, columns) array_like of bool
-        The pixels of the domain.
-    spacing : float or (float, float), optional
-        Distance between the centres of neighbouring pixels; for rectangular ones first from row to row, then from
-        column to column, like skimage's.
+    mask : (rows, columns) or (slices, rows, columns) array_like of bool
+        The pixels or voxels of the domain.
+    spacing : float or sequence of float, optional
+        Distance between the centres of neighbouring pixels; one for each axis of the image where they differ, from row
+        to row before from column to column, like skimage's.
 
     Returns
     -------
     ImageDomain
-        The mesh has a vertex for each pixel and one for each corner of pixels.
+        The mesh has a vertex for each pixel and one for each corner of pixels. A voxel is cut into twelve tetrahedra
+        around the centre.
 
     Raises
     ------
     MeshError
         If `mask` is not an image of booleans, or holds no pixel.
     ValueError
-        If `spacing` is not one or two positive numbers.
+        If `spacing` is neither one positive number nor one for each axis.
 
     Examples
     --------
@@ -121,7 +123,11 @@ def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> Ima
     (2, 3)
     """
     inside = _mask(mask)
-    down, across = _spacing(spacing)
+    steps = _spacing(spacing, inside.ndim)
+    if inside.ndim == 3:
+        V, tetrahedra, index = voxel_tetrahedra(inside, steps)
+        return ImageDomain(Mesh(V, tetrahedra), index)
+    down, across = steps
     row, column = np.nonzero(inside)
     n = len(row)
     index = np.full(inside.shape, -1)
@@ -145,21 +151,22 @@ def _mask(mask: ArrayLike) -> BoolArray:
         array: AnyArray = np.asarray(mask)
     except ValueError:
         raise MeshError("mask must be a boolean image (rows, columns), not a ragged sequence") from None
-    if array.ndim != 2 or array.dtype.kind != "b":
+    if array.ndim not in (2, 3) or array.dtype.kind != "b":
         raise MeshError(
-            f"mask must be a boolean image (rows, columns), not {array.dtype} of shape {array.shape}: compare with a "
-            "threshold first"
+            "mask must be a boolean image (rows, columns) or (slices, rows, columns), not "
+            f"{array.dtype} of shape {array.shape}: compare with a threshold first"
         )
     if not array.any():
         raise MeshError("mask holds no pixel: a domain needs at least one")
     return array
 
 
-def _spacing(spacing: float | Sequence[float]) -> tuple[float, float]:
+def _spacing(spacing: float | Sequence[float], dimension: int) -> list[float]:
     try:
-        down, across = np.broadcast_to(np.asarray(spacing, dtype=np.float64), (2,)).tolist()
+        steps: list[float] = np.broadcast_to(np.asarray(spacing, dtype=np.float64), (dimension,)).tolist()
     except (TypeError, ValueError):
-        down, across = np.nan, np.nan
-    if not (0 < down < np.inf and 0 < across < np.inf):
-        raise ValueError(f"spacing must be one or two positive numbers, not {spacing!r}")
-    return down, across
+        steps = [np.nan]
+    if not all(0 < step < np.inf for step in steps):
+        count = "two" if dimension == 2 else "three"
+        raise ValueError(f"spacing must be one or {count} positive numbers, not {spacing!r}")
+    return steps

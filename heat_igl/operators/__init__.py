@@ -1,9 +1,18 @@
 """The discrete Laplacian, mass, gradient and divergence of a domain: a function per kind returns `Operators`."""
 
-from heat_igl.operators.connection import connection_laplacian, edge_rotations, with_rotations
+from heat_igl.operators.connection import (
+    FaceRotations,
+    connection_laplacian,
+    edge_rotations,
+    face_rotations,
+    with_rotations,
+)
+from heat_igl.operators.element_derivatives import Elements, ElementSlopes
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
-from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
-from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
+from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators, without_refinement
+from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian, divergence_matrix
+from heat_igl.operators.metric import fibre_metric, metric_operators
+from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.point_clouds import point_cloud_operators
 from heat_igl.operators.polygons import polygon_operators
 from heat_igl.operators.simplices import cotan_operators
@@ -14,7 +23,11 @@ from heat_igl.operators.triangles import operators, tufted_operators, unfolding_
 
 __all__ = [
     "EdgeLengths",
+    "ElementSlopes",
+    "Elements",
+    "FaceRotations",
     "Laplacian",
+    "MetricSimplices",
     "OnLaplacian",
     "Operators",
     "Surface",
@@ -22,10 +35,14 @@ __all__ = [
     "check_laplacian",
     "connection_laplacian",
     "cotan_operators",
+    "divergence_matrix",
     "edge_length_operators",
     "edge_rotations",
+    "fibre_metric",
+    "face_rotations",
     "intrinsic_operators",
     "is_rough_or_narrow",
+    "metric_operators",
     "operators",
     "point_cloud_operators",
     "polygon_operators",
@@ -33,4 +50,5 @@ __all__ = [
     "tufted_operators",
     "unfolding_surface",
     "with_rotations",
+    "without_refinement",
 ]

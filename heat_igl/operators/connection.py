@@ -6,6 +6,8 @@ exp(i rho) (Knoeppel, Crane, Pinkall, Schroeder 2013; Sharp, Soliman, Crane 2019
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -21,9 +23,9 @@ from heat_igl.intrinsic import (
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.operators.matrices import Laplacian, Operators
 from heat_igl.operators.triangles import operators
-from heat_igl.typing import FloatArray
+from heat_igl.typing import AnyArray, FloatArray
 
-__all__ = ["connection_laplacian", "edge_rotations", "with_rotations"]
+__all__ = ["FaceRotations", "connection_laplacian", "edge_rotations", "face_rotations", "with_rotations"]
 
 
 def connection_laplacian(mesh: MeshLike, laplacian: Laplacian = "intrinsic-delaunay") -> sp.csc_matrix:
@@ -101,6 +103,52 @@ def edge_rotations(domain: Operators) -> sp.csc_matrix:
     diagonal = domain.L.diagonal()
     extra = np.divide(cost, diagonal, out=np.zeros(n), where=diagonal != 0)
     return sp.csc_matrix(turned + sp.diags_array(1 + extra))
+
+
+class FaceRotations(NamedTuple):
+    """Factors (m, 3) that turn vectors at the corners of faces into vectors in the planes of the faces.
+
+    Attributes
+    ----------
+    of_faces : (m, 3) complex128
+        For the faces of the mesh.
+    of_triangulation : (m, 3) complex128
+        For the triangles that the operators belong to.
+    """
+
+    of_faces: AnyArray
+    of_triangulation: AnyArray
+
+
+def face_rotations(domain: Operators) -> FaceRotations:
+    """By what the numbers a + i b of vectors at corners are multiplied to give those of vectors in faces.
+
+    A vector in a face has its components along the side from corner 0 to corner 1, and across it, towards corner 2.
+    Angles around a vertex are scaled and those in a face are not: of the directions between the two sides of a corner,
+    the middle one keeps its place, and the plane of the face is turned by one angle.
+
+    Raises
+    ------
+    MeshError
+        As for `edge_rotations`.
+    """
+    triangulation, angles = _triangles(domain)
+    surface = domain.surface
+    if surface is None or surface.faces is None or surface.faces is triangulation:
+        both = _corner_rotations(triangulation, angles)
+        return FaceRotations(both, both)
+    of_faces = _corner_rotations(surface.faces, polar_angles(surface.faces))
+    return FaceRotations(of_faces, _corner_rotations(triangulation, angles))
+
+
+def _corner_rotations(triangulation: IntrinsicTriangulation, angles: PolarAngles) -> AnyArray:
+    F, inside = triangulation.F, angles.corners
+    half_edge = np.arange(F.size)
+    leaving, scale = angles.rigid(triangulation.tail(half_edge))
+    # Half-edge 3 f + c leaves from corner c + 1.
+    at_corner = np.roll(leaving.reshape(-1, 3), 1, axis=1)
+    in_face = np.stack([np.zeros(len(F)), np.pi - inside[:, 1], 2 * np.pi - inside[:, 1] - inside[:, 2]], axis=1)
+    return np.asarray(np.exp(1j * (in_face + inside / 2 - at_corner - scale[F] * inside / 2)))
 
 
 def _triangles(domain: Operators) -> tuple[IntrinsicTriangulation, PolarAngles]:

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
+from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.surface import Surface
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
@@ -70,6 +71,10 @@ class Operators:
     surface : Surface or None
         The triangles, for exact distance near sources and for unfolding; None if distance is not measured along
         triangles. The three steps never read it.
+    simplices : MetricSimplices or None
+        Tetrahedra, or triangles that do not fit together, for fronts that pass through them; None for other domains.
+    contrast : float
+        Largest ratio between faces of the length in the metric per length in space; 1 without a metric.
     """
 
     L: sp.csc_matrix
@@ -86,6 +91,8 @@ class Operators:
     lengths: sp.csc_matrix | TriangleElements | None = None
     surface: Surface | None = None
     longest_distances: FloatArray | None = None
+    simplices: MetricSimplices | None = None
+    contrast: float = 1.0
 
     @property
     def n(self) -> int:

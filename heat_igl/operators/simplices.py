@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial, reduce
 
 import igl
@@ -12,6 +13,7 @@ from heat_igl.errors import MeshError
 from heat_igl.mesh import Mesh
 from heat_igl.operators.elements import TriangleElements
 from heat_igl.operators.matrices import OnLaplacian, Operators, laplacian_of_gradient
+from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.surface import Surface
 from heat_igl.typing import FloatArray, IntArray
 
@@ -44,7 +46,7 @@ def cotan_operators(mesh: Mesh, on_laplacian: OnLaplacian | None = None) -> Oper
     L = laplacian_of_gradient(G, mesh.measures)
     if on_laplacian is not None:
         on_laplacian(L)
-    return _assembled(mesh, L, G)
+    return replace(_assembled(mesh, L, G), simplices=MetricSimplices.in_space(mesh))
 
 
 def surface_operators(mesh: Mesh, surface: Surface, on_laplacian: OnLaplacian | None = None) -> Operators:

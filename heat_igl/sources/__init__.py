@@ -3,6 +3,7 @@
 from heat_igl.sources.assembly import NEAR_RADIUS, SourceAssembler, SourceTerm, right_hand_side, take_shorter
 from heat_igl.sources.near_field import NearField, Seeds
 from heat_igl.sources.ordered import ordered_vertices
+from heat_igl.sources.oriented import Oriented, OrientedPoints, OrientedSet, oriented_set
 from heat_igl.sources.specification import (
     OffsetSources,
     SourcePoints,
@@ -19,6 +20,9 @@ __all__ = [
     "NEAR_RADIUS",
     "NearField",
     "OffsetSources",
+    "Oriented",
+    "OrientedPoints",
+    "OrientedSet",
     "Seeds",
     "SourceAssembler",
     "SourcePoints",
@@ -29,6 +33,7 @@ __all__ = [
     "named_vertices",
     "nearest_first",
     "ordered_vertices",
+    "oriented_set",
     "right_hand_side",
     "source_set",
     "take_shorter",

@@ -9,7 +9,7 @@ from heat_igl.runtime import LOWEST_HEAT
 from heat_igl.steps.descending import Triangles, normalized_divergence, triangles
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["NormalizedDivergence", "damping", "normalize"]
+__all__ = ["NormalizedDivergence", "damping", "lowest_full_rate", "normalize"]
 
 # Share of a front's rate of decay from which on a direction is trusted fully; docs/heat_path.md compares values. Fronts
 # of a fitted flow scatter less.
@@ -83,7 +83,7 @@ def damping(
         at which an insulated boundary mirrors the front, a slower rate is enough, and the factor
         is 1 if the flow is not `fitted`.
     """
-    return _share_of_rate(operators, u, _lowest_full_rate(operators, t, fitted, full_rate))
+    return _share_of_rate(operators, u, lowest_full_rate(operators, t, fitted, full_rate))
 
 
 def _share_of_rate(operators: Operators, u: FloatArray, full_rate: FloatArray) -> FloatArray:
@@ -96,7 +96,7 @@ def _share_of_rate(operators: Operators, u: FloatArray, full_rate: FloatArray) -
     return np.asarray(np.where(share < 1, share, 1.0))
 
 
-def _lowest_full_rate(
+def lowest_full_rate(
     operators: Operators, t: float | FloatArray, fitted: bool, full_rate: float | None = None
 ) -> FloatArray:
     """The rate (m,), in e-foldings per length, from which on a direction is trusted fully."""
@@ -145,7 +145,7 @@ class NormalizedDivergence:
         self._arguments = operators, t, order, fitted
         self._full_rate: FloatArray | None = None
         self._kernel: Triangles | None = None
-        full_rate = None if t is None else _lowest_full_rate(operators, t, fitted)
+        full_rate = None if t is None else lowest_full_rate(operators, t, fitted)
         if isinstance(operators.gradient, TriangleElements):
             full_rate = np.zeros(len(operators.weights)) if full_rate is None else full_rate
             self._kernel = triangles(operators.gradient, operators.weights, full_rate, order)

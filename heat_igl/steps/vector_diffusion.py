@@ -7,6 +7,7 @@ import scipy.sparse as sp
 
 from heat_igl.linear import Backend, factorize
 from heat_igl.operators import Operators, with_rotations
+from heat_igl.steps.fitted import fitted_laplacian
 from heat_igl.steps.pattern import shifted
 from heat_igl.typing import AnyArray, FloatArray
 
@@ -28,10 +29,13 @@ class VectorHeatFlow:
         The domain.
     rotations : (n, n) csc_matrix of complex128
         Factors of transport along the edges, as `edge_rotations` gives it for triangles.
-    t : float
-        Time step, a squared length.
+    t : float or (n_components,) float64
+        Time step, a squared length; one for all components, or one for each.
     backend : {"auto", "scipy", "multifrontal"}
         See `factorize`. The iterative backend solves for numbers of one sign only.
+    fitted : bool
+        As for `HeatFlow`. No weight is negative then, and Y is nowhere longer than heat that starts with the lengths
+        of b.
     mass : (n,) float64, optional
         In place of the diagonal of M.
 
@@ -47,8 +51,9 @@ class VectorHeatFlow:
         self,
         operators: Operators,
         rotations: sp.csc_matrix,
-        t: float,
+        t: float | FloatArray,
         backend: Backend = "auto",
+        fitted: bool = False,
         mass: FloatArray | None = None,
     ) -> None:
         if backend == "iterative":
@@ -58,8 +63,10 @@ class VectorHeatFlow:
             is_large = 2 * operators.n >= _SMALLEST_MULTIFRONTAL
             backend = "multifrontal" if is_large else "scipy"
         self.t, self.mean_mass, self._n = t, operators.mean_mass, operators.n
+        L = fitted_laplacian(operators, t) if fitted else operators.L
         lumped = operators.M.diagonal() if mass is None else mass
-        matrix = shifted(with_rotations(operators.L, rotations), -t / self.mean_mass, lumped / self.mean_mass)
+        step = operators.expand_to_vertices(t) if isinstance(t, np.ndarray) else t
+        matrix = shifted(with_rotations(L, rotations), -step / self.mean_mass, lumped / self.mean_mass)
         self.factor = factorize(_real(matrix), backend, np.repeat(operators.referenced, 2))
 
     def solve(self, b: AnyArray) -> AnyArray:

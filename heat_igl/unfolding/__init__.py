@@ -4,17 +4,23 @@ from heat_igl.unfolding.directions import PathAngles, in_circle
 from heat_igl.unfolding.distance import directed_from_scratch, distance_from_scratch, unfolded_distance
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
 from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
+from heat_igl.unfolding.fronts import FrontSolver
 from heat_igl.unfolding.local import distances_within, nearest_vertices, pair_distances
+from heat_igl.unfolding.path_derivatives import Change
+from heat_igl.unfolding.path_lengths import PathLengths
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = [
     "ExactPaths",
+    "Change",
     "ExactSolution",
     "ExactSurface",
+    "FrontSolver",
     "Known",
     "Origin",
     "PathAngles",
+    "PathLengths",
     "Refine",
     "Refinement",
     "UnfoldingSolver",

@@ -14,7 +14,7 @@ from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSolution
-from heat_igl.unfolding.refinement import Refinement, Starts
+from heat_igl.unfolding.refinement import Refinement, WalkStarts
 from heat_igl.unfolding.walks import INSIDE, unknown
 
 __all__ = ["PathAngles", "PathDirections", "in_circle"]
@@ -105,7 +105,7 @@ class PathDirections:
         found[2, row] = turning[row] - _WHOLE * np.rint(turning[row] / _WHOLE)
         return PathAngles(*found[:, self._refinement.number])
 
-    def of_windows(self, found: ExactSolution, starts: Starts, points: SurfacePoints | None = None) -> PathAngles:
+    def of_windows(self, found: ExactSolution, starts: WalkStarts, points: SurfacePoints | None = None) -> PathAngles:
         """The angles of exact paths from sources that begin at `starts`, p of them at `points` in faces."""
         refinement, n, origin = self._refinement, len(self._begin), found.origin
         number = refinement.number

@@ -162,6 +162,14 @@ class ExactSurface:
             done.n_crossings,
         )
 
+    def located(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray]:
+        """Triangles that hold points of the mesh, coordinates in them, and which point each is.
+
+        A point on a side is there once for each triangle.
+        """
+        place = self._half_edges.located(points)
+        return self._half_edges.face[place.faces].astype(np.int64), place.barycentric, place.point
+
     def _result(self, found: Found, done: Searched, which: AnyArray, cutoff: float) -> tuple[FloatArray, Origin]:
         """Distance and origin of some of the places that the kernel found, in the caller's numbers and unit."""
         edges, starts, label = self._half_edges, done.starts, done.found.label

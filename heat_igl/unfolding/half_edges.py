@@ -13,7 +13,7 @@ from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["HalfEdges", "Located", "Tables", "from_mesh", "from_triangulation"]
+__all__ = ["HalfEdges", "Located", "Tables", "from_mesh", "from_triangulation", "rings"]
 
 # A point whose barycentric coordinate is below this lies on the side of its face.
 _ON_SIDE = 1e-13
@@ -213,7 +213,7 @@ def from_triangulation(triangulation: IntrinsicTriangulation) -> HalfEdges:
     return HalfEdges(
         triangulation.F.ravel().astype(np.int32),
         triangulation.twin.astype(np.int32),
-        _rings(triangulation),
+        rings(triangulation),
         triangulation.aligned.astype(np.uint8),
         np.ldexp(triangulation.l.ravel(), -exponent),
         triangulation.n,
@@ -247,7 +247,7 @@ def _exponent(lengths: FloatArray) -> int:
     return int(np.frexp(lengths.mean())[1])
 
 
-def _rings(triangulation: IntrinsicTriangulation) -> AnyArray:
+def rings(triangulation: IntrinsicTriangulation) -> AnyArray:
     """For a half-edge where more than two faces meet, the next of those there; elsewhere itself."""
     ring = np.arange(len(triangulation.twin), dtype=np.int32)
     many = np.flatnonzero(triangulation.twin == -2)

@@ -14,9 +14,11 @@ import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation, double_cover, oriented
 from heat_igl.intrinsic.fans import breadth_first, tables
+from heat_igl.intrinsic.history import BACK_CORNERS
 from heat_igl.kernels.ordering import ascending
 from heat_igl.mesh import SurfacePoints
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.path_derivatives import Paths, Places, Starts, Triangles, Ways, half_edge_arrays
 from heat_igl.unfolding.walks import INSIDE, Points, sweep, unfold, unknown, views
 
 __all__ = ["TOLERANCE", "Known", "Refine", "Refinement"]
@@ -86,9 +88,9 @@ class Refinement:
         if not triangulation.aligned.all():
             self._n_sheets = 2
             F, lengths, twin = double_cover(triangulation)
-        self._triangulation = triangulation
+        self.triangulation = triangulation
         self.number, self.face, F, lengths, twin = breadth_first(F, lengths, twin, self._n_sheets * self.n)
-        self._F = F
+        self._F, self._lengths = F, lengths
         self.tables = tables(F, lengths, twin, len(self.number))
         self._twin = twin
 
@@ -220,24 +222,76 @@ class Refinement:
         walk = self.walks(key, self.starts(sources, offsets, points, point_offsets), tolerance)
         return self._on_base(walk["distance"], walk["label"], labels)
 
-    def walks(self, key: FloatArray, starts: Starts, tolerance: float = TOLERANCE) -> AnyArray:
-        """What `unfold` finds of the path of each row of the tables; see `heat_igl.unfolding.walks.WALK`."""
+    def walks(self, key: FloatArray, starts: WalkStarts, tolerance: float = TOLERANCE, **ways: AnyArray) -> AnyArray:
+        """What is known of the path of each row after `unfold`; how each path begins is filled into `ways`."""
         walk = unknown(len(self.number) + starts.n_points)
         walk[starts.row] = starts.walk
-        # Below 1e-5, forecasts are wrong by as much because of the curvature on the way.
-        shortfall = max(_SHORTFALL * tolerance, 1e-5)
         unfold(
             self._order(key),
             self.tables,
             walk,
             starts.points,
             tolerance=tolerance,
-            shortfall=shortfall,
+            # Below 1e-5, forecasts are wrong by as much because of the curvature on the way.
+            shortfall=max(_SHORTFALL * tolerance, 1e-5),
             max_steps=_MAX_SEARCH,
             max_passes=_MAX_PASSES,
             has_holes=self.has_holes,
+            **ways,
         )
         return walk
+
+    def paths(self, key: FloatArray, sources: Starts, tolerance: float = TOLERANCE) -> Paths:
+        """The paths whose lengths `unfold` returns, on the triangles by the numbers of the tables.
+
+        Of a surface that cannot be oriented, on both sheets.
+        """
+        vertices, offsets, points, point_offsets = sources
+        starts = self.starts(vertices, offsets if offsets.any() else None, points, point_offsets)
+        n = len(self.number)
+        entered, share, reach = np.full(n, -1, np.int32), np.zeros(n), np.zeros(n)
+        walk = self.walks(key, starts, tolerance, entered=entered, share=share, reach=reach)
+        found = Ways(walk["distance"][:n].copy(), entered.astype(np.int64), share, reach)
+        places = Places.none()
+        if points is not None:
+            faces, barycentric, point, _ = self._faces_of(points)
+            late = np.zeros(len(points)) if point_offsets is None else np.asarray(point_offsets, np.float64)
+            places = Places(faces, barycentric, point, late[point])
+        is_source = np.zeros(n, bool)
+        on_sheets = self.number[np.concatenate([vertices + self.n * sheet for sheet in range(self._n_sheets)])]
+        is_source[on_sheets] = walk["distance"][on_sheets] >= np.tile(offsets, self._n_sheets)
+        return Paths(self._triangles, places, found, is_source)
+
+    @cached_property
+    def _triangles(self) -> Triangles:
+        size = self._F.size
+        F, twin = self._F.astype(np.int64), self._twin.ravel().astype(np.int64)
+        return half_edge_arrays(IntrinsicTriangulation(F, self._lengths, twin, np.ones(size, bool), len(self.number)))
+
+    def by_given_sides(self, by_side: FloatArray) -> FloatArray:
+        """Derivatives by the sides (m, 3) of `triangulation`, from those by the numbers of the tables."""
+        sheets = by_side[self.face].reshape(self._n_sheets, -1, 3)
+        return np.asarray(sheets[0] if self._n_sheets == 1 else sheets[0] + sheets[1][:, BACK_CORNERS])
+
+    def on_tables(self, sides: FloatArray) -> FloatArray:
+        """Values by the numbers of the tables, from those on the sides (m, 3) of `triangulation`."""
+        if self._n_sheets == 2:
+            sides = np.concatenate([sides, sides[:, BACK_CORNERS]])
+        ordered = np.empty_like(sides)
+        ordered[self.face] = sides
+        return ordered
+
+    def rows_of(self, distance: FloatArray) -> AnyArray:
+        """The number (n,) in the tables of each vertex, on the sheet on which `distance` by these numbers is less."""
+        on_sheets = self.number.reshape(self._n_sheets, -1)
+        nearer = distance[on_sheets].argmin(axis=0)
+        return np.asarray(on_sheets[nearer, np.arange(self.n)])
+
+    def vertex_of(self, rows: AnyArray) -> IntArray:
+        """The vertices that have some numbers in the tables."""
+        vertex = np.empty(len(self.number), np.int64)
+        vertex[self.number] = np.tile(np.arange(self.n), self._n_sheets)
+        return np.asarray(vertex[rows])
 
     def _order(self, key: FloatArray) -> AnyArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
@@ -250,7 +304,7 @@ class Refinement:
         offsets: FloatArray | None,
         points: SurfacePoints | None,
         point_offsets: FloatArray | None,
-    ) -> Starts:
+    ) -> WalkStarts:
         """Initial values of the kernels, on all sheets and by the numbers of the tables."""
         n, k, sheets = len(self.number), len(sources), range(self._n_sheets)
         row = self.number[np.concatenate([sources + self.n * sheet for sheet in sheets])]
@@ -282,11 +336,11 @@ class Refinement:
 
     def _faces_of(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Triangles of the tables that hold points, coordinates in them, which point each is, and `Inside.turn`."""
-        faces, barycentric = self._triangulation.locate(points.faces, points.barycentric)
+        faces, barycentric = self.triangulation.locate(points.faces, points.barycentric)
         point = np.arange(len(faces))
         if self._n_sheets == 2:
             # On the other sheet faces are turned over: their corners 1 and 2 change places.
-            faces = np.concatenate([faces, faces + len(self._triangulation.F)])
+            faces = np.concatenate([faces, faces + len(self.triangulation.F)])
             barycentric = np.concatenate([barycentric, barycentric[:, [0, 2, 1]]])
             point = np.tile(point, 2)
         faces = self.face[faces]
@@ -326,7 +380,7 @@ class Refinement:
         return np.asarray(on_sheets.min(axis=0))
 
 
-class Starts(NamedTuple):
+class WalkStarts(NamedTuple):
     """Rows of the walks that are known and these, (k,) each, the nearest last; then by label where it begins."""
 
     row: AnyArray
@@ -338,7 +392,7 @@ class Starts(NamedTuple):
 
 def _ascending(
     row: AnyArray, walk: AnyArray, offset: FloatArray, n_points: int = 0, points: Points | None = None
-) -> Starts:
+) -> WalkStarts:
     """Far ones first, so that of several for one vertex the nearest is written last."""
     order = np.argsort(-walk["distance"], kind="stable")
-    return Starts(row[order], walk[order], offset, n_points, points)
+    return WalkStarts(row[order], walk[order], offset, n_points, points)

@@ -16,7 +16,8 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSurface
-from heat_igl.unfolding.refinement import TOLERANCE, Known, Refine, Refinement, Starts
+from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
+from heat_igl.unfolding.refinement import TOLERANCE, Known, Refine, Refinement, WalkStarts
 
 __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
 
@@ -179,6 +180,20 @@ class UnfoldingSolver:
         labels = np.empty(len(u), np.int64)
         return self._distance(term, u, labels), labels
 
+    def paths(self, sources: SourceSet, u: FloatArray) -> PathLengths:
+        """The paths whose lengths are the distances from vertices and points, for heat (n,).
+
+        Raises
+        ------
+        ValueError
+            With ``refine="sweep"``, whose distances are not the lengths of paths.
+        """
+        if self._sweeps:
+            raise ValueError('refine="sweep" finds no paths to differentiate: take refine="unfold" or "exact"')
+        if self._refinement is None or self.is_exact:
+            return from_windows(self._exact, self._surface.unfolding, sources)
+        return from_walks(self._refinement, sources, u)
+
     def directed(
         self, term: UnfoldingTerm, u: FloatArray, tolerance: float | None = None
     ) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
@@ -197,7 +212,7 @@ class UnfoldingSolver:
         """
         _require_share(tolerance)
         labels, angles = np.empty((2, len(u)), np.int64), np.empty((3, len(u)))
-        distance = self._distance(term, u, labels[0], angles, tolerance, labels[1])
+        distance = self._measured(term, u, labels[0], angles, tolerance, labels[1])
         return distance, labels[0], PathAngles(*angles), self._places(term, labels[1])
 
     def _places(self, term: UnfoldingTerm, origin: IntArray) -> SurfacePoints:
@@ -211,7 +226,10 @@ class UnfoldingSolver:
         barycentric = np.concatenate([np.eye(3)[corner[:-1] % 3], points.barycentric, np.eye(3)[:1]])
         return SurfacePoints(faces[origin], barycentric[origin])
 
-    def _distance(
+    def _distance(self, term: UnfoldingTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
+        return self._measured(term, u, labels)
+
+    def _measured(
         self,
         term: UnfoldingTerm,
         u: FloatArray,
@@ -326,7 +344,7 @@ class UnfoldingSolver:
             asked.angles[:] = self.path_directions.of_walks(walk, asked.points)
         return np.asarray(walk["distance"][row])
 
-    def _starts(self, asked: _Asked) -> Starts:
+    def _starts(self, asked: _Asked) -> WalkStarts:
         return self._walking.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
 
     @cached_property

@@ -26,6 +26,8 @@ WALK = np.dtype(
 # that of the first face.
 INSIDE = np.dtype([("barycentric", "f8", 3), ("turn", "f8"), ("following", "i4"), ("row", "i4")])
 
+_NOT_ASKED = np.empty(0, np.int32), np.empty(0)
+
 
 class Points(NamedTuple):
     """Sources inside faces, for walks to end at. One on an edge is listed in the faces on both sides.
@@ -92,6 +94,9 @@ def unfold(
     max_steps: int,
     max_passes: int,
     has_holes: bool = False,
+    entered: AnyArray = _NOT_ASKED[0],
+    share: FloatArray = _NOT_ASKED[1],
+    reach: FloatArray = _NOT_ASKED[1],
 ) -> None:
     """Distance by straight paths through strips of triangles, to be read from `walk`.
 
@@ -116,9 +121,13 @@ def unfold(
         Passes over vertices that a later one may have improved.
     has_holes : bool
         Whether a closed curve on some component encloses no piece of surface.
+    entered, share, reach : (n,) int32, (n,) float64, (n,) float64, optional
+        Filled with how each path begins, see `heat_igl.unfolding.path_derivatives.Ways`.
     """
     first, inside = (np.empty(0, np.int32), np.empty(0, INSIDE)) if points is None else points
-    unfolding.unfold(order, t, walk, first, inside, tolerance, shortfall, max_steps, max_passes, has_holes)
+    unfolding.unfold(
+        order, t, walk, first, inside, tolerance, shortfall, max_steps, max_passes, has_holes, entered, share, reach
+    )
 
 
 def views(faces: IntArray, barycentric: FloatArray, F: AnyArray, t: Tables) -> tuple[AnyArray, AnyArray]:

@@ -1,0 +1,86 @@
+"""Geodesic distance as a JAX function with a gradient by the positions of the vertices (extra ``jax``)."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from heat_igl.applications.differentiable import check_positions, solver_on
+from heat_igl.errors import MissingExtraError
+from heat_igl.heat_method import HeatMethodSolver
+
+with MissingExtraError.guard("heat_igl.jax", "jax", "jax"):
+    import jax
+    import jax.numpy as jnp
+
+__all__ = ["geodesic_distance"]
+
+
+def geodesic_distance(
+    V: Any,
+    F: Any,
+    sources: Any,
+    *,
+    refine: str | None = "unfold",
+    solver: HeatMethodSolver | None = None,
+    **options: Any,
+) -> Any:
+    """Distance from `sources`, differentiable by `V` in reverse mode, also under ``jax.jit``.
+
+    Parameters
+    ----------
+    V : (n, 3) array of float32 or float64
+        Positions of the vertices; may be traced.
+    F, sources, refine, solver, options
+        As for `heat_igl.torch.geodesic_distance`; not traced.
+
+    Returns
+    -------
+    (n,) array of V's type
+        ``inf`` at unreachable vertices, whose gradient is 0. Found in float64 on the processor, by a callback. The
+        gradient finds the distance once more.
+
+    Raises
+    ------
+    TypeError
+        If V does not hold floating-point numbers.
+    ValueError
+        If V has another shape, and as `HeatMethodSolver.distance_vjp`; under ``jit`` JAX wraps errors of the callback.
+    """
+    positions = jnp.asarray(V)
+    check_positions(positions.shape, bool(jnp.issubdtype(positions.dtype, jnp.floating)), str(positions.dtype))
+    if solver is None:
+        options = {"refine": refine, **options}
+    return _Host(F, sources, solver, options).distance()(positions)
+
+
+class _Host:
+    """The calls that run outside of JAX."""
+
+    def __init__(self, F: Any, sources: Any, solver: HeatMethodSolver | None, options: dict[str, Any]) -> None:
+        self._F = None if F is None else np.asarray(F)
+        self._sources, self._solver, self._options = sources, solver, options
+
+    def distance(self) -> Any:
+        """The distance as a function of the positions, with its gradient."""
+        function = jax.custom_vjp(self._forward)
+        function.defvjp(lambda V: (self._forward(V), V), self._backward)
+        return function
+
+    def _forward(self, V: Any) -> Any:
+        shape = jax.ShapeDtypeStruct(V.shape[:1], V.dtype)
+        return jax.pure_callback(partial(self._on_host, g=None), shape, V, vmap_method="sequential")
+
+    def _backward(self, V: Any, g: Any) -> tuple[Any]:
+        shape = jax.ShapeDtypeStruct(V.shape, V.dtype)
+        return (jax.pure_callback(self._on_host, shape, V, g, vmap_method="sequential"),)
+
+    def _on_host(self, V: Any, g: Any) -> Any:
+        """The distance, or with `g` its derivative by the positions."""
+        solver = solver_on(V, self._F, self._solver, self._options)
+        if g is None:
+            return solver.distance(self._sources).astype(V.dtype)
+        _, pull_back = solver.distance_vjp(self._sources)
+        return pull_back(np.asarray(g, np.float64)).astype(V.dtype)

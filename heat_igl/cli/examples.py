@@ -1,0 +1,31 @@
+"""Examples for the help of each command."""
+
+from __future__ import annotations
+
+__all__ = ["EXAMPLES", "epilog"]
+
+EXAMPLES = {
+    "info": ("info bunny.obj", "info lh.pial --json -"),
+    "validate": ("validate bunny.obj", "validate bunny.obj --methods heat,unfold --sources 10 --picture errors.png"),
+    "distance": (
+        "distance bunny.obj --source 1234 --output distance.ply --picture distance.png",
+        "distance bunny.obj --source 12 --source 40 --cutoff 0.1 --output distance.npy",
+        "distance bunny.obj --at 0.3,0.1,0 --method exact --json -",
+    ),
+    "isolines": (
+        "isolines bunny.obj --source 1234 --spacing 0.05 --output lines.obj",
+        "isolines bunny.obj --source 1234 --spacing 0.05 --output lines.svg",
+    ),
+    "path": ("path bunny.obj --from 12 --to 2000 --output path.obj",),
+    "view": ("view bunny.obj --source 1234", "view bunny.obj --html bunny.html"),
+    "demo": ("demo", "demo --out results"),
+    "batch": ("batch meshes --store distances.zarr --sources farthest:200",),
+}
+
+
+def epilog(command: str) -> str | None:
+    """The examples of a command, one a line, for the end of its help; None where there are none."""
+    if command not in EXAMPLES:
+        return None
+    # click keeps the lines of a paragraph that begins with this character.
+    return "\n".join(["\b", "Examples:", *(f"  heat-igl {example}" for example in EXAMPLES[command])])

@@ -1,0 +1,92 @@
+"""Commands for curves that separate: signed distance, and cutting."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, cast
+
+import numpy as np
+import typer
+
+import heat_igl
+from heat_igl.cli.options import MeshArgument, choice, positive
+from heat_igl.cli.output import check_outputs, check_writable, print_rows
+from heat_igl.errors import MeshError
+from heat_igl.heat_method import Level, Refine, SignedHeatSolver
+from heat_igl.io import MESH_SUFFIXES, read_mesh, read_polylines, write_mesh
+from heat_igl.mesh import Mesh, SurfaceCurve, curve_on
+
+__all__ = ["COMMANDS"]
+
+CurvesOption = Annotated[
+    Path, typer.Option(metavar="OBJ", help="Polylines (records l), as `isolines` and `path` write them; projected.")
+]
+
+
+def signed(
+    mesh: MeshArgument,
+    curves: CurvesOption,
+    output: Annotated[Path | None, typer.Option(help="PLY or VTU file for mesh and distance.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for a picture.")] = None,
+    refine: Annotated[str | None, choice(Refine, "Size of the distance by unfolding, near-exact; or exact.")] = None,
+    level: Annotated[str, choice(Level, "What is 0: each curve, or the mean over all.")] = "zero",
+    t_coef: Annotated[
+        float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=positive)
+    ] = None,
+) -> None:
+    """Distance from curves, negative on their left; curves may have gaps."""
+    loaded = read_mesh(mesh)
+    drawn_on = _projected(loaded, curves)
+    check_outputs(loaded, output, picture)
+    solver = SignedHeatSolver(loaded, refine=cast(Refine | None, refine), t_coef=t_coef)
+    phi = solver.distance(drawn_on, level=cast(Level, level))
+    drawn = None
+    if picture is not None:
+        from heat_igl.drawing import plots
+
+        drawn = plots.plot_field(loaded, np.where(np.isfinite(phi), phi, np.nan), label="signed distance")
+    if output is not None:
+        write_mesh(output, loaded, distance=phi)
+    if drawn is not None and picture is not None:
+        drawn.save(picture)
+    finite = phi[np.isfinite(phi)]
+    rows = [
+        ("curves", str(len(drawn_on))),
+        ("left", f"{int((finite < 0).sum())} vertices, down to {finite.min():.6g}"),
+        ("right", f"{int((finite > 0).sum())} vertices, up to {finite.max():.6g}"),
+    ]
+    if len(finite) < len(phi):
+        rows.append(("unreachable", f"{len(phi) - len(finite)} vertices"))
+    print_rows([*rows, *(("wrote", str(path)) for path in (output, picture) if path is not None)])
+
+
+def cut(
+    mesh: MeshArgument,
+    curves: CurvesOption,
+    output: Annotated[Path, typer.Option(help="File for the cut mesh; with --split, one for each piece beside it.")],
+    split: Annotated[bool, typer.Option("--split", help="Write each piece to a file of its own.")] = False,
+) -> None:
+    """Cut a mesh along curves, so that they become edges."""
+    loaded = read_mesh(mesh)
+    if output.suffix.lower() not in MESH_SUFFIXES:
+        raise MeshError(f"--output {output}: meshes go to {', '.join(MESH_SUFFIXES)} files")
+    check_writable(output)
+    found = heat_igl.cut(loaded, _projected(loaded, curves))
+    pieces = found.split()
+    written = {output: found.mesh}
+    if split:
+        written = {output.with_stem(f"{output.stem}_{i}"): piece.mesh for i, piece in enumerate(pieces)}
+    for path, part in written.items():
+        write_mesh(path, part)
+    rows = [
+        ("faces", f"{loaded.n_faces} before, {found.mesh.n_faces} now"),
+        ("pieces", ", ".join(f"{piece.mesh.measures.sum():.6g}" for piece in pieces) + " in area"),
+    ]
+    print_rows([*rows, *(("wrote", str(path)) for path in written)])
+
+
+def _projected(mesh: Mesh, path: Path) -> list[SurfaceCurve]:
+    return [curve_on(mesh, line.positions, closed=line.is_closed) for line in read_polylines(path)]
+
+
+COMMANDS = (signed, cut)

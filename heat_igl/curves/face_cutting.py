@@ -1,0 +1,215 @@
+"""One triangle cut along straight segments, in integers, so that no rounding decides which segments cross.
+
+A point is a triple of integers, its barycentric coordinates times any positive number. The sign of the determinant of
+three points is the orientation of their triangle, and the line through two points is their cross product: nothing is
+divided. The triangulation starts with the triangle and takes in one point after another; segments are enforced by flips
+(Sloan 1993), and further flips make the other edges Delaunay. Only these look at lengths.
+"""
+
+from __future__ import annotations
+
+from cmath import phase
+from collections import deque
+from itertools import combinations, pairwise
+from math import gcd, pi
+
+import numpy as np
+
+from heat_igl.typing import FloatArray
+
+__all__ = ["Point", "cut_triangle"]
+
+Point = tuple[int, int, int]
+# Two angles opposite an edge that sum to more than pi by less than this are pi, rounded.
+_ROUNDING = 1e-9
+_MOST_CHECKS_PER_EDGE = 100
+
+
+def cut_triangle(
+    points: list[Point], segments: list[tuple[int, int]], corners: FloatArray
+) -> tuple[list[Point], list[tuple[int, int, int]], list[list[int]]]:
+    """Triangulate a triangle with points in it and segments between them.
+
+    Parameters
+    ----------
+    points : list of Point
+        The corners first; others inside the triangle or on its sides, all distinct.
+    segments : list of (int, int)
+        Pairs of points. Segments may cross, overlap, and run along sides.
+    corners : (3, 2) float64
+        Positions of the corners in the plane.
+
+    Returns
+    -------
+    points : list of Point
+        The given ones, and the crossings of segments.
+    triangles : list of (int, int, int)
+        Points of each, in the sense of the corners.
+    chains : list of list of int
+        The points along each segment: edges of the triangles join each with the next.
+    """
+    points = [_reduced(point) for point in points]
+    number = {point: i for i, point in enumerate(points)}
+    for (a, b), (c, d) in combinations(segments, 2):
+        crossing = _crossing(points[a], points[b], points[c], points[d])
+        if crossing is not None and crossing not in number:
+            number[crossing] = len(points)
+            points.append(crossing)
+    chains = [_along(points, a, b) for a, b in segments]
+    triangulation = _Triangulation(points)
+    for i in range(3, len(points)):
+        triangulation.insert(i)
+    for chain in chains:
+        for a, b in pairwise(chain):
+            triangulation.enforce(a, b)
+    triangulation.make_delaunay({edge for chain in chains for edge in pairwise(chain)}, corners)
+    return points, triangulation.triangles(), chains
+
+
+def _cross(p: Point, q: Point) -> Point:
+    return p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]
+
+
+def _side(line: Point, p: Point) -> int:
+    """Sign of the determinant of the two points of a line and a third: 1 on its left, -1 on its right, 0 on it."""
+    value = line[0] * p[0] + line[1] * p[1] + line[2] * p[2]
+    return (value > 0) - (value < 0)
+
+
+def _reduced(p: Point) -> Point:
+    """The triple of the same point with no common divisor, not negative."""
+    divisor = gcd(*p)
+    if sum(p) < 0:
+        divisor = -divisor
+    return p[0] // divisor, p[1] // divisor, p[2] // divisor
+
+
+def _crossing(a: Point, b: Point, c: Point, d: Point) -> Point | None:
+    """The point at which the insides of two segments cross."""
+    ab = _cross(a, b)
+    if _side(ab, c) * _side(ab, d) >= 0:
+        return None
+    cd = _cross(c, d)
+    return _reduced(_cross(ab, cd)) if _side(cd, a) * _side(cd, b) < 0 else None
+
+
+def _along(points: list[Point], a: int, b: int) -> list[int]:
+    """All points on the segment from a to b, in order."""
+    line = _cross(points[a], points[b])
+    on_line = [i for i, p in enumerate(points) if _side(line, p) == 0]
+    # Coordinates along the segment, as fractions of the sum: the one that differs most between its ends.
+    sums = [sum(points[i]) for i in (a, b)]
+    differences = [points[b][k] * sums[0] - points[a][k] * sums[1] for k in range(3)]
+    k = max(range(3), key=lambda i: abs(differences[i]))
+    sign = 1 if differences[k] > 0 else -1
+
+    def before(i: int, j: int) -> bool:
+        p, q = points[i], points[j]
+        return sign * (p[k] * sum(q) - q[k] * sum(p)) < 0
+
+    inside = [i for i in on_line if before(a, i) and before(i, b)]
+    chain: list[int] = []
+    for i in inside:
+        chain.insert(sum(before(j, i) for j in chain), i)
+    return [a, *chain, b]
+
+
+class _Triangulation:
+    """Triangles, as the third point of each directed edge on its left."""
+
+    def __init__(self, points: list[Point]) -> None:
+        self._points = points
+        self._apex: dict[tuple[int, int], int] = {}
+        self._add(0, 1, 2)
+
+    def triangles(self) -> list[tuple[int, int, int]]:
+        """Each triangle once, from its smallest point."""
+        return sorted((a, b, c) for (a, b), c in self._apex.items() if a < b and a < c)
+
+    def insert(self, i: int) -> None:
+        """Split the triangle that holds point i, or the two at the edge that holds it."""
+        for a, b, c in self.triangles():
+            edges = ((a, b), (b, c), (c, a))
+            sides = [self._left(*edge, i) for edge in edges]
+            if min(sides) < 0:
+                continue
+            if min(sides) > 0:
+                self._remove(a, b, c)
+                for edge in edges:
+                    self._add(*edge, i)
+                return
+            on = edges[sides.index(0)]
+            for tail, head in (on, on[::-1]):
+                third = self._apex.get((tail, head))
+                if third is not None:
+                    self._remove(tail, head, third)
+                    self._add(tail, i, third)
+                    self._add(i, head, third)
+            return
+
+    def enforce(self, a: int, b: int) -> None:
+        """Flip edges until one joins a and b; no point lies between them."""
+        if (a, b) in self._apex or (b, a) in self._apex:
+            return
+        crossed = deque(self._crossed(a, b))
+        while crossed:
+            x, y = crossed.popleft()
+            p, q = self._apex[x, y], self._apex[y, x]
+            if not self._flip(x, y):
+                crossed.append((x, y))  # not convex before its neighbours are flipped
+            elif self._left(a, b, p) * self._left(a, b, q) < 0:
+                crossed.append((p, q))
+
+    def make_delaunay(self, fixed: set[tuple[int, int]], corners: FloatArray) -> None:
+        """Flip edges that are not `fixed` while the two angles opposite them sum to more than pi.
+
+        Thin triangles along straight rows of points go; the flips end since each raises the smallest angles.
+        """
+        weights = np.array([[weight / sum(point) for weight in point] for point in self._points])
+        at = (weights @ corners @ [1, 1j]).tolist()
+        waiting = deque(edge for edge in sorted(self._apex) if edge[0] < edge[1])
+        # A bound on the work where all points lie on a line, whose angles say nothing.
+        for _ in range(_MOST_CHECKS_PER_EDGE * len(self._apex)):
+            if not waiting:
+                return
+            x, y = waiting.popleft()
+            if not ((x, y) in self._apex and (y, x) in self._apex) or (x, y) in fixed or (y, x) in fixed:
+                continue
+            p, q = self._apex[x, y], self._apex[y, x]
+            opposite = sum(abs(phase((at[x] - at[k]).conjugate() * (at[y] - at[k]))) for k in (p, q))
+            if opposite > pi + _ROUNDING and self._flip(x, y):
+                waiting.extend(((p, x), (x, q), (q, y), (y, p)))
+
+    def _flip(self, x: int, y: int) -> bool:
+        """Replace the edge between x and y by the other diagonal of its two triangles, if they are convex together."""
+        p, q = self._apex[x, y], self._apex[y, x]
+        if self._left(p, q, y) <= 0 or self._left(q, p, x) <= 0:
+            return False
+        self._remove(x, y, p)
+        self._remove(y, x, q)
+        self._add(p, q, y)
+        self._add(q, p, x)
+        return True
+
+    def _crossed(self, a: int, b: int) -> list[tuple[int, int]]:
+        """The edges that the segment from a to b crosses, in order, each with its right end first."""
+        for (p, x), y in list(self._apex.items()):
+            if p == a and self._left(a, b, x) < 0 < self._left(a, b, y):
+                found = [(x, y)]
+                break
+        while True:
+            x, y = found[-1]
+            third = self._apex[y, x]
+            if third == b:
+                return found
+            found.append((x, third) if self._left(a, b, third) > 0 else (third, y))
+
+    def _left(self, a: int, b: int, c: int) -> int:
+        return _side(_cross(self._points[a], self._points[b]), self._points[c])
+
+    def _add(self, a: int, b: int, c: int) -> None:
+        self._apex[a, b], self._apex[b, c], self._apex[c, a] = c, a, b
+
+    def _remove(self, a: int, b: int, c: int) -> None:
+        for edge in ((a, b), (b, c), (c, a)):
+            del self._apex[edge]

@@ -1,0 +1,198 @@
+"""On which side of oriented curves vertices are, whether the curves have gaps, and what closes these."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.csgraph as csgraph
+
+from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
+from heat_igl.mesh import Mesh, SurfaceCurve, level_segments
+from heat_igl.mesh.grouping import next_in_run
+from heat_igl.sources import OrientedSet
+from heat_igl.typing import BoolArray, FloatArray, IntArray
+
+__all__ = ["has_gaps", "left_of_closed", "left_of_nearest", "zero_curve_in_gaps"]
+
+# Ends of curves nearer to each other than this share of the mean edge length meet.
+_SAME_PLACE = 1e-6
+# The zero curve of an integrated distance runs within a quarter of an edge of the curves. It counts as the closing of a
+# gap where it is farther than this from all of them, in mean edge lengths.
+_IN_GAP = 1.0
+# Where a vertex sees the nearest place of a segment almost along the segment, the side is that of rounding.
+_LEAST_SINE = 1e-6
+# Straight lines in one face are as long as the distance, but for rounding.
+_SAME_DISTANCE = 1e-6
+# Share by which the sides seen from the vertices of a region have to agree. A curve that does not separate, as around
+# the handle of a torus, is seen from both sides.
+_AGREED = 0.5
+
+
+def has_gaps(mesh: Mesh, sources: OrientedSet) -> bool:
+    """Whether a curve ends, inside the mesh, at no place at which one begins; points always have gaps."""
+    if len(sources.point_faces):
+        return True
+    begin, end = (
+        np.einsum("sc,scx->sx", barycentric, mesh.V[mesh.F[sources.faces]])
+        for barycentric in (sources.start, sources.end)
+    )
+    tolerance = _SAME_PLACE * float(mesh.edge_lengths.mean())
+    # Most segments are followed by the next of their curve, and the last by the first.
+    following = next_in_run(np.arange(len(begin)), np.unique(sources.label, return_counts=True)[1])
+    apart = np.linalg.norm(begin[following] - end, axis=1) > tolerance
+    ends, begins = np.flatnonzero(apart), following[apart]
+    loose_ends = ends[~_on_boundary(mesh, sources.faces[ends], sources.end[ends])]
+    loose_begins = begins[~_on_boundary(mesh, sources.faces[begins], sources.start[begins])]
+    if len(loose_ends) != len(loose_begins):
+        return True
+    if not len(loose_ends):
+        return False
+    from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
+
+    to_begin = cKDTree(begin[loose_begins]).query(end[loose_ends])[0]
+    to_end = cKDTree(end[loose_ends]).query(begin[loose_begins])[0]
+    return bool(max(to_begin.max(), to_end.max()) > tolerance)
+
+
+def _on_boundary(mesh: Mesh, faces: IntArray, barycentric: FloatArray) -> BoolArray:
+    """Which points (k,) lie on the boundary of the mesh."""
+    on_side = (barycentric == 0) & (mesh.facets.n_faces[mesh.facets.of_face[faces]] == 1)
+    in_corner = (barycentric == 1) & mesh.boundary[mesh.F[faces]]
+    return np.asarray((on_side | in_corner).any(axis=1))
+
+
+def zero_curve_in_gaps(mesh: Mesh, phi: FloatArray, distance: FloatArray, h: float) -> SurfaceCurve | None:
+    """The parts of the zero curve of `phi` (n,) far from the curves that `distance` (n,) is measured from.
+
+    Returns
+    -------
+    SurfaceCurve or None
+        Its segments, in the order of faces; None if there is none.
+    """
+    faces, start, end, _ = level_segments(mesh, phi, 0.0)
+    middle = np.einsum("sc,sc->s", (start + end) / 2, distance[mesh.F[faces]])
+    kept = (middle > _IN_GAP * h) & (start != end).any(axis=1)
+    return SurfaceCurve(faces[kept], start[kept], end[kept]) if kept.any() else None
+
+
+def left_of_closed(
+    mesh: Mesh, triangulation: IntrinsicTriangulation, sources: OrientedSet, otherwise: BoolArray
+) -> BoolArray:
+    """Which vertices (n,) are on the left of curves without gaps.
+
+    Vertices are in one region if edges join them that no curve meets. The corners of the faces in which the curves run
+    see the side of their region.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    triangulation : IntrinsicTriangulation
+        Its faces, before any flip.
+    sources : OrientedSet
+        Curves.
+    otherwise : (n,) bool
+        The answer on curves, and in regions that see both sides.
+    """
+    n = mesh.n_vertices
+    on_curve = np.zeros(n, bool)
+    is_met = np.zeros(len(mesh.edges), bool)
+    for barycentric in (sources.start, sources.end):
+        n_zero = (barycentric == 0).sum(axis=1)
+        in_vertex, on_edge = n_zero == 2, n_zero == 1
+        on_curve[mesh.F[sources.faces[in_vertex], barycentric[in_vertex].argmax(axis=1)]] = True
+        is_met[mesh.facets.of_face[sources.faces[on_edge], barycentric[on_edge].argmin(axis=1)]] = True
+    joins = mesh.edges[~is_met & ~on_curve[mesh.edges].any(axis=1)]
+    graph = sp.coo_array((np.ones(len(joins), np.int8), tuple(joins.T)), shape=(n, n))
+    n_regions, region = csgraph.connected_components(graph, directed=False)
+    seen = _seen(triangulation, sources)
+    # Of the segments in a face, each corner sees the nearest, and of equally near ones that under the largest angle.
+    order = np.lexsort((-np.abs(seen.sine), seen.away, seen.corner))
+    first = np.unique(seen.corner[order], return_index=True)[1]
+    sine, where = seen.sine[order[first]], region[seen.vertex[order[first]]]
+    total = np.bincount(where, sine, n_regions)
+    decided = np.abs(total) > _AGREED * np.bincount(where, np.abs(sine), n_regions)
+    return np.where(decided[region] & ~on_curve, total[region] > 0, otherwise)
+
+
+def left_of_nearest(
+    triangulation: IntrinsicTriangulation, sources: OrientedSet, distance: FloatArray, otherwise: BoolArray
+) -> BoolArray:
+    """Which vertices (n,) are on the left of the nearest segment, where that is in one of their faces.
+
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        The faces that the curves refer to.
+    sources : OrientedSet
+        Curves.
+    distance : (n,) float64
+        Distance from them.
+    otherwise : (n,) bool
+        The answer at all other vertices.
+    """
+    seen = _seen(triangulation, sources)
+    nearest = np.flatnonzero(
+        (seen.away <= distance[seen.vertex] * (1 + _SAME_DISTANCE)) & (np.abs(seen.sine) > _LEAST_SINE)
+    )
+    # Of segments that meet in the nearest place, the one seen under the largest angle is written last.
+    nearest = nearest[np.argsort(np.abs(seen.sine[nearest]), kind="stable")]
+    left = otherwise.copy()
+    left[seen.vertex[nearest]] = seen.sine[nearest] > 0
+    return left
+
+
+class _Seen(NamedTuple):
+    """Segments as the corners of their faces see them.
+
+    Attributes
+    ----------
+    corner, vertex : (q,) int64
+        The corner 3 f + c, and the vertex there.
+    away : (q,) float64
+        Distance of the nearest place of the segment.
+    sine : (q,) float64
+        Sine of the angle between the segment and the line from that place to the corner: positive on the left.
+    """
+
+    corner: IntArray
+    vertex: IntArray
+    away: FloatArray
+    sine: FloatArray
+
+
+def _seen(triangulation: IntrinsicTriangulation, sources: OrientedSet) -> _Seen:
+    faces, start, end = _in_both_faces(triangulation, sources)
+    flat = lay_out(triangulation.l[faces]) @ np.array([1, 1j])
+    begin, finish = np.einsum("sc,sc->s", start, flat), np.einsum("sc,sc->s", end, flat)
+    along = finish - begin
+    length = np.abs(along)
+    # Corners relative to the start of the segment, in its direction.
+    turn = np.divide(along.conj(), length, out=np.zeros_like(along), where=length > 0)
+    relative = (flat - begin[:, None]) * turn[:, None]
+    beyond = relative.real - np.clip(relative.real, 0, length[:, None])
+    away = np.hypot(beyond, relative.imag)
+    sine = np.divide(relative.imag, away, out=np.zeros_like(away), where=away > 0)
+    corner = 3 * faces[:, None] + np.arange(3)
+    return _Seen(corner.ravel(), triangulation.F[faces].ravel(), away.ravel(), sine.ravel())
+
+
+def _in_both_faces(
+    triangulation: IntrinsicTriangulation, sources: OrientedSet
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Segments (faces, start, end), and those along a side of their face in the face on the other side, too."""
+    faces, start, end = sources.faces, sources.start, sources.end
+    segment, corner = np.nonzero((start == 0) & (end == 0))
+    twin = triangulation.twin[3 * faces[segment] + corner]
+    segment, corner, twin = segment[twin >= 0], corner[twin >= 0], twin[twin >= 0]
+    other, opposite = np.divmod(twin, 3)
+    rows = np.arange(len(segment))
+    copies = []
+    for barycentric in (start, end):
+        copied = np.zeros((len(segment), 3))
+        copied[rows, (opposite + 1) % 3] = barycentric[segment, (corner + 2) % 3]
+        copied[rows, (opposite + 2) % 3] = barycentric[segment, (corner + 1) % 3]
+        copies.append(copied)
+    return np.concatenate([faces, other]), np.concatenate([start, copies[0]]), np.concatenate([end, copies[1]])

@@ -1,0 +1,267 @@
+"""Derivatives of an answer by the positions of the vertices, by edge lengths, by the sources and by the time step.
+
+All of them go by the lengths of the sides of the triangles that the answer was found on. From the answer to these
+lengths lead paths (`heat_igl.unfolding.path_lengths`) or the adjoint of the heat method
+(`heat_igl.heat_method.adjoint`), from there to the edges of the mesh the flips
+(`heat_igl.intrinsic.length_derivatives`); the positions follow here.
+docs/derivatives.md derives each step.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.intrinsic import IntrinsicTriangulation, Merged
+from heat_igl.intrinsic.length_derivatives import PlaceSlopes, carry_lengths, carry_lengths_back, check_carried
+from heat_igl.mesh import Mesh
+from heat_igl.operators import Surface
+from heat_igl.sources import SourceSet
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
+from heat_igl.unfolding import Change
+
+__all__ = ["DistanceDerivative", "SidesDerivative"]
+
+# A distance that differs from the length of the path by more than this fraction is not the length of that path.
+_SAME = 1e-9
+
+
+class SidesDerivative(Protocol):
+    """The derivative of one answer by the lengths of the sides of a triangulation."""
+
+    @property
+    def triangulation(self) -> IntrinsicTriangulation:
+        """The triangles that the answer was found on."""
+
+    def pull_back(self, g: FloatArray) -> Change:
+        """The derivative of the sum of distances times g (n,), finite."""
+
+    def push_forward(self, by_side: FloatArray) -> FloatArray:
+        """How the distances (n,) change when the sides (m, 3) change by `by_side`."""
+
+    def lengths(self) -> FloatArray:
+        """The distances (n,) that are differentiated; any number at unreachable vertices."""
+
+
+class DistanceDerivative:
+    """The derivative of one distance: called with a gradient by the distances, it returns that by the positions.
+
+    Where the shortest path is not unique (at the cut locus, and between two sources) the path that was found decides,
+    and the derivative is one of several one-sided ones. So it is at a vertex next to a source vertex, whose distance
+    has no gradient in the source. Which edges were flipped counts as fixed, which is right almost everywhere: a flip
+    changes neither the surface nor a path on it.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        The answer.
+    unreachable : (k,) int64
+        Vertices at distance ``inf``. Their derivative is 0.
+    """
+
+    def __init__(
+        self, distance: FloatArray, sources: SourceSet, surface: Surface, mesh: Mesh | None, answer: SidesDerivative
+    ) -> None:
+        self.distance, self._sources, self._mesh, self._answer = distance, sources, mesh, answer
+        if surface.faces is None:
+            raise ValueError("the faces before any flip are not known: make the solver from a mesh or edge lengths")
+        self._faces = surface.faces
+        self._given = surface.given_faces
+        check_carried(answer.triangulation)
+        self.unreachable: IntArray = np.flatnonzero(np.isinf(distance))
+
+    def __call__(self, g: ArrayLike) -> FloatArray:
+        """The gradient by the positions of the vertices.
+
+        Parameters
+        ----------
+        g : (n,) or (k, n) array_like
+            Derivative of a function by each distance; entries at unreachable vertices do not count. Rows are functions.
+            The rows of the identity give the Jacobian of a small mesh.
+
+        Returns
+        -------
+        (n, 3) or (k, n, 3) float64
+            Its derivative by the positions.
+
+        Raises
+        ------
+        ValueError
+            If g has another shape, or is not finite at a reachable vertex.
+        MeshError
+            If the solver has no vertices to move: it was made from edge lengths or operators.
+        """
+        mesh = self._positions()
+        rows = self._rows(g)
+        result = np.stack([self._to_positions(mesh, self._by_sides(row)[0]) for row in rows])
+        return result if np.ndim(g) == 2 else result[0]
+
+    def by_lengths(self, g: ArrayLike) -> FloatArray:
+        """The gradient (m, 3) or (k, m, 3) by the lengths of the sides opposite each corner, for `g` as for a call.
+
+        An edge of two faces changes both of its sides: its derivative is the sum of theirs. Rows are the faces of the
+        mesh; of faces that are there twice, one has the derivative of both.
+        """
+        rows = self._rows(g)
+        result = np.stack([self._on_given_faces(self._by_sides(row)[0]) for row in rows])
+        return result if np.ndim(g) == 2 else result[0]
+
+    def by_points(self, g: ArrayLike) -> FloatArray:
+        """The gradient by the positions of the sources that are points in faces.
+
+        Parameters
+        ----------
+        g : (n,) array_like
+            As for a call.
+
+        Returns
+        -------
+        (p, 3) float64
+            For each point a vector in the plane of its face. The gradient of one distance has length 1 and leads away
+            from the path. Of a point on a side of its face, to paths that leave by this side, the component along the
+            side alone. Source vertices have their gradient among the positions.
+
+        Raises
+        ------
+        ValueError
+            If g has another shape or is not finite.
+        MeshError
+            If the solver has no positions.
+        """
+        mesh = self._positions()
+        (row,) = self._rows(g, 1)
+        _, by_place = self._by_sides(row)
+        points = self._sources.points
+        if by_place is None:
+            return np.zeros((len(points.faces), 3))
+        corners = mesh.V[mesh.F[points.faces]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        per_area = 1 / np.einsum("px,px->p", normal, normal)
+        opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+        # A coordinate rises by the height of its corner.
+        slopes = np.cross(normal[:, None], opposite) * per_area[:, None, None]
+        return np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
+
+    def by_time_step(self, g: ArrayLike) -> float:
+        """The derivative by the time step t, all else fixed; 0 with ``refine``, which takes an order from the heat."""
+        (row,) = self._rows(g, 1)
+        return self._answer.pull_back(row).by_t
+
+    def push_forward(self, dV: ArrayLike) -> FloatArray:
+        """The directional derivative of all distances: how they change when the vertices move.
+
+        Parameters
+        ----------
+        dV : (n, 3) array_like
+            Velocity of each vertex.
+
+        Returns
+        -------
+        (n,) float64
+            Rate of change of each distance; 0 at unreachable vertices.
+
+        Raises
+        ------
+        ValueError
+            If dV has another shape or is not finite, or without ``refine``.
+        MeshError
+            If the solver has no vertices to move.
+        """
+        mesh = self._positions()
+        moved = np.asarray(dV, np.float64)
+        if moved.shape != mesh.V.shape or not np.isfinite(moved).all():
+            raise ValueError(
+                f"dV must be {mesh.V.shape} finite numbers, one velocity per vertex; it has shape {moved.shape}"
+            )
+        directions, following, preceding = self._sides
+        by_side = np.einsum("mcx,mcx->mc", directions, moved[preceding] - moved[following])
+        return self.push_lengths_forward(by_side)
+
+    def push_lengths_forward(self, by_side: FloatArray) -> FloatArray:
+        """How the distances (n,) change when the sides (m, 3) of the mesh's faces, each there once, change."""
+        if len(self._sources.points.faces):
+            raise ValueError(
+                "directional derivatives are there for source vertices: multiply with the gradient instead"
+            )
+        on_answer = carry_lengths(self._answer.triangulation, by_side, len(self._faces.history))
+        return self._answer.push_forward(on_answer)
+
+    @cached_property
+    def inexact(self) -> IntArray:
+        """Vertices whose distance is not the length of the path that is differentiated.
+
+        With ``refine="unfold"`` a few paths became shorter after others had been measured by them, by some 1e-5, and
+        some distances are set by bounds instead. The derivative is that of the path as it is.
+        """
+        reached = np.flatnonzero(np.isfinite(self.distance))
+        distance = self.distance[reached]
+        return np.asarray(reached[np.abs(self._answer.lengths()[reached] - distance) > _SAME * distance])
+
+    def _positions(self) -> Mesh:
+        if self._mesh is None:
+            raise MeshError(
+                "the solver was made without positions, so there are no vertices to move: use by_lengths for the "
+                "derivative by edge lengths"
+            )
+        return self._mesh
+
+    def _rows(self, g: ArrayLike, most: int = 2) -> FloatArray:
+        """`g` as rows (k, n), 0 at unreachable vertices."""
+        array = np.asarray(g, np.float64)
+        n = len(self.distance)
+        if not 1 <= array.ndim <= most or array.shape[-1] != n:
+            also = f" or (k, {n})" if most == 2 else ""
+            raise ValueError(f"g must have shape ({n},){also}, one entry per vertex, but it has shape {array.shape}")
+        rows = np.array(array.reshape(-1, n))
+        rows[:, self.unreachable] = 0.0
+        if not np.isfinite(rows).all():
+            row, vertex = np.argwhere(~np.isfinite(rows))[0]
+            raise ValueError(f"g must be finite at reachable vertices, but is {rows[row, vertex]} at vertex {vertex}")
+        return rows
+
+    def _by_sides(self, row: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+        """The derivative (m, 3) by the sides of the faces before any flip, and (p, 3) by the points in given faces."""
+        change, points = self._answer.pull_back(row), self._sources.points
+        places = None if change.by_place is None else PlaceSlopes(points.faces, points.barycentric, change.by_place)
+        triangulation, n_before = self._answer.triangulation, len(self._faces.history)
+        by_side, by_place = carry_lengths_back(triangulation, change.by_side, n_before, places)
+        return by_side if change.by_given is None else by_side + change.by_given, by_place
+
+    def _to_positions(self, mesh: Mesh, by_side: FloatArray) -> FloatArray:
+        """The derivative (n, 3) by the positions, from that by the sides (m, 3)."""
+        directions, following, preceding = self._sides
+        pull = by_side[..., None] * directions
+        n = mesh.n_vertices
+        columns = [
+            np.bincount(preceding.ravel(), pull[..., k].ravel(), n)
+            - np.bincount(following.ravel(), pull[..., k].ravel(), n)
+            for k in range(3)
+        ]
+        return np.stack(columns, axis=1)
+
+    @cached_property
+    def _sides(self) -> tuple[FloatArray, IntArray, IntArray]:
+        """Unit vectors (m, 3, 3) along the sides of the faces, and the vertices (m, 3) that they lead from and to.
+
+        A side without length has no direction, and none is taken.
+        """
+        mesh, F = self._positions(), self._faces.F
+        following, preceding = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
+        along = mesh.V[preceding] - mesh.V[following]
+        length = np.sqrt(np.einsum("mcx,mcx->mc", along, along))
+        return along / np.where(length > 0, length, 1.0)[..., None], following, preceding
+
+    def _on_given_faces(self, by_side: FloatArray) -> FloatArray:
+        """The derivative by the sides of the faces that the user gave, some of which may be there twice."""
+        if not self._faces.history or self._given is None:
+            return by_side
+        merged = self._faces.history[0]
+        if not isinstance(merged, Merged):
+            return by_side
+        kept, which = np.unique(merged.face, return_index=True)
+        on_given = np.zeros((len(merged.face), 3))
+        on_given[which] = np.take_along_axis(by_side[kept], merged.corner[which], axis=1)
+        return on_given

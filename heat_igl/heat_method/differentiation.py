@@ -1,0 +1,55 @@
+"""From an answer of a solver to its derivative: which parts of the solver are differentiated, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heat_igl.heat_method.adjoint import HeatAdjoint
+from heat_igl.heat_method.derivatives import DistanceDerivative, SidesDerivative
+from heat_igl.heat_method.parts import SolverParts
+from heat_igl.mesh import Mesh, PointCloud
+from heat_igl.sources import SourceSet, right_hand_side
+from heat_igl.typing import FloatArray
+from heat_igl.unfolding import UnfoldingSolver
+
+__all__ = ["differentiated"]
+
+
+def differentiated(
+    distance: FloatArray, sources: SourceSet, parts: SolverParts, mesh: Mesh | PointCloud | None
+) -> tuple[FloatArray, DistanceDerivative]:
+    """A distance (n,) from `sources`, and its derivative.
+
+    Parameters
+    ----------
+    distance : (n,) float64
+        The answer.
+    sources : SourceSet
+        Vertices and, with ``refine``, points in faces.
+    parts : SolverParts
+        Of the solver that gave the answer.
+    mesh : Mesh, PointCloud or None
+        Its vertices.
+
+    Raises
+    ------
+    ValueError
+        If the domain is no surface of triangles, if a curve is among the sources, with ``refine="sweep"``, or where
+        vertices were added. Without ``refine`` also for points in faces, sources with offsets, a boundary condition
+        other than "neumann", and the iterative backend.
+    """
+    surface = parts.operators.surface
+    if surface is None or isinstance(mesh, PointCloud):
+        raise ValueError("derivatives need a surface of triangles: this domain has none, or is a point cloud")
+    if len(sources.segments.faces):
+        raise ValueError("derivatives are there for sources that are vertices or points, and a curve is among them")
+    answer: SidesDerivative
+    if isinstance(parts.last_steps, UnfoldingSolver):
+        u = np.zeros(parts.operators.n)
+        if not parts.last_steps.is_exact:
+            term = parts.assembler.term(sources)
+            u = parts.heat_flow.solve(right_hand_side(parts.operators.n, [term]))[:, 0]
+        answer = parts.last_steps.paths(sources, u)
+    else:
+        answer = HeatAdjoint(parts, sources)
+    return distance, DistanceDerivative(distance, sources, surface, mesh, answer)

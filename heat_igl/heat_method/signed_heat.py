@@ -1,0 +1,306 @@
+"""`SignedHeatSolver`: distance with a sign from curves that have a left and a right, broken or not."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+
+from heat_igl.errors import MeshError, SourceError
+from heat_igl.heat_method.curve_sides import has_gaps, left_of_closed, left_of_nearest, zero_curve_in_gaps
+from heat_igl.heat_method.integration import Integration
+from heat_igl.heat_method.options import SolverOptions
+from heat_igl.heat_method.parts import prepare
+from heat_igl.heat_method.solver import HeatMethodSolver
+from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_gradient, lay_out, oriented
+from heat_igl.linear import Backend
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.operators import Operators, divergence_matrix, edge_rotations, face_rotations, operators
+from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT
+from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set
+from heat_igl.steps import PoissonProblem, VectorHeatFlow
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding import Refine
+
+__all__ = ["Level", "SignedHeatSolver"]
+
+Level = Literal["zero", "constant", "none"]
+
+# Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
+# alike (docs/signed.md).
+_T_COEF = 0.25
+# Normals that sum to less than this share of the length of the curves have cancelled.
+_CANCELLED = 1e-9
+
+
+class _Pieces(NamedTuple):
+    """Segments and points of oriented sources, as what is diffused.
+
+    Attributes
+    ----------
+    faces, barycentric : (q,) int64, (q, 3) float64
+        The middle of each segment, and the points.
+    normal : (q,) complex128
+        Unit normal to the right of a segment, or of a point, in the plane of the face.
+    weight : (q,) float64
+        Length of each segment; h for a point.
+    label : (q,) int64
+        Curve, region or set of points.
+    """
+
+    faces: IntArray
+    barycentric: FloatArray
+    normal: AnyArray
+    weight: FloatArray
+    label: IntArray
+
+
+class SignedHeatSolver:
+    """The signed heat method (Feng and Crane 2024): factor once, ask many times.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles, manifold and oriented alike; whatever `as_mesh` takes.
+    refine : {"unfold", "exact"}, optional
+        Take the size from `HeatMethodSolver` with the same `refine`,
+        measured from the curves, and in gaps between them from the zero curve of the integrated distance. The sign is
+        that of the integrated distance, and where no curve has a gap, that of the region, in both cases.
+    t_coef : float, optional
+        t = t_coef h^2, with h the mean edge length of the intrinsic Delaunay triangulation; 0.25 by default. Larger
+        values close wide gaps with rounder curves, and smooth noisy ones.
+    t : float, optional
+        Time step as a squared length; overrides `t_coef`. It is raised where heat would not cross the mesh.
+    backend : {"auto", "scipy", "multifrontal"}
+        Linear solver, see `factorize`.
+
+    Raises
+    ------
+    MeshError
+        If the mesh is tetrahedral, not manifold, not oriented, or cannot be oriented.
+    FactorizationError, MissingExtraError, ValueError
+        As for `HeatMethodSolver`.
+
+    Notes
+    -----
+    The paper diffuses vectors at edges. Here they are at vertices, with weights fitted to the lengths of edges
+    (`fitted_laplacian`): a third of the unknowns, and no more error (docs/signed.md). The solver is immutable, and
+    threads may share it.
+    """
+
+    def __init__(
+        self,
+        mesh: MeshLike,
+        *,
+        refine: Refine | None = None,
+        t_coef: float | None = None,
+        t: float | None = None,
+        backend: Backend = "auto",
+    ) -> None:
+        options = SolverOptions(_T_COEF if t_coef is None and t is None else t_coef, t, refine=refine, backend=backend)
+        self._mesh = as_simplices(mesh)
+        self._refines = refine is not None
+        domain, self._faces, self._triangulation = _oriented_domain(self._mesh)
+        parts = prepare(domain, options, V=self._mesh.V)
+        self._heat_flow = parts.heat_flow
+        last_steps = parts.last_steps
+        if isinstance(last_steps, Integration):
+            self._poisson = last_steps.poisson
+        else:
+            self._poisson = PoissonProblem(domain, options.backend, parts.analysis)
+        self._vector_flow = VectorHeatFlow(
+            domain, edge_rotations(domain), _one_or_all(parts.time_steps), options.backend, parts.fitted
+        )
+        self._rotations = face_rotations(domain)
+        self._domain = domain
+        gradient = intrinsic_gradient(self._triangulation).tocsr()
+        self._D = divergence_matrix(gradient, self._triangulation.areas)
+        self._unsigned = HeatMethodSolver._of(parts)
+
+    @property
+    def operators(self) -> Operators:
+        """L and M of the triangulation that is solved on."""
+        return self._domain
+
+    @property
+    def t(self) -> float:
+        """The time step in use, a squared length."""
+        return self._unsigned.t
+
+    @property
+    def n_vertices(self) -> int:
+        """Length of a distance array."""
+        return self._mesh.n_vertices
+
+    def distance(self, curves: Oriented, *, unsigned: Sources | None = None, level: Level = "zero") -> FloatArray:
+        """Distance from the nearest curve, negative on the left of the curves.
+
+        Seen from outside, a counter-clockwise loop is negative inside.
+
+        Parameters
+        ----------
+        curves : oriented sources
+            A directed `SurfaceCurve`; a mask of bool of the faces (m,) or vertices (n,) of a region, which is negative
+            inside; `OrientedPoints`; or a list of these kinds. Curves may have gaps.
+        unsigned : sources, optional
+            More sources, as for `HeatMethodSolver.distance`, without a sign: near them the size of the distance is
+            that from them, and the sign is the one that the curves give.
+        level : {"zero", "constant", "none"}
+            Without `refine`: "zero" subtracts from each vertex the integrated value at the place on the curves that
+            its heat comes from, so that all curves are at 0. "constant" makes the value constant along each curve, at a
+            level of its own, and 0 in the mean over all. "none" only makes the mean 0. `refine` measures from
+            the curves in any case, and takes the sign from this.
+
+        Returns
+        -------
+        (n,) float64
+            In the mesh's unit; ``inf`` on components without a curve. Never NaN.
+
+        Raises
+        ------
+        SourceError
+            If `curves` or `unsigned` does not describe places on the mesh, a curve has no length, or the normals of
+            all curves cancel: the same curve twice, in opposite directions.
+        ValueError
+            If there is no such `level`.
+
+        Notes
+        -----
+        Where curves contradict each other, the longer pieces decide: the diffused normals of both are added.
+        """
+        if level not in get_args(Level):
+            raise ValueError(f"level must be 'zero', 'constant' or 'none', not {level!r}")
+        chosen = oriented_set(curves, self._mesh)
+        pieces = self._pieces(chosen)
+        phi = self._integrated(pieces, level)
+        if not np.isfinite(phi).any():
+            raise SourceError("curves reach no vertex: the components that they lie on have no area")
+        size, left = np.abs(phi), phi < 0
+        is_broken = has_gaps(self._mesh, chosen)
+        if not is_broken:
+            left = left_of_closed(self._mesh, self._faces, chosen, left)
+        if self._refines:
+            size = self._unsigned.distance(chosen.unoriented())
+            if is_broken:
+                left = left_of_nearest(self._faces, chosen, size, left)
+                closing = zero_curve_in_gaps(self._mesh, phi, size, self._domain.mean_edge_length)
+                if closing is not None:
+                    size = np.minimum(size, self._unsigned.distance(closing))
+        if unsigned is not None:
+            reached = np.isfinite(phi)
+            size = np.minimum(size, self._unsigned.distance(unsigned), out=size, where=reached)
+        # Adding 0 makes 0 of -0.
+        return np.where(left, -size, size) + 0.0
+
+    def _pieces(self, chosen: OrientedSet) -> _Pieces:
+        """Segments and points with their normals in the planes of their faces."""
+        flat = lay_out(self._faces.l[chosen.faces]) @ np.array([1, 1j])
+        along = np.einsum("sc,sc->s", chosen.end - chosen.start, flat)
+        length = np.abs(along)
+        corners = self._mesh.V[self._mesh.F[chosen.point_faces]]
+        x, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        y = np.cross(np.cross(x, other), x)
+        at_points = [np.einsum("kx,kx->k", axis, chosen.normals) / np.linalg.norm(axis, axis=1) for axis in (x, y)]
+        normal = at_points[0] + 1j * at_points[1]
+        across = np.abs(normal) <= _CANCELLED * np.linalg.norm(chosen.normals, axis=1)
+        if across.any():
+            first = int(np.argmax(across))
+            raise SourceError(
+                f"normals[{first}] is that of the face, and has no direction on the surface "
+                f"({int(across.sum())} normals are like that): give the normals of the curve that the points sample"
+            )
+        return _Pieces(
+            np.concatenate([chosen.faces, chosen.point_faces]),
+            np.concatenate([(chosen.start + chosen.end) / 2, chosen.point_barycentric]),
+            # To the right of a segment is its direction turned by -90 degrees.
+            np.concatenate([-1j * _unit(along), _unit(normal)]),
+            np.concatenate([length, np.full(len(normal), self._domain.mean_edge_length)]),
+            np.concatenate([chosen.label, chosen.point_label]),
+        )
+
+    def _integrated(self, pieces: _Pieces, level: Level) -> FloatArray:
+        """The signed distance (n,) of the method's steps 1 to 3, and its level."""
+        # Step 1: diffuse the normals, integrated against the hat functions.
+        corners = self._mesh.F[pieces.faces]
+        share = pieces.weight[:, None] * pieces.barycentric
+        at_corners = share * pieces.normal[:, None] * self._rotations.of_faces[pieces.faces].conj()
+        b = np.zeros(self.n_vertices, complex)
+        np.add.at(b, corners, at_corners)
+        largest = np.abs(b).max()
+        if largest <= _CANCELLED * share.max():
+            raise SourceError(
+                "the normals of the curves cancel: two curves run along each other in opposite directions"
+            )
+        Y = self._vector_flow.solve(b * (SOURCE_HEAT / largest))
+        # Step 2: the unit field in faces.
+        at_faces = Y[self._triangulation.F]
+        # Dividing by the largest first keeps squares in range.
+        size = np.abs(at_faces).max(axis=1, keepdims=True)
+        at_faces = np.divide(at_faces, size, out=np.zeros_like(at_faces), where=size > LOWEST_HEAT)
+        X = _unit((self._rotations.of_triangulation * at_faces).sum(axis=1))
+        # Step 3: L phi = D X.
+        phi = self._poisson.solve(self._D @ np.concatenate([X.real, X.imag]))
+        return phi - self._level(phi, pieces, share, level)
+
+    def _level(self, phi: FloatArray, pieces: _Pieces, share: FloatArray, level: Level) -> FloatArray:
+        """What to subtract from the integrated distance (n,): its values on the curves, extended to all vertices."""
+        n, domain = self.n_vertices, self._domain
+        corners = self._mesh.F[pieces.faces]
+        value = np.einsum("qc,qc->q", pieces.barycentric, phi[corners])
+        component = domain.components[corners[:, 0]]
+        weight = np.bincount(component, pieces.weight, domain.n_components)
+        total = np.bincount(component, pieces.weight * value, domain.n_components)
+        mean = np.divide(total, weight, out=np.full(domain.n_components, -np.inf), where=weight > 0)
+        at_vertices = domain.expand_to_vertices(mean)
+        if level == "none":
+            return np.asarray(at_vertices)
+        rest = value - mean[component]
+        if level == "constant":
+            _, group = np.unique(np.stack([pieces.label, component]), axis=1, return_inverse=True)
+            group = group.ravel()
+            rest -= (np.bincount(group, pieces.weight * rest) / np.bincount(group, pieces.weight))[group]
+        # Heat of the values over heat of ones is the value at the nearest places on the curves.
+        b = np.zeros((n, 2))
+        largest = max(float(np.abs(rest).max()), np.finfo(float).tiny)
+        np.add.at(b[:, 0], corners, share * (rest / largest)[:, None])
+        np.add.at(b[:, 1], corners, share)
+        u, ones = self._heat_flow.solve(b * (SOURCE_HEAT / b[:, 1].max())).T
+        extended = np.divide(u, ones, out=np.zeros(n), where=ones > LOWEST_HEAT)
+        return np.asarray(at_vertices + largest * np.clip(extended, -1, 1))
+
+
+def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, IntrinsicTriangulation]:
+    """The operators of a mesh on which a curve has a left and a right, its faces, and the triangles solved on."""
+    if mesh.is_tetrahedral:
+        raise MeshError("curves have a left and a right on triangles, but the mesh is tetrahedral")
+    domain = operators(mesh, "intrinsic-delaunay")
+    surface = domain.surface
+    if surface is None or surface.faces is None or surface.uncovered is not None:
+        raise MeshError(
+            "more than two faces meet at an edge of the mesh: a curve has no two sides there; remove faces or separate "
+            "the sheets"
+        )
+    faces = surface.faces
+    if not faces.aligned.all():
+        first = int(np.argmin(faces.aligned)) // 3
+        if not oriented(faces).aligned.all():
+            raise MeshError(
+                "the surface cannot be oriented, as a Moebius strip cannot: along a loop left becomes right, so a sign "
+                "has no meaning; cut the surface open, or take a distance without a sign"
+            )
+        raise MeshError(
+            f"face {first} and a neighbour are oriented differently: left and right change between them; orient the "
+            "faces alike, as igl.bfs_orient does"
+        )
+    return domain, faces, surface.triangulation
+
+
+def _one_or_all(steps: FloatArray) -> float | FloatArray:
+    """Time steps (n_components,) as one number if they are equal."""
+    return float(steps[0]) if (steps == steps[0]).all() else np.array(steps)
+
+
+def _unit(numbers: AnyArray) -> AnyArray:
+    """Complex numbers divided by their size; 0 stays."""
+    size = np.abs(numbers)
+    return np.divide(numbers, size, out=np.zeros_like(numbers), where=size > 0)

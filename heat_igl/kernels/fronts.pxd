@@ -1,0 +1,18 @@
+cdef extern from *:
+    """
+    // A smaller distance is handed on if it is shorter by more than this share of the way from the source.
+    #define GAIN 1e-5
+    // A front from this many edges away is straight: farther away, its curve is lost in the digits.
+    #define STRAIGHT 1e4
+    // Height of a triangle over its base below which spheres about the corners lose too many digits where they meet.
+    #define FLAT 1e-3
+    // Part by which a way may be longer than a straight line and still be one.
+    #define STRAIGHT_LINE 1e-6
+    // Part of a triangle by which a straight line may miss it, along its rim.
+    #define ON_SIDE 1e-9
+    """
+    double GAIN, STRAIGHT, FLAT, STRAIGHT_LINE, ON_SIDE
+
+cdef enum:
+    # Visits per vertex after which the kernel gives up.
+    MOST_VISITS = 100

@@ -1,0 +1,373 @@
+"""Kernel of fronts: distance through triangles or tetrahedra that need not fit together.
+
+Each simplex has edge lengths of its own, so two of them may see the edge between them at two lengths: there a front is
+refracted. Seen from a vertex, the source lies behind the opposite side of a simplex, at the distances of its corners.
+"""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, MOST_VISITS, ON_SIDE, STRAIGHT, STRAIGHT_LINE
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
+
+__all__ = ["advance"]
+
+
+def advance(
+    order: cython.const[cython.int][::1],
+    corners: cython.const[cython.int][:, ::1],
+    lengths: cython.const[cython.double][:, :, ::1],
+    slowness: cython.const[cython.double][::1],
+    first: cython.const[cython.int][::1],
+    incident: cython.const[cython.int][::1],
+    d: cython.double[::1],
+    label: cython.int[::1],
+    positions: cython.const[cython.double][:, ::1],
+    sources: cython.const[cython.int][::1],
+):
+    """Lower `d` (n,) to the best that the simplices of each vertex say, in passes over the given order.
+
+    Parameters
+    ----------
+    order : (n,) int32
+        All vertices, roughly from near to far; a wrong order costs time.
+    corners : (m, p + 1) int32
+        Triangles, p = 2, or tetrahedra, p = 3.
+    lengths : (m, p + 1, p + 1) float64
+        Distances of the corners, in the metric of the simplex.
+    slowness : (m,) float64
+        Time per length in each simplex: a front that passes from one to another of a different slowness is bent.
+    first, incident : (n + 1,) int32, (m (p + 1),) int32
+        Corners ``simplex * (p + 1) + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
+    d : (n,) float64
+        The value at which distance begins at each source, ``inf`` elsewhere; on return the distances.
+    label : (n,) int32
+        The source that distance comes from, -1 where there is none.
+    positions : (n, 3) float64
+        Of the vertices, where lengths are those of space; else no entries. Straight lines then tell fronts of several
+        sources apart.
+    sources : (k,) int32
+        Vertex of each source.
+
+    Returns
+    -------
+    int
+        Number of visits.
+    """
+    n = order.shape[0]
+    one = _Fronts()
+    one.p = corners.shape[1] - 1
+    one.order, one.corners, one.lengths, one.slowness = order, corners, lengths, slowness
+    one.first, one.incident, one.d, one.label = first, incident, d, label
+    one.positions, one.sources = positions, sources
+    one.begin = np.array(d)
+    one.arrived = np.ones(n)
+    one.is_stale = np.ones(n, np.uint8)
+    with cython.nogil:
+        one.run()
+    return one.n_visits
+
+
+@cython.final
+@cython.cclass
+class _Fronts:
+    """What is read and written, by vertex and by simplex.
+
+    `begin` (n,) is the value at which a front that looks like the one that passes here would have left its source, and
+    `arrived` (n,) the slowness of the simplex that it came through.
+    """
+
+    p: cython.int
+    order: cython.const[cython.int][::1]
+    corners: cython.const[cython.int][:, ::1]
+    lengths: cython.const[cython.double][:, :, ::1]
+    slowness: cython.const[cython.double][::1]
+    first: cython.const[cython.int][::1]
+    incident: cython.const[cython.int][::1]
+    d: cython.double[::1]
+    label: cython.int[::1]
+    positions: cython.const[cython.double][:, ::1]
+    sources: cython.const[cython.int][::1]
+    begin: cython.double[::1]
+    arrived: cython.double[::1]
+    is_stale: cython.uchar[::1]
+    n_visits: cython.longlong
+    # The best that was found for the vertex that is visited.
+    best: cython.double
+    best_begin: cython.double
+    best_label: cython.int
+    best_simplex: cython.int
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def run(self) -> cython.void:
+        """Visit all that is stale, in order, until nothing is."""
+        n: cython.Py_ssize_t = self.order.shape[0]
+        i: cython.Py_ssize_t
+        again: cython.bint = True
+        self.n_visits = 0
+        while again and self.n_visits < MOST_VISITS * n:
+            again = False
+            for i in range(n):
+                v: cython.int = self.order[i]
+                if not self.is_stale[v]:
+                    continue
+                self.is_stale[v] = False
+                self.n_visits += 1
+                if self.visit(v):
+                    again = True
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def visit(self, v: cython.int) -> cython.bint:
+        """Give v the best that its simplices say; returns whether that is news to its neighbours."""
+        k: cython.int
+        old: cython.double = self.d[v]
+        floor: cython.double = -INFINITY
+        if self.positions.shape[0] > 0 and self.sources.shape[0] == 1:
+            # No way is shorter than the straight line.
+            floor = self.d[self.sources[0]] + self.line(v, 0) * (1 + STRAIGHT_LINE)
+        self.best, self.best_simplex = old, -1
+        for k in range(self.first[v], self.first[v + 1]):
+            if self.best <= floor:
+                break
+            self.through(self.incident[k] // (self.p + 1), self.incident[k] % (self.p + 1))
+        if self.best_simplex < 0:
+            return False
+        self.d[v] = self.best
+        self.begin[v], self.label[v] = self.best_begin, self.best_label
+        self.arrived[v] = self.slowness[self.best_simplex]
+        if old - self.best <= GAIN * (self.best - self.best_begin):
+            return False
+        for k in range(self.first[v], self.first[v + 1]):
+            s: cython.int = self.incident[k] // (self.p + 1)
+            c: cython.int
+            for c in range(self.p + 1):
+                # What is nearer to the source gets nothing from here, unless a front comes back along a flat simplex.
+                if self.d[self.corners[s, c]] > self.best - self.lengths[s, c, self.incident[k] % (self.p + 1)]:
+                    self.is_stale[self.corners[s, c]] = True
+        self.is_stale[v] = False
+        return True
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def through(self, s: cython.int, v: cython.int) -> cython.void:
+        """What corner v of simplex s gets from the other corners: each alone, two at a time, and all three."""
+        a: cython.int = (v + 1) % (self.p + 1)
+        b: cython.int = (v + 2) % (self.p + 1)
+        c: cython.int = (v + 3) % (self.p + 1)
+        # No point of the opposite side is farther than `reach` from all corners.
+        near: cython.double = min(self.d[self.corners[s, a]], self.d[self.corners[s, b]])
+        reach: cython.double = 0.5 * self.lengths[s, a, b]
+        if self.p == 3:
+            near = min(near, self.d[self.corners[s, c]])
+            reach = 0.6 * max(self.lengths[s, a, b], self.lengths[s, a, c], self.lengths[s, b, c])
+        if not near - reach < self.best or near == INFINITY:
+            return
+        # Straight through the triangle is the shortest way through the simplex.
+        if self.p == 3 and self.across_triangle(s, v, a, b, c):
+            return
+        self.along_edge(s, v, a)
+        self.along_edge(s, v, b)
+        self.across_edge(s, v, a, b)
+        if self.p == 3:
+            self.along_edge(s, v, c)
+            self.across_edge(s, v, a, c)
+            self.across_edge(s, v, b, c)
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def begins(self, s: cython.int, corner: cython.int) -> cython.double:
+        """Where the front at a corner seems to begin, seen in simplex s.
+
+        A front that leaves a simplex of slowness c for one of slowness C is flatter by (C / c)^2, seen in time.
+        """
+        v: cython.int = self.corners[s, corner]
+        ratio: cython.double = self.slowness[s] / self.arrived[v]
+        if ratio == 1.0:
+            return self.begin[v]
+        return self.d[v] - (self.d[v] - self.begin[v]) * ratio * ratio
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def is_source(self, v: cython.int) -> cython.bint:
+        """Whether distance begins at v."""
+        return self.d[v] == self.begin[v]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def line(self, v: cython.int, label: cython.int) -> cython.double:
+        """Length of the straight line from a source to v."""
+        s: cython.int = self.sources[label]
+        x: cython.double = self.positions[v, 0] - self.positions[s, 0]
+        y: cython.double = self.positions[v, 1] - self.positions[s, 1]
+        z: cython.double = self.positions[v, 2] - self.positions[s, 2]
+        return sqrt(x * x + y * y + z * z)
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def sees_source(self, v: cython.int) -> cython.bint:
+        """Whether the way to v is known to be a straight line."""
+        if self.positions.shape[0] == 0 or self.label[v] < 0:
+            return False
+        return (self.d[v] - self.begin[v]) * (1 - STRAIGHT_LINE) <= self.line(v, self.label[v])
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def by_lines(self, s: cython.int, v: cython.int, i: cython.int, j: cython.int, k: cython.int) -> cython.void:
+        """Straight lines to corner v through the triangle ijk, from the sources of its corners."""
+        which: cython.int
+        for which in range(3):
+            label: cython.int = self.label[i if which == 0 else j if which == 1 else k]
+            start: cython.double = self.begin[i if which == 0 else j if which == 1 else k]
+            target: cython.int = self.corners[s, v]
+            value: cython.double = start + self.line(target, label)
+            if not value < self.best:
+                continue
+            source: cython.int = self.sources[label]
+            of_i: cython.double = self.volume(target, source, j, k)
+            of_j: cython.double = self.volume(target, source, k, i)
+            of_k: cython.double = self.volume(target, source, i, j)
+            least: cython.double = -ON_SIDE * (fabs(of_i) + fabs(of_j) + fabs(of_k))
+            if min(of_i, of_j, of_k) >= least or max(of_i, of_j, of_k) <= -least:
+                self.take(target, value, start, label, s)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def volume(self, o: cython.int, a: cython.int, b: cython.int, c: cython.int) -> cython.double:
+        """Six times the signed volume of the tetrahedron oabc."""
+        x: cython.double = self.positions[o, 0]
+        y: cython.double = self.positions[o, 1]
+        z: cython.double = self.positions[o, 2]
+        ax: cython.double = self.positions[a, 0] - x
+        ay: cython.double = self.positions[a, 1] - y
+        az: cython.double = self.positions[a, 2] - z
+        bx: cython.double = self.positions[b, 0] - x
+        by: cython.double = self.positions[b, 1] - y
+        bz: cython.double = self.positions[b, 2] - z
+        cx: cython.double = self.positions[c, 0] - x
+        cy: cython.double = self.positions[c, 1] - y
+        cz: cython.double = self.positions[c, 2] - z
+        return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def take(
+        self, target: cython.int, value: cython.double, begin: cython.double, label: cython.int, s: cython.int
+    ) -> cython.void:
+        """Keep a value for `target` if it is the best so far, and at least the straight line from the source."""
+        if value < self.best and self.positions.shape[0] > 0:
+            value = max(value, self.d[self.sources[label]] + self.line(target, label))
+        if value < self.best:
+            self.best, self.best_begin, self.best_label, self.best_simplex = value, begin, label, s
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def along_edge(self, s: cython.int, v: cython.int, a: cython.int) -> cython.void:
+        """Straight from corner a to v."""
+        i: cython.int = self.corners[s, a]
+        value: cython.double = self.d[i] + self.lengths[s, v, a]
+        if value < self.best:
+            self.take(self.corners[s, v], value, self.begins(s, a), self.label[i], s)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def across_edge(self, s: cython.int, v: cython.int, a: cython.int, b: cython.int) -> cython.void:
+        """Through the edge ab: the source lies in the plane of v, a and b, behind the edge."""
+        i: cython.int = self.corners[s, a]
+        j: cython.int = self.corners[s, b]
+        base: cython.double = self.lengths[s, a, b]
+        if not min(self.d[i], self.d[j]) - 0.5 * base < self.best or max(self.d[i], self.d[j]) == INFINITY:
+            return
+        to_a: cython.double = self.lengths[s, v, a]
+        to_b: cython.double = self.lengths[s, v, b]
+        start: cython.double = -INFINITY
+        if self.label[i] == self.label[j]:
+            start = 0.5 * (self.begins(s, a) + self.begins(s, b))
+        elif self.is_source(i) or self.is_source(j) or (self.sees_source(i) and self.sees_source(j)):
+            return
+        start = max(start, min(self.d[i], self.d[j]) - STRAIGHT * (base + to_a))
+        da: cython.double = self.d[i] - start
+        db: cython.double = self.d[j] - start
+        x: cython.double = 0.5 * ((da - db) * (da + db) / base + base)
+        y_squared: cython.double = da * da - x * x
+        if not y_squared >= 0:
+            return
+        along: cython.double = 0.5 * ((to_a - to_b) * (to_a + to_b) / base + base)
+        height: cython.double = sqrt(max(to_a * to_a - along * along, 0.0))
+        y: cython.double = sqrt(y_squared)
+        crossing: cython.double = x * height + along * y  # times y + height
+        if 0 <= crossing <= (y + height) * base:
+            across: cython.double = sqrt((along - x) * (along - x) + (height + y) * (height + y))
+            self.take(self.corners[s, v], start + across, start, self.label[i], s)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def across_triangle(self, s: cython.int, v: cython.int, a: cython.int, b: cython.int, c: cython.int) -> cython.bint:
+        """Through the triangle abc, if the straight line passes there, and whether it does.
+
+        The source lies where spheres about the corners meet, on the other side.
+        """
+        i: cython.int = self.corners[s, a]
+        j: cython.int = self.corners[s, b]
+        k: cython.int = self.corners[s, c]
+        base: cython.double = self.lengths[s, a, b]
+        start: cython.double = -INFINITY
+        if self.label[i] == self.label[j] and self.label[i] == self.label[k]:
+            start = (self.begins(s, a) + self.begins(s, b) + self.begins(s, c)) / 3
+        elif self.sees_source(i) and self.sees_source(j) and self.sees_source(k):
+            self.by_lines(s, v, i, j, k)
+            return False
+        elif self.is_source(i) or self.is_source(j) or self.is_source(k):
+            return False
+        start = max(start, min(self.d[i], self.d[j], self.d[k]) - STRAIGHT * (base + self.lengths[s, v, a]))
+        da: cython.double = self.d[i] - start
+        db: cython.double = self.d[j] - start
+        dc: cython.double = self.d[k] - start
+        # a in the origin, b on the first axis, c in the plane of the first two, v above it.
+        ac: cython.double = self.lengths[s, a, c]
+        bc: cython.double = self.lengths[s, b, c]
+        cx: cython.double = 0.5 * ((ac - bc) * (ac + bc) / base + base)
+        cy: cython.double = sqrt(max(ac * ac - cx * cx, 0.0))
+        if not cy > FLAT * base:
+            return False
+        x: cython.double = 0.5 * ((da - db) * (da + db) / base + base)
+        y: cython.double = 0.5 * ((da - dc) * (da + dc) + ac * ac - 2 * cx * x) / cy
+        z_squared: cython.double = da * da - x * x - y * y
+        if not z_squared >= 0:
+            return False
+        z: cython.double = sqrt(z_squared)
+        to_a: cython.double = self.lengths[s, v, a]
+        to_b: cython.double = self.lengths[s, v, b]
+        to_c: cython.double = self.lengths[s, v, c]
+        vx: cython.double = 0.5 * ((to_a - to_b) * (to_a + to_b) / base + base)
+        vy: cython.double = 0.5 * ((to_a - to_c) * (to_a + to_c) + ac * ac - 2 * cx * vx) / cy
+        vz: cython.double = sqrt(max(to_a * to_a - vx * vx - vy * vy, 0.0))
+        # The straight line meets the plane in (px, py), times z + vz.
+        height: cython.double = z + vz
+        px: cython.double = x * vz + vx * z
+        py: cython.double = y * vz + vy * z
+        of_c: cython.double = py / cy
+        of_b: cython.double = (px - of_c * cx) / base
+        if of_c >= 0 and of_b >= 0 and of_b + of_c <= height:
+            across: cython.double = sqrt((vx - x) * (vx - x) + (vy - y) * (vy - y) + height * height)
+            self.take(self.corners[s, v], start + across, start, self.label[i], s)
+            return True
+        return False

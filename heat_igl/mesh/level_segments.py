@@ -1,0 +1,153 @@
+"""The segments at which values cross a level, one for each triangle, and segments joined to curves."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.mesh.mesh import Mesh
+from heat_igl.mesh.surface_points import SurfaceCurve
+from heat_igl.typing import BoolArray, FloatArray, IntArray
+
+__all__ = ["Crossings", "Segments", "crossings", "joined_segments", "level_segments"]
+
+
+class Crossings(NamedTuple):
+    """Crossings of a level with faces and their edges.
+
+    Attributes
+    ----------
+    faces : (s,) int64
+        The faces with vertices on both sides of the level.
+    apex : (s,) int64
+        The corner alone on one side.
+    toward : (s, 2) float64
+        Position of the level between the apex (0) and the next corner (1), and between the apex and the corner after
+        that.
+    is_below : (s,) bool
+        Whether the apex is below the level.
+    """
+
+    faces: IntArray
+    apex: IntArray
+    toward: FloatArray
+    is_below: BoolArray
+
+
+def crossings(mesh: Mesh, values: FloatArray, level: float) -> Crossings:
+    """The faces in which `values` (n,), linear in each, cross `level`; a value equal to it counts as above."""
+    above = (values >= level)[mesh.F]
+    n_above = above.sum(axis=1)
+    faces = np.flatnonzero((n_above % 3 != 0) & np.isfinite(values[mesh.F]).all(axis=1))
+    is_below = n_above[faces] == 2
+    apex = np.argmax(above[faces] != is_below[:, None], axis=1)
+    corner = mesh.F[faces, apex]
+    toward = np.empty((len(faces), 2))
+    for i in (0, 1):
+        other = mesh.F[faces, (apex + 1 + i) % 3]
+        # From the lower end in both faces of an edge, so that both have the same bits; halves cannot overflow.
+        low, high = np.where(is_below, corner, other), np.where(is_below, other, corner)
+        from_low = (level / 2 - values[low] / 2) / (values[high] / 2 - values[low] / 2)
+        toward[:, i] = np.where(is_below, from_low, 1 - from_low)
+    return Crossings(faces, apex, toward, is_below)
+
+
+class Segments(NamedTuple):
+    """Directed straight segments (s,) in faces.
+
+    Attributes
+    ----------
+    faces : (s,) int64
+        The face of each segment.
+    start, end : (s, 3) float64
+        Barycentric coordinates of the two ends.
+    ends : (s, 2) int64
+        Labels of the two ends: ends at the same place have the same label.
+    """
+
+    faces: IntArray
+    start: FloatArray
+    end: FloatArray
+    ends: IntArray
+
+
+def level_segments(mesh: Mesh, values: FloatArray, level: float) -> Segments:
+    """The segments at which `values` (n,) cross `level`, lower values on the left; ends are labelled by edges."""
+    found = crossings(mesh, values, level)
+    count = len(found.faces)
+    rows = np.arange(count)
+    start, end = np.zeros((count, 3)), np.zeros((count, 3))
+    for i, point in ((0, start), (1, end)):
+        point[rows, found.apex] = 1 - found.toward[:, i]
+        point[rows, (found.apex + 1 + i) % 3] = found.toward[:, i]
+    # A segment runs from the edge between the apex and the next corner to the edge between the apex and the corner
+    # after that, each opposite the third corner: the apex is on the left.
+    ends = np.stack([mesh.facets.of_face[found.faces, (found.apex + 2 - i) % 3] for i in (0, 1)], axis=1)
+    turned = ~found.is_below
+    start[turned], end[turned] = end[turned], start[turned]
+    ends[turned] = ends[turned, ::-1]
+    return Segments(found.faces, start, end, ends)
+
+
+def joined_segments(segments: Segments) -> list[SurfaceCurve]:
+    """Segments joined to curves, in the order of their first segments; those of no length are left out."""
+    faces, start, end, ends = segments
+    has_length = (start != end).any(axis=1)
+    curves = []
+    for chain, is_closed in _chains(ends):
+        segment, is_reversed = chain // 2, chain % 2 == 1
+        kept = has_length[segment]
+        segment, is_reversed = segment[kept], is_reversed[kept, None]
+        if len(segment):
+            first = np.where(is_reversed, end[segment], start[segment])
+            last = np.where(is_reversed, start[segment], end[segment])
+            curves.append(SurfaceCurve(faces[segment], first, last, is_closed))
+    return curves
+
+
+def _chains(ends: IntArray) -> list[tuple[IntArray, bool]]:
+    """Join segments to chains.
+
+    Parameters
+    ----------
+    ends : (s, 2) int64
+        Labels of the start and end of each segment. Two ends are joined if they, and no other, have the same label.
+
+    Returns
+    -------
+    list of (chain, is_closed)
+        A chain holds ``2 i`` for segment i and ``2 i + 1`` for segment i reversed. The segment with the smallest i of a
+        chain is not reversed. Chains are sorted by this i, and closed ones begin with it.
+    """
+    order = np.argsort(ends.ravel(), kind="stable")
+    label = ends.ravel()[order]
+    _, first, count = np.unique(label, return_index=True, return_counts=True)
+    pair = first[count == 2]
+    joined = np.full(ends.size, -1)
+    joined[order[pair]], joined[order[pair + 1]] = order[pair + 1], order[pair]
+    partner: list[int] = joined.tolist()
+
+    def follow(oriented: int, stop: int) -> list[int]:
+        # Ends 2 i and 2 i + 1 belong to segment i; an oriented segment has the number of the end at which it starts.
+        chain = []
+        while oriented >= 0:
+            chain.append(oriented)
+            oriented = partner[oriented ^ 1]
+            if oriented == stop:
+                break
+        return chain
+
+    chains = []
+    seen = bytearray(len(ends))
+    for i in range(len(ends)):
+        if seen[i]:
+            continue
+        forward = follow(2 * i, 2 * i)
+        is_closed = partner[forward[-1] ^ 1] == 2 * i
+        before = [] if is_closed else [segment ^ 1 for segment in follow(2 * i + 1, -2)[:0:-1]]
+        chain = np.array(before + forward, np.int64)
+        for segment in chain.tolist():
+            seen[segment // 2] = 1
+        chains.append((chain, is_closed))
+    return chains

@@ -1,0 +1,302 @@
+"""A metric on each face: distance is measured with a length for every direction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import igl
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.csgraph as csgraph
+
+from heat_igl.errors import MeshError
+from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, intrinsic_delaunay, lay_out
+from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
+from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
+from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
+from heat_igl.operators.metric_simplices import MetricSimplices
+from heat_igl.operators.simplices import cotan_operators, longest_sides
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+
+__all__ = ["checked_numbers", "fibre_metric", "metric_operators", "operators_in_metric"]
+
+# Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken
+# for its length. Beyond, fronts are refracted at the edge.
+_ONE_LENGTH = 0.1
+# Share that has to remain of the length by which two sides of a triangle are longer than the third.
+_SLACK = 0.03
+# Asymmetry of a metric, and a negative direction across a triangle, that are taken for rounding.
+_ROUNDING = 1e-9
+
+
+def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "auto") -> Operators:
+    """The operators of a mesh with a metric on each face, which may be longer in one direction than in another.
+
+    A vector w in face f has the length sqrt(w^T g w), with g = ``metric[f]``: travel time, where g is the inverse
+    square of a speed; a distance that is shorter along fibres than across; the first fundamental form of another shape.
+
+    Parameters
+    ----------
+    mesh : mesh
+        m triangles or tetrahedra.
+    metric : (m, 3, 3) or (m, 2, 2) array_like
+        Symmetric and positive definite. (m, 3, 3) in space, of which a triangle takes what lies in its plane. (m, 2, 2)
+        in the plane of each triangle: the first axis along the edge from corner 0 to corner 1, the second towards
+        corner 2. Unit: squared length in the metric per squared length of the mesh.
+    laplacian : {"auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"}
+        Of triangles, see `operators`.
+
+    Returns
+    -------
+    Operators
+        For `HeatMethodSolver.from_operators`; all lengths are those of the metric.
+
+        Triangles: where faces see their common edges at the same length, within 10 %, they are an intrinsic
+        triangulation with these lengths (the mean of both). Edges are flipped, and every `refine` works. If lengths are
+        30 times as long in one place as in another, `HeatMethodSolver` takes exact windows by default: one time step
+        cannot suit both.
+
+        Where faces differ by more anywhere, as at a jump of the speed, fronts are refracted, and no unfolding is
+        straight: there is no `surface`, flips end at such edges, and `HeatMethodSolver` takes the fronts of
+        `FrontSolver` by default and with ``refine="sweep"``; other refinements are refused, and sources are vertices.
+
+        Tetrahedra are treated like the latter.
+
+    Raises
+    ------
+    MeshError
+        If a face has no area or volume.
+    ValueError
+        If `metric` is not symmetric and positive definite on every face, or `laplacian` is unknown.
+
+    Notes
+    -----
+    Edge lengths determine the metric of a triangle: each has the squared lengths of its three sides, e^T g e (Sharp,
+    Soliman and Crane 2019, section 2). A front that passes an edge keeps its travel time along the edge: Snell's law.
+
+    Examples
+    --------
+    Twice as far in x as in y:
+
+    >>> import numpy as np
+    >>> from heat_igl import HeatMethodSolver, metric_operators, shapes
+    >>> mesh = shapes.grid(8)
+    >>> domain = metric_operators(mesh, np.tile(np.diag([4.0, 1.0, 1.0]), (mesh.n_faces, 1, 1)))
+    >>> distance = HeatMethodSolver.from_operators(domain, refine="exact").distance(0)
+    >>> bool(np.allclose(distance, np.hypot(2 * mesh.V[:, 0], mesh.V[:, 1])))
+    True
+    """
+    check_laplacian(laplacian)
+    mesh = as_simplices(mesh)
+    _check_faces(mesh)
+    return operators_in_metric(mesh, _checked(metric, mesh), laplacian)
+
+
+def fibre_metric(directions: ArrayLike, along: ArrayLike, across: ArrayLike) -> FloatArray:
+    """The metric in space in which lengths are multiplied by `along` along a direction, and by `across` across it.
+
+    Parameters
+    ----------
+    directions : (m, 3) array_like
+        Of the fibres, or a principal direction, on each face; of any length but 0, and either sign.
+    along, across : float or (m,) array_like
+        Positive factors; for a speed, one over it.
+
+    Returns
+    -------
+    (m, 3, 3) float64
+        For `metric_operators`.
+
+    Raises
+    ------
+    ValueError
+        If a direction is 0 or not finite, or a factor is not positive.
+    """
+    w = checked_numbers("directions", directions)
+    if w.ndim != 2 or w.shape[1] != 3:
+        raise ValueError(f"directions must have shape (m, 3), one per face, not {w.shape}")
+    length = np.linalg.norm(w, axis=1)
+    _raise_at_first(~((length > 0) & np.isfinite(length)), "directions", w, "is no direction")
+    factors = []
+    for name, given in (("along", along), ("across", across)):
+        factor = checked_numbers(name, given)
+        if factor.shape not in ((), (len(w),)):
+            raise ValueError(f"{name} must be a number or have shape ({len(w)},), not {factor.shape}")
+        factor = np.broadcast_to(factor, len(w))
+        _raise_at_first(~((factor > 0) & np.isfinite(factor)), name, factor, "must be positive and finite")
+        factors.append(factor[:, None, None] ** 2)
+    unit = w / length[:, None]
+    projection = unit[:, :, None] * unit[:, None]
+    return np.asarray(factors[0] * projection + factors[1] * (np.eye(3) - projection))
+
+
+def operators_in_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian = "auto") -> Operators:
+    """`metric_operators` of a checked mesh and metric g (m, p, p), in the planes of triangles or in space."""
+    # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T: edges times C have the lengths of the metric.
+    factor = np.linalg.cholesky(g)
+    p = mesh.F.shape[1] - 1
+    slowness = np.prod(np.diagonal(factor, axis1=1, axis2=2), axis=1) ** (1 / p)
+    corners = mesh.V[mesh.F] if p == 3 else lay_out(igl.edge_lengths(mesh.V, mesh.F))
+    # Relative to the first corner: digits would be lost far from the origin.
+    corners = (corners - corners[:, :1]) @ factor
+    lengths = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=3)
+    if p == 3:
+        return _of_tetrahedra(mesh, corners, MetricSimplices(mesh.F, lengths, slowness, mesh.n_vertices))
+    sides, fit_together = _smoothed(mesh, lengths[:, [1, 2, 0], [2, 0, 1]])
+    if fit_together:
+        domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
+        return replace(domain, contrast=float(slowness.max() / slowness.min()))
+    return _refracting(mesh, sides, slowness, laplacian)
+
+
+def _smoothed(mesh: Mesh, sides: FloatArray) -> tuple[FloatArray, bool]:
+    """Lengths (m, 3), the mean where faces see an edge at nearly the same, and whether now all see all at the same.
+
+    A triangle that the means would leave without area keeps its own.
+    """
+    of_side = mesh.facets.of_face
+    shortest, longest = np.full(len(mesh.edges), np.inf), np.zeros(len(mesh.edges))
+    np.minimum.at(shortest, of_side, sides)
+    np.maximum.at(longest, of_side, sides)
+    is_one = longest - shortest <= _ONE_LENGTH * longest
+    mean = np.bincount(of_side.ravel(), sides.ravel()) / np.bincount(of_side.ravel())
+    smoothed = np.where(is_one[of_side], mean[of_side], sides)
+    slack = smoothed.sum(axis=1) - 2 * longest_sides(smoothed)
+    was_slack = sides.sum(axis=1) - 2 * longest_sides(sides)
+    too_thin = slack < _SLACK * was_slack
+    smoothed[too_thin] = sides[too_thin]
+    differs = too_thin[:, None] & (longest - shortest > _ROUNDING * longest)[of_side]
+    return smoothed, bool(is_one.all() and not differs.any())
+
+
+def _refracting(mesh: Mesh, sides: FloatArray, slowness: FloatArray, laplacian: Laplacian) -> Operators:
+    """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
+    glued = _glued_where_equal(mesh, sides)
+    triangulation = glued if laplacian == "cotan" else intrinsic_delaunay(glued)
+    domain = intrinsic_operators(triangulation)
+    pairs = np.concatenate([triangulation.F[:, pair] for pair in ([1, 2], [2, 0], [0, 1])])
+    domain = _with_shortest_edges(domain, mesh, pairs, triangulation.l.ravel(order="F"))
+    lengths = np.zeros((mesh.n_faces, 3, 3))
+    lengths[:, [1, 2, 0], [2, 0, 1]] = lengths[:, [2, 0, 1], [1, 2, 0]] = triangulation.l
+    # Where triangles fit together, fronts go straight on. A flip keeps the numbers of its two faces, and their region.
+    regions = _regions(glued)
+    mean = np.exp(np.bincount(regions, np.log(slowness)) / np.bincount(regions))
+    simplices = MetricSimplices(triangulation.F, lengths, mean[regions], mesh.n_vertices)
+    return replace(domain, simplices=simplices, contrast=float(slowness.max() / slowness.min()))
+
+
+def _regions(triangulation: IntrinsicTriangulation) -> IntArray:
+    """Label (m,) of each triangle: those that are glued together have one."""
+    m = len(triangulation.F)
+    glued = np.flatnonzero(triangulation.twin >= 0)
+    graph = sp.coo_array((np.ones(len(glued), np.int8), (glued // 3, triangulation.twin[glued] // 3)), shape=(m, m))
+    return np.asarray(csgraph.connected_components(graph, directed=False)[1])
+
+
+def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
+    """The triangles with lengths of their own, cut apart at the edges that they see at two lengths."""
+    apart = from_edge_lengths(igl.edge_lengths(mesh.V, mesh.F), mesh.F, mesh.n_vertices, mesh.facets)
+    twin = apart.twin.copy()
+    glued = np.flatnonzero(twin >= 0)
+    one, other = sides.ravel()[glued], sides.ravel()[twin[glued]]
+    twin[glued[np.abs(one - other) > _ROUNDING * np.maximum(one, other)]] = -1
+    return replace(apart, l=sides, twin=twin)
+
+
+def _of_tetrahedra(mesh: Mesh, corners: FloatArray, simplices: MetricSimplices) -> Operators:
+    """The operators of tetrahedra with corners (m, 4, 3) in a space of their own."""
+    m, n = mesh.n_faces, mesh.n_vertices
+    domain = cotan_operators(mesh)
+    apart = np.arange(4 * m).reshape(-1, 4)
+    # In units of the mean length: libigl multiplies up to six of them.
+    pairs, lengths = simplices.edges
+    unit = float(2.0 ** round(np.log2(float(lengths.mean()))))
+    flat = corners.reshape(-1, 3) / unit
+    own = sp.csc_matrix((np.ones(4 * m), (apart.ravel(), mesh.F.ravel())), shape=(4 * m, n))
+    G = (igl.grad(flat, apart) @ own).tocsc() / unit
+    weights = np.abs(igl.volume(flat, apart)) * unit**3
+    # A quarter of the volume for each corner, as igl.massmatrix has it.
+    mass = np.bincount(mesh.F.ravel(), np.repeat(weights / 4, 4), minlength=n)
+    domain = replace(
+        domain,
+        L=laplacian_of_gradient(G, weights),
+        M=sp.diags(mass, format="csc"),
+        gradient=G,
+        weights=weights,
+        face_sizes=longest_sides(lengths.reshape(m, -1)),
+        simplices=simplices,
+        contrast=float(simplices.slowness.max() / simplices.slowness.min()),
+    )
+    return _with_shortest_edges(domain, mesh, pairs, lengths)
+
+
+def _with_shortest_edges(domain: Operators, mesh: Mesh, pairs: AnyArray, lengths: FloatArray) -> Operators:
+    """With the shortest lengths of edges (e, 2), and the boundary of the mesh; without a `surface`."""
+    graph = connectivity.shortest_edge_graph(pairs, lengths, mesh.n_vertices)
+    longest = connectivity.longest_paths(graph, domain.components)
+    return replace(
+        domain,
+        mean_edge_length=float(graph.data.mean()),
+        boundary=mesh.boundary,
+        longest_distance=float(longest.max()),
+        longest_distances=longest,
+        surface=None,
+    )
+
+
+def _check_faces(mesh: Mesh) -> None:
+    flat = mesh.measures <= 0
+    if flat.any():
+        first = int(np.argmax(flat))
+        raise MeshError(
+            f"F[{first}] = {mesh.F[first].tolist()} has no {'volume' if mesh.is_tetrahedral else 'area'}, and so no "
+            f"metric ({int(flat.sum())} of {mesh.n_faces} faces): remove these faces"
+        )
+
+
+def _checked(metric: ArrayLike, mesh: Mesh) -> FloatArray:
+    """The metric (m, p, p) in the planes of triangles or in space."""
+    m, p = mesh.n_faces, mesh.F.shape[1] - 1
+    g = checked_numbers("metric", metric)
+    shapes = [(m, 3, 3)] if p == 3 else [(m, 3, 3), (m, 2, 2)]
+    if g.shape not in shapes:
+        raise ValueError(f"metric must have shape {' or '.join(map(str, shapes))}, one per face, not {g.shape}")
+    transposed = np.swapaxes(g, 1, 2)
+    size = np.abs(g).max(axis=(1, 2))
+    _raise_at_first(~np.isfinite(size), "metric", g, "must be finite")
+    _raise_at_first(np.abs(g - transposed).max(axis=(1, 2)) > _ROUNDING * size, "metric", g, "must be symmetric")
+    g = (g + transposed) / 2
+    if p < g.shape[1]:
+        axes = _frames(mesh)
+        g = axes @ g @ np.swapaxes(axes, 1, 2)
+    smallest = np.linalg.eigvalsh(g)[:, 0]
+    _raise_at_first(~(smallest > 0), "metric", np.asarray(metric), "must be positive definite on its face")
+    return np.asarray(g)
+
+
+def _frames(mesh: Mesh) -> FloatArray:
+    """Axes (m, 2, 3) of triangles: along the edge from corner 0 to corner 1, and towards corner 2."""
+    corners = mesh.V[mesh.F]
+    x = corners[:, 1] - corners[:, 0]
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    y = corners[:, 2] - corners[:, 0]
+    y -= np.einsum("mk,mk->m", x, y)[:, None] * x
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    return np.stack([x, y], axis=1)
+
+
+def checked_numbers(name: str, values: ArrayLike) -> FloatArray:
+    """`values` as float64; a ValueError that calls them `name` if they are no real numbers."""
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be real numbers, not {type(values).__name__}") from None
+
+
+def _raise_at_first(bad: AnyArray, name: str, values: AnyArray, problem: str) -> None:
+    """A ValueError with the first of the `values` that are `bad`."""
+    if bad.any():
+        first = int(np.argmax(bad))
+        raise ValueError(
+            f"{name}[{first}] = {values[first].tolist()} {problem} ({int(bad.sum())} of {len(bad)} are not)"
+        )

@@ -1,0 +1,183 @@
+"""Oriented sources: directed curves with a left and a right, boundaries of regions, and points with normals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from heat_igl.errors import SourceError
+from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, region_boundary
+from heat_igl.sources.specification import on_simplex
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+__all__ = ["Oriented", "OrientedPoints", "OrientedSet", "oriented_set"]
+
+_ACCEPTED = (
+    "a SurfaceCurve, OrientedPoints, a mask of the faces or of the vertices of a region, or a list of these kinds"
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OrientedPoints:
+    """Points on a triangle mesh with normals: samples of a curve that has a left and a right.
+
+    Parameters
+    ----------
+    points : SurfacePoints
+        The k points.
+    normals : (k, 3) array_like
+        Vectors in space that point to the positive side, of any length but 0; the part along the normal of the face is
+        left out.
+
+    Raises
+    ------
+    SourceError
+        If `normals` has another shape, or a row is 0 or not finite; the message names the first such row.
+    """
+
+    points: SurfacePoints
+    normals: FloatArray
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.points, SurfacePoints):
+            raise SourceError(
+                f"points must be SurfacePoints, not {type(self.points).__name__}: closest_points(mesh, P).points finds "
+                "those of positions"
+            )
+        try:
+            normals = np.atleast_2d(np.array(self.normals, dtype=np.float64))
+        except (TypeError, ValueError):
+            raise SourceError(f"normals must be real numbers of shape ({len(self.points)}, 3)") from None
+        if normals.shape != (len(self.points), 3):
+            raise SourceError(f"normals must have shape ({len(self.points)}, 3), not {normals.shape}")
+        wrong = ~(np.isfinite(normals).all(axis=1) & normals.any(axis=1))
+        if wrong.any():
+            first = int(np.argmax(wrong))
+            raise SourceError(f"normals[{first}] = {normals[first].tolist()} must be finite and not 0")
+        object.__setattr__(self, "normals", normals)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __repr__(self) -> str:
+        return f"OrientedPoints({len(self)} points)"
+
+
+# A list may hold several kinds.
+Oriented = SurfaceCurve | OrientedPoints | Sequence[Any] | AnyArray
+
+
+@dataclass(frozen=True, eq=False)
+class OrientedSet:
+    """Oriented sources, checked.
+
+    Attributes
+    ----------
+    faces, start, end, label : (s,) int64, (s, 3) float64, (s, 3) float64, (s,) int64
+        Directed segments in faces, negative on their left, and the curve that each belongs to.
+    point_faces, point_barycentric, point_label : (k,) int64, (k, 3) float64, (k,) int64
+        Points, and the set of `OrientedPoints` that each belongs to.
+    normals : (k, 3) float64
+        Normals of the points in space.
+    n_labels : int
+        Number of curves, regions and sets of points.
+    """
+
+    faces: IntArray
+    start: FloatArray
+    end: FloatArray
+    label: IntArray
+    point_faces: IntArray
+    point_barycentric: FloatArray
+    point_label: IntArray
+    normals: FloatArray
+    n_labels: int
+
+    def unoriented(self) -> list[SurfaceCurve | SurfacePoints]:
+        """The same places as sources of a distance without a sign."""
+        places: list[SurfaceCurve | SurfacePoints] = []
+        if len(self.faces):
+            places.append(SurfaceCurve(self.faces, self.start, self.end))
+        if len(self.point_faces):
+            places.append(SurfacePoints(self.point_faces, self.point_barycentric))
+        return places
+
+
+def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
+    """All that a user may pass as oriented sources, as one checked object.
+
+    Parameters
+    ----------
+    curves : oriented sources
+        A `SurfaceCurve`, `OrientedPoints`, a mask of bool of the faces (m,) or the vertices (n,) of a region, or a list
+        or tuple of these kinds.
+    mesh : Mesh
+        Triangles that they lie on.
+
+    Raises
+    ------
+    SourceError
+        If there is no source, one is of another kind, a face is not one of the mesh, or a curve has no length; the
+        message names the first such.
+    """
+    parts = list(curves) if isinstance(curves, (list, tuple)) else [curves]
+    if not parts:
+        raise SourceError(f"curves is empty: pass {_ACCEPTED}")
+    segments: list[tuple[IntArray, FloatArray, FloatArray, IntArray]] = []
+    points: list[tuple[IntArray, FloatArray, IntArray, FloatArray]] = []
+    for i, part in enumerate(parts):
+        name = f"curves[{i}]" if isinstance(curves, (list, tuple)) else "curves"
+        if isinstance(part, OrientedPoints):
+            _check_faces(name, part.points.faces, mesh)
+            label = np.full(len(part), i)
+            points.append((part.points.faces, on_simplex(part.points.barycentric), label, part.normals))
+        else:
+            faces, start, end = _segments(name, part, mesh)
+            segments.append((faces, start, end, np.full(len(faces), i)))
+    no_segments = (np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.int64))
+    no_points = (np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, np.int64), np.empty((0, 3)))
+    faces, start, end, label = (np.concatenate(column) for column in zip(no_segments, *segments, strict=True))
+    at, barycentric, label_at, normals = (np.concatenate(column) for column in zip(no_points, *points, strict=True))
+    return OrientedSet(faces, start, end, label, at, barycentric, label_at, normals, len(parts))
+
+
+def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
+    """The segments of a curve or of the boundary of a region, without those of no length."""
+    if isinstance(part, SurfaceCurve):
+        _check_faces(name, part.faces, mesh)
+        start, end = on_simplex(part.start), on_simplex(part.end)
+        kept = (start != end).any(axis=1)
+        if not kept.any():
+            raise SourceError(f"{name} has no length, and so neither left nor right: give points with normals instead")
+        return part.faces[kept], start[kept], end[kept]
+    mask = np.asarray(part) if isinstance(part, (np.ndarray, list, tuple)) else None
+    if mask is None or mask.dtype.kind != "b":
+        raise SourceError(f"{name} must be {_ACCEPTED}, not {type(part).__name__}")
+    n, m = mesh.n_vertices, mesh.n_faces
+    if mask.shape not in ((n,), (m,)) or n == m:
+        why = "which is both here: pass region_boundary(mesh, faces=mask) or (mesh, vertices=mask)"
+        raise SourceError(
+            f"{name} is a mask of shape {mask.shape}; it must have {n} entries for vertices or {m} for faces"
+            + (f", {why}" if n == m else "")
+        )
+    try:
+        loops = region_boundary(mesh, vertices=mask) if len(mask) == n else region_boundary(mesh, faces=mask)
+    except SourceError as error:
+        raise SourceError(f"{name}: {error}") from None
+    return (
+        np.concatenate([loop.faces for loop in loops]),
+        np.concatenate([loop.start for loop in loops]),
+        np.concatenate([loop.end for loop in loops]),
+    )
+
+
+def _check_faces(name: str, faces: IntArray, mesh: Mesh) -> None:
+    outside = (faces < 0) | (faces >= mesh.n_faces)
+    if outside.any():
+        first = int(np.argmax(outside))
+        raise SourceError(
+            f"{name}: faces[{first}] = {faces[first]} is no face: indices run from 0 to {mesh.n_faces - 1}"
+        )

@@ -1,0 +1,116 @@
+"""Distances as lengths of paths: one answer of the unfolding or of exact windows, to be differentiated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heat_igl.intrinsic import IntrinsicTriangulation
+from heat_igl.mesh import SurfacePoints
+from heat_igl.sources import SourceSet
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.exact import ExactSurface
+from heat_igl.unfolding.path_derivatives import Change, Paths, Places, Starts, Ways, half_edge_arrays
+from heat_igl.unfolding.refinement import Refinement
+
+__all__ = ["PathLengths", "from_walks", "from_windows"]
+
+
+class PathLengths:
+    """The paths of one answer, on the triangulation that they were found on.
+
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        m triangles on n vertices.
+    paths : Paths
+        On these triangles, or on others that `refinement` made of them.
+    rows : (n,) int
+        Where each vertex stands in `paths`.
+    points : SurfacePoints or None
+        Source points in the faces of the mesh.
+    refinement : Refinement, optional
+        Carries sides to the triangles of `paths` and back.
+    """
+
+    def __init__(
+        self,
+        triangulation: IntrinsicTriangulation,
+        paths: Paths,
+        rows: AnyArray,
+        points: SurfacePoints | None,
+        refinement: Refinement | None = None,
+    ) -> None:
+        self.triangulation, self._paths, self._rows, self._refinement = triangulation, paths, rows, refinement
+        self._points = points
+
+    @property
+    def lost(self) -> IntArray:
+        """Vertices whose path could not be followed to its end: it does not count in the derivative."""
+        return np.flatnonzero(self._paths.is_lost[self._rows])
+
+    def pull_back(self, g: FloatArray) -> Change:
+        """The derivative of the sum of distances times g (n,), by the sides of the triangulation."""
+        weight = np.zeros(self._paths.n)
+        weight[self._rows] = g
+        change = self._paths.pull_back(weight)
+        if self._refinement is not None:
+            change = change._replace(by_side=self._refinement.by_given_sides(change.by_side))
+        if change.by_place is not None:
+            change = change._replace(by_place=self._by_points(change.by_place))
+        return change
+
+    def _by_points(self, by_place: FloatArray) -> FloatArray:
+        """The derivative (p, 3) by the coordinates of each source point in its own triangle.
+
+        Of a point on a side, the triangle on the other side has a copy: it knows the derivative along the side alone.
+        """
+        places, points = self._paths.places, self._points
+        if points is None:
+            return by_place
+        F = self._paths.corners(places.faces)
+        if self._refinement is not None:
+            F = self._refinement.vertex_of(F)
+        own_faces, _ = self.triangulation.locate(points.faces, points.barycentric)
+        own = self.triangulation.F[own_faces[places.point]]
+        result = np.zeros((len(points), 3))
+        for c in range(3):
+            # The corner of the point's own triangle with the same vertex.
+            same = own == F[:, [c]]
+            known = same.any(axis=1)
+            np.add.at(result, (places.point[known], same.argmax(axis=1)[known]), by_place[known, c])
+        return result
+
+    def push_forward(self, by_side: FloatArray) -> FloatArray:
+        """How the distances (n,) change when the sides (m, 3) change by `by_side`."""
+        if self._refinement is not None:
+            by_side = self._refinement.on_tables(by_side)
+        return np.asarray(self._paths.push_forward(by_side)[self._rows])
+
+    def lengths(self) -> FloatArray:
+        """Lengths (n,) of the paths; 0 at unreachable vertices."""
+        return np.asarray(self._paths.lengths()[self._rows])
+
+
+def from_walks(refinement: Refinement, sources: SourceSet, u: FloatArray) -> PathLengths:
+    """The paths that unfolding finds from vertices and points, in the order of the heat u (n,)."""
+    starts = Starts.of(sources)
+    paths = refinement.paths(-u, starts)
+    rows = refinement.rows_of(paths.distance)
+    return PathLengths(refinement.triangulation, paths, rows, starts.points, refinement)
+
+
+def from_windows(surface: ExactSurface, triangulation: IntrinsicTriangulation, sources: SourceSet) -> PathLengths:
+    """The paths that exact windows on a triangulation find from vertices and points."""
+    starts = Starts.of(sources)
+    found = surface.solve(starts.vertices, starts.offsets, starts.points, starts.point_offsets)
+    origin, n = found.origin, triangulation.n
+    places = Places.none()
+    begins = np.append(found.distance, 0.0)
+    if starts.points is not None and starts.point_offsets is not None:
+        placed = surface.located(starts.points)
+        places = Places(*placed, starts.point_offsets[placed[2]])
+        begins = np.concatenate([found.distance, starts.point_offsets, [0.0]])
+    length = triangulation.l.ravel()[origin.entered]
+    ways = Ways(found.distance, origin.entered, origin.crossing / length, found.distance - begins[origin.root])
+    paths = Paths(half_edge_arrays(triangulation), places, ways, is_source=origin.root == np.arange(n))
+    return PathLengths(triangulation, paths, np.arange(n), starts.points)

@@ -1,0 +1,231 @@
+"""Distance in a metric per face, at jumps of the speed, and through tetrahedra: errors and times beside heat alone.
+
+    python scripts/metrics_table.py [--rows 48] [--points 20000] [--sources 3] [--seed 0] [--json FILE]
+
+Every row has a closed form. Prints, as a Markdown table, the mean of |d - exact| / exact over vertices and sources in
+percent for the default of `HeatMethodSolver` and for other methods, "-" where a method does not apply. "heat" is the
+paper's method, ``magnitude="unit"``. For tetrahedra, also by how much the worst value is below the straight line, and
+seconds to make the solver and for a query. docs/metrics.md shows the tables.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial import Delaunay
+
+from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, metric_operators, shapes, speed_operators
+from heat_igl.operators import Operators
+from heat_igl.typing import FloatArray
+
+from scaffold import add_json, add_seed, environment, option_parser, publish, table
+
+Truth = Callable[[int], FloatArray]
+METHODS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "heat": {"magnitude": "unit"},
+    "sweep": {"refine": "sweep"},
+    "unfold": {"refine": "unfold"},
+}
+
+
+def plane(rows: int, rng: np.random.Generator, border: float | None = None) -> Mesh:
+    """The unit square, with vertices inside moved by a quarter of an edge; those at x = `border` stay there."""
+    mesh = shapes.grid(rows)
+    V = mesh.V.copy()
+    inner = ~mesh.boundary
+    if border is not None:
+        inner &= V[:, 0] != border
+    V[inner, :2] += rng.uniform(-0.25, 0.25, (int(inner.sum()), 2)) / rows
+    return Mesh(V, mesh.F)
+
+
+def linear_maps(rows: int, rng: np.random.Generator) -> Iterator[tuple[str, Operators, Truth]]:
+    for ratio in (1.0, 10.0, 100.0):
+        mesh = plane(rows, rng)
+        turn = np.array([[0.8, 0.6, 0], [-0.6, 0.8, 0], [0, 0, 1]])
+        A = np.diag([ratio, 1, 1]) @ turn
+        mapped = mesh.V @ A.T
+        metric = np.tile(A.T @ A, (mesh.n_faces, 1, 1))
+        yield (
+            f"one tensor, 1 : {ratio:g}",
+            metric_operators(mesh, metric),
+            lambda i, mapped=mapped: np.linalg.norm(mapped - mapped[i], axis=1),
+        )
+
+
+def exponential_speeds(rows: int, rng: np.random.Generator) -> Iterator[tuple[str, Operators, Truth]]:
+    for contrast in (1e1, 1e3, 1e6):
+        strip = shapes.strip(8 * rows // 2, rows // 2)
+        V = strip.V.copy()
+        inner = ~strip.boundary
+        V[inner, :2] += rng.uniform(-0.25, 0.25, (int(inner.sum()), 2))
+        mesh = Mesh(V, strip.F)
+        k = np.log(contrast) / np.ptp(V[:, 0])
+        unrolled = np.exp(-k * (V[:, 0] + 1j * (V[:, 1] - V[:, 1].mean()))) / k
+        speed = np.exp(k * V[mesh.F][:, :, 0].mean(axis=1))
+        yield (
+            f"speed growing exponentially, 1 : {contrast:g}",
+            speed_operators(mesh, speed),
+            lambda i, unrolled=unrolled: np.abs(unrolled - unrolled[i]),
+        )
+
+
+def two_speeds(rows: int, rng: np.random.Generator) -> Iterator[tuple[str, Operators, Truth]]:
+    for left, right in ((1.0, 2.0), (1.0, 1e3), (1e3, 1.0), (1.0, 1e6), (1e6, 1.0)):
+        mesh = plane(rows, rng, border=0.5)
+        speed = np.where(mesh.V[mesh.F][:, :, 0].mean(axis=1) < 0.5, left, right)
+        yield (
+            f"two speeds, {left:g} beside {right:g}",
+            speed_operators(mesh, speed),
+            lambda i, V=mesh.V, left=left, right=right: by_fermat(V, i, left, right),
+        )
+
+
+def by_fermat(V: FloatArray, i: int, left: float, right: float) -> FloatArray:
+    """Least time over where the way crosses x = 1/2, or along the faster side of it."""
+    source, x, y = V[i], V[:, 0] - 0.5, V[:, 1]
+    here, there = (left, right) if source[0] < 0.5 else (right, left)
+    beyond = x * (source[0] - 0.5) < 0
+    depth = abs(source[0] - 0.5)
+    crossing = np.linspace(-0.5, 1.5, 8001)
+    to_crossing = np.hypot(depth, source[1] - crossing) / here
+    refracted = np.array([(to_crossing + np.hypot(a, b - crossing) / there).min() for a, b in zip(x, y, strict=True)])
+    straight = np.linalg.norm(V - source, axis=1) / here
+    if there > here:
+        critical = np.arcsin(here / there)
+        both, along = depth + np.abs(x), np.abs(y - source[1])
+        head = both * np.cos(critical) / here + along / there
+        straight = np.where(along >= both * np.tan(critical), np.minimum(straight, head), straight)
+    return np.where(beyond, refracted, straight)
+
+
+def bodies(points: int, rng: np.random.Generator) -> Iterator[tuple[str, Mesh, Truth]]:
+    """Boxes of even tetrahedra, Delaunay tetrahedra of random points, and a cube without a quarter."""
+    rows = round(points ** (1 / 3)) - 1
+    scattered = rng.random((points, 3))
+    ball = rng.random((2 * points, 3)) - 0.5
+    ball = ball[np.linalg.norm(ball, axis=1) < 0.5][:points]
+    for name, mesh in (
+        ("cube, even tetrahedra", shapes.box(rows)),
+        ("cube, Delaunay tetrahedra", delaunay(scattered)),
+        ("ball, Delaunay tetrahedra", delaunay(ball)),
+    ):
+        yield name, mesh, lambda i, V=mesh.V: np.linalg.norm(V - V[i], axis=1)
+    # A cube without the quarter x, y > 1/2, as many vertices.
+    cube = shapes.box(2 * round((points / 6) ** (1 / 3)))
+    centre = cube.V[cube.F].mean(axis=1)
+    used, F = np.unique(cube.F[(centre[:, :2] < 0.5).any(axis=1)], return_inverse=True)
+    mesh = Mesh(cube.V[used], F.reshape(-1, 4))
+    yield "three quarters of a cube", mesh, lambda i: around_the_edge(mesh.V, i)
+
+
+def delaunay(V: FloatArray) -> Mesh:
+    F = Delaunay(V).simplices
+    volumes = np.abs(np.linalg.det(V[F[:, 1:]] - V[F[:, :1]]))
+    return Mesh(V, F[volumes > 1e-12])
+
+
+def around_the_edge(V: FloatArray, i: int) -> FloatArray:
+    """Distance in the cube without the quarter x, y > 1/2, whose inner edge turns the part beyond into line."""
+    x, y, z = (V - [0.5, 0.5, V[i, 2]]).T
+    angle = np.mod(np.arctan2(y, x) - np.pi / 2, 2 * np.pi)
+    bent = np.hypot(np.hypot(x, y) + np.hypot(x[i], y[i]), z)
+    return np.where(np.abs(angle - angle[i]) > np.pi, bent, np.linalg.norm(V - V[i], axis=1))
+
+
+def mean_error(found: FloatArray, exact: FloatArray) -> float:
+    away = exact > 0
+    return 100 * float(np.mean(np.abs(found - exact)[away] / exact[away]))
+
+
+def surfaces_table(rows: int, k: int, rng: np.random.Generator) -> list[dict[str, Any]]:
+    found = []
+    for family in (linear_maps, exponential_speeds, two_speeds):
+        for name, domain, truth in family(rows, rng):
+            sources = rng.choice(domain.n_given, k, replace=False).tolist()
+            row: dict[str, Any] = {"case": name}
+            for method, options in METHODS.items():
+                if method == "unfold" and domain.surface is None:
+                    continue
+                solver = HeatMethodSolver.from_operators(domain, **options)
+                row[method] = float(np.mean([mean_error(solver.distance(i), truth(i)) for i in sources]))
+            found.append(row)
+            print(row, file=sys.stderr, flush=True)
+    return found
+
+
+def bodies_table(points: int, k: int, rng: np.random.Generator) -> list[dict[str, Any]]:
+    found = []
+    for name, mesh, truth in bodies(points, rng):
+        sources = rng.choice(mesh.n_vertices, k, replace=False).tolist()
+        row: dict[str, Any] = {"body": name, "vertices": mesh.n_vertices, "tetrahedra": mesh.n_faces}
+        for method in ("default", "heat"):
+            start = time.perf_counter()
+            solver = HeatMethodSolver(mesh, **METHODS[method])
+            made = time.perf_counter() - start
+            start = time.perf_counter()
+            distances = [solver.distance(i) for i in sources]
+            asked = (time.perf_counter() - start) / k
+            below = max(
+                float((1 - d[line > 0] / line[line > 0]).max())
+                for d, line in zip(
+                    distances, (np.linalg.norm(mesh.V - mesh.V[i], axis=1) for i in sources), strict=True
+                )
+            )
+            error = float(np.mean([mean_error(d, truth(i)) for d, i in zip(distances, sources, strict=True)]))
+            row[method] = {"error": error, "below": 100 * below, "made": made, "asked": asked}
+        found.append(row)
+        print(row, file=sys.stderr, flush=True)
+    return found
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = option_parser(__doc__)
+    parser.add_argument("--rows", type=int, default=48, help="cells along the unit square (default 48)")
+    parser.add_argument("--points", type=int, default=20000, help="vertices of bodies (default 20000)")
+    parser.add_argument("--sources", type=int, default=3, help="per case (default 3)")
+    add_seed(parser)
+    add_json(parser)
+    arguments = parser.parse_args(argv)
+    # That heat is wrong here is what the table shows.
+    warnings.simplefilter("ignore", AccuracyWarning)
+    rng = np.random.default_rng(arguments.seed)
+    surfaces = surfaces_table(arguments.rows, arguments.sources, rng)
+    solids = bodies_table(arguments.points, arguments.sources, rng)
+    on_surfaces = table(
+        ["metric", *(f"{method}, %" for method in METHODS)],
+        [(row["case"], *(f"{row[m]:.2g}" if m in row else "-" for m in METHODS)) for row in surfaces],
+    )
+    in_bodies = table(
+        [
+            "body",
+            "vertices",
+            *(f"{m}, %" for m in ("default", "heat")),
+            "below lines, %",
+            "default, s + s",
+            "heat, s + s",
+        ],
+        [
+            (
+                row["body"],
+                str(row["vertices"]),
+                *(f"{row[m]['error']:.2g}" for m in ("default", "heat")),
+                " and ".join(f"{max(row[m]['below'], 0):.2g}" for m in ("default", "heat")),
+                *(f"{row[m]['made']:.2g} + {row[m]['asked']:.2g}" for m in ("default", "heat")),
+            )
+            for row in solids
+        ],
+    )
+    result = {"environment": environment(), "surfaces": surfaces, "bodies": solids}
+    publish(result, "\n".join([*on_surfaces, "", *in_bodies]), json_file=arguments.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,199 @@
+"""Signed distance from broken curves, beside potpourri3d's: errors, failures, and times.
+
+    python scripts/signed_table.py MESH [MESH ...] [--cases 40] [--seed 0] [--no-times] [--json FILE]
+
+Each case is a level of a random smooth function on one of the meshes, in turn, and 10, 30 or 50 % of the length of its
+curves removed, in turn, in one to six pieces. The truth is the unfolded distance from the whole curves, with the sign
+of the function. Errors are means over the vertices, as a share of the square root of the area inside, in percent.
+Times are medians of paired runs; those of potpourri3d's first query are part of its precomputation, since it factors
+then. Needs potpourri3d; docs/signed.md shows the tables.
+"""
+
+from __future__ import annotations
+
+import statistics
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import heat_igl
+from heat_igl import Mesh, SignedHeatSolver, SurfaceCurve, isolines, sublevel_areas, unfolded_distance
+from heat_igl.typing import FloatArray
+
+from measuring import seconds_of
+from scaffold import add_json, add_seed, environment, option_parser, publish, table
+
+SHARES = (0.1, 0.3, 0.5)
+LEVELS = ("ZeroSet", "None")
+
+
+class Peer:
+    """potpourri3d's signed heat method; its curves are lists of vertices, points on edges and points in faces."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        import potpourri3d
+
+        self._mesh = mesh
+        self._solver = potpourri3d.MeshSignedHeatSolver(mesh.V, mesh.F)
+        pairs = np.asarray(potpourri3d.edges(mesh.V, mesh.F)).tolist()
+        self._edge = {frozenset(pair): (i, pair[0]) for i, pair in enumerate(pairs)}
+
+    def nodes(self, curves: list[SurfaceCurve]) -> list[list[tuple[int, list[float]]]]:
+        """The curves as it takes them, reversed: it is positive on the left."""
+        found = []
+        for curve in curves:
+            places = [(curve.faces[0], curve.start[0]), *zip(curve.faces, curve.end, strict=True)]
+            found.append([self._node(int(face), at) for face, at in places[::-1]])
+        return found
+
+    def _node(self, face: int, at: FloatArray) -> tuple[int, list[float]]:
+        held = np.flatnonzero(at > 1e-12)
+        corners = self._mesh.F[face, held].tolist()
+        if len(held) == 1:
+            return corners[0], []
+        if len(held) == 3:
+            return face, at.tolist()
+        edge, tail = self._edge[frozenset(corners)]
+        return edge, [float(at[held[1 if tail == corners[0] else 0]])]
+
+    def distance(self, nodes: Any, level: str) -> FloatArray:
+        """The answer; a RuntimeError where it fails."""
+        return np.asarray(self._solver.compute_distance(nodes, level_set_constraint=level))
+
+
+def broken(mesh: Mesh, curve: SurfaceCurve, share: float, gaps: int, rng: np.random.Generator) -> list[SurfaceCurve]:
+    """What is left of a curve when a share of its length is removed, in pieces of equal length."""
+    lengths = curve.lengths(mesh)
+    middle = (np.cumsum(lengths) - lengths / 2) / lengths.sum()
+    kept = np.ones(len(curve), bool)
+    for start in (rng.uniform() + np.arange(gaps) + rng.uniform(-0.3, 0.3, gaps) * (1 - share)) / gaps:
+        kept &= (middle - start) % 1 >= share / gaps
+    if kept.all() or not kept.any():
+        return [curve] if kept.all() else []
+    # A closed one from a gap on, so that no piece lies over the start.
+    order = np.roll(np.arange(len(curve)), -int(np.argmin(kept)) if curve.is_closed else 0)
+    runs = np.split(order, np.flatnonzero(np.diff(kept[order].astype(int))) + 1)
+    return [SurfaceCurve(curve.faces[run], curve.start[run], curve.end[run]) for run in runs if kept[run[0]]]
+
+
+def smooth_function(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
+    """A sum of a few waves, at most two wavelengths across the mesh."""
+    waves = rng.normal(size=(3, 4)) * rng.uniform(1, 5, 4) / np.ptp(mesh.V, axis=0).max()
+    return np.asarray(np.sin(mesh.V @ waves + rng.uniform(0, 2 * np.pi, 4)) @ rng.normal(size=4))
+
+
+def measure_case(mesh: Mesh, solvers: dict[str, Any], share: float, rng: np.random.Generator) -> dict[str, float]:
+    """The errors of all solvers in one case; NaN where one fails."""
+    values = smooth_function(mesh, rng)
+    level = float(np.quantile(values, rng.uniform(0.3, 0.7)))
+    whole = isolines(mesh, values, level)[0]
+    gaps = int(rng.integers(1, 7))
+    pieces = [piece for curve in whole for piece in broken(mesh, curve, share, gaps, rng)]
+    truth = np.where(values < level, -1, 1) * unfolded_distance(mesh, whole)
+    size = float(np.sqrt(sublevel_areas(mesh, values, level)[0]))
+    answers: dict[str, FloatArray | None] = {}
+    for name, solver in solvers.items():
+        if isinstance(solver, Peer):
+            for constraint in LEVELS:
+                try:
+                    answers[f"{name} {constraint}"] = solver.distance(solver.nodes(pieces), constraint)
+                except RuntimeError:
+                    answers[f"{name} {constraint}"] = None
+        else:
+            answers[name] = solver.distance(pieces)
+    return {
+        name: np.nan if found is None else float(100 * np.abs(found - truth).mean() / size)
+        for name, found in answers.items()
+    }
+
+
+def measure_times(mesh: Mesh, rounds: int) -> dict[str, float]:
+    """Seconds, and their ratios: a curve through the middle of the mesh."""
+    height = mesh.V @ [0.3, 0.5, 0.81]
+    curves = isolines(mesh, height, float(np.median(height)))[0]
+    found: dict[str, list[float]] = {}
+
+    def ours() -> SignedHeatSolver:
+        return SignedHeatSolver(mesh)
+
+    peer = Peer(mesh)
+    nodes = peer.nodes(curves)
+
+    def theirs() -> None:
+        import potpourri3d
+
+        solver = potpourri3d.MeshSignedHeatSolver(mesh.V, mesh.F)
+        solver.compute_distance(nodes, level_set_constraint="None")
+
+    solver = ours()
+    solver.distance(curves)
+    peer.distance(nodes, "None")
+    for _ in range(rounds):
+        times = {
+            "precomputation": (seconds_of(ours), seconds_of(theirs)),
+            "query": (
+                seconds_of(lambda: solver.distance(curves)),
+                seconds_of(lambda: peer.distance(nodes, "None")),
+            ),
+        }
+        for name, (one, other) in times.items():
+            for key, value in ((f"{name}, s", one), (f"{name}, peer, s", other), (f"{name}, ratio", one / other)):
+                found.setdefault(key, []).append(value)
+    return {"vertices": mesh.n_vertices} | {name: statistics.median(each) for name, each in found.items()}
+
+
+def summary(rows: list[dict[str, Any]]) -> str:
+    names = [name for name in rows[0] if name not in ("mesh", "removed")]
+    lines = []
+    for share in SHARES:
+        those = [row for row in rows if row["removed"] == share]
+        cells = []
+        for name in names:
+            errors = np.array([row[name] for row in those])
+            failed = int(np.isnan(errors).sum())
+            cells.append(f"{np.nanmean(errors):.3g}" + (f" ({failed} failed)" if failed else ""))
+        lines.append((f"{100 * share:.0f} %", str(len(those)), *cells))
+    best = np.array([np.nanmin([row[name] for name in names if name.startswith("potpourri3d")]) for row in rows])
+    better = [f"{int((np.array([row[name] for row in rows]) <= best).sum())} of {len(rows)}" for name in names]
+    lines.append(("no worse than the better of potpourri3d's", str(len(rows)), *better))
+    return "\n".join(table(["removed", "cases", *names], lines))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = option_parser(__doc__)
+    parser.add_argument("meshes", nargs="+", type=Path)
+    parser.add_argument("--cases", type=int, default=40, help="number of cases (default 40)")
+    parser.add_argument("--no-times", action="store_true", help="errors only")
+    add_seed(parser)
+    add_json(parser)
+    arguments = parser.parse_args(argv)
+    rng = np.random.default_rng(arguments.seed)
+    meshes = {path.stem: heat_igl.read_mesh(path) for path in arguments.meshes}
+    solvers = {
+        name: {
+            "heat": SignedHeatSolver(mesh),
+            "unfold": SignedHeatSolver(mesh, refine="unfold"),
+            "potpourri3d": Peer(mesh),
+        }
+        for name, mesh in meshes.items()
+    }
+    rows: list[dict[str, Any]] = []
+    for case in range(arguments.cases):
+        name, share = list(meshes)[case % len(meshes)], SHARES[case // len(meshes) % len(SHARES)]
+        rows.append({"mesh": name, "removed": share} | measure_case(meshes[name], solvers[name], share, rng))
+        print(rows[-1], file=sys.stderr, flush=True)
+    text = summary(rows)
+    times = {} if arguments.no_times else {name: measure_times(mesh, 5) for name, mesh in meshes.items()}
+    if times:
+        head = ["mesh", *next(iter(times.values()))]
+        cells = [(name, *(f"{value:.3g}" for value in row.values())) for name, row in times.items()]
+        text += "\n\n" + "\n".join(table(head, cells))
+    publish({"environment": environment(), "rows": rows, "times": times}, text, json_file=arguments.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,109 @@
+"""Distance as a function of PyTorch and JAX; skipped where they are not installed."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from heat_igl import HeatMethodSolver, Mesh, MissingExtraError, shapes
+
+
+def sphere() -> Mesh:
+    mesh = shapes.icosphere(2)
+    return Mesh(mesh.V + 0.02 * np.random.default_rng(0).standard_normal(mesh.V.shape), mesh.F)
+
+
+def test_the_package_imports_neither() -> None:
+    code = "import sys, heat_igl, heat_igl.applications; print([name in sys.modules for name in ('torch', 'jax')])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[False, False]"
+
+
+@pytest.mark.parametrize("name", ["torch", "jax"])
+def test_what_to_install_is_said(name: str) -> None:
+    if importlib.util.find_spec(name) is not None:
+        assert importlib.import_module(f"heat_igl.{name}").geodesic_distance
+        return
+    with pytest.raises(MissingExtraError, match=rf"heat_igl\.{name} needs {name}: pip install {name}"):
+        importlib.import_module(f"heat_igl.{name}")
+
+
+class TestTorch:
+    @pytest.mark.parametrize("refine", ["exact", "unfold", None])
+    def test_gradients_are_those_of_differences(self, refine: str | None) -> None:
+        torch = pytest.importorskip("torch")
+        from heat_igl.torch import geodesic_distance
+
+        mesh = sphere()
+        V = torch.tensor(mesh.V, requires_grad=True)
+        assert torch.autograd.gradcheck(
+            lambda V: geodesic_distance(V, mesh.F, [0, 70], refine=refine), (V,), eps=1e-6, atol=1e-5, rtol=1e-4
+        )
+
+    def test_types_and_solver(self) -> None:
+        torch = pytest.importorskip("torch")
+        from heat_igl.torch import geodesic_distance
+
+        mesh = sphere()
+        solver = HeatMethodSolver(mesh, refine="exact")
+        expected, pull_back = solver.distance_vjp(3)
+        V = torch.tensor(mesh.V, dtype=torch.float32, requires_grad=True)
+        distance = geodesic_distance(V, torch.tensor(mesh.F), torch.tensor([3]), solver=solver)
+        assert distance.dtype == torch.float32
+        distance.sum().backward()
+        assert V.grad is not None
+        np.testing.assert_allclose(distance.detach().numpy(), expected, rtol=1e-5)
+        np.testing.assert_allclose(V.grad.numpy(), pull_back(np.ones(len(expected))), atol=1e-4)
+
+    def test_what_cannot_be_used(self) -> None:
+        torch = pytest.importorskip("torch")
+        from heat_igl.torch import geodesic_distance
+
+        mesh = sphere()
+        V = torch.tensor(mesh.V, requires_grad=True)
+        with pytest.raises(
+            TypeError, match=r"V must hold floating-point numbers to be differentiated, not torch\.int64"
+        ):
+            geodesic_distance(V.detach().long(), mesh.F, 0)
+        with pytest.raises(TypeError, match="V must be a tensor, not ndarray"):
+            geodesic_distance(mesh.V, mesh.F, 0)
+        with pytest.raises(ValueError, match=r"V is on the device meta, and distance is found on the processor"):
+            geodesic_distance(V.to("meta"), mesh.F, 0)
+        with pytest.raises(ValueError, match=r"V must have shape \(n, 3\)"):
+            geodesic_distance(V[:, :2], mesh.F, 0)
+        with pytest.raises(ValueError, match="t_coef cannot be changed"):
+            geodesic_distance(V, mesh.F, 0, solver=HeatMethodSolver(mesh), t_coef=1.0)
+        squares = (geodesic_distance(V, mesh.F, 0) ** 2).sum()
+        (gradient,) = torch.autograd.grad(squares, V, create_graph=True)
+        with pytest.raises(RuntimeError, match="differentiate twice a function that was marked"):
+            gradient.sum().backward()
+
+
+class TestJax:
+    def test_gradients_under_jit(self) -> None:
+        jax = pytest.importorskip("jax")
+        from heat_igl.jax import geodesic_distance
+
+        mesh = sphere()
+        expected, pull_back = HeatMethodSolver(mesh, refine="exact").distance_vjp(3)
+
+        def loss(V: object) -> object:
+            return (geodesic_distance(V, mesh.F, 3, refine="exact") ** 2).sum()
+
+        value, gradient = jax.jit(jax.value_and_grad(loss))(mesh.V)
+        assert float(value) == pytest.approx((expected**2).sum(), rel=1e-4)
+        np.testing.assert_allclose(np.asarray(gradient), pull_back(2 * expected), atol=1e-3)
+
+    def test_what_cannot_be_used(self) -> None:
+        pytest.importorskip("jax")
+        from heat_igl.jax import geodesic_distance
+
+        mesh = sphere()
+        with pytest.raises(TypeError, match="V must hold floating-point numbers to be differentiated, not int"):
+            geodesic_distance(mesh.V.astype(int), mesh.F, 0)
+        with pytest.raises(ValueError, match=r"V must have shape \(n, 3\)"):
+            geodesic_distance(mesh.V[0], mesh.F, 0)

@@ -1,0 +1,340 @@
+"""Derivatives of distance: against central differences, identities and closed forms; one-sided cases; bad input."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import perturbed
+
+import heat_igl
+from heat_igl import HeatMethodSolver, Mesh, MeshError, OffsetSources, SurfacePoints, shapes
+
+BY_PATHS = [{"refine": "exact"}, {"refine": "unfold"}]
+HEAT = [
+    {"magnitude": "unit", "laplacian": "cotan"},
+    {"magnitude": "unit", "laplacian": "intrinsic-delaunay"},
+    {"laplacian": "intrinsic-delaunay"},
+    {"laplacian": "intrinsic-delaunay", "t_coef": 1.0},
+]
+
+
+def moebius_strip(around: int = 40, across: int = 5) -> Mesh:
+    """A strip that cannot be oriented."""
+    angle = np.repeat(np.linspace(0, 2 * np.pi, around, endpoint=False), across)
+    off = np.tile(np.linspace(-0.4, 0.4, across), around)
+    radius = 1 + off / 2 * np.cos(angle / 2)
+    V = np.stack([radius * np.cos(angle), radius * np.sin(angle), off / 2 * np.sin(angle / 2)], axis=1)
+    F = []
+    for i in range(around):
+        for j in range(across - 1):
+            a, b, c, d = i * across + j, i * across + j + 1, (i + 1) * across + j, (i + 1) * across + j + 1
+            if i == around - 1:
+                c, d = across - 1 - j, across - 2 - j
+            F += [[a, c, b], [b, c, d]]
+    return Mesh(V, F)
+
+
+def moved(mesh: Mesh, amount: float = 0.15) -> Mesh:
+    """All vertices moved at random, the outer ones too: no two paths are equally long, and no edges are cocircular."""
+    h = mesh.edge_lengths.mean()
+    return Mesh(mesh.V + amount * h * np.random.default_rng(7).uniform(-1, 1, mesh.V.shape), mesh.F)
+
+
+MESHES = {
+    "sphere": lambda: moved(shapes.icosphere(3)),
+    "grid": lambda: moved(shapes.grid(16)),
+    "torus": lambda: moved(shapes.torus(40, 20)),
+    "moebius": lambda: moved(moebius_strip()),
+    "book": lambda: moved(shapes.book(3, 8), 0.1),
+    "fine sphere": lambda: moved(shapes.icosphere(4), 0.05),
+}
+
+
+def differences(
+    solver: HeatMethodSolver, V: np.ndarray, sources: Any, direction: np.ndarray, step: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Central differences (n,) of the distance, and where they cross no kink: a second difference would show it."""
+    ahead, behind = (solver.with_vertices(V + sign * step * direction).distance(sources) for sign in (1, -1))
+    here = solver.distance(sources)
+    with np.errstate(invalid="ignore"):
+        smooth = np.abs(ahead - 2 * here + behind) <= 1e-4 * step + 1e-12 * here
+        return np.where(np.isfinite(here), (ahead - behind) / (2 * step), 0.0), smooth
+
+
+@pytest.mark.parametrize("options", BY_PATHS, ids=str)
+@pytest.mark.parametrize("name", MESHES)
+def test_paths_against_central_differences(name: str, options: dict[str, Any]) -> None:
+    mesh, rng = MESHES[name](), np.random.default_rng(1)
+    solver, sources = HeatMethodSolver(mesh, **options), [5, mesh.n_vertices // 2]
+    distance, pull_back = solver.distance_vjp(sources)
+    np.testing.assert_array_equal(distance, solver.distance(sources))
+    assert len(pull_back.inexact) <= 0.01 * mesh.n_vertices
+    g = rng.standard_normal(mesh.n_vertices)
+    g[pull_back.inexact] = 0
+    for _ in range(20 if mesh.n_vertices < 700 else 4):
+        direction = rng.standard_normal(mesh.V.shape)
+        step = 1e-7 * mesh.edge_lengths.mean()
+        expected, smooth = differences(solver, mesh.V, sources, direction, step)
+        assert smooth.mean() > 0.97
+        counted = np.where(smooth, g, 0.0)
+        rate = (counted * expected).sum()
+        assert (pull_back(counted) * direction).sum() == pytest.approx(
+            rate, rel=1e-5, abs=1e-7 * np.abs(expected).sum()
+        )
+        np.testing.assert_allclose(
+            (pull_back.push_forward(direction) * counted).sum(), (pull_back(counted) * direction).sum(), rtol=1e-9
+        )
+
+
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+@pytest.mark.parametrize("options", HEAT, ids=str)
+@pytest.mark.parametrize("name", ["sphere", "grid", "moebius", "book"])
+def test_heat_against_central_differences(name: str, options: dict[str, Any]) -> None:
+    mesh, rng = MESHES[name](), np.random.default_rng(2)
+    solver, sources = HeatMethodSolver(mesh, **options), 150
+    distance, pull_back = solver.distance_vjp(sources)
+    np.testing.assert_array_equal(distance, solver.distance(sources))
+    g = rng.standard_normal(mesh.n_vertices)
+    g[pull_back.inexact] = 0
+    for _ in range(5):
+        direction = rng.standard_normal(mesh.V.shape)
+        expected, _ = differences(solver, mesh.V, sources, direction, 1e-6 * mesh.edge_lengths.mean())
+        rate = (g * expected).sum()
+        assert (pull_back(g) * direction).sum() == pytest.approx(rate, rel=1e-4, abs=1e-6 * np.abs(expected).sum())
+
+
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+@pytest.mark.parametrize("sources", [[5, 100, 200], list(range(30))], ids=["three", "a region"])
+@pytest.mark.parametrize("options", HEAT[::2], ids=str)
+def test_heat_from_several_sources(sources: list[int], options: dict[str, Any]) -> None:
+    mesh, rng = MESHES["grid"](), np.random.default_rng(3)
+    solver = HeatMethodSolver(mesh, **options)
+    _, pull_back = solver.distance_vjp(sources)
+    g = rng.standard_normal(mesh.n_vertices)
+    g[pull_back.inexact] = 0  # raised to straight lines
+    direction = rng.standard_normal(mesh.V.shape)
+    expected, _ = differences(solver, mesh.V, sources, direction, 1e-6 * mesh.edge_lengths.mean())
+    assert (pull_back(g) * direction).sum() == pytest.approx((g * expected).sum(), rel=1e-4)
+
+
+@pytest.mark.parametrize("options", BY_PATHS + HEAT, ids=str)
+@pytest.mark.parametrize("name", ["sphere", "grid", "moebius"])
+def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name: str, options: dict[str, Any]) -> None:
+    mesh, rng = MESHES[name](), np.random.default_rng(4)
+    distance, pull_back = HeatMethodSolver(mesh, **options).distance_vjp(5)
+    g = rng.standard_normal(mesh.n_vertices)
+    g[pull_back.inexact] = 0
+    dV = pull_back(g)
+    scale = np.abs(g * distance).sum()
+    np.testing.assert_allclose(dV.sum(axis=0), 0, atol=1e-10 * np.abs(dV).sum())
+    np.testing.assert_allclose(np.cross(mesh.V, dV).sum(axis=0), 0, atol=1e-10 * np.abs(dV).sum())
+    assert (dV * mesh.V).sum() == pytest.approx((g * distance).sum(), abs=1e-10 * scale)
+
+
+def test_with_a_given_time_step_scaling_takes_its_derivative_too() -> None:
+    mesh = MESHES["sphere"]()
+    t = 0.7 * mesh.edge_lengths.mean() ** 2
+    distance, pull_back = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay", t=t).distance_vjp(5)
+    g = np.random.default_rng(5).standard_normal(mesh.n_vertices)
+    by_t = pull_back.by_time_step(g)
+    assert (pull_back(g) * mesh.V).sum() + 2 * t * by_t == pytest.approx((g * distance).sum(), rel=1e-10)
+    ahead, behind = (
+        HeatMethodSolver(mesh, laplacian="intrinsic-delaunay", t=t * (1 + e)).distance(5) for e in (1e-6, -1e-6)
+    )
+    assert by_t == pytest.approx((g * (ahead - behind)).sum() / (2e-6 * t), rel=1e-5)
+
+
+@pytest.mark.parametrize("options", BY_PATHS, ids=str)
+def test_on_a_flat_convex_mesh_the_ends_move_along_the_line(options: dict[str, Any]) -> None:
+    flat = perturbed(shapes.grid(20))
+    mesh = Mesh(flat.V * [1, 1, 0], flat.F)
+    distance, pull_back = HeatMethodSolver(mesh, **options).distance_vjp(110)
+    others = [3, 50, 217, 399]
+    assert HeatMethodSolver(mesh).diagnostics.n_flips > 0
+    rows = pull_back(np.eye(mesh.n_vertices)[others])
+    for vertex, dV in zip(others, rows, strict=True):
+        unit = (mesh.V[vertex] - mesh.V[110]) / distance[vertex]
+        expected = np.zeros_like(dV)
+        expected[vertex], expected[110] = unit, -unit
+        np.testing.assert_allclose(dV, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("options", BY_PATHS, ids=str)
+def test_a_bend_moves_with_its_vertex(options: dict[str, Any]) -> None:
+    square = shapes.grid(12)
+    centre = square.V[square.F].mean(axis=1)
+    mesh = Mesh(square.V, square.F[~((centre[:, 0] > 0.5) & (centre[:, 1] > 0.5))])
+    start, end, bend = (
+        int(np.argmin(np.linalg.norm(mesh.V - place, axis=1))) for place in ([1, 0.25, 0], [0.25, 1, 0], [0.5, 0.5, 0])
+    )
+    solver = HeatMethodSolver(mesh, **options)
+    _, pull_back = solver.distance_vjp(start)
+    dV = pull_back(np.eye(mesh.n_vertices)[end])
+    to_bend, from_bend = mesh.V[bend] - mesh.V[start], mesh.V[end] - mesh.V[bend]
+    to_bend, from_bend = to_bend / np.linalg.norm(to_bend), from_bend / np.linalg.norm(from_bend)
+    np.testing.assert_allclose(dV[bend], to_bend - from_bend, atol=1e-9)
+    np.testing.assert_allclose(dV[start], -to_bend, atol=1e-9)
+
+
+@pytest.mark.parametrize("options", BY_PATHS + HEAT[2:3], ids=str)
+def test_by_edge_lengths_without_positions(options: dict[str, Any]) -> None:
+    mesh, rng = MESHES["sphere"](), np.random.default_rng(6)
+    corners = mesh.V[mesh.F]
+    lengths = np.stack([np.linalg.norm(corners[:, (c + 1) % 3] - corners[:, (c + 2) % 3], axis=1) for c in range(3)], 1)
+    solver = HeatMethodSolver.from_edge_lengths(mesh.F, lengths, **options)
+    distance, pull_back = solver.distance_vjp(9)
+    g = rng.standard_normal(len(distance))
+    g[pull_back.inexact] = 0
+    by_lengths = pull_back.by_lengths(g)
+    edge = np.sort(np.stack([mesh.F[:, [1, 2, 0]], mesh.F[:, [2, 0, 1]]], axis=-1), axis=-1)
+    rate = rng.standard_normal(mesh.n_vertices)[edge].prod(axis=-1) * lengths  # the same on both sides of an edge
+    ahead, behind = (
+        HeatMethodSolver.from_edge_lengths(mesh.F, lengths + e * rate, **options).distance(9) for e in (1e-7, -1e-7)
+    )
+    assert (by_lengths * rate).sum() == pytest.approx((g * (ahead - behind)).sum() / 2e-7, rel=1e-4)
+    with pytest.raises(MeshError, match="no vertices to move: use by_lengths"):
+        pull_back(g)
+
+
+@pytest.mark.parametrize("options", BY_PATHS, ids=str)
+def test_points_in_faces_as_sources(options: dict[str, Any]) -> None:
+    mesh, rng = moved(shapes.torus(50, 25), 0.3), np.random.default_rng(8)
+    faces, barycentric = rng.integers(mesh.n_faces, size=4), rng.dirichlet([2, 2, 2], 4)
+    solver = HeatMethodSolver(mesh, **options)
+    triangulation = solver.operators.surface.unfolding
+    carried = triangulation.locate(faces, barycentric)[1]
+    assert (carried != barycentric).any(), "no point lies beside a flipped edge"
+
+    def at(coordinates: np.ndarray) -> SurfacePoints:
+        return SurfacePoints(faces, coordinates)
+
+    _, pull_back = solver.distance_vjp(at(barycentric))
+    g = rng.standard_normal(mesh.n_vertices)
+    g[pull_back.inexact] = 0
+    direction, step = rng.standard_normal(mesh.V.shape), 1e-6 * mesh.edge_lengths.mean()
+    expected, smooth = differences(solver, mesh.V, at(barycentric), direction, step)
+    g = np.where(smooth, g, 0.0)
+    assert (pull_back(g) * direction).sum() == pytest.approx((g * expected).sum(), rel=1e-5)
+
+    change = rng.standard_normal((4, 3))
+    change -= change.mean(axis=1, keepdims=True)
+    ahead, behind = (solver.distance(at(barycentric + e * change)) for e in (1e-6, -1e-6))
+    motion = np.einsum("pc,pcx->px", change, mesh.V[mesh.F[faces]])
+    rate = (g * (ahead - behind)).sum() / 2e-6
+    assert (pull_back.by_points(g) * motion).sum() == pytest.approx(rate, rel=1e-5)
+
+
+def test_one_distance_changes_at_rate_1_with_its_source_point() -> None:
+    mesh = MESHES["sphere"]()
+    _, pull_back = HeatMethodSolver(mesh, refine="exact").distance_vjp(SurfacePoints([17], [[0.2, 0.3, 0.5]]))
+    for vertex in (0, 100, 300):
+        (by_point,) = pull_back.by_points(np.eye(mesh.n_vertices)[vertex])
+        assert np.linalg.norm(by_point) == pytest.approx(1, rel=1e-9)
+
+
+def test_sources_that_start_later() -> None:
+    mesh, rng = MESHES["grid"](), np.random.default_rng(9)
+    solver, sources = HeatMethodSolver(mesh, refine="exact"), OffsetSources([3, 200], [0.1, 0.3])
+    _, pull_back = solver.distance_vjp(sources)
+    assert not len(pull_back.inexact)
+    direction, g = rng.standard_normal(mesh.V.shape), rng.standard_normal(mesh.n_vertices)
+    expected, smooth = differences(solver, mesh.V, sources, direction, 1e-7)
+    g = np.where(smooth, g, 0.0)
+    assert (pull_back(g) * direction).sum() == pytest.approx((g * expected).sum(), rel=1e-5)
+
+
+@pytest.mark.parametrize("options", BY_PATHS + HEAT[2:3], ids=str)
+def test_unreachable_vertices_have_no_derivative(options: dict[str, Any]) -> None:
+    one = MESHES["grid"]()
+    n = one.n_vertices
+    mesh = Mesh(np.concatenate([one.V, one.V + 3.0]), np.concatenate([one.F, one.F + n]))
+    distance, pull_back = HeatMethodSolver(mesh, **options).distance_vjp(5)
+    np.testing.assert_array_equal(pull_back.unreachable, np.arange(n, 2 * n))
+    g = np.where(np.isinf(distance), np.nan, 1.0)
+    dV = pull_back(g)
+    assert not dV[n:].any()
+    np.testing.assert_array_equal(dV[:n], HeatMethodSolver(mesh, **options).distance_vjp(5)[1](np.ones(2 * n))[:n])
+    assert np.abs(dV[:n]).max() > 0.1
+
+
+def test_a_step_down_the_gradient_recovers_a_source() -> None:
+    """Gauss-Newton on the squares of what distances to landmarks miss, with the products of both directions."""
+    mesh = MESHES["sphere"]()
+    solver = HeatMethodSolver(mesh, refine="exact")
+    landmarks, hidden = [10, 200, 350, 600], SurfacePoints([1234], [[0.1, 0.6, 0.3]])
+    measured = solver.distance(hidden)[landmarks]
+    guess = SurfacePoints([1200], [[0.3, 0.3, 0.4]])
+    for _ in range(12):
+        distance, pull_back = solver.distance_vjp(guess)
+        rows = np.stack([pull_back.by_points(np.eye(mesh.n_vertices)[v])[0] for v in landmarks])
+        step = np.linalg.lstsq(rows, measured - distance[landmarks], rcond=1e-9)[0]
+        guess = heat_igl.closest_points(mesh, guess.positions(mesh) + step).points
+    place = [points.positions(mesh)[0] for points in (guess, hidden)]
+    assert np.linalg.norm(place[0] - place[1]) < 1e-3 * solver.distance(0).max()
+
+
+BAD_GRADIENTS = [
+    (np.ones(5), r"g must have shape \(289,\) or \(k, 289\), one entry per vertex, but it has shape \(5,\)"),
+    (np.ones((2, 3, 289)), "one entry per vertex"),
+    (np.where(np.arange(289) == 7, np.nan, 1.0), "finite at reachable vertices, but is nan at vertex 7"),
+]
+
+
+@pytest.mark.parametrize(("g", "message"), BAD_GRADIENTS, ids=["length", "dimensions", "nan"])
+def test_gradients_that_cannot_be_used(g: np.ndarray, message: str) -> None:
+    mesh = MESHES["grid"]()
+    _, pull_back = HeatMethodSolver(mesh, refine="unfold").distance_vjp(0)
+    with pytest.raises(ValueError, match=message):
+        pull_back(g)
+    assert pull_back(np.ones((2, mesh.n_vertices))).shape == (2, mesh.n_vertices, 3)
+
+
+def test_velocities_that_cannot_be_used() -> None:
+    mesh = MESHES["grid"]()
+    _, pull_back = HeatMethodSolver(mesh, refine="unfold").distance_vjp(0)
+    with pytest.raises(ValueError, match=r"dV must be \(289, 3\) finite numbers"):
+        pull_back.push_forward(np.ones(3))
+    _, of_heat = HeatMethodSolver(mesh, laplacian="cotan").distance_vjp(0)
+    with pytest.raises(ValueError, match="directional derivatives are there for distances by paths"):
+        of_heat.push_forward(mesh.V)
+
+
+def refused() -> list[Any]:
+    curve = heat_igl.SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]])
+    point = SurfacePoints([3], [[0.2, 0.3, 0.5]])
+    return [
+        pytest.param({"refine": "exact"}, curve, "a curve is among them", id="curve"),
+        pytest.param({"refine": "sweep"}, 0, "finds no paths to differentiate", id="sweep"),
+        pytest.param({"laplacian": "cotan"}, point, "points are among the sources", id="point"),
+        pytest.param({"laplacian": "cotan"}, OffsetSources([0, 9], [0, 0.1]), "some have offsets", id="offsets"),
+        pytest.param({"laplacian": "cotan", "boundary": "average"}, 0, "not 'average'", id="boundary"),
+        pytest.param({"laplacian": "cotan", "backend": "iterative"}, 0, "cannot solve the adjoint", id="backend"),
+        pytest.param({"laplacian": "intrinsic-delaunay-refined"}, 0, "more vertices than the mesh", id="refined"),
+    ]
+
+
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+@pytest.mark.parametrize(("options", "sources", "message"), refused())
+def test_what_has_no_derivative_is_refused(options: dict[str, Any], sources: Any, message: str) -> None:
+    mesh = moved(shapes.grid(40)) if options.get("refine") == "sweep" else MESHES["grid"]()
+    with pytest.raises(ValueError, match=message):
+        HeatMethodSolver(mesh, **options).distance_vjp(sources)
+
+
+def test_sources_at_a_shared_edge_are_refused() -> None:
+    solver = HeatMethodSolver(MESHES["book"](), laplacian="intrinsic-delaunay")
+    with pytest.raises(ValueError, match="next to an edge of more than two faces"):
+        solver.distance_vjp(5)
+    assert solver.distance_vjp(150)[1](np.ones(solver.n_vertices)).any()
+
+
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+def test_tetrahedra_and_clouds_are_refused() -> None:
+    cloud = heat_igl.PointCloud(MESHES["sphere"]().V)
+    with pytest.raises(ValueError, match="derivatives need a surface of triangles"):
+        HeatMethodSolver(cloud).distance_vjp(0)
+    tetrahedron = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    with pytest.raises(ValueError, match="derivatives need a surface of triangles"):
+        HeatMethodSolver(tetrahedron).distance_vjp(0)

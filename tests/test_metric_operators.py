@@ -1,0 +1,244 @@
+"""An anisotropic metric per face: linear maps of the plane, first fundamental forms, refraction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import perturbed
+
+import heat_igl
+from heat_igl import fibre_metric, metric_operators, shapes
+from heat_igl.mesh import Mesh
+from heat_igl.operators import Operators, operators
+from heat_igl.typing import FloatArray, IntArray
+from heat_igl.validation import relative_error
+
+
+def flat(mesh: Mesh, seed: int = 0) -> Mesh:
+    """Perturbed within the plane."""
+    V = perturbed(mesh, 0.25, seed).V.copy()
+    V[:, 2] = 0
+    return Mesh(V, mesh.F)
+
+
+def distance(domain: Operators, source: int = 0, **options: Any) -> FloatArray:
+    return heat_igl.HeatMethodSolver.from_operators(domain, **options).distance(source)
+
+
+def error(found: FloatArray, exact: FloatArray) -> float:
+    return float(np.nanmean(relative_error(found, exact)))
+
+
+def stretch(ratio: float, degrees: float = 30.0) -> FloatArray:
+    """A linear map of the plane with singular values `ratio` and 1."""
+    angle = np.radians(degrees)
+    turn = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    return np.asarray(np.diag([ratio, 1.0, 1.0]) @ turn)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 4.0, 100.0])
+def test_one_tensor_is_a_linear_map(ratio):
+    """Operators, heat and unfolding are those of the mesh that the map makes."""
+    mesh, A = flat(shapes.grid(24)), stretch(ratio)
+    mapped = Mesh(mesh.V @ A.T, mesh.F)
+    domain = metric_operators(mesh, np.tile(A.T @ A, (mesh.n_faces, 1, 1)))
+    expected = operators(mapped, "auto")
+    assert domain.n == expected.n
+    assert domain.M.sum() == pytest.approx(expected.M.sum(), rel=1e-9)
+    assert domain.mean_edge_length == pytest.approx(expected.mean_edge_length, rel=1e-3)
+    exact = np.linalg.norm(mapped.V - mapped.V[300], axis=1)
+    for refine in ("sweep", "unfold", "exact"):
+        assert error(distance(domain, 300, refine=refine), exact) < 1e-4
+    assert error(distance(domain, 300), exact) < 0.015
+    assert error(distance(domain, 300), exact) < 1.1 * error(heat_igl.HeatMethodSolver(mapped).distance(300), exact)
+
+
+def test_metrics_in_the_plane_of_each_face_and_in_space():
+    mesh = perturbed(shapes.torus(9, 20))
+    x = mesh.V[mesh.F[:, 1]] - mesh.V[mesh.F[:, 0]]
+    y = mesh.V[mesh.F[:, 2]] - mesh.V[mesh.F[:, 0]]
+    normal = np.cross(x, y)
+    axes = np.stack([x, np.cross(normal, x)], axis=1)
+    axes /= np.linalg.norm(axes, axis=2, keepdims=True)
+    rng = np.random.default_rng(0)
+    base = rng.normal(size=(3, 3))
+    in_space = (base.T @ base + 0.1 * np.eye(3)) * rng.choice([1, 4, 100], mesh.n_faces)[:, None, None]
+    in_plane = axes @ in_space @ np.swapaxes(axes, 1, 2)
+    one, other = (metric_operators(mesh, metric, "cotan") for metric in (in_space, in_plane))
+    assert abs(one.L - other.L).max() < 1e-9 * abs(one.L).max()
+    assert abs(one.D @ one.G - one.L).max() < 1e-9 * abs(one.L).max()
+    area = np.sqrt(np.linalg.det(in_plane)) * mesh.measures
+    np.testing.assert_allclose(one.weights, area, rtol=1e-9)
+    # |dx|^2 in the metric is the trace of its inverse on the coordinates' differentials.
+    gradient = (one.G @ mesh.V).reshape(2, mesh.n_faces, 3)
+    trace = np.trace(np.linalg.inv(in_plane), axis1=1, axis2=2)
+    np.testing.assert_allclose((gradient**2).sum(axis=(0, 2)), trace, rtol=1e-9)
+
+
+def test_a_plane_with_the_metric_of_a_helicoid():
+    """(u, v) -> (u cos v, u sin v, c v) has the metric du^2 + (u^2 + c^2) dv^2."""
+    c, errors = 0.7, []
+    for n in (20, 40):
+        plane = flat(shapes.grid(n))
+        u, v = plane.V[:, 0] * 2 - 1, plane.V[:, 1] * 3
+        helicoid = Mesh(np.stack([u * np.cos(v), u * np.sin(v), c * v], axis=1), plane.F)
+        plane = Mesh(np.stack([u, v, 0 * u], axis=1), plane.F)
+        middle = u[plane.F].mean(axis=1)
+        metric = np.zeros((plane.n_faces, 3, 3))
+        metric[:, 0, 0], metric[:, 1, 1], metric[:, 2, 2] = 1, middle**2 + c**2, 1
+        domain = metric_operators(plane, metric)
+        assert domain.surface is not None
+        source = int(np.argmin(np.hypot(u - 0.6, v - 0.5)))
+        exact = heat_igl.geodesic_distance(helicoid, source)
+        errors.append([error(distance(domain, source, refine=refine), exact) for refine in ("unfold", None)])
+    assert errors[1][0] < 0.5 * errors[0][0]
+    assert errors[1][0] < 0.002
+    assert errors[1][1] < 0.02
+
+
+def test_fibres_around_a_cylinder():
+    """Helical fibres: the unrolled cylinder is stretched across them."""
+    V, F = cylinder(48, 24)
+    surface = Mesh(np.stack([np.cos(V[:, 0]), np.sin(V[:, 0]), V[:, 1]], axis=1), F)
+    rise = 0.4
+    angle = np.arctan2(*surface.V[F].mean(axis=1)[:, [1, 0]].T)
+    fibres = np.stack([-np.sin(angle), np.cos(angle), np.full(len(F), rise)], axis=1)
+    domain = metric_operators(surface, fibre_metric(fibres, along=1.0, across=3.0))
+    # The closed form on the faces as they are: flat strips of the polygonal cylinder, laid side by side.
+    width = 2 * np.sin(np.pi / 48)
+    step = np.stack([np.round(V[:, 0] / (2 * np.pi / 48)) * width, V[:, 1]], axis=1)
+    direction = np.array([1.0, rise]) / np.hypot(1, rise)
+    normal = np.array([-direction[1], direction[0]])
+    around = np.array([48 * width, 0.0])
+    source = 48 * 12 + 10
+    ways = [step - step[source] + turn * around for turn in (-2, -1, 0, 1, 2)]
+    exact = np.min([np.hypot(way @ direction, 3 * (way @ normal)) for way in ways], axis=0)
+    for refine, bound in (("exact", 0.006), ("unfold", 0.006), (None, 0.04)):
+        assert error(distance(domain, source, refine=refine), exact) < bound, refine
+
+
+def cylinder(around: int, rows: int) -> tuple[FloatArray, IntArray]:
+    """Angles and heights (n, 2), and triangles of a cylinder of radius 1."""
+    i, j = np.meshgrid(np.arange(around), np.arange(rows + 1))
+    V = np.stack([i.ravel() * 2 * np.pi / around, j.ravel() * 2 * np.pi / around], axis=1)
+    a = (j[:-1] * around + i[:-1]).ravel()
+    b = (j[:-1] * around + (i[:-1] + 1) % around).ravel()
+    quads = np.stack([a, b, b + around, a + around], axis=1)
+    return V, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def test_a_piecewise_constant_metric_that_fits_together():
+    """Half of a square is stretched across the border, along which both halves agree: a rectangle."""
+    mesh = shapes.grid(24)
+    moved = flat(mesh).V
+    mesh = Mesh(np.where(mesh.V[:, :1] == 0.5, mesh.V, moved), mesh.F)
+    V = mesh.V.copy()
+    V[:, 0] += 2 * np.maximum(V[:, 0] - 0.5, 0)
+    is_right = mesh.V[mesh.F][:, :, 0].mean(axis=1) > 0.5
+    domain = metric_operators(mesh, np.where(is_right[:, None, None], np.diag([9.0, 1, 1]), np.eye(3)))
+    assert domain.surface is not None
+    exact = np.linalg.norm(V - V[100], axis=1)
+    for refine in ("sweep", "unfold", "exact"):
+        assert error(distance(domain, 100, refine=refine), exact) < 1e-6
+    assert error(distance(domain, 100), exact) < 0.015
+
+
+def test_layers_by_snells_law():
+    """Three layers: the time is the least over where the straight pieces cross the two borders."""
+    speeds, borders = np.array([1.0, 2.5, 0.5]), (1 / 3, 2 / 3)
+    mesh = shapes.grid(48)
+    moved = flat(mesh).V
+    on_border = np.abs(mesh.V[:, :1] - np.array(borders)).min(axis=1) < 1e-9
+    mesh = Mesh(np.where(on_border[:, None], mesh.V, moved), mesh.F)
+    layer = np.searchsorted(borders, mesh.V[mesh.F][:, :, 0].mean(axis=1))
+    metric = np.eye(3) / speeds[layer][:, None, None] ** 2
+    source = int(np.argmin(np.linalg.norm(mesh.V - [0, 0.5, 0], axis=1)))
+    found = distance(metric_operators(mesh, metric), source)
+    x, y = mesh.V[:, 0], mesh.V[:, 1] - mesh.V[source, 1]
+    # Rays by their ray parameter p = sin / speed: horizontal advance and time over the three layers, on the far side.
+    p = np.linspace(0, 1 / speeds.max(), 200001)[:-1]
+    thickness = np.diff([0, *borders, 1])
+    slope = [h * p * s / np.sqrt(1 - (p * s) ** 2) for h, s in zip(thickness, speeds, strict=True)]
+    times = [h / (s * np.sqrt(1 - (p * s) ** 2)) for h, s in zip(thickness, speeds, strict=True)]
+    far = np.isclose(x, 1) & (np.abs(y) < 0.45)
+    exact = np.interp(np.abs(y[far]), sum(slope), sum(times))
+    assert np.abs(found[far] / exact - 1).max() < 0.005
+
+
+def test_a_metric_on_tetrahedra_is_a_linear_map():
+    mesh, A = shapes.box(6), stretch(10.0)
+    A[2, 0] = 0.5
+    domain = metric_operators(mesh, np.tile(A.T @ A, (mesh.n_faces, 1, 1)))
+    exact = np.linalg.norm((mesh.V - mesh.V[40]) @ A.T, axis=1)
+    np.testing.assert_allclose(distance(domain, 40), exact, rtol=2e-5, atol=1e-12)
+    expected = operators(Mesh(mesh.V @ A.T, mesh.F))
+    for one, other in ((domain.L, expected.L), (domain.M, expected.M)):
+        assert abs(one - other).max() < 1e-9 * abs(other).max()
+
+
+def test_points_are_sources_in_a_metric():
+    mesh, A = flat(shapes.grid(12)), stretch(5.0)
+    domain = metric_operators(mesh, np.tile(A.T @ A, (mesh.n_faces, 1, 1)))
+    inside = heat_igl.SurfacePoints([100], [[0.2, 0.3, 0.5]])
+    place = inside.barycentric[0] @ mesh.V[mesh.F[100]]
+    exact = np.linalg.norm((mesh.V - place) @ A.T, axis=1)
+    solver = heat_igl.HeatMethodSolver.from_operators(domain, refine="exact")
+    np.testing.assert_allclose(solver.distance(inside), exact, rtol=1e-9)
+
+
+def test_a_ratio_of_lengths_is_drawn_along_fibres():
+    metric = fibre_metric([[2, 0, 0], [0, 0, -1]], [1.0, 2.0], 10.0)
+    np.testing.assert_allclose(metric, [np.diag([1, 100, 100]), np.diag([100, 100, 4])])
+
+
+GOOD = np.tile(np.eye(3), (18, 1, 1))
+
+
+def changed(face: int, value: Any) -> FloatArray:
+    metric = GOOD.copy()
+    metric[face] = value
+    return metric
+
+
+@pytest.mark.parametrize(
+    ("metric", "message"),
+    [
+        (GOOD[:17], r"metric must have shape \(18, 3, 3\) or \(18, 2, 2\), one per face, not \(17, 3, 3\)"),
+        (
+            changed(4, np.diag([1, -1, 1])),
+            r"metric\[4\] = .* must be positive definite on its face \(1 of 18 are not\)",
+        ),
+        (changed(5, np.diag([1, 0, 1])), r"metric\[5\] = .* must be positive definite"),
+        (changed(3, [[1, 1, 0], [0, 1, 0], [0, 0, 1]]), r"metric\[3\] = .* must be symmetric"),
+        (changed(2, np.nan), r"metric\[2\] = .* must be finite"),
+        ("round", "metric must be real numbers"),
+    ],
+)
+def test_wrong_metrics_are_refused(metric, message):
+    with pytest.raises(ValueError, match=message):
+        metric_operators(shapes.grid(3), metric)
+    # What is orthogonal to a flat mesh plays no part.
+    assert metric_operators(shapes.grid(3), changed(4, np.diag([1, 1, -1]))).n_given == 16
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (([[1, 0, 0], [0, 0, 0]], 1, 2), r"directions\[1\] = \[0.0, 0.0, 0.0\] is no direction"),
+        (([1, 0, 0], 1, 2), r"directions must have shape \(m, 3\)"),
+        (([[1, 0, 0]], 0, 2), r"along\[0\] = 0.0 must be positive and finite"),
+        (([[1, 0, 0]], 1, [1, 2]), r"across must be a number or have shape \(1,\), not \(2,\)"),
+    ],
+)
+def test_wrong_fibres_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        fibre_metric(*arguments)
+    assert fibre_metric([[1, 0, 0]], 1, 2).shape == (1, 3, 3)
+
+
+def test_faces_without_area_have_no_metric():
+    mesh = Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 1, 3], [0, 1, 2]])
+    with pytest.raises(heat_igl.MeshError, match=r"F\[1\] = \[0, 1, 2\] has no area, and so no metric"):
+        metric_operators(mesh, GOOD[:2])

@@ -1,0 +1,58 @@
+"""What a release says of itself agrees: versions, supported Pythons, extras, and the files that workflows name."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import heat_igl
+
+yaml = pytest.importorskip("yaml")
+tomllib = pytest.importorskip("tomllib", reason="new in Python 3.11")
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf8"))["project"]
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+
+
+def loaded(path: str | Path) -> dict[Any, Any]:
+    return yaml.safe_load((ROOT / path).read_text(encoding="utf8"))
+
+
+def test_versions_agree() -> None:
+    assert loaded("CITATION.cff")["version"] == heat_igl.__version__
+    assert loaded("packaging/conda/recipe.yaml")["context"]["version"] == heat_igl.__version__
+
+
+def test_every_supported_python_is_tested() -> None:
+    tested = loaded(".github/workflows/tests.yml")["jobs"]["tests"]["strategy"]["matrix"]["python"]
+    classified = [text.rpartition(" ")[2] for text in PROJECT["classifiers"] if re.search(r":: 3\.\d+$", text)]
+    assert tested == classified
+    assert PROJECT["requires-python"] == f">={tested[0]}"
+
+
+def test_all_brings_every_extra() -> None:
+    extras = PROJECT["optional-dependencies"]
+    (everything,) = extras["all"]
+    assert set(re.search(r"\[(.*)\]", everything)[1].split(",")) == extras.keys() - {"all"}
+
+
+def test_the_recipe_needs_what_the_package_needs() -> None:
+    needed = {re.split(r"[>=]", text)[0] for text in PROJECT["dependencies"]}
+    run = {
+        text.split()[0].removeprefix("python-") for text in loaded("packaging/conda/recipe.yaml")["requirements"]["run"]
+    }
+    assert run == needed | {"python"}
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_workflows_may_do_no_more_than_they_need(path: Path) -> None:
+    workflow = loaded(path)
+    assert workflow["permissions"] == {"contents": "read"}
+    granted = [job["permissions"] for job in workflow["jobs"].values() if "permissions" in job]
+    assert granted == ([{"id-token": "write"}] if path.name == "publish.yml" else [])
+    for name in re.findall(r"(?:scripts|tests)/\w+\.py", path.read_text(encoding="utf8")):
+        assert (ROOT / name).is_file(), name

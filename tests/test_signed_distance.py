@@ -1,0 +1,288 @@
+"""Signed distance: sizes against closed forms, signs against the pieces of the cut mesh, broken curves, errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import flat_perturbed
+from test_unfolding import moebius_strip
+
+from heat_igl import (
+    Mesh,
+    MeshError,
+    OrientedPoints,
+    SignedHeatSolver,
+    SourceError,
+    SurfaceCurve,
+    closest_points,
+    curve_on,
+    cut,
+    edge_curve,
+    isolines,
+    region_boundary,
+    shapes,
+    unfolded_distance,
+)
+
+
+def ring(mesh: Mesh, radius: float = 0.3, start: float = 0.0, end: float = 2 * np.pi) -> SurfaceCurve:
+    """A circle on a unit square, or an arc of it, counter-clockwise seen from +z."""
+    closed = end - start > 2 * np.pi - 1e-9
+    angle = np.linspace(start, end, int(2000 * (end - start) / (2 * np.pi)), endpoint=not closed)
+    positions = np.stack([0.5 + radius * np.cos(angle), 0.5 + radius * np.sin(angle), 0 * angle], axis=1)
+    return curve_on(mesh, positions, closed=closed)
+
+
+def reversed_curve(curve: SurfaceCurve) -> SurfaceCurve:
+    return SurfaceCurve(curve.faces[::-1], curve.end[::-1], curve.start[::-1], curve.is_closed)
+
+
+def plane(n: int) -> tuple[Mesh, SurfaceCurve, np.ndarray]:
+    mesh = flat_perturbed(shapes.grid(n), 0.2)
+    return mesh, ring(mesh), np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1) - 0.3
+
+
+def sphere(n: int) -> tuple[Mesh, SurfaceCurve, np.ndarray]:
+    # Around the pole, counter-clockwise seen from outside: the pole is inside.
+    mesh = shapes.icosphere({20: 3, 40: 4, 80: 5}[n])
+    angle = np.linspace(0, 2 * np.pi, 2000, endpoint=False)
+    circle = 0.6 * np.stack([np.cos(angle), np.sin(angle), np.full(len(angle), 4 / 3)], axis=1)
+    latitude = np.arctan2(np.linalg.norm(mesh.V[:, :2], axis=1), mesh.V[:, 2])
+    return mesh, curve_on(mesh, circle, closed=True), latitude - np.arctan2(3, 4)
+
+
+def cylinder(n: int) -> tuple[Mesh, SurfaceCurve, np.ndarray]:
+    mesh = shapes.cylinder(2 * n, n, 2.0)
+    level = mesh.V[:, 2].min() + 0.77
+    # Lower values are on the left.
+    return mesh, isolines(mesh, mesh.V[:, 2], level)[0][0], mesh.V[:, 2] - level
+
+
+def mean_error(distance: np.ndarray, truth: np.ndarray) -> float:
+    """As a share of the mean distance."""
+    return float(np.abs(distance - truth).mean() / np.abs(truth).mean())
+
+
+@pytest.mark.parametrize("surface", [plane, sphere, cylinder])
+def test_circles_converge_and_are_near_exact_when_refined(surface):
+    errors = []
+    for n in (20, 40, 80):
+        mesh, circle, truth = surface(n)
+        # The time step in proportion to h: in proportion to h^2, the directions of a grid stay in the normals.
+        errors.append(mean_error(SignedHeatSolver(mesh, t_coef=n / 80).distance(circle), truth))
+    # First order; on the cylinder the field is exact at once.
+    assert errors[2] < 0.002
+    assert errors[2] < 0.6 * errors[1] < 0.36 * errors[0] or errors[0] < 1e-9
+    refined = SignedHeatSolver(mesh, refine="unfold").distance(circle)
+    assert mean_error(refined, truth) < 2e-4
+    far = np.abs(truth) > 1e-3
+    np.testing.assert_array_equal(refined[far] < 0, truth[far] < 0)
+
+
+def drawn(kind: str, mesh: Mesh, values: np.ndarray, seed: int) -> list[SurfaceCurve]:
+    """Curves around a region of low values, with the region on their left."""
+    level = float(np.quantile(values, 0.3 + 0.1 * (seed % 5)))
+    if kind == "across faces":
+        return isolines(mesh, values, level)[0]
+    if kind == "through vertices":
+        return isolines(mesh, values, values[np.argsort(values)[len(values) // 2 + seed]])[0]
+    if kind == "along edges":
+        return region_boundary(mesh, faces=values[mesh.F].mean(axis=1) < level)
+    return region_boundary(mesh, vertices=values < level)
+
+
+@pytest.mark.parametrize("kind", ["across faces", "through vertices", "along edges", "through midpoints"])
+@pytest.mark.parametrize("name", ["sphere", "torus", "square"])
+def test_signs_are_those_of_the_pieces(name, kind):
+    mesh = {
+        "sphere": lambda: shapes.icosphere(3),
+        "torus": lambda: shapes.torus(40, 20),
+        "square": lambda: plane(24)[0],
+    }[name]()
+    solvers = [SignedHeatSolver(mesh), SignedHeatSolver(mesh, refine="unfold")]
+    rng = np.random.default_rng(7)
+    for seed in range(4):
+        waves = rng.normal(size=(3, 5)) * 2.5
+        values = np.sin(mesh.V @ waves + rng.uniform(0, 6, 5)).sum(axis=1)
+        curves = drawn(kind, mesh, values, seed)
+        pieces = cut(mesh, curves)
+        left, right = (set(side.tolist()) for side in pieces.pieces[pieces.sides].T)
+        assert not left & right
+        is_left = np.zeros(pieces.mesh.n_vertices, bool)
+        is_left[pieces.mesh.F[np.isin(pieces.pieces, sorted(left))]] = True
+        far = unfolded_distance(mesh, curves) > mesh.edge_lengths.mean() / 2
+        for solver in solvers:
+            distance = solver.distance(curves)
+            np.testing.assert_array_equal(distance[far] < 0, is_left[: mesh.n_vertices][far])
+
+
+def test_reversed_curves_change_the_sign_alone():
+    mesh, circle, _ = plane(20)
+    for refine in (None, "unfold"):
+        solver = SignedHeatSolver(mesh, refine=refine)
+        forward, backward = solver.distance(circle), solver.distance(reversed_curve(circle))
+        np.testing.assert_allclose(backward, -forward, atol=1e-12)
+
+
+def test_size_turn_and_order_of_the_faces_do_not_matter():
+    mesh, circle, _ = sphere(20)
+    turn, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
+    moved = Mesh(1e3 * mesh.V @ (turn * np.sign(np.linalg.det(turn))) + 5, mesh.F)
+    here, there = (SignedHeatSolver(m).distance(circle) for m in (mesh, moved))
+    np.testing.assert_allclose(there, 1e3 * here, atol=1e-6)
+    order = np.random.default_rng(1).permutation(mesh.n_faces)
+    place = np.argsort(order)
+    shuffled = SurfaceCurve(place[circle.faces], np.roll(circle.start, 1, 1), np.roll(circle.end, 1, 1))
+    other = SignedHeatSolver(Mesh(mesh.V, np.roll(mesh.F, 1, axis=1)[order])).distance(shuffled)
+    np.testing.assert_allclose(other, here, atol=1e-9)
+
+
+def test_masks_are_the_boundaries_of_their_regions():
+    mesh, _, truth = plane(20)
+    solver = SignedHeatSolver(mesh)
+    inside = truth < 0
+    of_vertices = solver.distance(inside)
+    np.testing.assert_array_equal(of_vertices < 0, inside)
+    np.testing.assert_array_equal(of_vertices, solver.distance(region_boundary(mesh, vertices=inside)))
+    faces = inside[mesh.F].all(axis=1)
+    np.testing.assert_array_equal(solver.distance(faces), solver.distance(region_boundary(mesh, faces=faces)))
+
+
+@pytest.mark.parametrize("removed", [0.1, 0.3, 0.5])
+def test_broken_circles(removed):
+    mesh, _, truth = plane(40)
+    n_arcs = 5
+    width = 2 * np.pi / n_arcs
+    arcs = [ring(mesh, start=i * width, end=(i + 1 - removed) * width) for i in range(n_arcs)]
+    far = np.abs(truth) > 0.05
+    for refine, bound in ((None, 0.06), ("unfold", 0.04)):
+        distance = SignedHeatSolver(mesh, refine=refine).distance(arcs)
+        assert mean_error(distance, truth) < bound
+        np.testing.assert_array_equal(distance[far] < 0, truth[far] < 0)
+
+
+def test_points_with_normals():
+    mesh, _, truth = plane(40)
+    angle = np.random.default_rng(3).uniform(0, 2 * np.pi, 60)
+    normals = np.stack([np.cos(angle), np.sin(angle), 0.5 + 0 * angle], axis=1)
+    places = closest_points(mesh, [0.5, 0.5, 0] + 0.3 * normals * [1, 1, 0]).points
+    samples = OrientedPoints(places, normals)
+    far = np.abs(truth) > 0.05
+    for refine in (None, "unfold"):
+        distance = SignedHeatSolver(mesh, refine=refine).distance(samples)
+        assert mean_error(distance, truth) < 0.06
+        np.testing.assert_array_equal(distance[far] < 0, truth[far] < 0)
+    mixed = SignedHeatSolver(mesh).distance([samples, ring(mesh)])
+    assert mean_error(mixed, truth) < 0.03
+
+
+def test_unsigned_sources_among_the_curves():
+    mesh, circle, truth = plane(30)
+    points = [int(np.argmin(np.linalg.norm(mesh.V - p, axis=1))) for p in ([0.5, 0.5, 0], [0.05, 0.05, 0])]
+    solver = SignedHeatSolver(mesh, refine="unfold")
+    distance = solver.distance(circle, unsigned=points)
+    nearest = np.minimum(np.abs(solver.distance(circle)), unfolded_distance(mesh, points))
+    np.testing.assert_allclose(np.abs(distance), nearest, atol=1e-12)
+    np.testing.assert_array_equal(distance[points], 0)
+    far = nearest > 1e-3
+    np.testing.assert_array_equal(distance[far] < 0, truth[far] < 0)
+
+
+def test_levels():
+    mesh, _, _ = plane(40)
+    solver = SignedHeatSolver(mesh)
+    rings = [ring(mesh, 0.2), ring(mesh, 0.4)]
+    from_centre = np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1)
+    means = {}
+    for level in ("zero", "constant", "none"):
+        phi = solver.distance(rings, level=level)
+        means[level] = [
+            np.average(np.einsum("sc,sc->s", c.start, phi[mesh.F[c.faces]]), weights=c.lengths(mesh)) for c in rings
+        ]
+    # Both rings are level lines of the same field, 0.2 apart.
+    assert np.diff(means["constant"])[0] == pytest.approx(0.2, rel=0.03)
+    np.testing.assert_allclose(means["zero"], 0, atol=0.01)
+    np.testing.assert_allclose(np.dot(means["none"], [0.2, 0.4]), 0, atol=1e-3)
+    phi = solver.distance(rings, level="constant")
+    np.testing.assert_allclose(phi - phi.mean(), from_centre - from_centre.mean(), atol=0.03)
+
+
+def test_components_without_a_curve_are_not_reached():
+    one, circle, _ = plane(12)
+    n = one.n_vertices
+    both = Mesh(np.vstack([one.V, one.V + np.array([5, 0, 0]), [[9, 9, 9]]]), np.vstack([one.F, one.F + n]))
+    for refine in (None, "unfold"):
+        alone = SignedHeatSolver(one, refine=refine).distance(circle)
+        distance = SignedHeatSolver(both, refine=refine).distance(circle, unsigned=0 if refine else None)
+        if refine is None:
+            np.testing.assert_allclose(distance[:n], alone, atol=1e-9)
+        np.testing.assert_array_equal(distance[n:], np.inf)
+    # A small component keeps the time step of its own.
+    small = Mesh(np.vstack([one.V, 1e-3 * one.V + [5, 0, 0]]), np.vstack([one.F, one.F + n]))
+    moved = SurfaceCurve(circle.faces + one.n_faces, circle.start, circle.end, is_closed=True)
+    found = SignedHeatSolver(small).distance([circle, moved])
+    np.testing.assert_allclose(found[n:], 1e-3 * found[:n], atol=1e-9)
+
+
+def test_long_strips_stay_in_range():
+    mesh = shapes.strip(2000, 3)
+    across = isolines(mesh, mesh.V[:, 0], 10.5)[0]
+    distance = SignedHeatSolver(mesh).distance(across)
+    np.testing.assert_allclose(distance, mesh.V[:, 0] - 10.5, atol=0.02)
+
+
+def test_surfaces_without_sides():
+    strip = moebius_strip(30, 4)
+    with pytest.raises(MeshError, match="the surface cannot be oriented, as a Moebius strip cannot"):
+        SignedHeatSolver(strip)
+    grid = shapes.grid(4)
+    turned = grid.F.copy()
+    turned[5] = turned[5, ::-1]
+    with pytest.raises(MeshError, match=r"face \d+ and a neighbour are oriented differently.*bfs_orient"):
+        SignedHeatSolver((grid.V, turned))
+    with pytest.raises(MeshError, match="more than two faces meet at an edge"):
+        SignedHeatSolver(shapes.book(3, 4))
+    tetrahedron = Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 1, 2, 3]])
+    with pytest.raises(MeshError, match="the mesh is tetrahedral"):
+        SignedHeatSolver(tetrahedron)
+    SignedHeatSolver(grid)
+
+
+def test_bad_curves():
+    mesh, circle, _ = plane(12)
+    solver = SignedHeatSolver(mesh)
+    point = closest_points(mesh, [[0.5, 0.5, 0]]).points
+    for curves, match in (
+        ([], "curves is empty"),
+        (7, "curves must be a SurfaceCurve, OrientedPoints, a mask"),
+        ([circle, 7], r"curves\[1\] must be a SurfaceCurve"),
+        (np.ones(5, bool), r"curves is a mask of shape \(5,\); it must have 169 entries"),
+        (np.ones(169, bool), "curves: the region has no boundary inside the mesh"),
+        (SurfaceCurve([3], [[0.2, 0.3, 0.5]], [[0.2, 0.3, 0.5]]), "curves has no length"),
+        (SurfaceCurve([288], [[1, 0, 0]], [[0, 1, 0]]), r"curves: faces\[0\] = 288 is no face"),
+        ([circle, reversed_curve(circle)], "the normals of the curves cancel"),
+        (OrientedPoints(point, [[0, 0, 1]]), r"normals\[0\] is that of the face"),
+    ):
+        with pytest.raises(SourceError, match=match):
+            solver.distance(curves)
+    with pytest.raises(ValueError, match="level must be 'zero', 'constant' or 'none', not 'all'"):
+        solver.distance(circle, level="all")
+    with pytest.raises(SourceError, match=r"normals must have shape \(1, 3\), not \(1, 2\)"):
+        OrientedPoints(point, [[1, 0]])
+    with pytest.raises(SourceError, match=r"normals\[0\] = .* must be finite and not 0"):
+        OrientedPoints(point, [[0, 0, 0]])
+    with pytest.raises(SourceError, match="points must be SurfacePoints"):
+        OrientedPoints([[0, 0, 0]], [[1, 0, 0]])
+    with pytest.raises(SourceError, match="give one mask of the region"):
+        region_boundary(mesh)
+    with pytest.raises(SourceError, match=r"faces must be a mask of bool of shape \(288,\)"):
+        region_boundary(mesh, faces=[1, 2])
+    assert np.isfinite(solver.distance(circle)).all()
+
+
+def test_an_open_path_along_edges_has_two_sides():
+    mesh = shapes.grid(8)
+    distance = SignedHeatSolver(mesh, refine="unfold").distance(edge_curve(mesh, np.arange(36, 45)))
+    # Along y = 0.5 or x = 0.5, whichever way the grid counts: half of the square is on each side.
+    assert (distance < 0).sum() == (distance > 0).sum() == 36
+    assert np.abs(distance).max() == pytest.approx(0.5)

@@ -1,0 +1,136 @@
+"""Distance through tetrahedra: straight lines in convex bodies, ways around an edge, fronts of many sources."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay, cKDTree
+
+import heat_igl
+from heat_igl import HeatMethodSolver, OffsetSources, shapes
+from heat_igl.mesh import Mesh
+from heat_igl.typing import FloatArray
+
+
+def scattered(n: int, body: str, seed: int = 0) -> Mesh:
+    """Delaunay tetrahedra of random points, slivers and all."""
+    rng = np.random.default_rng(seed)
+    V = rng.random((n, 3))
+    if body == "ball":
+        V = V - 0.5
+        V = V[np.linalg.norm(V, axis=1) < 0.5]
+    F = Delaunay(V).simplices
+    volumes = np.abs(np.linalg.det(V[F[:, 1:]] - V[F[:, :1]]))
+    return Mesh(V, F[volumes > 1e-12])
+
+
+def l_shape(n: int, jitter: float) -> Mesh:
+    """A cube without the quarter x, y > 1/2."""
+    cube = shapes.box(n)
+    centre = cube.V[cube.F].mean(axis=1)
+    F = cube.F[~((centre[:, 0] > 0.5) & (centre[:, 1] > 0.5))]
+    used, F = np.unique(F, return_inverse=True)
+    mesh = Mesh(cube.V[used], F.reshape(-1, 4))
+    V = mesh.V.copy()
+    inner = ~mesh.boundary
+    V[inner] += np.random.default_rng(0).uniform(-jitter / n, jitter / n, (int(inner.sum()), 3))
+    return Mesh(V, mesh.F)
+
+
+def around_the_edge(V: FloatArray, source: int) -> FloatArray:
+    """The edge x = y = 1/2 of `l_shape` is where ways bend: the part beyond is turned about it."""
+    x, y, z = (V - [0.5, 0.5, V[source, 2]]).T
+    # From the wall y > 1/2, over the inside of the body, to the other wall.
+    angle = np.mod(np.arctan2(y, x) - np.pi / 2, 2 * np.pi)
+    apart = np.abs(angle - angle[source])
+    bent = np.hypot(np.hypot(x, y) + np.hypot(x[source], y[source]), z)
+    return np.where(apart > np.pi, bent, np.linalg.norm(V - V[source], axis=1))
+
+
+@pytest.mark.parametrize("body", ["cube", "ball"])
+def test_straight_lines_in_convex_bodies(body):
+    mesh = scattered(2500, body)
+    solver = HeatMethodSolver(mesh)
+    for source in (0, 700):
+        exact = np.linalg.norm(mesh.V - mesh.V[source], axis=1)
+        np.testing.assert_allclose(solver.distance(source), exact, rtol=2e-5, atol=1e-12)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.25])
+def test_ways_around_an_edge(jitter):
+    errors = []
+    for n in (6, 12, 24):
+        mesh = l_shape(n, jitter)
+        source = int(np.argmin(np.linalg.norm(mesh.V - [1, 0, 0], axis=1)))
+        exact = around_the_edge(mesh.V, source)
+        found = HeatMethodSolver(mesh).distance(source)
+        assert (found >= exact * (1 - 1e-9)).all()
+        errors.append(np.abs(found - exact).mean() / exact.mean())
+    assert errors[2] < 0.8 * errors[1] < 0.64 * errors[0]
+    assert errors[2] < 0.0025
+
+
+@pytest.mark.parametrize("k", [2, 30, 400])
+def test_nearest_of_many_sources(k):
+    mesh = scattered(2500, "cube", 1)
+    sources = np.random.default_rng(2).choice(mesh.n_vertices, k, replace=False)
+    exact, nearest = cKDTree(mesh.V[sources]).query(mesh.V)
+    found = HeatMethodSolver(mesh).voronoi(sources)
+    assert (found.distance >= exact - 1e-12).all()
+    assert np.abs(found.distance - exact).mean() < 0.002 * exact.mean()
+    assert (found.labels == nearest).mean() > 0.99
+    rows = HeatMethodSolver(mesh).distances([sources, [5]])
+    np.testing.assert_array_equal(rows[0], found.distance)
+
+
+def test_offsets_and_components():
+    cube = shapes.box(4)
+    two = Mesh(
+        np.concatenate([cube.V, cube.V + np.array([5, 0, 0])]), np.concatenate([cube.F, cube.F + cube.n_vertices])
+    )
+    corner, opposite = 0, cube.n_vertices - 1
+    each = np.linalg.norm(cube.V[:, None] - cube.V[[corner, opposite]], axis=2) + np.array([0, 0.5])
+    found = HeatMethodSolver(two).voronoi(OffsetSources([corner, opposite], [0, 0.5]))
+    np.testing.assert_allclose(found.distance[: cube.n_vertices], each.min(axis=1), atol=1e-9)
+    assert np.isinf(found.distance[cube.n_vertices :]).all()
+    assert (found.labels[cube.n_vertices :] == -1).all()
+
+
+def test_the_method_of_the_paper_on_request():
+    """A magnitude, a time step, a boundary condition and the cotangent Laplacian ask for heat."""
+    box = shapes.box(5)
+    solver = HeatMethodSolver(box)
+    assert solver.diagnostics.factor_nonzeros == 0
+    for options in ({"magnitude": "unit"}, {"t_coef": 1.0}, {"boundary": "average"}, {"laplacian": "cotan"}):
+        by_heat = HeatMethodSolver(box, **options)
+        assert by_heat.diagnostics.factor_nonzeros > 0
+        assert np.abs(by_heat.distance(0) - solver.distance(0)).max() > 0.01
+    np.testing.assert_array_equal(HeatMethodSolver(box, refine="sweep").distance(0), solver.distance(0))
+    # Heat is there for who looks at the steps.
+    np.testing.assert_allclose(solver.solve(0).heat, HeatMethodSolver(box, magnitude="unit").solve(0).heat, rtol=1e-9)
+    again = pickle.loads(pickle.dumps(solver))
+    np.testing.assert_array_equal(again.distance(7), solver.distance(7))
+    for refine in ("unfold", "exact"):
+        with pytest.raises(ValueError, match="unfolds triangles by their edge lengths, and this domain has none"):
+            HeatMethodSolver(box, refine=refine)
+
+
+def test_depth_below_a_surface():
+    """All boundary vertices as sources; in the middle the depth is that below the nearest of them."""
+    mesh = scattered(4000, "cube", 3)
+    sources = np.flatnonzero(mesh.boundary)
+    exact = cKDTree(mesh.V[sources]).query(mesh.V)[0]
+    found = HeatMethodSolver(mesh).distance(mesh.boundary)
+    inner = exact > 0
+    assert (found >= exact - 1e-12).all()
+    assert np.mean(found[inner] / exact[inner] - 1) < 0.01
+
+
+def test_units_and_places_play_no_part():
+    mesh = scattered(600, "ball", 4)
+    distance = HeatMethodSolver(mesh).distance(3)
+    for unit in (1e-12, 1e12):
+        moved = Mesh(unit * (mesh.V + 7), mesh.F)
+        np.testing.assert_allclose(heat_igl.geodesic_distance(moved, 3, method="sweep") / unit, distance, rtol=1e-4)
