@@ -127,6 +127,18 @@ def offsets() -> Picture:
     return plot(mesh, phi, sources=[1234, 9000], style="plain", curves=found)
 
 
+def scribble() -> Picture:
+    """Signed distance from a loop with four gaps."""
+    mesh = shapes.torus(160, 80)
+    angle = np.linspace(0, 2 * np.pi, 200)
+    x = np.cos(angle) * (0.55 + 0.15 * np.cos(3 * angle))
+    loop = np.stack([0.9 + 0.55 * x, np.sin(angle) * 0.6, np.full(200, 0.39)], axis=1)
+    places = heat_igl.closest_points(mesh, loop).points.positions(mesh)
+    arcs = [heat_igl.curve_on(mesh, places[i : i + 36]) for i in (0, 50, 100, 150)]
+    phi = heat_igl.SignedHeatSolver(mesh, refine="unfold").distance(arcs)
+    return plot_field(mesh, phi, label="signed distance", limits=(-1, 1), spacing=0.1, curves=arcs, view=(10, 60))
+
+
 def tetrahedra() -> Picture:
     """Distance through a solid, by the heat method on tetrahedra."""
     mesh = shapes.box(12, (2.0, 1.0, 1.0))
@@ -212,8 +224,8 @@ def unfolded() -> Picture:
 
 
 ENTRIES = (
-    torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, heat, error, unfolded, cut_locus, book,
-    tetrahedra, polygons, cloud, maze, travel_time, directions, straightest, extended, asked,
+    torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, scribble, heat, error, unfolded, cut_locus,
+    book, tetrahedra, polygons, cloud, maze, travel_time, directions, straightest, extended, asked,
 )  # fmt: skip
 
 
@@ -229,7 +241,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             result.save(out / f"{name}.png")
             shown = f"![{title}]({name}.png)"
             # The sections below bring the pictures into this folder of the site.
-            thumbnails.append(f'<a href="#{name}"><img src="_images/{name}.png" alt="{title}">{_short(title)}</a>')
+            link, picture = name.replace("_", "-"), f'<img src="_images/{name}.png" alt="{title}">'
+            thumbnails.append(f'<a href="#{link}">{picture}{_short(title)}</a>')
         else:
             result.save(out / "pages" / f"{name}.html")
             shown = f'<iframe src="{name}.html" style="width: 100%; height: 520px; border: 0"></iframe>'

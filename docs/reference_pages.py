@@ -15,12 +15,12 @@ GROUPS = {
         write_curves""",
     "Sources": "SurfacePoints SurfaceCurve OffsetSources curve_on edge_curve",
     "Curves": """isolines offset_curves enclosed_areas sublevel_areas shortest_paths geodesic_path straighten
-        trace_geodesic cut""",
+        GeodesicPathSolver handle_loops geodesic_bezier trace_geodesic cut""",
     "Directions and tangent vectors": """tangent_frames TangentFrames log_map exp_map VectorHeatSolver
         connection_laplacian""",
     "Which side": "SignedHeatSolver",
     "Sampling": """farthest_points farthest_cells voronoi_cells VoronoiCells dual_triangulation geodesic_centre
-        karcher_mean diameter sampling""",
+        karcher_mean centroidal_voronoi CentroidalSites diameter sampling""",
     "Operators of a domain": "Operators polygon_operators point_cloud_operators speed_operators metric_operators",
     "Validation": "validate ValidationReport ValidationRow reference closed_forms metrics shapes baselines",
     "Pictures": "plots",

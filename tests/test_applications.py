@@ -9,8 +9,8 @@ from conftest import shared_path
 import heat_igl
 from heat_igl import shapes
 from heat_igl.applications import EdgePath, EdgeSearch, particle_length, reconstruct, skeleton, zones_of_influence
-from heat_igl.baselines import graph_distance
 from heat_igl.mesh import Mesh
+from heat_igl.reference.baselines import graph_distance
 
 # A* along edges.
 

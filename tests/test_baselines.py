@@ -14,8 +14,8 @@ from scipy.spatial.distance import cdist
 from scipy.special import ive, logsumexp
 
 from heat_igl import AccuracyWarning, Mesh, MeshError, MissingExtraError, SourceError, baselines, shapes
-from heat_igl.baselines.schrodinger import _inverse_log_bessel
 from heat_igl.operators import intrinsic_operators, operators
+from heat_igl.reference.baselines.schrodinger import _inverse_log_bessel
 
 MESH_METHODS = {
     "varadhan": baselines.varadhan,
@@ -288,7 +288,7 @@ def test_tiny_cells_do_not_stop_the_heat_kernel(monkeypatch):
     """An edge of 1e-5 h asks for a million products. Steps do it instead, and one vertex more changes little."""
     disk = shapes.disk(12)
     clean = baselines.varadhan(disk, 0, form="heat-kernel", t=0.05)
-    monkeypatch.setattr("heat_igl.baselines.linear._poisson_mean", None)
+    monkeypatch.setattr("heat_igl.reference.baselines.linear._poisson_mean", None)
     split = baselines.varadhan(with_a_short_edge(disk, 100, 1e-5), 0, form="heat-kernel", t=0.05)
     np.testing.assert_allclose(split[: disk.n_vertices], clean, rtol=0, atol=1e-4)
 
@@ -296,7 +296,7 @@ def test_tiny_cells_do_not_stop_the_heat_kernel(monkeypatch):
 def test_extrapolated_steps_agree_with_the_sum(monkeypatch):
     domain = intrinsic_operators(shapes.flat_torus(40))
     exact = baselines.varadhan(domain, 0, form="heat-kernel")
-    monkeypatch.setattr("heat_igl.baselines.linear._MOST_PRODUCTS", 0)
+    monkeypatch.setattr("heat_igl.reference.baselines.linear._MOST_PRODUCTS", 0)
     np.testing.assert_allclose(baselines.varadhan(domain, 0, form="heat-kernel"), exact, rtol=1e-3)
     one = baselines.log_heat_kernel(domain, 0, 0.01)
     np.testing.assert_allclose(one, log_torus_kernel(40, 0.01), rtol=0, atol=2e-3 * np.ptp(one))

@@ -105,6 +105,24 @@ def test_refined_distance_is_that_of_the_library(sphere: Path) -> None:
     assert_one_line(refused.stderr, "--refine", "'best' is not one of sweep, unfold")
 
 
+def test_paths_and_traces_are_those_of_the_library(
+    sphere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(sphere.parent)
+    mesh = shapes.icosphere(2)
+    place = heat_igl.closest_points(mesh, [0.3, 2, 0.1]).points
+    expected = {
+        ("path", "12", "0.3,2,0.1", "40"): heat_igl.geodesic_path(mesh, [12, place, 40]),
+        ("path", "--from=12", "--to=40"): heat_igl.shortest_paths(mesh, None, 12, 40)[0],
+        ("trace", "--from=12", "--direction=1,2,3", "--length=0.7"): heat_igl.trace_geodesic(mesh, 12, [1, 2, 3], 0.7),
+    }
+    for (name, *arguments), curve in expected.items():
+        assert cli.run([name, str(sphere), *arguments, "--output=curve.obj"]) == 0
+        assert f"{curve.lengths(mesh).sum():.6g}" in capsys.readouterr().out
+        written = [line.split()[1:] for line in Path("curve.obj").read_text().splitlines() if line.startswith("v ")]
+        np.testing.assert_allclose(np.array(written, float), curve.positions(mesh), atol=1e-6)
+
+
 def test_a_file_that_is_no_mesh(tmp_path: Path) -> None:
     (tmp_path / "notes.off").write_text("buy milk\n")
     done = command("distance", "notes.off", "--source", 0, "--output", "out.ply", cwd=tmp_path)
@@ -133,6 +151,21 @@ def test_an_output_directory_that_does_not_exist(sphere: Path) -> None:
     [
         (["path", "--from=0", "--to=162", "--output=p.obj"], 1, ("--to 162 is no vertex", "162, counted from 0")),
         (["path", "--from=-1", "--to=0", "--output=p.obj"], 1, ("--from -1 is no vertex",)),
+        (["path", "--output=p.obj"], 1, ("name two waypoints or more",)),
+        (["path", "3", "--output=p.obj"], 1, ("2 places or more for a path, not 1",)),
+        (["path", "3", "south", "--output=p.obj"], 1, ("'south' is no place",)),
+        (["path", "3", "1,2", "--output=p.obj"], 1, ("position 1,2: three numbers",)),
+        (["path", "3", "4", "5", "--closed", "--output=p.obj"], 1, ("contracts to a point",)),
+        (
+            ["trace", "--from=0", "--direction=0,0,0", "--length=1", "--output=p.obj"],
+            1,
+            ("direction", "needs a length"),
+        ),
+        (
+            ["trace", "--from=0", "--direction=1,0", "--length=1", "--output=p.obj"],
+            1,
+            ("--direction 1,0: three numbers",),
+        ),
         (["isolines", "--source=0", "--spacing=9", "--output=l.obj"], 1, ("--spacing 9 makes no line",)),
         (["validate", "--methods=heat", "--fail-above=nan"], 2, ("--fail-above", "nan is not a positive number")),
     ],

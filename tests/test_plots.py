@@ -422,6 +422,18 @@ def test_labels_have_one_colour_each_and_neighbours_others() -> None:
     assert counts[np.argsort(counts)][-len(set(numbers)) :].sum() > 0.95 * len(inside)
 
 
+def test_between_two_labels_is_no_third() -> None:
+    """A square of two triangles; each corner of a triangle has a third of it."""
+    mesh = shapes.grid(1)
+    diagonal = [v for v in range(4) if (v == mesh.F).sum() == 2]
+    labels = np.zeros(4, int)
+    labels[[diagonal[1], np.setdiff1d(mesh.F[1], diagonal)[0]]] = [2, 1]
+    image = surface_image(plot_labels(mesh, labels))
+    inside = image[image[..., 3] == 1][:, :3].round(3)
+    counts = np.sort(np.unique(inside, axis=0, return_counts=True)[1])[-3:]
+    assert np.allclose(counts / len(inside), [1 / 6, 1 / 3, 1 / 2], atol=0.03)
+
+
 def test_vertices_without_a_label_are_grey() -> None:
     mesh = shapes.grid(4)
     image = surface_image(plot_labels(mesh, np.full(25, -1) + (mesh.V[:, 0] > mesh.V[:, 0].mean())))

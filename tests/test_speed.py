@@ -183,6 +183,20 @@ def test_speed_that_grows_exponentially():
         assert np.nanmean(relative_error(time, exact)) < 0.003, refine
 
 
+def test_faces_without_area_at_a_jump():
+    """A vertex on the straight side of a triangle, in a square of two speeds."""
+    square = [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [0.5, 0]]
+    mesh = Mesh(square, [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [0, 6, 1]])
+    speed = [1.0, 1.0, 10.0, 10.0, 1.0]
+    assert np.isfinite(solver(mesh, speed, t_coef=1.0).distance(0)).all()
+    # To (1, 1) along the border at x = 1, on its fast side.
+    steep = 0.1 / np.sqrt(0.99)
+    border = np.hypot(1, steep) + (1 - steep) / 10
+    np.testing.assert_allclose(
+        solver(mesh, speed).distance(0)[[0, 1, 2, 3, 4, 6]], [0, 1, 1.1, 1, border, 0.5], rtol=0.01
+    )
+
+
 def test_checkerboard_of_speeds():
     """Shortest paths in a graph with 20 points on every edge, at most 0.1 % above the fastest ways."""
     mesh = flat(shapes.grid(12))

@@ -49,6 +49,7 @@ def test_packed_files_have_the_same_bytes_each_time(tmp_path: Path, mesh: Mesh) 
     for name in ("a.PLY.GZ", "b.ply.gz"):
         heat_igl.write_mesh(tmp_path / name, mesh, distance=mesh.V[:, 0])
     assert (tmp_path / "a.PLY.GZ").read_bytes() == (tmp_path / "b.ply.gz").read_bytes()
+    assert (tmp_path / "a.PLY.GZ").read_bytes()[4:8] == bytes(4)  # the time of packing, in seconds
     assert np.array_equal(heat_igl.read_attributes(tmp_path / "a.PLY.GZ")["distance"], mesh.V[:, 0])
 
 

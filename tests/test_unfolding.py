@@ -11,9 +11,9 @@ from conftest import perturbed, wheel_path
 
 import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, Refinement, shapes, unfolded_distance
-from heat_igl.baselines import graph_distance
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
+from heat_igl.reference.baselines import graph_distance
 
 METHODS = ("sweep", "unfold")
 

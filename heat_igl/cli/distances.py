@@ -1,4 +1,4 @@
-"""Commands that measure: a distance, isolines, a shortest path."""
+"""Commands that measure: a distance, isolines."""
 
 from __future__ import annotations
 
@@ -173,29 +173,6 @@ def isolines(
     print_rows([*rows, ("distances", f"{spacing:g} apart", levels.tolist()), ("wrote", str(output))], json_file)
 
 
-def path(
-    mesh: MeshArgument,
-    start: Annotated[int, typer.Option("--from", help="Vertex where the path begins, counted from 0.")],
-    end: Annotated[int, typer.Option("--to", help="Vertex where it ends.")],
-    output: Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the path.")],
-    json_file: JsonOption = None,
-) -> None:
-    """A locally shortest path between two vertices."""
-    loaded = read_mesh(mesh)
-    for option, vertex in (("--from", start), ("--to", end)):
-        if not 0 <= vertex < loaded.n_vertices:
-            raise SourceError(f"{option} {vertex} is no vertex: the mesh has {loaded.n_vertices}, counted from 0")
-    check_curves(output)
-    check_json(json_file)
-    found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), start, end)
-    heat_igl.write_curves(output, loaded, found)
-    length = float(found[0].lengths(loaded).sum())
-    segments = len(found[0])
-    print_rows(
-        [("length", f"{length:.6g}", length), ("segments", str(segments), segments), ("wrote", str(output))], json_file
-    )
-
-
 def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, picture: Path | None) -> list[Path]:
     drawn = None
     if picture is not None:
@@ -226,4 +203,4 @@ def _summary(path: Path, mesh: Mesh, phi: FloatArray) -> list[Row]:
     return [*rows, ("mean", f"{mean:.6g}", mean)]
 
 
-COMMANDS = (distance, isolines, path)
+COMMANDS = (distance, isolines)

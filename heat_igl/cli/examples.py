@@ -16,7 +16,16 @@ EXAMPLES = {
         "isolines bunny.obj --source 1234 --spacing 0.05 --output lines.obj",
         "isolines bunny.obj --source 1234 --spacing 0.05 --output lines.svg",
     ),
-    "path": ("path bunny.obj --from 12 --to 2000 --output path.obj",),
+    "path": (
+        "path bunny.obj --from 12 --to 2000 --output path.obj",
+        "path bunny.obj 12 2000 0.1,0.2,0.05 --output path.obj",
+    ),
+    "trace": ("trace bunny.obj --from 12 --direction 1,0,0 --length 0.1 --output line.obj",),
+    "signed": ("signed bunny.obj --curves loops.obj --output signed.ply",),
+    "cut": (
+        "cut bunny.obj --curves loops.obj --output cut.ply",
+        "cut bunny.obj --curves loops.obj --output part.ply --split",
+    ),
     "view": ("view bunny.obj --source 1234", "view bunny.obj --html bunny.html"),
     "demo": ("demo", "demo --out results"),
     "batch": ("batch meshes --store distances.zarr --sources farthest:200",),

@@ -47,10 +47,12 @@ def choice(kind: Any, text: str) -> Any:
     return typer.Option(help=text, metavar="|".join(choices), callback=one_of(choices))
 
 
-def position(text: str) -> list[float]:
-    """The three coordinates in the value of ``--at``."""
+def position(text: str, name: str = "--at") -> list[float]:
+    """The three coordinates in the value of an option."""
     try:
         x, y, z = (float(number) for number in text.split(","))
     except ValueError:
-        raise SourceError(f"--at {text}: three numbers separated by commas are expected, such as 0.5,0,1.25") from None
+        raise SourceError(
+            f"{name} {text}: three numbers separated by commas are expected, such as 0.5,0,1.25"
+        ) from None
     return [x, y, z]

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 import heat_igl
-from heat_igl.cli import collections, comparison, distances, regions, views
+from heat_igl.cli import collections, comparison, distances, paths, regions, views
 from heat_igl.cli.examples import epilog
 from heat_igl.cli.output import say
 from heat_igl.errors import (
@@ -36,7 +36,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _commands in (comparison, distances, regions, views, collections):
+for _commands in (comparison, distances, paths, regions, views, collections):
     for _command in _commands.COMMANDS:
         app.command(epilog=epilog(_command.__name__))(_command)
 

@@ -9,8 +9,8 @@ import numpy as np
 import typer
 
 import heat_igl
-from heat_igl.cli.options import MeshArgument, choice, positive
-from heat_igl.cli.output import check_outputs, check_writable, print_rows
+from heat_igl.cli.options import JsonOption, MeshArgument, choice, positive
+from heat_igl.cli.output import Row, check_json, check_outputs, check_writable, print_rows, write_distance
 from heat_igl.errors import MeshError
 from heat_igl.heat_method import Level, Refine, SignedHeatSolver
 from heat_igl.io import MESH_SUFFIXES, read_mesh, read_polylines, write_mesh
@@ -33,11 +33,13 @@ def signed(
     t_coef: Annotated[
         float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=positive)
     ] = None,
+    json_file: JsonOption = None,
 ) -> None:
     """Distance from curves, negative on their left; curves may have gaps."""
     loaded = read_mesh(mesh)
     drawn_on = _projected(loaded, curves)
     check_outputs(loaded, output, picture)
+    check_json(json_file)
     solver = SignedHeatSolver(loaded, refine=cast(Refine | None, refine), t_coef=t_coef)
     phi = solver.distance(drawn_on, level=cast(Level, level))
     drawn = None
@@ -46,18 +48,20 @@ def signed(
 
         drawn = plots.plot_field(loaded, np.where(np.isfinite(phi), phi, np.nan), label="signed distance")
     if output is not None:
-        write_mesh(output, loaded, distance=phi)
+        write_distance(output, loaded, phi)
     if drawn is not None and picture is not None:
         drawn.save(picture)
     finite = phi[np.isfinite(phi)]
-    rows = [
-        ("curves", str(len(drawn_on))),
-        ("left", f"{int((finite < 0).sum())} vertices, down to {finite.min():.6g}"),
-        ("right", f"{int((finite > 0).sum())} vertices, up to {finite.max():.6g}"),
+    low, high, left, right = float(finite.min()), float(finite.max()), int((finite < 0).sum()), int((finite > 0).sum())
+    rows: list[Row] = [
+        ("curves", str(len(drawn_on)), len(drawn_on)),
+        ("left", f"{left} vertices, down to {low:.6g}", {"n_vertices": left, "distance": low}),
+        ("right", f"{right} vertices, up to {high:.6g}", {"n_vertices": right, "distance": high}),
     ]
-    if len(finite) < len(phi):
-        rows.append(("unreachable", f"{len(phi) - len(finite)} vertices"))
-    print_rows([*rows, *(("wrote", str(path)) for path in (output, picture) if path is not None)])
+    unreachable = len(phi) - len(finite)
+    if unreachable:
+        rows.append(("unreachable", f"{unreachable} vertices", unreachable))
+    print_rows([*rows, *(("wrote", str(path)) for path in (output, picture) if path is not None)], json_file)
 
 
 def cut(
@@ -65,12 +69,14 @@ def cut(
     curves: CurvesOption,
     output: Annotated[Path, typer.Option(help="File for the cut mesh; with --split, one for each piece beside it.")],
     split: Annotated[bool, typer.Option("--split", help="Write each piece to a file of its own.")] = False,
+    json_file: JsonOption = None,
 ) -> None:
     """Cut a mesh along curves, so that they become edges."""
     loaded = read_mesh(mesh)
     if output.suffix.lower() not in MESH_SUFFIXES:
         raise MeshError(f"--output {output}: meshes go to {', '.join(MESH_SUFFIXES)} files")
     check_writable(output)
+    check_json(json_file)
     found = heat_igl.cut(loaded, _projected(loaded, curves))
     pieces = found.split()
     written = {output: found.mesh}
@@ -78,11 +84,13 @@ def cut(
         written = {output.with_stem(f"{output.stem}_{i}"): piece.mesh for i, piece in enumerate(pieces)}
     for path, part in written.items():
         write_mesh(path, part)
-    rows = [
-        ("faces", f"{loaded.n_faces} before, {found.mesh.n_faces} now"),
-        ("pieces", ", ".join(f"{piece.mesh.measures.sum():.6g}" for piece in pieces) + " in area"),
+    areas = [float(piece.mesh.measures.sum()) for piece in pieces]
+    n_faces = {"before": loaded.n_faces, "now": found.mesh.n_faces}
+    rows: list[Row] = [
+        ("faces", f"{loaded.n_faces} before, {found.mesh.n_faces} now", n_faces),
+        ("pieces", ", ".join(f"{area:.6g}" for area in areas) + " in area", areas),
     ]
-    print_rows([*rows, *(("wrote", str(path)) for path in written)])
+    print_rows([*rows, *(("wrote", str(path)) for path in written)], json_file)
 
 
 def _projected(mesh: Mesh, path: Path) -> list[SurfaceCurve]:

@@ -1,21 +1,34 @@
 """Curves from a distance: isolines and the areas that they enclose, shortest paths."""
 
+from heat_igl.curves.bezier import geodesic_bezier
 from heat_igl.curves.cutting import CutMesh, MeshPiece, cut
+from heat_igl.curves.geodesics import GeodesicPathSolver, geodesic_path, straighten
+from heat_igl.curves.handles import handle_loops
 from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas
 from heat_igl.curves.log_map import log_map
+from heat_igl.curves.means import karcher_mean
 from heat_igl.curves.paths import shortest_paths
+from heat_igl.curves.relaxation import CentroidalSites, centroidal_voronoi
 from heat_igl.curves.straightest import exp_map, trace_geodesic
 
 __all__ = [
+    "CentroidalSites",
     "CutMesh",
+    "GeodesicPathSolver",
     "MeshPiece",
+    "centroidal_voronoi",
     "cut",
     "enclosed_areas",
     "exp_map",
+    "geodesic_bezier",
+    "geodesic_path",
+    "handle_loops",
     "isolines",
+    "karcher_mean",
     "log_map",
     "offset_curves",
     "shortest_paths",
+    "straighten",
     "sublevel_areas",
     "trace_geodesic",
 ]

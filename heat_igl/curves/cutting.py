@@ -1,4 +1,4 @@
-"""Cut a triangle mesh along curves: curves become edges, and faces are split only where curves run through them."""
+"""Cut a triangle mesh along curves: curves become edges, and only the faces that they meet are split."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class MeshPiece:
     Attributes
     ----------
     mesh : Mesh
-        Its faces, with its vertices alone.
+        The faces of the piece, on the vertices that they use.
     vertices : (n,) int64
         The vertex of the cut mesh that each vertex is.
     faces : (m,) int64
@@ -108,10 +108,10 @@ class CutMesh:
 
     @cached_property
     def sides(self) -> IntArray:
-        """The faces (k, 2) on the left and on the right of each of `edges`; -1 where there is none.
+        """The faces (k, 2) on the left and on the right of each of `edges`; -1 if there is none.
 
-        Where more than two faces meet, or neighbours are oriented differently, one of the faces that has the edge in
-        its direction, and one that has it in the other.
+        If more than two faces meet, or neighbours are oriented differently: one of the faces that run along the edge in
+        the direction of the curve, and one of those that run in the other.
         """
         F, n = self.mesh.F, self.mesh.n_vertices
         key = (F[:, [1, 2, 0]] * n + F[:, [2, 0, 1]]).ravel()
@@ -354,6 +354,6 @@ def _on_grid(barycentric: FloatArray) -> IntArray:
     kept = np.where(barycentric < _SAME, 0.0, barycentric)
     kept /= kept.sum(axis=1, keepdims=True)
     steps = np.rint(kept * _STEPS).astype(np.int64)
-    # The largest takes what rounding leaves over.
+    # The largest takes the rest that rounding leaves.
     steps[np.arange(len(steps)), steps.argmax(axis=1)] += _STEPS - steps.sum(axis=1)
     return np.asarray(steps)

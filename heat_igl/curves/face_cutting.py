@@ -168,7 +168,7 @@ class _Triangulation:
         weights = np.array([[weight / sum(point) for weight in point] for point in self._points])
         at = (weights @ corners @ [1, 1j]).tolist()
         waiting = deque(edge for edge in sorted(self._apex) if edge[0] < edge[1])
-        # A bound on the work where all points lie on a line, whose angles say nothing.
+        # A bound on the work if all points lie on a line: angles say nothing then.
         for _ in range(_MOST_CHECKS_PER_EDGE * len(self._apex)):
             if not waiting:
                 return

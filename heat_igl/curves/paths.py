@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import igl
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
 from heat_igl.curves import tracing
+from heat_igl.curves.places import places, snapped
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
-from heat_igl.intrinsic import corner_angles
-from heat_igl.mesh import ON_SIDE, Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
-from heat_igl.sources import Sources, SourceSet, named_vertices, source_set
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
+from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import exact_paths
 
 __all__ = ["shortest_paths"]
 
-# Edges are at least this long, in mean edge lengths: the kernel divides by lengths.
-_SHORTEST = 1e-12
 # A path passes a source vertex whose distance is below the offset of the source by more than this share, the rounding
 # of refined distances: the vertex is nearer to another source.
 _SAME_DISTANCE = 1e-9
@@ -86,7 +83,7 @@ def shortest_paths(
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")
-    face, barycentric = _points("targets", mesh, targets)
+    face, barycentric = places("targets", mesh, targets)
     solver = distance if isinstance(distance, HeatMethodSolver) else None
     if distance is None or (solver is not None and solver.is_exact):
         named = _required(solver, sources)
@@ -112,7 +109,7 @@ def _straightened(
     lost = (goals.escape < 0) & ~_roots(mesh, goals.is_source, goals.first_inside)
     _refuse_lost(lost[mesh.F[face[which], 0]])
     most_steps = 4 * mesh.n_faces + 100
-    found = tracing.trace(_surface(mesh), values, goals, face[which], barycentric[which], most_steps)
+    found = tracing.trace(tracing.surface(mesh), values, goals, face[which], barycentric[which], most_steps)
     return _curves(which, *found)
 
 
@@ -184,30 +181,6 @@ def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver, sources: Sources
     return values
 
 
-def _points(name: str, mesh: Mesh, points: Sources) -> tuple[IntArray, FloatArray]:
-    """Faces and barycentric coordinates of points, or of vertices in the order given."""
-    if isinstance(points, SurfacePoints):
-        try:
-            points.positions(mesh)  # which checks the faces
-        except SourceError as error:
-            raise SourceError(f"{name}: {error}") from None
-        return points.faces, _snapped(points.barycentric)
-    vertex = named_vertices(points, mesh.n_vertices, name)
-    corner_at = np.full(mesh.n_vertices, -1)
-    corner_at[mesh.F.ravel()] = np.arange(mesh.F.size)
-    corner = corner_at[vertex]
-    if (corner < 0).any():
-        first = int(np.argmax(corner < 0))
-        raise SourceError(f"{name}[{first}] = {vertex[first]} is a vertex that no face uses: no path starts there")
-    return corner // 3, np.eye(3)[corner % 3]
-
-
-def _snapped(barycentric: FloatArray) -> FloatArray:
-    """Barycentric coordinates with those below `ON_SIDE` set to 0."""
-    weights = np.where(barycentric < ON_SIDE, 0.0, barycentric)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
-
-
 def _goals(
     mesh: Mesh, values: FloatArray, sources: Sources | None
 ) -> tuple[BoolArray, IntArray, FloatArray, FloatArray, IntArray]:
@@ -219,7 +192,7 @@ def _goals(
     found = _source_set(mesh, sources)
     points, segments = found.points, found.segments
     face = np.concatenate([points.faces, segments.faces])
-    start, end = (_snapped(np.concatenate([points.barycentric, there])) for there in (segments.start, segments.end))
+    start, end = (snapped(np.concatenate([points.barycentric, there])) for there in (segments.start, segments.end))
     inside, offset = np.stack([start, end], axis=1), np.concatenate([points.offset, segments.offset])
 
     is_source = np.zeros(mesh.n_vertices, bool)
@@ -277,12 +250,3 @@ def _ways_out(mesh: Mesh, values: FloatArray, roots: BoolArray) -> IntArray:
     tree = csgraph.minimum_spanning_tree(graph.tocsr())
     previous = csgraph.breadth_first_order(tree, n, directed=False)[1][:n]
     return np.where((previous < 0) | (previous == n), -1, previous).astype(np.int64)
-
-
-def _surface(mesh: Mesh) -> tracing.Surface:
-    """The tables of the kernel."""
-    # Not mollified: mollification gives a flat triangle some height, and would bend the paths across it.
-    lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
-    return tracing.surface(
-        mesh.F, lengths, corner_angles(lengths), mesh.facets.of_face, mesh.n_vertices, len(mesh.facets.n_faces)
-    )

@@ -15,7 +15,7 @@ from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, ordered_vertices
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
-__all__ = ["exp_map", "trace_geodesic"]
+__all__ = ["Tracer", "exp_map", "trace_geodesic"]
 
 # The compiled module, whose signatures are those of Cython.
 kernel: Any = straightest
@@ -65,7 +65,7 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
     on exactly one side of it: then it leaves at pi on this side, as a straight line in the plane does along a straight
     boundary or past a corner. It is not the shortest path in general.
     """
-    tracer = _Tracer(as_simplices(mesh))
+    tracer = Tracer(as_simplices(mesh))
     begin = tracer.starts("start", start)
     if len(begin.faces) != 1:
         raise SourceError(f"start must be one vertex or point, not {len(begin.faces)}")
@@ -105,17 +105,7 @@ def exp_map(mesh: MeshLike, source: Sources, vectors: ArrayLike) -> SurfacePoint
     -----
     Traced on all processors (`HEAT_IGL_NUM_THREADS`), with the same bits for any number of them.
     """
-    tracer = _Tracer(as_simplices(mesh))
-    begin = tracer.starts("source", source)
-    array: AnyArray = np.asarray(vectors)
-    k = len(array) if array.ndim == 2 else 1
-    if len(begin.faces) == 1:
-        begin = begin.repeated(k)
-    elif len(begin.faces) != k:
-        raise SourceError(f"source must be one point, or one for each of the {k} vectors, not {len(begin.faces)}")
-    turn, size = tracer.directions("vectors", begin, vectors)
-    found = tracer.ends(begin, turn, size)
-    return SurfacePoints(found.faces, found.barycentric)
+    return Tracer(as_simplices(mesh)).exp(source, vectors)
 
 
 class _Starts(NamedTuple):
@@ -141,8 +131,8 @@ class _Ends(NamedTuple):
     counts: IntArray
 
 
-class _Tracer:
-    """The frames of a mesh, and the tables of the kernel."""
+class Tracer:
+    """Straightest geodesics of one mesh: its frames, and the tables of the kernel."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
@@ -152,6 +142,19 @@ class _Tracer:
         self._tables = kernel.Triangles(
             triangulation.l, triangulation.areas, polar.corners, triangulation.twin, np.ascontiguousarray(half)
         )
+
+    def exp(self, source: Sources, vectors: ArrayLike) -> SurfacePoints:
+        """The exponential map; see `exp_map`."""
+        begin = self.starts("source", source)
+        array: AnyArray = np.asarray(vectors)
+        k = len(array) if array.ndim == 2 else 1
+        if len(begin.faces) == 1:
+            begin = begin.repeated(k)
+        elif len(begin.faces) != k:
+            raise SourceError(f"source must be one point, or one for each of the {k} vectors, not {len(begin.faces)}")
+        turn, size = self.directions("vectors", begin, vectors)
+        found = self.ends(begin, turn, size)
+        return SurfacePoints(found.faces, found.barycentric)
 
     def starts(self, name: str, points: Sources) -> _Starts:
         """Starts of geodesics: vertices in the order given, or points in faces."""

@@ -10,14 +10,19 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import igl
 import numpy as np
 
+from heat_igl.intrinsic import corner_angles
 from heat_igl.kernels import tracing
+from heat_igl.mesh import Mesh
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 __all__ = ["Goals", "Surface", "goals", "surface", "trace"]
 
+# Edges are at least this long, in mean edge lengths: the kernel divides by lengths.
+_SHORTEST = 1e-12
 _TRIANGLE = np.dtype([("length", "f8", 3), ("angle", "f8", 3), ("vertex", "i4", 3), ("edge", "i4", 3)])
 _GOAL = np.dtype([("start", "f8", 3), ("end", "f8", 3), ("offset", "f8")])
 
@@ -63,12 +68,16 @@ class Goals(NamedTuple):
     escape: AnyArray
 
 
-def surface(F: IntArray, l: FloatArray, angle: FloatArray, edge: IntArray, n: int, n_edges: int) -> Surface:  # noqa: E741
-    """The tables of m triangles F (m, 3) on n vertices, with edge lengths (m, 3), none 0, angles and edges (m, 3)."""
-    triangle = np.empty(len(F), _TRIANGLE)
-    triangle["length"], triangle["angle"], triangle["vertex"], triangle["edge"] = l, angle, F, edge
-    groups = (*group_by_label(edge.ravel(), n_edges), *group_by_label(F.ravel(), n))
-    return Surface(triangle, *(array.astype(np.int32) for array in groups))
+def surface(mesh: Mesh) -> Surface:
+    """The tables of a triangle mesh."""
+    # Not mollified: mollification gives a flat triangle some height, and would bend the paths across it.
+    lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
+    triangle = np.empty(mesh.n_faces, _TRIANGLE)
+    triangle["length"], triangle["angle"] = lengths, corner_angles(lengths)
+    triangle["vertex"], triangle["edge"] = mesh.F, mesh.facets.of_face
+    sides = group_by_label(mesh.facets.of_face.ravel(), len(mesh.facets.n_faces))
+    corners = group_by_label(mesh.F.ravel(), mesh.n_vertices)
+    return Surface(triangle, *(array.astype(np.int32) for array in (*sides, *corners)))
 
 
 def goals(

@@ -14,6 +14,7 @@ from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.levels import PinnedLevels
 from heat_igl.heat_method.parts import SolverParts
 from heat_igl.intrinsic import IntrinsicTriangulation
+from heat_igl.kernels import heat_adjoint as kernels
 from heat_igl.operators import ElementSlopes
 from heat_igl.sources import SourceSet, right_hand_side
 from heat_igl.steps.normalization import lowest_full_rate
@@ -56,7 +57,6 @@ class HeatAdjoint:
         self._parts, self._domain = parts, domain
         self.triangulation: IntrinsicTriangulation = surface.triangulation
         self._elements = parts.elements
-        self._i, self._j = self._elements.i, self._elements.j
         term = parts.assembler.term(sources)
         if term.seen.any():
             raise ValueError(
@@ -64,9 +64,9 @@ class HeatAdjoint:
                 f"distances are straight lines{_REMEDY}"
             )
         heat = parts.heat_flow.solve(right_hand_side(domain.n, [term]))
-        self._u = heat[:, 0]
+        self._u = np.ascontiguousarray(heat[:, 0])
         phi = last_steps.poisson.solve(last_steps.divergence([term], heat))[:, 0]
-        self._phi = phi
+        self._phi = np.ascontiguousarray(phi)
         self._levels = PinnedLevels(parts, term, phi, self._u)
 
     def lengths(self) -> FloatArray:
@@ -80,8 +80,7 @@ class HeatAdjoint:
         levels = self._levels.pull_back(g)
         # L is symmetric. Rounding aside, each component's sum is 0, as a right-hand side of L needs.
         p = self._poisson.solve(levels.by_phi)
-        slopes.by_weight += self._differences(p) * self._differences(self._phi)
-        by_heat = levels.by_heat + self._normalized(p, slopes, by_t)
+        by_heat = levels.by_heat + self._fields(p, slopes, by_t)
         pairs = [(self._parts.heat_flow.solve(by_heat), self._u)]
         if levels.pair is not None:
             pairs.append(levels.pair)
@@ -96,55 +95,35 @@ class HeatAdjoint:
             "with the gradient"
         )
 
-    def _differences(self, values: FloatArray) -> FloatArray:
-        """Differences (m, 3) of values (n,) along the sides."""
-        return np.asarray(values[self._i] - values[self._j])
-
-    def _to_vertices(self, by_difference: FloatArray) -> FloatArray:
-        """The derivative (n,) by values, from that by their `_differences`."""
-        n, pull = self._domain.n, by_difference.ravel()
-        return np.asarray(np.bincount(self._i.ravel(), pull, n) - np.bincount(self._j.ravel(), pull, n), np.float64)
-
-    def _normalized(self, p: FloatArray, slopes: ElementSlopes, by_t: FloatArray) -> FloatArray:
-        """The derivative (n,) by the heat of p . b, with b the divergence of the normalized field.
+    def _fields(self, p: FloatArray, slopes: ElementSlopes, by_t: FloatArray) -> FloatArray:
+        """The derivative (n,) by the heat of p . (b - L phi), with b the divergence of the normalized field.
 
         On each face b is s K v, with K the cotangent matrix of the face, v the logarithm of the heat (or the heat) and
         s = 1 / |grad v|, at most one over the full rate; and |grad v|^2 is v . K v over the area.
         """
         e, parts, u = self._elements, self._parts, self._u
-        scale = np.ones(len(e.area))
-        if parts.fitted:
-            d = self._differences(np.log(u, out=np.zeros_like(u), where=u > 0))
-        else:
-            # Any multiple of the heat has this direction; its own may be too small for squares.
-            d = self._differences(u)
-            scale = np.maximum(np.abs(d).max(axis=1), np.finfo(float).tiny)
-            d /= scale[:, None]
-        energy = np.einsum("fc,fc,fc->f", e.weight, d, d)
-        steep = energy > 0
-        rate = np.sqrt(np.where(steep, energy, 1.0) / e.area)
-        s = np.where(steep, 1 / rate, 0.0)
-        damped = np.zeros(len(s), bool)
+        full_rate = np.zeros(len(e.area))
         if parts.t_damping is not None:
-            full = lowest_full_rate(self._domain, parts.t_damping, parts.fitted)
-            damped = steep & (rate < full)
-            s[damped] = 1 / full[damped]
-        q = self._differences(p)
-        by_s = np.einsum("fc,fc,fc->f", e.weight, q, d)
-        slopes.by_weight += s[:, None] * q * d
-        by_d = s[:, None] * e.weight * q
-        by_energy = np.where(steep & ~damped, -0.5 * by_s * s / np.where(steep, energy, 1.0), 0.0)
-        slopes.by_area += np.where(damped, 0.0, 0.5 * by_s * s / e.area)
-        slopes.by_weight += by_energy[:, None] * d**2
-        by_d += 2 * by_energy[:, None] * e.weight * d
+            full_rate = lowest_full_rate(self._domain, parts.t_damping, parts.fitted)
+        v = np.log(u, out=np.zeros_like(u), where=u > 0) if parts.fitted else u
+        by_step, by_v = np.zeros(len(e.area)), np.zeros(self._domain.n)
+        kernels.normalized(
+            self.triangulation.F,
+            e.weight,
+            e.area,
+            np.ascontiguousarray(v),
+            self._phi,
+            np.ascontiguousarray(p),
+            full_rate,
+            slopes.by_weight,
+            slopes.by_area,
+            by_step,
+            by_v,
+        )
         # The full rate is a multiple of t^(-1/2).
-        by_step = np.where(damped, 0.5 * by_s * s, 0.0)
         of_face = self._domain.components[self.triangulation.F[:, 0]]
         by_t += np.bincount(of_face, by_step, len(by_t)) / self._parts.time_steps
-        by_v = self._to_vertices(by_d / scale[:, None])
-        if not parts.fitted:
-            return by_v
-        return np.divide(by_v, u, out=np.zeros_like(u), where=u > 0)
+        return np.divide(by_v, u, out=np.zeros_like(u), where=u > 0) if parts.fitted else by_v
 
     def _heat_flow(
         self, pairs: Sequence[tuple[FloatArray, FloatArray]], slopes: ElementSlopes, by_t: FloatArray
@@ -153,24 +132,23 @@ class HeatAdjoint:
         flow, components = self._parts.heat_flow, self._domain.components
         F, t = self.triangulation.F, self._parts.time_steps
         of_face = components[F[:, 0]]
-        unit = np.broadcast_to(flow.mean_mass, self._domain.n)
+        unit = np.full(self._domain.n, flow.mean_mass)
         by_mass, by_weight = np.zeros(self._domain.n), np.zeros(F.shape)
         for x, u in pairs:
             by_mass -= x * (u / unit)
-            by_weight -= self._differences(x) * (self._differences(u) / unit[F[:, :1]])
+            kernels.heat_flow(F, np.ascontiguousarray(x), np.ascontiguousarray(u), unit, by_weight)
         slopes.by_mass += by_mass[F]
-        step = t[of_face][:, None]
         if not self._parts.fitted:
-            slopes.by_weight += step * by_weight
+            slopes.by_weight += t[of_face][:, None] * by_weight
             by_t += np.bincount(of_face, np.einsum("fc,fc->f", self._elements.weight, by_weight), len(by_t))
             return
         # L has one entry for all sides between the same two vertices: its weight is the sum of theirs, not below 0,
         # times the factor of the shortest.
-        pair, first = self._elements.pairs
-        weight, x, factor, slope = self._parts.fitted_weights
+        first = self._elements.pairs[1]
+        weight, x, factor, slope, of_side = self._parts.fitted_weights
         of_pair = of_face[first // 3]
         by_fitted, t_of_pair = by_weight.ravel()[first], t[of_pair]
-        slopes.by_weight += step * by_weight * np.where(weight > 0, factor, 0.0)[pair].reshape(F.shape)
+        slopes.by_weight += by_weight * of_side
         by_factor = t_of_pair * by_fitted * weight * slope
         slopes.by_side.ravel()[first] += by_factor / np.sqrt(t_of_pair)
         by_t += np.bincount(of_pair, by_fitted * weight * factor - by_factor * x / (2 * t_of_pair), len(by_t))

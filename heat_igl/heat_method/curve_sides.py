@@ -1,4 +1,4 @@
-"""On which side of oriented curves vertices are, whether the curves have gaps, and what closes these."""
+"""The sides of oriented curves on which vertices lie, gaps in the curves, and the segments that close them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SAME_PLACE = 1e-6
 # The zero curve of an integrated distance runs within a quarter of an edge of the curves. It counts as the closing of a
 # gap where it is farther than this from all of them, in mean edge lengths.
 _IN_GAP = 1.0
-# Where a vertex sees the nearest place of a segment almost along the segment, the side is that of rounding.
+# If a vertex sees the nearest place of a segment almost along the segment, rounding decides the side.
 _LEAST_SINE = 1e-6
 # Straight lines in one face are as long as the distance, but for rounding.
 _SAME_DISTANCE = 1e-6
@@ -69,7 +69,7 @@ def zero_curve_in_gaps(mesh: Mesh, phi: FloatArray, distance: FloatArray, h: flo
     Returns
     -------
     SurfaceCurve or None
-        Its segments, in the order of faces; None if there is none.
+        The segments, in the order of faces; None if there is none.
     """
     faces, start, end, _ = level_segments(mesh, phi, 0.0)
     middle = np.einsum("sc,sc->s", (start + end) / 2, distance[mesh.F[faces]])
@@ -90,7 +90,7 @@ def left_of_closed(
     mesh : Mesh
         The mesh.
     triangulation : IntrinsicTriangulation
-        Its faces, before any flip.
+        The faces of the mesh, before any flip.
     sources : OrientedSet
         Curves.
     otherwise : (n,) bool

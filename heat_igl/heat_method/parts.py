@@ -101,17 +101,19 @@ class SolverParts:
         return Elements(self.operators)
 
     @cached_property
-    def fitted_weights(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def fitted_weights(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """What the fitted flow knows of each of ``elements.pairs``, to be differentiated.
 
         Its cotangent weight, not below 0; the length x of its shortest side in units of sqrt(t); `fit` and `fit_slope`
-        of x.
+        of x. Last, of each side (m, 3) the time step times that factor, 0 where the weight is.
         """
         elements = self.elements
         pair, first = elements.pairs
         t = self.time_steps[self.operators.components[elements.i.ravel()[first]]]
         x = elements.l.ravel()[first] / np.sqrt(t)
-        return np.maximum(np.bincount(pair, elements.weight.ravel()), 0.0), x, fit(x), fit_slope(x)
+        weight, factor = np.maximum(np.bincount(pair, elements.weight.ravel()), 0.0), fit(x)
+        of_side = np.where(weight > 0, t * factor, 0.0)[pair].reshape(-1, 3)
+        return weight, x, factor, fit_slope(x), of_side
 
     @property
     def given_faces(self) -> IntArray | None:
@@ -190,13 +192,7 @@ def prepare(
     takes_heat = options.refine != "exact" and front_solver is None
     found = analysis(domain.L, options.backend, known) if takes_heat else None
     analysed = time.perf_counter()
-    makers: list[Callable[[], Any]] = []
-    if takes_heat:
-        makers.append(lambda: HeatFlow(domain, step, options.boundary, options.backend, found, fitted))
-    if options.refine is None and takes_heat:
-        makers.append(lambda: PoissonProblem(domain, options.backend, found))
-    # Both matrices at once: the backends run without the interpreter's lock.
-    problems = list(in_order(lambda make: make(), makers, max(1, min(len(makers), n_threads()))))
+    problems = [] if found is None else _factored(domain, options, step, found, fitted)
     factored = time.perf_counter()
     heat_flow = problems[0] if problems else None
     unfolds = options.refine is not None or front_solver is not None
@@ -241,6 +237,17 @@ def prepare(
         checker=None if options.refine in ("unfold", "exact") else Checker(domain, V),
         diagnostics=diagnostics,
     )
+
+
+def _factored(
+    domain: Operators, options: SolverOptions, step: float | FloatArray, found: Analysis, fitted: bool
+) -> list[Any]:
+    """The heat flow, and the Poisson problem unless `refine` takes the place of it."""
+    makers: list[Callable[[], Any]] = [lambda: HeatFlow(domain, step, options.boundary, options.backend, found, fitted)]
+    if options.refine is None:
+        makers.append(lambda: PoissonProblem(domain, options.backend, found))
+    # Both matrices at once: the backends run without the interpreter's lock.
+    return list(in_order(lambda make: make(), makers, max(1, min(len(makers), n_threads()))))
 
 
 def _resolved(domain: Operators, options: SolverOptions) -> tuple[Operators, SolverOptions]:

@@ -34,7 +34,7 @@ _CANCELLED = 1e-9
 
 
 class _Pieces(NamedTuple):
-    """Segments and points of oriented sources, as what is diffused.
+    """Segments and points of oriented sources, as they are diffused.
 
     Attributes
     ----------
@@ -63,14 +63,13 @@ class SignedHeatSolver:
     mesh : mesh
         Triangles, manifold and oriented alike; whatever `as_mesh` takes.
     refine : {"unfold", "exact"}, optional
-        Take the size from `HeatMethodSolver` with the same `refine`,
-        measured from the curves, and in gaps between them from the zero curve of the integrated distance. The sign is
-        that of the integrated distance, and where no curve has a gap, that of the region, in both cases.
+        Take the size from `HeatMethodSolver` with the same `refine`, measured from the curves, and in gaps between them
+        from the zero curve of the integrated distance.
     t_coef : float, optional
         t = t_coef h^2, with h the mean edge length of the intrinsic Delaunay triangulation; 0.25 by default. Larger
         values close wide gaps with rounder curves, and smooth noisy ones.
     t : float, optional
-        Time step as a squared length; overrides `t_coef`. It is raised where heat would not cross the mesh.
+        Time step as a squared length; overrides `t_coef`. It is raised if heat would not cross the mesh.
     backend : {"auto", "scipy", "multifrontal"}
         Linear solver, see `factorize`.
 
@@ -147,9 +146,9 @@ class SignedHeatSolver:
             that from them, and the sign is the one that the curves give.
         level : {"zero", "constant", "none"}
             Without `refine`: "zero" subtracts from each vertex the integrated value at the place on the curves that
-            its heat comes from, so that all curves are at 0. "constant" makes the value constant along each curve, at a
-            level of its own, and 0 in the mean over all. "none" only makes the mean 0. `refine` measures from
-            the curves in any case, and takes the sign from this.
+            its heat comes from, so that all curves are at 0. "constant" makes the value constant along each curve, with
+            a different level for each, and 0 in the mean over all. "none" only makes the mean 0. `refine` measures from
+            the curves in any case, and takes the sign from this if curves have gaps.
 
         Returns
         -------
@@ -166,7 +165,9 @@ class SignedHeatSolver:
 
         Notes
         -----
-        Where curves contradict each other, the longer pieces decide: the diffused normals of both are added.
+        If no curve has a gap, the regions between curves have one sign each. The levels "constant" and "none" keep the
+        sign of the integrated value instead, unless there is `refine`. The diffused normals of all curves are added: if
+        curves contradict each other, the longer pieces decide.
         """
         if level not in get_args(Level):
             raise ValueError(f"level must be 'zero', 'constant' or 'none', not {level!r}")
@@ -177,7 +178,7 @@ class SignedHeatSolver:
             raise SourceError("curves reach no vertex: the components that they lie on have no area")
         size, left = np.abs(phi), phi < 0
         is_broken = has_gaps(self._mesh, chosen)
-        if not is_broken:
+        if not is_broken and (self._refines or level == "zero"):
             left = left_of_closed(self._mesh, self._faces, chosen, left)
         if self._refines:
             size = self._unsigned.distance(chosen.unoriented())
@@ -219,7 +220,7 @@ class SignedHeatSolver:
         )
 
     def _integrated(self, pieces: _Pieces, level: Level) -> FloatArray:
-        """The signed distance (n,) of the method's steps 1 to 3, and its level."""
+        """The signed distance (n,): steps 1 to 3 of the method, and the level."""
         # Step 1: diffuse the normals, integrated against the hat functions.
         corners = self._mesh.F[pieces.faces]
         share = pieces.weight[:, None] * pieces.barycentric
@@ -243,7 +244,7 @@ class SignedHeatSolver:
         return phi - self._level(phi, pieces, share, level)
 
     def _level(self, phi: FloatArray, pieces: _Pieces, share: FloatArray, level: Level) -> FloatArray:
-        """What to subtract from the integrated distance (n,): its values on the curves, extended to all vertices."""
+        """Values of the integrated distance on the curves, extended to all vertices (n,), to be subtracted from it."""
         n, domain = self.n_vertices, self._domain
         corners = self._mesh.F[pieces.faces]
         value = np.einsum("qc,qc->q", pieces.barycentric, phi[corners])

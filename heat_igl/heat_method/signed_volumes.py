@@ -19,8 +19,8 @@ from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["VoxelBox", "volume_signed_distance"]
 
-# Each time step of a grid is this times the one before, and gives directions where heat of the one before is lost: that
-# is below this share of the largest, since transforms in double precision then have few digits left.
+# Each time step of a grid is this times the one before. It gives the directions at points that have less heat than this
+# share of the largest, since transforms in double precision leave few digits of it there.
 _NEXT_STEP = 4.0
 _LOST = 1e-10
 

@@ -35,7 +35,7 @@ def read_polylines(path: str | os.PathLike[str]) -> list[Polyline]:
     Parameters
     ----------
     path : path-like
-        An OBJ file with vertices and lines; what else it holds is ignored.
+        An OBJ file with vertices and lines; all other records are ignored.
 
     Raises
     ------

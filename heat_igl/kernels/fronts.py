@@ -6,7 +6,7 @@ refracted. Seen from a vertex, the source lies behind the opposite side of a sim
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, MOST_VISITS, ON_SIDE, STRAIGHT, STRAIGHT_LINE
+from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, GO_BACK, MOST_VISITS, ON_SIDE, STRAIGHT, STRAIGHT_LINE
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 __all__ = ["advance"]
@@ -62,6 +62,9 @@ def advance(
     one.begin = np.array(d)
     one.arrived = np.ones(n)
     one.is_stale = np.ones(n, np.uint8)
+    rank = np.empty(n, np.int32)
+    rank[order] = np.arange(n, dtype=np.int32)
+    one.rank = rank
     with cython.nogil:
         one.run()
     return one.n_visits
@@ -90,6 +93,7 @@ class _Fronts:
     begin: cython.double[::1]
     arrived: cython.double[::1]
     is_stale: cython.uchar[::1]
+    rank: cython.const[cython.int][::1]
     n_visits: cython.longlong
     # The best that was found for the vertex that is visited.
     best: cython.double
@@ -101,54 +105,69 @@ class _Fronts:
     @cython.nogil
     @cython.exceptval(check=False)
     def run(self) -> cython.void:
-        """Visit all that is stale, in order, until nothing is."""
+        """Visit all that is stale, in order, until nothing is.
+
+        Where straight lines from a single source are known, most vertices soon have their last value, and the kernel
+        goes back at once to what depends on one. Else it goes on to the end first, since the value may change again.
+        """
         n: cython.Py_ssize_t = self.order.shape[0]
-        i: cython.Py_ssize_t
-        again: cython.bint = True
+        i: cython.Py_ssize_t = 0
+        behind: cython.Py_ssize_t = n  # lowest rank of what was passed and is stale again
+        goes_back: cython.bint = self.positions.shape[0] > 0 and self.sources.shape[0] == 1
         self.n_visits = 0
-        while again and self.n_visits < MOST_VISITS * n:
-            again = False
-            for i in range(n):
-                v: cython.int = self.order[i]
-                if not self.is_stale[v]:
-                    continue
+        while i < n and self.n_visits < MOST_VISITS * n:
+            v: cython.int = self.order[i]
+            i += 1
+            if self.is_stale[v]:
                 self.is_stale[v] = False
                 self.n_visits += 1
-                if self.visit(v):
-                    again = True
+                behind = min(behind, self.visit(v))
+            if behind < i and (i == n or (goes_back and self.n_visits < GO_BACK * n)):
+                i, behind = behind, n
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def visit(self, v: cython.int) -> cython.bint:
-        """Give v the best that its simplices say; returns whether that is news to its neighbours."""
+    def visit(self, v: cython.int) -> cython.Py_ssize_t:
+        """Give v the best that its simplices say; returns the lowest rank of what that makes stale, or n."""
+        n: cython.Py_ssize_t = self.order.shape[0]
+        lowest: cython.Py_ssize_t = n
+        u: cython.int
         k: cython.int
         old: cython.double = self.d[v]
-        floor: cython.double = -INFINITY
-        if self.positions.shape[0] > 0 and self.sources.shape[0] == 1:
-            # No way is shorter than the straight line.
-            floor = self.d[self.sources[0]] + self.line(v, 0) * (1 + STRAIGHT_LINE)
+        floor: cython.double = self.floor(v)
         self.best, self.best_simplex = old, -1
         for k in range(self.first[v], self.first[v + 1]):
             if self.best <= floor:
                 break
             self.through(self.incident[k] // (self.p + 1), self.incident[k] % (self.p + 1))
         if self.best_simplex < 0:
-            return False
+            return n
         self.d[v] = self.best
         self.begin[v], self.label[v] = self.best_begin, self.best_label
         self.arrived[v] = self.slowness[self.best_simplex]
         if old - self.best <= GAIN * (self.best - self.best_begin):
-            return False
+            return n
         for k in range(self.first[v], self.first[v + 1]):
             s: cython.int = self.incident[k] // (self.p + 1)
             c: cython.int
             for c in range(self.p + 1):
-                # What is nearer to the source gets nothing from here, unless a front comes back along a flat simplex.
-                if self.d[self.corners[s, c]] > self.best - self.lengths[s, c, self.incident[k] % (self.p + 1)]:
-                    self.is_stale[self.corners[s, c]] = True
-        self.is_stale[v] = False
-        return True
+                u = self.corners[s, c]
+                # Nearer vertices too: v may be the far corner of the side that their way crosses.
+                if not self.is_stale[u] and u != v and self.d[u] > self.floor(u):
+                    self.is_stale[u] = True
+                    lowest = min(lowest, self.rank[u])
+        return lowest
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def floor(self, v: cython.int) -> cython.double:
+        """What no distance of v is below: from a single source, the straight line."""
+        if self.positions.shape[0] == 0 or self.sources.shape[0] > 1:
+            return -INFINITY
+        return self.d[self.sources[0]] + self.line(v, 0) * (1 + STRAIGHT_LINE)
 
     @cython.cfunc
     @cython.nogil

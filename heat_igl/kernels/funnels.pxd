@@ -23,7 +23,7 @@ cdef class Layout:
     cdef Gate[::1] gate
     cdef Bend[::1] bend
     cdef int n_gates, n_bends
-    cdef Corners last
+    cdef Corners first, last
     cdef double x, y
 
     cdef int lay_out(self, Surface s, int face, const Place* start, Strip strip) except -1 nogil

@@ -45,6 +45,7 @@ class Layout:
         p.x[0], p.y[0], p.x[1], p.y[1] = 0.0, 0.0, c, 0.0
         p.x[2] = 0.5 * ((b - a) * (b + a) / c + c)
         p.y[2] = 2.0 * sqrt(max(half * (half - a) * (half - b) * (half - c), 0.0)) / c
+        self.first = p
         self.x, self.y = weighted(start, p.x), weighted(start, p.y)
         entered: cython.int = -1
         left: cython.int = -1

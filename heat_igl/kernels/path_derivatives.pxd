@@ -4,10 +4,12 @@ cdef extern from *:
     #define MEETS 1e-6
     // A vertex lies on a line within this angle.
     #define ON_LINE 1e-9
-    // Two lengths of one path differ by less than this fraction.
+    // Lengths of a path by its line and the path of the line's end differ by less than this fraction.
     #define SAME_LENGTH 1e-7
+    // The same for a vertex on the line: a path that is longer by a fraction x may leave at an angle of sqrt(x) to it.
+    #define SAME_LINE 1e-12
     """
-    double MEETS, ON_LINE, SAME_LENGTH
+    double MEETS, ON_LINE, SAME_LENGTH, SAME_LINE
 
 # An edge that a straight line crosses, in the plane: its right and its left end, their corners in the face before, the
 # half-edge to leave that face by and the one to enter the next by; and whether the face before is counter-clockwise.

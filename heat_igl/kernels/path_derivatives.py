@@ -12,7 +12,7 @@ By the envelope theorem the places on the edges count as fixed, so the derivativ
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.path_derivatives import MEETS, ON_LINE, SAME_LENGTH, End, Gate, Place
+from cython.cimports.heat_igl.kernels.path_derivatives import MEETS, ON_LINE, SAME_LENGTH, SAME_LINE, End, Gate, Place
 from cython.cimports.heat_igl.kernels.triangles import foot, next_half_edge, previous_half_edge
 from cython.cimports.libc.math import fabs, sqrt
 
@@ -208,6 +208,7 @@ class _Lines:
             self.ux * x + self.uy * y > 0.0
             and apart < self.extent
             and fabs(self.ux * y - self.uy * x) <= ON_LINE * apart
+            and apart + behind <= self.distance[self.v] * (1.0 + SAME_LINE)
             and behind < self.distance[self.v]
         )
 

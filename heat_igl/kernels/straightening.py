@@ -33,7 +33,7 @@ class Course:
 
     def segments(self):
         """Faces (k,) of all segments, and barycentric coordinates (k, 2, 3) of their starts and ends."""
-        some = np.asarray(self.segment)[: self.n_segments]
+        some = self.segment.base[: self.n_segments]
         return some["face"].astype(np.int64), np.stack([some["start"], some["end"]], axis=1)
 
     @cython.cfunc

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, intrinsic_delaunay, lay_out
+from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, intrinsic_delaunay, lay_out, mollify
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
@@ -171,7 +171,7 @@ def _smoothed(mesh: Mesh, sides: FloatArray) -> tuple[FloatArray, bool]:
 
 def _refracting(mesh: Mesh, sides: FloatArray, slowness: FloatArray, laplacian: Laplacian) -> Operators:
     """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
-    glued = _glued_where_equal(mesh, sides)
+    glued = _glued_where_equal(mesh, sides + mollify(sides, mesh.F)[:, None])
     triangulation = glued if laplacian == "cotan" else intrinsic_delaunay(glued)
     domain = intrinsic_operators(triangulation)
     pairs = np.concatenate([triangulation.F[:, pair] for pair in ([1, 2], [2, 0], [0, 1])])

@@ -1,7 +1,7 @@
-"""Exact distance, distances by other people's solvers, each called as it gives the right result, and bounds.
+"""Distances to compare with: exact ones, those of other people's solvers, bounds, and the paper's other methods.
 
 Every native solver runs in a child process. `docs/references.md` says how far each one can be trusted. Closed forms are
-in `heat_igl.closed_forms`.
+in `heat_igl.closed_forms`; the other methods that the paper discusses are in `heat_igl.reference.baselines`.
 """
 
 from heat_igl.reference.bounds import edge_paths, straight_lines

@@ -9,10 +9,10 @@ On grids: `schrodinger_grid`, `fast_marching_grid` and `fast_sweeping`. They tak
 and return distances in an array of the same shape.
 """
 
-from heat_igl.baselines.fronts import fast_marching, fast_marching_grid, fast_sweeping
-from heat_igl.baselines.graph import graph_distance, graph_limit
-from heat_igl.baselines.linear import boundary_problem, log_heat_kernel, varadhan
-from heat_igl.baselines.schrodinger import schrodinger, schrodinger_grid
+from heat_igl.reference.baselines.fronts import fast_marching, fast_marching_grid, fast_sweeping
+from heat_igl.reference.baselines.graph import graph_distance, graph_limit
+from heat_igl.reference.baselines.linear import boundary_problem, log_heat_kernel, varadhan
+from heat_igl.reference.baselines.schrodinger import schrodinger, schrodinger_grid
 
 __all__ = [
     "boundary_problem",

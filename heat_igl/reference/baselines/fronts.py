@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from heat_igl.baselines.grids import grid_domain, grid_sources, grid_spacing
 from heat_igl.errors import MeshError, MissingExtraError
 from heat_igl.mesh import MeshLike, as_simplices
+from heat_igl.reference.baselines.grids import grid_domain, grid_sources, grid_spacing
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 

@@ -1,0 +1,90 @@
+"""Commands for curves: paths and loops through waypoints, and straight lines in a direction."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import heat_igl
+from heat_igl.cli.options import JsonOption, MeshArgument, position
+from heat_igl.cli.output import Row, check_curves, check_json, print_rows
+from heat_igl.errors import SourceError
+from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.io import read_mesh
+from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, closest_points
+
+__all__ = ["COMMANDS"]
+
+CurveOutput = Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the curve.")]
+
+
+def path(
+    mesh: MeshArgument,
+    output: CurveOutput,
+    waypoints: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[A B ...]", help="Vertices, counted from 0, or positions X,Y,Z; before a negative one write --."
+        ),
+    ] = None,
+    closed: Annotated[bool, typer.Option("--closed", help="Straighten the loop through the waypoints.")] = False,
+    start: Annotated[int | None, typer.Option("--from", help="Vertex where the shortest path begins.")] = None,
+    end: Annotated[int | None, typer.Option("--to", help="Vertex where the shortest path ends.")] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """A geodesic through waypoints, a closed one, or the shortest path between two vertices."""
+    loaded = read_mesh(mesh)
+    check_curves(output)
+    check_json(json_file)
+    if (start is None) != (end is None) or (start is None) == (not waypoints) or (closed and not waypoints):
+        raise SourceError("name two waypoints or more, such as 12 900, or one vertex with --from and one with --to")
+    if waypoints:
+        places = [_place(loaded, text) for text in waypoints]
+        _write(loaded, heat_igl.geodesic_path(loaded, places, closed), output, json_file)
+        return
+    ends = []
+    for option, vertex in (("--from", start), ("--to", end)):
+        if vertex is None or not 0 <= vertex < loaded.n_vertices:
+            raise SourceError(f"{option} {vertex} is no vertex: the mesh has {loaded.n_vertices}, counted from 0")
+        ends.append(vertex)
+    found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), *ends)
+    _write(loaded, found[0], output, json_file)
+
+
+def trace(
+    mesh: MeshArgument,
+    start: Annotated[str, typer.Option("--from", metavar="V|X,Y,Z", help="Vertex, counted from 0, or position.")],
+    direction: Annotated[str, typer.Option(metavar="X,Y,Z", help="Direction in space; its length does not matter.")],
+    length: Annotated[float, typer.Option(help="Length of the line, in the unit of the mesh.")],
+    output: CurveOutput,
+    json_file: JsonOption = None,
+) -> None:
+    """A straight line on the surface, from a point in a direction."""
+    loaded = read_mesh(mesh)
+    check_curves(output)
+    check_json(json_file)
+    place = _place(loaded, start)
+    towards = position(direction, "--direction")
+    _write(loaded, heat_igl.trace_geodesic(loaded, place, towards, length), output, json_file)
+
+
+def _place(mesh: Mesh, text: str) -> int | SurfacePoints:
+    """The vertex of this number, or the closest point of the surface to this position."""
+    if "," in text:
+        return closest_points(mesh, [position(text, "position")]).points
+    try:
+        return int(text)
+    except ValueError:
+        raise SourceError(f"{text!r} is no place: a vertex such as 12, or a position such as 0.5,0,1.25") from None
+
+
+def _write(mesh: Mesh, curve: SurfaceCurve, output: Path, json_file: Path | None) -> None:
+    heat_igl.write_curves(output, mesh, [curve])
+    length, segments = float(curve.lengths(mesh).sum()), len(curve)
+    rows: list[Row] = [("length", f"{length:.6g}", length), ("segments", str(segments), segments)]
+    print_rows([*rows, ("wrote", str(output))], json_file)
+
+
+COMMANDS = (path, trace)

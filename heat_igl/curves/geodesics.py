@@ -1,0 +1,194 @@
+"""Geodesics by class: curves straightened, and paths and loops through waypoints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heat_igl.curves.places import Waypoints, corners, mixed_places
+from heat_igl.curves.routes import Router
+from heat_igl.curves.shortening import Course, Shortened, Shortener, as_curve, course_of
+from heat_igl.errors import MeshError, SourceError
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
+from heat_igl.typing import FloatArray, IntArray
+
+__all__ = ["GeodesicPathSolver", "geodesic_path", "straighten"]
+
+# Straightened paths whose lengths differ by a smaller share are one path.
+_SAME_LENGTH = 1e-11
+
+
+def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
+    """The locally shortest curve of the class of a curve.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles, also with edges of more than two faces.
+    curve : SurfaceCurve
+        Any curve on the mesh: along edges, through faces, over itself. An open one keeps its ends; a closed one is
+        straightened as a loop, without a fixed point.
+
+    Returns
+    -------
+    SurfaceCurve
+        Never longer than `curve`, and of the same homotopy class: it can be moved there on the surface. It is straight
+        across edges and has angles of at least pi on both sides at each vertex that it touches, where the surface goes
+        on there, so no curve nearby is shorter. A loop that contracts to a point is a single segment of length 0.
+
+    Raises
+    ------
+    MeshError
+        If the mesh is tetrahedral.
+    SourceError
+        If the curve is none of this mesh, a segment does not start where the one before it ends, or a closed curve has
+        no length.
+
+    Notes
+    -----
+    The curve gives a strip of faces, in which a funnel finds the shortest path (Lee and Preparata 1984). Where it bends
+    at a vertex with an angle below pi on the other side, the strip is led there (Xin and Wang 2007). A loop is
+    straightened from one of its points to itself, then from another one, until its length stays the same. On a surface
+    with hills one class can have several locally shortest curves.
+    """
+    return GeodesicPathSolver(mesh).straighten(curve)
+
+
+def geodesic_path(mesh: MeshLike, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
+    """The geodesic through waypoints, or the closed geodesic in the class of the loop through them.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles, also with edges of more than two faces.
+    waypoints : sequence of int, SurfacePoints, or a sequence of both
+        Two or more vertices or points on faces; three or more for a loop.
+    closed : bool
+        Whether a last part leads back to the first waypoint, and the loop is straightened as a whole: then it leaves
+        the waypoints. For a loop that passes them, name the first one at the end again.
+
+    Returns
+    -------
+    SurfaceCurve
+        An open one passes all waypoints in the given order, and is locally shortest from each to the next. A closed one
+        is locally shortest everywhere.
+
+    Raises
+    ------
+    MeshError
+        If the mesh is tetrahedral.
+    SourceError
+        If there are too few waypoints, one is no vertex or point of the mesh or cannot be reached from the one before
+        it, or if the loop contracts to a point.
+
+    Notes
+    -----
+    The first course is the shortest way along edges and straight lines from corner to corner across an edge, and it is
+    shortened as by `straighten`. Between far points with hills in between it may pass a hill on the longer side:
+    for the shortest path of all, call `shortest_paths` without a distance.
+    """
+    return GeodesicPathSolver(mesh).path(waypoints, closed)
+
+
+class GeodesicPathSolver:
+    """Geodesics of one mesh: makes the tables once for many calls of `straighten` and `geodesic_path`.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles, also with edges of more than two faces.
+
+    Raises
+    ------
+    MeshError
+        If the mesh is tetrahedral.
+
+    Notes
+    -----
+    Curves are independent of one another: they may cross, touch and overlap. Threads need a solver each.
+    """
+
+    def __init__(self, mesh: MeshLike) -> None:
+        self._mesh: Mesh = as_simplices(mesh)
+        if self._mesh.is_tetrahedral:
+            raise MeshError("paths need triangles, but the mesh is tetrahedral")
+        self._shortener = Shortener(self._mesh)
+        self._corner_at = corners(self._mesh)
+        self._router: Router | None = None
+
+    def straighten(self, curve: SurfaceCurve) -> SurfaceCurve:
+        """The locally shortest curve of the class of a curve; see `heat_igl.straighten`."""
+        if not isinstance(curve, SurfaceCurve):
+            raise SourceError(f"curve must be a SurfaceCurve, not {type(curve).__name__}: see edge_curve and curve_on")
+        course = course_of(self._mesh, curve)
+        if curve.is_closed and not curve.lengths(self._mesh).any():
+            raise SourceError("curve is closed and has no length: a loop needs two different points")
+        return as_curve([self._shortener.shortest(course, is_closed=curve.is_closed)], is_closed=curve.is_closed)
+
+    def path(self, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
+        """The geodesic through waypoints, or the closed one of their loop; see `geodesic_path`."""
+        faces, barycentric = mixed_places("waypoints", self._mesh, waypoints, self._corner_at)
+        needed = 3 if closed else 2
+        if len(faces) < needed:
+            raise SourceError(
+                f"waypoints must be {needed} places or more for a {'loop' if closed else 'path'}, not {len(faces)}"
+            )
+        if closed:
+            around = np.append(np.arange(len(faces)), 0)
+            return self._loop(self._routes.legs(faces[around], barycentric[around]))
+        return as_curve(self.geodesics(faces, barycentric), is_closed=False)
+
+    def log_vectors(self, face: int, barycentric: FloatArray, faces: IntArray, ends: FloatArray) -> FloatArray:
+        """The log maps (k, 2) at a place inside a face, of places with barycentric coordinates `ends` (k, 3) in faces.
+
+        The first axis runs from corner 0 to corner 1 of the face, the second to the side of corner 2. A vector
+        has the length of the path to the place, and the direction in which this leaves.
+        """
+        corner = self._mesh.V[self._mesh.F[face]]
+        along, side = corner[1] - corner[0], corner[2] - corner[0]
+        along /= np.linalg.norm(along)
+        across = side - (side @ along) * along
+        axes = np.stack([along, across / np.linalg.norm(across)])
+        vectors = np.zeros((len(faces), 2))
+        for i in range(len(faces)):
+            leg = self.geodesics(np.array([face, faces[i]]), np.stack([barycentric, ends[i]]))[0]
+            if leg.length > 0:
+                first = int(np.argmax((leg.points[:, 0] != leg.points[:, 1]).any(axis=1)))
+                direction = axes @ ((leg.points[first, 1] - leg.points[first, 0]) @ corner)
+                vectors[i] = leg.length * direction / np.linalg.norm(direction)
+        return vectors
+
+    def geodesics(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
+        """The geodesics between checked places (k,), each from one to the next."""
+        # Each of the two ways may lead past a hill on the longer side.
+        ways = (self._routes.legs(faces, barycentric, crosses=crosses) for crosses in (True, False))
+        return [self._shorter(*pair) for pair in zip(*ways, strict=True)]
+
+    def _shorter(self, one: Course, other: Course) -> Shortened:
+        """The shorter of the geodesics of two courses between the same places."""
+        plain = [self._shortener.shortest(course, tries_sides=False).length for course in (one, other)]
+        first = self._shortener.shortest(one)
+        if abs(plain[0] - plain[1]) <= _SAME_LENGTH * plain[0]:
+            return first
+        second = self._shortener.shortest(other)
+        return second if second.length < first.length else first
+
+    @property
+    def _routes(self) -> Router:
+        if self._router is None:
+            self._router = Router(self._mesh, self._shortener.surface)
+        return self._router
+
+    def _loop(self, legs: list[Course]) -> SurfaceCurve:
+        """The closed geodesic of the loop that these legs make."""
+        loop = Course(
+            np.concatenate([leg.faces[:-1] for leg in legs]),
+            np.concatenate([leg.joins for leg in legs]),
+            legs[0].ends[[0, 0]],
+        )
+        found = self._shortener.shortest(loop, is_closed=True)
+        if not found.length > 0:
+            raise SourceError(
+                "the loop through the waypoints contracts to a point, so no closed geodesic belongs to it: lead it "
+                "around a handle, or name the first waypoint again at the end for a loop that passes all of them"
+            )
+        return as_curve([found], is_closed=True)

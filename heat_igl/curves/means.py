@@ -1,0 +1,194 @@
+"""Means and medians of points on a surface."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.curves.geodesics import GeodesicPathSolver
+from heat_igl.curves.places import Waypoints, mixed_places
+from heat_igl.curves.straightest import Tracer
+from heat_igl.errors import AccuracyWarning, SourceError
+from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
+from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices
+from heat_igl.runtime import warn_caller
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
+
+__all__ = ["karcher_mean"]
+
+# A mean inside a face keeps this barycentric distance from its sides, so that all paths leave through this face.
+_INSIDE = 1e-7
+# The search ends with a step below this share of the largest distance from the mean.
+_CONVERGED = 1e-9
+_MOST_STEPS = 500
+# Distances in a weight d^(p - 2) are at least this share of the largest one.
+_NEAREST = 1e-12
+# From this number of points on, one factorization pays.
+_MANY = 4
+
+
+def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = None, p: float = 2) -> SurfacePoints:
+    """The point x with the least sum of w_i d(x, p_i)^p: the mean for p = 2, the geometric median for p = 1.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles, manifold and oriented alike.
+    points : sequence of int, SurfacePoints, or a sequence of both
+        Vertices or points on faces, k altogether.
+    weights : (k,) array_like, optional
+        One for each point: not negative, and not all 0; 1 if not given.
+    p : float
+        1 or more.
+
+    Returns
+    -------
+    SurfacePoints
+        One point.
+
+    Raises
+    ------
+    MeshError
+        If the mesh has no tangent frames, see `tangent_frames`.
+    SourceError
+        If `points` does not name points of the mesh, or they lie on different components.
+    ValueError
+        If `weights` or `p` are no such numbers.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the steps are still longer than 1e-9 of the largest distance after 500 of them.
+
+    Notes
+    -----
+    The search starts at the best vertex, by a near-exact distance query for each point: the mean is the global one
+    where several places are locally best. Each step goes along the mean of the log maps v_i of the points, weighted
+    by w_i d_i^(p - 2): the Karcher iteration for p = 2 (Karcher 1977) and Weiszfeld's for p = 1. The step is halved
+    until the sum falls, so the sum falls in every step. A median can be one of the points: it is if the unit vectors to
+    the others, weighted, sum to no more than the weight of this point (Vardi and Zhang 2000). Log maps are the first
+    directions and the lengths of straightened paths.
+    """
+    triangles = as_simplices(mesh)
+    faces, barycentric = mixed_places("points", triangles, points)
+    weight = _checked_weights(weights, len(faces))
+    power = _checked_power(p)
+    used = weight > 0
+    search = _Search(triangles, faces[used], barycentric[used], weight[used], power)
+    return search.found()
+
+
+class _State(NamedTuple):
+    """A place, the log maps (k, 2) of all points there, their distances (k,), and the sum of the powers."""
+
+    face: int
+    barycentric: FloatArray
+    vectors: FloatArray
+    distances: FloatArray
+    energy: float
+
+    @property
+    def points(self) -> SurfacePoints:
+        """The place as a point of the surface."""
+        return SurfacePoints(np.array([self.face]), self.barycentric[None])
+
+
+class _Search:
+    """The points, with the weights and the power of their distances."""
+
+    def __init__(self, mesh: Mesh, faces: IntArray, barycentric: FloatArray, weight: FloatArray, power: float) -> None:
+        self._mesh = mesh
+        self._faces, self._barycentric = faces, barycentric
+        self._weight, self._power = weight / weight.sum(), power
+        self._solver = GeodesicPathSolver(mesh)
+        self._tracer = Tracer(mesh)
+
+    def found(self) -> SurfacePoints:
+        """The point with the least sum."""
+        if len(self._faces) == 1:
+            return SurfacePoints(self._faces, self._barycentric)
+        fields = self._fields()
+        if self._power == 1:
+            at_point = self._median_at_a_point(fields)
+            if at_point is not None:
+                return at_point
+        energy = self._weight @ fields**self._power
+        if not np.isfinite(energy).any():
+            raise SourceError("points lie on different components of the mesh, so none is at a distance from all")
+        corner = int(np.flatnonzero(self._mesh.F.ravel() == int(np.argmin(energy)))[0])
+        return self._descend(self._state(corner // 3, np.eye(3)[corner % 3])).points
+
+    def _fields(self) -> FloatArray:
+        """Distances (k, n) of all vertices from each point."""
+        places = [SurfacePoints(np.array([f]), b[None]) for f, b in zip(self._faces, self._barycentric, strict=True)]
+        if len(places) < _MANY:
+            return np.stack([geodesic_distance(self._mesh, place) for place in places])
+        return np.asarray(HeatMethodSolver(self._mesh, refine="unfold").distances(places))
+
+    def _state(self, face: int, barycentric: FloatArray) -> _State:
+        inside = np.maximum(barycentric, _INSIDE)
+        inside /= inside.sum()
+        vectors = self._solver.log_vectors(face, inside, self._faces, self._barycentric)
+        distances = np.hypot(*vectors.T)
+        return _State(face, inside, vectors, distances, float(self._weight @ distances**self._power))
+
+    def _direction(self, at: _State) -> FloatArray:
+        """The mean (2,) of the log maps."""
+        nearest = max(float(at.distances.max()) * _NEAREST, np.finfo(float).tiny)
+        share = self._weight * np.maximum(at.distances, nearest) ** (self._power - 2)
+        # The second derivative of d^p along the path is p - 1 times that across it.
+        return np.asarray(share @ at.vectors / (share.sum() * max(self._power - 1, 1)))
+
+    def _descend(self, at: _State) -> _State:
+        """Steps along the mean of the log maps until they are short."""
+        for _ in range(_MOST_STEPS):
+            step = self._direction(at)
+            shortest = _CONVERGED * float(at.distances.max())
+            while np.hypot(*step) > shortest:
+                end = self._tracer.exp(at.points, step[None])
+                trial = self._state(int(end.faces[0]), end.barycentric[0])
+                if trial.energy < at.energy:
+                    break
+                step = step / 2
+            else:
+                return at
+            at = trial
+        warn_caller(
+            f"the mean of {len(self._faces)} points moves by {np.hypot(*step):.3g} still, after {_MOST_STEPS} steps",
+            AccuracyWarning,
+        )
+        return at
+
+    def _median_at_a_point(self, fields: FloatArray) -> SurfacePoints | None:
+        """The best of the points, if it is their median."""
+        corners = self._mesh.F[self._faces]
+        sums = np.einsum("kc,kc->k", (self._weight @ fields)[corners], self._barycentric)
+        best = int(np.argmin(sums))
+        at = self._state(int(self._faces[best]), self._barycentric[best])
+        if not np.isfinite(sums[best]):
+            return None
+        # Points in the same place weigh together.
+        here = at.distances <= 10 * _INSIDE * self._mesh.edge_lengths.mean()
+        pull = self._weight[~here] @ (at.vectors[~here] / at.distances[~here, None])
+        if np.hypot(*pull) <= self._weight[here].sum():
+            return SurfacePoints(self._faces[[best]], self._barycentric[[best]])
+        return None
+
+
+def _checked_weights(weights: ArrayLike | None, k: int) -> FloatArray:
+    if weights is None:
+        return np.ones(k)
+    try:
+        array = np.asarray(weights, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"weights must be {k} real numbers, one for each point") from None
+    if array.shape != (k,) or not (np.isfinite(array) & (array >= 0)).all() or not array.any():
+        raise ValueError(f"weights must be {k} numbers, one for each point: finite, not negative, and not all 0")
+    return array
+
+
+def _checked_power(p: float) -> float:
+    if isinstance(p, bool) or not isinstance(p, int | float | np.integer | np.floating) or not 1 <= p < np.inf:
+        raise ValueError(f"p must be a number of at least 1, not {p!r}: 2 for the mean, 1 for the median")
+    return float(p)

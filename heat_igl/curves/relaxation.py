@@ -1,0 +1,155 @@
+"""Centroidal Voronoi diagrams: sites moved to the means of their cells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from heat_igl.curves.straightest import Tracer
+from heat_igl.errors import SourceError
+from heat_igl.heat_method import HeatMethodSolver, VectorHeatSolver
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.sources import Sources, named_vertices
+from heat_igl.typing import BoolArray, FloatArray, IntArray
+
+__all__ = ["CentroidalSites", "centroidal_voronoi"]
+
+# A site that would raise the energy of its cell is tried at this many shorter steps.
+_SHORTER = 3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CentroidalSites:
+    """Sites that are about the means of their Voronoi cells.
+
+    Attributes
+    ----------
+    sites : (k,) int64
+        Vertices.
+    labels : (n,) int64
+        Position in `sites` of the nearest site, the earlier of two equally near ones; -1 at vertices that no site
+        reaches.
+    energies : (r + 1,) float64
+        The sum of area times squared distance from the nearest site before and after each of r rounds, falling.
+    """
+
+    sites: IntArray
+    labels: IntArray
+    energies: FloatArray
+
+    def __repr__(self) -> str:
+        return f"CentroidalSites({len(self.sites)} sites, {len(self.energies) - 1} rounds)"
+
+
+def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> CentroidalSites:
+    """Spread sites evenly: move each towards the mean of its Voronoi cell until no move lowers the energy.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles, manifold and oriented alike.
+    sites : sequence of int, or (n,) mask of bool
+        The vertices to begin with, for instance `farthest_points`.
+    rounds : int
+        At most so many.
+
+    Returns
+    -------
+    CentroidalSites
+        `sites`, `labels` and `energies`.
+
+    Raises
+    ------
+    MeshError
+        If the mesh has no tangent frames, see `tangent_frames`.
+    SourceError
+        If `sites` are not distinct vertices.
+    ValueError
+        If `rounds` is no integer of at least 0.
+
+    Notes
+    -----
+    Lloyd's algorithm (1982) on the vertices, each with a third of the area of its faces, for the energy
+    sum of a_v d(v, nearest site)^2. The mean of a cell is the end of the mean of its log map at the site, by
+    `VectorHeatSolver`, at the nearest corner. The site moves there if this lowers the energy of its cell, or else the
+    same way in shorter steps. So the energy falls in every round, and the last round is one in which no site moves.
+    Distances are near-exact, see `HeatMethodSolver` with ``refine="unfold"``: a round asks for one distance and one
+    log map for each site.
+    """
+    if isinstance(rounds, bool) or not isinstance(rounds, int | np.integer) or rounds < 0:
+        raise ValueError(f"rounds must be an integer of at least 0, not {rounds!r}")
+    triangles = as_simplices(mesh)
+    chosen = named_vertices(sites, triangles.n_vertices, "sites")
+    if len(np.unique(chosen)) < len(chosen):
+        values, counts = np.unique(chosen, return_counts=True)
+        raise SourceError(f"sites must be distinct, but vertex {values[counts > 1][0]} is there twice")
+    lost = np.flatnonzero(~triangles.referenced[chosen])
+    if len(lost):
+        raise SourceError(f"sites[{lost[0]}] = {chosen[lost[0]]} is a vertex that no face uses: it has no cell")
+    return _Relaxation(triangles).relaxed(chosen, int(rounds))
+
+
+class _Relaxation:
+    """The solvers of a mesh, and the areas of its vertices."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+        self._vectors = VectorHeatSolver(mesh, refine="unfold")
+        self._distances = HeatMethodSolver(mesh, refine="unfold")
+        self._tracer = Tracer(mesh)
+        self._areas = np.bincount(mesh.F.ravel(), np.repeat(mesh.measures / 3, 3), mesh.n_vertices)
+
+    def relaxed(self, sites: IntArray, rounds: int) -> CentroidalSites:
+        """Sites moved for some rounds."""
+        sites, rows = sites.copy(), self._rows(sites)
+        labels, energy = self._cells(rows)
+        energies = [energy]
+        for _ in range(rounds):
+            moved, new_rows = self._moved(sites, rows, labels)
+            if (moved == sites).all():
+                break
+            sites, rows = moved, new_rows
+            labels, energy = self._cells(rows)
+            energies.append(energy)
+        return CentroidalSites(sites, labels, np.array(energies))
+
+    def _rows(self, sites: IntArray) -> FloatArray:
+        """Distances (k, n) from each site."""
+        return np.asarray(self._distances.distances([[int(site)] for site in sites]))
+
+    def _cells(self, rows: FloatArray) -> tuple[IntArray, float]:
+        nearest = rows.min(axis=0)
+        reached = np.isfinite(nearest)
+        labels = np.where(reached, rows.argmin(axis=0), -1)
+        return labels, float(self._areas[reached] @ nearest[reached] ** 2)
+
+    def _moved(self, sites: IntArray, rows: FloatArray, labels: IntArray) -> tuple[IntArray, FloatArray]:
+        """The sites after a round, and the distances from them."""
+        steps = np.array([self._mean(int(site), labels == i) for i, site in enumerate(sites)])
+        own = np.array([self._of_cell(row, labels == i) for i, row in enumerate(rows)])
+        sites, rows = sites.copy(), rows.copy()
+        waiting = np.arange(len(sites))
+        for _ in range(_SHORTER + 1):
+            ends = self._tracer.exp(sites[waiting], steps[waiting])
+            corner = self._mesh.F[ends.faces, ends.barycentric.argmax(axis=1)]
+            # Inside the cell, so that no two sites meet.
+            moves = (corner != sites[waiting]) & (labels[corner] == waiting)
+            waiting, corner, steps = waiting[moves], corner[moves], steps / 2
+            if not len(waiting):
+                break
+            trial = self._rows(corner)
+            lower = np.array([self._of_cell(row, labels == i) < own[i] for i, row in zip(waiting, trial, strict=True)])
+            sites[waiting[lower]], rows[waiting[lower]] = corner[lower], trial[lower]
+            waiting = waiting[~lower]
+            if not len(waiting):
+                break
+        return sites, rows
+
+    def _mean(self, site: int, cell: BoolArray) -> FloatArray:
+        """The mean (2,) of the log map of a site over a cell."""
+        area = self._areas * cell
+        return np.asarray(area @ self._vectors.log_map(site) / area.sum())
+
+    def _of_cell(self, row: FloatArray, cell: BoolArray) -> float:
+        return float(self._areas[cell] @ row[cell] ** 2)

@@ -1,0 +1,214 @@
+"""Means and medians on surfaces, and geodesic Bezier curves, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import flat_perturbed
+
+from heat_igl import (
+    Mesh,
+    MeshError,
+    SourceError,
+    SurfacePoints,
+    centroidal_voronoi,
+    geodesic_bezier,
+    karcher_mean,
+    pair_distances,
+    shapes,
+    voronoi_cells,
+)
+
+CELLS = 12
+
+
+def flat_torus() -> Mesh:
+    """The flat torus of circumference 1, folded flat twice: lengths along the surface are not changed by folds."""
+    along = np.minimum(np.arange(CELLS), CELLS - np.arange(CELLS)) / CELLS
+    x, y = np.meshgrid(along, along, indexing="ij")
+    V = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+    return Mesh(V, shapes.lattice_faces(CELLS, CELLS, True, True))
+
+
+def torus_vertex(cell: np.ndarray) -> np.ndarray:
+    return cell[..., 0] % CELLS * CELLS + cell[..., 1] % CELLS
+
+
+def torus_coordinates(mesh: Mesh, points: SurfacePoints) -> np.ndarray:
+    """Of one point near the origin, in cells."""
+    cell = np.stack(np.divmod(mesh.F[points.faces[0]], CELLS), axis=1)
+    return points.barycentric[0] @ ((cell + CELLS // 2) % CELLS - CELLS // 2)
+
+
+def sphere_mean(P: np.ndarray, weights: np.ndarray, p: float) -> np.ndarray:
+    """The mean on the unit sphere, by the Karcher iteration with the log map of the sphere."""
+    z = weights @ P
+    z /= np.linalg.norm(z)
+    for _ in range(2000):
+        angle = np.arccos(np.clip(P @ z, -1, 1))
+        log = (P - np.cos(angle)[:, None] * z) * (angle / np.sin(angle))[:, None]
+        share = weights * angle ** (p - 2)
+        step = share @ log / (share.sum() * max(p - 1, 1))
+        size = np.linalg.norm(step)
+        if size < 1e-14:
+            break
+        z = np.cos(size) * z + np.sin(size) * step / size
+    return z
+
+
+def test_means_on_the_flat_torus_are_those_of_the_plane():
+    mesh = flat_torus()
+    rng = np.random.default_rng(0)
+    for _ in range(6):
+        cell = rng.integers(-2, 3, (5, 2))
+        weights = rng.uniform(0, 2, 5)
+        found = karcher_mean(mesh, torus_vertex(cell), weights)
+        np.testing.assert_allclose(torus_coordinates(mesh, found), weights @ cell / weights.sum(), atol=1e-6)
+
+
+def test_medians_on_the_flat_torus_are_those_of_the_plane():
+    mesh = flat_torus()
+    # Where the diagonals of a convex quadrilateral meet.
+    found = karcher_mean(mesh, torus_vertex(np.array([[-2, -1], [2, 2], [-1, 2], [2, -2]])), p=1)
+    share = np.linalg.solve([[4, -3], [3, 4]], [1, 3])[0]
+    np.testing.assert_allclose(torus_coordinates(mesh, found), [-2 + 4 * share, -1 + 3 * share], atol=1e-6)
+    # A corner with an angle of 120 degrees or more, and a point that weighs as much as all others.
+    cell = np.array([[0, 0], [2, -1], [-2, -1]])
+    np.testing.assert_array_equal(torus_coordinates(mesh, karcher_mean(mesh, torus_vertex(cell), p=1)), [0, 0])
+    heavy = karcher_mean(mesh, torus_vertex(cell), [1, 1, 2], p=1)
+    np.testing.assert_array_equal(torus_coordinates(mesh, heavy), [-2, -1])
+
+
+@pytest.mark.parametrize("p", [1, 1.5, 2, 4])
+def test_means_on_spheres_approach_those_of_the_sphere(p):
+    errors = []
+    for level in (2, 4):
+        mesh = shapes.icosphere(level)
+        # Vertices of the coarser sphere are the first of the finer.
+        cap = np.flatnonzero(mesh.V[:162] @ [0.36, 0.48, 0.8] > 0.4)
+        chosen = np.random.default_rng(4).choice(cap, 6, replace=False)
+        weights = np.random.default_rng(5).uniform(0.5, 1.5, 6)
+        found = karcher_mean(mesh, chosen, weights, p=p).positions(mesh)[0]
+        expected = sphere_mean(mesh.V[chosen], weights, p)
+        errors.append(np.linalg.norm(found / np.linalg.norm(found) - expected))
+    assert errors[1] < 4e-3
+    assert errors[1] < errors[0] / 3
+
+
+def test_two_points_divide_their_geodesic(cow):
+    mesh = Mesh(cow.V, cow.F)
+    ends = [100, 1800]
+    if mesh.components[ends[0]] != mesh.components[ends[1]]:
+        pytest.skip("different parts of the cow")
+    length = pair_distances(mesh, [ends])[0]
+    found = karcher_mean(mesh, ends, [3, 1])
+    refined = np.array([_length(mesh, found, end) for end in ends])
+    np.testing.assert_allclose(refined, length * np.array([0.25, 0.75]), rtol=1e-2)
+
+
+def _length(mesh: Mesh, place: SurfacePoints, vertex: int) -> float:
+    from heat_igl import geodesic_path
+
+    return float(geodesic_path(mesh, [place, vertex]).lengths(mesh).sum())
+
+
+def test_single_points_are_their_means(sphere):
+    point = SurfacePoints([7], [[0.2, 0.3, 0.5]])
+    found = karcher_mean(sphere, point)
+    np.testing.assert_array_equal(found.faces, [7])
+    np.testing.assert_allclose(found.barycentric, [[0.2, 0.3, 0.5]])
+    same = karcher_mean(sphere, [5, 9, 30], [0, 1, 0])
+    np.testing.assert_array_equal(same.positions(sphere)[0], sphere.V[9])
+    mixed = karcher_mean(sphere, [point, 40])
+    gap = [_length(sphere, mixed, 40), _length(sphere, point, 40)]
+    assert gap[0] == pytest.approx(gap[1] / 2, rel=1e-6)
+
+
+def test_bezier_curves_in_the_plane_are_polynomials():
+    mesh = flat_perturbed(shapes.grid(8))
+    control = SurfacePoints([3, 60, 100, 30], np.random.default_rng(0).dirichlet([1, 1, 1], 4))
+    P = control.positions(mesh)
+    pieces = 8
+    curve = geodesic_bezier(mesh, control, pieces)
+    t = np.arange(pieces + 1)[:, None] / pieces
+    expected = (1 - t) ** 3 * P[0] + 3 * t * (1 - t) ** 2 * P[1] + 3 * t**2 * (1 - t) * P[2] + t**3 * P[3]
+    corners = curve.positions(mesh)
+    gap = np.linalg.norm(corners[:, None] - expected, axis=2).min(axis=0)
+    np.testing.assert_allclose(gap, 0, atol=1e-9)
+    np.testing.assert_allclose(curve.lengths(mesh).sum(), np.linalg.norm(np.diff(expected, axis=0), axis=1).sum())
+
+
+def test_bad_arguments_of_means_are_told_apart(sphere):
+    with pytest.raises(ValueError, match="weights must be 2 numbers, one for each point"):
+        karcher_mean(sphere, [1, 2], [1, 2, 3])
+    with pytest.raises(ValueError, match="not negative"):
+        karcher_mean(sphere, [1, 2], [1, -1])
+    with pytest.raises(ValueError, match="not all 0"):
+        karcher_mean(sphere, [1, 2], [0, 0])
+    with pytest.raises(ValueError, match="weights must be 2 real numbers"):
+        karcher_mean(sphere, [1, 2], ["a", "b"])
+    for p in (0.5, np.inf, np.nan, "2", True):
+        with pytest.raises(ValueError, match="p must be a number of at least 1"):
+            karcher_mean(sphere, [1, 2], p=p)
+    with pytest.raises(SourceError, match=r"points\[1\] = -1 is no vertex"):
+        karcher_mean(sphere, [1, -1])
+    two = Mesh(np.concatenate([sphere.V, sphere.V + 9]), np.concatenate([sphere.F, sphere.F + sphere.n_vertices]))
+    for p in (1, 2):
+        with pytest.raises(SourceError, match="different components"):
+            karcher_mean(two, [0, sphere.n_vertices], p=p)
+    with pytest.raises(MeshError, match="tetrahedral"):
+        karcher_mean(shapes.box(2), [0, 1])
+    with pytest.raises(ValueError, match="pieces must be a positive integer"):
+        geodesic_bezier(sphere, [0, 1, 2], 0)
+    with pytest.raises(SourceError, match="two control points or more, not 1"):
+        geodesic_bezier(sphere, [0])
+    assert len(geodesic_bezier(sphere, [0, 1, 2], 2))
+
+
+def test_sites_become_centroidal():
+    mesh = shapes.grid(21)
+    found = centroidal_voronoi(mesh, [0, 1, 2, 23, 24, 46, 200, 300, 400])
+    assert (np.diff(found.energies) < 0).all()
+    assert len(np.unique(found.sites)) == 9
+    cells = voronoi_cells(mesh, found.sites)
+    np.testing.assert_array_equal(found.labels, cells.labels)
+    areas = np.bincount(mesh.F.ravel(), np.repeat(mesh.measures / 3, 3), mesh.n_vertices)
+    assert found.energies[-1] == pytest.approx(areas @ cells.distance**2, rel=1e-3)
+    # Hexagons are the best cells of a plane, and squares are better than what 9 cells of a square come to by chance.
+    hexagons = 5 / (18 * np.sqrt(3)) / 9
+    assert hexagons < found.energies[-1] < 1.4 * hexagons
+    means = np.stack([areas[found.labels == i] @ mesh.V[found.labels == i] for i in range(9)])
+    means /= np.bincount(found.labels, areas)[:, None]
+    assert np.linalg.norm(means - mesh.V[found.sites], axis=1).max() < 1.5 / 21
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_energies_fall_on_coarse_meshes_too(seed):
+    mesh = shapes.torus(7, 14)
+    sites = np.random.default_rng(seed).choice(mesh.n_vertices, 12, replace=False)
+    energies = centroidal_voronoi(mesh, sites).energies
+    assert len(energies) > 1
+    assert (np.diff(energies) < 0).all()
+
+
+def test_relaxation_stops_where_no_site_moves():
+    mesh = shapes.icosphere(3)
+    found = centroidal_voronoi(mesh, [0, 1, 2, 3, 4, 5])
+    again = centroidal_voronoi(mesh, found.sites)
+    np.testing.assert_array_equal(again.sites, found.sites)
+    assert len(again.energies) == 1
+    assert len(centroidal_voronoi(mesh, [0, 1, 2], rounds=0).energies) == 1
+
+
+def test_bad_sites_are_told_apart():
+    mesh = shapes.grid(4)
+    with pytest.raises(SourceError, match="sites must be distinct, but vertex 3 is there twice"):
+        centroidal_voronoi(mesh, [3, 3])
+    with pytest.raises(SourceError, match=r"sites\[1\] = 25 is no vertex"):
+        centroidal_voronoi(mesh, [3, 25])
+    with pytest.raises(ValueError, match="rounds must be an integer of at least 0"):
+        centroidal_voronoi(mesh, [3], rounds=-1)
+    loose = Mesh(np.concatenate([mesh.V, [[9, 9, 9]]]), mesh.F)
+    with pytest.raises(SourceError, match=r"sites\[1\] = 25 is a vertex that no face uses"):
+        centroidal_voronoi(loose, [3, 25])
+    assert len(centroidal_voronoi(mesh, [3]).sites) == 1
