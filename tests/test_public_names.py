@@ -26,6 +26,7 @@ read_distances_within read_mesh read_point_cloud
 read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_operators split_long_edges sublevel_areas
 tangent_frames trace_geodesic CentroidalSites GeodesicPathSolver centroidal_voronoi
 geodesic_bezier geodesic_path handle_loops karcher_mean straighten
+Directions log_map
 unfolded_distance validate voronoi_cells write_curves write_distances_within write_mesh write_point_cloud
 fibre_metric metric_operators
 CutMesh OrientedPoints SignedHeatSolver VoxelBox cut region_boundary volume_signed_distance
@@ -63,6 +64,7 @@ HeatMethodSolver.distance(self, sources, cutoff=None)
 HeatMethodSolver.distances(self, source_sets, out=None, progress=False, dtype=None, *, cutoff=None)
 HeatMethodSolver.voronoi(self, sources, *, cutoff=None)
 HeatMethodSolver.solve(self, sources)
+HeatMethodSolver.directions(self, sources, *, tolerance=None)
 HeatMethodSolver.distance_vjp(self, sources)
 isolines(mesh, values, levels)
 offset_curves(mesh, solver, sources, radius)
@@ -72,6 +74,7 @@ shortest_paths(mesh, distance, targets, sources=None)
 tangent_frames(mesh)
 trace_geodesic(mesh, start, direction, length)
 exp_map(mesh, source, vectors)
+log_map(mesh, source, *, method='unfold')
 connection_laplacian(mesh, laplacian='intrinsic-delaunay')
 VectorHeatSolver(mesh, *, t_coef=None, t=None, refine=None, backend='auto')
 VectorHeatSolver.extend(self, sources, values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -245,3 +246,77 @@ def test_a_large_sphere_is_finite_and_right():
     error = angle_between(found, frames.from_world(sphere_transport(p, mesh.V, w)))[near]
     assert error.mean() < np.radians(0.1)
     assert error.max() < np.radians(1)
+
+
+@pytest.mark.parametrize("refine", ["unfold", "exact"])
+def test_transport_around_the_corner_of_a_box_turns_by_a_right_angle(refine):
+    """The holonomy of a triangle of geodesics is the curvature inside: pi / 2 around a corner, else 0."""
+    solid = shapes.box(8)
+    faces = igl.boundary_facets(solid.F)[0]
+    used, F = np.unique(faces, return_inverse=True)
+    mesh = Mesh(solid.V[used], F.reshape(-1, 3))
+    low, high = mesh.V.min(axis=0), mesh.V.max(axis=0)
+    at = (mesh.V - low) / (high - low)
+
+    def vertex(*place: float) -> int:
+        return int(np.argmin(np.linalg.norm(at - place, axis=1)))
+
+    solver = VectorHeatSolver(mesh, refine=refine)
+
+    def holonomy(*loop: int) -> complex:
+        turned = 1.0 + 0j
+        for start, end in zip(loop, [*loop[1:], loop[0]], strict=True):
+            turned *= complex(*solver.transport(start, [1, 0])[end])
+        return turned
+
+    around = holonomy(vertex(0.625, 0.75, 0), vertex(0, 0.75, 0.25), vertex(0.625, 1, 0.375))
+    beside = holonomy(vertex(0.625, 0.75, 0), vertex(0.25, 0.5, 0), vertex(0, 0.625, 0.375))
+    np.testing.assert_allclose(
+        [abs(around), abs(np.angle(around)), abs(np.angle(beside))], [1, np.pi / 2, 0], atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("refine", ["unfold", "exact"])
+@pytest.mark.parametrize("mesh", [shapes.strip(1500, 3), flat_perturbed(shapes.grid(15))])
+def test_transport_along_paths_in_the_plane_changes_nothing(mesh, refine):
+    solver = VectorHeatSolver(mesh, refine=refine)
+    frames, source = solver.frames, mesh.n_vertices // 3
+    transported = frames.to_world(solver.transport(source, frames.from_world([[0.6, -0.8, 0]], [source])))
+    np.testing.assert_allclose(transported, np.broadcast_to([0.6, -0.8, 0], transported.shape), atol=1e-8)
+
+
+def test_transport_along_paths_converges_on_the_sphere():
+    errors = []
+    for level in (3, 4, 5):
+        mesh = shapes.icosphere(level)
+        solver = VectorHeatSolver(mesh, refine="unfold")
+        frames, p = solver.frames, mesh.V[0]
+        near = np.flatnonzero((mesh.V @ p > -0.5) & (mesh.V @ p < 1))
+        expected = frames.from_world(sphere_transport(p, mesh.V, frames.to_world([[1.0, 0]], [0])[0]))
+        errors.append(angle_between(solver.transport(0, [1, 0]), expected)[near].mean())
+    assert errors[2] < 0.5 * errors[1] < 0.25 * errors[0]
+    assert errors[2] < np.radians(0.2)
+
+
+def test_along_paths_the_nearest_source_alone_counts(sphere):
+    solver = VectorHeatSolver(sphere, refine="exact")
+    sources = [40, 7, 40]
+    labels = heat_igl.HeatMethodSolver(sphere, refine="exact").voronoi([40, 7]).labels
+    np.testing.assert_allclose(solver.extend(sources, [1.0, 5.0, 2.0]), np.where(labels == 0, 1.5, 5.0))
+    length = np.hypot(*solver.transport(sources, [[1, 0], [3, 4], [0, 1]]).T)
+    np.testing.assert_allclose(length, np.where(labels == 0, np.sqrt(0.5), 5.0))
+    np.testing.assert_allclose(solver.log_map(7), heat_igl.log_map(sphere, 7, method="exact"), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", [name for name, mesh in SHAPES.items() if not mesh.boundary.any()])
+def test_transport_on_closed_surfaces_is_that_of_potpourri3d(name):
+    """With the same time step, weights and masses; at a boundary the connections differ."""
+    potpourri3d = pytest.importorskip("potpourri3d")
+    mesh = SHAPES[name]
+    theirs = potpourri3d.MeshVectorHeatSolver(mesh.V, mesh.F)
+    X, Y, _ = theirs.get_tangent_frames()
+    solver = VectorHeatSolver(mesh)
+    vector = solver.frames.to_world([[1.0, 0]], [3])[0]
+    found = theirs.transport_tangent_vector(3, [X[3] @ vector, Y[3] @ vector])
+    expected = solver.frames.from_world(found[:, :1] * X + found[:, 1:] * Y)
+    assert np.median(angle_between(solver.transport(3, [1, 0]), expected)) < 1e-6

@@ -5,6 +5,7 @@ from heat_igl.curves.cutting import CutMesh, MeshPiece, cut
 from heat_igl.curves.geodesics import GeodesicPathSolver, geodesic_path, straighten
 from heat_igl.curves.handles import handle_loops
 from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas
+from heat_igl.curves.log_map import log_map
 from heat_igl.curves.means import karcher_mean
 from heat_igl.curves.paths import shortest_paths
 from heat_igl.curves.relaxation import CentroidalSites, centroidal_voronoi
@@ -24,6 +25,7 @@ __all__ = [
     "handle_loops",
     "isolines",
     "karcher_mean",
+    "log_map",
     "offset_curves",
     "shortest_paths",
     "straighten",

@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl.errors import SourceError
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.kernels import straightest
-from heat_igl.mesh import ON_SIDE, Mesh, SurfaceCurve, SurfacePoints
+from heat_igl.mesh import ON_SIDE, Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, ordered_vertices
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -23,13 +23,13 @@ kernel: Any = straightest
 _FEW = 500
 
 
-def trace_geodesic(mesh: Mesh, start: Sources, direction: ArrayLike, length: float) -> SurfaceCurve:
+def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length: float) -> SurfaceCurve:
     """The straightest geodesic from a point in a direction (Polthier and Schmies 1998).
 
     Parameters
     ----------
-    mesh : Mesh
-        Triangles, manifold and oriented alike.
+    mesh : mesh
+        Whatever `as_mesh` takes, with triangles, manifold and oriented alike.
     start : int or SurfacePoints
         A vertex, or one point in a face.
     direction : (2,) or (3,) array_like
@@ -65,7 +65,7 @@ def trace_geodesic(mesh: Mesh, start: Sources, direction: ArrayLike, length: flo
     on exactly one side of it: then it leaves at pi on this side, as a straight line in the plane does along a straight
     boundary or past a corner. It is not the shortest path in general.
     """
-    tracer = Tracer(mesh)
+    tracer = Tracer(as_simplices(mesh))
     begin = tracer.starts("start", start)
     if len(begin.faces) != 1:
         raise SourceError(f"start must be one vertex or point, not {len(begin.faces)}")
@@ -78,13 +78,13 @@ def trace_geodesic(mesh: Mesh, start: Sources, direction: ArrayLike, length: flo
     return tracer.curve(begin, turn, np.array([distance]))
 
 
-def exp_map(mesh: Mesh, source: Sources, vectors: ArrayLike) -> SurfacePoints:
+def exp_map(mesh: MeshLike, source: Sources, vectors: ArrayLike) -> SurfacePoints:
     """The exponential map: the ends of straightest geodesics from a point along tangent vectors.
 
     Parameters
     ----------
-    mesh : Mesh
-        Triangles, manifold and oriented alike.
+    mesh : mesh
+        Whatever `as_mesh` takes, with triangles, manifold and oriented alike.
     source : int, sequence of int or SurfacePoints
         A vertex or point for all vectors, or one for each.
     vectors : (k, 2) or (k, 3) array_like
@@ -105,7 +105,7 @@ def exp_map(mesh: Mesh, source: Sources, vectors: ArrayLike) -> SurfacePoints:
     -----
     Traced on all processors (`HEAT_IGL_NUM_THREADS`), with the same bits for any number of them.
     """
-    return Tracer(mesh).exp(source, vectors)
+    return Tracer(as_simplices(mesh)).exp(source, vectors)
 
 
 class _Starts(NamedTuple):

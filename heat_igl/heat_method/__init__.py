@@ -1,6 +1,7 @@
 """`HeatMethodSolver`: the steps put together, factored once, asked many times."""
 
 from heat_igl.heat_method.checking import AnswerCheck
+from heat_igl.heat_method.directions import Directions
 from heat_igl.heat_method.front_door import DistanceMethod, geodesic_distance
 from heat_igl.heat_method.options import Backend, Boundary, Laplacian, Magnitude, Refine, SolverOptions
 from heat_igl.heat_method.signed_heat import Level, SignedHeatSolver
@@ -15,6 +16,7 @@ __all__ = [
     "Backend",
     "Boundary",
     "Diagnostics",
+    "Directions",
     "DistanceMethod",
     "HeatMethodSolver",
     "HeatSolution",

@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import AccuracyWarning
+from heat_igl.errors import AccuracyWarning, MeshError
 from heat_igl.heat_method.batches import checked_cutoff, cut_off
 from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.construction import PreparedSolver
 from heat_igl.heat_method.derivatives import DistanceDerivative
 from heat_igl.heat_method.differentiation import differentiated
+from heat_igl.heat_method.directions import Directions, directions
 from heat_igl.heat_method.integration import damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
 from heat_igl.heat_method.solution import HeatSolution, LabelledDistance
+from heat_igl.intrinsic import TangentFrames, tangent_frames
 from heat_igl.linear import Backend
-from heat_igl.mesh import MeshLike, as_mesh
+from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_mesh
 from heat_igl.operators import Laplacian
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
 from heat_igl.steps import Boundary
-from heat_igl.typing import ArrayLike, FloatArray
-from heat_igl.unfolding import Refine, UnfoldingSolver
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
+from heat_igl.unfolding import FrontSolver, PathAngles, Refine, UnfoldingSolver
 
 __all__ = ["HeatMethodSolver", "heat_method_distance"]
 
@@ -223,6 +226,54 @@ class HeatMethodSolver(PreparedSolver):
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
+
+    def directions(self, sources: Sources, *, tolerance: float | None = None) -> Directions:
+        """Distance, and the directions in which the shortest paths leave the sources and arrive.
+
+        Parameters
+        ----------
+        sources : sources
+            As for `distance`, with its errors. Points at most an eighth of a mean edge length apart stand for curves,
+            and the paths start there.
+        tolerance : float, optional
+            For ``refine="unfold"``, see `Refinement.unfold`. With the default, departures are wrong by 0.1 to 0.2
+            degrees in the mean, and by less than 0.02 degrees in the median; with 1e-6 by half of that, and hardly at
+            all away from the cut locus. With 0, and with less than the default on up to 10 000 vertices, windows find
+            the paths, which are exact.
+
+        Returns
+        -------
+        Directions
+            Distances and labels as those of `voronoi`, angles in the frames of `tangent_frames`, and the gradient.
+
+        Raises
+        ------
+        MeshError
+            If the mesh has no tangent frames.
+        ValueError
+            Without ``refine="unfold"`` or ``refine="exact"``, for a solver that was made from operators, and if
+            `tolerance` is not a number from 0 to 1.
+        """
+        found = self._paths(sources, tolerance)
+        return directions(*found, self._frames)
+
+    def _paths(
+        self, sources: Sources, tolerance: float | None
+    ) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
+        """Distance, labels, and angles and starts of the shortest paths."""
+        last_steps = self._parts.last_steps
+        if not isinstance(last_steps, UnfoldingSolver) or self._parts.options.refine == "sweep":
+            raise ValueError('directions follow paths: make the solver with refine="unfold" or refine="exact"')
+        if isinstance(last_steps, FrontSolver):
+            raise MeshError("directions need triangles that fit together: fronts through this domain follow no paths")
+        (term,) = self._source_terms([self._source_set(sources)])
+        return last_steps.directed(term, self._order([term])[:, 0], tolerance)
+
+    @cached_property
+    def _frames(self) -> TangentFrames:
+        if not isinstance(self._mesh, Mesh):
+            raise ValueError("directions need the positions of a mesh, which this solver does not have")
+        return tangent_frames(self._mesh)
 
     def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
         """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.

@@ -11,7 +11,7 @@ from heat_igl.errors import MeshError
 from heat_igl.intrinsic.gluing import intrinsic_triangulation
 from heat_igl.intrinsic.polar_angles import PolarAngles, polar_angles
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["TangentFrames", "checked_vectors", "tangent_frames"]
@@ -169,7 +169,7 @@ class TangentFrames:
         return 3 * face + corner
 
 
-def tangent_frames(mesh: Mesh) -> TangentFrames:
+def tangent_frames(mesh: MeshLike) -> TangentFrames:
     """Orthonormal frames at the vertices of a triangle mesh, and their polar angles.
 
     Angles around a vertex are those of the faces times one factor per vertex, so that they sum to 2 pi, and to pi on
@@ -183,8 +183,9 @@ def tangent_frames(mesh: Mesh) -> TangentFrames:
 
     Parameters
     ----------
-    mesh : Mesh
-        Triangles, manifold and oriented alike, with or without boundary.
+    mesh : mesh
+        Whatever `as_mesh` takes, with triangles (those of polygons, too), manifold and oriented alike, with or without
+        boundary.
 
     Returns
     -------
@@ -199,6 +200,7 @@ def tangent_frames(mesh: Mesh) -> TangentFrames:
         Moebius strip any orientation has such neighbours), or the faces at a vertex are not one fan. The message names
         the first offender.
     """
+    mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("tangent frames need triangles, but the mesh is tetrahedral")
     # Not mollified: mollification gives a flat triangle some height, and would bend lines across it.

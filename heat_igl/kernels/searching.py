@@ -59,14 +59,15 @@ def search(q: Query, v: cython.int) -> cython.void:
             w = cython.address(q.walk[step.vertex])
             if w.distance < INFINITY:
                 turned.right = turned.left = -1.0
+                back: cython.double = atan2(wx * view.by - wy * view.bx, wx * (wx - view.bx) + wy * (wy - view.by))
+                there: cython.double = step.direction + back
                 if w.fan == step.fan:
-                    back: cython.double = atan2(wx * view.by - wy * view.bx, wx * (wx - view.bx) + wy * (wy - view.by))
-                    turned = savings(step.direction + back, w)
+                    turned = savings(there, w)
                 bend: cython.double = turned.left if turned.left >= turned.right else -turned.right
                 if max(turned.right, turned.left) < -STRAIGHT:
                     bend = REAL_BEND
                 distance: cython.double = sqrt(wx * wx + wy * wy) + w.distance
-                take(q, distance, step.vertex, wx, wy, bend, view.spoke, -first.along, -first.height)
+                take(q, distance, step.vertex, wx, wy, bend, view.spoke, -first.along, -first.height, there)
                 if w.fan == NO_FAN:
                     break
             # Between a and w, with w as the left limit; and between w and b.

@@ -210,8 +210,12 @@ class _Tracer:
             for c in range(3):
                 a = dx * (p.y[c] - p.start_y) - dy * (p.x[c] - p.start_x)
                 b = dx * (p.y[(c + 1) % 3] - p.start_y) - dy * (p.x[(c + 1) % 3] - p.start_x)
-                if min(-a, b) > best:
-                    best = min(-a, b)
+                between: cython.double = min(-a, b)
+                if fabs(a) + fabs(b) < ON_SIDE * self.tables.l[p.f, (p.side + c) % 3]:
+                    # It runs along this side, and leaves at the end: a crossing would be rounding.
+                    between -= 1e200
+                if between > best:
+                    best = between
                     k = c
         elif not self.ray.is_at_tail and not dx * (p.y[2] - p.start_y) - dy * (p.x[2] - p.start_x) > 0.0:
             k = 2

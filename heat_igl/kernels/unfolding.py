@@ -219,6 +219,8 @@ def _settle(q: Query, v: cython.int) -> cython.void:
     y: cython.double = found.y
     reach: cython.double = sqrt(x * x + y * y)
     offset: cython.double = end.distance
+    departure: cython.double = found.there
+    root: cython.int = found.end
     if found.saving != REAL_BEND and end.reach > 0.0:
         # On to the last bend of that path, in the direction in which it is seen from the end.
         c: cython.double = cos(found.saving)
@@ -226,8 +228,13 @@ def _settle(q: Query, v: cython.int) -> cython.void:
         further: cython.double = end.reach / reach
         x, y = x + further * (x * c - y * s), y + further * (x * s + y * c)
         reach = sqrt(x * x + y * y)
-        offset = end.offset
+        offset, root = end.offset, end.root
+        # Turned about that bend from the direction to the end.
+        ex: cython.double = found.x - x
+        ey: cython.double = found.y - y
+        departure = end.departure + atan2(ey * x - ex * y, -(ex * x + ey * y))
     walk.distance, walk.offset, walk.reach, walk.label = found.distance, offset, reach, end.label
+    walk.departure, walk.root = departure, root
     walk.angle = turn.here + atan2(found.ax * y - found.ay * x, found.ax * x + found.ay * y)
     walk.fan, walk.total = turn.fan_here, q.t.total[turn.fan_here]
 
@@ -265,3 +272,11 @@ def views(
             one.fan = turn.fan_here if one.reach > 1e-12 * spoke.base else NO_FAN
             one.angle = turn.here + atan2(ax * y - ay * x, ax * x + ay * y)
             one.total = t.total[turn.fan_here]
+            # At the point, from the side of corners 0 and 1.
+            ex: cython.double = spoke.base
+            ey: cython.double = 0.0
+            if c == 0:
+                ex, ey = ax, ay
+            elif c == 1:
+                ex, ey = -ax - spoke.base, -ay
+            one.departure = atan2(ey * x - ex * y, -(ex * x + ey * y))

@@ -58,7 +58,7 @@ def look_around(q: Query, v: cython.int) -> cython.double:
                 smallest = min(smallest, advice.promise)
             if most >= -STRAIGHT:
                 bend = most if turned.left >= turned.right else -most
-        take(q, spoke.length + w.distance, spoke.neighbour, spoke.length, 0.0, bend, k, 1.0, 0.0)
+        take(q, spoke.length + w.distance, spoke.neighbour, spoke.length, 0.0, bend, k, 1.0, 0.0, turn.there)
     return smallest
 
 
@@ -84,6 +84,7 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
     left_advice = cython.address(q.advice[spoke.next - q.t.first[v]])
     right.vertex, right.length = spoke.neighbour, spoke.length
     left.vertex, left.length = spoke.next_neighbour, q.t.spoke[spoke.next].length
+    right.there, left.there = q.t.turn[k].there, q.t.turn[spoke.next].there
     right.saving = right_advice.saving if right_advice.side == SAYS_LEFT else -1.0
     left.saving = left_advice.saving if left_advice.side == SAYS_RIGHT else -1.0
     right.x, right.y, left.x, left.y = view.ax, view.ay, view.bx, view.by
@@ -91,7 +92,7 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
     if _may_agree(q, cython.address(right), cython.address(left)):
         distance = _common_source(q, right, left)
         if distance < INFINITY:
-            take(q, distance, right.vertex, right.x, right.y, right.saving, k, first_x, first_y)
+            take(q, distance, right.vertex, right.x, right.y, right.saving, k, first_x, first_y, 0.0)
             return -1
     has_points: cython.bint = q.first_inside.shape[0] > 0
     far: cython.double = 4.0 * q.found.distance * q.found.distance
@@ -123,14 +124,15 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
             # Of a bend close behind w, pulling tight may leave nothing.
             reach: cython.double = max(w.reach, min(length, w.distance))
             turned.right = turned.left = -1.0
+            back: cython.double = atan2(wx * view.by - wy * view.bx, squared - (view.bx * wx + view.by * wy))
             if w.fan == step.fan:
-                back: cython.double = atan2(wx * view.by - wy * view.bx, squared - (view.bx * wx + view.by * wy))
                 turned = savings(step.direction + back, w)
             most: cython.double = max(turned.right, turned.left)
             if most < STRAIGHT:
                 # A source, a real bend, or straight on along a path that is known: the walk is over.
                 bend: cython.double = most if most >= -STRAIGHT else REAL_BEND
-                take(q, length + w.distance, step.vertex, wx, wy, bend, k, first_x, first_y)
+                there: cython.double = step.direction + back
+                take(q, length + w.distance, step.vertex, wx, wy, bend, k, first_x, first_y, there)
                 return -1
             if turned.left >= turned.right:
                 right.x, right.y, right.length, right.saving, right.vertex = wx, wy, length, most, step.vertex
@@ -146,16 +148,16 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
                 if _may_agree(q, cython.address(right), cython.address(left)):
                     distance = _common_source(q, right, left)
                     if distance < INFINITY:
-                        take(q, distance, right.vertex, right.x, right.y, right.saving, k, first_x, first_y)
+                        take(q, distance, right.vertex, right.x, right.y, right.saving, k, first_x, first_y, 0.0)
                 break
         if view.ax * view.ax + view.ay * view.ay > far and view.bx * view.bx + view.by * view.by > far:
             break
     distance = right.length + q.walk[right.vertex].distance
     bend = right.saving if right.saving > 0.0 else REAL_BEND
-    take(q, distance, right.vertex, right.x, right.y, bend, k, first_x, first_y)
+    take(q, distance, right.vertex, right.x, right.y, bend, k, first_x, first_y, right.there)
     distance = left.length + q.walk[left.vertex].distance
     bend = -left.saving if left.saving > 0.0 else REAL_BEND
-    take(q, distance, left.vertex, left.x, left.y, bend, k, first_x, first_y)
+    take(q, distance, left.vertex, left.x, left.y, bend, k, first_x, first_y, left.there)
     return wait_for
 
 
@@ -254,5 +256,5 @@ def cross_crowded(q: Query, k: cython.int) -> cython.void:
         if fabs(turn - atan2(y, x)) < 1e-8:
             # Seen from v, a lies at (-along, -height), and the point x further along and y below it.
             saving: cython.double = atan2(along * y + height * x, height * y - along * x)
-            take(q, distance, spoke.neighbour, -along, -height, saving, k, -along, -height)
+            take(q, distance, spoke.neighbour, -along, -height, saving, k, -along, -height, 0.0)
             return

@@ -1,4 +1,4 @@
-from libc.math cimport M_PI, sqrt
+from libc.math cimport M_PI, atan2, sqrt
 
 from heat_igl.kernels.half_edges cimport HalfEdges
 
@@ -20,18 +20,21 @@ cdef enum:
 cdef struct Walk:
     double distance, offset, reach, angle, total
     int fan, label
-    double spare[2]
+    double departure
+    int root, spare
 
-# A source inside a face.
+# A source inside a face; on a side, once for the face beyond, whose side of corners 0 and 1 is turned by `turn`.
 cdef struct Inside:
     double barycentric[3]
+    double turn
     int following, row
 
 # The best path found so far for the vertex v that is visited: its length; straight to the vertex `end` at (x, y) and on
 # by that one's own path; what pulling it tight saves in angle, positive when `end` is passed on its left and negative
-# on its right, REAL_BEND where it bends there for good; (ax, ay) is the direction of v's spoke.
+# on its right, REAL_BEND where it bends there for good; (ax, ay) is the direction of v's spoke. If the path bends
+# or ends at `end`, `there` is the direction in which it leaves that: an angle in its fan, or in its face.
 cdef struct Way:
-    double distance, x, y, saving, ax, ay
+    double distance, x, y, saving, ax, ay, there
     int end, spoke
 
 # What a neighbour says of the way to v's source: SAYS_LEFT if its own path is shorter passing left of it; the angle
@@ -81,11 +84,11 @@ cdef bint arrive(Query q, View view, double wx, double wy) noexcept nogil
 
 # Note the path of length `distance` if it is the shortest so far.
 cdef inline void take(
-    Query q, double distance, int end, double x, double y, double saving, int spoke, double ax, double ay
+    Query q, double distance, int end, double x, double y, double saving, int spoke, double ax, double ay, double there
 ) noexcept nogil:
     if distance < q.found.distance:
         q.found.distance, q.found.end, q.found.x, q.found.y = distance, end, x, y
-        q.found.saving, q.found.spoke, q.found.ax, q.found.ay = saving, spoke, ax, ay
+        q.found.saving, q.found.spoke, q.found.ax, q.found.ay, q.found.there = saving, spoke, ax, ay, there
 
 
 # The path comes from the direction `incoming` and leaves in that of `walk`, angles in a fan that sums to ``walk.total``
@@ -113,3 +116,14 @@ cdef inline double promise(double length, const Walk* walk, double saving) noexc
     cdef double straight = length + walk.reach
     cdef double squared = straight * straight - 2.0 * length * walk.reach * versine
     return walk.offset + (sqrt(squared) if squared > 0.0 else 0.0)
+
+
+# At a point (x, y) in the face behind a view: the angle from the side of corners 0 and 1 to the origin.
+cdef inline double seen_from_point(View view, double wx, double wy, double x, double y) noexcept nogil:
+    cdef double ex = wx - view.ax, ey = wy - view.ay
+    # From w, its face runs first to b and then to a.
+    if view.h % 3 == 0:
+        ex, ey = view.bx - wx, view.by - wy
+    elif view.h % 3 == 2:
+        ex, ey = view.ax - view.bx, view.ay - view.by
+    return atan2(ey * x - ex * y, -(ex * x + ey * y))

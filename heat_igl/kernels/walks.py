@@ -3,7 +3,7 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.half_edges import HalfEdges
-from cython.cimports.heat_igl.kernels.walks import REAL_BEND, View, take
+from cython.cimports.heat_igl.kernels.walks import REAL_BEND, View, seen_from_point, take
 from cython.cimports.libc.math import sqrt
 
 __all__ = ["Query"]
@@ -66,7 +66,18 @@ def arrive(q: Query, view: View, wx: cython.double, wy: cython.double) -> cython
         distance: cython.double = q.walk[point.row].distance + sqrt(x * x + y * y)
         is_seen: cython.bint = view.rx * y - view.ry * x >= -slack and x * view.ly - y * view.lx >= -slack
         if is_seen and distance < q.found.distance:
-            take(q, distance, point.row, x, y, REAL_BEND, view.spoke, -first.along, -first.height)
+            take(
+                q,
+                distance,
+                point.row,
+                x,
+                y,
+                REAL_BEND,
+                view.spoke,
+                -first.along,
+                -first.height,
+                seen_from_point(view, wx, wy, x, y) + point.turn,
+            )
             arrived = True
         entry = point.following
     return arrived

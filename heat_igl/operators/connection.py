@@ -20,7 +20,7 @@ from heat_igl.intrinsic import (
     tangent_frames,
     transport_angles,
 )
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.operators.matrices import Laplacian, Operators
 from heat_igl.operators.triangles import operators
 from heat_igl.typing import AnyArray, FloatArray
@@ -28,13 +28,13 @@ from heat_igl.typing import AnyArray, FloatArray
 __all__ = ["FaceRotations", "connection_laplacian", "edge_rotations", "face_rotations", "with_rotations"]
 
 
-def connection_laplacian(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay") -> sp.csc_matrix:
+def connection_laplacian(mesh: MeshLike, laplacian: Laplacian = "intrinsic-delaunay") -> sp.csc_matrix:
     """The connection Laplacian of a triangle mesh, in the frames of `tangent_frames`.
 
     Parameters
     ----------
-    mesh : Mesh
-        Triangles, manifold and oriented alike.
+    mesh : mesh
+        Whatever `as_mesh` takes, with triangles, manifold and oriented alike.
     laplacian : {"intrinsic-delaunay", "cotan"}
         The triangulation whose edges carry the weights, as for `operators`.
 
@@ -53,6 +53,7 @@ def connection_laplacian(mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay"
     ValueError
         If `laplacian` is neither.
     """
+    mesh = as_simplices(mesh)
     tangent_frames(mesh)  # which checks the mesh
     domain = operators(mesh, laplacian)
     return with_rotations(domain.L, edge_rotations(domain))

@@ -36,6 +36,8 @@ class VectorHeatFlow:
     fitted : bool
         As for `HeatFlow`. No weight is negative then, and Y is nowhere longer than heat that starts with the lengths
         of b.
+    mass : (n,) float64, optional
+        In place of the diagonal of M.
 
     Raises
     ------
@@ -52,6 +54,7 @@ class VectorHeatFlow:
         t: float | FloatArray,
         backend: Backend = "auto",
         fitted: bool = False,
+        mass: FloatArray | None = None,
     ) -> None:
         if backend == "iterative":
             raise ValueError("backend='iterative' cannot solve for vectors: use 'auto', 'scipy' or 'multifrontal'")
@@ -61,9 +64,9 @@ class VectorHeatFlow:
             backend = "multifrontal" if is_large else "scipy"
         self.t, self.mean_mass, self._n = t, operators.mean_mass, operators.n
         L = fitted_laplacian(operators, t) if fitted else operators.L
-        mass = operators.M.diagonal() / self.mean_mass
+        lumped = operators.M.diagonal() if mass is None else mass
         step = operators.expand_to_vertices(t) if isinstance(t, np.ndarray) else t
-        matrix = shifted(with_rotations(L, rotations), -step / self.mean_mass, mass)
+        matrix = shifted(with_rotations(L, rotations), -step / self.mean_mass, lumped / self.mean_mass)
         self.factor = factorize(_real(matrix), backend, np.repeat(operators.referenced, 2))
 
     def solve(self, b: AnyArray) -> AnyArray:

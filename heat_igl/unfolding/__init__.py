@@ -1,6 +1,12 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
-from heat_igl.unfolding.distance import distance_from_scratch, distance_to_targets, unfolded_distance
+from heat_igl.unfolding.directions import PathAngles, in_circle
+from heat_igl.unfolding.distance import (
+    directed_from_scratch,
+    distance_from_scratch,
+    distance_to_targets,
+    unfolded_distance,
+)
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
 from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
 from heat_igl.unfolding.fronts import FrontSolver
@@ -19,16 +25,19 @@ __all__ = [
     "FrontSolver",
     "Known",
     "Origin",
+    "PathAngles",
     "PathLengths",
     "Refine",
     "Refinement",
     "UnfoldingSolver",
     "blocks_within",
+    "directed_from_scratch",
     "distance_from_scratch",
     "distance_to_targets",
     "distances_within",
     "exact_distance",
     "exact_paths",
+    "in_circle",
     "nearest_vertices",
     "pair_distances",
     "read_distances_within",

@@ -25,13 +25,14 @@ from heat_igl.sources import (
     source_set,
 )
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.unfolding.directions import PathAngles
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import from_mesh
 from heat_igl.unfolding.local import positive
 from heat_igl.unfolding.refinement import TOLERANCE, Refine
 from heat_igl.unfolding.solver import UnfoldingSolver
 
-__all__ = ["distance_from_scratch", "distance_to_targets", "unfolded_distance"]
+__all__ = ["directed_from_scratch", "distance_from_scratch", "distance_to_targets", "unfolded_distance"]
 
 _NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
 # For the order of the vertices, curves are points at most so many mean edge lengths apart.
@@ -116,11 +117,29 @@ def distance_from_scratch(
         refine = "exact"
     if refine == "exact" and chosen.on_vertices_alone:
         return _from_vertices(mesh, chosen, cutoff)
+    solver, lines, order = _prepared(mesh, chosen, refine, tolerance, cutoff)
+    return np.asarray(solver.distances([lines], order[:, None])[0])
+
+
+def directed_from_scratch(
+    mesh: Mesh, sources: Sources, refine: Refine, tolerance: float | None = None
+) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
+    """As `distance_from_scratch`, with labels, directions and starts of the paths: see `UnfoldingSolver.directed`."""
+    if mesh.is_tetrahedral:
+        raise MeshError("directions need triangles, and the mesh holds tetrahedra")
+    chosen = source_set(sources, mesh.n_vertices, mesh.F)
+    solver, lines, order = _prepared(mesh, chosen, refine, tolerance, np.inf)
+    return solver.directed(lines, order)
+
+
+def _prepared(
+    mesh: Mesh, chosen: SourceSet, refine: Refine, tolerance: float | None, cutoff: float
+) -> tuple[UnfoldingSolver, _Lines, FloatArray]:
+    """A solver for one set of sources, that set as the solver takes it, and an order of the vertices."""
     domain = _Domain(mesh, unfolding_surface(mesh))
     solver = UnfoldingSolver(domain, refine, tolerance, cutoff)
     lines = _Lines(chosen, *((_NONE, _NONE) if solver.is_exact else _straight_lines(domain, chosen)))
-    order = np.zeros(mesh.n_vertices) if solver.is_exact else -_along_edges(domain, chosen)
-    return np.asarray(solver.distances([lines], order[:, None])[0])
+    return solver, lines, np.zeros(mesh.n_vertices) if solver.is_exact else -_along_edges(domain, chosen)
 
 
 def distance_to_targets(mesh: Mesh, sources: Sources, targets: Sources) -> FloatArray:

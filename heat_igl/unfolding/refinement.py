@@ -65,6 +65,13 @@ class Refinement:
     triangulation : IntrinsicTriangulation
         n vertices; an intrinsic Delaunay one, since long thin triangles hide the way from their neighbours.
 
+    Attributes
+    ----------
+    number, face : (n,), (m,) int32
+        Rows of the tables of the vertices (on all sheets) and of the faces.
+    tables : Tables
+        What the kernels read.
+
     Notes
     -----
     Paths end at the boundary and at edges of more than two faces: they run along such edges, not across. A surface that
@@ -82,9 +89,9 @@ class Refinement:
             self._n_sheets = 2
             F, lengths, twin = double_cover(triangulation)
         self.triangulation = triangulation
-        self._number, self._face, F, lengths, twin = breadth_first(F, lengths, twin, self._n_sheets * self.n)
+        self.number, self.face, F, lengths, twin = breadth_first(F, lengths, twin, self._n_sheets * self.n)
         self._F, self._lengths = F, lengths
-        self._tables = tables(F, lengths, twin, len(self._number))
+        self.tables = tables(F, lengths, twin, len(self.number))
         self._twin = twin
 
     @cached_property
@@ -97,7 +104,7 @@ class Refinement:
             is_first &= (beyond < 0) | (beyond >= side)
             n_shared += beyond >= 0
         of_face = np.cumsum(is_first) - 1
-        of_vertex = np.full(len(self._number), -1)
+        of_vertex = np.full(len(self.number), -1)
         of_vertex[self._F] = of_face[:, None]
         # Where more than two faces meet, they are cut apart: an edge is shared by two faces, or belongs to one.
         edges = np.bincount(of_face, 3 - n_shared / 2)
@@ -107,7 +114,7 @@ class Refinement:
     @cached_property
     def flatness(self) -> float:
         """The share of vertices without curvature, those on the boundary included."""
-        return float(self._tables.is_flat.mean())
+        return float(self.tables.is_flat.mean())
 
     @cached_property
     def curvature(self) -> float:
@@ -115,7 +122,7 @@ class Refinement:
 
         The sum inside the surface is compared with two pi; on the boundary, a notch with more than pi counts.
         """
-        total = self._tables.total
+        total = self.tables.total
         return float(np.where(total > 0, np.abs(2 * np.pi - total), np.maximum(-total - np.pi, 0.0)).mean())
 
     def sweep(
@@ -158,8 +165,8 @@ class Refinement:
             ``inf`` if no source is reached. Neither an upper nor a lower bound on a curved surface; on a flat
             convex one exact to rounding.
         """
-        starts = self._starts(sources, offsets, points, point_offsets)
-        n = len(self._number)
+        starts = self.starts(sources, offsets, points, point_offsets)
+        n = len(self.number)
         distance = np.full(n + starts.n_points, np.inf)
         distance[starts.row] = starts.walk["distance"]
         label = None
@@ -168,12 +175,12 @@ class Refinement:
             label[starts.row] = starts.walk["label"]
         is_stale = np.ones(n, bool)
         if known is not None:
-            row = self._number[np.concatenate([known.vertex + self.n * sheet for sheet in range(self._n_sheets)])]
+            row = self.number[np.concatenate([known.vertex + self.n * sheet for sheet in range(self._n_sheets)])]
             distance[row], is_stale[row] = np.tile(known.distance, self._n_sheets), False
             if label is not None:
                 label[row] = np.tile(known.source, self._n_sheets)
         group = np.arange(len(starts.offset)) if groups is None else np.ascontiguousarray(groups, np.int64)
-        sweep(self._order(key), self._tables, distance[:n], label, starts.offset, group, is_stale)
+        sweep(self._order(key), self.tables, distance[:n], label, starts.offset, group, is_stale)
         return self._on_base(distance, label, labels)
 
     def unfold(
@@ -212,16 +219,16 @@ class Refinement:
         """
         if not 0 <= tolerance <= 1:
             raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
-        walk = self._walks(key, self._starts(sources, offsets, points, point_offsets), tolerance)
+        walk = self.walks(key, self.starts(sources, offsets, points, point_offsets), tolerance)
         return self._on_base(walk["distance"], walk["label"], labels)
 
-    def _walks(self, key: FloatArray, starts: _Starts, tolerance: float, **ways: AnyArray) -> AnyArray:
+    def walks(self, key: FloatArray, starts: WalkStarts, tolerance: float = TOLERANCE, **ways: AnyArray) -> AnyArray:
         """What is known of the path of each row after `unfold`; how each path begins is filled into `ways`."""
-        walk = unknown(len(self._number) + starts.n_points)
+        walk = unknown(len(self.number) + starts.n_points)
         walk[starts.row] = starts.walk
         unfold(
             self._order(key),
-            self._tables,
+            self.tables,
             walk,
             starts.points,
             tolerance=tolerance,
@@ -240,18 +247,18 @@ class Refinement:
         Of a surface that cannot be oriented, on both sheets.
         """
         vertices, offsets, points, point_offsets = sources
-        starts = self._starts(vertices, offsets if offsets.any() else None, points, point_offsets)
-        n = len(self._number)
+        starts = self.starts(vertices, offsets if offsets.any() else None, points, point_offsets)
+        n = len(self.number)
         entered, share, reach = np.full(n, -1, np.int32), np.zeros(n), np.zeros(n)
-        walk = self._walks(key, starts, tolerance, entered=entered, share=share, reach=reach)
+        walk = self.walks(key, starts, tolerance, entered=entered, share=share, reach=reach)
         found = Ways(walk["distance"][:n].copy(), entered.astype(np.int64), share, reach)
         places = Places.none()
         if points is not None:
-            faces, barycentric, point = self._faces_of(points)
+            faces, barycentric, point, _ = self._faces_of(points)
             late = np.zeros(len(points)) if point_offsets is None else np.asarray(point_offsets, np.float64)
             places = Places(faces, barycentric, point, late[point])
         is_source = np.zeros(n, bool)
-        on_sheets = self._number[np.concatenate([vertices + self.n * sheet for sheet in range(self._n_sheets)])]
+        on_sheets = self.number[np.concatenate([vertices + self.n * sheet for sheet in range(self._n_sheets)])]
         is_source[on_sheets] = walk["distance"][on_sheets] >= np.tile(offsets, self._n_sheets)
         return Paths(self._triangles, places, found, is_source)
 
@@ -259,11 +266,11 @@ class Refinement:
     def _triangles(self) -> Triangles:
         size = self._F.size
         F, twin = self._F.astype(np.int64), self._twin.ravel().astype(np.int64)
-        return half_edge_arrays(IntrinsicTriangulation(F, self._lengths, twin, np.ones(size, bool), len(self._number)))
+        return half_edge_arrays(IntrinsicTriangulation(F, self._lengths, twin, np.ones(size, bool), len(self.number)))
 
     def by_given_sides(self, by_side: FloatArray) -> FloatArray:
         """Derivatives by the sides (m, 3) of `triangulation`, from those by the numbers of the tables."""
-        sheets = by_side[self._face].reshape(self._n_sheets, -1, 3)
+        sheets = by_side[self.face].reshape(self._n_sheets, -1, 3)
         return np.asarray(sheets[0] if self._n_sheets == 1 else sheets[0] + sheets[1][:, BACK_CORNERS])
 
     def on_tables(self, sides: FloatArray) -> FloatArray:
@@ -271,47 +278,49 @@ class Refinement:
         if self._n_sheets == 2:
             sides = np.concatenate([sides, sides[:, BACK_CORNERS]])
         ordered = np.empty_like(sides)
-        ordered[self._face] = sides
+        ordered[self.face] = sides
         return ordered
 
     def rows_of(self, distance: FloatArray) -> AnyArray:
         """The number (n,) in the tables of each vertex, on the sheet on which `distance` by these numbers is less."""
-        on_sheets = self._number.reshape(self._n_sheets, -1)
+        on_sheets = self.number.reshape(self._n_sheets, -1)
         nearer = distance[on_sheets].argmin(axis=0)
         return np.asarray(on_sheets[nearer, np.arange(self.n)])
 
     def vertex_of(self, rows: AnyArray) -> IntArray:
         """The vertices that have some numbers in the tables."""
-        vertex = np.empty(len(self._number), np.int64)
-        vertex[self._number] = np.tile(np.arange(self.n), self._n_sheets)
+        vertex = np.empty(len(self.number), np.int64)
+        vertex[self.number] = np.tile(np.arange(self.n), self._n_sheets)
         return np.asarray(vertex[rows])
 
     def _order(self, key: FloatArray) -> AnyArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
         on_sheets = np.tile(key, self._n_sheets) if self._n_sheets > 1 else np.ascontiguousarray(key)
-        return np.asarray(self._number[ascending(on_sheets)])
+        return np.asarray(self.number[ascending(on_sheets)])
 
-    def _starts(
+    def starts(
         self,
         sources: IntArray,
         offsets: FloatArray | None,
         points: SurfacePoints | None,
         point_offsets: FloatArray | None,
-    ) -> _Starts:
+    ) -> WalkStarts:
         """Initial values of the kernels, on all sheets and by the numbers of the tables."""
-        n, k, sheets = len(self._number), len(sources), range(self._n_sheets)
-        row = self._number[np.concatenate([sources + self.n * sheet for sheet in sheets])]
+        n, k, sheets = len(self.number), len(sources), range(self._n_sheets)
+        row = self.number[np.concatenate([sources + self.n * sheet for sheet in sheets])]
         walk = unknown(len(row))
-        walk["label"] = np.tile(np.arange(k), self._n_sheets)
+        walk["label"], walk["root"] = np.tile(np.arange(k), self._n_sheets), row
         begin = np.zeros(k) if offsets is None else np.asarray(offsets, np.float64)
         if points is None:
             walk["distance"] = walk["offset"] = begin[walk["label"]]
             return _ascending(row, walk, begin)
-        faces, barycentric, point = self._faces_of(points)
-        vertex, seen = views(faces, barycentric, self._F, self._tables)
+        faces, barycentric, point, turn = self._faces_of(points)
+        vertex, seen = views(faces, barycentric, self._F, self.tables)
         place = unknown(len(points))
         walk["distance"] = place["distance"] = 0.0
         seen["label"], place["label"] = k + np.repeat(point, 3), k + np.arange(len(points))
+        seen["departure"] += np.repeat(turn, 3)
+        seen["root"], place["root"] = n + np.repeat(point, 3), n + np.arange(len(points))
         row, walk = np.concatenate([row, vertex, n + np.arange(len(points))]), np.concatenate([walk, seen, place])
         begin = np.concatenate([begin, np.zeros(len(points)) if point_offsets is None else point_offsets])
         walk["offset"] = begin[walk["label"]]
@@ -320,13 +329,13 @@ class Refinement:
         first = np.full(len(self._F), -1, np.int32)
         first[faces[by_face][::-1]] = by_face[::-1]
         inside = np.zeros(len(faces), INSIDE)
-        inside["barycentric"], inside["following"], inside["row"] = barycentric, -1, n + point
+        inside["barycentric"], inside["turn"], inside["following"], inside["row"] = barycentric, turn, -1, n + point
         same = faces[by_face][1:] == faces[by_face][:-1]
         inside["following"][by_face[:-1][same]] = by_face[1:][same]
         return _ascending(row, walk, begin, len(points), Points(first, inside))
 
-    def _faces_of(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray]:
-        """Triangles of the tables that hold points, coordinates in them, and which point each is."""
+    def _faces_of(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
+        """Triangles of the tables that hold points, coordinates in them, which point each is, and `Inside.turn`."""
         faces, barycentric = self.triangulation.locate(points.faces, points.barycentric)
         point = np.arange(len(faces))
         if self._n_sheets == 2:
@@ -334,10 +343,10 @@ class Refinement:
             faces = np.concatenate([faces, faces + len(self.triangulation.F)])
             barycentric = np.concatenate([barycentric, barycentric[:, [0, 2, 1]]])
             point = np.tile(point, 2)
-        faces = self._face[faces]
+        faces = self.face[faces]
         # A point on a side also lies in the face beyond it.
         i, c = np.nonzero(barycentric < _ON_SIDE)
-        beyond = self._tables.across(faces[i], c)
+        beyond = self.tables.across(faces[i], c)
         there = np.flatnonzero(beyond >= 0)
         i, c, beyond = i[there], c[there], beyond[there]
         following = beyond - beyond % 3 + (beyond + 1) % 3
@@ -345,25 +354,33 @@ class Refinement:
         # The corner after the far one is at the end, as seen from here, of the side that starts after corner c.
         other[np.arange(len(i)), following % 3] = barycentric[i, (c + 2) % 3]
         other[np.arange(len(i)), (following + 1) % 3] = barycentric[i, (c + 1) % 3]
+        # The same side runs the other way there.
+        turn = self._direction(3 * faces[i] + c) + np.pi - self._direction(beyond)
         return (
             np.concatenate([faces, following // 3]),
             np.concatenate([barycentric, other]),
             np.concatenate([point, point[i]]),
+            np.concatenate([np.zeros(len(point)), turn]),
         )
 
+    def _direction(self, half_edge: IntArray) -> FloatArray:
+        """The angle (k,) of half-edges in their triangles, from the side of corners 0 and 1."""
+        first, angle = half_edge - half_edge % 3, self.tables.step["angle"]
+        return np.choose(half_edge % 3, [np.pi - angle[first + 1], angle[first] - np.pi, np.zeros(len(half_edge))])
+
     def _on_base(self, distance: FloatArray, label: AnyArray | None, labels: IntArray | None) -> FloatArray:
-        on_sheets = distance[self._number].reshape(self._n_sheets, -1)
+        on_sheets = distance[self.number].reshape(self._n_sheets, -1)
         if self._n_sheets == 1:
             if labels is not None and label is not None:
-                labels[:] = label[self._number]
+                labels[:] = label[self.number]
             return np.asarray(on_sheets[0])
         if labels is not None and label is not None:
             nearest = on_sheets.argmin(axis=0)[None]
-            labels[:] = np.take_along_axis(label[self._number].reshape(self._n_sheets, -1), nearest, axis=0)[0]
+            labels[:] = np.take_along_axis(label[self.number].reshape(self._n_sheets, -1), nearest, axis=0)[0]
         return np.asarray(on_sheets.min(axis=0))
 
 
-class _Starts(NamedTuple):
+class WalkStarts(NamedTuple):
     """Rows of the walks that are known and these, (k,) each, the nearest last; then by label where it begins."""
 
     row: AnyArray
@@ -375,7 +392,7 @@ class _Starts(NamedTuple):
 
 def _ascending(
     row: AnyArray, walk: AnyArray, offset: FloatArray, n_points: int = 0, points: Points | None = None
-) -> _Starts:
+) -> WalkStarts:
     """Far ones first, so that of several for one vertex the nearest is written last."""
     order = np.argsort(-walk["distance"], kind="stable")
-    return _Starts(row[order], walk[order], offset, n_points, points)
+    return WalkStarts(row[order], walk[order], offset, n_points, points)

@@ -14,9 +14,10 @@ from heat_igl.operators import Surface
 from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSegments, SourceSet, take_shorter
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
+from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
-from heat_igl.unfolding.refinement import Known, Refine, Refinement
+from heat_igl.unfolding.refinement import TOLERANCE, Known, Refine, Refinement, WalkStarts
 
 __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
 
@@ -32,6 +33,9 @@ _FEW = 1000
 # 0.7 to 3.4 % of the largest distance on plates, beams, voxels and terrain, most with 0.5 to 3 radians, and up to
 # 0.46 % on a coarse cow with 0.14, which is too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
 _ROUGH = {"sweep": 0.25, "unfold": 0.1}
+# Up to so many vertices directions are found by windows, if the tolerance is smaller than the default. Walks of the
+# tolerance 1e-6 take 0.8 times as long there, and at some vertices depart to the other side of a hill.
+_FEW_FOR_DIRECTIONS = 10_000
 # With this share of flat vertices, and holes that keep walks from proving flatness, windows are as fast as walks.
 _FLAT = 0.5
 # Sweeps from several sources start with the exact distance up to so many mean edge lengths: next to a border of cells
@@ -85,8 +89,16 @@ def _costs_little_to_be_exact(refinement: Refinement, rough: float) -> bool:
     )
 
 
+def _require_share(tolerance: float | None) -> None:
+    if tolerance is not None and not 0 <= tolerance <= 1:
+        raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
+
+
 class _Asked(NamedTuple):
-    """What distance starts from, and when; `labels` is filled if given. Without `segments`, points stand for curves."""
+    """What distance starts from, and when; `labels` and `angles` are filled if given.
+
+    Without `segments`, points stand for curves.
+    """
 
     vertices: IntArray
     offsets: FloatArray | None
@@ -94,6 +106,8 @@ class _Asked(NamedTuple):
     point_offsets: FloatArray | None
     segments: SourceSegments | None
     labels: IntArray | None
+    angles: FloatArray | None
+    tolerance: float | None
 
 
 class UnfoldingSolver:
@@ -129,8 +143,7 @@ class UnfoldingSolver:
         self._refinement = None if refine == "exact" else Refinement(surface.unfolding)
         #: Whether distances do not depend on the heat.
         self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement, _ROUGH[refine])
-        if tolerance is not None and not 0 <= tolerance <= 1:
-            raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
+        _require_share(tolerance)
         self._tolerance, self._cutoff = tolerance, cutoff
         self._sweeps = refine == "sweep" and not self.is_exact
         self._error = _SWEEP_ERROR if self._sweeps else 0.0
@@ -181,12 +194,56 @@ class UnfoldingSolver:
             return from_windows(self._exact, self._surface.unfolding, sources)
         return from_walks(self._refinement, sources, u)
 
+    def directed(
+        self, term: UnfoldingTerm, u: FloatArray, tolerance: float | None = None
+    ) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
+        """As `labelled`, and of each path the directions and the place at which it starts.
+
+        Points stand for curves. With a smaller `tolerance` than that of the solver the directions are more accurate.
+        Windows give them, which are exact, if it is 0, or if it is smaller than the default and the mesh has at most
+        10 000 vertices.
+
+        Raises
+        ------
+        MeshError
+            If vertices have no tangent plane, see `polar_angles`.
+        ValueError
+            If `tolerance` is not a number from 0 to 1.
+        """
+        _require_share(tolerance)
+        labels, angles = np.empty((2, len(u)), np.int64), np.empty((3, len(u)))
+        distance = self._measured(term, u, labels[0], angles, tolerance, labels[1])
+        return distance, labels[0], PathAngles(*angles), self._places(term, labels[1])
+
+    def _places(self, term: UnfoldingTerm, origin: IntArray) -> SurfacePoints:
+        """Sources (n,), counted vertices first; a corner of face 0 where there is none."""
+        F, points, vertices = self._given_faces, self._points(term, sampled=True), term.sources.vertices
+        corner_at = np.zeros(self._domain.components.size, np.int64)
+        corner_at[F.ravel()[::-1]] = np.arange(F.size)[::-1]
+        corner = np.append(corner_at[vertices], 0)
+        # After the vertices, points and nothing: the last one is nothing for an origin of -1.
+        faces = np.concatenate([corner[:-1] // 3, points.faces, corner[-1:] // 3])
+        barycentric = np.concatenate([np.eye(3)[corner[:-1] % 3], points.barycentric, np.eye(3)[:1]])
+        return SurfacePoints(faces[origin], barycentric[origin])
+
     def _distance(self, term: UnfoldingTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
-        sources, points, components = term.sources, self._points(term), self._domain.components
+        return self._measured(term, u, labels)
+
+    def _measured(
+        self,
+        term: UnfoldingTerm,
+        u: FloatArray,
+        labels: IntArray | None = None,
+        angles: FloatArray | None = None,
+        tolerance: float | None = None,
+        origin: IntArray | None = None,
+    ) -> FloatArray:
+        sources, components = term.sources, self._domain.components
+        points = self._points(term, sampled=angles is not None)
         places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
         # Tolerances are relative to the distance: the common part is added afterwards.
         earliest = np.full(self._domain.n_components, np.inf)
-        segments = sources.segments if self.is_exact and len(sources.segments.faces) else None
+        segments = sources.segments if self.is_exact and angles is None and len(sources.segments.faces) else None
         faces = points.faces if segments is None else np.concatenate([points.faces, segments.faces])
         in_faces = components[self._given_faces[faces, 0]] if len(faces) else np.empty(0, np.int64)
         component = np.concatenate([components[sources.vertices], in_faces])
@@ -201,12 +258,16 @@ class UnfoldingSolver:
             late[k : k + p] if late.any() and places else None,
             None if segments is None else replace(segments, offset=late[k + p :]),
             labels,
+            angles,
+            self._tolerance if tolerance is None else tolerance,
         )
-        by_windows = self._takes_windows(component)
+        by_windows = self._takes_windows(component) or self._is_straight(asked)
         distance = self._unfolded(u, asked, term, points, earliest, by_windows)
         start = self._domain.expand_to_vertices(earliest)
         if offset.any():
             distance += start
+        if origin is not None and labels is not None:
+            origin[:] = labels
         if labels is not None:
             of_places = points.label if segments is None else np.concatenate([points.label, segments.label])
             labels[:] = np.concatenate([sources.vertex_label, of_places, [-1]])[labels]
@@ -247,13 +308,17 @@ class UnfoldingSolver:
             )
             if asked.labels is not None:
                 asked.labels[:] = found.origin.label
+            if asked.angles is not None:
+                asked.angles[:] = self.path_directions.of_windows(found, self._starts(asked), asked.points)
             return found.distance
+        if asked.angles is not None:
+            return self._directed_walks(u, asked)
         unfolded = self._refinement.unfold
         if self._sweeps:
             known, groups = self._known(term, points, earliest, asked), self._groups(term, points)
             unfolded = partial(self._refinement.sweep, known=known, groups=groups)
-        elif self._tolerance is not None:
-            unfolded = partial(unfolded, tolerance=self._tolerance)
+        elif asked.tolerance is not None:
+            unfolded = partial(unfolded, tolerance=asked.tolerance)
         return unfolded(
             -u,
             asked.vertices,
@@ -262,6 +327,34 @@ class UnfoldingSolver:
             point_offsets=asked.point_offsets,
             labels=asked.labels,
         )
+
+    def _is_straight(self, asked: _Asked) -> bool:
+        """Whether directions are found by windows, as walks of a small tolerance would take as long."""
+        if asked.angles is None or asked.tolerance is None or asked.tolerance >= TOLERANCE:
+            return False
+        return asked.tolerance == 0 or self._walking.n <= _FEW_FOR_DIRECTIONS
+
+    def _directed_walks(self, u: FloatArray, asked: _Asked) -> FloatArray:
+        refinement, starts = self._walking, self._starts(asked)
+        walk = refinement.walks(-u, starts, TOLERANCE if asked.tolerance is None else asked.tolerance)
+        row = refinement.number
+        if asked.labels is not None:
+            asked.labels[:] = walk["label"][row]
+        if asked.angles is not None:
+            asked.angles[:] = self.path_directions.of_walks(walk, asked.points)
+        return np.asarray(walk["distance"][row])
+
+    def _starts(self, asked: _Asked) -> WalkStarts:
+        return self._walking.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
+
+    @cached_property
+    def _walking(self) -> Refinement:
+        return Refinement(self._surface.unfolding) if self._refinement is None else self._refinement
+
+    @cached_property
+    def path_directions(self) -> PathDirections:
+        """Polar angles of the paths; a `MeshError` where vertices have no tangent plane."""
+        return PathDirections(self._surface, self._walking)
 
     def _groups(self, term: UnfoldingTerm, points: SourcePoints) -> IntArray | None:
         """For each source, which curve it is a point of, or itself."""
@@ -296,8 +389,9 @@ class UnfoldingSolver:
         near, source = near.at(count[at] == 1), first[at][count[at] == 1]
         return Known(near.vertex, near.value - earliest[self._domain.components[near.vertex]], source)
 
-    def _points(self, term: UnfoldingTerm) -> SourcePoints:
+    def _points(self, term: UnfoldingTerm, sampled: bool = False) -> SourcePoints:
+        """The points of a term, and those that stand for curves, unless windows take curves as they are."""
         points, segments = term.sources.points, term.sources.segments
-        if not len(segments.faces) or self._faces is None or self.is_exact:
+        if not len(segments.faces) or self._faces is None or (self.is_exact and not sampled):
             return points
         return points.joined(self._faces.samples(segments, self._spacing)[0]).joined(segments.ends())

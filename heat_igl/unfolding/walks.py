@@ -14,14 +14,17 @@ __all__ = ["INSIDE", "WALK", "Points", "sweep", "unfold", "unknown", "views"]
 
 # What is known of the path of a vertex: its `distance`; the distance of the last bend (or source), `offset`; how far
 # that is away in a straight line, `reach`; the direction in which it lies, `angle` in the `fan` of the vertex (-1:
-# none, at a source), whose angles sum to `total` (negative: open); the `label` of the source that the path ends at.
+# none, at a source), whose angles sum to `total` (negative: open); the `label` of the source that the path ends at;
+# the `root`, the row of that bend or source; and the direction in which the path leaves it, `departure`: an angle in
+# the fan of a vertex, and in the face of a source point from the side of corners 0 and 1.
 WALK = np.dtype(
     [(name, "f8") for name in ("distance", "offset", "reach", "angle", "total")]
-    + [("fan", "i4"), ("label", "i4"), ("spare", "f8", 2)]
+    + [("fan", "i4"), ("label", "i4"), ("departure", "f8"), ("root", "i4"), ("spare", "i4")]
 )
 # A source inside a face: the next one in the same face, `following` (-1 after the last), and the `row` of the walks
-# that stands for it.
-INSIDE = np.dtype([("barycentric", "f8", 3), ("following", "i4"), ("row", "i4")])
+# that stands for it. On a side it is in the face beyond, too, whose side of corners 0 and 1 is turned by `turn` from
+# that of the first face.
+INSIDE = np.dtype([("barycentric", "f8", 3), ("turn", "f8"), ("following", "i4"), ("row", "i4")])
 
 _NOT_ASKED = np.empty(0, np.int32), np.empty(0)
 

@@ -1,0 +1,95 @@
+"""The logarithmic map: the vector from a point of the surface to every vertex, along the shortest path."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from heat_igl.errors import SourceError
+from heat_igl.heat_method import HeatMethodSolver, VectorHeatSolver
+from heat_igl.mesh import MeshLike, SurfacePoints, as_simplices
+from heat_igl.sources import Sources, ordered_vertices
+from heat_igl.typing import FloatArray
+from heat_igl.unfolding import directed_from_scratch
+
+__all__ = ["LogMapMethod", "log_map"]
+
+LogMapMethod = Literal["unfold", "exact", "vector-heat"]
+
+# With the tolerance for distances the departure is wrong by 0.1 to 0.2 degrees in the mean.
+_TOLERANCE = 1e-6
+
+
+def log_map(
+    mesh: MeshLike | HeatMethodSolver | VectorHeatSolver, source: Sources, *, method: LogMapMethod = "unfold"
+) -> FloatArray:
+    """The logarithmic map of a vertex or a point: polar coordinates around it, as vectors.
+
+    Parameters
+    ----------
+    mesh : mesh, HeatMethodSolver or VectorHeatSolver
+        Whatever `as_mesh` takes, with triangles that are a manifold and oriented alike; or a solver on such a mesh,
+        which is quicker from the second source on.
+    source : int or SurfacePoints
+        A vertex, or one point in a face.
+    method : {"unfold", "exact", "vector-heat"}
+        "unfold" follows paths through strips of triangles, and takes exact windows on up to 10 000 vertices. "exact"
+        takes windows on all meshes, for up to three times the time. "vector-heat" is `VectorHeatSolver.log_map`, from
+        vertices only. A solver has a method of its own, and this is not read: `HeatMethodSolver` that of its `refine`.
+
+    Returns
+    -------
+    (n, 2) float64
+        Vectors as long as the distance, in the direction in which the shortest path departs: in the frame of
+        `tangent_frames` at a vertex, and with the first axis along the side of corners 0 and 1 in a face, as
+        `exp_map` takes them. 0 at the source and where it does not reach.
+
+    Raises
+    ------
+    MeshError
+        If the mesh cannot be used or has no tangent frames, see `tangent_frames`.
+    SourceError
+        If `source` is not one vertex or one point of the mesh.
+    ValueError
+        If there is no such `method`, or if a `HeatMethodSolver` has no `refine` that follows paths.
+
+    Notes
+    -----
+    If the shortest path to a vertex is straight, `exp_map` of the vector leads back to the vertex. Where
+    the path bends, at a vertex of negative curvature or on the boundary, the vector has the whole length, and the
+    direction in which the path leaves the source: no straightest geodesic from the source need lead there. At the cut
+    locus there are several shortest paths, and the vector is that of one of them.
+    """
+    if isinstance(mesh, VectorHeatSolver):
+        return mesh.log_map(_one_vertex(source, mesh.operators.n_given))
+    if isinstance(mesh, HeatMethodSolver):
+        _require_one(source, mesh.n_vertices)
+        found = mesh.directions(source, tolerance=_TOLERANCE)
+        return _vectors(found.distance, found.departure)
+    if method not in get_args(LogMapMethod):
+        raise ValueError(f"method must be one of {', '.join(map(repr, get_args(LogMapMethod)))}, not {method!r}")
+    triangles = as_simplices(mesh)
+    if method == "vector-heat":
+        return VectorHeatSolver(triangles).log_map(_one_vertex(source, triangles.n_vertices))
+    _require_one(source, triangles.n_vertices)
+    distance, _, angles, _ = directed_from_scratch(triangles, source, method, _TOLERANCE)
+    return _vectors(distance, np.nan_to_num(angles.departure))
+
+
+def _vectors(distance: FloatArray, departure: FloatArray) -> FloatArray:
+    length = np.where(np.isfinite(distance), distance, 0.0)
+    return np.stack([length * np.cos(departure), length * np.sin(departure)], axis=1)
+
+
+def _one_vertex(source: Sources, n: int) -> int:
+    if isinstance(source, SurfacePoints):
+        raise SourceError("the vector heat method starts at vertices: take another method for a point in a face")
+    _require_one(source, n)
+    return int(ordered_vertices(source, n)[0])
+
+
+def _require_one(source: Sources, n: int) -> None:
+    k = len(source) if isinstance(source, SurfacePoints) else len(ordered_vertices(source, n))
+    if k != 1:
+        raise SourceError(f"source must be one vertex or point, not {k}")

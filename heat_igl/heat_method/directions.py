@@ -1,0 +1,95 @@
+"""Directions of shortest paths in the frames of the vertices: where they leave their source and how they arrive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from heat_igl.intrinsic import PolarAngles, TangentFrames
+from heat_igl.mesh import SurfacePoints
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding import PathAngles, in_circle
+
+__all__ = ["Directions", "carried", "directions"]
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Distance, and the directions of the shortest paths, in the frames of `tangent_frames`.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        Length of the path from the nearest source; ``inf`` where no source is reached.
+    labels : (n,) int64
+        The nearest source, counted as by `HeatMethodSolver.voronoi`; -1 where none is reached.
+    departure : (n,) float64
+        Polar angle in [0, 2 pi) at which the path leaves a source vertex, as `exp_map` takes it: scaled, see
+        `tangent_frames`. From a source inside a face, the angle from the side of corners 0 and 1 of that face, to the
+        side of corner 2.
+    arrival : (n,) float64
+        Angle in [0, 2 pi) in the frame of the vertex of the direction in which the path arrives there, away from the
+        source: ``frames.to_world(frames.from_angles(arrival))`` is `gradient`.
+    turning : (n,) float64
+        Angle in [-pi, pi] by which the path turns at the vertices where it bends, counterclockwise, summed up. A vector
+        of angle ``a`` at a source inside the boundary, transported along the path, has the angle ``a + arrival -
+        departure - turning``.
+    gradient : (n, 3) float64
+        Unit vectors in space, tangent at the vertices: the gradient of the distance.
+    start : SurfacePoints
+        The n places at which the paths start: the source, or the place on a curve, in the face in which `departure`
+        counts. Any place where no source is reached.
+
+    Notes
+    -----
+    Departure, arrival, turning and gradient are 0 at sources and where no source is reached. A path that bends at
+    a vertex of negative curvature, or on the boundary, has the departure of the path to the bend.
+    """
+
+    distance: FloatArray
+    labels: IntArray
+    departure: FloatArray
+    arrival: FloatArray
+    turning: FloatArray
+    gradient: FloatArray
+    start: SurfacePoints
+
+
+def directions(
+    distance: FloatArray, labels: IntArray, angles: PathAngles, start: SurfacePoints, frames: TangentFrames
+) -> Directions:
+    """The result for paths whose angles are known."""
+    has_path = ~np.isnan(angles.back)
+    departure, turning = (np.where(has_path, angle, 0.0) for angle in (angles.departure, angles.turning))
+    arrival = np.where(has_path, _arrival(angles.back, frames.angles), 0.0)
+    along, across = (np.where(has_path, part, 0.0)[:, None] for part in (np.cos(arrival), np.sin(arrival)))
+    gradient = along * frames.x + across * frames.y
+    return Directions(distance, labels, departure, arrival, turning, gradient, start)
+
+
+def carried(angles: PathAngles, labels: IntArray, sources: IntArray, polar: PolarAngles) -> AnyArray:
+    """Unit numbers (n,) that components are multiplied by on the way from the source; 1 at sources, 0 without a path.
+
+    Parameters
+    ----------
+    angles, labels : PathAngles, (n,) int64
+        Of paths from vertices.
+    sources : (k,) int64
+        The vertex of each label.
+    polar : PolarAngles
+        Around the vertices.
+    """
+    start = sources[np.maximum(labels, 0)]
+    # As transport has it, see `PolarAngles.rigid`.
+    flat = angles.departure / polar.scale[start] + (np.pi - polar.sums[start]) / 2
+    departure = np.where(polar.on_boundary[start], flat, angles.departure)
+    turn = _arrival(angles.back, polar) - departure - angles.turning
+    return np.where(labels < 0, 0.0, np.exp(1j * np.where(np.isnan(turn), 0.0, turn)))
+
+
+def _arrival(back: FloatArray, polar: PolarAngles) -> FloatArray:
+    """The angle (n,) in the frame opposite the polar angle `back` (n,)."""
+    # On the boundary in the plane of the faces, as `PolarAngles.rigid`.
+    flat = back / polar.scale + (np.pi - polar.sums) / 2
+    return in_circle(np.where(polar.on_boundary, flat, back) + np.pi)

@@ -1,0 +1,236 @@
+"""Directions of shortest paths, and the logarithmic map."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import flat_perturbed, perturbed
+
+import heat_igl
+from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, exp_map, log_map, shapes, tangent_frames
+from heat_igl.unfolding import ExactSurface
+
+REFINES = ["unfold", "exact"]
+
+
+def angle_between(a: np.ndarray, b: np.ndarray | float) -> np.ndarray:
+    return np.abs(np.angle(np.exp(1j * (a - b))))
+
+
+def walking(mesh: Mesh, refine: str) -> HeatMethodSolver:
+    """A solver that does not take exact windows because the mesh is small."""
+    solver = HeatMethodSolver(mesh, refine=refine)
+    if refine == "unfold":
+        solver._parts.last_steps._takes_windows = lambda _: False
+        solver._parts.last_steps._is_straight = lambda _: False
+    return solver
+
+
+def straight(mesh: Mesh, source: int) -> np.ndarray:
+    """Mask (n,) of the vertices whose shortest path does not bend."""
+    return (
+        ExactSurface(heat_igl.operators.operators(mesh).surface.unfolding).solve(np.array([source])).origin.root
+        == source
+    )
+
+
+@pytest.mark.parametrize("refine", REFINES)
+@pytest.mark.parametrize("source", [0, 7, 60])
+def test_directions_in_the_plane_are_those_of_straight_lines(refine, source):
+    mesh = flat_perturbed(shapes.grid(8))
+    solver = walking(mesh, refine)
+    found, frames = solver.directions(source), tangent_frames(mesh)
+    line = mesh.V - mesh.V[source]
+    length = np.linalg.norm(line, axis=1)
+    others = length > 0
+    np.testing.assert_allclose(found.distance, length, atol=1e-12)
+    unit = line[others] / length[others, None]
+    np.testing.assert_allclose(found.gradient[others], unit, atol=1e-7)
+    np.testing.assert_allclose(frames.to_world(frames.from_angles(found.arrival))[others], unit, atol=1e-7)
+    np.testing.assert_allclose(found.turning, 0, atol=1e-12)
+    np.testing.assert_allclose(exp_map(mesh, source, log_map(solver, source)).positions(mesh), mesh.V, atol=1e-12)
+    at_source = [found.departure[source], found.arrival[source], *found.gradient[source]]
+    assert at_source == [0] * 5
+    assert found.labels[source] == 0
+
+
+@pytest.mark.parametrize("refine", REFINES)
+@pytest.mark.parametrize("barycentric", [[0.2, 0.3, 0.5], [0.4, 0.6, 0.0], [0.0, 0.25, 0.75]])
+def test_directions_from_a_point_count_from_the_first_side_of_the_face(refine, barycentric):
+    mesh = flat_perturbed(shapes.grid(8))
+    point = SurfacePoints([61], [barycentric])
+    log = log_map(walking(mesh, refine), point)
+    a, b, _ = mesh.V[mesh.F[61]]
+    x = (b - a) / np.linalg.norm(b - a)
+    line = mesh.V - point.positions(mesh)
+    np.testing.assert_allclose(log, np.stack([line @ x, line @ np.cross([0, 0, 1], x)], axis=1), atol=1e-12)
+    np.testing.assert_allclose(exp_map(mesh, point, log).positions(mesh), mesh.V, atol=1e-12)
+
+
+@pytest.mark.parametrize("refine", REFINES)
+def test_a_path_around_a_corner_departs_towards_the_corner_and_turns_there(refine):
+    mesh = shapes.grid(8)
+    corner = mesh.V[mesh.F].mean(axis=1)[:, :2]
+    kept = mesh.F[~(corner > 0.5).all(axis=1)]
+    used, F = np.unique(kept, return_inverse=True)
+    mesh = Mesh(mesh.V[used], F.reshape(-1, 3))
+    tip = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1)))
+    source = int(np.argmin(np.linalg.norm(mesh.V - [1, 0.25, 0], axis=1)))
+    behind = (mesh.V[:, 1] > 0.5) & (mesh.V[:, 0] > 0.125)
+    solver = walking(mesh, refine)
+    found = solver.directions(source)
+    line = mesh.V - mesh.V[tip]
+    length = np.linalg.norm(line, axis=1)
+    np.testing.assert_allclose(found.distance[behind], (length + found.distance[tip])[behind], atol=1e-12)
+    np.testing.assert_allclose(found.departure[behind], found.departure[tip], atol=1e-7)
+    # From the direction of the source to the corner to that of the corner to the vertex.
+    into = mesh.V[tip] - mesh.V[source]
+    turn = np.arctan2(line[:, 1], line[:, 0]) - np.arctan2(into[1], into[0])
+    np.testing.assert_allclose(angle_between(found.turning, turn)[behind], 0, atol=1e-7)
+    assert (found.turning[behind] < -1e-3).sum() > 5
+    np.testing.assert_allclose(found.gradient[behind], line[behind] / length[behind, None], atol=1e-7)
+
+
+@pytest.mark.parametrize("method", REFINES)
+def test_the_exponential_map_undoes_the_log_map_along_straight_paths(method, bunny):
+    source = 17
+    log = log_map(bunny, source, method=method)
+    is_straight = straight(bunny, source)
+    assert 0.1 < is_straight.mean() < 0.9
+    gap = np.linalg.norm(exp_map(bunny, source, log).positions(bunny) - bunny.V, axis=1)
+    diameter = np.hypot(*log.T).max()
+    # Walks take the other way around a hill at a few vertices.
+    share = 1.0 if method == "exact" else 0.9
+    assert (gap[is_straight] < 1e-6 * diameter).mean() >= share
+    np.testing.assert_allclose(np.hypot(*log.T), heat_igl.geodesic_distance(bunny, source, method=method), rtol=1e-3)
+
+
+def test_departures_are_those_of_straightened_paths(bunny):
+    source, targets = 900, np.arange(0, bunny.n_vertices, 400)
+    distance = heat_igl.geodesic_distance(bunny, source, method="exact")
+    frames, log = tangent_frames(bunny), log_map(bunny, source, method="exact")
+    paths = heat_igl.shortest_paths(bunny, distance, targets, source)
+    length = np.array([path.lengths(bunny).sum() for path in paths])
+    assert (np.hypot(*log[targets].T) <= length * (1 + 1e-9)).all()
+    faces = np.array([path.faces[-1] for path in paths])
+    corners = bunny.V[bunny.F[faces]]
+    away = np.einsum("pc,pcx->px", [path.start[-1] - path.end[-1] for path in paths], corners)
+    corner = (bunny.F[faces] == source).argmax(axis=1)
+    found = frames.from_faces(faces, corner, away) @ [1, 1j]
+    # Straightening may leave a path on the wrong side of a hill.
+    same = np.abs(np.hypot(*log[targets].T) - length) < 1e-9 * length
+    assert same.sum() > 40
+    assert np.abs(np.angle(found[same] / (log[targets] @ [1, 1j])[same])).max() < 1e-6
+
+
+@pytest.mark.parametrize("source", [5, SurfacePoints([40], [[0.3, 0.3, 0.4]])])
+def test_walks_and_windows_depart_and_arrive_alike(sphere, source):
+    walk, exact = (walking(sphere, refine).directions(source, tolerance=0) for refine in REFINES)
+    near = exact.distance < 2.5
+    for angle in ("departure", "arrival", "turning"):
+        off = angle_between(getattr(walk, angle), getattr(exact, angle))[near]
+        assert (off < 1e-7).mean() > 0.9
+        assert off.mean() < 3e-3
+
+
+def test_log_map_converges_on_the_sphere():
+    errors = []
+    for level in (3, 4):
+        mesh = perturbed(shapes.icosphere(level), 0.02)
+        frames, p = tangent_frames(mesh), mesh.V[0] / np.linalg.norm(mesh.V[0])
+        directions = mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True)
+        near = directions @ p > -0.7
+        flat = frames.from_world(directions - (directions @ p)[:, None] * p, np.zeros(mesh.n_vertices, int))
+        expected = np.arccos(np.clip(directions @ p, -1, 1)) * np.exp(1j * np.arctan2(flat[:, 1], flat[:, 0]))
+        log = log_map(mesh, 0) @ [1, 1j]
+        errors.append(np.abs(log - expected)[near].mean())
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[1] < 0.01
+
+
+def test_labels_and_departures_of_several_sources(sphere):
+    sources = [3, 900, 2000]
+    for refine in REFINES:
+        solver = HeatMethodSolver(sphere, refine=refine)
+        together, alone = solver.directions(sources), [solver.directions(source) for source in sources]
+        np.testing.assert_array_equal(together.labels, solver.voronoi(sources).labels)
+        departure = np.choose(together.labels, [found.departure for found in alone])
+        assert np.quantile(angle_between(together.departure, departure), 0.9) < 1e-3
+
+
+@pytest.mark.parametrize("refine", REFINES)
+def test_paths_from_a_curve_start_at_the_nearest_place_on_it(refine):
+    mesh = flat_perturbed(shapes.grid(8))
+    curve = heat_igl.curve_on(mesh, [[0.2, 0.33, 0], [0.8, 0.33, 0]])
+    found = walking(mesh, refine).directions([curve, 0])
+    assert set(found.labels) == {0, 1}
+    place = found.start.positions(mesh)
+    of_curve = found.labels == 0
+    nearest = np.stack([np.clip(mesh.V[:, 0], 0.2, 0.8), np.full(mesh.n_vertices, 0.33), mesh.V[:, 2]], axis=1)
+    # Walks within the tolerance of the shortest may start some points beside it.
+    beside = (0.07 if refine == "exact" else 0.4) * mesh.edge_lengths.mean()
+    np.testing.assert_allclose(place[of_curve], nearest[of_curve], atol=beside)
+    np.testing.assert_array_equal(place[~of_curve], np.broadcast_to(mesh.V[0], place[~of_curve].shape))
+    # The departure counts from the first side of the face of the start.
+    a, b = (mesh.V[mesh.F[found.start.faces, k]] for k in (0, 1))
+    side = np.arctan2(*(b - a).T[1::-1])
+    line = mesh.V - place
+    off = angle_between(found.departure + side, np.arctan2(line[:, 1], line[:, 0]))
+    assert off[of_curve].max() < 1e-6
+
+
+def test_unreachable_vertices_have_no_direction():
+    one = shapes.icosphere(1)
+    mesh = Mesh(np.concatenate([one.V, one.V + 5]), np.concatenate([one.F, one.F + one.n_vertices]))
+    found = HeatMethodSolver(mesh, refine="unfold").directions(2)
+    far = slice(one.n_vertices, None)
+    assert np.isinf(found.distance[far]).all()
+    assert (found.labels[far] == -1).all()
+    for nothing in (found.gradient, found.departure, log_map(mesh, 2)):
+        assert not nothing[far].any()
+
+
+def test_log_map_takes_solvers_and_other_meshes(sphere):
+    pair = log_map((sphere.V, sphere.F), 4, method="exact")
+    np.testing.assert_allclose(log_map(HeatMethodSolver(sphere, refine="exact"), 4), pair, atol=1e-12)
+    vector = heat_igl.VectorHeatSolver(sphere)
+    np.testing.assert_array_equal(log_map(vector, 4), vector.log_map(4))
+    np.testing.assert_allclose(log_map(sphere, 4, method="vector-heat"), vector.log_map(4), atol=1e-9)
+
+
+def test_bad_arguments_are_one_clear_error(sphere):
+    exact = HeatMethodSolver(sphere, refine="exact")
+    with pytest.raises(ValueError, match='directions follow paths: make the solver with refine="unfold"'):
+        HeatMethodSolver(sphere).directions(0)
+    with pytest.raises(ValueError, match='directions follow paths: make the solver with refine="unfold"'):
+        HeatMethodSolver(sphere, refine="sweep").directions(0)
+    with pytest.raises(ValueError, match="tolerance must lie between 0 and 1, not -1"):
+        exact.directions(0, tolerance=-1)
+    with pytest.raises(heat_igl.SourceError, match="source must be one vertex or point, not 2"):
+        log_map(sphere, [1, 2])
+    with pytest.raises(heat_igl.SourceError, match="source must be one vertex or point, not 2"):
+        log_map(exact, SurfacePoints([0, 1], [[0.2, 0.4, 0.4]] * 2))
+    with pytest.raises(heat_igl.SourceError, match="the vector heat method starts at vertices"):
+        log_map(sphere, SurfacePoints([0], [[0.2, 0.4, 0.4]]), method="vector-heat")
+    with pytest.raises(ValueError, match="method must be one of 'unfold', 'exact', 'vector-heat', not 'heat'"):
+        log_map(sphere, 0, method="heat")
+    with pytest.raises(heat_igl.MeshError, match="directions need triangles, and the mesh holds tetrahedra"):
+        log_map((np.eye(4, 3), [[0, 1, 2, 3]]), 0)
+    solid = HeatMethodSolver(shapes.box(2))
+    with pytest.raises(heat_igl.MeshError, match="directions need triangles that fit together"):
+        solid.directions(0)
+    fan = Mesh(np.random.default_rng(0).random((5, 3)), [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+    with pytest.raises(heat_igl.MeshError, match="is one of more than two faces"):
+        HeatMethodSolver(fan, refine="exact").directions(0)
+
+
+def test_pairs_and_polygons_are_meshes_too(sphere):
+    pair = (sphere.V, sphere.F)
+    np.testing.assert_array_equal(tangent_frames(pair).x, tangent_frames(sphere).x)
+    assert abs(heat_igl.connection_laplacian(pair) - heat_igl.connection_laplacian(sphere)).max() == 0
+    ends = (exp_map(mesh, 3, [[0.5, 0.2]]).barycentric for mesh in (pair, sphere))
+    np.testing.assert_array_equal(*ends)
+    lengths = (heat_igl.trace_geodesic(mesh, 3, [1, 0], 0.7).lengths(sphere) for mesh in (pair, sphere))
+    np.testing.assert_array_equal(*lengths)
+    squares = heat_igl.PolygonMesh(np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]]), [[0, 1, 2, 3]])
+    np.testing.assert_allclose(np.hypot(*log_map(squares, 0).T), [0, 1, np.sqrt(2), 1])
