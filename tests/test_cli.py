@@ -19,7 +19,7 @@ import heat_igl
 from heat_igl import cli, demo, drawing, io, reference, shapes
 from heat_igl.cli import comparison, distances
 from heat_igl.cli.examples import EXAMPLES
-from heat_igl.cli.program import app
+from heat_igl.cli.program import application
 
 ENVIRONMENT = {
     **os.environ,
@@ -394,7 +394,7 @@ def test_a_fault_of_the_package_is_not_hidden(sphere: Path, monkeypatch: pytest.
 
 
 def commands() -> list[str]:
-    return [each.callback.__name__ for each in app.registered_commands]
+    return [each.callback.__name__ for each in application().registered_commands]
 
 
 @pytest.mark.parametrize("name", commands())
@@ -407,7 +407,7 @@ def test_every_command_has_json_and_examples(capsys: pytest.CaptureFixture[str],
 
 @pytest.mark.parametrize("example", [example for examples in EXAMPLES.values() for example in examples])
 def test_examples_are_understood(example: str) -> None:
-    command = typer.main.get_command(app)
+    command = typer.main.get_command(application())
     name, *arguments = example.split()
     context = command.commands[name].make_context(name, arguments)
     assert all(value is not None for key, value in context.params.items() if key in ("mesh", "folder", "store"))

@@ -22,8 +22,8 @@ FIELDS = {field.name: field.default for field in dataclasses.fields(SolverOption
     [
         (HeatMethodSolver, {"mesh", "F"}),
         (HeatMethodSolver.from_operators, {"domain"}),
-        (HeatMethodSolver.from_edge_lengths, {"F", "lengths", "n"}),
-        (distances.distance, {"mesh", "source", "at", "method", "cutoff", "output", "picture"}),
+        (HeatMethodSolver.from_edge_lengths, {"F", "lengths", "n", "twin"}),
+        (distances.distance, {"mesh", "source", "at", "method", "cutoff", "output", "picture", "json_file"}),
     ],
 )
 def test_options_have_the_same_names_and_defaults_everywhere(make, others):

@@ -344,7 +344,7 @@ def test_bad_arguments():
     with pytest.raises(ValueError, match="refine must be None, 'sweep', 'unfold' or 'exact', not 'fold'"):
         HeatMethodSolver(grid, refine="fold")
     with pytest.raises(ValueError, match="this domain has none"):
-        HeatMethodSolver(shapes.box(1), refine="sweep")
+        HeatMethodSolver(shapes.box(1), refine="unfold")
     box = shapes.box(1)
     with pytest.raises(MeshError, match="needs triangles"):
         unfolded_distance(box.V, box.F, 0)

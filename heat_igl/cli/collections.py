@@ -15,7 +15,7 @@ from heat_igl.cli.options import JsonOption, choice, one_of
 from heat_igl.cli.output import check_json, print_json, prints_json, say
 from heat_igl.heat_method import Refine
 
-__all__ = ["COMMANDS"]
+__all__ = ["batch"]
 
 
 def batch(
@@ -69,6 +69,3 @@ def _logged(path: Path | None) -> Iterator[None]:
     finally:
         logger.removeHandler(handler)
         handler.close()
-
-
-COMMANDS = (batch,)

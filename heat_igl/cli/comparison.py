@@ -20,7 +20,7 @@ from heat_igl.io import read_mesh
 from heat_igl.reference.guarded import TIMEOUT
 from heat_igl.validation import METHODS, draw_sources
 
-__all__ = ["COMMANDS"]
+__all__ = ["info", "validate"]
 
 _DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
 
@@ -75,6 +75,3 @@ def validate(
         names = ", ".join(row.method for row in exceeding)
         say(f"no mean error of at most {fail_above:g} % for {names}")
         raise typer.Exit(1)
-
-
-COMMANDS = (info, validate)

@@ -15,7 +15,6 @@ from rich.console import Console
 import heat_igl
 from heat_igl.cli.options import JsonOption, MeshArgument, choice, position, positive
 from heat_igl.cli.output import Row, check_curves, check_json, check_outputs, print_rows, write_distance
-from heat_igl.drawing import write_line_drawing
 from heat_igl.errors import SourceError
 from heat_igl.heat_method import (
     Backend,
@@ -32,9 +31,12 @@ from heat_igl.io import is_flat, read_mesh
 from heat_igl.mesh import Mesh, closest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import FloatArray
-from heat_igl.validation import shapes
 
-__all__ = ["COMMANDS"]
+__all__ = ["distance", "isolines"]
+
+# Positions and cells of small meshes, on which a first distance loads what every distance needs.
+_PYRAMID = np.vstack([np.eye(3), -np.eye(3)[:2]]), [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2]]
+_CORNER = np.vstack([np.eye(3), np.zeros(3)]), [[0, 1, 2, 3]]
 
 # Largest number of isolines; a larger number indicates a wrong spacing.
 _MOST_LINES = 10000
@@ -135,7 +137,7 @@ def _measured(
 
 def _warm_up(mesh: Mesh, method: DistanceMethod, options: SolverOptions) -> None:
     """Measure on a small mesh, so that times are of the work alone, without loading libraries for the first time."""
-    small = shapes.box(2) if mesh.is_tetrahedral else shapes.icosphere(4)
+    small = Mesh(*_CORNER) if mesh.is_tetrahedral else Mesh(*_PYRAMID)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         _measured(small, 0, method, options, None)
@@ -165,7 +167,7 @@ def isolines(
     levels = spacing * np.arange(1, int(farthest / spacing) + 1)
     curves = heat_igl.isolines(loaded, phi, levels)
     if output.suffix.lower() == ".svg" and not is_flat(loaded):
-        write_line_drawing(output, loaded, curves)
+        heat_igl.plots.write_line_drawing(output, loaded, curves)
     else:
         heat_igl.write_curves(output, loaded, {f"{level:g}": each for level, each in zip(levels, curves, strict=True)})
     n = sum(map(len, curves))
@@ -201,6 +203,3 @@ def _summary(path: Path, mesh: Mesh, phi: FloatArray) -> list[Row]:
     if unreachable:
         rows.append(("unreachable", f"{unreachable} vertices", unreachable))
     return [*rows, ("mean", f"{mean:.6g}", mean)]
-
-
-COMMANDS = (distance, isolines)

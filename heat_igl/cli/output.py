@@ -13,7 +13,6 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from heat_igl.drawing.output import PAGE_SUFFIXES, PICTURE_SUFFIXES
 from heat_igl.errors import MeshError, MissingExtraError
 from heat_igl.io import CURVE_SUFFIXES, complete_file, write_mesh
 from heat_igl.mesh import Mesh
@@ -111,6 +110,8 @@ def check_writable(path: Path) -> None:
 
 def check_page(path: Path) -> None:
     """Check that a page can be written to `path`."""
+    from heat_igl.drawing.output import PAGE_SUFFIXES
+
     if path.suffix.lower() not in PAGE_SUFFIXES:
         raise ValueError(f"--html {path}: pages go to {' or '.join(PAGE_SUFFIXES)} files")
     MissingExtraError.check("a page", "matplotlib", "view")
@@ -129,6 +130,8 @@ def check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> None
                 MissingExtraError.check(f"a {suffix} file", package, extra)
         check_writable(output)
     if picture is not None:
+        from heat_igl.drawing.output import PICTURE_SUFFIXES
+
         if picture.suffix.lower() not in PICTURE_SUFFIXES:
             raise ValueError(f"--picture {picture}: pictures go to {', '.join(PICTURE_SUFFIXES)} files")
         MissingExtraError.check("a picture", "matplotlib", "view")

@@ -15,7 +15,7 @@ from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.io import read_mesh
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, closest_points
 
-__all__ = ["COMMANDS"]
+__all__ = ["path", "trace"]
 
 CurveOutput = Annotated[Path, typer.Option(help="OBJ, SVG (flat meshes) or DXF file for the curve.")]
 
@@ -85,6 +85,3 @@ def _write(mesh: Mesh, curve: SurfaceCurve, output: Path, json_file: Path | None
     length, segments = float(curve.lengths(mesh).sum()), len(curve)
     rows: list[Row] = [("length", f"{length:.6g}", length), ("segments", str(segments), segments)]
     print_rows([*rows, ("wrote", str(output))], json_file)
-
-
-COMMANDS = (path, trace)

@@ -16,7 +16,7 @@ from heat_igl.heat_method import Level, Refine, SignedHeatSolver
 from heat_igl.io import MESH_SUFFIXES, read_mesh, read_polylines, write_mesh
 from heat_igl.mesh import Mesh, SurfaceCurve, curve_on
 
-__all__ = ["COMMANDS"]
+__all__ = ["cut", "signed"]
 
 CurvesOption = Annotated[
     Path, typer.Option(metavar="OBJ", help="Polylines (records l), as `isolines` and `path` write them; projected.")
@@ -95,6 +95,3 @@ def cut(
 
 def _projected(mesh: Mesh, path: Path) -> list[SurfaceCurve]:
     return [curve_on(mesh, line.positions, closed=line.is_closed) for line in read_polylines(path)]
-
-
-COMMANDS = (signed, cut)

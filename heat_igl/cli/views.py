@@ -16,7 +16,7 @@ from heat_igl.heat_method import Boundary, Refine, SolverOptions
 from heat_igl.io import read_mesh
 from heat_igl.sources import vertex_sources
 
-__all__ = ["COMMANDS"]
+__all__ = ["demo", "view"]
 
 
 def view(
@@ -75,6 +75,3 @@ def demo(
     check_writable(out / "demo.png")
     check_json(json_file)
     print_rows(demonstrate(out), json_file)
-
-
-COMMANDS = (view, demo)

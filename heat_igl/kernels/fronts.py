@@ -70,6 +70,28 @@ def advance(
     return one.n_visits
 
 
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _volume(
+    positions: cython.const[cython.double][:, ::1], o: cython.int, a: cython.int, b: cython.int, c: cython.int
+) -> cython.double:
+    """Six times the signed volume of the tetrahedron oabc."""
+    x: cython.double = positions[o, 0]
+    y: cython.double = positions[o, 1]
+    z: cython.double = positions[o, 2]
+    ax: cython.double = positions[a, 0] - x
+    ay: cython.double = positions[a, 1] - y
+    az: cython.double = positions[a, 2] - z
+    bx: cython.double = positions[b, 0] - x
+    by: cython.double = positions[b, 1] - y
+    bz: cython.double = positions[b, 2] - z
+    cx: cython.double = positions[c, 0] - x
+    cy: cython.double = positions[c, 1] - y
+    cz: cython.double = positions[c, 2] - z
+    return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+
+
 @cython.final
 @cython.cclass
 class _Fronts:
@@ -254,31 +276,12 @@ class _Fronts:
             if not value < self.best:
                 continue
             source: cython.int = self.sources[label]
-            of_i: cython.double = self.volume(target, source, j, k)
-            of_j: cython.double = self.volume(target, source, k, i)
-            of_k: cython.double = self.volume(target, source, i, j)
+            of_i: cython.double = _volume(self.positions, target, source, j, k)
+            of_j: cython.double = _volume(self.positions, target, source, k, i)
+            of_k: cython.double = _volume(self.positions, target, source, i, j)
             least: cython.double = -ON_SIDE * (fabs(of_i) + fabs(of_j) + fabs(of_k))
             if min(of_i, of_j, of_k) >= least or max(of_i, of_j, of_k) <= -least:
                 self.take(target, value, start, label, s)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def volume(self, o: cython.int, a: cython.int, b: cython.int, c: cython.int) -> cython.double:
-        """Six times the signed volume of the tetrahedron oabc."""
-        x: cython.double = self.positions[o, 0]
-        y: cython.double = self.positions[o, 1]
-        z: cython.double = self.positions[o, 2]
-        ax: cython.double = self.positions[a, 0] - x
-        ay: cython.double = self.positions[a, 1] - y
-        az: cython.double = self.positions[a, 2] - z
-        bx: cython.double = self.positions[b, 0] - x
-        by: cython.double = self.positions[b, 1] - y
-        bz: cython.double = self.positions[b, 2] - z
-        cx: cython.double = self.positions[c, 0] - x
-        cy: cython.double = self.positions[c, 1] - y
-        cz: cython.double = self.positions[c, 2] - z
-        return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
 
     @cython.cfunc
     @cython.inline

@@ -92,6 +92,22 @@ def trace_back(
     return n_done
 
 
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _apart(
+    length: cython.pointer[cython.const[cython.double]], a: cython.p_double, b: cython.p_double
+) -> cython.double:
+    """Distance between two points of a face with these edge lengths."""
+    u: cython.double = a[0] - b[0]
+    v: cython.double = a[1] - b[1]
+    w: cython.double = a[2] - b[2]
+    p: cython.double = length[0]
+    q: cython.double = length[1]
+    r: cython.double = length[2]
+    return sqrt(max(-(p * p * v * w + q * q * w * u + r * r * u * v), 0.0))
+
+
 @cython.final
 @cython.cclass
 class _Back:
@@ -304,20 +320,7 @@ class _Back:
         k: cython.int
         for k in range(3):
             there[k] = k == c
-        return self.apart(f, here, there)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def apart(self, f: cython.int, a: cython.p_double, b: cython.p_double) -> cython.double:
-        """Distance between two points of face f."""
-        u: cython.double = a[0] - b[0]
-        v: cython.double = a[1] - b[1]
-        w: cython.double = a[2] - b[2]
-        p: cython.double = self.length[3 * f]
-        q: cython.double = self.length[3 * f + 1]
-        r: cython.double = self.length[3 * f + 2]
-        return sqrt(max(-(p * p * v * w + q * q * w * u + r * r * u * v), 0.0))
+        return _apart(cython.address(self.length[3 * f]), here, there)
 
     @cython.cfunc
     @cython.nogil
@@ -357,7 +360,10 @@ class _Back:
         if begin.root < self.distance.shape[0] or self.face_of_source(begin.root) != f:
             return False
         offset = self.nearest_of_source(begin.root, here, there)
-        return fabs(offset + walked + self.apart(f, here, there) - begin.distance) <= AT_ROOT * begin.distance
+        return (
+            fabs(offset + walked + _apart(cython.address(self.length[3 * f]), here, there) - begin.distance)
+            <= AT_ROOT * begin.distance
+        )
 
     @cython.cfunc
     @cython.nogil

@@ -97,19 +97,7 @@ class Refinement:
     @cached_property
     def has_holes(self) -> bool:
         """Whether some component is neither a disk nor a sphere, so that a closed curve may enclose no surface."""
-        m = len(self._F)
-        is_first, n_shared, side = np.ones(m, bool), np.zeros(m), np.arange(0, 3 * m, 3, dtype=np.int32)
-        for beyond in self._twin.reshape(-1, 3).T:
-            # In breadth-first order a face without an earlier neighbour begins a component.
-            is_first &= (beyond < 0) | (beyond >= side)
-            n_shared += beyond >= 0
-        of_face = np.cumsum(is_first) - 1
-        of_vertex = np.full(len(self.number), -1)
-        of_vertex[self._F] = of_face[:, None]
-        # Where more than two faces meet, they are cut apart: an edge is shared by two faces, or belongs to one.
-        edges = np.bincount(of_face, 3 - n_shared / 2)
-        vertices = np.bincount(of_vertex[of_vertex >= 0], minlength=len(edges))
-        return bool((vertices - edges + np.bincount(of_face) < 1).any())
+        return _has_holes(self._F, self._twin, len(self.number))
 
     @cached_property
     def flatness(self) -> float:
@@ -378,6 +366,23 @@ class Refinement:
             nearest = on_sheets.argmin(axis=0)[None]
             labels[:] = np.take_along_axis(label[self.number].reshape(self._n_sheets, -1), nearest, axis=0)[0]
         return np.asarray(on_sheets.min(axis=0))
+
+
+def _has_holes(F: AnyArray, twin: AnyArray, n: int) -> bool:
+    """Whether some component of m faces in breadth-first order is neither a disk nor a sphere."""
+    m = len(F)
+    is_first, n_shared, side = np.ones(m, bool), np.zeros(m), np.arange(0, 3 * m, 3, dtype=np.int32)
+    for beyond in twin.reshape(-1, 3).T:
+        # In breadth-first order a face without an earlier neighbour begins a component.
+        is_first &= (beyond < 0) | (beyond >= side)
+        n_shared += beyond >= 0
+    of_face = np.cumsum(is_first) - 1
+    of_vertex = np.full(n, -1)
+    of_vertex[F] = of_face[:, None]
+    # Where more than two faces meet, they are cut apart: an edge is shared by two faces, or belongs to one.
+    edges = np.bincount(of_face, 3 - n_shared / 2)
+    vertices = np.bincount(of_vertex[of_vertex >= 0], minlength=len(edges))
+    return bool((vertices - edges + np.bincount(of_face) < 1).any())
 
 
 class WalkStarts(NamedTuple):
