@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -140,3 +142,11 @@ def test_faces_beside_a_mesh_are_refused() -> None:
     np.testing.assert_array_equal(as_mesh(V, F).F, F)
     with pytest.raises(MeshError, match="F is given beside a Mesh"):
         as_mesh(SPHERE, F)
+
+
+def test_a_path_is_taken_in_a_new_interpreter(tmp_path):
+    """Where nothing has loaded the room that reads files."""
+    path = tmp_path / "ball.off"
+    heat_igl.write_mesh(path, heat_igl.shapes.icosphere(1))
+    code = f"import heat_igl; print(heat_igl.as_mesh({str(path)!r}).n_vertices)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "42\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,8 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     if isinstance(mesh, (Mesh, PolygonMesh, PointCloud)):
         return mesh
     if isinstance(mesh, (str, os.PathLike)):
+        if not _readers:
+            import_module("heat_igl.io")  # which calls `read_paths_with`
         return _readers[0](mesh)
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
         return Mesh(*mesh)

@@ -34,18 +34,13 @@ class Bounds:
 
     @cached_property
     def _edges(self) -> tuple[AnyArray, FloatArray]:
-        """Ends (e, 2) and lengths (e,) of the edges unfolded in, and of given ones that were flipped."""
-        ends, length = _sides(self._surface.unfolding)
-        given = self._surface.faces
-        if given is not None and self._surface.unfolding.n_flips:
-            others, their_length = _sides(given)
-            known = np.sort(_keys(ends))
-            keys = _keys(others)
-            at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
-            is_flipped = known[at] != keys
-            ends = np.concatenate([ends, others[is_flipped]])
-            length = np.concatenate([length, their_length[is_flipped]])
-        return ends, length
+        """Ends (e, 2) and lengths (e,) of the edges unfolded in, and of the given ones if some were flipped."""
+        unfolding, given = self._surface.unfolding, self._surface.faces
+        if given is None or not unfolding.n_flips:
+            return _sides(unfolding)
+        # Most edges are there twice then, which costs less than to find out which.
+        ends, length = zip(_sides(unfolding), _sides(given), strict=True)
+        return np.concatenate(ends), np.concatenate(length)
 
     @cached_property
     def _incident(self) -> tuple[IntArray, AnyArray]:
@@ -81,14 +76,8 @@ class Bounds:
 
 
 def _sides(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, FloatArray]:
-    """Ends (e, 2), the smaller vertex first, and lengths (e,) of edges, each once."""
+    """Ends (e, 2) and lengths (e,) of edges, each once."""
     twin = triangulation.twin
     half_edges = np.flatnonzero((twin < 0) | (np.arange(len(twin)) < twin))
-    ends = np.stack([triangulation.tail(half_edges), triangulation.head(half_edges)], axis=1)
-    ends.sort(axis=1)
-    return ends.astype(np.int32), triangulation.l.ravel()[half_edges]
-
-
-def _keys(ends: AnyArray) -> IntArray:
-    """A number (e,) for each pair of ends."""
-    return np.asarray((ends[:, 0].astype(np.int64) << 32) | ends[:, 1])
+    ends = np.stack([triangulation.tail(half_edges), triangulation.head(half_edges)], axis=1, dtype=np.int32)
+    return ends, triangulation.l.ravel()[half_edges]
