@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import heat_igl
 from heat_igl import Mesh, MeshError, PolygonMesh, as_mesh, shapes, write_mesh
 
 SPHERE = shapes.icosphere(1)
