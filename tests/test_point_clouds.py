@@ -390,3 +390,18 @@ def test_a_star_is_the_delaunay_star() -> None:
     inner = (np.abs(P[F][:, :, :2] - 0.5) < 0.35).all(axis=(1, 2))
     assert inner.sum() > 100
     assert (distance[inner] > radius[inner, None] * (1 - 1e-9)).all()
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_triangles_are_oriented_like_the_normals(side):
+    P = heat_igl.shapes.icosphere(3).V
+    triangles = heat_igl.PointCloud(P, side * P).triangles
+    first, second, third = np.swapaxes(triangles.V[triangles.F], 0, 1)
+    assert (np.sign(np.einsum("fx,fx->f", np.cross(second - first, third - first), first)) == side).all()
+
+
+def test_vectors_on_a_cloud():
+    """The log map of a sphere: as long as the great circles."""
+    P = heat_igl.shapes.icosphere(3).V
+    vectors = heat_igl.VectorHeatSolver(heat_igl.PointCloud(P), refine="exact").log_map(0)
+    np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), np.arccos(np.clip(P @ P[0], -1, 1)), atol=0.01)

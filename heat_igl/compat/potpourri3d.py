@@ -174,9 +174,7 @@ class PointCloudHeatSolver(_Framed):
 
     @cached_property
     def _vectors(self) -> VectorHeatSolver:  # type: ignore[override]
-        triangles = self._cloud.triangles
-        oriented, _ = igl.bfs_orient(np.array(triangles.F))
-        return VectorHeatSolver(Mesh(triangles.V, oriented), t_coef=self._t_coef)
+        return VectorHeatSolver(self._cloud, t_coef=self._t_coef)
 
     def compute_distance(self, p_ind: int) -> FloatArray:
         """Distance (n,) from a point."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import igl
 import numpy as np
 
 from heat_igl.errors import MeshError
@@ -110,7 +111,8 @@ class PointCloud:
 
         The triangles are Delaunay in the tangent planes of their corners; an edge has at most two of them. The vertices
         are `P`, unless the points are noisy: if at half of them the neighbours deviate from a quadric by more than
-        1 / 20 of their spacing, and that is not detail, all are moved onto such quadrics.
+        1 / 20 of their spacing, and that is not detail, all are moved onto such quadrics. Neighbours are oriented alike
+        as far as the surface allows it, and like the normals if there are any.
 
         Raises
         ------
@@ -129,7 +131,9 @@ class PointCloud:
             )
         V = positions[original]
         copies = np.delete(np.arange(len(V)), distinct)
-        return Mesh(V, with_points(V, F, near.axes[original], copies, distinct[original[copies]]))
+        return Mesh(
+            V, _oriented(V, with_points(V, F, near.axes[original], copies, distinct[original[copies]]), self.normals)
+        )
 
     @property
     def components(self) -> IntArray:
@@ -212,3 +216,14 @@ def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:
     directions[rows] /= largest[rows]
     directions[rows] /= np.linalg.norm(directions[rows], axis=1, keepdims=True)
     return directions
+
+
+def _oriented(V: FloatArray, F: IntArray, normals: FloatArray | None) -> IntArray:
+    """The triangles F (m, 3), reversed until neighbours are oriented alike, and each part like most of the normals."""
+    F, part = igl.bfs_orient(F)
+    if normals is not None:
+        area = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
+        along = np.bincount(part, np.einsum("fx,fx->f", area, normals[F].sum(axis=1)))
+        turned = along[part] < 0
+        F[turned] = F[turned, ::-1]
+    return np.asarray(F, np.int64)
