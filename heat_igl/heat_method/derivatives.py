@@ -17,6 +17,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
 from heat_igl.intrinsic.length_derivatives import PlaceSlopes, carry_lengths, carry_lengths_back, check_carried
+from heat_igl.kernels import side_derivatives as kernels
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Surface
 from heat_igl.sources import SourceSet
@@ -232,15 +233,9 @@ class DistanceDerivative:
 
     def _to_positions(self, mesh: Mesh, by_side: FloatArray) -> FloatArray:
         """The derivative (n, 3) by the positions, from that by the sides (m, 3)."""
-        directions, following, preceding = self._sides
-        pull = by_side[..., None] * directions
-        n = mesh.n_vertices
-        columns = [
-            np.bincount(preceding.ravel(), pull[..., k].ravel(), n)
-            - np.bincount(following.ravel(), pull[..., k].ravel(), n)
-            for k in range(3)
-        ]
-        return np.stack(columns, axis=1)
+        by_position = np.zeros((mesh.n_vertices, 3))
+        kernels.pull_to_positions(self._faces.F, mesh.V, by_side, by_position)
+        return by_position
 
     @cached_property
     def _sides(self) -> tuple[FloatArray, IntArray, IntArray]:
