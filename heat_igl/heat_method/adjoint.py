@@ -61,6 +61,8 @@ class HeatAdjoint:
             )
         heat = parts.heat_flow.solve(right_hand_side(domain.n, [term]))
         self._u = np.ascontiguousarray(heat[:, 0])
+        #: The logarithm of the heat, of which the normalized field is made, or the heat.
+        self._v = np.log(self._u, out=np.zeros_like(self._u), where=self._u > 0) if parts.fitted else self._u
         phi = last_steps.poisson.solve(last_steps.divergence([term], heat))[:, 0]
         self._phi = np.ascontiguousarray(phi)
         self._levels = PinnedLevels(parts, term, phi, self._u)
@@ -90,7 +92,10 @@ class HeatAdjoint:
             # t = t_coef h^2, with h the mean edge length of the component.
             by_h = np.where(parts.step_raised, 0.0, 2 * parts.time_steps / self._domain.mean_edge_lengths * by_t)
             if by_h.any():
-                by_side += self._domain.expand_to_faces(by_h)[:, None] * parts.mean_length_slopes
+                # In the memory of an array that is read no more.
+                by_side += np.multiply(
+                    self._domain.expand_to_faces(by_h)[:, None], parts.mean_length_slopes, out=by_weight
+                )
         return Change(by_side, None, levels.by_given, float(by_t.sum()))
 
     def push_forward(self, by_side: FloatArray) -> FloatArray:  # noqa: ARG002
@@ -112,11 +117,10 @@ class HeatAdjoint:
             By the weights and areas of the triangles, and by the heat.
         """
         e, parts, u, components = self._elements, self._parts, self._u, self._domain.components
-        v = np.log(u, out=np.zeros_like(u), where=u > 0) if parts.fitted else u
         by_weight, by_area, by_v, by_log_t = np.empty_like(e.l), np.empty_like(e.area), np.zeros_like(u), 0 * by_t
         p, full_rate, F = np.ascontiguousarray(p), parts.full_rate, self.triangulation.F
         kernels.normalized(
-            F, e.weight, e.area, v, self._phi, p, full_rate, components, by_weight, by_area, by_log_t, by_v
+            F, e.weight, e.area, self._v, self._phi, p, full_rate, components, by_weight, by_area, by_log_t, by_v
         )
         # The full rate is a multiple of t^(-1/2).
         by_t += by_log_t / parts.time_steps

@@ -96,9 +96,8 @@ class DistanceDerivative:
             If the solver has no vertices to move: it was made from edge lengths or operators.
         """
         mesh = self._positions()
-        rows = self._rows(g)
-        result = np.stack([self._to_positions(mesh, self._by_sides(row)[0]) for row in rows])
-        return result if np.ndim(g) == 2 else result[0]
+        result = [self._to_positions(mesh, self._by_sides(row)[0]) for row in self._rows(g)]
+        return np.stack(result) if np.ndim(g) == 2 else result[0]
 
     def by_lengths(self, g: ArrayLike) -> FloatArray:
         """The gradient (m, 3) or (k, m, 3) by the lengths of the sides opposite each corner, for `g` as for a call.
@@ -106,9 +105,8 @@ class DistanceDerivative:
         An edge of two faces changes both of its sides: its derivative is the sum of theirs. Rows are the faces of the
         mesh; of faces that are there twice, one has the derivative of both.
         """
-        rows = self._rows(g)
-        result = np.stack([self._on_given_faces(self._by_sides(row)[0]) for row in rows])
-        return result if np.ndim(g) == 2 else result[0]
+        result = [self._on_given_faces(self._by_sides(row)[0]) for row in self._rows(g)]
+        return np.stack(result) if np.ndim(g) == 2 else result[0]
 
     def by_points(self, g: ArrayLike) -> FloatArray:
         """The gradient by the positions of the sources that are points in faces.

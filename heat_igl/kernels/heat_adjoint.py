@@ -33,6 +33,7 @@ def normalized(
     """
     f: cython.Py_ssize_t
     c: cython.int
+    corner: cython.longlong[3]
     d: cython.double[3]
     q: cython.double[3]
     with cython.nogil:
@@ -40,9 +41,13 @@ def normalized(
             largest: cython.double = 0.0
             by_area[f] = 0.0
             for c in range(3):
-                d[c] = v[F[f, (c + 1) % 3]] - v[F[f, (c + 2) % 3]]
-                q[c] = p[F[f, (c + 1) % 3]] - p[F[f, (c + 2) % 3]]
-                by_weight[f, c] = q[c] * (phi[F[f, (c + 1) % 3]] - phi[F[f, (c + 2) % 3]])
+                corner[c] = F[f, c]
+            for c in range(3):
+                i: cython.longlong = corner[(c + 1) % 3]
+                j: cython.longlong = corner[(c + 2) % 3]
+                d[c] = v[i] - v[j]
+                q[c] = p[i] - p[j]
+                by_weight[f, c] = q[c] * (phi[i] - phi[j])
                 largest = max(largest, fabs(d[c]))
             if largest == 0.0:
                 continue
@@ -61,15 +66,15 @@ def normalized(
             if full_rate[f] * s * scale > 1.0:
                 # As d has been scaled, so is s.
                 s = largest / full_rate[f]
-                by_log_t[component[F[f, 0]]] += 0.5 * by_s * s
+                by_log_t[component[corner[0]]] += 0.5 * by_s * s
             else:
                 by_energy = -0.5 * by_s * s / energy
                 by_area[f] = 0.5 * by_s * s / area[f]
             for c in range(3):
                 by_weight[f, c] += s * q[c] * d[c] + by_energy * d[c] * d[c]
-                pull: cython.double = (s * q[c] + 2.0 * by_energy * d[c]) * weight[f, c] * scale
-                by_v[F[f, (c + 1) % 3]] += pull
-                by_v[F[f, (c + 2) % 3]] -= pull
+                q[c] = (s * q[c] + 2.0 * by_energy * d[c]) * weight[f, c] * scale
+            for c in range(3):
+                by_v[corner[c]] += q[(c + 2) % 3] - q[(c + 1) % 3]
 
 
 def elements(
@@ -97,6 +102,7 @@ def elements(
     f: cython.Py_ssize_t
     c: cython.int
     k: cython.Py_ssize_t
+    corner: cython.longlong[3]
     of_weight: cython.double[3]
     mass: cython.double[3]
     with cython.nogil:
@@ -105,18 +111,20 @@ def elements(
             all_masses: cython.double = 0.0
             is_obtuse: cython.bint = False
             for c in range(3):
-                i: cython.longlong = F[f, (c + 1) % 3]
-                j: cython.longlong = F[f, (c + 2) % 3]
+                corner[c] = F[f, c]
+                mass[c] = by_mass[corner[c]]
+                all_masses += mass[c]
+                is_obtuse = is_obtuse or weight[f, c] < 0.0
+            for c in range(3):
+                i: cython.longlong = corner[(c + 1) % 3]
+                j: cython.longlong = corner[(c + 2) % 3]
                 flow: cython.double = 0.0
                 for k in range(x.shape[0]):
                     flow -= (x[k, i] - x[k, j]) * (u[k, i] - u[k, j])
                 of_weight[c] = by_weight[f, c] + flow * slopes[0, f, c]
                 by_side[f, c] += flow * slopes[1, f, c]
                 change += flow * slopes[2, f, c]
-                mass[c] = by_mass[F[f, c]]
-                all_masses += mass[c]
-                is_obtuse = is_obtuse or weight[f, c] < 0.0
-            by_t[component[F[f, 0]]] += change
+            by_t[component[corner[0]]] += change
             of_area: cython.double = by_area[f]
             for c in range(3):
                 if is_obtuse:

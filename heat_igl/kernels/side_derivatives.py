@@ -19,19 +19,20 @@ def pull_to_positions(
     f: cython.Py_ssize_t
     c: cython.int
     d: cython.int
-    along: cython.double[3]
+    corner: cython.longlong[3]
+    along: cython.double[3][3]
     with cython.nogil:
         for f in range(F.shape[0]):
             for c in range(3):
-                i: cython.longlong = F[f, (c + 1) % 3]
-                j: cython.longlong = F[f, (c + 2) % 3]
+                corner[c] = F[f, c]
+            for c in range(3):
                 square: cython.double = 0.0
                 for d in range(3):
-                    along[d] = V[j, d] - V[i, d]
-                    square += along[d] * along[d]
-                if not square > 0.0:
-                    continue
-                pull: cython.double = by_side[f, c] / sqrt(square)
+                    along[c][d] = V[corner[(c + 2) % 3], d] - V[corner[(c + 1) % 3], d]
+                    square += along[c][d] * along[c][d]
+                pull: cython.double = by_side[f, c] / sqrt(square) if square > 0.0 else 0.0
                 for d in range(3):
-                    by_position[j, d] += pull * along[d]
-                    by_position[i, d] -= pull * along[d]
+                    along[c][d] *= pull
+            for c in range(3):
+                for d in range(3):
+                    by_position[corner[c], d] += along[(c + 1) % 3][d] - along[(c + 2) % 3][d]
