@@ -40,7 +40,8 @@ class LevelSlopes(NamedTuple):
     pair : tuple of two (n,) float64, or None
         The adjoint and the solution of one more heat solve, with several sources.
     by_side, by_given : (m, 3), (m', 3) float64
-        By the sides of the triangles that are solved on, and of the faces before any flip; None where these do not count.
+        By the sides of the triangles that are solved on, and of the faces before any flip, or None where those do not
+        count.
     """
 
     by_phi: FloatArray

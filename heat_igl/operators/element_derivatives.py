@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.operators.matrices import Operators
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.typing import BoolArray, IntArray
 
 __all__ = ["Elements"]
 
