@@ -119,6 +119,21 @@ def test_heat_from_several_sources(sources: list[int], options: dict[str, Any]) 
     assert (pull_back(g) * direction).sum() == pytest.approx((g * expected).sum(), rel=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+@pytest.mark.parametrize("options", HEAT[1:], ids=str)
+def test_heat_on_components_with_time_steps_of_their_own(options: dict[str, Any]) -> None:
+    one, other = MESHES["grid"](), MESHES["sphere"]()
+    n = one.n_vertices
+    mesh = Mesh(np.concatenate([one.V, 3 + 5 * other.V]), np.concatenate([one.F, n + other.F]))
+    solver, sources, rng = HeatMethodSolver(mesh, **options), [150, n + 5], np.random.default_rng(11)
+    _, pull_back = solver.distance_vjp(sources)
+    g = rng.standard_normal(mesh.n_vertices)
+    g[pull_back.inexact] = 0
+    for direction in (rng.standard_normal(mesh.V.shape), mesh.V * (np.arange(len(mesh.V)) < n)[:, None]):
+        expected, _ = differences(solver, mesh.V, sources, direction, 1e-6 * one.edge_lengths.mean())
+        assert (pull_back(g) * direction).sum() == pytest.approx((g * expected).sum(), rel=1e-4)
+
+
 @pytest.mark.parametrize("options", BY_PATHS + HEAT, ids=str)
 @pytest.mark.parametrize("name", ["sphere", "grid", "moebius"])
 def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name: str, options: dict[str, Any]) -> None:

@@ -6,8 +6,6 @@ symmetric, so their adjoints are two more solves with the same factors; all else
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from heat_igl.heat_method.integration import Integration
@@ -15,9 +13,7 @@ from heat_igl.heat_method.levels import PinnedLevels
 from heat_igl.heat_method.parts import SolverParts
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels import heat_adjoint as kernels
-from heat_igl.operators import ElementSlopes
 from heat_igl.sources import SourceSet, right_hand_side
-from heat_igl.steps.normalization import lowest_full_rate
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import Change
 
@@ -65,6 +61,8 @@ class HeatAdjoint:
             )
         heat = parts.heat_flow.solve(right_hand_side(domain.n, [term]))
         self._u = np.ascontiguousarray(heat[:, 0])
+        #: The logarithm of the heat, of which the normalized field is made, or the heat.
+        self._v = np.log(self._u, out=np.zeros_like(self._u), where=self._u > 0) if parts.fitted else self._u
         phi = last_steps.poisson.solve(last_steps.divergence([term], heat))[:, 0]
         self._phi = np.ascontiguousarray(phi)
         self._levels = PinnedLevels(parts, term, phi, self._u)
@@ -75,17 +73,29 @@ class HeatAdjoint:
 
     def pull_back(self, g: FloatArray) -> Change:
         """The derivative of the sum of distances times g (n,)."""
-        domain, slopes = self._domain, ElementSlopes(self._elements)
-        by_t = np.zeros(domain.n_components)
+        e, parts, components = self._elements, self._parts, self._domain.components
+        by_t = np.zeros(self._domain.n_components)
         levels = self._levels.pull_back(g)
         # L is symmetric. Rounding aside, each component's sum is 0, as a right-hand side of L needs.
         p = self._poisson.solve(levels.by_phi)
-        by_heat = levels.by_heat + self._fields(p, slopes, by_t)
-        pairs = [(self._parts.heat_flow.solve(by_heat), self._u)]
+        by_weight, by_area, by_heat = self._fields(p, by_t)
+        pairs = [(parts.heat_flow.solve(levels.by_heat + by_heat), self._u)]
         if levels.pair is not None:
             pairs.append(levels.pair)
-        self._heat_flow(pairs, slopes, by_t)
-        by_side = levels.by_side + slopes.total() + self._time_step(by_t)
+        x, u = np.stack([x for x, _ in pairs]), np.stack([u / parts.heat_flow.mean_mass for _, u in pairs])
+        by_mass, by_side = -np.einsum("kn,kn->n", x, u), levels.by_side
+        slopes, F = parts.flow_slopes, self.triangulation.F
+        kernels.elements(
+            F, e.l, e.weight, e.area, e.share, x, u, slopes, components, by_weight, by_area, by_mass, by_side, by_t
+        )
+        if parts.options.t is None:
+            # t = t_coef h^2, with h the mean edge length of the component.
+            by_h = np.where(parts.step_raised, 0.0, 2 * parts.time_steps / self._domain.mean_edge_lengths * by_t)
+            if by_h.any():
+                # In the memory of an array that is read no more.
+                by_side += np.multiply(
+                    self._domain.expand_to_faces(by_h)[:, None], parts.mean_length_slopes, out=by_weight
+                )
         return Change(by_side, None, levels.by_given, float(by_t.sum()))
 
     def push_forward(self, by_side: FloatArray) -> FloatArray:  # noqa: ARG002
@@ -95,81 +105,26 @@ class HeatAdjoint:
             "with the gradient"
         )
 
-    def _fields(self, p: FloatArray, slopes: ElementSlopes, by_t: FloatArray) -> FloatArray:
-        """The derivative (n,) by the heat of p . (b - L phi), with b the divergence of the normalized field.
+    def _fields(self, p: FloatArray, by_t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The derivative of p . (b - L phi), with b the divergence of the normalized field; that by t is added.
 
         On each face b is s K v, with K the cotangent matrix of the face, v the logarithm of the heat (or the heat) and
         s = 1 / |grad v|, at most one over the full rate; and |grad v|^2 is v . K v over the area.
+
+        Returns
+        -------
+        by_weight, by_area, by_heat : (m, 3), (m,), (n,) float64
+            By the weights and areas of the triangles, and by the heat.
         """
-        e, parts, u = self._elements, self._parts, self._u
-        full_rate = np.zeros(len(e.area))
-        if parts.t_damping is not None:
-            full_rate = lowest_full_rate(self._domain, parts.t_damping, parts.fitted)
-        v = np.log(u, out=np.zeros_like(u), where=u > 0) if parts.fitted else u
-        by_step, by_v = np.zeros(len(e.area)), np.zeros(self._domain.n)
+        e, parts, u, components = self._elements, self._parts, self._u, self._domain.components
+        by_weight, by_area, by_v, by_log_t = np.empty_like(e.l), np.empty_like(e.area), np.zeros_like(u), 0 * by_t
+        p, full_rate, F = np.ascontiguousarray(p), parts.full_rate, self.triangulation.F
         kernels.normalized(
-            self.triangulation.F,
-            e.weight,
-            e.area,
-            np.ascontiguousarray(v),
-            self._phi,
-            np.ascontiguousarray(p),
-            full_rate,
-            slopes.by_weight,
-            slopes.by_area,
-            by_step,
-            by_v,
+            F, e.weight, e.area, self._v, self._phi, p, full_rate, components, by_weight, by_area, by_log_t, by_v
         )
         # The full rate is a multiple of t^(-1/2).
-        of_face = self._domain.components[self.triangulation.F[:, 0]]
-        by_t += np.bincount(of_face, by_step, len(by_t)) / self._parts.time_steps
-        return np.divide(by_v, u, out=np.zeros_like(u), where=u > 0) if parts.fitted else by_v
-
-    def _heat_flow(
-        self, pairs: Sequence[tuple[FloatArray, FloatArray]], slopes: ElementSlopes, by_t: FloatArray
-    ) -> None:
-        """Add - x . dA u for pairs of an adjoint x and a solution u, where A = M - t L."""
-        flow, components = self._parts.heat_flow, self._domain.components
-        F, t = self.triangulation.F, self._parts.time_steps
-        of_face = components[F[:, 0]]
-        unit = np.full(self._domain.n, flow.mean_mass)
-        by_mass, by_weight = np.zeros(self._domain.n), np.zeros(F.shape)
-        for x, u in pairs:
-            by_mass -= x * (u / unit)
-            kernels.heat_flow(F, np.ascontiguousarray(x), np.ascontiguousarray(u), unit, by_weight)
-        slopes.by_mass += by_mass[F]
-        if not self._parts.fitted:
-            slopes.by_weight += t[of_face][:, None] * by_weight
-            by_t += np.bincount(of_face, np.einsum("fc,fc->f", self._elements.weight, by_weight), len(by_t))
-            return
-        # L has one entry for all sides between the same two vertices: its weight is the sum of theirs, not below 0,
-        # times the factor of the shortest.
-        first = self._elements.pairs[1]
-        weight, x, factor, slope, of_side = self._parts.fitted_weights
-        of_pair = of_face[first // 3]
-        by_fitted, t_of_pair = by_weight.ravel()[first], t[of_pair]
-        slopes.by_weight += by_weight * of_side
-        by_factor = t_of_pair * by_fitted * weight * slope
-        slopes.by_side.ravel()[first] += by_factor / np.sqrt(t_of_pair)
-        by_t += np.bincount(of_pair, by_fitted * weight * factor - by_factor * x / (2 * t_of_pair), len(by_t))
-
-    def _time_step(self, by_t: FloatArray) -> FloatArray:
-        """The derivative (m, 3) by the sides through t = t_coef h^2, h the mean edge length of each component."""
-        options, domain, T = self._parts.options, self._domain, self.triangulation
-        result = np.zeros(T.l.size)
-        t = self._parts.time_steps
-        if options.t is not None:
-            return result.reshape(-1, 3)
-        edges = self._elements.edges
-        if domain.n_components == 1 and not np.isclose(T.l.ravel()[edges].mean(), domain.mean_edge_length, rtol=1e-12):
-            # On the mesh's own faces an edge of more than two faces counts once.
-            edges = self._elements.pairs[1]
-        component = domain.components[T.F[edges // 3, 0]]
-        h = domain.mean_edge_lengths
-        by_h = np.where(self._parts.step_raised, 0.0, 2 * t / h * by_t)
-        count = np.bincount(component, minlength=domain.n_components)
-        result[edges] = (by_h / np.maximum(count, 1))[component]
-        return result.reshape(-1, 3)
+        by_t += by_log_t / parts.time_steps
+        return by_weight, by_area, np.divide(by_v, u, out=np.zeros_like(u), where=u > 0) if parts.fitted else by_v
 
 
 def _check(parts: SolverParts, sources: SourceSet) -> None:

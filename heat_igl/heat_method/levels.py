@@ -40,14 +40,15 @@ class LevelSlopes(NamedTuple):
     pair : tuple of two (n,) float64, or None
         The adjoint and the solution of one more heat solve, with several sources.
     by_side, by_given : (m, 3), (m', 3) float64
-        By the sides of the triangles that are solved on, and of the faces before any flip.
+        By the sides of the triangles that are solved on, and of the faces before any flip, or None where those do not
+        count.
     """
 
     by_phi: FloatArray
     by_heat: FloatArray
     pair: tuple[FloatArray, FloatArray] | None
     by_side: FloatArray
-    by_given: FloatArray
+    by_given: FloatArray | None
 
 
 class PinnedLevels:
@@ -154,15 +155,14 @@ class PinnedLevels:
         place = np.full(len(g), -1)
         place[term.near.vertex] = np.arange(len(term.near.vertex))
         np.add.at(by_value, place[anchors.vertex], -by_excess)
-        on_triangles, on_faces = self._values_to_sides(by_value)
-        return LevelSlopes(by_phi, by_heat, pair, (sides + on_triangles).reshape(-1, 3), on_faces.reshape(-1, 3))
-
-    def _values_to_sides(self, by_value: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The derivative by the edges that the known distances are the lengths of."""
-        one, other = (np.zeros(triangulation.l.size) for triangulation in self._triangulations)
-        for sides, (side, place) in zip((one, other), self._sides_of_values, strict=True):
-            np.add.at(sides, side, by_value[place])
-        return one, other
+        # The edges whose lengths the known distances are.
+        (on_triangles, place), (on_faces, place_before) = self._sides_of_values
+        np.add.at(sides, on_triangles, by_value[place])
+        by_given = None
+        if len(on_faces):
+            by_given = np.zeros(self._triangulations[1].l.shape)
+            np.add.at(by_given.ravel(), on_faces, by_value[place_before])
+        return LevelSlopes(by_phi, by_heat, pair, sides.reshape(-1, 3), by_given)
 
     @cached_property
     def _sides_of_values(self) -> list[tuple[IntArray, IntArray]]:

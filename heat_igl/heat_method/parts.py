@@ -31,6 +31,7 @@ from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
 from heat_igl.steps.fitted import fit, fit_slope
+from heat_igl.steps.normalization import lowest_full_rate
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import FrontSolver, UnfoldingSolver
 
@@ -101,19 +102,47 @@ class SolverParts:
         return Elements(self.operators)
 
     @cached_property
-    def fitted_weights(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """What the fitted flow knows of each of ``elements.pairs``, to be differentiated.
+    def flow_slopes(self) -> FloatArray:
+        """How the entry t L of each side changes (3, m, 3): with its weight, its length and the time step.
 
-        Its cotangent weight, not below 0; the length x of its shortest side in units of sqrt(t); `fit` and `fit_slope`
-        of x. Last, of each side (m, 3) the time step times that factor, 0 where the weight is.
+        In a fitted L there is one entry for all sides between the same two vertices: the sum of their weights, not
+        below 0, times the factor of the shortest.
         """
         elements = self.elements
+        t = self.operators.expand_to_faces(self.time_steps)[:, None]
+        if not self.fitted:
+            return np.stack([t + np.zeros_like(elements.l), np.zeros_like(elements.l), elements.weight])
         pair, first = elements.pairs
-        t = self.time_steps[self.operators.components[elements.i.ravel()[first]]]
-        x = elements.l.ravel()[first] / np.sqrt(t)
+        t_of_pair = t[first // 3, 0]
+        x = elements.l.ravel()[first] / np.sqrt(t_of_pair)
         weight, factor = np.maximum(np.bincount(pair, elements.weight.ravel()), 0.0), fit(x)
-        of_side = np.where(weight > 0, t * factor, 0.0)[pair].reshape(-1, 3)
-        return weight, x, factor, fit_slope(x), of_side
+        by_x = weight * fit_slope(x)
+        slopes = np.zeros((3, elements.l.size))
+        slopes[0] = np.where(weight > 0, t_of_pair * factor, 0.0)[pair]
+        slopes[1, first] = by_x * np.sqrt(t_of_pair)
+        slopes[2, first] = weight * factor - by_x * x / 2
+        return slopes.reshape(3, -1, 3)
+
+    @cached_property
+    def full_rate(self) -> FloatArray:
+        """The rate (m,) of `lowest_full_rate`; 0 for a field of length 1."""
+        if self.t_damping is None:
+            return np.zeros(len(self.elements.area))
+        return lowest_full_rate(self.operators, self.t_damping, self.fitted)
+
+    @cached_property
+    def mean_length_slopes(self) -> FloatArray:
+        """The derivative (m, 3) of the mean edge length of each component by the sides."""
+        domain, elements = self.operators, self.elements
+        edges = elements.edges
+        mean = elements.l.ravel()[edges].mean()
+        if domain.n_components == 1 and not np.isclose(mean, domain.mean_edge_length, rtol=1e-12):
+            # On the mesh's own faces an edge of more than two faces counts once.
+            edges = elements.pairs[1]
+        component = domain.components[elements.i.ravel()[edges]]
+        slopes = np.zeros(elements.l.size)
+        slopes[edges] = 1 / np.bincount(component, minlength=domain.n_components)[component]
+        return slopes.reshape(-1, 3)
 
     @property
     def given_faces(self) -> IntArray | None:

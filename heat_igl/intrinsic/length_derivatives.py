@@ -48,7 +48,7 @@ def carry_lengths_back(
     triangulation : IntrinsicTriangulation
         m triangles.
     by_side : (m, 3) float64
-        Derivative by the length opposite each corner; an edge of two faces changes both of its sides.
+        Derivative by the length opposite each corner; an edge of two faces changes both of its sides. Overwritten.
     n_before : int
         How many changes of the history the earlier faces have behind them.
     places : PlaceSlopes, optional
@@ -68,7 +68,6 @@ def carry_lengths_back(
         If vertices were added.
     """
     check_carried(triangulation)
-    by_side = by_side.copy()
     visited = [] if places is None else _visited(triangulation, places)
     slopes = None if places is None else places.slopes.copy()
     for i in range(len(triangulation.history) - 1, -1, -1):

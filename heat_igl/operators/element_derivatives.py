@@ -1,4 +1,4 @@
-"""Derivatives of what the heat method takes of a triangle, by the lengths of the sides: weights, area and masses."""
+"""What the heat method takes of triangles, to be differentiated by the lengths of their sides: weights and areas."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.operators.matrices import Operators
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.typing import BoolArray, IntArray
 
-__all__ = ["ElementSlopes", "Elements"]
+__all__ = ["Elements"]
 
 
 class Elements:
@@ -32,6 +32,8 @@ class Elements:
         Half the cotangent opposite each side: the entry of L at the ends of an edge is the sum over its sides.
     area : (m,) float64
         Area of each triangle.
+    share : float
+        One half on a cover, 1 otherwise.
     """
 
     def __init__(self, domain: Operators) -> None:
@@ -44,11 +46,8 @@ class Elements:
         self.share = 0.5 if triangulation.is_cover else 1.0
         self.area = self.share * triangulation.areas
         square = self.l**2
-        self._inner = square.sum(axis=1)[:, None] - 2 * square
-        self.weight = self.share**2 * self._inner / (8 * self.area)[:, None]
-        #: Corners (m, 3) with an obtuse angle.
-        self._is_obtuse = self._inner < 0
-        self._has_obtuse = self._is_obtuse.any(axis=1)
+        inner = square.sum(axis=1)[:, None] - 2 * square
+        self.weight = self.share**2 * inner / (8 * self.area)[:, None]
 
     @cached_property
     def edges(self) -> IntArray:
@@ -66,50 +65,3 @@ class Elements:
         pair = np.empty(len(key), np.int64)
         pair[order] = np.cumsum(is_first) - 1
         return pair, order[is_first]
-
-    def mass(self) -> FloatArray:
-        """Area (m, 3) of the Voronoi cell of each corner; of an obtuse triangle one half and twice a quarter."""
-        parts = self.weight * self.l**2 / 4
-        cells = parts.sum(axis=1)[:, None] - parts
-        obtuse = self._has_obtuse
-        cells[obtuse] = self.area[obtuse, None] * np.where(self._is_obtuse[obtuse], 0.5, 0.25)
-        return np.asarray(cells)
-
-
-class ElementSlopes:
-    """Sums the derivative of a number by the weights, areas, masses and sides of triangles, all zero at first.
-
-    Attributes
-    ----------
-    by_weight, by_mass, by_side : (m, 3) float64
-        By `Elements.weight`, `Elements.mass` and the lengths themselves.
-    by_area : (m,) float64
-        By `Elements.area`.
-    """
-
-    def __init__(self, elements: Elements) -> None:
-        self._elements = elements
-        self.by_weight, self.by_mass, self.by_side = (np.zeros_like(elements.l) for _ in range(3))
-        self.by_area = np.zeros(len(elements.l))
-
-    def total(self) -> FloatArray:
-        """The derivative (m, 3) by the lengths of the sides."""
-        e = self._elements
-        by_area, obtuse = self.by_area.copy(), e._has_obtuse
-        by_area[obtuse] += (self.by_mass[obtuse] * np.where(e._is_obtuse[obtuse], 0.5, 0.25)).sum(axis=1)
-        # The cell of a corner has a part for both sides there: for all but the opposite one.
-        by_part = _sum(self.by_mass)[:, None] - self.by_mass
-        by_part[obtuse] = 0
-        by_weight = self.by_weight + by_part * e.l**2 / 4
-        by_side = self.by_side + by_part * e.weight * e.l / 2
-        # The weight is inner / (8 area), and the area changes by l times the weight.
-        by_area -= np.einsum("fc,fc->f", by_weight, e.weight) / e.area
-        by_inner = e.share**2 * by_weight / (8 * e.area)[:, None]
-        by_side += 2 * e.l * (_sum(by_inner)[:, None] - 2 * by_inner)
-        by_side += by_area[:, None] * e.l * e.weight
-        return np.asarray(by_side)
-
-
-def _sum(rows: FloatArray) -> FloatArray:
-    """Sums of rows of three; by columns, which takes a third of the time."""
-    return np.asarray(rows[:, 0] + rows[:, 1] + rows[:, 2])
