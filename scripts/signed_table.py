@@ -6,9 +6,9 @@ Each case is a level of a random smooth function on one of the meshes, in turn, 
 curves removed, in turn, in one to six pieces. The truth is the unfolded distance from the whole curves, with the sign
 of the function. Errors are means over the vertices, as a share of the square root of the area inside, in percent.
 Times are medians of paired runs; those of potpourri3d's first query are part of its precomputation, since it factors
-then. With --signs, the curves around as many random regions of each mesh: across faces, through vertices, along edges and through
-midpoints of edges in turn; signs are compared with the pieces of the cut mesh, at all vertices farther than half a mean
-edge from the curves. Needs potpourri3d, but for the signs; docs/signed.md shows the tables.
+then. With --signs, the curves around as many random regions of each mesh: across faces, through vertices, along edges
+and through midpoints of edges in turn; signs are compared with the pieces of the cut mesh, at all vertices farther than
+half a mean edge from the curves. Needs potpourri3d, but for the signs; docs/signed.md shows the tables.
 """
 
 from __future__ import annotations
