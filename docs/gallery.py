@@ -139,6 +139,28 @@ def scribble() -> Picture:
     return plot_field(mesh, phi, label="signed distance", limits=(-1, 1), spacing=0.1, curves=arcs, view=(10, 60))
 
 
+def grown() -> Picture:
+    """A region of disks, with lines at which it is grown and shrunk: signed distance from the boundary."""
+    mesh = heat_igl.sample_mesh()
+    sites = np.random.default_rng(2).choice(mesh.n_vertices, 25, replace=False)
+    region = heat_igl.HeatMethodSolver(mesh).distance(sites) < 0.07
+    phi = heat_igl.SignedHeatSolver(mesh, refine="unfold").distance(region)
+    outline = heat_igl.isolines(mesh, phi, 0)[0]
+    return plot_field(mesh, phi, label="signed distance", spacing=0.03, limits=(-0.12, 0.12), curves=outline)
+
+
+def noisy() -> Picture:
+    """The inside of noisy samples of a curve, with one normal in six that points the wrong way."""
+    mesh, rng = shapes.grid(60), np.random.default_rng(5)
+    angle = rng.uniform(0, 2 * np.pi, 150)
+    radius = 0.3 + 0.06 * np.cos(3 * angle) + rng.uniform(-0.02, 0.02, 150)
+    outwards = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    points = heat_igl.closest_points(mesh, mesh.V.mean(axis=0) + radius[:, None] * outwards).points
+    normals = np.where(rng.permutation(150) < 25, -1, 1)[:, None] * outwards
+    phi = heat_igl.SignedHeatSolver(mesh, t_coef=8).distance(heat_igl.OrientedPoints(points, normals))
+    return plot_field(mesh, phi, label="signed distance", spacing=0.05, sources=points)
+
+
 def tetrahedra() -> Picture:
     """Distance through a solid, by the heat method on tetrahedra."""
     mesh = shapes.box(12, (2.0, 1.0, 1.0))
@@ -224,8 +246,8 @@ def unfolded() -> Picture:
 
 
 ENTRIES = (
-    torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, scribble, heat, error, unfolded, cut_locus,
-    book, tetrahedra, polygons, cloud, maze, travel_time, directions, straightest, extended, asked,
+    torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, scribble, grown, noisy, heat, error,
+    unfolded, cut_locus, book, tetrahedra, polygons, cloud, maze, travel_time, directions, straightest, extended, asked,
 )  # fmt: skip
 
 

@@ -1,12 +1,14 @@
 """Signed distance from broken curves, beside potpourri3d's: errors, failures, and times.
 
-    python scripts/signed_table.py MESH [MESH ...] [--cases 40] [--seed 0] [--no-times] [--json FILE]
+    python scripts/signed_table.py MESH [MESH ...] [--cases 40] [--signs 0] [--seed 0] [--no-times] [--json FILE]
 
 Each case is a level of a random smooth function on one of the meshes, in turn, and 10, 30 or 50 % of the length of its
 curves removed, in turn, in one to six pieces. The truth is the unfolded distance from the whole curves, with the sign
 of the function. Errors are means over the vertices, as a share of the square root of the area inside, in percent.
 Times are medians of paired runs; those of potpourri3d's first query are part of its precomputation, since it factors
-then. Needs potpourri3d; docs/signed.md shows the tables.
+then. With --signs, the curves around as many random regions of each mesh: across faces, through vertices, along edges
+and through midpoints of edges in turn; signs are compared with the pieces of the cut mesh, at all vertices farther than
+half a mean edge from the curves. Needs potpourri3d, but for the signs; docs/signed.md shows the tables.
 """
 
 from __future__ import annotations
@@ -20,7 +22,16 @@ from typing import Any
 import numpy as np
 
 import heat_igl
-from heat_igl import Mesh, SignedHeatSolver, SurfaceCurve, isolines, sublevel_areas, unfolded_distance
+from heat_igl import (
+    Mesh,
+    SignedHeatSolver,
+    SurfaceCurve,
+    cut,
+    isolines,
+    region_boundary,
+    sublevel_areas,
+    unfolded_distance,
+)
 from heat_igl.typing import FloatArray
 
 from measuring import seconds_of
@@ -28,6 +39,7 @@ from scaffold import add_json, add_seed, environment, option_parser, publish, ta
 
 SHARES = (0.1, 0.3, 0.5)
 LEVELS = ("ZeroSet", "None")
+KINDS = ("across faces", "through vertices", "along edges", "through midpoints")
 
 
 class Peer:
@@ -111,7 +123,7 @@ def measure_case(mesh: Mesh, solvers: dict[str, Any], share: float, rng: np.rand
 
 
 def measure_times(mesh: Mesh, rounds: int) -> dict[str, float]:
-    """Seconds, and their ratios: a curve through the middle of the mesh."""
+    """Seconds, and their ratios: a curve through the middle of the mesh; the refined query beside the same one."""
     height = mesh.V @ [0.3, 0.5, 0.81]
     curves = isolines(mesh, height, float(np.median(height)))[0]
     found: dict[str, list[float]] = {}
@@ -128,8 +140,9 @@ def measure_times(mesh: Mesh, rounds: int) -> dict[str, float]:
         solver = potpourri3d.MeshSignedHeatSolver(mesh.V, mesh.F)
         solver.compute_distance(nodes, level_set_constraint="None")
 
-    solver = ours()
+    solver, refined = ours(), SignedHeatSolver(mesh, refine="unfold")
     solver.distance(curves)
+    refined.distance(curves)
     peer.distance(nodes, "None")
     for _ in range(rounds):
         times = {
@@ -138,11 +151,51 @@ def measure_times(mesh: Mesh, rounds: int) -> dict[str, float]:
                 seconds_of(lambda: solver.distance(curves)),
                 seconds_of(lambda: peer.distance(nodes, "None")),
             ),
+            "refined query": (
+                seconds_of(lambda: refined.distance(curves)),
+                seconds_of(lambda: peer.distance(nodes, "None")),
+            ),
         }
         for name, (one, other) in times.items():
             for key, value in ((f"{name}, s", one), (f"{name}, peer, s", other), (f"{name}, ratio", one / other)):
                 found.setdefault(key, []).append(value)
     return {"vertices": mesh.n_vertices} | {name: statistics.median(each) for name, each in found.items()}
+
+
+def drawn(kind: str, mesh: Mesh, values: FloatArray, level: float) -> list[SurfaceCurve]:
+    """Closed curves around a region of low values, with the region on their left."""
+    if kind == "across faces":
+        return isolines(mesh, values, level)[0]
+    if kind == "through vertices":
+        return isolines(mesh, values, float(values[np.argmin(np.abs(values - level))]))[0]
+    if kind == "along edges":
+        return region_boundary(mesh, faces=values[mesh.F].mean(axis=1) < level)
+    return region_boundary(mesh, vertices=values < level)
+
+
+def wrong_signs(mesh: Mesh, count: int, rng: np.random.Generator) -> dict[str, int]:
+    """Cases with a wrong sign, and vertices compared; the truth is a flood fill of the cut mesh."""
+    solvers = {"heat": SignedHeatSolver(mesh), "unfold": SignedHeatSolver(mesh, refine="unfold")}
+    found = {"cases": 0, "curves": 0, "vertices compared": 0}
+    found |= {f"{name}, cases with a wrong sign": 0 for name in solvers}
+    for case in range(count):
+        values = smooth_function(mesh, rng)
+        level = float(np.quantile(values, rng.uniform(0.2, 0.8)))
+        curves = drawn(KINDS[case % len(KINDS)], mesh, values, level)
+        pieces = cut(mesh, curves)
+        left, right = (set(side[side >= 0].tolist()) for side in pieces.pieces[pieces.sides].T)
+        if left & right:
+            raise RuntimeError(f"case {case}: the curves do not separate the mesh")
+        is_left = np.zeros(pieces.mesh.n_vertices, bool)
+        is_left[pieces.mesh.F[np.isin(pieces.pieces, sorted(left))]] = True
+        far = unfolded_distance(mesh, curves) > mesh.edge_lengths.mean() / 2
+        found["cases"] += 1
+        found["curves"] += len(curves)
+        found["vertices compared"] += int(far.sum())
+        for name, solver in solvers.items():
+            is_wrong = (solver.distance(curves) < 0) != is_left[: mesh.n_vertices]
+            found[f"{name}, cases with a wrong sign"] += bool(is_wrong[far].any())
+    return found
 
 
 def summary(rows: list[dict[str, Any]]) -> str:
@@ -162,16 +215,8 @@ def summary(rows: list[dict[str, Any]]) -> str:
     return "\n".join(table(["removed", "cases", *names], lines))
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    parser = option_parser(__doc__)
-    parser.add_argument("meshes", nargs="+", type=Path)
-    parser.add_argument("--cases", type=int, default=40, help="number of cases (default 40)")
-    parser.add_argument("--no-times", action="store_true", help="errors only")
-    add_seed(parser)
-    add_json(parser)
-    arguments = parser.parse_args(argv)
-    rng = np.random.default_rng(arguments.seed)
-    meshes = {path.stem: heat_igl.read_mesh(path) for path in arguments.meshes}
+def measure_errors(meshes: dict[str, Mesh], count: int, rng: np.random.Generator) -> list[dict[str, Any]]:
+    """A row for each case: mesh, share removed, and the errors of all solvers."""
     solvers = {
         name: {
             "heat": SignedHeatSolver(mesh),
@@ -181,17 +226,43 @@ def main(argv: Sequence[str] | None = None) -> int:
         for name, mesh in meshes.items()
     }
     rows: list[dict[str, Any]] = []
-    for case in range(arguments.cases):
+    for case in range(count):
         name, share = list(meshes)[case % len(meshes)], SHARES[case // len(meshes) % len(SHARES)]
         rows.append({"mesh": name, "removed": share} | measure_case(meshes[name], solvers[name], share, rng))
         print(rows[-1], file=sys.stderr, flush=True)
-    text = summary(rows)
-    times = {} if arguments.no_times else {name: measure_times(mesh, 5) for name, mesh in meshes.items()}
-    if times:
-        head = ["mesh", *next(iter(times.values()))]
-        cells = [(name, *(f"{value:.3g}" for value in row.values())) for name, row in times.items()]
-        text += "\n\n" + "\n".join(table(head, cells))
-    publish({"environment": environment(), "rows": rows, "times": times}, text, json_file=arguments.json)
+    return rows
+
+
+def one_row_each(found: dict[str, dict[str, Any]]) -> str:
+    """A table with a row for each mesh."""
+    head = ["mesh", *next(iter(found.values()))]
+    cells = [
+        (name, *(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()))
+        for name, row in found.items()
+    ]
+    return "\n".join(table(head, cells))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = option_parser(__doc__)
+    parser.add_argument("meshes", nargs="+", type=Path)
+    parser.add_argument("--cases", type=int, default=40, help="number of cases (default 40)")
+    parser.add_argument("--signs", type=int, default=0, help="number of regions on each mesh for the signs (default 0)")
+    parser.add_argument("--no-times", action="store_true", help="errors and signs only")
+    add_seed(parser)
+    add_json(parser)
+    arguments = parser.parse_args(argv)
+    rng = np.random.default_rng(arguments.seed)
+    meshes = {path.stem: heat_igl.read_mesh(path) for path in arguments.meshes}
+    parts: list[str] = []
+    rows = measure_errors(meshes, arguments.cases, rng) if arguments.cases else []
+    if rows:
+        parts.append(summary(rows))
+    signs = {name: wrong_signs(mesh, arguments.signs, rng) for name, mesh in meshes.items() if arguments.signs}
+    times = {name: measure_times(mesh, 5) for name, mesh in meshes.items() if not arguments.no_times}
+    parts += [one_row_each(found) for found in (signs, times) if found]
+    result = {"environment": environment(), "rows": rows, "signs": signs, "times": times}
+    publish(result, "\n\n".join(parts), json_file=arguments.json)
     return 0
 
 

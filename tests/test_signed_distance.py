@@ -8,6 +8,7 @@ from conftest import flat_perturbed
 from test_unfolding import moebius_strip
 
 from heat_igl import (
+    HeatMethodSolver,
     Mesh,
     MeshError,
     OrientedPoints,
@@ -186,6 +187,53 @@ def test_unsigned_sources_among_the_curves():
     np.testing.assert_array_equal(distance[points], 0)
     far = nearest > 1e-3
     np.testing.assert_array_equal(distance[far] < 0, truth[far] < 0)
+
+
+@pytest.mark.parametrize("level", ["zero", "none"])
+def test_an_unsigned_curve_among_signed_ones(level):
+    mesh, circle, _ = plane(34)
+    # Through both sides of the circle.
+    line = curve_on(mesh, [[0.1, 0.52, 0], [0.9, 0.47, 0]])
+    solver = SignedHeatSolver(mesh)
+    alone, both = solver.distance(circle, level=level), solver.distance(circle, unsigned=line, level=level)
+    from_line = HeatMethodSolver(mesh, t_coef=0.25).distance(line)
+    np.testing.assert_array_equal(both < 0, alone < 0)
+    np.testing.assert_allclose(np.abs(both), np.minimum(np.abs(alone), from_line), atol=1e-12)
+    assert 0 < (from_line < np.abs(alone)).sum() < mesh.n_vertices
+
+
+def on_curves(mesh: Mesh, curves: list[SurfaceCurve], values: np.ndarray) -> float:
+    """Root mean square of values along curves, in mean edge lengths."""
+    middle = np.concatenate([np.einsum("sc,sc->s", (c.start + c.end) / 2, values[mesh.F[c.faces]]) for c in curves])
+    length = np.concatenate([curve.lengths(mesh) for curve in curves])
+    return float(np.sqrt(np.average(middle**2, weights=length)) / mesh.edge_lengths.mean())
+
+
+def test_a_circle_is_nearer_to_zero_than_the_true_distance():
+    # The true distance is not linear in the faces, and so not 0 on the segments of the circle.
+    mesh, circle, truth = plane(40)
+    assert on_curves(mesh, [circle], SignedHeatSolver(mesh).distance(circle)) < on_curves(mesh, [circle], truth)
+
+
+@pytest.mark.parametrize(
+    "mesh", [shapes.icosphere(3), shapes.torus(40, 20), shapes.blob(3)], ids=["sphere", "torus", "blob"]
+)
+def test_curves_with_bends_are_near_zero(mesh):
+    solver, rng = SignedHeatSolver(mesh), np.random.default_rng(0)
+    for _ in range(3):
+        values = np.sin(mesh.V @ rng.normal(size=(3, 5)) * 2 + rng.uniform(0, 6, 5)).sum(axis=1)
+        curves = isolines(mesh, values, float(np.quantile(values, 0.4)))[0]
+        near = on_curves(mesh, curves, solver.distance(curves))
+        assert near < 0.06
+        assert near < on_curves(mesh, curves, solver.distance(curves, level="none")) / 3
+
+
+def test_vertices_on_curves_that_were_cut_are_exactly_zero():
+    mesh, circle, _ = sphere(20)
+    found = cut(mesh, circle)
+    curve = [edge_curve(found.mesh, edge) for edge in found.edges]
+    distance = SignedHeatSolver(found.mesh, refine="unfold").distance(curve)
+    np.testing.assert_array_equal(distance[np.unique(found.edges)], 0)
 
 
 def test_levels():
