@@ -389,3 +389,10 @@ def test_errors():
         exact_distance(mesh.V, mesh.F, 99)
     with pytest.raises(ValueError, match="make it from a triangulation"):
         ExactSurface(from_mesh(mesh, 0)).solve(points=SurfacePoints([0], [[0.2, 0.3, 0.5]]))
+
+
+def test_faces_that_are_there_twice_count_once():
+    square = shapes.grid(20)
+    twice = Mesh(square.V, np.concatenate([square.F, square.F[::2]]))
+    found = exact_distance(twice.V, twice.F, 0)
+    np.testing.assert_allclose(found, np.linalg.norm(square.V - square.V[0], axis=1), rtol=1e-12)

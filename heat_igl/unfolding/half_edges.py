@@ -10,6 +10,7 @@ from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, mollify
 from heat_igl.kernels import gluing, window_surface
 from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
+from heat_igl.mesh.connectivity import duplicate_faces
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
@@ -229,6 +230,11 @@ def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
     """
     exponent = _exponent(np.ptp(mesh.V[mesh.F[:, 0]], axis=0))
     vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, np.ldexp(1.0, -exponent))
+    if (twin == -2).any():
+        # Windows would go on in every copy of a face, and multiply.
+        repeated = duplicate_faces(mesh.F, mesh.n_vertices)
+        if len(repeated):
+            return from_mesh(Mesh(mesh.V, np.delete(mesh.F, repeated, axis=0)), start)
     if n_across:
         return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh)))
     length += np.repeat(mollify(length.reshape(-1, 3), mesh.F), 3)
