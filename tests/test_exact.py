@@ -17,6 +17,7 @@ from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.kernels import gluing
 from heat_igl.reference.steiner import graph_distance
+from heat_igl.unfolding.distance import distance_to_targets
 from heat_igl.unfolding.exact import ExactSurface, exact_distance
 from heat_igl.unfolding.half_edges import from_mesh
 
@@ -396,3 +397,11 @@ def test_faces_that_are_there_twice_count_once():
     twice = Mesh(square.V, np.concatenate([square.F, square.F[::2]]))
     found = exact_distance(twice.V, twice.F, 0)
     np.testing.assert_allclose(found, np.linalg.norm(square.V - square.V[0], axis=1), rtol=1e-12)
+
+
+def test_targets_where_faces_are_there_twice():
+    square = shapes.grid(20)
+    twice = Mesh(square.V, np.concatenate([square.F, square.F[::2]]))
+    assert distance_to_targets(twice, 0, [20])[0] == pytest.approx(np.linalg.norm(square.V[20] - square.V[0]))
+    with pytest.raises(MeshError, match=r"face 800 is there twice \(400 are\)"):
+        distance_to_targets(twice, 0, SurfacePoints([0], [[0.2, 0.3, 0.5]]))
