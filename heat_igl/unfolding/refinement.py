@@ -169,7 +169,7 @@ class Refinement:
                 label[row] = np.tile(known.source, self._n_sheets)
         group = np.arange(len(starts.offset)) if groups is None else np.ascontiguousarray(groups, np.int64)
         sweep(self._order(key), self.tables, distance[:n], label, starts.offset, group, is_stale)
-        return self._on_base(distance, label, labels)
+        return _on_base(self.number, self._n_sheets, distance, label, labels)
 
     def unfold(
         self,
@@ -208,7 +208,7 @@ class Refinement:
         if not 0 <= tolerance <= 1:
             raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
         walk = self.walks(key, self.starts(sources, offsets, points, point_offsets), tolerance)
-        return self._on_base(walk["distance"], walk["label"], labels)
+        return _on_base(self.number, self._n_sheets, walk["distance"], walk["label"], labels)
 
     def walks(self, key: FloatArray, starts: WalkStarts, tolerance: float = TOLERANCE, **ways: AnyArray) -> AnyArray:
         """What is known of the path of each row after `unfold`; how each path begins is filled into `ways`."""
@@ -356,16 +356,20 @@ class Refinement:
         first, angle = half_edge - half_edge % 3, self.tables.step["angle"]
         return np.choose(half_edge % 3, [np.pi - angle[first + 1], angle[first] - np.pi, np.zeros(len(half_edge))])
 
-    def _on_base(self, distance: FloatArray, label: AnyArray | None, labels: IntArray | None) -> FloatArray:
-        on_sheets = distance[self.number].reshape(self._n_sheets, -1)
-        if self._n_sheets == 1:
-            if labels is not None and label is not None:
-                labels[:] = label[self.number]
-            return np.asarray(on_sheets[0])
+
+def _on_base(
+    number: AnyArray, n_sheets: int, distance: FloatArray, label: AnyArray | None, labels: IntArray | None
+) -> FloatArray:
+    """The smaller of the distances on the sheets, by the vertices of the mesh; `labels`, if given, are filled."""
+    on_sheets = distance[number].reshape(n_sheets, -1)
+    if n_sheets == 1:
         if labels is not None and label is not None:
-            nearest = on_sheets.argmin(axis=0)[None]
-            labels[:] = np.take_along_axis(label[self.number].reshape(self._n_sheets, -1), nearest, axis=0)[0]
-        return np.asarray(on_sheets.min(axis=0))
+            labels[:] = label[number]
+        return np.asarray(on_sheets[0])
+    if labels is not None and label is not None:
+        nearest = on_sheets.argmin(axis=0)[None]
+        labels[:] = np.take_along_axis(label[number].reshape(n_sheets, -1), nearest, axis=0)[0]
+    return np.asarray(on_sheets.min(axis=0))
 
 
 def _has_holes(F: AnyArray, twin: AnyArray, n: int) -> bool:
