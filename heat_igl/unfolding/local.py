@@ -56,8 +56,8 @@ def distances_within(mesh: MeshLike, radius: float, sources: Sources | None = No
 
     Examples
     --------
-    >>> import heat_igl
-    >>> near = heat_igl.distances_within(heat_igl.shapes.strip(100, 1), 2.5, sources=[50])
+    >>> from heat_igl import distances_within, shapes
+    >>> near = distances_within(shapes.strip(100, 1), 2.5, sources=[50])
     >>> near.indices[:5].tolist(), near.data[:5].round(6).tolist()
     ([48, 49, 50, 51, 52], [2.0, 1.0, 0.0, 1.0, 2.0])
     """
