@@ -18,27 +18,96 @@ __all__ = [
 
 
 class MeshError(ValueError):
-    """A mesh, or a file that should hold one, cannot be used as given."""
+    """A mesh, or a file that should hold one, cannot be used as given.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> try:
+    ...     heat_igl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3]])
+    ... except heat_igl.MeshError as error:
+    ...     print(error)
+    ...
+    F[0, 2] = 3 is no vertex (1 of 1 faces are affected): there are 3 vertices, so indices run from 0 to 2
+    """
 
 
 class SourceError(ValueError):
-    """The sources are not vertices, points or curves of the mesh."""
+    """The sources are not vertices, points or curves of the mesh.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> try:
+    ...     heat_igl.geodesic_distance(heat_igl.shapes.grid(2), 9)
+    ... except heat_igl.SourceError as error:
+    ...     print(error)
+    ...
+    sources[0] = 9 is no vertex (1 of 1 are not): the mesh has 9 vertices, so indices run from 0 to 8
+    """
 
 
 class FactorizationError(RuntimeError):
-    """A matrix cannot be factored, since it is not symmetric positive definite."""
+    """A matrix cannot be factored, since it is not symmetric positive definite.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import scipy.sparse as sp
+    >>> from heat_igl.linear import factorize
+    >>> try:
+    ...     factorize(sp.csc_array([[1.0, 2.0], [2.0, 1.0]]))  # of the eigenvalues -1 and 3
+    ... except heat_igl.FactorizationError as error:
+    ...     print(error)
+    ...
+    the matrix (2 rows) is singular or not positive definite
+    """
 
 
 class ReferenceSolverError(RuntimeError):
-    """A reference solver crashed, exceeded the time limit, or returned values that cannot be distances."""
+    """A reference solver crashed, exceeded the time limit, or returned values that cannot be distances.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> try:
+    ...     heat_igl.closed_forms.plane(heat_igl.shapes.icosphere(1), 0)
+    ... except heat_igl.ReferenceSolverError as error:
+    ...     print(error)
+    ...
+    the mesh does not lie in a plane: use reference.exact
+    """
 
 
 class BatchError(RuntimeError):
-    """A batch stopped early. Finished blocks are kept, and the same call resumes the batch."""
+    """A batch stopped early. Finished blocks are kept, and the same call resumes the batch.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> try:
+    ...     with heat_igl.cluster.connected("nowhere"):
+    ...         pass
+    ... except heat_igl.BatchError as error:
+    ...     print(error)
+    ...
+    there is no Dask scheduler at nowhere: missing port number in address 'nowhere'
+    """
 
 
 class MissingExtraError(ImportError):
-    """An optional library is not installed; the message names the extra that installs it."""
+    """An optional library is not installed; the message names the extra that installs it.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> try:
+    ...     heat_igl.MissingExtraError.check("reading .abc", "abc_reader", "io")
+    ... except heat_igl.MissingExtraError as error:
+    ...     print(error)
+    ...
+    reading .abc needs abc_reader: pip install abc_reader (or install heat-igl with its extra 'io')
+    """
 
     @classmethod
     def of(cls, purpose: str, package: str, extra: str) -> MissingExtraError:
@@ -66,4 +135,18 @@ class MissingExtraError(ImportError):
 
 
 class AccuracyWarning(UserWarning):
-    """A result is usable but less accurate than usual; the message gives the reason."""
+    """A result is usable but less accurate than usual; the message gives the reason.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import heat_igl
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     solver = heat_igl.HeatMethodSolver(heat_igl.shapes.grid(20), t=1e-12)
+    ...
+    >>> print(str(caught[0].message).partition(";")[0])
+    t = 1e-12 is too small for heat to cross the mesh in double precision
+    >>> solver.diagnostics.t_raised
+    True
+    """

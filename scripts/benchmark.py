@@ -10,6 +10,7 @@ happens on the machine hits all of them alike, and ratios are medians over paire
     python scripts/benchmark.py --large                   # adds the icosphere with 655 362 vertices
     python scripts/benchmark.py --huge 10000000           # one query on a sphere of about that size, and nothing else
     python scripts/benchmark.py --docs docs/cost.md       # also writes the tables of that page
+    python scripts/benchmark.py --page docs/peers.md --vtp PROGRAM  # all peers, on the bunny or each --mesh
 
 Writes benchmark.json, benchmark.md and pictures. Needs the extras ``bench`` (potpourri3d), ``fast``, ``cli``, ``view``
 and ``validate``.
@@ -39,6 +40,7 @@ from heat_igl.demo import sample_mesh
 from heat_igl.io import read_mesh
 from heat_igl.runtime import PeakMemory
 
+import peers
 from measuring import bandwidth
 from scaffold import add_seed, environment, option_parser, page, publish, table, write_parts
 
@@ -111,8 +113,9 @@ PREPARE = {
     "libigl heat": _libigl,
     "MeshLab's front": _front,
     "pygeodesic": _exact,
+    **peers.PREPARE,
 }
-NEEDS = {"potpourri3d": "potpourri3d", "MeshLab's front": "pymeshlab", "pygeodesic": "pygeodesic"}
+NEEDS = {"potpourri3d": "potpourri3d", "MeshLab's front": "pymeshlab", "pygeodesic": "pygeodesic", **peers.NEEDS}
 
 
 # The child process: one method on one mesh, one run per line of its input.
@@ -585,6 +588,8 @@ def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--backend", default="auto", help="of --huge")
     parser.add_argument("--single", action="store_true", help="no later queries after --huge's first")
     parser.add_argument("--docs", type=Path, help="page whose tables are to be written")
+    parser.add_argument("--page", type=Path, help="page on the peers: they are measured, and nothing else is")
+    parser.add_argument("--vtp", type=Path, help="the program of VTP, for --page")
     parser.add_argument("--out", type=Path, default=Path("benchmark-results"), help="directory of the results")
     parser.add_argument("--child", nargs=2, help=argparse.SUPPRESS)
     return parser.parse_args(argv)
@@ -594,7 +599,7 @@ def _measured(arguments: argparse.Namespace) -> dict[str, Any]:
     rng = np.random.default_rng(arguments.seed)
     sizes = arguments.size or (SIZES[:2] if arguments.quick else SIZES)
     most_runs = 2 if arguments.quick else arguments.runs
-    methods = [m for m in METHODS if importlib.util.find_spec(NEEDS.get(m, "heat_igl")) is not None]
+    methods = [m for m in METHODS if _installed(m)]
     paths = arguments.mesh or [path for path in [sample_mesh()] if path is not None]
     result: dict[str, Any] = {"bandwidth": bandwidth(), "import": import_seconds(), "timings": []}
     for name, mesh, first in timed_meshes(sizes, paths, rng):
@@ -609,6 +614,19 @@ def _measured(arguments: argparse.Namespace) -> dict[str, Any]:
     reference.close()
     result["accuracy"] = accuracy([m for m in methods if m in HEAT], arguments.large)
     return result
+
+
+def _installed(method: str) -> bool:
+    return importlib.util.find_spec(NEEDS.get(method, "heat_igl")) is not None
+
+
+def _against_peers(arguments: argparse.Namespace) -> list[dict[str, Any]]:
+    if arguments.vtp is not None:
+        os.environ[peers.VTP] = str(arguments.vtp.resolve())
+    methods = [m for m in peers.LARGEST if _installed(m) and (m != "VTP" or arguments.vtp is not None)]
+    paths = arguments.mesh or [path for path in [sample_mesh()] if path is not None]
+    meshes = [(path.stem, read_mesh(path)) for path in paths]
+    return peers.measured(measure, meshes, methods, 2 if arguments.quick else arguments.runs)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -626,10 +644,14 @@ def main(argv: Sequence[str] | None = None) -> int:
             arguments.huge, arguments.mesh[0] if arguments.mesh else None, arguments.backend, not arguments.single
         )
         reference.close()
+    elif arguments.page:
+        name, result["peers"] = "peers", _against_peers(arguments)
+        peers.write_page(arguments.page, result)
     else:
         result |= _measured(arguments)
         draw(result["timings"], arguments.out / "benchmark.png")
-    publish(result, _all_tables(result), folder=arguments.out, name=name)
+    text = peers.parts(result)["peers"] if arguments.page else _all_tables(result)
+    publish(result, text, folder=arguments.out, name=name)
     if arguments.docs:
         write_parts(arguments.docs, tables(result))
     return 0

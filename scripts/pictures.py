@@ -3,8 +3,8 @@
     python scripts/pictures.py                      # into docs/images: about three minutes
     python scripts/pictures.py --out DIRECTORY --picture bunny
 
-``bunny`` heads the README, ``paper`` makes those of docs/paper.md. Needs the extras ``view`` and ``fast``, and the
-meshes of the pymeshlab wheel.
+``bunny`` heads the README, ``paper`` makes those of docs/paper.md, ``theory`` those of docs/theory.md. Needs the extras
+``view`` and ``fast``, and the meshes of the pymeshlab wheel.
 """
 
 from __future__ import annotations
@@ -38,7 +38,11 @@ def paper(out: Path) -> None:
             shutil.copyfile(Path(folder, f"figure_{name}.png"), out / f"paper_{name}.png")
 
 
-PICTURES: dict[str, Callable[[Path], None]] = {"bunny": bunny, "paper": paper}
+def theory(out: Path) -> None:
+    subprocess.run([sys.executable, SCRIPTS / "theory_figures.py", "--out", out], check=True)
+
+
+PICTURES: dict[str, Callable[[Path], None]] = {"bunny": bunny, "paper": paper, "theory": theory}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

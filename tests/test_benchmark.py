@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 from pathlib import Path
 from types import ModuleType
 
@@ -117,3 +118,32 @@ def test_subdivided_meshes_keep_their_exact_distances(benchmark: ModuleType, tmp
     assert name == f"cone {mesh.n_vertices}"
     assert 1600 < mesh.n_vertices < 2500
     np.testing.assert_allclose(mesh.V[: first.n_vertices], cone.V, atol=1e-12)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in for VTP is a shell script")
+def test_vertices_that_vtp_merges_get_their_distance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    peers = load_script("peers")
+    # VTP counts three places: the fourth vertex is where the second is.
+    program = tmp_path / "vtp"
+    program.write_text("#!/bin/sh\necho propagation step took 0.5 seconds\nprintf '2\\n%s\\n1e100\\n' $4 > $6\n")
+    program.chmod(0o755)
+    monkeypatch.setenv(peers.VTP, str(program))
+    V = np.array([[1.0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 0]])
+    solve, batch, facts = peers.PREPARE["VTP"](V, np.array([[0, 1, 2], [2, 3, 0]]))
+    assert solve(3).tolist() == [2, 1, np.inf, 1]  # asked for as number 1
+    assert batch is None
+    assert facts["query"] == 0.5
+
+
+def test_the_page_on_peers_has_a_table_for_each_mesh() -> None:
+    peers = load_script("peers")
+    row = {"mesh": "cow", "n": 9, "precomputation": 0.25, "query": 0.5, "peak_memory": 2e6, "mean_error": 1.0}
+    rows = [
+        {**row, "method": "heat_igl", "later": 0.125, "max_error": 2.0},
+        {**row, "method": "VTP", "later": None, "max_error": None, "peak_memory": None},
+        {**row, "method": "heat_igl", "later": 0.125, "max_error": 2.0, "mesh": "bunny"},
+    ]
+    text = peers.parts({"peers": rows, "environment": {"python": "3"}})["peers"]
+    assert text.count("### cow, 9 vertices") == text.count("### bunny, 9 vertices") == 1
+    assert "| heat_igl | 0.250 | 0.5000 | 0.1250 | 2 | 1.000 | 2.000 |" in text
+    assert "| VTP | - | 0.5000 | - | - | 1.000 | - |" in text

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import load_script
 
 import heat_igl
 from heat_igl import shapes
@@ -52,3 +53,16 @@ def test_coming_from_another_library(block: str) -> None:
     names: dict[str, Any] = {library: peer, "heat_igl": heat_igl, "np": np, "scan": Scan}
     exec(compile(block, "coming_from.md", "exec"), names)
     assert any(key in names for key in ("phi", "line"))
+
+
+def test_the_drawn_strip_is_flat_and_true_to_length() -> None:
+    figures = load_script("theory_figures")
+    mesh = shapes.torus(14, 22, tube=0.5)
+    path = heat_igl.geodesic_path(mesh, heat_igl.SurfacePoints([476, 546], [[0.2, 0.3, 0.5], [0.3, 0.4, 0.3]]))
+    corners, way = figures.laid_out(mesh, path)
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    in_space = mesh.V[mesh.F[path.faces]]
+    assert len(sides) > 10
+    np.testing.assert_allclose(sides, np.linalg.norm(np.roll(in_space, -1, axis=1) - in_space, axis=2), rtol=1e-12)
+    np.testing.assert_allclose(way[:, 1], 0, atol=1e-9)  # one straight line
+    np.testing.assert_allclose(way[-1, 0], path.lengths(mesh).sum(), rtol=1e-12)

@@ -47,6 +47,14 @@ def geodesic_bezier(mesh: MeshLike, points: Waypoints, pieces: int = 32) -> Surf
     De Casteljau's algorithm with the geodesics of `geodesic_path` (Park and Ravani 1995): d (d + 1) / 2 of them for
     each parameter. The curve is continuous as long as these geodesics change continuously with the parameter. It can
     jump where control points lie behind a hill from each other, so that another geodesic becomes the shorter one.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(8)
+    >>> curve = heat_igl.geodesic_bezier(mesh, [0, 8, 80], pieces=2)  # three corners of the square
+    >>> curve.positions(mesh).round(6)[[0, -1]].tolist()
+    [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
     """
     if isinstance(pieces, bool) or not isinstance(pieces, int | np.integer) or pieces < 1:
         raise ValueError(f"pieces must be a positive integer, not {pieces!r}")

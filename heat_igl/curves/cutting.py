@@ -88,6 +88,15 @@ class CutMesh:
         The edges on the curves, each in the direction of its curve; one for each curve that runs along it.
     curve : (k,) int64
         The curve of each, by its position in the list.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.icosphere(3)
+    >>> equator = heat_igl.isolines(mesh, mesh.V[:, 2], 0.1)[0]
+    >>> halves = heat_igl.cut(mesh, equator).split()
+    >>> [half.mesh.report().euler_characteristic for half in halves]  # of disks
+    [1, 1]
     """
 
     mesh: Mesh
@@ -176,6 +185,16 @@ def cut(mesh: MeshLike, curves: SurfaceCurve | list[SurfaceCurve]) -> CutMesh:
     -----
     Corners of the curves nearer than 1e-9 of a face to a vertex, an edge or each other are put there. All that follows
     is decided in integers (`cut_triangle`), so the new mesh is a triangulation whatever the curves.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(3)
+    >>> found = heat_igl.cut(mesh, heat_igl.isolines(mesh, mesh.V[:, 0], 0.5)[0])
+    >>> found.mesh
+    Mesh(23 vertices, 30 triangles)
+    >>> round(float(found.mesh.measures.sum()), 6), int(found.pieces.max()) + 1
+    (1.0, 2)
     """
     triangles = as_simplices(mesh)
     if triangles.is_tetrahedral:

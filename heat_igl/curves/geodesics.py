@@ -49,6 +49,15 @@ def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
     at a vertex with an angle below pi on the other side, the strip is led there (Xin and Wang 2007). A loop is
     straightened from one of its points to itself, then from another one, until its length stays the same. On a surface
     with hills one class can have several locally shortest curves.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(4, 3)
+    >>> detour = heat_igl.edge_curve(mesh, [0, 1, 2, 3, 4, 9, 14, 19])
+    >>> straight = heat_igl.straighten(mesh, detour)
+    >>> float(detour.lengths(mesh).sum()), round(float(straight.lengths(mesh).sum()), 6)
+    (7.0, 5.0)
     """
     return GeodesicPathSolver(mesh).straighten(curve)
 
@@ -85,6 +94,15 @@ def geodesic_path(mesh: MeshLike, waypoints: Waypoints, closed: bool = False) ->
     The first course is the shortest way along edges and straight lines from corner to corner across an edge, and it is
     shortened as by `straighten`. Between far points with hills in between it may pass a hill on the longer side:
     for the shortest path of all, call `shortest_paths` without a distance.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.cylinder(48, 12)
+    >>> loop = heat_igl.geodesic_path(mesh, [0, 16, 32], closed=True)  # once around
+    >>> round(float(loop.lengths(mesh).sum() / (2 * np.pi)), 3)
+    0.999
     """
     return GeodesicPathSolver(mesh).path(waypoints, closed)
 
@@ -105,6 +123,15 @@ class GeodesicPathSolver:
     Notes
     -----
     Curves are independent of one another: they may cross, touch and overlap. Threads need a solver each.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(12, 5)
+    >>> solver = heat_igl.GeodesicPathSolver(mesh)
+    >>> paths = [solver.path([0, target]) for target in (12, 77)]
+    >>> [round(float(path.lengths(mesh).sum()), 6) for path in paths]
+    [12.0, 13.0]
     """
 
     def __init__(self, mesh: MeshLike) -> None:

@@ -41,6 +41,15 @@ def handle_loops(mesh: MeshLike) -> list[SurfaceCurve]:
     one vertex of a component, that of the least total length. Each edge outside the tree of shortest ways from this
     vertex closes one loop; a spanning tree of the faces crosses the edges with the longest loops, and those that are
     left generate all. Each of their loops is then straightened, which frees it from the vertex.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.torus(48, 96, tube=0.4)
+    >>> loops = heat_igl.handle_loops(mesh)
+    >>> len(loops), round(float(loops[0].lengths(mesh).sum() / (2 * np.pi)), 2)  # around the tube
+    (2, 0.4)
     """
     triangles = as_simplices(mesh)
     if triangles.is_tetrahedral:

@@ -52,6 +52,14 @@ def isolines(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> list[list[
     The curves of a level bound ``{values < level}``. They follow the lower side of a plateau at the level, cross a
     vertex at the level like any other point, and there is no curve around a minimum or maximum at the level.
     This is the convention of libigl's ``isolines``. The lengths of a curve are ``curve.lengths(mesh)``.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(10)
+    >>> (curve,), none = heat_igl.isolines(mesh, mesh.V[:, 0], [0.25, 2.0])  # of the coordinate x
+    >>> round(float(curve.lengths(mesh).sum()), 6), none
+    (1.0, [])
     """
     mesh = as_simplices(mesh)
     checked, wanted = _checked(mesh, values, levels)
@@ -81,6 +89,16 @@ def offset_curves(mesh: MeshLike, solver: HeatMethodSolver, sources: Sources, ra
     ------
     ValueError
         If `radius` is not a positive number, or the solver belongs to another mesh.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.disk(40)
+    >>> solver = heat_igl.HeatMethodSolver(mesh, refine="unfold")
+    >>> (curve,) = heat_igl.offset_curves(mesh, solver, 0, radius=0.5)
+    >>> round(float(curve.lengths(mesh).sum() / np.pi), 2)  # a circle of radius 1/2
+    1.0
     """
     mesh = as_simplices(mesh)
     if not (np.isfinite(radius) and radius > 0):
@@ -104,6 +122,13 @@ def sublevel_areas(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> Floa
     -------
     (k,) float64
         Squared units of the mesh; exact to rounding.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(10)
+    >>> heat_igl.sublevel_areas(mesh, mesh.V[:, 0], [0.0, 0.25, 2.0]).round(6).tolist()
+    [0.0, 0.25, 1.0]
     """
     mesh = as_simplices(mesh)
     checked, wanted = _checked(mesh, values, levels)
@@ -123,6 +148,13 @@ def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArra
     (c,) float64
         For each curve of ``isolines(mesh, values, level)[0]``, the area of the connected part of ``{values < level}``
         on the left of the curve. Curves that bound the same part, such as the two of an annulus, have the same value.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(10)
+    >>> heat_igl.enclosed_areas(mesh, mesh.V[:, 0], 0.25).round(6).tolist()
+    [0.25]
     """
     mesh = as_simplices(mesh)
     checked, wanted = _checked(mesh, values, level)

@@ -60,6 +60,15 @@ def log_map(
     the path bends, at a vertex of negative curvature or on the boundary, the vector has the whole length, and the
     direction in which the path leaves the source: no straightest geodesic from the source need lead there. At the cut
     locus there are several shortest paths, and the vector is that of one of them.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.strip(4, 3)
+    >>> vectors = heat_igl.log_map(mesh, 0)
+    >>> np.linalg.norm(vectors, axis=1)[[4, 15, 19]].round(6).tolist()
+    [4.0, 3.0, 5.0]
     """
     if isinstance(mesh, VectorHeatSolver):
         return mesh.log_map(_one_vertex(source, mesh.operators.n_given))

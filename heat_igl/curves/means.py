@@ -69,6 +69,14 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
     until the sum falls, so the sum falls in every step. A median can be one of the points: it is if the unit vectors to
     the others, weighted, sum to no more than the weight of this point (Vardi and Zhang 2000). Log maps are the first
     directions and the lengths of straightened paths.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(8)
+    >>> mean = heat_igl.karcher_mean(mesh, [0, 8, 72, 80])  # of the corners of the unit square
+    >>> mean.positions(mesh).round(6).tolist()
+    [[0.5, 0.5, 0.0]]
     """
     triangles = as_simplices(mesh)
     faces, barycentric = mixed_places("points", triangles, points)

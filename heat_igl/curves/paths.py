@@ -79,6 +79,14 @@ def shortest_paths(
     the source as the distances at the ends of an edge place it in the plane of the face, whichever agrees best with the
     distance left. The shorter of the two paths is taken. If it is still longer than the distance by one percent, as on
     rough surfaces, an exact path takes its place.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(4, 3)
+    >>> (path,) = heat_igl.shortest_paths(mesh, None, targets=19, sources=0)  # along the diagonal of 3 by 4
+    >>> round(float(path.lengths(mesh).sum()), 6)
+    5.0
     """
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:

@@ -64,6 +64,16 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
     boundary and points off the surface. At a vertex of the boundary it goes on if the faces have an angle of pi or more
     on exactly one side of it: then it leaves at pi on this side, as a straight line in the plane does along a straight
     boundary or past a corner. It is not the shortest path in general.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.icosphere(4)
+    >>> around = heat_igl.trace_geodesic(mesh, 0, (1, 0), 2 * np.pi)  # a great circle of the unit sphere
+    >>> start, end = around.positions(mesh)[[0, -1]]
+    >>> bool(np.linalg.norm(end - start) < 0.05)
+    True
     """
     tracer = Tracer(as_simplices(mesh))
     begin = tracer.starts("start", start)
@@ -104,6 +114,15 @@ def exp_map(mesh: MeshLike, source: Sources, vectors: ArrayLike) -> SurfacePoint
     Notes
     -----
     Traced on all processors (`HEAT_IGL_NUM_THREADS`), with the same bits for any number of them.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.icosphere(4)
+    >>> ends = heat_igl.exp_map(mesh, 0, [[np.pi, 0], [0, np.pi]]).positions(mesh)  # halfway around the unit sphere
+    >>> bool(np.linalg.norm(ends + mesh.V[0], axis=1).max() < 0.05)  # both are at the antipode
+    True
     """
     return Tracer(as_simplices(mesh)).exp(source, vectors)
 

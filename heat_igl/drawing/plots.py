@@ -3,6 +3,15 @@
 Pictures need neither a display nor OpenGL. matplotlib lays out the figure. The surface is rasterized in
 `heat_igl.drawing.raster`: matplotlib does not remove hidden surfaces, and VTK needs OpenGL system libraries, which many
 servers lack.
+
+Examples
+--------
+>>> import heat_igl
+>>> from pathlib import Path
+>>> mesh = heat_igl.shapes.torus(20, 12)
+>>> heat_igl.plots.plot(mesh, heat_igl.geodesic_distance(mesh, 0), sources=0).save("torus.png")
+>>> Path("torus.png").read_bytes()[1:4]
+b'PNG'
 """
 
 from __future__ import annotations

@@ -85,6 +85,15 @@ class SignedHeatSolver:
     The paper diffuses vectors at edges. Here they are at vertices, with weights fitted to the lengths of edges
     (`fitted_laplacian`): a third of the unknowns, and no more error (docs/signed.md). The solver is immutable, and
     threads may share it.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(20)
+    >>> line = heat_igl.isolines(mesh, mesh.V[:, 0], 0.5)[0]  # x = 1/2
+    >>> phi = heat_igl.SignedHeatSolver(mesh, refine="unfold").distance(line)
+    >>> phi[:21:5].round(6).tolist()
+    [-0.5, -0.25, 0.0, 0.25, 0.5]
     """
 
     def __init__(

@@ -42,6 +42,13 @@ class VoxelBox:
     ------
     ValueError
         If a parameter is none of these.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> box = heat_igl.VoxelBox(origin=(0, 0, 0), spacing=0.5, shape=(3, 3, 2))
+    >>> box.positions()[2, 2, 1].tolist()
+    [1.0, 1.0, 0.5]
     """
 
     origin: Sequence[float]
@@ -111,6 +118,16 @@ def volume_signed_distance(domain: MeshLike | VoxelBox, surface: MeshLike, *, t_
         If the surface has no area, leaves the domain, or is a point cloud without normals.
     ValueError
         If `t_coef` is not positive.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> box = heat_igl.VoxelBox(origin=(-1.5, -1.5, -1.5), spacing=0.1, shape=(31, 31, 31))
+    >>> phi = heat_igl.volume_signed_distance(box, heat_igl.shapes.icosphere(3))
+    >>> inside = (phi < 0).sum() * box.spacing**3
+    >>> round(float(inside / (4 / 3 * np.pi)), 1)  # the volume of the unit ball
+    1.0
     """
     coefficient = positive("t_coef", t_coef)
     if isinstance(domain, VoxelBox):

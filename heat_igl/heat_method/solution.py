@@ -40,6 +40,13 @@ class Diagnostics:
         far as it takes longer; factors.
     check : AnswerCheck or None
         Of a `HeatSolution`, by how much the distance leaves bounds that need no reference. None for the solver.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> diagnostics = heat_igl.HeatMethodSolver(heat_igl.shapes.grid(20), t_coef=1).diagnostics
+    >>> round(diagnostics.t / diagnostics.mean_edge_length**2, 6), diagnostics.t_raised
+    (1.0, False)
     """
 
     t: float
@@ -72,6 +79,14 @@ class LabelledDistance(NamedTuple):
         As `HeatMethodSolver.distance` returns it.
     labels : (n,) int64
         The nearest source of each vertex; -1 if none reaches it, or none within the cutoff.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(6, 1)
+    >>> found = heat_igl.HeatMethodSolver(mesh).voronoi([1, 6])
+    >>> found.labels[:7].tolist()
+    [0, 0, 0, 0, 1, 1, 1]
     """
 
     distance: FloatArray
@@ -98,6 +113,17 @@ class HeatSolution:
         Time step.
     diagnostics : Diagnostics
         The solver's.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.disk(30)
+    >>> solution = heat_igl.HeatMethodSolver(mesh).solve(0)
+    >>> bool(np.allclose(np.linalg.norm(solution.direction, axis=1), 1))
+    True
+    >>> int(solution.heat.argmax()), int(solution.distance.argmin())
+    (0, 0)
     """
 
     heat: FloatArray

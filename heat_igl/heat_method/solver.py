@@ -91,6 +91,18 @@ class HeatMethodSolver(PreparedSolver):
     -----
     A time step too small for the heat to cross the mesh in double precision is raised, and `t` and `diagnostics` say
     so. The solver is immutable; threads may share it, and a pickled copy gives the same bits.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.icosphere(4)  # the unit sphere, on which distance is an angle
+    >>> solver = heat_igl.HeatMethodSolver(mesh)
+    >>> angle = np.arccos(np.clip(mesh.V @ mesh.V[7], -1, 1))
+    >>> bool(abs(solver.distance(7) - angle).mean() < 0.01 * np.pi)
+    True
+    >>> solver.distances([[0, 1], [2]]).shape  # of two sets of sources
+    (2, 2562)
     """
 
     def __init__(
@@ -326,5 +338,13 @@ def heat_method_distance(V: ArrayLike, F: ArrayLike, sources: Sources, **options
     -------
     (n,) float64
         See `HeatMethodSolver.distance`, for errors too.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.disk(30)  # the unit disk, with vertex 0 in the middle
+    >>> phi = heat_igl.heat_method_distance(mesh.V, mesh.F, 0)
+    >>> round(float(phi.max()), 1)
+    1.0
     """
     return HeatMethodSolver(V, F, **options).distance(sources)

@@ -42,6 +42,18 @@ class TangentFrames:
         Unit vector in space along the half-edge that leaves from corner c of face f, to the next corner.
     face_normals : (m, 3) float64
         Unit normals of the faces, 0 for a face without area.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.icosphere(2)
+    >>> frames = heat_igl.tangent_frames(mesh)
+    >>> round(float((frames.normal * mesh.V).sum(axis=1).min()), 2)  # the normals of a sphere are radii
+    1.0
+    >>> v = np.tile([0.6, 0.8], (mesh.n_vertices, 1))  # the same components at every vertex
+    >>> bool(np.allclose(frames.from_world(frames.to_world(v)), v))
+    True
     """
 
     x: FloatArray
@@ -199,6 +211,17 @@ def tangent_frames(mesh: MeshLike) -> TangentFrames:
         If the mesh is tetrahedral, more than two faces meet at an edge, neighbours are oriented differently (on a
         Moebius strip any orientation has such neighbours), or the faces at a vertex are not one fan. The message names
         the first offender.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> frames = heat_igl.tangent_frames(heat_igl.shapes.grid(2))
+    >>> frames.normal[4].tolist()  # of a flat mesh
+    [0.0, 0.0, 1.0]
+    >>> x, y = frames.x[4], frames.y[4]
+    >>> bool(np.allclose(np.cross(frames.normal[4], x), y))
+    True
     """
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:

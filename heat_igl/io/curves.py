@@ -63,6 +63,16 @@ def write_curves(
     -----
     Coordinates are in the unit of the mesh and in double precision. SVG files contain -y, since y points downwards in
     SVG, and the width of a line is 1/500 of the drawing.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> from pathlib import Path
+    >>> mesh = heat_igl.shapes.disk(12)
+    >>> lines = heat_igl.isolines(mesh, heat_igl.geodesic_distance(mesh, 0), [0.25, 0.5, 0.75])
+    >>> heat_igl.write_curves("lines.svg", mesh, lines)
+    >>> Path("lines.svg").read_text().count("<polygon")  # closed, one for each level
+    3
     """
     mesh = as_simplices(mesh)
     target = Path(os.fspath(path))

@@ -62,7 +62,7 @@ _ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
-    """Read a triangle or tetrahedral mesh from a file.
+    r"""Read a triangle or tetrahedral mesh from a file.
 
     Parameters
     ----------
@@ -94,7 +94,11 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
 
     Examples
     --------
-    >>> mesh = read_mesh("bunny.obj")  # doctest: +SKIP
+    >>> import heat_igl
+    >>> from pathlib import Path
+    >>> _ = Path("triangle.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    >>> heat_igl.read_mesh("triangle.off")
+    Mesh(3 vertices, 1 triangles)
     """
     path, contents = _load(path)
     return _mesh(path, contents)
@@ -104,7 +108,7 @@ read_paths_with(read_mesh)
 
 
 def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
-    """Read a mesh from a file without splitting polygons.
+    r"""Read a mesh from a file without splitting polygons.
 
     Parameters
     ----------
@@ -122,6 +126,16 @@ def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
         As `read_mesh`; also if the file holds tetrahedra.
     MissingExtraError
         For .vtu without meshio, for GIFTI and FreeSurfer without nibabel.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> from pathlib import Path
+    >>> _ = Path("square.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
+    >>> heat_igl.read_polygon_mesh("square.obj")
+    PolygonMesh(4 vertices, 1 polygons)
+    >>> heat_igl.read_mesh("square.obj")
+    Mesh(4 vertices, 2 triangles)
     """
     path, contents = _load(path)
     cells = contents.cells
@@ -150,6 +164,14 @@ def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
     ------
     MeshError
         As `read_mesh`, and for formats without attributes.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(2)
+    >>> heat_igl.write_mesh("square.ply", mesh, height=mesh.V[:, 1])
+    >>> heat_igl.read_attributes("square.ply")["height"].tolist()
+    [0.0, 0.0, 0.0, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0]
     """
     path = _checked(path)
     if not _FORMATS[form_suffix(path)].attributes:
@@ -190,7 +212,11 @@ def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, /, **attributes: Ar
 
     Examples
     --------
-    >>> write_mesh("bunny.ply", mesh, distance=phi)  # doctest: +SKIP
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(3, 1)
+    >>> heat_igl.write_mesh("strip.ply", mesh, distance=heat_igl.geodesic_distance(mesh, 0))
+    >>> heat_igl.read_attributes("strip.ply")["distance"][:4].round(6).tolist()
+    [0.0, 1.0, 2.0, 3.0]
     """
     path = _checked(path)
     form = _FORMATS[form_suffix(path)]

@@ -24,7 +24,7 @@ _Points = tuple[FloatArray, FloatArray | None]
 
 
 def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
-    """Read a point cloud from a file; the faces of a mesh are ignored.
+    r"""Read a point cloud from a file; the faces of a mesh are ignored.
 
     Parameters
     ----------
@@ -45,6 +45,14 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
     MeshError
         If the file is missing, unreadable or damaged, or the points cannot be used. Normals that are all 0, as some
         programs write them, count as none.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> from pathlib import Path
+    >>> _ = Path("points.xyz").write_text("0 0 0\n1 0 0\n0 1 0\n1 1 0\n")
+    >>> heat_igl.read_point_cloud("points.xyz").V[3].tolist()
+    [1.0, 1.0, 0.0]
     """
     path = checked_path(path, POINT_CLOUD_SUFFIXES, POINT_CLOUD_SUFFIXES)
     P, normals = _FORMATS[form_suffix(path)](path, file_bytes(path))
@@ -71,6 +79,14 @@ def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud) -> None:
     ------
     MeshError
         If the extension is another, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> cloud = heat_igl.PointCloud([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    >>> heat_igl.write_point_cloud("points.ply", cloud)
+    >>> bool((heat_igl.read_point_cloud("points.ply").P == cloud.P).all())
+    True
     """
     path = checked_path(path, tuple(_WRITERS), tuple(_WRITERS))
     with replacing(path) as temporary:

@@ -137,6 +137,17 @@ class Mesh:
     -----
     Both arrays are read-only, so a solver made from the mesh always agrees with it. Meshes with defects (not manifold,
     slivers, zero areas, duplicate faces, unreferenced vertices) are accepted; `report` lists the defects.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.Mesh([[0, 0, 0], [3, 0, 0], [3, 4, 0], [0, 4, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> mesh
+    Mesh(4 vertices, 2 triangles)
+    >>> float(mesh.measures.sum())  # the area
+    12.0
+    >>> float(mesh.edge_lengths.max())
+    5.0
     """
 
     V: FloatArray

@@ -63,6 +63,16 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     -----
     Objects are recognized by the attributes that hold positions and faces. An array (m, 4) in a pair (V, F) holds
     tetrahedra, as everywhere in this package; `PolygonMesh` takes quadrilaterals.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> from types import SimpleNamespace
+    >>> heat_igl.as_mesh(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+    Mesh(3 vertices, 1 triangles)
+    >>> theirs = SimpleNamespace(vertices=[[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces=[[0, 1, 2]])  # as in trimesh
+    >>> heat_igl.as_mesh(theirs)
+    Mesh(3 vertices, 1 triangles)
     """
     if F is not None:
         if isinstance(mesh, (Mesh, PolygonMesh, PointCloud)):

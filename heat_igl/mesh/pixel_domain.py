@@ -28,6 +28,19 @@ class ImageDomain:
     index : (rows, columns) or (slices, rows, columns) int64
         Vertex at the centre of each pixel; -1 outside the mask. They count up from 0 row by row, and the corners of the
         pixels follow.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mask = np.ones((3, 4), bool)
+    >>> mask[1, 1:] = False
+    >>> domain = heat_igl.image_domain(mask)
+    >>> float(domain.mesh.measures.sum())  # nine pixels of area 1
+    9.0
+    >>> phi = heat_igl.geodesic_distance(domain.mesh, domain.index[0, 0])
+    >>> domain.image(phi)[:, 0].round(6).tolist()
+    [0.0, 1.0, 2.0]
     """
 
     mesh: Mesh

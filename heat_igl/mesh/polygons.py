@@ -51,6 +51,16 @@ class PolygonMesh:
     Polygons need be neither planar nor convex, but the virtual vertex inside (see `polygon_operators`) should see every
     corner; `triangles` need no such vertex. Corners on a straight side, as a polygon has beside smaller neighbours, are
     fine.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> V = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [0, 1, 0]]
+    >>> mesh = heat_igl.PolygonMesh(V, [[0, 1, 4, 5], [1, 2, 3, 4]])
+    >>> mesh.n_faces, mesh.triangles.n_faces
+    (2, 4)
+    >>> float(mesh.triangles.measures.sum())
+    2.0
     """
 
     V: FloatArray

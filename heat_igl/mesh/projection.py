@@ -28,6 +28,16 @@ class ClosestPoints(NamedTuple):
         k points.
     gap : (k,) float64
         Distance in space between each point and the position found.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(4)  # the unit square
+    >>> found = heat_igl.closest_points(mesh, [[0.3, 0.6, 2.0], [0.5, 4.0, 0.0]])
+    >>> found.gap.tolist()
+    [2.0, 3.0]
+    >>> found.points.positions(mesh).round(6).tolist()
+    [[0.3, 0.6, 0.0], [0.5, 1.0, 0.0]]
     """
 
     points: SurfacePoints
@@ -53,6 +63,15 @@ def closest_points(mesh: MeshLike, positions: ArrayLike) -> ClosestPoints:
     ------
     SourceError
         If positions have the wrong shape or are not finite, or the mesh is tetrahedral.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.icosphere(4)
+    >>> found = heat_igl.closest_points(mesh, 3 * mesh.V[:5])  # straight above five vertices of the unit sphere
+    >>> bool(np.allclose(found.points.positions(mesh), mesh.V[:5])), found.gap.round(6).tolist()
+    (True, [2.0, 2.0, 2.0, 2.0, 2.0])
     """
     mesh = as_simplices(mesh)
     return Projector(mesh).project(checked_points(positions))

@@ -39,6 +39,16 @@ def region_boundary(
     SourceError
         If not exactly one of the two masks is given, a mask has the wrong length or type, or the region has no
         boundary inside the mesh; if the mesh is tetrahedral.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(8)
+    >>> centre = mesh.V[mesh.F].mean(axis=1)
+    >>> region = (abs(centre[:, :2] - 0.5) < 0.25).all(axis=1)  # a square of side 1/2
+    >>> (curve,) = heat_igl.region_boundary(mesh, faces=region)
+    >>> curve.is_closed, float(curve.lengths(mesh).sum())
+    (True, 2.0)
     """
     triangles = as_simplices(mesh)
     require_triangles(triangles)

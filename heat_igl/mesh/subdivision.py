@@ -49,6 +49,17 @@ def split_long_edges(mesh: MeshLike, longest: float | None = None) -> Mesh:
     -----
     All faces at an edge share the new vertex, so they stay joined. Triangles next to a split edge get worse; the
     intrinsic Delaunay triangulation on which the solver works does not.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.strip(4, 1)
+    >>> finer = heat_igl.split_long_edges(mesh, 0.5)
+    >>> float(finer.edge_lengths.max())
+    0.5
+    >>> np.array_equal(finer.V[: mesh.n_vertices], mesh.V)
+    True
     """
     surface = as_simplices(mesh)
     if surface.is_tetrahedral:

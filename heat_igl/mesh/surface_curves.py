@@ -64,6 +64,14 @@ def curve_on(
     SourceError
         If the polyline is farther from the surface than `tolerance`, or the closest points jump from one part of it to
         another; if there are fewer than two different corners, or a position is not finite.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(4)
+    >>> curve = heat_igl.curve_on(mesh, [[0.1, 0.2, 0.01], [0.4, 0.6, 0.01]])
+    >>> round(float(curve.lengths(mesh).sum()), 6)
+    0.5
     """
     mesh = as_simplices(mesh)
     corners = checked_points(positions)
@@ -104,6 +112,16 @@ def edge_curve(mesh: MeshLike, vertices: ArrayLike, *, closed: bool = False) -> 
     ------
     SourceError
         If no edge joins a vertex with the next; the message names the first such pair.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(5, 1)
+    >>> row = heat_igl.edge_curve(mesh, [0, 1, 2, 3, 4, 5])
+    >>> float(row.lengths(mesh).sum())
+    5.0
+    >>> heat_igl.geodesic_distance(mesh, row)[6:].round(6).tolist()
+    [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
     """
     mesh = as_simplices(mesh)
     require_triangles(mesh)

@@ -38,6 +38,16 @@ class SurfacePoints:
     SourceError
         If an array has the wrong shape, a coordinate is not finite or negative, or a sum is not 1 to 1e-9; the message
         names the first such point.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.Mesh([[0, 0, 0], [6, 0, 0], [0, 8, 0]], [[0, 1, 2]])
+    >>> point = heat_igl.SurfacePoints([0], [[0, 0.5, 0.5]])
+    >>> point.positions(mesh).tolist()
+    [[3.0, 4.0, 0.0]]
+    >>> heat_igl.geodesic_distance(mesh, point).tolist()
+    [5.0, 5.0, 5.0]
     """
 
     faces: IntArray
@@ -83,6 +93,16 @@ class SurfaceCurve:
     ------
     SourceError
         As for `SurfacePoints`.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.Mesh([[0, 0, 0], [6, 0, 0], [0, 8, 0]], [[0, 1, 2]])
+    >>> middle = heat_igl.SurfaceCurve([0], [[0.5, 0.5, 0]], [[0.5, 0, 0.5]])
+    >>> float(middle.lengths(mesh).sum())
+    5.0
+    >>> heat_igl.geodesic_distance(mesh, middle).round(6).tolist()
+    [2.4, 3.0, 4.0]
     """
 
     faces: IntArray

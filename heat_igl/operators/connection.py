@@ -52,6 +52,16 @@ def connection_laplacian(mesh: MeshLike, laplacian: Laplacian = "intrinsic-delau
         If the mesh has no tangent frames, see `tangent_frames`.
     ValueError
         If `laplacian` is neither.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> L = heat_igl.connection_laplacian(heat_igl.shapes.icosphere(2)).toarray()
+    >>> bool(np.allclose(L, L.conj().T))
+    True
+    >>> bool(np.linalg.eigvalsh(L).max() < 0)  # no vector field on a sphere is parallel
+    True
     """
     mesh = as_simplices(mesh)
     tangent_frames(mesh)  # which checks the mesh

@@ -75,6 +75,19 @@ class Operators:
         Tetrahedra, or triangles that do not fit together, for fronts that pass through them; None for other domains.
     contrast : float
         Largest ratio between faces of the length in the metric per length in space; 1 without a metric.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.grid(8)
+    >>> domain = heat_igl.HeatMethodSolver(mesh).operators
+    >>> round(float(domain.M.sum()), 12)  # the area
+    1.0
+    >>> bool(np.allclose((domain.D @ domain.G - domain.L).toarray(), 0))
+    True
+    >>> bool(np.allclose(domain.L @ np.ones(domain.n), 0))
+    True
     """
 
     L: sp.csc_matrix

@@ -111,6 +111,13 @@ def fibre_metric(directions: ArrayLike, along: ArrayLike, across: ArrayLike) -> 
     ------
     ValueError
         If a direction is 0 or not finite, or a factor is not positive.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> g = heat_igl.fibre_metric([[1, 0, 0]], along=0.5, across=2.0)
+    >>> g[0].tolist()
+    [[0.25, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]]
     """
     w = checked_numbers("directions", directions)
     if w.ndim != 2 or w.shape[1] != 3:

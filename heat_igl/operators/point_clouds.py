@@ -32,6 +32,16 @@ def point_cloud_operators(
         If no three points are near enough to one another to make a triangle.
     ValueError
         If `laplacian` is neither.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> domain = heat_igl.point_cloud_operators(heat_igl.PointCloud(heat_igl.shapes.icosphere(4).V))
+    >>> round(float(domain.M.sum() / (4 * np.pi)), 2)  # the area of the unit sphere
+    1.0
+    >>> bool(np.allclose(domain.L @ np.ones(domain.n), 0))
+    True
     """
     mesh = cloud.triangles
     # The triangles of scattered points are even enough.

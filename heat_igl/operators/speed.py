@@ -44,6 +44,15 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     -----
     A time step that is asked for (`t_coef`, `t`) asks for heat. One step for slow and fast faces cannot suit both: with
     jumps, heat is 1 to 4 % wrong at a contrast of 2, 28 % at 1000, and arbitrarily wrong beyond.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(10, 2)
+    >>> domain = heat_igl.speed_operators(mesh, [2.0] * mesh.n_faces)
+    >>> time = heat_igl.HeatMethodSolver.from_operators(domain, refine="unfold").distance(0)
+    >>> round(float(time[10]), 6)  # the length 10 at the speed 2
+    5.0
     """
     mesh = as_simplices(mesh)
     s = _checked(speed, mesh.n_faces)

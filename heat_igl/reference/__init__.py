@@ -2,6 +2,12 @@
 
 Every native solver runs in a child process. `docs/references.md` says how far each one can be trusted. Closed forms are
 in `heat_igl.closed_forms`; the other methods that the paper discusses are in `heat_igl.reference.baselines`.
+
+Examples
+--------
+>>> import heat_igl
+>>> heat_igl.reference.exact(heat_igl.shapes.strip(4, 3), 0)[[4, 15, 19]].round(6).tolist()
+[4.0, 3.0, 5.0]
 """
 
 from heat_igl.reference.bounds import edge_paths, straight_lines

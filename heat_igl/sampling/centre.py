@@ -52,6 +52,14 @@ def geodesic_centre(
     linear interpolation of the values at the corners, minus W times the sum of x_i x_j l_ij^2 over the edges (Stewart's
     theorem, x barycentric). The minimum of this is found on every face in closed form. The result is exact on flat
     surfaces; on others, curvature inside one face is neglected.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(8)
+    >>> centre = heat_igl.geodesic_centre(mesh, mesh, [0, 8, 72, 80])  # of the corners of the unit square
+    >>> centre.positions(mesh).round(6).tolist()
+    [[0.5, 0.5, 0.0]]
     """
     solver = as_solver(solver)
     mesh = as_simplices(mesh)

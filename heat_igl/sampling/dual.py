@@ -40,6 +40,14 @@ def dual_triangulation(mesh: MeshLike, cells: VoronoiCells) -> Mesh:
     Replacing each vertex by the site of the cell maps every face of the mesh to a triangle, an edge or a vertex. The
     result has the triangles that an odd number of faces are mapped to. So a zigzag border between cells, or an island
     in a cell, changes nothing, and the boundary of the mesh is mapped to the boundary of the result.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.torus(48, 32)
+    >>> coarse = heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(mesh, 60))
+    >>> coarse.n_vertices, coarse.report().euler_characteristic
+    (60, 0)
     """
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:

@@ -38,6 +38,13 @@ def diameter(solver: HeatMethodSolver | MeshLike, *, start: int = 0, rounds: int
         If `start` is no vertex.
     ValueError
         If `rounds` is not a positive integer.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> distance, first, second = heat_igl.diameter(heat_igl.shapes.strip(12, 5))
+    >>> round(distance, 6)  # the diagonal
+    13.0
     """
     solver = as_solver(solver)
     if not isinstance(rounds, int | np.integer) or rounds < 1:
@@ -74,6 +81,12 @@ def distance_matrix(solver: HeatMethodSolver | MeshLike, indices: ArrayLike | No
     ------
     SourceError
         If an entry of `indices` is no vertex, or comes twice.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> heat_igl.distance_matrix(heat_igl.shapes.strip(4, 3), [0, 4, 19]).round(6).tolist()  # corners, 3 by 4
+    [[0.0, 4.0, 5.0], [4.0, 0.0, 3.0], [5.0, 3.0, 0.0]]
     """
     solver = as_solver(solver)
     chosen = (

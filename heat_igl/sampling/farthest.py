@@ -40,12 +40,26 @@ def farthest_points(solver: HeatMethodSolver | MeshLike, k: int, *, start: Array
         If `start` does not name vertices.
     ValueError
         If `k` is no integer, fewer than the starting vertices, or more than the vertices that a face uses.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> heat_igl.farthest_points(heat_igl.shapes.grid(10), 4).tolist()  # the corners of the square
+    [0, 120, 10, 110]
     """
     return farthest_cells(solver, k, start=start).sites
 
 
 def farthest_cells(solver: HeatMethodSolver | MeshLike, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
-    """The Voronoi cells of `farthest_points`, for one query more; arguments and errors as there."""
+    """The Voronoi cells of `farthest_points`, for one query more; arguments and errors as there.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> cells = heat_igl.farthest_cells(heat_igl.shapes.grid(10), 4)  # of the corners of the unit square
+    >>> round(float(cells.distance.max()), 6)  # the middle, sqrt(1/2) from each
+    0.707107
+    """
     solver = as_solver(solver)
     first = vertex_sources(cast(Any, start), solver.n_vertices, "start")
     referenced = solver.operators.referenced[: solver.n_vertices]

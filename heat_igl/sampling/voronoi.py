@@ -27,6 +27,13 @@ class VoronoiCells:
         reaches.
     distance : (n,) float64
         Distance from the nearest site, ``inf`` at vertices that no site reaches.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> cells = heat_igl.farthest_cells(heat_igl.shapes.strip(6, 1), 2)
+    >>> cells.sites.tolist(), cells.labels[:7].tolist()
+    ([0, 13], [0, 0, 0, 0, 1, 1, 1])
     """
 
     sites: IntArray
@@ -59,6 +66,13 @@ def voronoi_cells(solver: HeatMethodSolver | MeshLike, sites: ArrayLike) -> Voro
     ------
     SourceError
         If an entry of `sites` is no vertex, or comes twice.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(5, 1)
+    >>> heat_igl.voronoi_cells(mesh, [0, 5]).labels.tolist()
+    [0, 0, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1]
     """
     solver = as_solver(solver)
     chosen = checked_vertices("sites", sites, solver.n_vertices)

@@ -36,6 +36,17 @@ class OrientedPoints:
     ------
     SourceError
         If `normals` has another shape, or a row is 0 or not finite; the message names the first such row.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.grid(16)
+    >>> places = heat_igl.closest_points(mesh, [[0.5, y, 0] for y in np.linspace(0, 1, 17)]).points
+    >>> wall = heat_igl.OrientedPoints(places, [[1, 0, 0]] * 17)  # the positive side is on the right
+    >>> phi = heat_igl.SignedHeatSolver(mesh).distance(wall)
+    >>> bool(np.array_equal(phi > 0.05, mesh.V[:, 0] > 0.51))
+    True
     """
 
     points: SurfacePoints

@@ -47,6 +47,14 @@ class OffsetSources:
     ------
     SourceError
         If an offset is negative or not finite. That their number fits is checked when the sources are used.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(10, 1)
+    >>> starts = heat_igl.OffsetSources([0, 10], [0.0, 4.0])  # the right one begins at 4
+    >>> heat_igl.geodesic_distance(mesh, starts)[:11].round(6).tolist()
+    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 6.0, 5.0, 4.0]
     """
 
     sources: Sources

@@ -89,6 +89,13 @@ def unfolded_distance(
         If `sources` does not name places on the mesh.
     ValueError
         If `cutoff` is not positive.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(4, 3)
+    >>> heat_igl.unfolded_distance(mesh, sources=0)[[4, 15, 19]].round(6).tolist()
+    [4.0, 3.0, 5.0]
     """
     if sources is None:
         F, sources = None, F

@@ -53,6 +53,13 @@ def distances_within(mesh: MeshLike, radius: float, sources: Sources | None = No
         If the mesh cannot be used, or is tetrahedral.
     SourceError
         If `sources` does not name vertices.
+
+    Examples
+    --------
+    >>> from heat_igl import distances_within, shapes
+    >>> near = distances_within(shapes.strip(100, 1), 2.5, sources=[50])
+    >>> near.indices[:5].tolist(), near.data[:5].round(6).tolist()
+    ([48, 49, 50, 51, 52], [2.0, 1.0, 0.0, 1.0, 2.0])
     """
     limit = positive("radius", radius)
     triangles = _triangles(mesh)
@@ -129,6 +136,13 @@ def nearest_vertices(mesh: MeshLike, k: int, sources: Sources | None = None) -> 
         If the mesh cannot be used, or is tetrahedral.
     SourceError
         If `sources` does not name vertices.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> indices, distances = heat_igl.nearest_vertices(heat_igl.shapes.strip(4, 3), 3, sources=[0])
+    >>> indices.tolist(), distances.round(6).tolist()
+    ([[0, 1, 5]], [[0.0, 1.0, 1.0]])
     """
     if isinstance(k, bool) or not isinstance(k, int | np.integer) or k < 1:
         raise ValueError(f"k must be a positive integer, not {k!r}")
@@ -167,6 +181,12 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike) -> FloatArray:
         If the mesh cannot be used, or is tetrahedral.
     SourceError
         If `pairs` has another shape or type, or an entry is no vertex.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> heat_igl.pair_distances(heat_igl.shapes.strip(4, 3), [[0, 4], [0, 19]]).round(6).tolist()
+    [4.0, 5.0]
     """
     triangles = _triangles(mesh)
     first, second = _checked_pairs(pairs, triangles.n_vertices).T

@@ -77,6 +77,17 @@ class Refinement:
     Paths end at the boundary and at edges of more than two faces: they run along such edges, not across. A surface that
     cannot be oriented is replaced by the oriented double cover, with each source on both sheets. Immutable; threads may
     share it, and the kernels release the interpreter's lock.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
+    >>> mesh = heat_igl.shapes.strip(4, 3)
+    >>> surface = heat_igl.Refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)))
+    >>> rough = abs(mesh.V).sum(axis=1)  # in this order
+    >>> surface.unfold(rough, np.array([0]))[[4, 15, 19]].round(6).tolist()
+    [4.0, 3.0, 5.0]
     """
 
     def __init__(self, triangulation: IntrinsicTriangulation) -> None:

@@ -47,6 +47,15 @@ def write_distances_within(
     -----
     The store is a group with the arrays ``indptr`` (k + 1,), ``indices`` and ``data`` (entries,) of a matrix in
     compressed sparse rows, and the attribute ``shape``.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(20, 1)
+    >>> heat_igl.write_distances_within("near.zarr", mesh, 2.5)
+    >>> stored = heat_igl.read_distances_within("near.zarr")
+    >>> abs(stored - heat_igl.distances_within(mesh, 2.5)).nnz
+    0
     """
     zarr, target = _zarr(), Path(path)
     if target.exists():
@@ -98,6 +107,13 @@ def read_distances_within(path: str | os.PathLike[str], rows: slice | None = Non
         If `path` is no such store, or `rows` has a step.
     MissingExtraError
         If zarr is not installed.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> heat_igl.write_distances_within("rows.zarr", heat_igl.shapes.strip(20, 1), 1.0)
+    >>> heat_igl.read_distances_within("rows.zarr", slice(5, 6)).indices.tolist()  # the neighbours of vertex 5
+    [4, 5, 6, 26]
     """
     zarr = _zarr()
     try:

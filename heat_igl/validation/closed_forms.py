@@ -3,6 +3,14 @@
 Each function returns the distance (n,) to the nearest source, in the mesh's unit; ``inf`` if no source can be reached.
 On curved surfaces this is the distance on the smooth surface. The distance on a mesh inscribed in it is shorter by a
 fraction that shrinks with the square of the edge length.
+
+Examples
+--------
+>>> import heat_igl
+>>> import numpy as np
+>>> mesh = heat_igl.shapes.icosphere(2)
+>>> bool(np.isclose(heat_igl.closed_forms.sphere(mesh, 0).max(), np.pi))  # at the antipode
+True
 """
 
 from __future__ import annotations

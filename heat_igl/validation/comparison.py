@@ -69,6 +69,14 @@ def validate(
         If the sources do not name vertices of the mesh.
     ValueError
         If a method is unknown, or two have one name; if the reference has the wrong shape.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.disk(20)
+    >>> report = heat_igl.validate(mesh, 0, methods=["heat", "unfold"], reference=heat_igl.closed_forms.plane)
+    >>> [(row.method, round(row.errors.mean, 2)) for row in report.rows]
+    [('heat', 0.0), ('unfold', 0.0)]
     """
     mesh = as_simplices(mesh)
     sets = _source_sets(sources, mesh.n_vertices)

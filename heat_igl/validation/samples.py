@@ -28,6 +28,14 @@ def sample_mesh() -> Mesh:
     -------
     Mesh
         Connected triangles, over 2500 vertices; without pymeshlab `shapes.blob`.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.sample_mesh()
+    >>> report = mesh.report()
+    >>> report.n_components, report.n_boundary_loops, mesh.n_vertices > 2500
+    (1, 0, True)
     """
     path = bunny_path()
     return shapes.blob(4) if path is None else as_simplices(path)

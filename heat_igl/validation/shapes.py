@@ -1,6 +1,14 @@
 """Generated domains, most with a known distance, for tests, benchmarks and notebooks.
 
 Every function returns a `Mesh`, except `flat_torus`: the triangles are known by their edge lengths only.
+
+Examples
+--------
+>>> import heat_igl
+>>> heat_igl.shapes.torus(48, 32).report().euler_characteristic
+0
+>>> heat_igl.shapes.strip(4, 3).V[-1].tolist()
+[4.0, 3.0, 0.0]
 """
 
 from __future__ import annotations

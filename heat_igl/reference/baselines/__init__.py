@@ -7,6 +7,12 @@ distances (n,), which are 0 at the sources, ``inf`` at unreachable vertices, and
 
 On grids: `schrodinger_grid`, `fast_marching_grid` and `fast_sweeping`. They take a boolean array that marks the sources
 and return distances in an array of the same shape.
+
+Examples
+--------
+>>> import heat_igl
+>>> heat_igl.baselines.graph_distance(heat_igl.shapes.strip(4, 3), 0)[[4, 15, 19]].tolist()
+[4.0, 3.0, 7.0]
 """
 
 from heat_igl.reference.baselines.fronts import fast_marching, fast_marching_grid, fast_sweeping
