@@ -65,6 +65,8 @@ def advance(
     one.first, one.incident, one.d, one.label = first, incident, d, label
     one.positions, one.sources = positions, sources
     one.begin, one.is_stale = begin, is_stale
+    # A straight front between two round ones is too early. Straight lines have been followed where positions are known.
+    one.may_mix = positions.shape[0] == 0
     one.arrived = np.ones(n)
     rank = np.empty(n, np.int32)
     rank[order] = np.arange(n, dtype=np.int32)
@@ -98,6 +100,7 @@ class _Fronts:
     arrived: cython.double[::1]
     is_stale: cython.uchar[::1]
     rank: cython.const[cython.int][::1]
+    may_mix: cython.bint  # whether corners that are measured from different sources give a value together
     n_visits: cython.longlong
     # The best that was found for the vertex that is visited.
     best: cython.double
@@ -238,16 +241,6 @@ class _Fronts:
     @cython.inline
     @cython.nogil
     @cython.exceptval(check=False)
-    def sees_source(self, v: cython.int) -> cython.bint:
-        """Whether the way to v is known to be a straight line."""
-        if self.positions.shape[0] == 0 or self.label[v] < 0:
-            return False
-        return (self.d[v] - self.begin[v]) * (1 - STRAIGHT_LINE) <= self.line(v, self.label[v])
-
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    @cython.exceptval(check=False)
     def take(
         self, target: cython.int, value: cython.double, begin: cython.double, label: cython.int, s: cython.int
     ) -> cython.void:
@@ -280,10 +273,10 @@ class _Fronts:
             return
         to_a: cython.double = self.lengths[s, v, a]
         to_b: cython.double = self.lengths[s, v, b]
-        start: cython.double = -INFINITY
+        start: cython.double = -INFINITY  # of fronts from several sources: straight
         if self.label[i] == self.label[j]:
             start = 0.5 * (self.begins(s, a) + self.begins(s, b))
-        elif self.is_source(i) or self.is_source(j) or (self.sees_source(i) and self.sees_source(j)):
+        elif not self.may_mix or self.is_source(i) or self.is_source(j):
             return
         start = max(start, min(self.d[i], self.d[j]) - STRAIGHT * (base + to_a))
         da: cython.double = self.d[i] - start
@@ -315,10 +308,8 @@ class _Fronts:
         start: cython.double = -INFINITY
         if self.label[i] == self.label[j] and self.label[i] == self.label[k]:
             start = (self.begins(s, a) + self.begins(s, b) + self.begins(s, c)) / 3
-        elif self.is_source(i) or self.is_source(j) or self.is_source(k):
+        elif not self.may_mix or self.is_source(i) or self.is_source(j) or self.is_source(k):
             return False
-        elif self.sees_source(i) and self.sees_source(j) and self.sees_source(k):
-            return False  # straight lines of several sources are followed one by one, see `sight`
         start = max(start, min(self.d[i], self.d[j], self.d[k]) - STRAIGHT * (base + self.lengths[s, v, a]))
         da: cython.double = self.d[i] - start
         db: cython.double = self.d[j] - start

@@ -2,7 +2,15 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.sight import GAIN, MOST_LOOKS, MOST_PASSES, MOST_STEPS, NUDGE, ON_SIDE, STRAIGHT_LINE
+from cython.cimports.heat_igl.kernels.sight import (
+    GAIN,
+    MOST_LOOKS,
+    MOST_PASSES,
+    MOST_STEPS,
+    NUDGE,
+    ON_SIDE,
+    STRAIGHT_LINE,
+)
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 __all__ = ["look_around"]
@@ -56,9 +64,9 @@ def look_around(
     is_hidden: cython.uchar[::1] = np.zeros(n, np.uint8)
     one.is_waiting, one.is_touched, one.is_hidden = is_waiting, is_touched, is_hidden
     i: cython.Py_ssize_t
-    passes: cython.int
+    _passes: cython.int
     with cython.nogil:
-        for passes in range(MOST_PASSES):
+        for _passes in range(MOST_PASSES):
             n_changed: cython.Py_ssize_t = 0
             for i in range(n):
                 if is_waiting[order[i]]:
@@ -103,8 +111,8 @@ class _Sight:
         above: cython.double = -INFINITY
         k: cython.int
         c: cython.int
-        looks: cython.int
-        for looks in range(MOST_LOOKS):
+        _looks: cython.int
+        for _looks in range(MOST_LOOKS):
             nearest: cython.int = self.nearest_around(v, v, above, below, -1)
             if self.label[v] >= 0:
                 # On a boundary of sources the nearest one may be a neighbour of the one that was found.
@@ -168,9 +176,7 @@ class _Sight:
         bx: cython.double = self.positions[b, 0] - self.p[0]
         by: cython.double = self.positions[b, 1] - self.p[1]
         bz: cython.double = self.positions[b, 2] - self.p[2]
-        return (
-            self.w[0] * (ay * bz - az * by) + self.w[1] * (az * bx - ax * bz) + self.w[2] * (ax * by - ay * bx)
-        )
+        return self.w[0] * (ay * bz - az * by) + self.w[1] * (az * bx - ax * bz) + self.w[2] * (ax * by - ay * bx)
 
     @cython.cfunc
     @cython.nogil
@@ -203,7 +209,9 @@ class _Sight:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def aim(self, v: cython.int, t: cython.int, source: cython.int, into: cython.int, nudge: cython.double) -> cython.void:
+    def aim(
+        self, v: cython.int, t: cython.int, source: cython.int, into: cython.int, nudge: cython.double
+    ) -> cython.void:
         """Take the line from v to a source, both ends moved by a part of the way to the middle of a tetrahedron."""
         i: cython.int
         c: cython.int
@@ -229,7 +237,7 @@ class _Sight:
             i: cython.int = self.corners[t, (o + 1) % 4]
             j: cython.int = self.corners[t, (o + 2) % 4]
             m: cython.int = self.corners[t, (o + 3) % 4]
-            if source == i or source == j or source == m:
+            if source in (i, j, m):
                 return True
             self.aim(v, t, source, into, 0.0)
             if self.leaves(v, i, j, m, ON_SIDE):
@@ -271,8 +279,8 @@ class _Sight:
                 break
         if sign == 0:
             return False
-        steps: cython.int
-        for steps in range(MOST_STEPS):
+        _steps: cython.int
+        for _steps in range(MOST_STEPS):
             if self.is_lit(a, label) and self.is_lit(b, label) and self.is_lit(c, label):
                 return True
             t = self.behind(t, a, b, c)
@@ -311,7 +319,7 @@ class _Sight:
                 n_shared: cython.int = 0
                 for i in range(4):
                     u: cython.int = self.corners[other, i]
-                    n_shared += u == b or u == c
+                    n_shared += u in (b, c)
                 if n_shared == 2:
                     return other
         return -1
