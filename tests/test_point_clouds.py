@@ -120,6 +120,16 @@ def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary() -> None:
     assert mean_error(of_cloud, truth) < mean_error(of_mesh, truth)
 
 
+def test_even_points_are_solved_on_as_their_mesh_is() -> None:
+    """Random points take a larger time step than the vertices of a mesh."""
+    mesh = shapes.icosphere(4)
+    of_cloud, of_mesh = HeatMethodSolver(PointCloud(mesh.V)), HeatMethodSolver(mesh)
+    assert of_cloud.t == pytest.approx(of_mesh.t, rel=1e-6)
+    np.testing.assert_allclose(of_cloud.distance(0), of_mesh.distance(0), rtol=1e-6)
+    solver = HeatMethodSolver(PointCloud(sphere(1000)))
+    assert solver.t == pytest.approx(solver.operators.mean_edge_length**2, rel=1e-9)
+
+
 def test_uneven_density() -> None:
     P = sphere(6000)
     kept = np.random.default_rng(1).random(len(P)) < np.where(P[:, 2] > 0, 1.0, 0.2)

@@ -79,10 +79,36 @@ def test_nearest_of_many_sources(k):
     exact, nearest = cKDTree(mesh.V[sources]).query(mesh.V)
     found = HeatMethodSolver(mesh).voronoi(sources)
     assert (found.distance >= exact - 1e-12).all()
-    assert np.abs(found.distance - exact).mean() < 0.002 * exact.mean()
-    assert (found.labels == nearest).mean() > 0.99
+    assert np.abs(found.distance - exact).mean() < 1e-5 * exact.mean()
+    assert (found.distance <= 1.01 * exact).all()
+    assert (found.labels == nearest).mean() > 0.999
     rows = HeatMethodSolver(mesh).distances([sources, [5]])
     np.testing.assert_array_equal(rows[0], found.distance)
+
+
+@pytest.mark.parametrize("k", [2, 5, 40])
+def test_many_sources_around_an_edge(k):
+    """Lines that leave the body are not taken, and no front of two sources runs ahead of both."""
+    mesh = l_shape(12, 0.25)
+    sources = np.random.default_rng(k).choice(mesh.n_vertices, k, replace=False)
+    exact = np.min([around_the_edge(mesh.V, int(i)) for i in sources], axis=0)
+    found = HeatMethodSolver(mesh).distance(sources)
+    assert (found >= exact * (1 - 1e-9)).all()
+    assert np.abs(found - exact).mean() < 0.005 * exact.mean()
+
+
+def test_a_line_is_not_followed_across_a_gap():
+    """A slit as thin as nothing: vertices on both sides of it are there twice."""
+    box = shapes.box(8)
+    centre = box.V[box.F].mean(axis=1)
+    on_slit = np.flatnonzero((box.V[:, 0] == 0.5) & (box.V[:, 1] > 0.5))
+    copies = np.arange(box.n_vertices)
+    copies[on_slit] = box.n_vertices + np.arange(len(on_slit))
+    F = np.where((centre[:, 0] > 0.5)[:, None], copies[box.F], box.F)
+    mesh = Mesh(np.concatenate([box.V, box.V[on_slit]]), F)
+    left, right = (int(np.argmin(np.linalg.norm(mesh.V - [x, 1, 0.5], axis=1))) for x in (0.25, 0.75))
+    found = HeatMethodSolver(mesh).distance([left, 0])
+    assert found[right] == pytest.approx(2 * np.hypot(0.25, 0.5), rel=0.02)
 
 
 def test_offsets_and_components():
@@ -125,7 +151,8 @@ def test_depth_below_a_surface():
     found = HeatMethodSolver(mesh).distance(mesh.boundary)
     inner = exact > 0
     assert (found >= exact - 1e-12).all()
-    assert np.mean(found[inner] / exact[inner] - 1) < 0.01
+    assert np.mean(found[inner] / exact[inner] - 1) < 1e-4
+    assert (found <= 1.02 * exact).all()
 
 
 def test_units_and_places_play_no_part():

@@ -8,10 +8,8 @@ cdef extern from *:
     #define FLAT 1e-3
     // Part by which a way may be longer than a straight line and still be one.
     #define STRAIGHT_LINE 1e-6
-    // Part of a triangle by which a straight line may miss it, along its rim.
-    #define ON_SIDE 1e-9
     """
-    double GAIN, STRAIGHT, FLAT, STRAIGHT_LINE, ON_SIDE
+    double GAIN, STRAIGHT, FLAT, STRAIGHT_LINE
 
 cdef enum:
     # Visits per vertex up to which the kernel goes back at once to nearer vertices that have become stale.

@@ -6,8 +6,8 @@ refracted. Seen from a vertex, the source lies behind the opposite side of a sim
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, GO_BACK, MOST_VISITS, ON_SIDE, STRAIGHT, STRAIGHT_LINE
-from cython.cimports.libc.math import INFINITY, fabs, sqrt
+from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, GO_BACK, MOST_VISITS, STRAIGHT, STRAIGHT_LINE
+from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["advance"]
 
@@ -15,12 +15,14 @@ __all__ = ["advance"]
 def advance(
     order: cython.const[cython.int][::1],
     corners: cython.const[cython.int][:, ::1],
-    lengths: cython.const[cython.double][:, :, ::1],
-    slowness: cython.const[cython.double][::1],
     first: cython.const[cython.int][::1],
     incident: cython.const[cython.int][::1],
+    lengths: cython.const[cython.double][:, :, ::1],
+    slowness: cython.const[cython.double][::1],
     d: cython.double[::1],
+    begin: cython.double[::1],
     label: cython.int[::1],
+    is_stale: cython.uchar[::1],
     positions: cython.const[cython.double][:, ::1],
     sources: cython.const[cython.int][::1],
 ):
@@ -32,19 +34,22 @@ def advance(
         All vertices, roughly from near to far; a wrong order costs time.
     corners : (m, p + 1) int32
         Triangles, p = 2, or tetrahedra, p = 3.
+    first, incident : (n + 1,) int32, (m (p + 1),) int32
+        Corners ``simplex * (p + 1) + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
     lengths : (m, p + 1, p + 1) float64
         Distances of the corners, in the metric of the simplex.
     slowness : (m,) float64
         Time per length in each simplex: a front that passes from one to another of a different slowness is bent.
-    first, incident : (n + 1,) int32, (m (p + 1),) int32
-        Corners ``simplex * (p + 1) + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
     d : (n,) float64
         The value at which distance begins at each source, ``inf`` elsewhere; on return the distances.
+    begin : (n,) float64
+        The value at which a front that looks like the one that passes here would have left its source; at first, `d`.
     label : (n,) int32
         The source that distance comes from, -1 where there is none.
+    is_stale : (n,) uint8
+        The vertices to visit; none on return.
     positions : (n, 3) float64
-        Of the vertices, where lengths are those of space; else no entries. Straight lines then tell fronts of several
-        sources apart.
+        Of the vertices, where lengths are those of space; else no entries. No distance is then below the straight line.
     sources : (k,) int32
         Vertex of each source.
 
@@ -59,37 +64,16 @@ def advance(
     one.order, one.corners, one.lengths, one.slowness = order, corners, lengths, slowness
     one.first, one.incident, one.d, one.label = first, incident, d, label
     one.positions, one.sources = positions, sources
-    one.begin = np.array(d)
+    one.begin, one.is_stale = begin, is_stale
+    # A straight front between two round ones is too early. Straight lines have been followed where positions are known.
+    one.may_mix = positions.shape[0] == 0
     one.arrived = np.ones(n)
-    one.is_stale = np.ones(n, np.uint8)
     rank = np.empty(n, np.int32)
     rank[order] = np.arange(n, dtype=np.int32)
     one.rank = rank
     with cython.nogil:
         one.run()
     return one.n_visits
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _volume(
-    positions: cython.const[cython.double][:, ::1], o: cython.int, a: cython.int, b: cython.int, c: cython.int
-) -> cython.double:
-    """Six times the signed volume of the tetrahedron oabc."""
-    x: cython.double = positions[o, 0]
-    y: cython.double = positions[o, 1]
-    z: cython.double = positions[o, 2]
-    ax: cython.double = positions[a, 0] - x
-    ay: cython.double = positions[a, 1] - y
-    az: cython.double = positions[a, 2] - z
-    bx: cython.double = positions[b, 0] - x
-    by: cython.double = positions[b, 1] - y
-    bz: cython.double = positions[b, 2] - z
-    cx: cython.double = positions[c, 0] - x
-    cy: cython.double = positions[c, 1] - y
-    cz: cython.double = positions[c, 2] - z
-    return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
 
 
 @cython.final
@@ -116,6 +100,7 @@ class _Fronts:
     arrived: cython.double[::1]
     is_stale: cython.uchar[::1]
     rank: cython.const[cython.int][::1]
+    may_mix: cython.bint  # whether corners that are measured from different sources give a value together
     n_visits: cython.longlong
     # The best that was found for the vertex that is visited.
     best: cython.double
@@ -256,37 +241,6 @@ class _Fronts:
     @cython.inline
     @cython.nogil
     @cython.exceptval(check=False)
-    def sees_source(self, v: cython.int) -> cython.bint:
-        """Whether the way to v is known to be a straight line."""
-        if self.positions.shape[0] == 0 or self.label[v] < 0:
-            return False
-        return (self.d[v] - self.begin[v]) * (1 - STRAIGHT_LINE) <= self.line(v, self.label[v])
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def by_lines(self, s: cython.int, v: cython.int, i: cython.int, j: cython.int, k: cython.int) -> cython.void:
-        """Straight lines to corner v through the triangle ijk, from the sources of its corners."""
-        which: cython.int
-        for which in range(3):
-            label: cython.int = self.label[i if which == 0 else j if which == 1 else k]
-            start: cython.double = self.begin[i if which == 0 else j if which == 1 else k]
-            target: cython.int = self.corners[s, v]
-            value: cython.double = start + self.line(target, label)
-            if not value < self.best:
-                continue
-            source: cython.int = self.sources[label]
-            of_i: cython.double = _volume(self.positions, target, source, j, k)
-            of_j: cython.double = _volume(self.positions, target, source, k, i)
-            of_k: cython.double = _volume(self.positions, target, source, i, j)
-            least: cython.double = -ON_SIDE * (fabs(of_i) + fabs(of_j) + fabs(of_k))
-            if min(of_i, of_j, of_k) >= least or max(of_i, of_j, of_k) <= -least:
-                self.take(target, value, start, label, s)
-
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    @cython.exceptval(check=False)
     def take(
         self, target: cython.int, value: cython.double, begin: cython.double, label: cython.int, s: cython.int
     ) -> cython.void:
@@ -319,10 +273,10 @@ class _Fronts:
             return
         to_a: cython.double = self.lengths[s, v, a]
         to_b: cython.double = self.lengths[s, v, b]
-        start: cython.double = -INFINITY
+        start: cython.double = -INFINITY  # of fronts from several sources: straight
         if self.label[i] == self.label[j]:
             start = 0.5 * (self.begins(s, a) + self.begins(s, b))
-        elif self.is_source(i) or self.is_source(j) or (self.sees_source(i) and self.sees_source(j)):
+        elif not self.may_mix or self.is_source(i) or self.is_source(j):
             return
         start = max(start, min(self.d[i], self.d[j]) - STRAIGHT * (base + to_a))
         da: cython.double = self.d[i] - start
@@ -354,10 +308,7 @@ class _Fronts:
         start: cython.double = -INFINITY
         if self.label[i] == self.label[j] and self.label[i] == self.label[k]:
             start = (self.begins(s, a) + self.begins(s, b) + self.begins(s, c)) / 3
-        elif self.sees_source(i) and self.sees_source(j) and self.sees_source(k):
-            self.by_lines(s, v, i, j, k)
-            return False
-        elif self.is_source(i) or self.is_source(j) or self.is_source(k):
+        elif not self.may_mix or self.is_source(i) or self.is_source(j) or self.is_source(k):
             return False
         start = max(start, min(self.d[i], self.d[j], self.d[k]) - STRAIGHT * (base + self.lengths[s, v, a]))
         da: cython.double = self.d[i] - start

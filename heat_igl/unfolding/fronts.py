@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.kernels import fronts
+from heat_igl.kernels.fronts import advance
+from heat_igl.kernels.sight import look_around
 from heat_igl.mesh import connectivity
 from heat_igl.operators import MetricSimplices
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -50,24 +51,25 @@ class FrontSolver(UnfoldingSolver):
 
     def _distance(self, term: UnfoldingTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
         del u  # the order is that of Dijkstra's algorithm
-        sources = term.sources
+        n, sources = self._simplices.n, term.sources
+        vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
         order = np.argsort(connectivity.edge_distance(self._edge_graph, sources.vertices), kind="stable")
-        distance = np.full(self._simplices.n, np.inf)
-        distance[sources.vertices] = sources.vertex_offset
-        label: AnyArray = np.full(self._simplices.n, -1, np.int32)
-        label[sources.vertices] = np.arange(len(sources.vertices))
-        fronts.advance(
-            order.astype(np.int32),
-            self._corners,
-            self._lengths,
-            self._slowness,
-            self._first,
-            self._incident,
-            distance,
-            label,
-            self._V,
-            sources.vertices.astype(np.int32),
-        )
+        order = order.astype(np.int32)
+        distance = np.full(n, np.inf)
+        distance[vertices] = offset
+        begin = distance.copy()
+        label: AnyArray = np.full(n, -1, np.int32)
+        label[vertices] = np.arange(len(vertices))
+        mesh = order, self._corners, self._first, self._incident
+        of_vertices = distance, begin, label
+        is_stale = np.ones(n, np.uint8)
+        # Straight lines as far as they go, then ways that bend; behind a bend, the source of another way may be seen.
+        for _ in range(2):
+            if len(self._V):
+                is_stale = look_around(*mesh, self._V, vertices, offset, *of_vertices)
+            if not is_stale.any():
+                break
+            advance(*mesh, self._lengths, self._slowness, *of_vertices, is_stale, self._V, vertices)
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, [-1]])[label]
         return distance
