@@ -44,7 +44,10 @@ _AS_GIVEN = "Distance as given."
 _LOG_MAP = "log map"
 _SIGNED_COLOURS = "RdBu_r"
 _SCRIPTS = ("sweep.js", "polar.js", "geometry.js", "shaders.js", "view.js")
-_FRAME = '<iframe srcdoc="{}" sandbox="allow-scripts allow-downloads" style="width: 100%; height: 520px; border: 1px solid #ccc"></iframe>'
+_FRAME = (
+    '<iframe srcdoc="{}" sandbox="allow-scripts allow-downloads" '
+    'style="width: 100%; height: 520px; border: 1px solid #ccc"></iframe>'
+)
 
 
 @dataclass(frozen=True, eq=False)
