@@ -28,7 +28,6 @@ from scaffold import add_json, add_output, environment, option_parser, publish, 
 KNOWN = {
     "test_write_read_mesh": "five faces of its mesh repeat a vertex, which files of this package must not hold",
     "test_point_cloud_vector_heat": "its points fill a cube: their triangles are no surface that could be oriented",
-    "test_point_cloud_local_triangulation": "triangles of single neighbourhoods are not offered",
     "test_octree": "it fails with libigl 2.6.3 itself, whose marching_cubes returns another number of arrays",
 }
 

@@ -18,7 +18,7 @@ from conftest import shared_path
 import heat_igl
 from heat_igl import shapes
 from heat_igl.drawing.plots import Page, page, write_html
-from heat_igl.drawing.scene import LINE_INK, UNREACHABLE, colours
+from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, UNREACHABLE, colours
 
 read_image = pytest.importorskip("matplotlib.image").imread
 
@@ -67,7 +67,7 @@ def test_a_notebook_gets_the_page_in_a_frame() -> None:
     mesh, x = square(3)
     shown = page(mesh, x, title='"quoted"')
     frame = re.fullmatch(
-        r'<iframe srcdoc="([^"]*)" sandbox="allow-scripts" style="[^"]*"></iframe>', shown._repr_html_()
+        r'<iframe srcdoc="([^"]*)" sandbox="allow-scripts allow-downloads" style="[^"]*"></iframe>', shown._repr_html_()
     )
     assert frame
     assert html.unescape(frame[1]) == shown.html
@@ -84,6 +84,22 @@ def test_what_cannot_be_shown_is_rejected_by_name(tmp_path: Path) -> None:
         page(mesh, x, sources=25)
     with pytest.raises(ValueError, match=r"a\.png must end in \.html or \.htm to be a page"):
         write_html(tmp_path / "a.png", mesh, x)
+
+
+def test_fields_that_cannot_be_shown_are_rejected_by_name() -> None:
+    mesh, x = square(4)
+    page(mesh, x, fields={"exact": x, "map": mesh.V[:, :2]}, beside="map")
+    for fields, message in (
+        ({"exact": x[1:]}, r"fields\['exact'\] must have shape \(25,\) or \(25, 2\), not \(24,\)"),
+        ({"exact": np.where(x > 0.9, np.nan, x)}, r"fields\['exact'\] is NaN at vertex 4"),
+        ({"distance": x}, "fields cannot have the name 'distance', which the page uses itself"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            page(mesh, x, fields=fields)
+    with pytest.raises(ValueError, match="beside must be one of 'exact', 'log map', not 'exakt'"):
+        page(mesh, x, sources=3, fields={"exact": x}, beside="exakt")
+    with pytest.raises(ValueError, match="beside must be one of the fields, not 'log map'"):
+        page(mesh, x, beside="log map")
 
 
 # ---- the browser
@@ -395,6 +411,198 @@ def test_a_click_on_tetrahedra_reads_only(browser: Browser) -> None:
     assert readout.startswith(f"vertex {corner} ")
     assert float(readout.split()[-1]) == pytest.approx(distance[corner], rel=1e-5)
     assert not browser.driver.find_element("id", "pick-label").is_displayed()
+
+
+def choose(browser: Browser, identity: str, value: str) -> None:
+    browser.run(
+        "const e = document.getElementById(arguments[0]); e.value = arguments[1]; e.dispatchEvent(new Event('change'))",
+        identity, value,
+    )  # fmt: skip
+
+
+def set_to(browser: Browser, identity: str, value: bool) -> None:
+    if browser.run("return document.getElementById(arguments[0]).checked", identity) != value:
+        browser.driver.find_element("id", identity).click()
+
+
+def halves(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    middle = image.shape[1] // 2
+    return image[:, :middle], image[:, middle : 2 * middle]
+
+
+def test_two_fields_stand_side_by_side(browser: Browser) -> None:
+    """The same picture for the same numbers; a click in the right half is one on the same surface."""
+    mesh, x = square()
+    browser.open(page(mesh, x, fields={"exact": x, "half": x / 2}, beside="exact", style="plain"))
+    left, right = halves(browser.image())
+    np.testing.assert_allclose(left, right, atol=0.02)
+    assert not browser.run("return document.getElementById('scale2').checkVisibility()")
+    assert browser.run("return [...document.getElementById('beside').options].map((o) => o.value)") == [
+        "", "distance", "exact", "half",
+    ]  # fmt: skip
+    choose(browser, "beside", "half")
+    left, right = halves(browser.image())
+    vertex = 10 * 21 + 16
+    at = browser.on_canvas(vertex)
+    np.testing.assert_allclose(colour_at(left, at), colours("viridis_r")(x[vertex])[:3], atol=0.02)
+    np.testing.assert_allclose(colour_at(right, at), colours("viridis_r")(x[vertex] / 2)[:3], atol=0.02)
+    browser.click(at + np.array([left.shape[1], 0, 0]))
+    assert browser.sources() == [vertex]
+    assert browser.text("readout").endswith("): 0, exact 0.8, half 0.4")
+    assert browser.text("method").endswith("Other fields are as given: exact, half.")
+    choose(browser, "beside", "")
+    assert browser.on_canvas(vertex)[0] > at[0]
+
+
+def test_a_signed_field_is_white_at_0(browser: Browser) -> None:
+    mesh, x = square()
+    signed = x - 0.25
+    browser.open(page(mesh, x, fields={"signed": signed}, beside="signed", style="plain"))
+    _, right = halves(browser.image())
+    for vertex in (10 * 21 + 2, 10 * 21 + 5, 10 * 21 + 17):
+        expected = colours("RdBu_r", is_trimmed=False)(0.5 + signed[vertex] / 1.5)[:3]
+        np.testing.assert_allclose(colour_at(right, browser.on_canvas(vertex)), expected, atol=0.02)
+    assert browser.text("label2") == "signed"
+    # The isoline at 0 is wider than the others.
+    choose(browser, "style", "0")
+    browser.run("const e = document.getElementById('spacing'); e.value = 0.25; e.dispatchEvent(new Event('input'))")
+    _, lined = halves(browser.image())
+    row, left, end = (
+        int(browser.on_canvas(10 * 21)[1]),
+        browser.on_canvas(10 * 21)[0],
+        browser.on_canvas(11 * 21 - 1)[0],
+    )
+    dark = (right[row] - lined[row]).max(axis=1)
+
+    def ink(level: float) -> float:
+        at = left + (level + 0.25) * (end - left)
+        return float(dark[int(at) - 4 : int(at) + 5].sum())
+
+    assert ink(0) > 1.7 * max(ink(0.25), ink(0.5)) > 0.3
+    assert ink(0.125) < 0.1
+
+
+def test_the_log_map_in_the_page_is_that_of_python(browser: Browser, bunny: heat_igl.Mesh) -> None:
+    """Up to the first axis: frames begin at another edge."""
+    browser.open(page(bunny, np.zeros(bunny.n_vertices)))
+    for source in (100, 2000):
+        browser.run("window.heatIgl.setSources([arguments[0]])", source)
+        found = np.reshape(browser.run("return window.heatIgl.logMap()"), (-1, 2)) @ [1, 1j]
+        expected = heat_igl.log_map(bunny, source) @ [1, 1j]
+        away = np.abs(expected) > 0
+        np.testing.assert_allclose(np.abs(found[away]), np.abs(expected[away]), rtol=0.02)
+        turn = (expected * found.conj()).sum()
+        angle = np.abs(np.angle(found[away] * turn / expected[away]))
+        assert np.degrees(np.median(angle)) < 1
+        assert np.degrees(np.percentile(angle, 90)) < 5
+
+
+def test_the_log_map_of_a_plane_is_a_checkerboard(browser: Browser) -> None:
+    """Squares of the spacing: colours change along both axes, and not within a square."""
+    mesh = shapes.grid(16)
+    source = 8 * 17 + 8
+    browser.open(page(mesh, np.linalg.norm(mesh.V - mesh.V[source], axis=1), sources=source, beside="log map"))
+    found = np.reshape(browser.run("return window.heatIgl.logMap()"), (-1, 2))
+    straight = mesh.V[:, :2] - mesh.V[source, :2]
+    turn = (straight @ [1, 1j] * (found @ [1, -1j])).sum()
+    np.testing.assert_allclose(found @ [1, 1j] * turn / abs(turn), straight @ [1, 1j], atol=1e-5)
+    at = np.array([browser.on_canvas(v)[:2] for v in (source, source + 1)])
+    per_unit = np.linalg.norm(at[1] - at[0]) / np.linalg.norm(mesh.V[source + 1] - mesh.V[source])
+    farthest = float(np.linalg.norm(straight, axis=1).max())
+    spacing = farthest / 10
+    browser.run(
+        "const e = document.getElementById('spacing'); e.value = arguments[0]; e.dispatchEvent(new Event('input'))",
+        spacing,
+    )
+    _, right = halves(browser.image())
+    axes = np.array([1, 1j]) * turn / abs(turn)
+    for u, v in np.ndindex(4, 4):
+        along = (np.array([u, v]) + 0.5) * spacing
+        ink = np.array(colours("viridis_r")(np.linalg.norm(along) / farthest)[:3])
+        expected = ink + 1.3 * STRIPE_INK * (1 - ink) if (u + v) % 2 else ink
+        place = along @ axes * per_unit
+        found_there = colour_at(right, at[0] + np.array([place.real, -place.imag]))
+        np.testing.assert_allclose(found_there, expected, atol=0.04)
+
+
+def test_needles_point_along_the_gradient(browser: Browser) -> None:
+    """Of a linear function on a sphere: along the part of the slope in the plane of a triangle, upwards."""
+    mesh, front, _, distance = sphere()
+    browser.open(page(mesh, distance, sources=front, view=(0, 0), style="plain"))
+    slope = np.array([1.0, -2.0, 0.5])
+    needles = np.reshape(
+        browser.run(
+            "const x = arguments[2]; return Array.from(arrows(arguments[0], arguments[1], (v) => x[v]))",
+            mesh.V.ravel().tolist(), mesh.F.ravel().tolist(), (mesh.V @ slope).tolist(),
+        ), (-1, 3, 3),
+    )  # fmt: skip
+    assert 300 < len(needles) < mesh.n_faces / 2
+    middle = (2 * needles[:, 0] + needles[:, 1] + needles[:, 2]) / 4
+    along = needles[:, 0] - (needles[:, 1] + needles[:, 2]) / 2
+    points = heat_igl.closest_points(mesh, middle).points
+    assert np.abs(points.positions(mesh) - middle).max() < 1e-6
+    normal = np.cross(*(mesh.V[mesh.F[points.faces, i]] - mesh.V[mesh.F[points.faces, 0]] for i in (1, 2)))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    expected = slope - (normal @ slope)[:, None] * normal
+    cosine = (along * expected).sum(axis=1) / np.linalg.norm(along, axis=1) / np.linalg.norm(expected, axis=1)
+    assert cosine.min() > 1 - 1e-6
+    bare = browser.image()
+    set_to(browser, "directions", True)
+    dark = (bare - browser.image()).max(axis=2) > 0.3
+    assert 0.005 < dark.mean() < 0.2
+    set_to(browser, "directions", False)
+    np.testing.assert_allclose(browser.image(), bare, atol=0.01)
+
+
+def test_points_are_drawn_as_discs(browser: Browser) -> None:
+    """A cloud begins with discs, which cover the surface and have the colours of their points."""
+    mesh, front, _, distance = sphere()
+    cloud = heat_igl.PointCloud(mesh.V)
+    browser.open(page(cloud, distance, sources=front, view=(0, 0), style="plain"))
+    assert browser.run("return document.getElementById('points').checked")
+    image = browser.image()
+    set_to(browser, "points", False)
+    surface = browser.image()
+    both = (image < 0.99).any(axis=2) & (surface < 0.99).any(axis=2)
+    assert ((image < 0.99).any(axis=2) != (surface < 0.99).any(axis=2)).mean() < 0.02
+    assert np.abs(image - surface)[both].mean() < 0.03
+    assert (np.abs(image - surface).max(axis=2) > 0.02).mean() > 0.02  # discs have one colour each
+    browser.click(browser.on_canvas(front) + np.array([60, 0, 0]))
+    (source,) = browser.sources()
+    assert_agree(browser.distance(), heat_igl.HeatMethodSolver(cloud.triangles, refine="sweep").distance(source))
+
+
+def test_a_saved_scene_opens_as_it_was(browser: Browser) -> None:
+    mesh, front, _, distance = sphere()
+    shown = page(mesh, distance, sources=front, fields={"height </script>": mesh.V[:, 1]}, method="as given")
+    browser.open(shown)
+    source = int(browser.run("window.heatIgl.setSources([77]); return window.heatIgl.sources()[0]"))
+    choose(browser, "beside", "height </script>")
+    set_to(browser, "directions", True)
+    browser.drag(browser.on_canvas(front), browser.on_canvas(front) + np.array([40, 25, 0]))
+    state, image, at = browser.run("return window.heatIgl.state()"), browser.image(), browser.on_canvas(front)
+    found, text = browser.distance(), browser.run("return window.heatIgl.saved()")
+    assert text.count("<script") == text.count("</script>") == 3
+    browser.open(Page(text))
+    assert browser.run("return window.heatIgl.state()") == state
+    assert browser.sources() == [source]
+    np.testing.assert_array_equal(browser.distance(), found)
+    np.testing.assert_allclose(browser.on_canvas(front), at, atol=1e-9)
+    np.testing.assert_allclose(browser.image(), image, atol=0.01)
+    assert browser.run("return window.heatIgl.saved()") == text
+    browser.driver.find_element("id", "reset").click()
+    assert browser.sources() == [front]
+    assert browser.text("method") == "as given"
+
+
+def test_save_downloads_the_scene(browser: Browser, tmp_path: Path) -> None:
+    mesh, x = square(5)
+    browser.open(page(mesh, x, title="A square: 5 x 5"))
+    browser.driver.execute_cdp_cmd("Page.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
+    browser.driver.find_element("id", "save").click()
+    browser.wait(lambda: (tmp_path / "A-square-5-x-5-scene.html").exists())
+    saved = browser.run("return window.heatIgl.saved()")
+    assert (tmp_path / "A-square-5-x-5-scene.html").read_text(encoding="utf8") == saved
 
 
 def test_a_page_that_fails_says_so_in_the_console(browser: Browser) -> None:

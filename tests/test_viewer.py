@@ -108,6 +108,41 @@ def test_no_exact_distance_is_said_not_raised() -> None:
     assert now.error is None
 
 
+def test_directions_and_log_maps_follow_the_source(sphere: heat_igl.Mesh) -> None:
+    now = Exploration(sphere, 5)
+    for source in (5, 17):
+        now.choose(source)
+        found = now.directions()
+        assert found is not None
+        expected = heat_igl.HeatMethodSolver(sphere, refine="unfold").directions(source)
+        np.testing.assert_array_equal(found.gradient, expected.gradient)
+        np.testing.assert_allclose(now.log_map(), heat_igl.log_map(sphere, source), atol=0.02)
+    tetrahedra = Exploration(shapes.box(2), 0)
+    assert tetrahedra.log_map() is None
+    assert tetrahedra.message.startswith("no directions: ")
+
+
+def test_a_cloud_is_measured_as_a_cloud(sphere: heat_igl.Mesh) -> None:
+    cloud = heat_igl.PointCloud(sphere.V[sphere.V[:, 2] > -0.5])
+    now = Exploration(cloud, 3)
+    np.testing.assert_array_equal(now.distance, heat_igl.HeatMethodSolver(cloud).distance(3))
+    assert now.is_cloud
+    assert '"points": true' in now.page("cloud").html
+    assert '"points": false' in Exploration(cloud.triangles, 3).page("triangles").html
+
+
+def test_the_page_of_an_exploration_has_what_is_known(sphere: heat_igl.Mesh) -> None:
+    now = Exploration(sphere, 3, fields={"height": sphere.V[:, 2]})
+    assert '"fields": [["height", 1]]' in now.page("sphere").html
+    now.compare()
+    text = now.page("sphere").html
+    assert '"fields": [["exact", 1], ["height", 1]]' in text
+    assert '"beside": "exact"' in text
+    assert now.message in text
+    now.choose(4)
+    assert now.exact is None
+
+
 def test_a_display_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
@@ -133,7 +168,7 @@ from heat_igl import shapes
 from heat_igl.drawing.viewer import Exploration, Window
 
 mesh = shapes.icosphere(3)
-now = Exploration(mesh, 100)
+now = Exploration(mesh, 100, fields={"height": mesh.V[:, 2]})
 ps.set_window_size(1000, 560)
 window = Window(now)
 screen = display.Display()
@@ -184,7 +219,7 @@ gui, places = window._gui, {}
 class Watched:
     def __getattr__(self, name):
         found = getattr(gui, name)
-        if name not in ("Button", "Combo", "SliderFloat"):
+        if name not in ("Button", "Checkbox", "Combo", "SliderFloat", "TreeNode"):
             return found
         def watched(label, *arguments, **options):
             result = found(label, *arguments, **options)
@@ -201,16 +236,31 @@ out["error"] = now.message
 click(*middle("t / h^2", 0.6))
 out["t_coef"] = now.options.t_coef
 out["error_gone"] = now.error is None
-for label, steps in (("boundary", 1), ("refine", 2)):
+def pick(label, steps):
     click(*middle(label))
     x, y = middle(label)
     # The list opens below: its items are lines of text, with the usual distance between them.
     line, below = gui.GetTextLineHeightWithSpacing(), places[label][1][1] + gui.GetStyle().WindowPadding[1]
     click(x, int(below + (steps + 0.4) * line))
+for label, steps in (("boundary", 1), ("refine", 2)):
+    pick(label, steps)
 out["boundary"], out["refine"] = now.options.boundary, now.options.refine
 out["sources_at_end"] = now.sources.tolist()
 click(3 * width // 4, height - 5)
 out["beside"] = now.sources.tolist()
+click(*middle("fields and scenes", 0.05))
+out["shown"] = []
+for label, steps in (("show", 1), ("show", 2), ("show", 0)):
+    pick(label, steps)
+    out["shown"].append(window._field)
+click(*middle("directions"))
+out["directions"] = window._shows_directions
+click(*middle("exact beside it (takes seconds)", 0.05))
+out["exact"], out["beside_it"] = now.exact.tolist(), ps.has_surface_mesh("exact")
+click(*middle("exact beside it (takes seconds)", 0.05))
+out["gone"] = not ps.has_surface_mesh("exact")
+click(*middle("save the scene as a page"))
+out["saved"] = now.message
 print(json.dumps(out))
 """
 
@@ -274,7 +324,15 @@ def test_a_click_in_the_window_picks_a_vertex(tmp_path: Path) -> None:
     assert out["t_coef"] > 1.5
     assert out["error_gone"]
     assert (out["boundary"], out["refine"]) == ("dirichlet", "unfold")
-    assert {path.name for path in tmp_path.iterdir()} <= {"window.png"}  # no settings left behind
+    assert out["shown"] == ["log map", "height", "distance"]
+    assert out["directions"]
+    np.testing.assert_allclose(out["exact"], heat_igl.geodesic_distance(mesh, out["both"], method="exact"), atol=1e-9)
+    assert out["beside_it"]
+    assert out["gone"]
+    assert out["saved"] == f"saved {tmp_path / 'heat-igl-scene.html'}"
+    assert '"fields": [["exact", 1], ["height", 1]]' in (tmp_path / "heat-igl-scene.html").read_text(encoding="utf8")
+    # No settings are left behind.
+    assert {path.name for path in tmp_path.iterdir()} == {"window.png", "heat-igl-scene.html"}
     shown = pytest.importorskip("matplotlib.image").imread(tmp_path / "window.png")
     assert len(np.unique(shown[..., :3].reshape(-1, 3).round(1), axis=0)) > 30
 
@@ -319,6 +377,20 @@ def test_the_command_writes_the_page_that_it_is_told_to(folder: Path) -> None:
         assert message in done.stderr
         assert done.stderr.count("\n") == 1
     assert {path.name for path in folder.iterdir()} == {"ball.off", "shown.html"}
+
+
+def test_the_command_writes_exact_signed_and_points(folder: Path) -> None:
+    sphere = shapes.icosphere(2)
+    heat_igl.write_curves(folder / "loops.obj", sphere, heat_igl.isolines(sphere, sphere.V[:, 2], 0.1)[0])
+    done = run(view("ball.off", "--html", "a.html", "--exact", "--curves", "loops.obj"), cwd=folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    text = (folder / "a.html").read_text(encoding="utf8")
+    assert '"fields": [["exact", 1], ["signed distance", 1]]' in text
+    assert '"beside": "exact"' in text
+    heat_igl.write_point_cloud(folder / "scan.ply", heat_igl.PointCloud(sphere.V))
+    done = run(view("scan.ply", "--html", "b.html", "--points"), cwd=folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert '"points": true' in (folder / "b.html").read_text(encoding="utf8")
 
 
 # Waits for the window, and closes it as its own button would.

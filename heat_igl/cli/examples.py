@@ -26,7 +26,12 @@ EXAMPLES = {
         "cut bunny.obj --curves loops.obj --output cut.ply",
         "cut bunny.obj --curves loops.obj --output part.ply --split",
     ),
-    "view": ("view bunny.obj --source 1234", "view bunny.obj --html bunny.html"),
+    "view": (
+        "view bunny.obj --source 1234",
+        "view bunny.obj --html bunny.html --exact",
+        "view bunny.obj --html signed.html --curves loops.obj",
+        "view scan.ply --points",
+    ),
     "demo": ("demo", "demo --out results"),
     "batch": ("batch meshes --store distances.zarr --sources farthest:200",),
 }

@@ -16,7 +16,7 @@ from heat_igl.heat_method import Level, Refine, SignedHeatSolver
 from heat_igl.io import MESH_SUFFIXES, read_mesh, read_polylines, write_mesh
 from heat_igl.mesh import Mesh, SurfaceCurve, curve_on
 
-__all__ = ["cut", "signed"]
+__all__ = ["cut", "projected", "signed"]
 
 CurvesOption = Annotated[
     Path, typer.Option(metavar="OBJ", help="Polylines (records l), as `isolines` and `path` write them; projected.")
@@ -37,7 +37,7 @@ def signed(
 ) -> None:
     """Distance from curves, negative on their left; curves may have gaps."""
     loaded = read_mesh(mesh)
-    drawn_on = _projected(loaded, curves)
+    drawn_on = projected(loaded, curves)
     check_outputs(loaded, output, picture)
     check_json(json_file)
     solver = SignedHeatSolver(loaded, refine=cast(Refine | None, refine), t_coef=t_coef)
@@ -77,7 +77,7 @@ def cut(
         raise MeshError(f"--output {output}: meshes go to {', '.join(MESH_SUFFIXES)} files")
     check_writable(output)
     check_json(json_file)
-    found = heat_igl.cut(loaded, _projected(loaded, curves))
+    found = heat_igl.cut(loaded, projected(loaded, curves))
     pieces = found.split()
     written = {output: found.mesh}
     if split:
@@ -93,5 +93,6 @@ def cut(
     print_rows([*rows, *(("wrote", str(path)) for path in written)], json_file)
 
 
-def _projected(mesh: Mesh, path: Path) -> list[SurfaceCurve]:
+def projected(mesh: Mesh, path: Path) -> list[SurfaceCurve]:
+    """The polylines of a file as curves on the mesh."""
     return [curve_on(mesh, line.positions, closed=line.is_closed) for line in read_polylines(path)]

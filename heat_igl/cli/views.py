@@ -12,9 +12,13 @@ from rich.console import Console
 from heat_igl.cli.demo import demonstrate
 from heat_igl.cli.options import JsonOption, MeshArgument, choice, positive
 from heat_igl.cli.output import Row, check_json, check_page, check_writable, print_rows, say
-from heat_igl.heat_method import Boundary, Refine, SolverOptions
-from heat_igl.io import read_mesh
+from heat_igl.cli.regions import projected
+from heat_igl.errors import ReferenceSolverError
+from heat_igl.heat_method import Boundary, Refine, SignedHeatSolver, SolverOptions
+from heat_igl.io import read_mesh, read_point_cloud
+from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.sources import vertex_sources
+from heat_igl.typing import FloatArray
 
 __all__ = ["demo", "view"]
 
@@ -27,6 +31,11 @@ def view(
     ] = None,
     boundary: Annotated[str, choice(Boundary, "What heat does at the boundary.")] = "neumann",
     refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
+    exact: Annotated[bool, typer.Option("--exact", help="Show the exact distance beside it; takes seconds.")] = False,
+    curves: Annotated[
+        Path | None, typer.Option(metavar="OBJ", help="Show the signed distance from these polylines, too.")
+    ] = None,
+    points: Annotated[bool, typer.Option("--points", help="The file holds points; faces are not read.")] = False,
     html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -34,7 +43,7 @@ def view(
     from heat_igl.drawing.viewer import Exploration, Window, display_problem
 
     check_json(json_file)
-    loaded = read_mesh(mesh)
+    loaded = read_point_cloud(mesh) if points else read_mesh(mesh)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
     options = SolverOptions(t_coef, boundary=cast(Boundary, boundary), refine=cast(Refine | None, refine))
     target = html or Path(f"{mesh.stem}-view.html")
@@ -42,28 +51,34 @@ def view(
     if html or problem:
         check_page(target)
     with Console(stderr=True).status("factoring"):
-        shown = Exploration(loaded, sources, options)
+        shown = Exploration(loaded, sources, options, fields={} if curves is None else _signed(loaded, curves))
+        if exact:
+            shown.compare()
+            if shown.exact is None:
+                raise ReferenceSolverError(shown.message)
     if html is None and problem is None:
         try:
-            window = Window(shown, title=f"heat-igl: {mesh.name}")
+            window = Window(shown, title=f"heat-igl: {mesh.name}", exact=exact)
         except RuntimeError as error:
             problem = str(error)
             check_page(target)
         else:
             window.run()
             return
-    from heat_igl.drawing import write_html
-
     kind = f"unfolded in heat order (refine = {refine})" if refine else "the heat method"
-    write_html(
-        target, loaded, shown.distance, sources=sources, title=mesh.name,
-        method=f"Distance by {kind}, t = {shown.t_coef:.3g} h^2, boundary {boundary}.",
-    )  # fmt: skip
+    method = f"Distance by {kind}, t = {shown.t_coef:.3g} h^2, boundary {boundary}."
+    shown.page(mesh.name, method).save(target)
     if problem:
         say(f"no window: {problem}")
     counts = {"path": str(mesh), "n_vertices": loaded.n_vertices}
     rows: list[Row] = [("mesh", f"{mesh}: {loaded.n_vertices} vertices", counts)]
     print_rows([*rows, ("wrote", f"{target} (open it in a browser)", str(target))], json_file)
+
+
+def _signed(mesh: Mesh | PointCloud, curves: Path) -> dict[str, FloatArray]:
+    """The signed distance from the polylines of a file, as a field by name."""
+    surface = as_simplices(mesh)
+    return {"signed distance": SignedHeatSolver(surface).distance(projected(surface, curves))}
 
 
 def demo(

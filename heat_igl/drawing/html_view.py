@@ -1,7 +1,8 @@
 """An interactive view of a distance as one HTML file, without a server, network access or libraries.
 
 The page draws the surface with WebGL. After a click on a new source it computes the distance by the algorithm of
-`heat_igl.unfolding.sweeping`, implemented in JavaScript in page/sweep.js. The extra ``view`` is needed for the colours.
+`heat_igl.unfolding.sweeping`, implemented in JavaScript in page/sweep.js, and the logarithmic map by page/polar.js. The
+extra ``view`` is needed for the colours.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import html
 import json
 import os
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -32,15 +34,19 @@ from heat_igl.drawing.scene import (
 )
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.io import complete_file
-from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_mesh, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike
 
 __all__ = ["Page", "page"]
 
 _AS_GIVEN = "Distance as given."
+_LOG_MAP = "log map"
+_SIGNED_COLOURS = "RdBu_r"
+_SCRIPTS = ("sweep.js", "polar.js", "geometry.js", "shaders.js", "view.js")
 _FRAME = (
-    '<iframe srcdoc="{}" sandbox="allow-scripts" style="width: 100%; height: 520px; border: 1px solid #ccc"></iframe>'
+    '<iframe srcdoc="{}" sandbox="allow-scripts allow-downloads" '
+    'style="width: 100%; height: 520px; border: 1px solid #ccc"></iframe>'
 )
 
 
@@ -89,23 +95,37 @@ def page(
     label: str = DISTANCE_LABEL,
     title: str = "Geodesic distance",
     method: str = _AS_GIVEN,
+    fields: Mapping[str, ArrayLike] | None = None,
+    beside: str | None = None,
+    directions: bool = False,
 ) -> Page:
-    """Make an interactive page that shows a distance on a surface.
+    """Make an interactive page that shows a distance on a surface or on points, and other fields beside it.
 
     Dragging rotates the surface, the wheel or a pinch zooms, and dragging with Shift translates. The page displays
     vertex, position and distance under the pointer. A click makes the vertex the source; the page then computes the
     distance by planar unfolding on the intrinsic Delaunay triangulation. The result agrees with ``refine="sweep"`` to
-    1e-3, on average to 1e-5. For tetrahedra the page shows the boundary, and a click only displays the values, since
-    shortest paths run through the interior.
+    1e-3, on average to 1e-5. The logarithmic map of the source is drawn as a checkerboard; it is computed in the page,
+    too. "directions" draws needles along the gradient, and "points" draws vertices as discs, as the points of a cloud
+    are from the beginning. "save" downloads the page with the sources and the view as they are. For tetrahedra the page
+    shows the boundary, and a click only displays the values, since shortest paths run through the interior.
 
     Parameters
     ----------
     mesh, distance, sources, spacing, style, view, up, colormap, label
-        As for `heat_igl.drawing.plot`.
+        As for `heat_igl.drawing.plot`; also a `PointCloud`.
     title : str
         Title of the page.
     method : str
         Description of the method behind `distance`, displayed until a click replaces that distance.
+    fields : dict of str to (n,) or (n, 2) array_like, optional
+        More fields to choose from, by the names that the page shows: values at the vertices, such as the exact distance
+        or a signed one, with white for 0 if both signs occur; or vectors of a logarithmic map, drawn as a checkerboard.
+        They do not follow clicks.
+    beside : str, optional
+        The field that is drawn to the right of the distance at first: a name in `fields`, or "log map" if `sources` are
+        vertices.
+    directions : bool
+        Whether needles are drawn at first.
 
     Returns
     -------
@@ -116,9 +136,10 @@ def page(
     Raises
     ------
     ValueError, SourceError, MissingExtraError
-        As for `heat_igl.drawing.plot`.
+        As for `heat_igl.drawing.plot`; a ValueError also for fields of another shape, or if there is no field `beside`.
     """
-    mesh = as_simplices(mesh)
+    is_cloud = isinstance(given := as_mesh(mesh), PointCloud)
+    mesh = as_simplices(given)
     check_style(style)
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
     table = colours(colormap)(np.linspace(0, 1, 256))
@@ -139,7 +160,8 @@ def page(
         "dots": np.concatenate([seen.dots, seen.lines.reshape(-1, 3)]).round(7).ravel().tolist(),
         "spacing": spacing,
         "style": str(get_args(Style).index(style)),
-        "colours": np.rint(255 * table[:, :3]).astype(int).tolist(),
+        "colours": _bytes(table),
+        "signedColours": _bytes(colours(_SIGNED_COLOURS, is_trimmed=False)(np.linspace(0, 1, 256))),
         "lineInk": LINE_INK,
         "stripeInk": STRIPE_INK,
         "label": label,
@@ -147,18 +169,24 @@ def page(
     }
     if not mesh.is_tetrahedral:
         _add_sweep(arrays, meta, mesh)
+    _add_fields(arrays, meta, fields or {}, mesh.n_vertices)
+    meta["begin"] = {"field": "distance", "beside": beside or "", "directions": directions, "points": is_cloud}
+    choices = [name for name, _ in meta["fields"]]
+    if not mesh.is_tetrahedral and len(seen.vertices):
+        choices.append(_LOG_MAP)
+    if beside is not None and beside not in choices:
+        raise ValueError(f"beside must be one of {', '.join(map(repr, choices)) or 'the fields'}, not {beside!r}")
     meta["arrays"] = [
         (name, "float" if array.dtype.kind == "f" else "int", array.size) for name, array in arrays.items()
     ]
     folder = files("heat_igl.drawing") / "page"
-    parts = {name: (folder / name).read_text(encoding="utf8") for name in ("page.html", "sweep.js", "view.js")}
+    parts = {name: (folder / name).read_text(encoding="utf8") for name in ("page.html", *_SCRIPTS)}
     return Page(
         Template(parts["page.html"]).substitute(
             title=html.escape(title),
             meta=_in_script(meta),
             data=base64.b64encode(_packed(list(arrays.values()))).decode(),
-            sweep=parts["sweep.js"],
-            view=parts["view.js"],
+            **{Path(name).stem: parts[name] for name in _SCRIPTS},
         )
     )
 
@@ -171,6 +199,28 @@ def _add_sweep(arrays: dict[str, AnyArray], meta: dict[str, Any], mesh: Mesh) ->
     arrays["sweepFaces"] = (triangulation.F - mesh.F if same else triangulation.F).astype("<i4")
     arrays["lengths"] = (triangulation.l / meta["unit"]).astype("<f4")
     meta["sweepFacesAreDifferences"] = same
+
+
+def _add_fields(arrays: dict[str, AnyArray], meta: dict[str, Any], fields: Mapping[str, ArrayLike], n: int) -> None:
+    """Add further fields: the name of each, and how many numbers it has at a vertex."""
+    meta["fields"] = []
+    for name, given in fields.items():
+        if name in ("distance", _LOG_MAP, ""):
+            raise ValueError(f"fields cannot have the name {name!r}, which the page uses itself")
+        values = np.asarray(given, np.float64)
+        if values.shape not in ((n,), (n, 2)):
+            raise ValueError(f"fields[{name!r}] must have shape ({n},) or ({n}, 2), not {values.shape}")
+        if np.isnan(values).any():
+            first = np.unravel_index(int(np.argmax(np.isnan(values))), values.shape)
+            raise ValueError(f"fields[{name!r}] is NaN at vertex {first[0]}: there is nothing to draw")
+        arrays[f"field {name}"] = (values / meta["unit"]).astype("<f4").ravel()
+        meta["fields"].append([name, values.ndim])
+
+
+def _bytes(table: AnyArray) -> list[list[int]]:
+    """Colours (k, 4) between 0 and 1 as red, green and blue up to 255."""
+    colours_as_bytes: list[list[int]] = np.rint(255 * table[:, :3]).astype(int).tolist()
+    return colours_as_bytes
 
 
 def _in_script(value: object) -> str:

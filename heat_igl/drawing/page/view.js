@@ -1,8 +1,11 @@
-// The surface in WebGL: colours, isolines and stripes per pixel; rotation, zoom and translation; picking of vertices.
+// The surface in WebGL, once or twice side by side: colours, isolines, stripes and checkerboards per pixel; rotation, zoom and
+// translation; picking of vertices. The page can save itself as it is.
 "use strict";
 
 (async () => {
   const byId = (id) => document.getElementById(id);
+  // The document before anything changes in it, in two parts around the description of the scene.
+  const documentParts = document.documentElement.outerHTML.split(byId("meta").textContent);
   const meta = JSON.parse(byId("meta").textContent);
   const readout = byId("readout"), canvas = byId("surface");
   const gl = canvas.getContext("webgl2", { antialias: true });
@@ -34,73 +37,7 @@
   let tables = null;
   const sweepFaces = arrays.sweepFaces;
   if (sweepFaces && meta.sweepFacesAreDifferences) for (let i = 0; i < F.length; i++) sweepFaces[i] += F[i];
-  let values = Float64Array.from(arrays.distance), sources = meta.sources.slice(), dots = meta.dots;
-
-  function vertexNormals() {
-    const normals = new Float32Array(3 * n);
-    for (let f = 0; f < F.length; f += 3) {
-      const [a, b, c] = [3 * F[f], 3 * F[f + 1], 3 * F[f + 2]];
-      const p = [0, 1, 2].map((i) => V[b + i] - V[a + i]), q = [0, 1, 2].map((i) => V[c + i] - V[a + i]);
-      for (let i = 0; i < 3; i++) {
-        const j = (i + 1) % 3, k = (i + 2) % 3, x = p[j] * q[k] - p[k] * q[j];
-        normals[a + i] += x; normals[b + i] += x; normals[c + i] += x;
-      }
-    }
-    return normals;
-  }
-
-  // ---- shaders
-
-  const SURFACE_VERTEX = `#version 300 es
-    uniform mat3 turn; uniform vec2 zoom, pan;
-    in vec3 position, normal; in vec2 value;
-    out vec3 place, smoothNormal; out vec2 here;
-    void main() {
-      place = turn * position; smoothNormal = turn * normal; here = value;
-      gl_Position = vec4((place.xy + pan) * zoom, -0.5 * place.z, 1.0);
-    }`;
-  const SURFACE_FRAGMENT = `#version 300 es
-    precision highp float;
-    uniform sampler2D colours; uniform float low, high, spacing, lineWidth; uniform int style;
-    in vec3 place, smoothNormal; in vec2 here;
-    out vec4 colour;
-    // Integral of a wave that is 1 on every second unit.
-    float wave(float x) { return floor(0.5 * x) + max(mod(x, 2.0) - 1.0, 0.0); }
-    void main() {
-      float level = here.x / spacing, perPixel = length(vec2(dFdx(level), dFdy(level)));
-      vec3 ink = texture(colours, vec2((here.x - low) / (high - low), 0.5)).rgb;
-      if (style == 0 && perPixel > 0.0) {
-        float nearest = round(level), width = min(lineWidth, 0.25 / perPixel);
-        float cover = clamp(width / 2.0 + 0.5 - abs(level - nearest) / perPixel, 0.0, 1.0) * min(1.0, width);
-        if (low < 0.0 || nearest > 0.5) ink *= 1.0 - LINE_INK * cover;
-      }
-      if (style == 1) {
-        float span = max(perPixel, 1e-4);
-        ink = mix(ink, vec3(1.0), STRIPE_INK * (wave(level + span / 2.0) - wave(level - span / 2.0)) / span);
-      }
-      if (here.y < 0.999) ink = vec3(0.72);
-      vec3 flatNormal = normalize(cross(dFdx(place), dFdy(place))), n = normalize(smoothNormal);
-      n = n.z < 0.0 ? -n : n;
-      if (!(dot(n, flatNormal) > 0.82)) n = flatNormal;
-      colour = vec4(ink * (0.6 + 0.4 * pow(clamp(dot(n, vec3(-0.53, 0.73, 1.0)), 0.0, 1.15), 0.8)), 1.0);
-    }`;
-  const DOT_VERTEX = `#version 300 es
-    uniform mat3 turn; uniform vec2 zoom, pan; uniform float size;
-    in vec3 position;
-    void main() {
-      vec3 place = turn * position;
-      gl_Position = vec4((place.xy + pan) * zoom, -0.5 * place.z - 0.006, 1.0);
-      gl_PointSize = size;
-    }`;
-  const DOT_FRAGMENT = `#version 300 es
-    precision highp float;
-    uniform bool isHidden;
-    out vec4 colour;
-    void main() {
-      float r = 2.0 * length(gl_PointCoord - 0.5);
-      if (r > 1.0 || (isHidden && r < 0.7)) discard;
-      colour = !isHidden && r > 0.75 ? vec4(1.0) : vec4(0.91, 0.0, 0.043, 1.0);
-    }`;
+  let values = Float64Array.from(arrays.distance), sources = meta.sources.slice(), dots = meta.dots, isComputed = false;
 
   function program(vertex, fragment) {
     const made = gl.createProgram();
@@ -114,71 +51,145 @@
     if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
     return new Proxy({ made }, { get: (self, name) => (name === "made" ? made : gl.getUniformLocation(made, name)) });
   }
-  const inked = SURFACE_FRAGMENT.replace("LINE_INK", meta.lineInk).replace("STRIPE_INK", meta.stripeInk);
-  const surface = program(SURFACE_VERTEX, inked), dotProgram = program(DOT_VERTEX, DOT_FRAGMENT);
+  const inked = (text) => text.replaceAll("LINE_INK", meta.lineInk).replaceAll("STRIPE_INK", meta.stripeInk);
+  const surface = program(SURFACE_VERTEX, inked(SURFACE_FRAGMENT)), discs = program(DISC_VERTEX, inked(DISC_FRAGMENT));
+  const dotProgram = program(DOT_VERTEX, DOT_FRAGMENT), arrowProgram = program(ARROW_VERTEX, ARROW_FRAGMENT);
 
-  function attribute(owner, name, size) {
-    const buffer = gl.createBuffer(), at = gl.getAttribLocation(owner.made, name);
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    gl.enableVertexAttribArray(at);
-    gl.vertexAttribPointer(at, size, gl.FLOAT, false, 0, 0);
-    return (data) => { gl.bindBuffer(gl.ARRAY_BUFFER, buffer); gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW); };
+  const refill = (buffer, data) => { gl.bindBuffer(gl.ARRAY_BUFFER, buffer); gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW); };
+  const filled = (data) => {
+    const buffer = gl.createBuffer();
+    refill(buffer, data);
+    return buffer;
+  };
+  // Arrays for a program: its inputs by name, each a buffer and the numbers per vertex.
+  function arraysOf(owner, inputs) {
+    const made = gl.createVertexArray();
+    gl.bindVertexArray(made);
+    for (const [name, [buffer, size]] of Object.entries(inputs)) {
+      const at = gl.getAttribLocation(owner.made, name);
+      if (at < 0) continue;
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.enableVertexAttribArray(at);
+      gl.vertexAttribPointer(at, size, gl.FLOAT, false, 0, 0);
+    }
+    return made;
   }
-  const surfaceArrays = gl.createVertexArray();
-  gl.bindVertexArray(surfaceArrays);
-  attribute(surface, "position", 3)(V);
-  attribute(surface, "normal", 3)(vertexNormals());
-  const setValues = attribute(surface, "value", 2);
-  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+  const shared = { position: [filled(V), 3], normal: [filled(vertexNormals(V, F)), 3], radius: [filled(discRadii(V, F)), 1] };
+  const nothing = new Float32Array(0), triangles = gl.createBuffer(), dotBuffer = filled(nothing);
+  const dotArrays = arraysOf(dotProgram, { position: [dotBuffer, 3] });
+  gl.bindVertexArray(null);
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, triangles);
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, F, gl.STATIC_DRAW);
-  const dotArrays = gl.createVertexArray();
-  gl.bindVertexArray(dotArrays);
-  const setDots = attribute(dotProgram, "position", 3);
+
+  // One panel, or two side by side: the field that each shows, its numbers and the scale of its colours.
+  function panel(field) {
+    const value = filled(nothing), needles = filled(nothing);
+    const made = { field, value, needles, nNeedles: 0, low: 0, high: 1, spacing: 1, row: 0, isMap: false };
+    made.onSurface = arraysOf(surface, { ...shared, value: [value, 3] });
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, triangles);
+    made.onDiscs = arraysOf(discs, { ...shared, value: [value, 3] });
+    made.onArrows = arraysOf(arrowProgram, { position: [needles, 3] });
+    gl.bindVertexArray(null);
+    return made;
+  }
+  const panels = [panel("distance"), panel("")];
+  const shown = () => (panels[1].field ? panels : panels.slice(0, 1));
+
   gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
-  const table = Uint8Array.from(meta.colours.flatMap((rgb) => [...rgb, 255]));
-  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, meta.colours.length, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, table);
+  const table = Uint8Array.from([...meta.colours, ...meta.signedColours].flatMap((rgb) => [...rgb, 255]));
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, meta.colours.length, 2, 0, gl.RGBA, gl.UNSIGNED_BYTE, table);
   for (const [key, to] of [["MIN_FILTER", "LINEAR"], ["WRAP_S", "CLAMP_TO_EDGE"], ["WRAP_T", "CLAMP_TO_EDGE"]])
     gl.texParameteri(gl.TEXTURE_2D, gl["TEXTURE_" + key], gl[to]);
   gl.enable(gl.DEPTH_TEST);
 
-  // ---- the displayed field
+  // ---- the displayed fields
 
-  const scale = { low: 0, high: 1, spacing: 1 };
+  const sweep = () => (tables = tables || sweepTables(n, sweepFaces, arrays.lengths));
+  let map = null;
+  // Numbers of a field: one for each vertex, or two for a map.
+  function numbers(field) {
+    if (field === "distance") return values;
+    if (field !== "log map") return arrays["field " + field];
+    map = map || logMap(sweep(), isComputed ? values : sweepDistance(sweep(), sources), sources);
+    return map;
+  }
+  const isMap = (field) => field === "log map" || meta.fields.some(([name, width]) => name === field && width === 2);
+  const canMap = () => Boolean(sweepFaces) && sources.length > 0;
 
-  function roundSpacing(largest) {
-    const power = 10 ** Math.floor(Math.log10(largest / 16));
-    const steps = [1, 2, 5, 10, 20, 50].map((digit) => digit * power);
-    const off = (step) => Math.abs(Math.log(largest / 16 / step));
-    return steps.reduce((best, step) => (off(step) < off(best) ? step : best));
+  function limits(shownHere, found) {
+    let low = 0, high = 0;
+    for (let v = 0; v < n; v++) {
+      const x = shownHere.isMap ? Math.hypot(found[2 * v], found[2 * v + 1]) : found[v];
+      if (isFinite(x)) { low = Math.min(low, x); high = Math.max(high, x); }
+    }
+    // White is 0 where there are values of both signs.
+    const isSigned = low < 0 && high > 0;
+    if (isSigned) [low, high] = [Math.min(low, -high), Math.max(high, -low)];
+    return [low, high, isSigned ? 0.75 : 0.25];
+  }
+
+  function showPanel(at) {
+    const found = numbers(at.field);
+    at.isMap = isMap(at.field);
+    [at.low, at.high, at.row] = limits(at, found);
+    const triples = new Float32Array(3 * n), valueAt = (v) => (at.isMap ? Math.hypot(found[2 * v], found[2 * v + 1]) : found[v]);
+    for (let v = 0; v < n; v++) {
+      if (isFinite(valueAt(v))) triples.set(at.isMap ? [found[2 * v], found[2 * v + 1], 1] : [found[v], 0, 1], 3 * v);
+    }
+    refill(at.value, triples);
+    const corners = byId("directions").checked ? arrows(V, F, valueAt) : nothing;
+    at.nNeedles = corners.length / 3;
+    refill(at.needles, corners);
   }
 
   function showValues() {
-    let low = 0, high = 0;
-    for (const x of values) if (isFinite(x)) { low = Math.min(low, x); high = Math.max(high, x); }
-    scale.low = low;
-    scale.high = high > low ? high : low + 1;
+    if (!canMap()) for (const at of panels) if (at.field === "log map") at.field = at === panels[0] ? "distance" : "";
+    listFields();
+    shown().forEach(showPanel);
+    const [left, right] = shown();
+    // The same colours for the same numbers, if both are of one kind.
+    if (right && right.row === left.row) {
+      left.low = right.low = Math.min(left.low, right.low);
+      left.high = right.high = Math.max(left.high, right.high);
+    }
     const asked = parseFloat(byId("spacing").value) / meta.unit;
-    scale.spacing = asked > (scale.high - low) / 1000 ? asked : roundSpacing((scale.high - low) * meta.unit) / meta.unit;
-    const pairs = new Float32Array(2 * n);
-    for (let v = 0; v < n; v++) if (isFinite(values[v])) { pairs[2 * v] = values[v]; pairs[2 * v + 1] = 1; }
-    setValues(pairs);
-    setDots(Float32Array.from(dots));
-    drawBar();
+    for (const at of shown()) {
+      if (!(at.high > at.low)) at.high = at.low + 1;
+      const across = at.high - at.low;
+      at.spacing = asked > across / 1000 ? asked : roundSpacing(across * meta.unit) / meta.unit;
+    }
+    refill(dotBuffer, Float32Array.from(dots));
+    drawBars();
     redraw();
+  }
+
+  function listFields() {
+    const names = ["distance", ...(canMap() ? ["log map"] : []), ...meta.fields.map(([name]) => name)];
+    for (const [id, choices, chosen] of [["field", names, panels[0].field], ["beside", ["", ...names], panels[1].field]]) {
+      byId(id).replaceChildren(...choices.map((name) => new Option(name || "nothing", name, false, name === chosen)));
+      byId(id).parentElement.hidden = !sweepFaces && !meta.fields.length;
+    }
   }
 
   const written = (x) => String(Number((x * meta.unit).toPrecision(6)));
 
-  function drawBar() {
-    const bar = byId("bar"), rows = Math.max(bar.clientHeight, 1), pen = bar.getContext("2d"), style = byId("style").value;
+  function drawBars() {
+    const [left, right] = shown();
+    drawBar("", left);
+    byId("scale2").hidden = !right || (right.row === left.row && right.low === left.low && right.high === left.high);
+    if (!byId("scale2").hidden) drawBar("2", right);
+  }
+
+  function drawBar(suffix, at) {
+    const bar = byId("bar" + suffix), rows = Math.max(bar.clientHeight, 1), pen = bar.getContext("2d"), style = byId("style").value;
     bar.width = 1;
     bar.height = rows;
-    const { low, high, spacing } = scale, across = high - low;
+    const { low, high, spacing } = at, across = high - low, colours = at.row > 0.5 ? meta.signedColours : meta.colours;
     for (let row = 0; row < rows; row++) {
-      const at = 1 - (row + 0.5) / rows, x = low + at * across, level = x / spacing;
-      const last = meta.colours.length - 1, rgb = meta.colours[Math.round(at * last)];
-      const isLine = style === "0" && Math.abs(level - Math.round(level)) <= 0.5 * across / rows / spacing;
-      const isLight = style === "1" && Math.floor(level) % 2 !== 0;
+      const share = 1 - (row + 0.5) / rows, x = low + share * across, level = x / spacing;
+      const last = colours.length - 1, rgb = colours[Math.round(share * last)];
+      const isLine = style === "0" && !at.isMap && Math.abs(level - Math.round(level)) <= 0.5 * across / rows / spacing;
+      const isLight = style === "1" && !at.isMap && Math.floor(level) % 2 !== 0;
       const ink = rgb.map((c) => (isLine && (low < 0 || Math.round(level) !== 0) ? c * (1 - meta.lineInk) : isLight ? c + meta.stripeInk * (255 - c) : c));
       pen.fillStyle = "rgb(" + ink.join(",") + ")";
       pen.fillRect(0, row, 1, 1);
@@ -191,18 +202,22 @@
       tick.style.top = 100 * (1 - (i * every - low) / across) + "%";
       ticks.push(tick);
     }
-    byId("ticks").replaceChildren(...ticks);
+    byId("ticks" + suffix).replaceChildren(...ticks);
+    byId("label" + suffix).textContent = at.field === "distance" ? meta.label : at.field === "log map" ? "length in the log map" : at.field;
   }
 
   function setSources(chosen) {
     const start = performance.now();
-    tables = tables || sweepTables(n, sweepFaces, arrays.lengths);
+    sweep();
     const prepared = performance.now();
     values = sweepDistance(tables, chosen);
     const milliseconds = { prepare: prepared - start, solve: performance.now() - prepared };
     sources = chosen;
+    isComputed = true;
+    map = null;
     dots = chosen.flatMap((s) => [V[3 * s], V[3 * s + 1], V[3 * s + 2]]);
-    byId("method").textContent = "Computed in this page by the sweep, which unfolds triangles: " + milliseconds.solve.toFixed(0) + " ms.";
+    const others = meta.fields.length ? " Other fields are as given: " + meta.fields.map(([name]) => name).join(", ") + "." : "";
+    byId("method").textContent = "Computed in this page by the sweep, which unfolds triangles: " + milliseconds.solve.toFixed(0) + " ms." + others;
     showValues();
     return milliseconds;
   }
@@ -215,10 +230,11 @@
     pan = [-meta.middle[0], -meta.middle[1]];
     zoom = 1;
   }
+  const panelWidth = () => Math.floor(canvas.clientWidth / shown().length);
   // Pixels of the page per unit.
   function pixelsPerUnit() {
     const [x, y] = meta.extent;
-    return 0.92 * zoom * Math.min(canvas.clientWidth / x, canvas.clientHeight / y);
+    return 0.92 * zoom * Math.min(panelWidth() / x, canvas.clientHeight / y);
   }
   function rotate(dx, dy) {
     const angle = Math.hypot(dx, dy);
@@ -232,11 +248,12 @@
     pan = [-(R[0][0] * centre[0] + R[0][1] * centre[1]), -(R[1][0] * centre[0] + R[1][1] * centre[1])];
     redraw();
   }
+  const inPanel = (x) => (x >= panelWidth() && panels[1].field ? x - panelWidth() : x);
   function zoomAt(factor, x, y) {
     const before = pixelsPerUnit();
     zoom = Math.min(Math.max(zoom * factor, 0.2), 2000);
     const change = 1 / pixelsPerUnit() - 1 / before;
-    pan = [pan[0] + (x - canvas.clientWidth / 2) * change, pan[1] - (y - canvas.clientHeight / 2) * change];
+    pan = [pan[0] + (inPanel(x) - panelWidth() / 2) * change, pan[1] - (y - canvas.clientHeight / 2) * change];
     redraw();
   }
   function move(dx, dy) {
@@ -257,20 +274,38 @@
     gl.viewport(0, 0, width, height);
     gl.clearColor(1, 1, 1, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    const place = (owner) => {
-      gl.useProgram(owner.made);
-      gl.uniformMatrix3fv(owner.turn, true, turn.flat());
-      gl.uniform2f(owner.zoom, 2 * pixelsPerUnit() / canvas.clientWidth, 2 * pixelsPerUnit() / canvas.clientHeight);
-      gl.uniform2f(owner.pan, ...pan);
-    };
-    place(surface);
-    gl.uniform1f(surface.low, scale.low);
-    gl.uniform1f(surface.high, scale.high);
-    gl.uniform1f(surface.spacing, scale.spacing);
-    gl.uniform1f(surface.lineWidth, 1.3 * ratio);
-    gl.uniform1i(surface.style, Number(byId("style").value));
-    gl.bindVertexArray(surfaceArrays);
-    gl.drawElements(gl.TRIANGLES, F.length, gl.UNSIGNED_INT, 0);
+    const across = Math.floor(width / shown().length);
+    shown().forEach((at, i) => {
+      gl.viewport(i * across, 0, across, height);
+      drawPanel(at, ratio);
+    });
+  }
+  function place(owner) {
+    gl.useProgram(owner.made);
+    gl.uniformMatrix3fv(owner.turn, true, turn.flat());
+    gl.uniform2f(owner.zoom, 2 * pixelsPerUnit() / panelWidth(), 2 * pixelsPerUnit() / canvas.clientHeight);
+    gl.uniform2f(owner.pan, ...pan);
+  }
+  function drawPanel(at, ratio) {
+    const owner = byId("points").checked ? discs : surface;
+    place(owner);
+    for (const name of ["low", "high", "spacing", "row"]) gl.uniform1f(owner[name], at[name]);
+    gl.uniform1f(owner.lineWidth, 1.3 * ratio);
+    gl.uniform1i(owner.style, Number(byId("style").value));
+    gl.uniform1i(owner.isMap, at.isMap);
+    if (owner === discs) {
+      gl.uniform1f(owner.pixels, pixelsPerUnit() * ratio);
+      gl.bindVertexArray(at.onDiscs);
+      gl.drawArrays(gl.POINTS, 0, n);
+    } else {
+      gl.bindVertexArray(at.onSurface);
+      gl.drawElements(gl.TRIANGLES, F.length, gl.UNSIGNED_INT, 0);
+    }
+    if (at.nNeedles) {
+      place(arrowProgram);
+      gl.bindVertexArray(at.onArrows);
+      gl.drawArrays(gl.TRIANGLES, 0, at.nNeedles);
+    }
     place(dotProgram);
     gl.uniform1f(dotProgram.size, (dots.length <= 60 ? 11 : 5) * ratio);
     gl.bindVertexArray(dotArrays);
@@ -286,13 +321,14 @@
 
   // ---- picking
 
-  // Position of a vertex on the canvas, in pixels of the page, and depth.
+  // Position of a vertex on the canvas, in pixels of the page, and depth; in the left panel of two.
   function onCanvas(v) {
     const at = turn.map((row) => row[0] * V[3 * v] + row[1] * V[3 * v + 1] + row[2] * V[3 * v + 2]), s = pixelsPerUnit();
-    return [canvas.clientWidth / 2 + s * (at[0] + pan[0]), canvas.clientHeight / 2 - s * (at[1] + pan[1]), at[2]];
+    return [panelWidth() / 2 + s * (at[0] + pan[0]), canvas.clientHeight / 2 - s * (at[1] + pan[1]), at[2]];
   }
   // The vertex nearest to the visible point at (x, y) on the canvas, or -1 outside the surface.
-  function pick(x, y) {
+  function pick(xOnCanvas, y) {
+    const x = inPanel(xOnCanvas);
     const at = new Float64Array(3 * n);
     for (let v = 0; v < n; v++) at.set(onCanvas(v), 3 * v);
     let best = -1, nearest = -Infinity;
@@ -315,7 +351,11 @@
   function describe(v) {
     const where = [0, 1, 2].map((i) => String(Number((meta.centre[i] + meta.unit * V[3 * v + i]).toPrecision(7))));
     const value = isFinite(values[v]) ? written(values[v]) : "unreachable";
-    readout.textContent = "vertex " + v + " at (" + where.join(", ") + "): " + value;
+    const others = meta.fields.filter(([, width]) => width === 1).map(([name]) => {
+      const x = arrays["field " + name][v];
+      return ", " + name + " " + (isFinite(x) ? written(x) : "none");
+    });
+    readout.textContent = "vertex " + v + " at (" + where.join(", ") + "): " + value + others.join("");
   }
   function click(x, y, isAdding) {
     const v = pick(x, y);
@@ -377,32 +417,65 @@
     else return;
     event.preventDefault();
   });
-  byId("style").addEventListener("change", () => { drawBar(); redraw(); });
+  byId("style").addEventListener("change", () => { drawBars(); redraw(); });
   byId("spacing").addEventListener("input", showValues);
-  byId("reset").addEventListener("click", start);
-  new ResizeObserver(() => { drawBar(); redraw(); }).observe(canvas);
+  byId("directions").addEventListener("change", showValues);
+  byId("points").addEventListener("change", redraw);
+  byId("field").addEventListener("change", (event) => { panels[0].field = event.target.value; showValues(); });
+  byId("beside").addEventListener("change", (event) => { panels[1].field = event.target.value; showValues(); });
+  byId("reset").addEventListener("click", () => start(null));
+  byId("save").addEventListener("click", save);
+  new ResizeObserver(() => { drawBars(); redraw(); }).observe(canvas);
 
-  function start() {
+  // ---- the scene: what is shown, and how
+
+  function state() {
+    return {
+      turn, pan, zoom, field: panels[0].field, beside: panels[1].field, style: byId("style").value, spacing: byId("spacing").value,
+      directions: byId("directions").checked, points: byId("points").checked, sources: isComputed ? sources : null,
+    };
+  }
+  // This page with the scene as it is, as a document of its own.
+  function saved() {
+    const text = JSON.stringify({ ...meta, state: state() }).replaceAll("<", "\\u003c");
+    return "<!DOCTYPE html>\n" + documentParts.join(text);
+  }
+  function save() {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([saved()], { type: "text/html" }));
+    link.download = document.title.replace(/[^\w.-]+/g, "-") + "-scene.html";
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  }
+
+  function start(scene) {
     resetView();
     values = Float64Array.from(arrays.distance);
     sources = meta.sources.slice();
     dots = meta.dots;
-    byId("spacing").value = meta.spacing === null ? "" : meta.spacing;
-    byId("style").value = meta.style;
+    [isComputed, map] = [false, null];
     byId("method").textContent = meta.method;
     readout.textContent = n + " vertices, " + F.length / 3 + " triangles.";
-    showValues();
+    const begin = scene || { ...meta.begin, spacing: meta.spacing === null ? "" : meta.spacing, style: meta.style, sources: null };
+    if (scene) [turn, pan, zoom] = [scene.turn.map((row) => row.slice()), scene.pan.slice(), scene.zoom];
+    for (const name of ["spacing", "style"]) byId(name).value = begin[name];
+    for (const name of ["directions", "points"]) byId(name).checked = begin[name];
+    [panels[0].field, panels[1].field] = [begin.field, begin.beside];
+    if (begin.sources) setSources(begin.sources);
+    else showValues();
   }
-  byId("label").textContent = meta.label;
   byId("pick-label").hidden = !sweepFaces;
-  start();
+  start(meta.state || null);
 
   // For other scripts in the page; lengths are in the unit of the mesh.
   window.heatIgl = {
     distance: () => Array.from(values, (x) => x * meta.unit),
+    logMap: () => Array.from(numbers("log map"), (x) => x * meta.unit),
     sources: () => sources.slice(),
     setSources,
     pick,
     onCanvas,
+    state,
+    saved,
   };
 })();
