@@ -10,8 +10,9 @@ import scipy.sparse as sp
 from heat_igl.kernels import fronts
 from heat_igl.mesh import connectivity
 from heat_igl.operators import MetricSimplices
+from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.unfolding.solver import UnfoldingSolver, UnfoldingTerm
+from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = ["FrontSolver"]
 
@@ -48,9 +49,8 @@ class FrontSolver(UnfoldingSolver):
     def _edge_graph(self) -> sp.csr_array:
         return connectivity.shortest_edge_graph(*self._simplices.edges, self._simplices.n)
 
-    def _distance(self, term: UnfoldingTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
+    def _distance(self, sources: SourceSet, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
         del u  # the order is that of Dijkstra's algorithm
-        sources = term.sources
         order = np.argsort(connectivity.edge_distance(self._edge_graph, sources.vertices), kind="stable")
         distance = np.full(self._simplices.n, np.inf)
         distance[sources.vertices] = sources.vertex_offset
