@@ -19,7 +19,7 @@ from heat_igl.operators import Operators, divergence_matrix, edge_rotations, fac
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set
 from heat_igl.steps import PoissonProblem, VectorHeatFlow
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import Refine
 
 __all__ = ["Level", "SignedHeatSolver"]
@@ -173,26 +173,35 @@ class SignedHeatSolver:
         if level not in get_args(Level):
             raise ValueError(f"level must be 'zero', 'constant' or 'none', not {level!r}")
         chosen = oriented_set(curves, self._mesh)
-        pieces = self._pieces(chosen)
-        phi = self._integrated(pieces, level)
-        if not np.isfinite(phi).any():
+        size, left = self._refined(chosen, level) if self._refines else self._from_heat(chosen, level)
+        reached = np.isfinite(size)
+        if not reached.any():
             raise SourceError("curves reach no vertex: the components that they lie on have no area")
-        size, left = np.abs(phi), phi < 0
-        is_broken = has_gaps(self._mesh, chosen)
-        if not is_broken and (self._refines or level == "zero"):
-            left = left_of_closed(self._mesh, self._faces, chosen, left)
-        if self._refines:
-            size = self._unsigned.distance(chosen.unoriented())
-            if is_broken:
-                left = left_of_nearest(self._faces, chosen, size, left)
-                closing = zero_curve_in_gaps(self._mesh, phi, size, self._domain.mean_edge_length)
-                if closing is not None:
-                    size = np.minimum(size, self._unsigned.distance(closing))
         if unsigned is not None:
-            reached = np.isfinite(phi)
             size = np.minimum(size, self._unsigned.distance(unsigned), out=size, where=reached)
         # Adding 0 makes 0 of -0.
         return np.where(left, -size, size) + 0.0
+
+    def _from_heat(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
+        """Distance (n,) by integration, and which vertices (n,) are on the left."""
+        phi = self._integrated(self._pieces(chosen), level)
+        if level == "zero" and not has_gaps(self._mesh, chosen):
+            left, is_known = left_of_closed(self._mesh, self._faces, chosen)
+            return np.abs(phi), np.where(is_known, left, phi < 0)
+        return np.abs(phi), phi < 0
+
+    def _refined(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
+        """Near-exact distance (n,), and which vertices (n,) are on the left."""
+        size = self._unsigned.distance(chosen.unoriented())
+        if not has_gaps(self._mesh, chosen):
+            left, is_known = left_of_closed(self._mesh, self._faces, chosen)
+            if (is_known | (size == 0) | np.isinf(size)).all():
+                return size, left & np.isfinite(size)
+            return size, np.where(is_known, left, self._integrated(self._pieces(chosen), level) < 0)
+        phi = self._integrated(self._pieces(chosen), level)
+        left = left_of_nearest(self._faces, chosen, size, phi < 0)
+        closing = zero_curve_in_gaps(self._mesh, phi, size, self._domain.mean_edge_length)
+        return size if closing is None else np.minimum(size, self._unsigned.distance(closing)), left
 
     def _pieces(self, chosen: OrientedSet) -> _Pieces:
         """Segments and points with their normals in the planes of their faces."""
