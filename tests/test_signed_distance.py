@@ -236,6 +236,19 @@ def test_vertices_on_curves_that_were_cut_are_exactly_zero():
     np.testing.assert_array_equal(distance[np.unique(found.edges)], 0)
 
 
+def test_curves_come_in_lists_of_any_depth():
+    mesh, _, _ = plane(20)
+    nested = isolines(mesh, np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1), [0.2, 9, 0.4])
+    flat = [curve for level in nested for curve in level]
+    for refine in (None, "unfold"):
+        solver = SignedHeatSolver(mesh, refine=refine)
+        for level in ("zero", "constant"):
+            np.testing.assert_array_equal(solver.distance(nested, level=level), solver.distance(flat, level=level))
+    is_inside = mesh.V[:, 0] < 0.3
+    np.testing.assert_array_equal(solver.distance([[is_inside.tolist()]]), solver.distance(is_inside))
+    np.testing.assert_array_equal(cut(mesh, nested).curve, cut(mesh, flat).curve)
+
+
 def test_levels():
     mesh, _, _ = plane(40)
     solver = SignedHeatSolver(mesh)
@@ -304,6 +317,8 @@ def test_bad_curves():
         ([], "curves is empty"),
         (7, "curves must be a SurfaceCurve, OrientedPoints, a mask"),
         ([circle, 7], r"curves\[1\] must be a SurfaceCurve"),
+        ([[circle], [circle, "loop"]], r"curves\[1\]\[1\] must be a SurfaceCurve.* not str"),
+        ([[], []], "curves is empty"),
         (np.ones(5, bool), r"curves is a mask of shape \(5,\); it must have 169 entries"),
         (np.ones(169, bool), "curves: the region has no boundary inside the mesh"),
         (SurfaceCurve([3], [[0.2, 0.3, 0.5]], [[0.2, 0.3, 0.5]]), "curves has no length"),

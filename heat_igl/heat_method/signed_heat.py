@@ -140,7 +140,8 @@ class SignedHeatSolver:
         ----------
         curves : oriented sources
             A directed `SurfaceCurve`; a mask of bool of the faces (m,) or vertices (n,) of a region, which is negative
-            inside; `OrientedPoints`; or a list of these kinds. Curves may have gaps.
+            inside; `OrientedPoints`; or a list of these kinds, of any depth, such as the result of `isolines`. Curves
+            may have gaps.
         unsigned : sources, optional
             More sources, as for `HeatMethodSolver.distance`, without a sign: near them the size of the distance is
             that from them, and the sign is the one that the curves give.
