@@ -29,6 +29,9 @@ Level = Literal["zero", "constant", "none"]
 # Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
 # alike (docs/signed.md).
 _T_COEF = 0.25
+# Values on the curves are extended so many times, each time what is left of them. On random levels of five meshes 0.05
+# mean edge lengths are left by 1 at most, 0.03 by 2, 0.018 by 4, 0.011 by 8; each takes a tenth of a query.
+_LEVEL_ROUNDS = 4
 # Normals that sum to less than this share of the length of the curves have cancelled.
 _CANCELLED = 1e-9
 
@@ -256,8 +259,7 @@ class SignedHeatSolver:
 
     def _level(self, phi: FloatArray, pieces: _Pieces, share: FloatArray, level: Level) -> FloatArray:
         """Values of the integrated distance on the curves, extended to all vertices (n,), to be subtracted from it."""
-        n, domain = self.n_vertices, self._domain
-        corners = self._mesh.F[pieces.faces]
+        domain, corners = self._domain, self._mesh.F[pieces.faces]
         value = np.einsum("qc,qc->q", pieces.barycentric, phi[corners])
         component = domain.components[corners[:, 0]]
         weight = np.bincount(component, pieces.weight, domain.n_components)
@@ -271,14 +273,25 @@ class SignedHeatSolver:
             _, group = np.unique(np.stack([pieces.label, component]), axis=1, return_inverse=True)
             group = group.ravel()
             rest -= (np.bincount(group, pieces.weight * rest) / np.bincount(group, pieces.weight))[group]
-        # Heat of the values over heat of ones is the value at the nearest places on the curves.
-        b = np.zeros((n, 2))
-        largest = max(float(np.abs(rest).max()), np.finfo(float).tiny)
-        np.add.at(b[:, 0], corners, share * (rest / largest)[:, None])
-        np.add.at(b[:, 1], corners, share)
-        u, ones = self._heat_flow.solve(b * (SOURCE_HEAT / b[:, 1].max())).T
-        extended = np.divide(u, ones, out=np.zeros(n), where=ones > LOWEST_HEAT)
-        return np.asarray(at_vertices + largest * np.clip(extended, -1, 1))
+        return np.asarray(at_vertices + self._extended(rest, pieces, share))
+
+    def _extended(self, values: FloatArray, pieces: _Pieces, share: FloatArray) -> FloatArray:
+        """A function (n,) that takes `values` (q,) on the curves, and elsewhere that at the nearest place on them."""
+        n, corners = self.n_vertices, self._mesh.F[pieces.faces]
+        ones, extended = np.zeros(n), np.zeros(n)
+        np.add.at(ones, corners, share)
+        scale = SOURCE_HEAT / ones.max()
+        ones = self._heat_flow.solve((scale * ones)[:, None])[:, 0]
+        # Heat of the values over heat of ones is their mean over some edges: what that leaves is extended in turn.
+        for _ in range(_LEVEL_ROUNDS):
+            rest = values - np.einsum("qc,qc->q", pieces.barycentric, extended[corners])
+            largest = max(float(np.abs(rest).max()), np.finfo(float).tiny)
+            b = np.zeros(n)
+            np.add.at(b, corners, share * (rest / largest)[:, None])
+            u = self._heat_flow.solve((scale * b)[:, None])[:, 0]
+            ratio = np.divide(u, ones, out=np.zeros(n), where=ones > LOWEST_HEAT)
+            extended += largest * np.clip(ratio, -1, 1)
+        return extended
 
 
 def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, IntrinsicTriangulation]:
