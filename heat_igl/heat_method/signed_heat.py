@@ -150,7 +150,7 @@ class SignedHeatSolver:
             that from them, and the sign is the one that the curves give.
         level : {"zero", "constant", "none"}
             Without `refine`: "zero" subtracts from each vertex the integrated value at the place on the curves that
-            its heat comes from, so that all curves are near 0: within 0.06 mean edge lengths (root mean square) on
+            its heat comes from, so that all curves are near 0: within 0.03 mean edge lengths (root mean square) on
             coarse meshes, see docs/signed.md. "constant" makes the value nearly constant along each curve, with a
             different level for each, and 0 in the mean over all. "none" only makes the mean 0. `refine` measures from
             the curves in any case, and takes the sign from this if curves have gaps.
@@ -301,10 +301,7 @@ def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, Int
     domain = operators(mesh, "intrinsic-delaunay")
     surface = domain.surface
     if surface is None or surface.faces is None or surface.uncovered is not None:
-        raise MeshError(
-            "more than two faces meet at an edge of the mesh: a curve has no two sides there; remove faces or separate "
-            "the sheets"
-        )
+        raise MeshError(_shared_edge(mesh))
     faces = surface.faces
     if not faces.aligned.all():
         first = int(np.argmin(faces.aligned)) // 3
@@ -318,6 +315,18 @@ def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, Int
             "faces alike, as igl.bfs_orient does"
         )
     return domain, faces, surface.triangulation
+
+
+def _shared_edge(mesh: Mesh) -> str:
+    """What is wrong with a mesh that has an edge of more than two faces."""
+    facets = mesh.facets
+    crowded = np.flatnonzero(facets.n_faces > 2)
+    first = "" if not len(crowded) else " {} - {}".format(*facets.vertices[crowded[0]].tolist())
+    count = f" ({len(crowded)} edges are like that)" if len(crowded) > 1 else ""
+    return (
+        f"more than two faces meet at the edge{first}{count}: a curve that crosses it has no one left and right, and a "
+        "sign no meaning beyond; separate the sheets, or take the sides of closed curves from cut(mesh, curves).sides"
+    )
 
 
 def _one_or_all(steps: FloatArray) -> float | FloatArray:
