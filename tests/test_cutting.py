@@ -119,7 +119,7 @@ def test_pieces_lie_on_either_side():
 def test_split_and_loops():
     mesh = shapes.grid(8)
     ring = isolines(mesh, np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1), [0.2, 0.4])
-    pieces = cut(mesh, [curve for level in ring for curve in level]).split()
+    pieces = cut(mesh, ring).split()
     assert sorted(len(piece.boundary_loops()) for piece in pieces) == [1, 2, 2]
     assert sum(piece.mesh.measures.sum() for piece in pieces) == pytest.approx(1, rel=1e-12)
     disk = min(pieces, key=lambda piece: piece.mesh.n_faces)
@@ -167,7 +167,9 @@ def test_bad_input():
         cut(mesh, [])
     with pytest.raises(SourceError, match=r"curves\[1\] must be a SurfaceCurve, not int"):
         cut(mesh, [curve, 3])
-    with pytest.raises(SourceError, match=r"curves\[0\]\.faces\[0\] = 128 is no face"):
+    with pytest.raises(SourceError, match=r"curves\[1\]\[0\] must be a SurfaceCurve, not str"):
+        cut(mesh, [[curve], ["loop"]])
+    with pytest.raises(SourceError, match=r"curves\.faces\[0\] = 128 is no face"):
         cut(mesh, SurfaceCurve([128], [[1, 0, 0]], [[0, 1, 0]]))
     tetrahedron = Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 1, 2, 3]])
     with pytest.raises(MeshError, match="the mesh is tetrahedral"):

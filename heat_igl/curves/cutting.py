@@ -13,7 +13,7 @@ import scipy.sparse.csgraph as csgraph
 from heat_igl.curves.face_cutting import Point, cut_triangle
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import lay_out
-from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices, named_entries
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["CutMesh", "MeshPiece", "cut"]
@@ -156,7 +156,7 @@ class CutMesh:
         return found
 
 
-def cut(mesh: MeshLike, curves: SurfaceCurve | list[SurfaceCurve]) -> CutMesh:
+def cut(mesh: MeshLike, curves: NestedCurves) -> CutMesh:
     """Cut a triangle mesh along curves, so that they become edges.
 
     Curves may run through faces, along edges and through vertices, touch the boundary, cross themselves and each other,
@@ -166,8 +166,8 @@ def cut(mesh: MeshLike, curves: SurfaceCurve | list[SurfaceCurve]) -> CutMesh:
     ----------
     mesh : mesh
         Triangles, manifold or not.
-    curves : SurfaceCurve or list of SurfaceCurve
-        Paths, isolines, boundaries of regions.
+    curves : SurfaceCurve or sequence of such of any depth
+        Paths, boundaries of regions, or isolines as `isolines` returns them, a list for each level.
 
     Returns
     -------
@@ -199,20 +199,20 @@ def cut(mesh: MeshLike, curves: SurfaceCurve | list[SurfaceCurve]) -> CutMesh:
     triangles = as_simplices(mesh)
     if triangles.is_tetrahedral:
         raise MeshError("curves cut triangles, but the mesh is tetrahedral")
-    every = list(curves) if isinstance(curves, (list, tuple)) else [curves]
-    if not every:
+    entries = named_entries(curves, "curves")
+    if not entries:
         raise SourceError("curves is empty: give one curve or more")
-    for i, curve in enumerate(every):
+    for name, curve in entries:
         if not isinstance(curve, SurfaceCurve):
-            raise SourceError(f"curves[{i}] must be a SurfaceCurve, not {type(curve).__name__}")
+            raise SourceError(f"{name} must be a SurfaceCurve, not {type(curve).__name__}")
         outside = (curve.faces < 0) | (curve.faces >= triangles.n_faces)
         if outside.any():
             first = int(np.argmax(outside))
             raise SourceError(
-                f"curves[{i}].faces[{first}] = {curve.faces[first]} is no face: indices run from 0 to "
+                f"{name}.faces[{first}] = {curve.faces[first]} is no face: indices run from 0 to "
                 f"{triangles.n_faces - 1}"
             )
-    return _Cut(triangles, every).result()
+    return _Cut(triangles, [curve for _, curve in entries]).result()
 
 
 class _Cut:

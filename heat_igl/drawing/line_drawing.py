@@ -12,8 +12,8 @@ from heat_igl.drawing.camera import to_pixels
 from heat_igl.drawing.raster import rasterize, visible_runs
 from heat_igl.drawing.scene import scene
 from heat_igl.drawing.surface_image import fitted
-from heat_igl.io import complete_file, flat_curves, write_svg
-from heat_igl.mesh import MeshLike, as_simplices
+from heat_igl.io import complete_file, write_svg
+from heat_igl.mesh import MeshLike, as_simplices, flat_curves
 from heat_igl.typing import FloatArray
 
 __all__ = ["Hidden", "write_line_drawing"]

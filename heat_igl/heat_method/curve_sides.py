@@ -78,9 +78,9 @@ def zero_curve_in_gaps(mesh: Mesh, phi: FloatArray, distance: FloatArray, h: flo
 
 
 def left_of_closed(
-    mesh: Mesh, triangulation: IntrinsicTriangulation, sources: OrientedSet, otherwise: BoolArray
-) -> BoolArray:
-    """Which vertices (n,) are on the left of curves without gaps.
+    mesh: Mesh, triangulation: IntrinsicTriangulation, sources: OrientedSet
+) -> tuple[BoolArray, BoolArray]:
+    """Which vertices (n,) are on the left of curves without gaps, and of which vertices (n,) that is known.
 
     Vertices are in one region if edges join them that no curve meets. The corners of the faces in which the curves run
     see the side of their region.
@@ -93,8 +93,11 @@ def left_of_closed(
         The faces of the mesh, before any flip.
     sources : OrientedSet
         Curves.
-    otherwise : (n,) bool
-        The answer on curves, and in regions that see both sides.
+
+    Returns
+    -------
+    left, is_known : (n,) bool
+        Nothing is known of vertices on curves, of regions that see both sides, and of components without a curve.
     """
     n = mesh.n_vertices
     on_curve = np.zeros(n, bool)
@@ -109,12 +112,16 @@ def left_of_closed(
     n_regions, region = csgraph.connected_components(graph, directed=False)
     seen = _seen(triangulation, sources)
     # Of the segments in a face, each corner sees the nearest, and of equally near ones that under the largest angle.
-    order = np.lexsort((-np.abs(seen.sine), seen.away, seen.corner))
-    first = np.unique(seen.corner[order], return_index=True)[1]
-    sine, where = seen.sine[order[first]], region[seen.vertex[order[first]]]
+    angle = np.abs(seen.sine)
+    order = np.lexsort((-angle, seen.away, seen.corner))
+    corners, first = np.unique(seen.corner[order], return_index=True)
+    nearest = order[first][np.searchsorted(corners, seen.corner)]
+    # Several, if curves run along each other.
+    is_seen = (seen.away <= seen.away[nearest] * (1 + _SAME_DISTANCE)) & (angle >= angle[nearest] - _LEAST_SINE)
+    sine, where = seen.sine[is_seen], region[seen.vertex[is_seen]]
     total = np.bincount(where, sine, n_regions)
     decided = np.abs(total) > _AGREED * np.bincount(where, np.abs(sine), n_regions)
-    return np.where(decided[region] & ~on_curve, total[region] > 0, otherwise)
+    return total[region] > 0, decided[region] & ~on_curve
 
 
 def left_of_nearest(

@@ -189,11 +189,11 @@ class HeatMethodSolver(PreparedSolver):
             return np.zeros((self.operators.n, len(terms)))
         return self._heat(terms)
 
-    def _source_terms(self, source_sets: list[SourceSet]) -> list[SourceTerm]:
-        """Initial heat of each set, and what is known near it."""
-        terms = [self._parts.assembler.term(sources) for sources in source_sets]
+    def _source_terms(self, source_sets: list[SourceSet], for_field: bool = False) -> list[SourceTerm]:
+        """Initial heat of each set, and what is known near it; unfolding reads that only `for_field`, in `solve`."""
         if isinstance(self._parts.last_steps, UnfoldingSolver):
-            return terms
+            return [self._parts.assembler.term(sources, takes_lines=for_field) for sources in source_sets]
+        terms = [self._parts.assembler.term(sources) for sources in source_sets]
         return [drop_overtaken(term, self._parts.heat_flow, self.operators.n) for term in terms]
 
     def _heat(self, terms: list[SourceTerm]) -> FloatArray:
@@ -204,7 +204,7 @@ class HeatMethodSolver(PreparedSolver):
         """Distances (k, n) from the heat of `_heat`: steps 2 and 3, or unfolding in the order of the heat."""
         last_steps = self._parts.last_steps
         if isinstance(last_steps, UnfoldingSolver):
-            return last_steps.distances(terms, u)
+            return last_steps.distances([term.sources for term in terms], u)
         divergence = last_steps.divergence(terms, u)
         phi = last_steps.poisson.solve(divergence)
         return last_steps.pin_levels(terms, phi, u)[:, : self.n_vertices]
@@ -229,7 +229,7 @@ class HeatMethodSolver(PreparedSolver):
         terms = self._source_terms([chosen])
         u = self._order(terms)
         if isinstance(self._parts.last_steps, UnfoldingSolver):
-            distance, labels = self._parts.last_steps.labelled(terms[0], u[:, 0])
+            distance, labels = self._parts.last_steps.labelled(chosen, u[:, 0])
         else:
             distance = self._distances_from_heat(terms, u)[0]
             labels = warmest_sources(terms[0], self._parts.heat_flow, self.operators.n)[: self.n_vertices]
@@ -279,7 +279,7 @@ class HeatMethodSolver(PreparedSolver):
         if isinstance(last_steps, FrontSolver):
             raise MeshError("directions need triangles that fit together: fronts through this domain follow no paths")
         (term,) = self._source_terms([self._source_set(sources)])
-        return last_steps.directed(term, self._order([term])[:, 0], tolerance)
+        return last_steps.directed(term.sources, self._order([term])[:, 0], tolerance)
 
     @cached_property
     def _frames(self) -> TangentFrames:
@@ -297,7 +297,7 @@ class HeatMethodSolver(PreparedSolver):
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
         chosen = self._source_set(sources)
-        terms = self._source_terms([chosen])
+        terms = self._source_terms([chosen], for_field=True)
         u = self._heat(terms)
         X, magnitude = damped_field(self.operators, terms, u, self._parts.t_damping, self._parts.fitted)
         distance = self._distances_from_heat(terms, u)[0]

@@ -1,7 +1,7 @@
 """Files: reading and writing meshes with vertex attributes and point clouds, and writing curves."""
 
 from heat_igl.io.atomic import complete_file
-from heat_igl.io.curves import CURVE_SUFFIXES, flat_curves, is_flat, write_curves, write_svg
+from heat_igl.io.curves import CURVE_SUFFIXES, is_flat, write_curves, write_svg
 from heat_igl.io.files import MESH_SUFFIXES, is_mesh_path, read_attributes, read_mesh, read_polygon_mesh, write_mesh
 from heat_igl.io.point_clouds import POINT_CLOUD_SUFFIXES, read_point_cloud, write_point_cloud
 from heat_igl.io.polylines import Polyline, read_polylines
@@ -12,7 +12,6 @@ __all__ = [
     "POINT_CLOUD_SUFFIXES",
     "Polyline",
     "complete_file",
-    "flat_curves",
     "is_flat",
     "is_mesh_path",
     "read_attributes",

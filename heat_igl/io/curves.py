@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +11,16 @@ import numpy as np
 from heat_igl.errors import MissingExtraError
 from heat_igl.io.atomic import replacing
 from heat_igl.io.text import format_rows
-from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, NestedCurves, as_simplices, flat_curves
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["CURVE_SUFFIXES", "flat_curves", "is_flat", "write_curves", "write_svg"]
+__all__ = ["CURVE_SUFFIXES", "is_flat", "write_curves", "write_svg"]
 
 # A mesh is flat if all vertices are at most this far from a plane, as a fraction of the extent.
 _FLAT = 1e-9
 # Width of a line in an SVG file, as a fraction of the larger side of the drawing.
 _LINE = 1 / 500
 
-# A curve, or curves in lists of any depth.
-NestedCurves = SurfaceCurve | Sequence["NestedCurves"]
 Curves = NestedCurves | Mapping[str, NestedCurves]
 _Lines = dict[str, list[tuple[FloatArray, bool]]]
 
@@ -94,15 +92,6 @@ def write_curves(
         lines = {name: [(P @ matrix.T, closed) for P, closed in group] for name, group in lines.items()}
     with replacing(target) as temporary:
         write(temporary, lines)
-
-
-def flat_curves(curves: NestedCurves, place: str = "curves") -> list[SurfaceCurve]:
-    """The curves of nested lists, one after the other; `place` names the list for errors."""
-    if isinstance(curves, SurfaceCurve):
-        return [curves]
-    if isinstance(curves, str) or not isinstance(curves, Sequence):
-        raise TypeError(f"{place} must be a SurfaceCurve or a list of such, not {type(curves).__name__}")
-    return [curve for i, part in enumerate(curves) for curve in flat_curves(part, f"{place}[{i}]")]
 
 
 def _checked_projection(projection: ArrayLike) -> FloatArray:

@@ -11,7 +11,15 @@ from heat_igl.mesh.regions import region_boundary
 from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
 from heat_igl.mesh.subdivision import split_long_edges
 from heat_igl.mesh.surface_curves import curve_on, edge_curve
-from heat_igl.mesh.surface_points import ON_SIDE, ON_SIDE_COMPUTED, SurfaceCurve, SurfacePoints
+from heat_igl.mesh.surface_points import (
+    ON_SIDE,
+    ON_SIDE_COMPUTED,
+    NestedCurves,
+    SurfaceCurve,
+    SurfacePoints,
+    flat_curves,
+    named_entries,
+)
 from heat_igl.mesh.triangulation import triangulated
 
 __all__ = [
@@ -21,6 +29,7 @@ __all__ = [
     "Mesh",
     "MeshLike",
     "MeshReport",
+    "NestedCurves",
     "ON_SIDE",
     "ON_SIDE_COMPUTED",
     "PointCloud",
@@ -36,9 +45,11 @@ __all__ = [
     "crossings",
     "curve_on",
     "edge_curve",
+    "flat_curves",
     "image_domain",
     "joined_segments",
     "level_segments",
+    "named_entries",
     "read_paths_with",
     "region_boundary",
     "split_long_edges",

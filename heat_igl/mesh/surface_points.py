@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +13,16 @@ from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
-__all__ = ["ON_SIDE", "ON_SIDE_COMPUTED", "SurfaceCurve", "SurfacePoints", "require_triangles"]
+__all__ = [
+    "ON_SIDE",
+    "ON_SIDE_COMPUTED",
+    "NestedCurves",
+    "SurfaceCurve",
+    "SurfacePoints",
+    "flat_curves",
+    "named_entries",
+    "require_triangles",
+]
 
 # A point lies on a side of the face if a barycentric coordinate is below this. For given coordinates: numbers of
 # order 1, rounded by some 1e-16 in each operation; 1e-12 allows for thousands of these.
@@ -130,6 +141,37 @@ class SurfaceCurve:
     def lengths(self, mesh: MeshLike) -> FloatArray:
         """Length of each segment, (s,)."""
         return np.asarray(np.linalg.norm(np.diff(self.positions(mesh), axis=0), axis=1))
+
+
+# A curve, or curves in lists of any depth.
+NestedCurves = SurfaceCurve | Sequence["NestedCurves"]
+
+
+def named_entries(nested: object, name: str) -> list[tuple[str, Any]]:
+    """The entries of nested lists, one after another, each with the name that an error gives it.
+
+    A text and a list that begins with a bool, which is a mask, are entries.
+    """
+    if not isinstance(nested, Sequence) or isinstance(nested, str):
+        return [(name, nested)]
+    if len(nested) and isinstance(nested[0], (bool, np.bool_)):
+        return [(name, nested)]
+    return [entry for i, part in enumerate(nested) for entry in named_entries(part, f"{name}[{i}]")]
+
+
+def flat_curves(curves: NestedCurves, place: str = "curves") -> list[SurfaceCurve]:
+    """The curves of nested lists, one after another; `place` names the list for errors.
+
+    Raises
+    ------
+    TypeError
+        If an entry is no curve; the message names the first such.
+    """
+    entries = named_entries(curves, place)
+    for name, entry in entries:
+        if not isinstance(entry, SurfaceCurve):
+            raise TypeError(f"{name} must be a SurfaceCurve or a list of such, not {type(entry).__name__}")
+    return [entry for _, entry in entries]
 
 
 def _face_indices(name: str, faces: ArrayLike) -> IntArray:

@@ -82,11 +82,6 @@ class SourceTerm:
         held = (self.mass > 0) & (at_vertex > 0)
         return self.largest_heat * float((self.mass[held] / at_vertex[held]).min(initial=1.0))
 
-    @property
-    def near_seen(self) -> Seeds:
-        """Those of `near` that see a point or a curve."""
-        return self.near.at(self.seen)
-
     def restricted(self, labels: IntArray, anchors: Seeds, kept: BoolArray) -> SourceTerm:
         """The term of the sources in `labels` alone, with other anchors and those of `near` that are `kept` (g,)."""
         alive = np.isin(self.label, labels)
@@ -168,11 +163,11 @@ class SourceAssembler:
         if surface is not None and surface.uncovered is not None and surface.uncovered is not surface.faces:
             self._straight.append(NearField(surface.uncovered))
 
-    def term(self, sources: SourceSet) -> SourceTerm:
-        """Initial heat of `sources`, and the distances known around them."""
+    def term(self, sources: SourceSet, takes_lines: bool = True) -> SourceTerm:
+        """Initial heat of `sources`, and the distances known around them; those of straight lines only if asked for."""
         rim = self._rim(sources)
         ring = self._ring(sources, rim)
-        lines, far = self._straight_lines(sources, rim)
+        lines, far = self._straight_lines(sources, rim) if takes_lines else (_NONE, _NONE)
         near = Seeds.nearest(_joined(ring, lines))
         seen = np.zeros(len(near.vertex), bool)
         if len(lines.vertex):

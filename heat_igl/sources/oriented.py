@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import SourceError
-from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, region_boundary
+from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, named_entries, region_boundary
 from heat_igl.sources.specification import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -77,7 +77,7 @@ class OrientedPoints:
         return f"OrientedPoints({len(self)} points)"
 
 
-# A list may hold several kinds.
+# A list may hold several kinds, and lists.
 Oriented = SurfaceCurve | OrientedPoints | Sequence[Any] | AnyArray
 
 
@@ -124,7 +124,7 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
     ----------
     curves : oriented sources
         A `SurfaceCurve`, `OrientedPoints`, a mask of bool of the faces (m,) or the vertices (n,) of a region, or a list
-        or tuple of these kinds.
+        of these kinds, or of such lists.
     mesh : Mesh
         Triangles that they lie on.
 
@@ -134,13 +134,12 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
         If there is no source, one is of another kind, a face is not one of the mesh, or a curve has no length; the
         message names the first such.
     """
-    parts = list(curves) if isinstance(curves, (list, tuple)) else [curves]
+    parts = named_entries(curves, "curves")
     if not parts:
         raise SourceError(f"curves is empty: pass {_ACCEPTED}")
     segments: list[tuple[IntArray, FloatArray, FloatArray, IntArray]] = []
     points: list[tuple[IntArray, FloatArray, IntArray, FloatArray]] = []
-    for i, part in enumerate(parts):
-        name = f"curves[{i}]" if isinstance(curves, (list, tuple)) else "curves"
+    for i, (name, part) in enumerate(parts):
         if isinstance(part, OrientedPoints):
             _check_faces(name, part.points.faces, mesh)
             label = np.full(len(part), i)

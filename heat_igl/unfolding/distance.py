@@ -15,9 +15,7 @@ from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices, connectivity
 from heat_igl.operators import Surface, unfolding_surface
 from heat_igl.sources import (
-    NEAR_RADIUS,
     NearField,
-    Seeds,
     SourcePoints,
     Sources,
     SourceSet,
@@ -37,7 +35,6 @@ __all__ = ["directed_from_scratch", "distance_from_scratch", "distance_to_target
 # Up to so many vertices, one exact query from vertices takes half to all of the time of an unfolded one: both spend
 # most of it on tables, and those of the windows are smaller.
 _FEW = 30_000
-_NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
 # For the order of the vertices, curves are points at most so many mean edge lengths apart.
 _SPACING = 1.0
 # With more of the faces within the cutoff, leaving out the others saves nothing.
@@ -129,8 +126,8 @@ def distance_from_scratch(
         refine = "exact"
     if refine == "exact" and chosen.on_vertices_alone:
         return _from_vertices(mesh, chosen, cutoff)
-    solver, lines, order = _prepared(mesh, chosen, refine, tolerance, cutoff)
-    return np.asarray(solver.distances([lines], order[:, None])[0])
+    solver, order = _prepared(mesh, chosen, refine, tolerance, cutoff)
+    return np.asarray(solver.distances([chosen], order[:, None])[0])
 
 
 def directed_from_scratch(
@@ -140,18 +137,17 @@ def directed_from_scratch(
     if mesh.is_tetrahedral:
         raise MeshError("directions need triangles, and the mesh holds tetrahedra")
     chosen = source_set(sources, mesh.n_vertices, mesh.F)
-    solver, lines, order = _prepared(mesh, chosen, refine, tolerance, np.inf)
-    return solver.directed(lines, order)
+    solver, order = _prepared(mesh, chosen, refine, tolerance, np.inf)
+    return solver.directed(chosen, order)
 
 
 def _prepared(
     mesh: Mesh, chosen: SourceSet, refine: Refine, tolerance: float | None, cutoff: float
-) -> tuple[UnfoldingSolver, _Lines, FloatArray]:
-    """A solver for one set of sources, that set as the solver takes it, and an order of the vertices."""
+) -> tuple[UnfoldingSolver, FloatArray]:
+    """A solver for one set of sources, and an order of the vertices."""
     domain = _Domain(mesh, unfolding_surface(mesh))
     solver = UnfoldingSolver(domain, refine, tolerance, cutoff)
-    lines = _Lines(chosen, *((_NONE, _NONE) if solver.is_exact else _straight_lines(domain, chosen)))
-    return solver, lines, np.zeros(mesh.n_vertices) if solver.is_exact else -_along_edges(domain, chosen)
+    return solver, np.zeros(mesh.n_vertices) if solver.is_exact else -_along_edges(domain, chosen)
 
 
 def distance_to_targets(mesh: Mesh, sources: Sources, targets: Sources) -> FloatArray:
@@ -254,36 +250,6 @@ class _Domain:
 
     def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
         return np.asarray(of_component[self.components])
-
-
-@dataclass(frozen=True, eq=False)
-class _Lines:
-    """A set of sources as `UnfoldingSolver` takes it."""
-
-    sources: SourceSet
-    near_seen: Seeds
-    far: Seeds
-
-
-def _straight_lines(domain: _Domain, sources: SourceSet) -> tuple[Seeds, Seeds]:
-    """Straight lines from points and curves, to vertices that are no sources; see `NearField.seeds`."""
-    if sources.on_vertices_alone:
-        return _NONE, _NONE
-    rim = _rim(domain.mesh, sources.vertices)
-    vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
-    points = sources.points.joined(sources.segments.ends())
-    radius = NEAR_RADIUS * domain.mean_edge_length
-    near, far = domain.near_field.seeds(points, sources.segments, radius, vertices)
-    return near.at(~np.isin(near.vertex, sources.vertices)), far
-
-
-def _rim(mesh: Mesh, vertices: IntArray) -> BoolArray:
-    """Which of the source vertices have a neighbour that is none."""
-    is_source = np.zeros(mesh.n_vertices, bool)
-    is_source[vertices] = True
-    at_rim = np.zeros(mesh.n_vertices, bool)
-    at_rim[mesh.edges[is_source[mesh.edges].sum(axis=1) == 1]] = True
-    return np.asarray(at_rim[vertices])
 
 
 def _along_edges(domain: _Domain, sources: SourceSet) -> FloatArray:

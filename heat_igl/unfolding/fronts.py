@@ -11,8 +11,9 @@ from heat_igl.kernels.fronts import advance
 from heat_igl.kernels.sight import look_around
 from heat_igl.mesh import connectivity
 from heat_igl.operators import MetricSimplices
+from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.unfolding.solver import UnfoldingSolver, UnfoldingTerm
+from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = ["FrontSolver"]
 
@@ -49,9 +50,9 @@ class FrontSolver(UnfoldingSolver):
     def _edge_graph(self) -> sp.csr_array:
         return connectivity.shortest_edge_graph(*self._simplices.edges, self._simplices.n)
 
-    def _distance(self, term: UnfoldingTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
+    def _distance(self, sources: SourceSet, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
         del u  # the order is that of Dijkstra's algorithm
-        n, sources = self._simplices.n, term.sources
+        n = self._simplices.n
         vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
         order = np.argsort(connectivity.edge_distance(self._edge_graph, sources.vertices), kind="stable")
         order = order.astype(np.int32)

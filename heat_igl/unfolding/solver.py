@@ -11,22 +11,19 @@ import numpy as np
 
 from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
-from heat_igl.sources import NearField, Seeds, SourcePoints, SourceSegments, SourceSet, take_shorter
+from heat_igl.sources import NEAR_RADIUS, NearField, SourcePoints, SourceSegments, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.directions import PathAngles, PathDirections
-from heat_igl.unfolding.exact import ExactSurface
+from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
 from heat_igl.unfolding.refinement import TOLERANCE, Known, Refine, Refinement, WalkStarts
 
-__all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
+__all__ = ["UnfoldingDomain", "UnfoldingSolver"]
 
 # Curves are unfolded from as points, at most so many mean edge lengths s apart. At a distance d that is wrong by the
-# fraction (s / d)^2 / 8 at most: by 0.005 % beyond the 6 edges within which straight lines from the curve itself count.
+# fraction (s / d)^2 / 8 at most: by 0.005 % beyond the 6 edges within which windows take the curve itself.
 _SPACING = 0.125
-# If a sweep gives less than a straight line by less than this, it is the sweep that is wrong, and no shorter path is
-# there: sweeps are off by 0.06 to 0.4 % in the mean and by 1.6 % at most (cow, fandisk, camel's head).
-_SWEEP_ERROR = 0.01
 # In components of up to so many vertices distance is found by exact windows, whatever was asked for.
 _FEW = 1000
 # So it is with so much curvature at each vertex (radians, in the mean). There walks pass vertices on the wrong side:
@@ -66,22 +63,6 @@ class UnfoldingDomain(Protocol):
         """The value (n,) of each vertex's component."""
 
 
-class UnfoldingTerm(Protocol):
-    """A set of sources, and the straight lines from its points and curves; `SourceTerm` is one."""
-
-    @property
-    def sources(self) -> SourceSet:
-        """The sources."""
-
-    @property
-    def near_seen(self) -> Seeds:
-        """Vertices near points and curves, at the lengths of straight lines."""
-
-    @property
-    def far(self) -> Seeds:
-        """Corners of the sources' own faces that are farther away."""
-
-
 def _costs_little_to_be_exact(refinement: Refinement, rough: float) -> bool:
     """Whether the mesh is small or rough, or flat with holes."""
     return (
@@ -95,19 +76,27 @@ def _require_share(tolerance: float | None) -> None:
 
 
 class _Asked(NamedTuple):
-    """What distance starts from, and when; `labels` and `angles` are filled if given.
+    """What distance starts from; `labels` and `angles` are filled if given.
 
-    Without `segments`, points stand for curves.
+    Offsets count from the earliest on the component. `points` are those of `sources` and, unless windows take curves
+    as they are (`curves`), those that stand for curves.
     """
 
-    vertices: IntArray
-    offsets: FloatArray | None
-    points: SurfacePoints | None
-    point_offsets: FloatArray | None
-    segments: SourceSegments | None
+    sources: SourceSet
+    points: SourcePoints
+    curves: SourceSegments | None
     labels: IntArray | None
     angles: FloatArray | None
     tolerance: float | None
+
+    @property
+    def starts(self) -> tuple[IntArray, FloatArray | None, SurfacePoints | None, FloatArray | None]:
+        """Vertices and points with their offsets, None if all are 0, as `Refinement` and `ExactSurface` take them."""
+        vertices, of_vertices, of_points = self.sources.vertices, self.sources.vertex_offset, self.points.offset
+        places = SurfacePoints(self.points.faces, self.points.barycentric) if len(self.points.faces) else None
+        if not (of_vertices.any() or of_points.any()):
+            return vertices, None, places, None
+        return vertices, of_vertices, places, of_points if places else None
 
 
 class UnfoldingSolver:
@@ -120,9 +109,9 @@ class UnfoldingSolver:
     refine : {"sweep", "unfold", "exact"}
         Which update. "exact" is the polyhedral distance by windows, see `ExactSurface`; the heat is not read. The other
         two take it as well if the mesh is rough or flat with holes, and in small components. It is exact from vertices,
-        points and curves. For the other two, a curve stands for points at most an eighth of a mean edge length apart,
-        and straight lines from the curve itself count up to 6 edges from it: beyond, distance is too long by 0.005 % at
-        most.
+        points and curves. For the other two, a curve stands for points at most an eighth of a mean edge length apart;
+        up to 6 edges from points and curves windows give the exact distance, and beyond, distance from a curve is too
+        long by 0.005 % at most.
     tolerance : float, optional
         As for `Refinement.unfold`, with the same default.
     cutoff : float
@@ -146,7 +135,6 @@ class UnfoldingSolver:
         _require_share(tolerance)
         self._tolerance, self._cutoff = tolerance, cutoff
         self._sweeps = refine == "sweep" and not self.is_exact
-        self._error = _SWEEP_ERROR if self._sweeps else 0.0
         self._surface = surface
         self._domain = domain
         self._given_faces = np.empty((0, 3), np.int64) if surface.given_faces is None else surface.given_faces
@@ -168,17 +156,17 @@ class UnfoldingSolver:
     def _faces(self) -> NearField | None:
         return None if self._surface.faces is None else NearField(self._surface.faces)
 
-    def distances(self, terms: Sequence[UnfoldingTerm], u: FloatArray) -> FloatArray:
+    def distances(self, source_sets: Sequence[SourceSet], u: FloatArray) -> FloatArray:
         """Distances (k, n) for heat (n, k).
 
         If the heat has underflowed the order is arbitrary, which the unfolding corrects.
         """
-        return np.stack([self._distance(term, one) for term, one in zip(terms, u.T, strict=True)])
+        return np.stack([self._distance(sources, one) for sources, one in zip(source_sets, u.T, strict=True)])
 
-    def labelled(self, term: UnfoldingTerm, u: FloatArray) -> tuple[FloatArray, IntArray]:
+    def labelled(self, sources: SourceSet, u: FloatArray) -> tuple[FloatArray, IntArray]:
         """Distance (n,) for heat (n,), and the source (n,) that it is measured from, -1 if none is reached."""
         labels = np.empty(len(u), np.int64)
-        return self._distance(term, u, labels), labels
+        return self._distance(sources, u, labels), labels
 
     def paths(self, sources: SourceSet, u: FloatArray) -> PathLengths:
         """The paths whose lengths are the distances from vertices and points, for heat (n,).
@@ -195,7 +183,7 @@ class UnfoldingSolver:
         return from_walks(self._refinement, sources, u)
 
     def directed(
-        self, term: UnfoldingTerm, u: FloatArray, tolerance: float | None = None
+        self, sources: SourceSet, u: FloatArray, tolerance: float | None = None
     ) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
         """As `labelled`, and of each path the directions and the place at which it starts.
 
@@ -212,12 +200,12 @@ class UnfoldingSolver:
         """
         _require_share(tolerance)
         labels, angles = np.empty((2, len(u)), np.int64), np.empty((3, len(u)))
-        distance = self._measured(term, u, labels[0], angles, tolerance, labels[1])
-        return distance, labels[0], PathAngles(*angles), self._places(term, labels[1])
+        distance = self._measured(sources, u, labels[0], angles, tolerance, labels[1])
+        return distance, labels[0], PathAngles(*angles), self._places(sources, labels[1])
 
-    def _places(self, term: UnfoldingTerm, origin: IntArray) -> SurfacePoints:
+    def _places(self, sources: SourceSet, origin: IntArray) -> SurfacePoints:
         """Sources (n,), counted vertices first; a corner of face 0 where there is none."""
-        F, points, vertices = self._given_faces, self._points(term, sampled=True), term.sources.vertices
+        F, points, vertices = self._given_faces, self._points(sources), sources.vertices
         corner_at = np.zeros(self._domain.components.size, np.int64)
         corner_at[F.ravel()[::-1]] = np.arange(F.size)[::-1]
         corner = np.append(corner_at[vertices], 0)
@@ -226,107 +214,117 @@ class UnfoldingSolver:
         barycentric = np.concatenate([np.eye(3)[corner[:-1] % 3], points.barycentric, np.eye(3)[:1]])
         return SurfacePoints(faces[origin], barycentric[origin])
 
-    def _distance(self, term: UnfoldingTerm, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
-        return self._measured(term, u, labels)
+    def _distance(self, sources: SourceSet, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
+        return self._measured(sources, u, labels)
 
     def _measured(
         self,
-        term: UnfoldingTerm,
+        sources: SourceSet,
         u: FloatArray,
         labels: IntArray | None = None,
         angles: FloatArray | None = None,
         tolerance: float | None = None,
         origin: IntArray | None = None,
     ) -> FloatArray:
-        sources, components = term.sources, self._domain.components
-        points = self._points(term, sampled=angles is not None)
-        places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
         # Tolerances are relative to the distance: the common part is added afterwards.
-        earliest = np.full(self._domain.n_components, np.inf)
-        segments = sources.segments if self.is_exact and angles is None and len(sources.segments.faces) else None
-        faces = points.faces if segments is None else np.concatenate([points.faces, segments.faces])
-        in_faces = components[self._given_faces[faces, 0]] if len(faces) else np.empty(0, np.int64)
-        component = np.concatenate([components[sources.vertices], in_faces])
-        offset = np.concatenate([sources.vertex_offset, points.offset, [] if segments is None else segments.offset])
-        np.minimum.at(earliest, component, offset)
-        late = offset - earliest[component]
-        k, p = len(sources.vertices), len(points.faces)
+        earliest, relative = self._from_earliest(sources)
+        by_windows = self._takes_windows(sources)
+        takes_curves = by_windows and angles is None
         asked = _Asked(
-            sources.vertices,
-            late[:k] if late.any() else None,
-            places,
-            late[k : k + p] if late.any() and places else None,
-            None if segments is None else replace(segments, offset=late[k + p :]),
+            relative,
+            relative.points if takes_curves else self._points(relative),
+            relative.segments if takes_curves and len(relative.segments.faces) else None,
             labels,
             angles,
             self._tolerance if tolerance is None else tolerance,
         )
-        by_windows = self._takes_windows(component) or self._is_straight(asked)
-        distance = self._unfolded(u, asked, term, points, earliest, by_windows)
+        by_windows = by_windows or self._is_straight(asked)
+        near = self._near(asked, by_windows)
+        distance = self._unfolded(u, asked, near, by_windows)
         start = self._domain.expand_to_vertices(earliest)
-        if offset.any():
+        if sources.offsets.any():
             distance += start
         if origin is not None and labels is not None:
             origin[:] = labels
         if labels is not None:
-            of_places = points.label if segments is None else np.concatenate([points.label, segments.label])
-            labels[:] = np.concatenate([sources.vertex_label, of_places, [-1]])[labels]
-        for seeds in (term.near_seen, term.far):
-            if not len(seeds.vertex):
-                continue
-            taken = take_shorter(distance, seeds, 0.0 if by_windows else self._error, start)
+            labels[:] = _labels(sources, asked.points)[labels]
+        if near is not None:
+            at = np.flatnonzero(np.isfinite(near.distance))
+            distance[at] = start[at] + near.distance[at]
             if labels is not None:
-                labels[seeds.vertex[taken]] = seeds.label[taken]
+                labels[at] = _labels(sources, sources.points)[near.origin.label[at]]
         if not by_windows:
             self._bounds.shorten(distance, labels)
             if self._sweeps:
-                self._bounds.lengthen(distance, sources, points)
+                self._bounds.lengthen(distance, sources, asked.points)
         return distance
 
-    def _takes_windows(self, component: IntArray) -> bool:
-        """Whether distance from sources in these components is found by exact windows."""
-        return self.is_exact or bool((self._component_sizes[component] <= _FEW).all())
+    def _from_earliest(self, sources: SourceSet) -> tuple[FloatArray, SourceSet]:
+        """When distance begins on each component (n_components,), and the sources with their offsets from there."""
+        components, F = self._domain.components, self._given_faces
+        points, segments = sources.points, sources.segments
+        places = [components[at] for at in (sources.vertices, F[points.faces, 0], F[segments.faces, 0])]
+        offsets = [sources.vertex_offset, points.offset, segments.offset]
+        earliest = np.full(self._domain.n_components, np.inf)
+        np.minimum.at(earliest, np.concatenate(places), np.concatenate(offsets))
+        late = [offset - earliest[place] for offset, place in zip(offsets, places, strict=True)]
+        return earliest, replace(
+            sources,
+            vertex_offset=late[0],
+            points=replace(points, offset=late[1]),
+            segments=replace(segments, offset=late[2]),
+        )
+
+    def _near(self, asked: _Asked, by_windows: bool) -> ExactSolution | None:
+        """Exact distance around points and curves; None if all distances are, or if there are none.
+
+        Sweeps begin with that around several vertices as well.
+        """
+        sources, segments = asked.sources, asked.sources.segments
+        if by_windows and (asked.curves is not None or not len(segments.faces)):
+            return None
+        is_known = self._sweeps and len(sources.vertices) > 1
+        if sources.on_vertices_alone and not is_known:
+            return None
+        edges = _KNOWN_RADIUS if sources.on_vertices_alone else NEAR_RADIUS
+        cutoff = edges * self._domain.mean_edge_length + float(sources.offsets.max())
+        return self._by_windows(asked._replace(points=sources.points, curves=segments), cutoff)
+
+    def _by_windows(self, asked: _Asked, cutoff: float) -> ExactSolution:
+        has_curves = asked.curves is not None and len(asked.curves.faces) > 0
+        surface = self._exact_on_given_faces if has_curves else self._exact
+        return surface.solve(*asked.starts, asked.curves if has_curves else None, cutoff=cutoff)
+
+    def _takes_windows(self, sources: SourceSet) -> bool:
+        """Whether distance from these sources is found by exact windows."""
+        if self.is_exact:
+            return True
+        of_places = (self._given_faces[places.faces, 0] for places in (sources.points, sources.segments))
+        component = self._domain.components[np.concatenate([sources.vertices, *of_places])]
+        return bool((self._component_sizes[component] <= _FEW).all())
 
     @cached_property
     def _component_sizes(self) -> IntArray:
         return np.bincount(self._domain.components)
 
-    def _unfolded(
-        self,
-        u: FloatArray,
-        asked: _Asked,
-        term: UnfoldingTerm,
-        points: SourcePoints,
-        earliest: FloatArray,
-        by_windows: bool,
-    ) -> FloatArray:
-        """Distances (n,) from vertices and points, each component's from where it begins."""
+    def _unfolded(self, u: FloatArray, asked: _Asked, near: ExactSolution | None, by_windows: bool) -> FloatArray:
+        """Distances (n,), each component's from where it begins."""
         if self._refinement is None or by_windows:
-            surface = self._exact if asked.segments is None else self._exact_on_given_faces
-            found = surface.solve(
-                asked.vertices, asked.offsets, asked.points, asked.point_offsets, asked.segments, cutoff=self._cutoff
-            )
+            found = self._by_windows(asked, self._cutoff)
             if asked.labels is not None:
                 asked.labels[:] = found.origin.label
             if asked.angles is not None:
-                asked.angles[:] = self.path_directions.of_windows(found, self._starts(asked), asked.points)
+                asked.angles[:] = self.path_directions.of_windows(found, self._starts(asked), asked.starts[2])
             return found.distance
         if asked.angles is not None:
             return self._directed_walks(u, asked)
         unfolded = self._refinement.unfold
         if self._sweeps:
-            known, groups = self._known(term, points, earliest, asked), self._groups(term, points)
-            unfolded = partial(self._refinement.sweep, known=known, groups=groups)
+            unfolded = partial(self._refinement.sweep, known=_known(asked, near), groups=_groups(asked))
         elif asked.tolerance is not None:
             unfolded = partial(unfolded, tolerance=asked.tolerance)
-        return unfolded(
-            -u,
-            asked.vertices,
-            offsets=asked.offsets,
-            points=asked.points,
-            point_offsets=asked.point_offsets,
-            labels=asked.labels,
-        )
+        vertices, offsets, points, point_offsets = asked.starts
+        return unfolded(-u, vertices, offsets=offsets, points=points, point_offsets=point_offsets, labels=asked.labels)
 
     def _is_straight(self, asked: _Asked) -> bool:
         """Whether directions are found by windows, as walks of a small tolerance would take as long."""
@@ -341,11 +339,11 @@ class UnfoldingSolver:
         if asked.labels is not None:
             asked.labels[:] = walk["label"][row]
         if asked.angles is not None:
-            asked.angles[:] = self.path_directions.of_walks(walk, asked.points)
+            asked.angles[:] = self.path_directions.of_walks(walk, asked.starts[2])
         return np.asarray(walk["distance"][row])
 
     def _starts(self, asked: _Asked) -> WalkStarts:
-        return self._walking.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
+        return self._walking.starts(*asked.starts)
 
     @cached_property
     def _walking(self) -> Refinement:
@@ -356,42 +354,36 @@ class UnfoldingSolver:
         """Polar angles of the paths; a `MeshError` where vertices have no tangent plane."""
         return PathDirections(self._surface, self._walking)
 
-    def _groups(self, term: UnfoldingTerm, points: SourcePoints) -> IntArray | None:
-        """For each source, which curve it is a point of, or itself."""
-        segments = term.sources.segments
-        if not len(segments.faces):
-            return None
-        k = len(term.sources.vertices)
-        groups = np.arange(k + len(points.faces))
-        of_curve = np.isin(points.label, segments.label)
-        groups[k:][of_curve] = len(groups) + points.label[of_curve]
-        return groups
-
-    def _known(self, term: UnfoldingTerm, points: SourcePoints, earliest: FloatArray, asked: _Asked) -> Known | None:
-        """Vertices that straight lines from points reach, and exact windows near several sources."""
-        near = term.near_seen
-        if len(asked.vertices) + len(points.faces) > 1 and not len(term.sources.segments.faces):
-            radius = _KNOWN_RADIUS * self._domain.mean_edge_length
-            latest = max((late.max() for late in (asked.offsets, asked.point_offsets) if late is not None), default=0.0)
-            found = self._exact.solve(
-                asked.vertices, asked.offsets, asked.points, asked.point_offsets, cutoff=latest + radius
-            )
-            is_found = np.isfinite(found.distance)
-            is_found[asked.vertices] = False
-            vertex = np.flatnonzero(is_found)
-            return Known(vertex, found.distance[vertex], found.origin.label[vertex])
-        if not len(near.vertex):
-            return None
-        # A curve has many sources of one label, and which of them a line comes from is not known.
-        label = np.concatenate([term.sources.vertex_label, points.label])
-        which, first, count = np.unique(label, return_index=True, return_counts=True)
-        at = np.searchsorted(which, near.label)
-        near, source = near.at(count[at] == 1), first[at][count[at] == 1]
-        return Known(near.vertex, near.value - earliest[self._domain.components[near.vertex]], source)
-
-    def _points(self, term: UnfoldingTerm, sampled: bool = False) -> SourcePoints:
-        """The points of a term, and those that stand for curves, unless windows take curves as they are."""
-        points, segments = term.sources.points, term.sources.segments
-        if not len(segments.faces) or self._faces is None or (self.is_exact and not sampled):
+    def _points(self, sources: SourceSet) -> SourcePoints:
+        """The points of a set, and those that stand for its curves."""
+        points, segments = sources.points, sources.segments
+        if not len(segments.faces) or self._faces is None:
             return points
         return points.joined(self._faces.samples(segments, self._spacing)[0]).joined(segments.ends())
+
+
+def _labels(sources: SourceSet, points: SourcePoints) -> IntArray:
+    """The sources, as the user counts them, of vertices, `points` and segments, one after another; -1 for nothing."""
+    return np.concatenate([sources.vertex_label, points.label, sources.segments.label, [-1]])
+
+
+def _groups(asked: _Asked) -> IntArray | None:
+    """For each source, which curve it is a point of, or itself."""
+    segments, label = asked.sources.segments, asked.points.label
+    if not len(segments.faces):
+        return None
+    k = len(asked.sources.vertices)
+    groups = np.arange(k + len(label))
+    of_curve = np.isin(label, segments.label)
+    groups[k:][of_curve] = len(groups) + label[of_curve]
+    return groups
+
+
+def _known(asked: _Asked, near: ExactSolution | None) -> Known | None:
+    """Vertices that a sweep begins with. Which point of a curve is nearest is not known."""
+    if near is None or len(asked.sources.segments.faces):
+        return None
+    is_found = np.isfinite(near.distance)
+    is_found[asked.sources.vertices] = False
+    vertex = np.flatnonzero(is_found)
+    return Known(vertex, near.distance[vertex], near.origin.label[vertex])
