@@ -29,7 +29,8 @@ from heat_igl.unfolding.directions import PathAngles
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import from_mesh
 from heat_igl.unfolding.local import positive
-from heat_igl.unfolding.refinement import TOLERANCE, Refine
+from heat_igl.unfolding.numbered import TOLERANCE
+from heat_igl.unfolding.refinement import Refine
 from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = ["directed_from_scratch", "distance_from_scratch", "distance_to_targets", "unfolded_distance"]

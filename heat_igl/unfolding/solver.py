@@ -17,7 +17,8 @@ from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
-from heat_igl.unfolding.refinement import TOLERANCE, Known, Refine, Refinement, WalkStarts
+from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles, WalkStarts
+from heat_igl.unfolding.refinement import Known, Refine, Refinement
 
 __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
 
@@ -82,7 +83,7 @@ class UnfoldingTerm(Protocol):
         """Corners of the sources' own faces that are farther away."""
 
 
-def _costs_little_to_be_exact(refinement: Refinement, rough: float) -> bool:
+def _costs_little_to_be_exact(refinement: NumberedTriangles, rough: float) -> bool:
     """Whether the mesh is small or rough, or flat with holes."""
     return (
         refinement.n <= _FEW or refinement.curvature > rough or (refinement.flatness > _FLAT and refinement.has_holes)
