@@ -94,7 +94,10 @@ class NumberedTriangles:
         The sum inside the surface is compared with two pi; on the boundary, a notch with more than pi counts.
         """
         total = self.tables.total
-        return float(np.where(total > 0, np.abs(2 * np.pi - total), np.maximum(-total - np.pi, 0.0)).mean())
+        excess = np.abs(2 * np.pi - total)
+        is_open = total <= 0
+        excess[is_open] = np.maximum(-total[is_open] - np.pi, 0.0)
+        return float(excess.mean())
 
     def starts_at(self, sources: IntArray, offsets: FloatArray | None = None) -> WalkStarts:
         """Initial values of the kernels for sources that are vertices (k,), on all sheets."""
