@@ -63,7 +63,8 @@ class NumberedTriangles:
     """
 
     def __init__(self, tables: Tables, number: AnyArray, n_sheets: int = 1) -> None:
-        self.tables, self.number = tables, number
+        self.tables = self._swept = tables
+        self.number = number
         self.n, self._n_sheets = len(number) // n_sheets, n_sheets
 
     @property

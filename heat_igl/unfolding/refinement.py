@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation, double_cover, oriented
-from heat_igl.intrinsic.fans import breadth_first, tables
+from heat_igl.intrinsic.fans import Tables, breadth_first, tables
 from heat_igl.intrinsic.history import BACK_CORNERS
 from heat_igl.mesh import SurfacePoints
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -70,13 +70,21 @@ class Refinement(NumberedTriangles):
     def __init__(self, triangulation: IntrinsicTriangulation) -> None:
         if not triangulation.aligned.all():
             triangulation = oriented(triangulation)
-        F, lengths, twin, n_sheets = triangulation.F, triangulation.l, triangulation.twin, 1
-        if not triangulation.aligned.all():
-            n_sheets = 2
-            F, lengths, twin = double_cover(triangulation)
         self.triangulation = triangulation
-        number, self.face, F, lengths, twin = breadth_first(F, lengths, twin, n_sheets * triangulation.n)
-        super().__init__(tables(F, lengths, twin, len(number)), number, n_sheets)
+        n_sheets = 1 if triangulation.aligned.all() else 2
+        number, self.face, made = _numbered_tables(triangulation, n_sheets)
+        super().__init__(made, number, n_sheets)
+
+    @cached_property
+    def tables(self) -> Tables:
+        """What the kernels read; made again after `keep_for_sweeps`, if sources in faces or walks ask for it."""
+        return _numbered_tables(self.triangulation, self._n_sheets)[2]
+
+    def keep_for_sweeps(self) -> None:
+        """Let go of the tables that sweeps from vertices do not read: six tenths of all."""
+        t = self.tables
+        self._swept = t._replace(turn=np.empty(0, t.turn.dtype), step=np.empty(0, t.step.dtype))
+        del self.tables
 
     def sweep(
         self,
@@ -133,7 +141,7 @@ class Refinement(NumberedTriangles):
             if label is not None:
                 label[row] = np.tile(known.source, self._n_sheets)
         group = np.arange(len(starts.offset)) if groups is None else np.ascontiguousarray(groups, np.int64)
-        sweep(self._order(key), self.tables, distance[:n], label, starts.offset, group, is_stale)
+        sweep(self._order(key), self._swept, distance[:n], label, starts.offset, group, is_stale)
         return _on_base(self.number, self._n_sheets, distance, label, labels)
 
     def unfold(
@@ -308,3 +316,12 @@ def _on_base(
         nearest = on_sheets.argmin(axis=0)[None]
         labels[:] = np.take_along_axis(label[number].reshape(n_sheets, -1), nearest, axis=0)[0]
     return np.asarray(on_sheets.min(axis=0))
+
+
+def _numbered_tables(triangulation: IntrinsicTriangulation, n_sheets: int) -> tuple[AnyArray, AnyArray, Tables]:
+    """Numbers of the vertices, rows of the faces and the tables, of a surface or the double cover of it."""
+    F, lengths, twin = triangulation.F, triangulation.l, triangulation.twin
+    if n_sheets == 2:
+        F, lengths, twin = double_cover(triangulation)
+    number, face, F, lengths, twin = breadth_first(F, lengths, twin, n_sheets * triangulation.n)
+    return number, face, tables(F, lengths, twin, len(number))

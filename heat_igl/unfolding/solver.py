@@ -150,6 +150,8 @@ class UnfoldingSolver:
         require_share(tolerance)
         self._tolerance, self._cutoff = tolerance, cutoff
         self._sweeps = refine == "sweep" and not self.is_exact
+        if self._refinement is not None and self._sweeps:
+            self._refinement.keep_for_sweeps()
         self._error = _SWEEP_ERROR if self._sweeps else 0.0
         self._surface = surface
         self._domain = domain
