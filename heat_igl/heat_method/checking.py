@@ -102,8 +102,7 @@ class Checker:
     """
 
     def __init__(self, domain: Operators, V: FloatArray | None) -> None:
-        # A copy: the positions of a mesh are read-only, which kernels do not take.
-        self._V = None if V is None else np.array(V, np.float64, order="C")
+        self._V = None if V is None else np.ascontiguousarray(V, np.float64)
         self._F = None if domain.surface is None else domain.surface.given_faces
         self._referenced = domain.referenced
         vertices = _sample(np.flatnonzero(domain.referenced[: domain.n_given]), _MOST_VERTICES)

@@ -66,6 +66,11 @@ class SolverOptions:
         return "intrinsic-delaunay" if self.laplacian == "auto" and self.refine is not None else self.laplacian
 
     @property
+    def n_factors(self) -> int:
+        """How many matrices are factored: with `refine`, no Poisson problem."""
+        return 2 if self.refine is None else 1
+
+    @property
     def default_time_step(self) -> bool:
         """Whether the time step is left to the solver."""
         return self.t_coef is None and self.t is None

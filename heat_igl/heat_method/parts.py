@@ -163,7 +163,7 @@ def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysi
     with pool(1) as beside:
 
         def analyse(L: sp.csc_matrix) -> None:
-            begun.append(beside.submit(analysis, L, options.backend))
+            begun.append(beside.submit(analysis, L, options.backend, None, options.n_factors))
 
         # The order of elimination takes a third of the time and needs no more than the pattern of L.
         follows_fronts = isinstance(mesh, Mesh) and mesh.is_tetrahedral and options.leaves_heat
@@ -229,19 +229,21 @@ def prepare(
     t_damping = step if damped else None
     front_solver = None if domain.simplices is None or not options.leaves_heat else FrontSolver(domain.simplices)
     takes_heat = options.refine != "exact" and front_solver is None
-    found = analysis(domain.L, options.backend, known) if takes_heat else None
+    found = analysis(domain.L, options.backend, known, options.n_factors) if takes_heat else None
     analysed = time.perf_counter()
+    unfolding: UnfoldingSolver | None = front_solver
+    if unfolding is None and options.refine is not None:
+        # Before there are factors: most memory is needed while the tables are made.
+        unfolding = UnfoldingSolver(domain, options.refine)
+    unfolded = time.perf_counter()
     problems = [] if found is None else _factored(domain, options, step, found, t_damping, fitted)
     factored = time.perf_counter()
     heat_flow = problems[0] if problems else None
-    unfolds = options.refine is not None or front_solver is not None
     mass_unit = domain.mean_mass if heat_flow is None else heat_flow.mean_mass
-    assembler = SourceAssembler(domain, step, mass_unit, plain=not damped, unfolds=unfolds)
+    assembler = SourceAssembler(domain, step, mass_unit, plain=not damped, unfolds=unfolding is not None)
     last_steps: Integration | UnfoldingSolver
-    if front_solver is not None:
-        last_steps = front_solver
-    elif options.refine is not None or found is None:
-        last_steps = UnfoldingSolver(domain, options.refine or "exact")
+    if unfolding is not None or found is None:
+        last_steps = unfolding or UnfoldingSolver(domain, "exact")
     else:
         heat_flow, poisson, divergence = problems
         last_steps = Integration(domain, heat_flow, divergence, poisson, t_damping, fitted, assembler.edges)
@@ -260,7 +262,7 @@ def prepare(
         factor_nonzeros=sum(factor.nonzeros for factor in factors),
         factor_bytes=sum(factor.n_bytes for factor in factors),
         seconds_analysis=seconds_analysis + analysed - start,
-        seconds_factorization=factored - analysed,
+        seconds_factorization=factored - unfolded,
     )
     return SolverParts(
         options=options,

@@ -93,11 +93,7 @@ def tables(F: AnyArray, l: FloatArray, twin: AnyArray, n: int) -> Tables:  # noq
     """
     first = half_edges.first_spokes(F, twin, n)
     spoke, turn, step = aligned(first[-1], _SPOKE), aligned(first[-1], _TURN), aligned(F.size, _STEP)
-    total = half_edges.fill(F, l, twin, first, spoke, turn, step)
-    is_flat = np.ones(n, bool)
-    used = np.flatnonzero(np.diff(first))
-    around = total[turn["fan_here"][first[used]]]
-    is_flat[used] = (around < 0) | (np.abs(around - 2 * np.pi) < 1e-9)
+    total, is_flat = half_edges.fill(F, l, twin, first, spoke, turn, step)
     return Tables(first, spoke, turn, step, total, is_flat)
 
 

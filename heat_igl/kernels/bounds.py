@@ -2,9 +2,73 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.half_edges import Spoke
 from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["lengthen", "shorten"]
+__all__ = ["incident_edges", "is_longer", "lengthen", "shorten", "spoke_edges"]
+
+
+def is_longer(
+    ends: cython.const[cython.int][:, ::1],
+    length: cython.const[cython.double][::1],
+    d: cython.const[cython.double][::1],
+) -> bool:
+    """Whether `shorten` would lower any of the distances `d` (n,) along the edges: mostly it would not."""
+    e: cython.Py_ssize_t
+    found: cython.bint = False
+    with cython.nogil:
+        for e in range(length.shape[0]):
+            # Infinite at both ends gives nan, and false.
+            if fabs(d[ends[e, 0]] - d[ends[e, 1]]) > length[e]:
+                found = _far_end(ends, length, d, e) >= 0
+                if found:
+                    break
+    return found
+
+
+def incident_edges(ends: cython.const[cython.int][:, ::1], n: cython.int):
+    """Edges by vertex: those of v are ``incident[first[v]:first[v + 1]]``; returns both arrays, int64 and int32."""
+    firsts = np.zeros(n + 1, np.int64)
+    by_vertex = np.empty(2 * ends.shape[0], np.int32)
+    first: cython.longlong[::1] = firsts
+    incident: cython.int[::1] = by_vertex
+    e: cython.Py_ssize_t
+    v: cython.Py_ssize_t
+    c: cython.int
+    with cython.nogil:
+        for e in range(ends.shape[0]):
+            for c in range(2):
+                first[ends[e, c]] += 1
+        for v in range(n):
+            first[v + 1] += first[v]
+        # Now first[v] is where the edges of v end; filled from there back to where they begin.
+        for e in range(ends.shape[0] - 1, -1, -1):
+            for c in range(2):
+                first[ends[e, c]] -= 1
+                incident[first[ends[e, c]]] = e
+    return firsts, by_vertex
+
+
+def spoke_edges(first: cython.const[cython.int][::1], spoke: cython.const[Spoke][::1]):
+    """Ends (e, 2) int32 and lengths (e,) of the edges of tables, each once."""
+    v: cython.int
+    k: cython.int
+    e: cython.Py_ssize_t = 0
+    with cython.nogil:
+        for v in range(first.shape[0] - 1):
+            for k in range(first[v], first[v + 1]):
+                e += v < spoke[k].neighbour
+    pairs, lengths = np.empty((e, 2), np.int32), np.empty(e)
+    ends: cython.int[:, ::1] = pairs
+    length: cython.double[::1] = lengths
+    e = 0
+    with cython.nogil:
+        for v in range(first.shape[0] - 1):
+            for k in range(first[v], first[v + 1]):
+                if v < spoke[k].neighbour:
+                    ends[e, 0], ends[e, 1], length[e] = v, spoke[k].neighbour, spoke[k].length
+                    e += 1
+    return pairs, lengths
 
 
 def shorten(
@@ -65,17 +129,32 @@ def _lowered(
     e: cython.Py_ssize_t,
 ) -> cython.int:
     """The end of edge e whose distance was lowered to the path along it; -1 if that is not shorter."""
+    far: cython.int = _far_end(ends, length, d, e)
+    if far >= 0:
+        near: cython.int = ends[e, 0] if ends[e, 1] == far else ends[e, 1]
+        d[far] = d[near] + length[e]
+        if labels.shape[0] > 0:
+            labels[far] = labels[near]
+    return far
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _far_end(
+    ends: cython.const[cython.int][:, ::1],
+    length: cython.const[cython.double][::1],
+    d: cython.const[cython.double][::1],
+    e: cython.Py_ssize_t,
+) -> cython.int:
+    """The end of edge e to which the path along it is shorter; -1 if there is none."""
     near: cython.int = ends[e, 0]
     far: cython.int = ends[e, 1]
     if d[far] < d[near]:
         near, far = far, near
     # Not by rounding, which would pass along many edges.
-    if d[near] + length[e] < d[far] * (1 - 1e-12):
-        d[far] = d[near] + length[e]
-        if labels.shape[0] > 0:
-            labels[far] = labels[near]
-        return far
-    return -1
+    return far if d[near] + length[e] < d[far] * (1 - 1e-12) else -1
 
 
 def lengthen(V: cython.const[cython.double][:, ::1], place: cython.const[cython.double][::1], d: cython.double[::1]):

@@ -48,7 +48,11 @@ def edge_excess(
     return total, excess, worst
 
 
-def straight_lines(positions: cython.double[:, ::1], sources: cython.double[:, ::1], offsets: cython.double[::1]):
+def straight_lines(
+    positions: cython.const[cython.double][:, ::1],
+    sources: cython.const[cython.double][:, ::1],
+    offsets: cython.const[cython.double][::1],
+):
     """Length (p,) of the shortest straight line from each position to a source, the source's offset added."""
     found = np.empty(positions.shape[0])
     shortest: cython.double[::1] = found

@@ -302,7 +302,8 @@ def breadth_first(
         Old number of each face; corners stay in place.
     """
     m: cython.int = twin.shape[0] // 3
-    vertices, twins, rings = np.empty((3, 3 * m), np.int32)
+    # Each on its own, so that what is not needed any more can be let go of.
+    vertices, twins, rings = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)
     alignment, lengths = np.empty(3 * m, np.uint8), np.empty(3 * m)
     numbers, faces = np.full(n, -1, np.int32), np.empty(m, np.int32)
     new_vertex: cython.int[::1] = vertices

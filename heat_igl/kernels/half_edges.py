@@ -3,7 +3,7 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.half_edges import Spoke, Step, Turn, following, preceding
-from cython.cimports.libc.math import NAN, atan2, sqrt
+from cython.cimports.libc.math import M_PI, NAN, atan2, fabs, sqrt
 
 __all__ = ["HalfEdges", "breadth_first", "fill", "first_spokes"]
 
@@ -48,8 +48,13 @@ def fill(
     turn: Turn[::1],
     step: Step[::1],
 ):
-    """Fill the tables; returns the total angle (k,) of each fan."""
-    total_array = np.empty(twin.shape[0])
+    """Fill the tables; returns the total angle (k,) of each fan, and whether each vertex (n,) is flat.
+
+    A vertex is flat if the first fan of it has no curvature, or is open; or if it has none.
+    """
+    total_array, flat_array = np.empty(twin.shape[0]), np.ones(first.shape[0] - 1, np.uint8)
+    is_flat: cython.uchar[::1] = flat_array
+    v: cython.int
     total: cython.double[::1] = total_array
     end: cython.int[::1] = np.array(first)
     n_fans: cython.int
@@ -57,7 +62,11 @@ def fill(
         _shapes(F, l, twin, step)
         n_fans = _fans(twin, step, total, end, spoke, turn)
         _fill_spokes(l, twin, step, spoke, turn)
-    return total_array[:n_fans].copy()
+        for v in range(is_flat.shape[0]):
+            if first[v] < first[v + 1]:
+                around: cython.double = total[turn[first[v]].fan_here]
+                is_flat[v] = around < 0.0 or fabs(around - 2.0 * M_PI) < 1e-9
+    return total_array[:n_fans].copy(), flat_array.view(bool)
 
 
 @cython.cfunc

@@ -34,7 +34,7 @@ _ANALYSES: dict[str, Callable[[sp.csc_matrix], Analysis]] = {
 _SMALLEST_MULTIFRONTAL = 1000
 
 
-def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
+def analyse(pattern: sp.csc_matrix, backend: Backend = "auto", n_factors: int = 2) -> Analysis:
     """Order and analyse symmetric matrices of a pattern.
 
     Parameters
@@ -45,6 +45,8 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
         SuperLU; the package's own factorization; or no factors at all, see `iterative`, which needs pyamg. "auto" takes
         the second if the matrix is not small, and the third if pyamg is installed and factors would not fit into
         memory, by an estimate made before.
+    n_factors : int
+        How many matrices of the pattern will be factored, for that estimate.
 
     Raises
     ------
@@ -53,11 +55,11 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
     """
     if backend not in get_args(Backend):
         raise ValueError(f"backend must be one of {', '.join(map(repr, get_args(Backend)))}, not {backend!r}")
-    return _ANALYSES[_choice(pattern) if backend == "auto" else backend](pattern)
+    return _ANALYSES[_choice(pattern, n_factors) if backend == "auto" else backend](pattern)
 
 
-def _choice(pattern: sp.csc_matrix) -> str:
-    if has_iterative() and not factors_fit(pattern):
+def _choice(pattern: sp.csc_matrix, n_factors: int) -> str:
+    if has_iterative() and not factors_fit(pattern, n_factors):
         return "iterative"
     return "multifrontal" if pattern.shape[0] >= _SMALLEST_MULTIFRONTAL else "scipy"
 

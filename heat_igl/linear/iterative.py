@@ -235,9 +235,9 @@ def has_iterative() -> bool:
     return importlib.util.find_spec("pyamg") is not None
 
 
-def factors_fit(A: sp.csc_matrix) -> bool:
-    """Whether two factors with the pattern of `A`, heat's and Poisson's, would fit into the memory available now."""
-    return 2 * factor_bytes(A.shape[0], A.nnz) < available_memory()
+def factors_fit(A: sp.csc_matrix, n_factors: int = 2) -> bool:
+    """Whether factors with the pattern of `A`, heat's and Poisson's, would fit into the memory available now."""
+    return n_factors * factor_bytes(A.shape[0], A.nnz) < available_memory()
 
 
 def factor_bytes(n: int, n_entries: int) -> float:

@@ -11,13 +11,16 @@ from heat_igl.typing import FloatArray
 __all__ = ["analysis", "shifted"]
 
 
-def analysis(L: sp.csc_matrix, backend: Backend = "auto", known: Analysis | None = None) -> Analysis:
+def analysis(
+    L: sp.csc_matrix, backend: Backend = "auto", known: Analysis | None = None, n_factors: int = 2
+) -> Analysis:
     """Order and analyse the pattern that the matrices of the heat flow and of the Poisson problem have in common.
 
-    Of the Laplacian `L` only the pattern matters. An analysis that is `known` is returned as it is if it fits.
+    Of the Laplacian `L` only the pattern matters. An analysis that is `known` is returned as it is if it fits. With
+    `n_factors` 1, only one of the matrices will be factored.
     """
     pattern = shifted(L, 1.0, np.zeros(L.shape[0]))
-    return known if known is not None and known.fits(pattern) else analyse(pattern, backend)
+    return known if known is not None and known.fits(pattern) else analyse(pattern, backend, n_factors)
 
 
 def shifted(L: sp.csc_matrix, factor: float | FloatArray, diagonal: FloatArray) -> sp.csc_matrix:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels import bounds as kernels
-from heat_igl.mesh import grouping
 from heat_igl.operators import Surface
 from heat_igl.sources import SourcePoints, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Bounds"]
+__all__ = ["Bounds", "shorten_along"]
 
 # Less than this fraction is rounding.
 _ROUNDING = 1e-12
@@ -44,14 +44,14 @@ class Bounds:
 
     @cached_property
     def _incident(self) -> tuple[IntArray, AnyArray]:
-        """Edges by vertex: those of v are ``edges[first[v] : first[v + 1]]``."""
-        ends = self._edges[0]
-        first, members = grouping.group_by_label(ends.T.ravel(), self._surface.unfolding.n)
-        return first, (members % len(ends)).astype(np.int32)
+        """Edges by vertex, see `kernels.incident_edges`: only distances that are too long ask for them."""
+        first, incident = kernels.incident_edges(self._edges[0], self._surface.unfolding.n)
+        return first, incident
 
     def shorten(self, distance: FloatArray, labels: IntArray | None = None) -> None:
         """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them."""
-        kernels.shorten(*self._edges, *self._incident, distance, _NO_LABELS if labels is None else labels)
+        if kernels.is_longer(*self._edges, distance):
+            kernels.shorten(*self._edges, *self._incident, distance, _NO_LABELS if labels is None else labels)
 
     def lengthen(self, distance: FloatArray, sources: SourceSet, points: SourcePoints) -> None:
         """Raise distances (n,) to the straight lines from the nearest source, in place.
@@ -73,6 +73,14 @@ class Bounds:
 
             straight = np.asarray(KDTree(places).query(V)[0])
             np.maximum(distance, straight * (1 - _ROUNDING), out=distance)
+
+
+def shorten_along(edges: Sequence[tuple[AnyArray, FloatArray]], distance: FloatArray) -> None:
+    """Lower distances (n,) to the paths along edges, ends (e, 2) int32 and lengths (e,) of several sets, in place."""
+    ends, length = (np.concatenate(parts) for parts in zip(*edges, strict=True))
+    if kernels.is_longer(ends, length, distance):
+        first, incident = kernels.incident_edges(ends, len(distance))
+        kernels.shorten(ends, length, first, incident, distance, _NO_LABELS)
 
 
 def _sides(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, FloatArray]:

@@ -14,7 +14,8 @@ from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSolution
-from heat_igl.unfolding.refinement import Refinement, WalkStarts
+from heat_igl.unfolding.numbered import WalkStarts
+from heat_igl.unfolding.refinement import Refinement
 from heat_igl.unfolding.walks import INSIDE, unknown
 
 __all__ = ["PathAngles", "PathDirections", "in_circle"]

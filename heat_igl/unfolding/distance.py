@@ -27,7 +27,9 @@ from heat_igl.unfolding.directions import PathAngles
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import from_mesh
 from heat_igl.unfolding.local import positive
-from heat_igl.unfolding.refinement import TOLERANCE, Refine
+from heat_igl.unfolding.numbered import TOLERANCE
+from heat_igl.unfolding.refinement import Refine
+from heat_igl.unfolding.single_query import single_query
 from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = ["directed_from_scratch", "distance_from_scratch", "distance_to_targets", "unfolded_distance"]
@@ -126,6 +128,11 @@ def distance_from_scratch(
         refine = "exact"
     if refine == "exact" and chosen.on_vertices_alone:
         return _from_vertices(mesh, chosen, cutoff)
+    if refine == "unfold" and chosen.on_vertices_alone and not chosen.vertex_offset.any():
+        query = single_query(mesh, chosen.vertices)
+        if query is not None:
+            del mesh  # these may be copies of the arrays that were given, which are not needed any more
+            return query.distance(tolerance)
     solver, order = _prepared(mesh, chosen, refine, tolerance, cutoff)
     return np.asarray(solver.distances([chosen], order[:, None])[0])
 

@@ -13,12 +13,14 @@ from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["HalfEdges", "Located", "Tables", "from_mesh", "from_triangulation", "rings"]
+__all__ = ["Glued", "HalfEdges", "Located", "Tables", "from_mesh", "from_triangulation", "glued", "rings"]
 
 # A point whose barycentric coordinate is below this lies on the side of its face.
 _ON_SIDE = 1e-13
 # A last bound on the work; meshes measured so far take less than one flip per face.
 _MOST_FLIPS_PER_FACE = 100
+# Half-edges and vertices that indices of 32 bits tell apart, with room for a bit of the kernels' own.
+_TOO_MANY = 2**30
 
 
 class Tables(NamedTuple):
@@ -95,7 +97,7 @@ class HalfEdges:
         triangulation: IntrinsicTriangulation | None = None,
     ) -> None:
         m = len(vertex) // 3
-        if 3 * m + n >= 2**30:
+        if 3 * m + n >= _TOO_MANY:
             raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
         # By a power of two: no digit changes, and no square leaves the range of doubles.
         shift = _exponent(length)
@@ -222,24 +224,65 @@ def from_triangulation(triangulation: IntrinsicTriangulation) -> HalfEdges:
     )
 
 
+class Glued(NamedTuple):
+    """The triangles of a mesh by their sides, as `heat_igl.kernels.gluing.glue` returns them.
+
+    Attributes
+    ----------
+    vertex, twin, ring, aligned, length
+        As for `HalfEdges`; lengths in units of ``2 ** exponent``.
+    exponent : int
+        The power of two just above the mean extent of the mesh.
+    n_across : int
+        Half-edges that are not aligned.
+    """
+
+    vertex: AnyArray
+    twin: AnyArray
+    ring: AnyArray
+    aligned: AnyArray
+    length: FloatArray
+    exponent: int
+    n_across: int
+
+    def flip(self, F: IntArray) -> None:
+        """Mollify and flip in place to the intrinsic Delaunay triangulation; F (m, 3) are the faces before."""
+        sides = self.length.reshape(-1, 3)
+        sides += mollify(sides, F)[:, None]
+        gluing.flip(self.vertex, self.twin, self.ring, self.length, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * len(F))
+
+
+def glued(mesh: Mesh) -> Glued:
+    """The triangles of a mesh by their sides, before any flip.
+
+    Raises
+    ------
+    MeshError
+        If there are too many triangles for 32-bit indices.
+    """
+    if 3 * mesh.n_faces + mesh.n_vertices >= _TOO_MANY:
+        raise MeshError(f"{mesh.n_faces} faces are too many for 32-bit indices: split the mesh")
+    exponent = _exponent(np.ptp(mesh.V[mesh.F[:, 0]], axis=0))
+    vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, np.ldexp(1.0, -exponent))
+    return Glued(vertex, twin, ring, aligned, length, exponent, n_across)
+
+
 def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
     """The tables of the intrinsic Delaunay triangulation of a mesh that is asked once, for distances from vertices.
 
     Without a history of the flips; what is near vertex `start` comes first in memory.
     """
-    exponent = _exponent(np.ptp(mesh.V[mesh.F[:, 0]], axis=0))
-    vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, np.ldexp(1.0, -exponent))
-    if (twin == -2).any():
+    found = glued(mesh)
+    if (found.twin == -2).any():
         # Windows would go on in every copy of a face, and multiply.
         reduced, _ = mesh.without_duplicate_faces()
         if reduced is not mesh:
             return from_mesh(reduced, start)
-    if n_across:
+    if found.n_across:
         return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-    length += np.repeat(mollify(length.reshape(-1, 3), mesh.F), 3)
-    gluing.flip(vertex, twin, ring, length, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * mesh.n_faces)
-    first_face = int(np.argmax(vertex == start)) // 3
-    return HalfEdges(vertex, twin, ring, aligned, length, mesh.n_vertices, exponent, first_face)
+    found.flip(mesh.F)
+    first_face = int(np.argmax(found.vertex == start)) // 3
+    return HalfEdges(*found[:5], mesh.n_vertices, found.exponent, first_face)
 
 
 def _following(half_edge: IntArray) -> IntArray:

@@ -13,28 +13,18 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation, double_cover, oriented
-from heat_igl.intrinsic.fans import breadth_first, tables
+from heat_igl.intrinsic.fans import Tables, breadth_first, tables
 from heat_igl.intrinsic.history import BACK_CORNERS
-from heat_igl.kernels.ordering import ascending
 from heat_igl.mesh import SurfacePoints
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles, WalkStarts
 from heat_igl.unfolding.path_derivatives import Paths, Places, Starts, Triangles, Ways, half_edge_arrays
-from heat_igl.unfolding.walks import INSIDE, Points, sweep, unfold, unknown, views
+from heat_igl.unfolding.walks import INSIDE, Points, sweep, unknown, views
 
-__all__ = ["TOLERANCE", "Known", "Refine", "Refinement"]
+__all__ = ["Known", "Refine", "Refinement"]
 
 Refine = Literal["sweep", "unfold", "exact"]
 
-# Relative gain below which a path is not straightened further. The loss adds up to 0.0003 to 0.003 % on average; 0
-# loses nothing and takes up to twice the time.
-TOLERANCE = 4e-5
-# The search starts at vertices with distances longer than a neighbour promised by this many tolerances: by more than
-# the paths that the promise rests on may have been cut short.
-_SHORTFALL = 15.0
-# Passes over vertices whose neighbours turned out to be nearer than the order said. They are few, and ever fewer.
-_MAX_PASSES = 50
-# Steps that the search from one vertex may take; a walk takes 20 to 50.
-_MAX_SEARCH = 500
 # A point whose barycentric coordinate is below this lies on the side of its face.
 _ON_SIDE = 1e-8
 
@@ -57,7 +47,7 @@ class Known(NamedTuple):
     source: IntArray
 
 
-class Refinement:
+class Refinement(NumberedTriangles):
     """Distance on one triangulated surface by planar unfolding, for any number of queries.
 
     Parameters
@@ -67,10 +57,8 @@ class Refinement:
 
     Attributes
     ----------
-    number, face : (n,), (m,) int32
-        Rows of the tables of the vertices (on all sheets) and of the faces.
-    tables : Tables
-        What the kernels read.
+    face : (m,) int32
+        Rows of the tables of the faces.
 
     Notes
     -----
@@ -91,38 +79,23 @@ class Refinement:
     """
 
     def __init__(self, triangulation: IntrinsicTriangulation) -> None:
-        self.n = triangulation.n
         if not triangulation.aligned.all():
             triangulation = oriented(triangulation)
-        F, lengths, twin = triangulation.F, triangulation.l, triangulation.twin
-        self._n_sheets = 1
-        if not triangulation.aligned.all():
-            self._n_sheets = 2
-            F, lengths, twin = double_cover(triangulation)
         self.triangulation = triangulation
-        self.number, self.face, F, lengths, twin = breadth_first(F, lengths, twin, self._n_sheets * self.n)
-        self._F, self._lengths = F, lengths
-        self.tables = tables(F, lengths, twin, len(self.number))
-        self._twin = twin
+        n_sheets = 1 if triangulation.aligned.all() else 2
+        number, self.face, made = _numbered_tables(triangulation, n_sheets)
+        super().__init__(made, number, n_sheets)
 
     @cached_property
-    def has_holes(self) -> bool:
-        """Whether some component is neither a disk nor a sphere, so that a closed curve may enclose no surface."""
-        return _has_holes(self._F, self._twin, len(self.number))
+    def tables(self) -> Tables:
+        """What the kernels read; made again after `keep_for_sweeps`, if sources in faces or walks ask for it."""
+        return _numbered_tables(self.triangulation, self._n_sheets)[2]
 
-    @cached_property
-    def flatness(self) -> float:
-        """The share of vertices without curvature, those on the boundary included."""
-        return float(self.tables.is_flat.mean())
-
-    @cached_property
-    def curvature(self) -> float:
-        """Mean over the fans of vertices of how far their angles are from a plane's, in radians.
-
-        The sum inside the surface is compared with two pi; on the boundary, a notch with more than pi counts.
-        """
-        total = self.tables.total
-        return float(np.where(total > 0, np.abs(2 * np.pi - total), np.maximum(-total - np.pi, 0.0)).mean())
+    def keep_for_sweeps(self) -> None:
+        """Let go of the tables that sweeps from vertices do not read: six tenths of all."""
+        t = self.tables
+        self._swept = t._replace(turn=np.empty(0, t.turn.dtype), step=np.empty(0, t.step.dtype))
+        del self.tables
 
     def sweep(
         self,
@@ -179,7 +152,7 @@ class Refinement:
             if label is not None:
                 label[row] = np.tile(known.source, self._n_sheets)
         group = np.arange(len(starts.offset)) if groups is None else np.ascontiguousarray(groups, np.int64)
-        sweep(self._order(key), self.tables, distance[:n], label, starts.offset, group, is_stale)
+        sweep(self._order(key), self._swept, distance[:n], label, starts.offset, group, is_stale)
         return _on_base(self.number, self._n_sheets, distance, label, labels)
 
     def unfold(
@@ -221,25 +194,6 @@ class Refinement:
         walk = self.walks(key, self.starts(sources, offsets, points, point_offsets), tolerance)
         return _on_base(self.number, self._n_sheets, walk["distance"], walk["label"], labels)
 
-    def walks(self, key: FloatArray, starts: WalkStarts, tolerance: float = TOLERANCE, **ways: AnyArray) -> AnyArray:
-        """What is known of the path of each row after `unfold`; how each path begins is filled into `ways`."""
-        walk = unknown(len(self.number) + starts.n_points)
-        walk[starts.row] = starts.walk
-        unfold(
-            self._order(key),
-            self.tables,
-            walk,
-            starts.points,
-            tolerance=tolerance,
-            # Below 1e-5, forecasts are wrong by as much because of the curvature on the way.
-            shortfall=max(_SHORTFALL * tolerance, 1e-5),
-            max_steps=_MAX_SEARCH,
-            max_passes=_MAX_PASSES,
-            has_holes=self.has_holes,
-            **ways,
-        )
-        return walk
-
     def paths(self, key: FloatArray, sources: Starts, tolerance: float = TOLERANCE) -> Paths:
         """The paths whose lengths `unfold` returns, on the triangles by the numbers of the tables.
 
@@ -263,9 +217,9 @@ class Refinement:
 
     @cached_property
     def _triangles(self) -> Triangles:
-        size = self._F.size
-        F, twin = self._F.astype(np.int64), self._twin.ravel().astype(np.int64)
-        return half_edge_arrays(IntrinsicTriangulation(F, self._lengths, twin, np.ones(size, bool), len(self.number)))
+        F, twin = self._faces.astype(np.int64), self._twin.astype(np.int64).ravel()
+        lengths, is_aligned = self.on_tables(self.triangulation.l), np.ones(F.size, bool)
+        return half_edge_arrays(IntrinsicTriangulation(F, lengths, twin, is_aligned, len(self.number)))
 
     def by_given_sides(self, by_side: FloatArray) -> FloatArray:
         """Derivatives by the sides (m, 3) of `triangulation`, from those by the numbers of the tables."""
@@ -292,11 +246,6 @@ class Refinement:
         vertex[self.number] = np.tile(np.arange(self.n), self._n_sheets)
         return np.asarray(vertex[rows])
 
-    def _order(self, key: FloatArray) -> AnyArray:
-        """Vertices of all sheets in ascending order, by the numbers of the tables."""
-        on_sheets = np.tile(key, self._n_sheets) if self._n_sheets > 1 else np.ascontiguousarray(key)
-        return np.asarray(self.number[ascending(on_sheets)])
-
     def starts(
         self,
         sources: IntArray,
@@ -305,16 +254,13 @@ class Refinement:
         point_offsets: FloatArray | None,
     ) -> WalkStarts:
         """Initial values of the kernels, on all sheets and by the numbers of the tables."""
-        n, k, sheets = len(self.number), len(sources), range(self._n_sheets)
-        row = self.number[np.concatenate([sources + self.n * sheet for sheet in sheets])]
-        walk = unknown(len(row))
-        walk["label"], walk["root"] = np.tile(np.arange(k), self._n_sheets), row
-        begin = np.zeros(k) if offsets is None else np.asarray(offsets, np.float64)
+        at_vertices = self.starts_at(sources, offsets)
         if points is None:
-            walk["distance"] = walk["offset"] = begin[walk["label"]]
-            return _ascending(row, walk, begin)
+            return at_vertices
+        n, k = len(self.number), len(sources)
+        row, walk, begin = at_vertices.row, at_vertices.walk, at_vertices.offset
         faces, barycentric, point, turn = self._faces_of(points)
-        vertex, seen = views(faces, barycentric, self._F, self.tables)
+        vertex, seen = views(faces, barycentric, self._faces, self.tables)
         place = unknown(len(points))
         walk["distance"] = place["distance"] = 0.0
         seen["label"], place["label"] = k + np.repeat(point, 3), k + np.arange(len(points))
@@ -325,13 +271,13 @@ class Refinement:
         walk["offset"] = begin[walk["label"]]
         walk["distance"] += walk["offset"]
         by_face = np.argsort(faces, kind="stable")
-        first = np.full(len(self._F), -1, np.int32)
+        first = np.full(len(self.face), -1, np.int32)
         first[faces[by_face][::-1]] = by_face[::-1]
         inside = np.zeros(len(faces), INSIDE)
         inside["barycentric"], inside["turn"], inside["following"], inside["row"] = barycentric, turn, -1, n + point
         same = faces[by_face][1:] == faces[by_face][:-1]
         inside["following"][by_face[:-1][same]] = by_face[1:][same]
-        return _ascending(row, walk, begin, len(points), Points(first, inside))
+        return WalkStarts.ascending(row, walk, begin, len(points), Points(first, inside))
 
     def _faces_of(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Triangles of the tables that hold points, coordinates in them, which point each is, and `Inside.turn`."""
@@ -383,36 +329,10 @@ def _on_base(
     return np.asarray(on_sheets.min(axis=0))
 
 
-def _has_holes(F: AnyArray, twin: AnyArray, n: int) -> bool:
-    """Whether some component of m faces in breadth-first order is neither a disk nor a sphere."""
-    m = len(F)
-    is_first, n_shared, side = np.ones(m, bool), np.zeros(m), np.arange(0, 3 * m, 3, dtype=np.int32)
-    for beyond in twin.reshape(-1, 3).T:
-        # In breadth-first order a face without an earlier neighbour begins a component.
-        is_first &= (beyond < 0) | (beyond >= side)
-        n_shared += beyond >= 0
-    of_face = np.cumsum(is_first) - 1
-    of_vertex = np.full(n, -1)
-    of_vertex[F] = of_face[:, None]
-    # Where more than two faces meet, they are cut apart: an edge is shared by two faces, or belongs to one.
-    edges = np.bincount(of_face, 3 - n_shared / 2)
-    vertices = np.bincount(of_vertex[of_vertex >= 0], minlength=len(edges))
-    return bool((vertices - edges + np.bincount(of_face) < 1).any())
-
-
-class WalkStarts(NamedTuple):
-    """Rows of the walks that are known and these, (k,) each, the nearest last; then by label where it begins."""
-
-    row: AnyArray
-    walk: AnyArray
-    offset: FloatArray
-    n_points: int = 0
-    points: Points | None = None
-
-
-def _ascending(
-    row: AnyArray, walk: AnyArray, offset: FloatArray, n_points: int = 0, points: Points | None = None
-) -> WalkStarts:
-    """Far ones first, so that of several for one vertex the nearest is written last."""
-    order = np.argsort(-walk["distance"], kind="stable")
-    return WalkStarts(row[order], walk[order], offset, n_points, points)
+def _numbered_tables(triangulation: IntrinsicTriangulation, n_sheets: int) -> tuple[AnyArray, AnyArray, Tables]:
+    """Numbers of the vertices, rows of the faces and the tables, of a surface or the double cover of it."""
+    F, lengths, twin = triangulation.F, triangulation.l, triangulation.twin
+    if n_sheets == 2:
+        F, lengths, twin = double_cover(triangulation)
+    number, face, F, lengths, twin = breadth_first(F, lengths, twin, n_sheets * triangulation.n)
+    return number, face, tables(F, lengths, twin, len(number))

@@ -16,16 +16,17 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
+from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles, WalkStarts
 from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
-from heat_igl.unfolding.refinement import TOLERANCE, Known, Refine, Refinement, WalkStarts
+from heat_igl.unfolding.refinement import Known, Refine, Refinement
 
-__all__ = ["UnfoldingDomain", "UnfoldingSolver"]
+__all__ = ["FEW", "UnfoldingDomain", "UnfoldingSolver", "costs_little_to_be_exact", "require_share"]
 
 # Curves are unfolded from as points, at most so many mean edge lengths s apart. At a distance d that is wrong by the
 # fraction (s / d)^2 / 8 at most: by 0.005 % beyond the 6 edges within which windows take the curve itself.
 _SPACING = 0.125
 # In components of up to so many vertices distance is found by exact windows, whatever was asked for.
-_FEW = 1000
+FEW = 1000
 # So it is with so much curvature at each vertex (radians, in the mean). There walks pass vertices on the wrong side:
 # 0.7 to 3.4 % of the largest distance on plates, beams, voxels and terrain, most with 0.5 to 3 radians, and up to
 # 0.46 % on a coarse cow with 0.14, which is too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
@@ -63,14 +64,17 @@ class UnfoldingDomain(Protocol):
         """The value (n,) of each vertex's component."""
 
 
-def _costs_little_to_be_exact(refinement: Refinement, rough: float) -> bool:
+def costs_little_to_be_exact(triangles: NumberedTriangles, refine: Refine) -> bool:
     """Whether the mesh is small or rough, or flat with holes."""
     return (
-        refinement.n <= _FEW or refinement.curvature > rough or (refinement.flatness > _FLAT and refinement.has_holes)
+        triangles.n <= FEW
+        or triangles.curvature > _ROUGH[refine]
+        or (triangles.flatness > _FLAT and triangles.has_holes)
     )
 
 
-def _require_share(tolerance: float | None) -> None:
+def require_share(tolerance: float | None) -> None:
+    """Refuse a tolerance that is not a number from 0 to 1."""
     if tolerance is not None and not 0 <= tolerance <= 1:
         raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
 
@@ -131,10 +135,12 @@ class UnfoldingSolver:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
         self._refinement = None if refine == "exact" else Refinement(surface.unfolding)
         #: Whether distances do not depend on the heat.
-        self.is_exact = self._refinement is None or _costs_little_to_be_exact(self._refinement, _ROUGH[refine])
-        _require_share(tolerance)
+        self.is_exact = self._refinement is None or costs_little_to_be_exact(self._refinement, refine)
+        require_share(tolerance)
         self._tolerance, self._cutoff = tolerance, cutoff
         self._sweeps = refine == "sweep" and not self.is_exact
+        if self._refinement is not None and self._sweeps:
+            self._refinement.keep_for_sweeps()
         self._surface = surface
         self._domain = domain
         self._given_faces = np.empty((0, 3), np.int64) if surface.given_faces is None else surface.given_faces
@@ -198,7 +204,7 @@ class UnfoldingSolver:
         ValueError
             If `tolerance` is not a number from 0 to 1.
         """
-        _require_share(tolerance)
+        require_share(tolerance)
         labels, angles = np.empty((2, len(u)), np.int64), np.empty((3, len(u)))
         distance = self._measured(sources, u, labels[0], angles, tolerance, labels[1])
         return distance, labels[0], PathAngles(*angles), self._places(sources, labels[1])
@@ -301,7 +307,7 @@ class UnfoldingSolver:
             return True
         of_places = (self._given_faces[places.faces, 0] for places in (sources.points, sources.segments))
         component = self._domain.components[np.concatenate([sources.vertices, *of_places])]
-        return bool((self._component_sizes[component] <= _FEW).all())
+        return bool((self._component_sizes[component] <= FEW).all())
 
     @cached_property
     def _component_sizes(self) -> IntArray:
