@@ -43,7 +43,7 @@ def geodesic_distance(
         ``PolygonMesh.triangles``.
     method : {"unfold", "sweep", "heat", "exact"}
         "unfold" follows straight lines through strips of triangles: near-exact, and exact from vertices on meshes of up
-        to 30 000 vertices, see `unfolded_distance`. "sweep" unfolds two triangles at a time. Both go through the
+        to 50 000 vertices, see `unfolded_distance`. "sweep" unfolds two triangles at a time. Both go through the
         vertices in the order of Dijkstra's algorithm; polygons are cut into triangles. "heat" is `HeatMethodSolver`
         with its defaults; on polygons it takes `polygon_operators`. "exact" is the polyhedral distance by windows.
         Tetrahedra take "sweep" and "heat", which both are fronts there, see `FrontSolver`.

@@ -78,6 +78,8 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
         for f in range(m):
             for c in range(3):
                 vertex[3 * f + c] = F[f, c]
+                twin[3 * f + c] = -1
+                ring[3 * f + c] = 3 * f + c
         for h in range(3 * m):
             tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
             begin[(tail if tail < head else head) + 1] += 1
@@ -96,11 +98,9 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
                 i += 1
                 tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
                 upper = head if tail == lower else tail
-                ring[h] = h
                 if seen_from[upper] != lower:
                     seen_from[upper] = lower
                     seen[upper] = h
-                    twin[h] = -1
                     x = V[tail, 0] - V[head, 0]
                     y = V[tail, 1] - V[head, 1]
                     z = V[tail, 2] - V[head, 2]
@@ -358,5 +358,5 @@ def breadth_first(
                 t = twin[h]
                 new_twin[3 * i + c] = 3 * place[t // 3] + t % 3 if t >= 0 else t
                 t = ring[h]
-                new_ring[3 * i + c] = 3 * place[t // 3] + t % 3
+                new_ring[3 * i + c] = 3 * i + c if t == h else 3 * place[t // 3] + t % 3
     return vertices, twins, rings, alignment, lengths, numbers, faces

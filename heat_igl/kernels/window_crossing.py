@@ -1,6 +1,7 @@
 """Windows cross a face: distances of the vertex and of the targets in it, and windows on its two other sides."""
 
 import cython
+from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_lists import add, more_room
 from cython.cimports.heat_igl.kernels.window_sources import apart, relax, take
@@ -161,6 +162,17 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _fetch(s: cython.pointer(Search), t: cython.int) -> cython.void:
+    """Begin to fetch what windows over half-edge t will need."""
+    prefetch(s.slot + t)
+    prefetch(s.length + t)
+    prefetch(s.bulge + t)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
@@ -175,6 +187,8 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     apex: Apex
     w: cython.pointer(Window)
     is_best: cython.bint
+    _fetch(s, s.twin[previous_half_edge(h)])
+    _fetch(s, s.twin[next_half_edge(h)])
     s.slot[h] = -1
     s.n_lists_done += 1
     n = trim(s, windows, n, h)

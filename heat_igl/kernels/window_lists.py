@@ -48,23 +48,30 @@ def push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cyt
 @cython.exceptval(check=False)
 def pop(s: cython.pointer(Search)) -> Entry:
     """Take the entry with the smallest key."""
-    top: Entry = s.heap[0]
+    heap: cython.pointer(Entry) = s.heap
+    top: Entry = heap[0]
     last: Entry
     i: cython.int = 0
-    below: cython.int
+    above: cython.int
+    below: cython.int = 1
     s.n_heap -= 1
-    last = s.heap[s.n_heap]
-    while True:
-        below = 2 * i + 1
-        if below >= s.n_heap:
-            break
-        if below + 1 < s.n_heap and s.heap[below + 1].key < s.heap[below].key:
-            below += 1
-        if s.heap[below].key >= last.key:
-            break
-        s.heap[i] = s.heap[below]
+    last = heap[s.n_heap]
+    # From below: the gap goes down to a leaf, without a branch that depends on keys, and the last entry seldom rises.
+    while below + 1 < s.n_heap:
+        below += heap[below + 1].key < heap[below].key
+        heap[i] = heap[below]
         i = below
-    s.heap[i] = last
+        below = 2 * i + 1
+    if below < s.n_heap:
+        heap[i] = heap[below]
+        i = below
+    while i > 0:
+        above = (i - 1) // 2
+        if heap[above].key <= last.key:
+            break
+        heap[i] = heap[above]
+        i = above
+    heap[i] = last
     return top
 
 
@@ -95,6 +102,24 @@ def _key(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def _is_late(
+    s: cython.pointer(Search),
+    run: cython.pointer(Window),
+    n: cython.int,
+    length: cython.double,
+    bulge: cython.double,
+) -> cython.bint:
+    """Whether all windows of a run have their turn after the search has ended; keys do not depend on their frame."""
+    i: cython.int
+    for i in range(n):
+        if _key(s, run + i, length, bulge) <= s.last_key:
+            return False
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def _append(
     s: cython.pointer(Search),
     t: cython.int,
@@ -115,6 +140,8 @@ def _append(
     lowest: cython.double = INFINITY
     x: cython.double
     if place < 0:
+        if s.last_key < INFINITY and _is_late(s, run, n, length, bulge):
+            return
         place = _free_list(s)
         if place < 0:
             return

@@ -1,6 +1,7 @@
 """Continuous Dijkstra: lists of windows cross their faces in ascending order, until what is asked for is known."""
 
 import cython
+from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.window_crossing import cross, over_corners
 from cython.cimports.heat_igl.kernels.window_lists import empty_front, pop
 from cython.cimports.heat_igl.kernels.window_segments import emit_segment
@@ -39,14 +40,21 @@ def run(s: cython.pointer(Search)) -> cython.void:
     v: cython.int
     j: cython.int
     place: cython.int
+    s.last_key = s.cutoff * (1.0 + MARGIN) + s.slack
     while s.n_heap > 0 and not s.failed:
         if s.n_nearest > 0 and s.n_touched >= s.n_next:
             narrow(s)
+            s.last_key = s.cutoff * (1.0 + MARGIN)
         entry = pop(s)
-        if entry.key > s.cutoff * (1.0 + MARGIN) + s.slack:
+        if s.n_heap > 0:
+            prefetch(s.slot + s.heap[0].what)
+        if entry.key > s.last_key:
             break
-        if s.stops_early and _all_found(s, entry.key):
-            break
+        if s.stops_early:
+            if _all_found(s, entry.key):
+                break
+            if s.n_targets == 0 and s.n_found + 1 == s.n_goals:
+                s.last_key = min(s.last_key, s.distance[s.goal[s.n_found]] * (1.0 + MARGIN))
         if entry.what < s.n_half_edges:
             place = s.slot[entry.what]
             if place >= 0 and s.lists[place].key == entry.key:

@@ -43,6 +43,8 @@ def relax(
     s.label[v] = s.label[root]
     s.entered[v] = entered
     s.crossing[v] = crossing
+    if distance > s.last_key:
+        return
     if s.kind[v] == UNKNOWN:
         s.kind[v] = classify(s, v)
     if s.kind[v] != PASSED:

@@ -47,6 +47,7 @@ cdef struct Search:
     double* bulge
     int* corner_of_vertex
     int* next_corner
+    int* n_corners
     unsigned char* kind
     bint is_delaunay
     int n, n_half_edges
@@ -98,6 +99,7 @@ cdef struct Search:
     double tolerance
     # Where the search ends: at a distance, or, if so many vertices are asked for, once the nearest are known.
     double cutoff
+    double last_key      # what has a larger key can change nothing that is asked for
     int n_nearest, n_next
     double* ranked
     int n_all_ranked

@@ -19,6 +19,7 @@ def shapes(
     bulge: cython.double[::1],
     corner_of_vertex: cython.int[::1],
     next_corner: cython.int[::1],
+    n_corners: cython.int[::1],
     kind: cython.uchar[::1],
 ) -> bool:
     """Fill what `search` reads of a surface, and say whether it is intrinsic Delaunay.
@@ -35,6 +36,8 @@ def shapes(
         power ``x (x - length) + y (y + bulge)`` at the point (x, -y) of the frame of the half-edge.
     corner_of_vertex, next_corner : (n,), (3 m,)
         Take the corners of each vertex as linked lists that end with -1; the first must come full of -1.
+    n_corners : (n,)
+        Takes the number of corners of each vertex; must come full of 0.
     kind : (n,)
         Takes JOINS at the ends of edges of more than two faces; the rest must come as UNKNOWN.
     """
@@ -62,6 +65,7 @@ def shapes(
                 v = vertex[h + c]
                 next_corner[h + c] = corner_of_vertex[v]
                 corner_of_vertex[v] = h + c
+                n_corners[v] += 1
         for h in range(3 * m):
             if twin[h] > h and bulge[h] + bulge[twin[h]] < -1e-6 * length[h]:
                 is_delaunay = False
@@ -126,15 +130,11 @@ def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
     k: cython.int = start
     side: cython.int = previous_half_edge(start)
     ahead: cython.int
-    n_corners: cython.int = 0
+    n_corners: cython.int = s.n_corners[v]
     n_seen: cython.int = 0
     n_half_turns: cython.int = 0
     was_below: cython.bint
     ray: Ray
-    while k >= 0:
-        n_corners += 1
-        k = s.next_corner[k]
-    k = start
     ray.cosine, ray.sine = 1.0, 0.0
     while n_seen < n_corners:
         n_seen += 1

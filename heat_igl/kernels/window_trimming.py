@@ -244,9 +244,13 @@ def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cytho
 def _insert(
     windows: cython.pointer(Window), k: cython.int, w: cython.pointer(Window), length: cython.double
 ) -> cython.int:
-    """Add a window to k that lie side by side, after cutting all where another is nearer; how many there are then."""
+    """Add a window to k that lie side by side, after cutting all where another is nearer; how many there are then.
+
+    The window may stand in the same array, behind the k.
+    """
     j: cython.int = k
     outcome: cython.int
+    moved: Window
     narrow: cython.double = NARROW * length
     while j > 0:
         outcome = _settle(cython.address(windows[j - 1]), w)
@@ -266,12 +270,16 @@ def _insert(
             continue
         break
     if j < k:
+        moved = w[0]
         memmove(windows + (j + 1), windows + j, (k - j) * cython.sizeof(Window))
-    elif j > 0 and _goes_on(cython.address(windows[j - 1]), w, length):
+        windows[j] = moved
+        return k + 1
+    if j > 0 and _goes_on(cython.address(windows[j - 1]), w, length):
         if w.stop > windows[j - 1].stop:
             windows[j - 1].stop = w.stop
         return k
-    windows[j] = w[0]
+    if w != windows + j:
+        windows[j] = w[0]
     return k + 1
 
 
@@ -282,7 +290,7 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     """Cut from windows what a path over an end of the half-edge or another window makes useless; how many are left."""
     i: cython.int
     k: cython.int = 0
-    w: Window
+    w: cython.pointer(Window)
     length: cython.double = s.length[h]
     from_tail: cython.double = s.distance[s.vertex[next_half_edge(h)]]
     from_head: cython.double = s.distance[s.vertex[previous_half_edge(h)]]
@@ -290,9 +298,9 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     from_head += s.tolerance * from_head
     from_head += length
     for i in range(n):
-        w = windows[i]
-        if not _cut_by_ends(cython.address(w), from_tail - w.offset, from_head - w.offset):
+        w = windows + i
+        if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset):
             continue
         if w.stop - w.start > NARROW * length:
-            k = _insert(windows, k, cython.address(w), length)
+            k = _insert(windows, k, w, length)
     return k

@@ -74,7 +74,7 @@ class Front:
 
     Parameters
     ----------
-    vertex, length, twin, double_area, bulge, corner_of_vertex, next_corner, kind
+    vertex, length, twin, double_area, bulge, corner_of_vertex, next_corner, n_corners, kind
         As `window_surface.shapes` takes and fills them. `kind` is filled further, the same by every search.
     aligned : (3 m,)
         Whether the faces at a glued half-edge run along it in opposite directions.
@@ -105,6 +105,7 @@ class Front:
         bulge: cython.double[::1],
         corner_of_vertex: cython.int[::1],
         next_corner: cython.int[::1],
+        n_corners: cython.int[::1],
         kind: cython.uchar[::1],
         is_delaunay: bool,
         distance: cython.double[::1],
@@ -129,6 +130,7 @@ class Front:
             bulge.base,
             corner_of_vertex.base,
             next_corner.base,
+            n_corners.base,
             kind.base,
             distance.base,
             emitted.base,
@@ -148,6 +150,7 @@ class Front:
         s.bulge = cython.address(bulge[0])
         s.corner_of_vertex = cython.address(corner_of_vertex[0])
         s.next_corner = cython.address(next_corner[0])
+        s.n_corners = cython.address(n_corners[0])
         s.kind = cython.address(kind[0])
         s.distance = cython.address(distance[0])
         s.emitted = cython.address(emitted[0])
