@@ -1,8 +1,8 @@
 """Derivatives of an answer by the positions of the vertices, by edge lengths, by the sources and by the time step.
 
 All of them go by the lengths of the sides of the triangles that the answer was found on. From the answer to these
-lengths lead paths (`heat_igl.unfolding.path_lengths`) or the adjoint of the heat method
-(`heat_igl.heat_method.adjoint`), from there to the edges of the mesh the flips
+lengths lead paths (`heat_igl.unfolding.path_lengths`) or the steps of the heat method
+(`heat_igl.heat_method.heat_derivative`), from there to the edges of the mesh the flips
 (`heat_igl.intrinsic.length_derivatives`); the positions follow here.
 docs/derivatives.md derives each step.
 """
@@ -41,8 +41,8 @@ class SidesDerivative(Protocol):
     def pull_back(self, g: FloatArray) -> Change:
         """The derivative of the sum of distances times g (n,), finite."""
 
-    def push_forward(self, by_side: FloatArray) -> FloatArray:
-        """How the distances (n,) change when the sides (m, 3) change by `by_side`."""
+    def push_forward(self, by_side: FloatArray, by_given: FloatArray) -> FloatArray:
+        """How the distances (n,) change when the sides (m, 3) change by `by_side`, and those before any flip too."""
 
     def lengths(self) -> FloatArray:
         """The distances (n,) that are differentiated; any number at unreachable vertices."""
@@ -166,7 +166,7 @@ class DistanceDerivative:
         Raises
         ------
         ValueError
-            If dV has another shape or is not finite, or without ``refine``.
+            If dV has another shape or is not finite, or if points are among the sources.
         MeshError
             If the solver has no vertices to move.
         """
@@ -187,7 +187,9 @@ class DistanceDerivative:
                 "directional derivatives are there for source vertices: multiply with the gradient instead"
             )
         on_answer = carry_lengths(self._answer.triangulation, by_side, len(self._faces.history))
-        return self._answer.push_forward(on_answer)
+        change = self._answer.push_forward(on_answer, by_side)
+        change[self.unreachable] = 0.0
+        return change
 
     @cached_property
     def inexact(self) -> IntArray:
@@ -228,7 +230,13 @@ class DistanceDerivative:
         places = None if change.by_place is None else PlaceSlopes(points.faces, points.barycentric, change.by_place)
         triangulation, n_before = self._answer.triangulation, len(self._faces.history)
         by_side, by_place = carry_lengths_back(triangulation, change.by_side, n_before, places)
-        return by_side if change.by_given is None else by_side + change.by_given, by_place
+        if change.by_given is not None:
+            by_side = by_side + change.by_given
+        if change.by_given_place is not None:
+            direct = PlaceSlopes(points.faces, points.barycentric, change.by_given_place)
+            by_given_place = carry_lengths_back(self._faces, np.zeros_like(by_side), n_before, direct)[1]
+            by_place = by_given_place if by_place is None else by_place + by_given_place
+        return by_side, by_place
 
     def _to_positions(self, mesh: Mesh, by_side: FloatArray) -> FloatArray:
         """The derivative (n, 3) by the positions, from that by the sides (m, 3)."""

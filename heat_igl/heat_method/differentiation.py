@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.heat_method.adjoint import HeatAdjoint
 from heat_igl.heat_method.derivatives import DistanceDerivative, SidesDerivative
+from heat_igl.heat_method.heat_derivative import HeatDerivative
 from heat_igl.heat_method.parts import SolverParts
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.sources import SourceSet, right_hand_side
@@ -25,7 +25,7 @@ def differentiated(
     distance : (n,) float64
         The answer.
     sources : SourceSet
-        Vertices and, with ``refine``, points in faces.
+        Vertices and points in faces.
     parts : SolverParts
         Of the solver that gave the answer.
     mesh : Mesh, PointCloud or None
@@ -35,8 +35,7 @@ def differentiated(
     ------
     ValueError
         If the domain is no surface of triangles, if a curve is among the sources, with ``refine="sweep"``, or where
-        vertices were added. Without ``refine`` also for points in faces, sources with offsets, a boundary condition
-        other than "neumann", and the iterative backend.
+        vertices were added; and for what `HeatDerivative` refuses.
     """
     surface = parts.operators.surface
     if surface is None or isinstance(mesh, PointCloud):
@@ -51,5 +50,5 @@ def differentiated(
             u = parts.heat_flow.solve(right_hand_side(parts.operators.n, [term]))[:, 0]
         answer = parts.last_steps.paths(sources, u)
     else:
-        answer = HeatAdjoint(parts, sources)
+        answer = HeatDerivative(parts, sources)
     return distance, DistanceDerivative(distance, sources, surface, mesh, answer)

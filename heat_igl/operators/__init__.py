@@ -7,7 +7,7 @@ from heat_igl.operators.connection import (
     face_rotations,
     with_rotations,
 )
-from heat_igl.operators.element_derivatives import Elements
+from heat_igl.operators.element_derivatives import ElementChange, Elements
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
 from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators, without_refinement
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian, divergence_matrix
@@ -23,6 +23,7 @@ from heat_igl.operators.triangles import operators, tufted_operators, unfolding_
 
 __all__ = [
     "EdgeLengths",
+    "ElementChange",
     "Elements",
     "FaceRotations",
     "Laplacian",

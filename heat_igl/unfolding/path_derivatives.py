@@ -105,12 +105,15 @@ class Change(NamedTuple):
         By the sides of the faces before any flip, directly.
     by_t : float
         By the time step.
+    by_given_place : (p, 3) float64 or None
+        By the coordinates of source points in the faces before any flip, directly.
     """
 
     by_side: FloatArray
     by_place: FloatArray | None = None
     by_given: FloatArray | None = None
     by_t: float = 0.0
+    by_given_place: FloatArray | None = None
 
 
 class Paths:

@@ -6,13 +6,13 @@ import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.mesh import SurfacePoints
-from heat_igl.sources import SourceSet
+from heat_igl.sources import SightLines, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.path_derivatives import Change, Paths, Places, Starts, Ways, half_edge_arrays
 from heat_igl.unfolding.refinement import Refinement
 
-__all__ = ["PathLengths", "from_walks", "from_windows"]
+__all__ = ["PathLengths", "from_lines", "from_walks", "from_windows"]
 
 
 class PathLengths:
@@ -80,8 +80,8 @@ class PathLengths:
             np.add.at(result, (places.point[known], same.argmax(axis=1)[known]), by_place[known, c])
         return result
 
-    def push_forward(self, by_side: FloatArray) -> FloatArray:
-        """How the distances (n,) change when the sides (m, 3) change by `by_side`."""
+    def push_forward(self, by_side: FloatArray, by_given: FloatArray | None = None) -> FloatArray:  # noqa: ARG002
+        """How the distances (n,) change when the sides (m, 3) change by `by_side`, and no others."""
         if self._refinement is not None:
             by_side = self._refinement.on_tables(by_side)
         return np.asarray(self._paths.push_forward(by_side)[self._rows])
@@ -114,3 +114,16 @@ def from_windows(surface: ExactSurface, triangulation: IntrinsicTriangulation, s
     ways = Ways(found.distance, origin.entered, origin.crossing / length, found.distance - begins[origin.root])
     paths = Paths(half_edge_arrays(triangulation), places, ways, is_source=origin.root == np.arange(n))
     return PathLengths(triangulation, paths, np.arange(n), starts.points)
+
+
+def from_lines(triangulation: IntrinsicTriangulation, sources: SourceSet, lines: SightLines) -> PathLengths:
+    """The straight lines from vertices to the vertices and points that they see."""
+    starts, places = Starts.of(sources), Places.none()
+    if starts.points is not None and starts.point_offsets is not None:
+        placed = ExactSurface(triangulation).located(starts.points)
+        places = Places(*placed, starts.point_offsets[placed[2]])
+    is_source = np.zeros(triangulation.n, bool)
+    is_source[starts.vertices] = True
+    ways = Ways(lines.value, lines.entered, lines.share, lines.reach)
+    paths = Paths(half_edge_arrays(triangulation), places, ways, is_source)
+    return PathLengths(triangulation, paths, np.arange(triangulation.n), starts.points)
