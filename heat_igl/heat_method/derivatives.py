@@ -17,9 +17,8 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
 from heat_igl.intrinsic.length_derivatives import PlaceSlopes, carry_lengths, carry_lengths_back, check_carried
-from heat_igl.kernels import side_derivatives as kernels
 from heat_igl.mesh import Mesh
-from heat_igl.operators import Surface
+from heat_igl.operators import MetricSides, Surface
 from heat_igl.sources import SourceSet
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.unfolding import Change
@@ -48,6 +47,20 @@ class SidesDerivative(Protocol):
         """The distances (n,) that are differentiated; any number at unreachable vertices."""
 
 
+class SidesOfMesh(Protocol):
+    """The lengths of the sides of a mesh's faces as functions of the positions of the vertices."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh."""
+
+    def by_positions(self, by_side: FloatArray) -> FloatArray:
+        """The derivative (n, 3) by the positions, from that by the lengths (m, 3)."""
+
+    def push_positions(self, dV: FloatArray) -> FloatArray:
+        """How the lengths (m, 3) change when the vertices move by dV (n, 3)."""
+
+
 class DistanceDerivative:
     """The derivative of one distance: called with a gradient by the distances, it returns that by the positions.
 
@@ -65,13 +78,17 @@ class DistanceDerivative:
     """
 
     def __init__(
-        self, distance: FloatArray, sources: SourceSet, surface: Surface, mesh: Mesh | None, answer: SidesDerivative
+        self,
+        distance: FloatArray,
+        sources: SourceSet,
+        surface: Surface,
+        sides: SidesOfMesh | None,
+        answer: SidesDerivative,
     ) -> None:
-        self.distance, self._sources, self._mesh, self._answer = distance, sources, mesh, answer
+        self.distance, self._sources, self._sides, self._answer = distance, sources, sides, answer
         if surface.faces is None:
             raise ValueError("the faces before any flip are not known: make the solver from a mesh or edge lengths")
         self._faces = surface.faces
-        self._given = surface.given_faces
         check_carried(answer.triangulation)
         self.unreachable: IntArray = np.flatnonzero(np.isinf(distance))
 
@@ -96,8 +113,8 @@ class DistanceDerivative:
         MeshError
             If the solver has no vertices to move: it was made from edge lengths or operators.
         """
-        mesh = self._positions()
-        result = [self._to_positions(mesh, self._by_sides(row)[0]) for row in self._rows(g)]
+        sides = self._positions()
+        result = [sides.by_positions(self._on_given_faces(self._by_sides(row)[0])) for row in self._rows(g)]
         return np.stack(result) if np.ndim(g) == 2 else result[0]
 
     def by_lengths(self, g: ArrayLike) -> FloatArray:
@@ -131,7 +148,7 @@ class DistanceDerivative:
         MeshError
             If the solver has no positions.
         """
-        mesh = self._positions()
+        mesh = self._positions().mesh
         (row,) = self._rows(g, 1)
         _, by_place = self._by_sides(row)
         points = self._sources.points
@@ -149,6 +166,26 @@ class DistanceDerivative:
         """The derivative by the time step t, all else fixed; 0 with ``refine``, which takes an order from the heat."""
         (row,) = self._rows(g, 1)
         return self._answer.pull_back(row).by_t
+
+    def by_metric(self, g: ArrayLike) -> FloatArray:
+        """The gradient by the metric, (m, 3, 3) or (m, 2, 2) as it was given to `metric_operators`; `g` (n,).
+
+        Symmetric on each face. Raises a ValueError without a metric, and if g has another shape or is not finite.
+        """
+        metric = self._metric("metric_operators(mesh, metric)")
+        (row,) = self._rows(g, 1)
+        return metric.by_metric(self._on_given_faces(self._by_sides(row)[0]))
+
+    def by_speed(self, g: ArrayLike) -> FloatArray:
+        """The gradient (m,) by the speeds that were given to `speed_operators`; `g` (n,), errors as for `by_metric`."""
+        metric = self._metric("speed_operators(mesh, speed)")
+        (row,) = self._rows(g, 1)
+        return metric.by_speed(self._on_given_faces(self._by_sides(row)[0]))
+
+    def _metric(self, function: str) -> MetricSides:
+        if not isinstance(self._sides, MetricSides):
+            raise ValueError(f"the solver knows no metric to change: make it with from_operators({function})")
+        return self._sides
 
     def push_forward(self, dV: ArrayLike) -> FloatArray:
         """The directional derivative of all distances: how they change when the vertices move.
@@ -170,22 +207,22 @@ class DistanceDerivative:
         MeshError
             If the solver has no vertices to move.
         """
-        mesh = self._positions()
+        sides = self._positions()
+        mesh = sides.mesh
         moved = np.asarray(dV, np.float64)
         if moved.shape != mesh.V.shape or not np.isfinite(moved).all():
             raise ValueError(
                 f"dV must be {mesh.V.shape} finite numbers, one velocity per vertex; it has shape {moved.shape}"
             )
-        directions, following, preceding = self._sides
-        by_side = np.einsum("mcx,mcx->mc", directions, moved[preceding] - moved[following])
-        return self.push_lengths_forward(by_side)
+        return self._push_sides(sides.push_positions(moved))
 
-    def push_lengths_forward(self, by_side: FloatArray) -> FloatArray:
-        """How the distances (n,) change when the sides (m, 3) of the mesh's faces, each there once, change."""
+    def _push_sides(self, by_side: FloatArray) -> FloatArray:
+        """How the distances (n,) change when the sides (m, 3) of the faces of the mesh change."""
         if len(self._sources.points.faces):
             raise ValueError(
                 "directional derivatives are there for source vertices: multiply with the gradient instead"
             )
+        by_side = self._on_faces(by_side)
         on_answer = carry_lengths(self._answer.triangulation, by_side, len(self._faces.history))
         change = self._answer.push_forward(on_answer, by_side)
         change[self.unreachable] = 0.0
@@ -202,13 +239,13 @@ class DistanceDerivative:
         distance = self.distance[reached]
         return np.asarray(reached[np.abs(self._answer.lengths()[reached] - distance) > _SAME * distance])
 
-    def _positions(self) -> Mesh:
-        if self._mesh is None:
+    def _positions(self) -> SidesOfMesh:
+        if self._sides is None:
             raise MeshError(
                 "the solver was made without positions, so there are no vertices to move: use by_lengths for the "
                 "derivative by edge lengths"
             )
-        return self._mesh
+        return self._sides
 
     def _rows(self, g: ArrayLike, most: int = 2) -> FloatArray:
         """`g` as rows (k, n), 0 at unreachable vertices."""
@@ -238,32 +275,26 @@ class DistanceDerivative:
             by_place = by_given_place if by_place is None else by_place + by_given_place
         return by_side, by_place
 
-    def _to_positions(self, mesh: Mesh, by_side: FloatArray) -> FloatArray:
-        """The derivative (n, 3) by the positions, from that by the sides (m, 3)."""
-        by_position = np.zeros((mesh.n_vertices, 3))
-        kernels.pull_to_positions(self._faces.F, mesh.V, by_side, by_position)
-        return by_position
-
     @cached_property
-    def _sides(self) -> tuple[FloatArray, IntArray, IntArray]:
-        """Unit vectors (m, 3, 3) along the sides of the faces, and the vertices (m, 3) that they lead from and to.
-
-        A side without length has no direction, and none is taken.
-        """
-        mesh, F = self._positions(), self._faces.F
-        following, preceding = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
-        along = mesh.V[preceding] - mesh.V[following]
-        length = np.sqrt(np.einsum("mcx,mcx->mc", along, along))
-        return along / np.where(length > 0, length, 1.0)[..., None], following, preceding
+    def _merged(self) -> Merged | None:
+        """The change that removed faces which were there twice; None if there were none."""
+        history = self._faces.history
+        return history[0] if history and isinstance(history[0], Merged) else None
 
     def _on_given_faces(self, by_side: FloatArray) -> FloatArray:
         """The derivative by the sides of the faces that the user gave, some of which may be there twice."""
-        if not self._faces.history or self._given is None:
+        if self._merged is None:
             return by_side
-        merged = self._faces.history[0]
-        if not isinstance(merged, Merged):
-            return by_side
-        kept, which = np.unique(merged.face, return_index=True)
-        on_given = np.zeros((len(merged.face), 3))
-        on_given[which] = np.take_along_axis(by_side[kept], merged.corner[which], axis=1)
+        kept, which = np.unique(self._merged.face, return_index=True)
+        on_given = np.zeros((len(self._merged.face), 3))
+        on_given[which] = np.take_along_axis(by_side[kept], self._merged.corner[which], axis=1)
         return on_given
+
+    def _on_faces(self, by_side: FloatArray) -> FloatArray:
+        """Changes of the sides (m, 3) of the faces that the user gave, for each face once."""
+        if self._merged is None:
+            return by_side
+        kept, which = np.unique(self._merged.face, return_index=True)
+        on_faces = np.zeros((len(kept), 3))
+        np.put_along_axis(on_faces, self._merged.corner[which], by_side[which], axis=1)
+        return on_faces

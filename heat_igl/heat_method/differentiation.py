@@ -7,10 +7,11 @@ import numpy as np
 from heat_igl.heat_method.derivatives import DistanceDerivative, SidesDerivative
 from heat_igl.heat_method.heat_derivative import HeatDerivative
 from heat_igl.heat_method.parts import SolverParts
+from heat_igl.heat_method.side_lengths import SideLengths
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.sources import SourceSet, right_hand_side
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import UnfoldingSolver
+from heat_igl.unfolding import FrontSolver, UnfoldingSolver
 
 __all__ = ["differentiated"]
 
@@ -38,6 +39,11 @@ def differentiated(
         vertices were added; and for what `HeatDerivative` refuses.
     """
     surface = parts.operators.surface
+    if isinstance(parts.last_steps, FrontSolver):
+        raise ValueError(
+            "fronts through faces that see their edges at several lengths have no derivative: let the metric or the "
+            "speed change by less than 10 % from face to face"
+        )
     if surface is None or isinstance(mesh, PointCloud):
         raise ValueError("derivatives need a surface of triangles: this domain has none, or is a point cloud")
     if len(sources.segments.faces):
@@ -51,4 +57,5 @@ def differentiated(
         answer = parts.last_steps.paths(sources, u)
     else:
         answer = HeatDerivative(parts, sources)
-    return distance, DistanceDerivative(distance, sources, surface, mesh, answer)
+    sides = parts.operators.metric if mesh is None else SideLengths(mesh)
+    return distance, DistanceDerivative(distance, sources, surface, sides, answer)

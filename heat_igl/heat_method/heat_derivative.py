@@ -77,7 +77,7 @@ class HeatDerivative:
 
     def pull_back(self, g: FloatArray) -> Change:
         """The derivative of the sum of distances times g (n,)."""
-        e, parts, term = self._elements, self._parts, self._term
+        parts, term = self._parts, self._term
         levels = self._levels.pull_back(g)
         # L is symmetric. Rounding aside, each component's sum is 0, as a right-hand side of L needs.
         field = self._field.pull_back(self._poisson.solve(levels.by_phi))
@@ -115,9 +115,7 @@ class HeatDerivative:
         initial = np.bincount(term.vertex, flow.initial, domain.n)
         by_heat = self._flow.push_forward(initial, flow.product, flow.diagonal)
         by_value = self._values.push_forward(by_side, by_given)
-        by_phi = self._poisson.solve(
-            self._field.push_forward(elements, by_heat, self._at_vertices(by_value), by_t)
-        )
+        by_phi = self._poisson.solve(self._field.push_forward(elements, by_heat, self._at_vertices(by_value), by_t))
         return self._levels.push_forward(by_phi, by_heat, by_value, by_side, flow)[: domain.n_given]
 
     def _add_elements(

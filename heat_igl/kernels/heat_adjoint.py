@@ -99,8 +99,8 @@ def elements(
     """Add the derivative by the sides (m, 3), from those by the heat flow and by weights, areas and masses.
 
     The heat flow gives -x . dA u for rows of adjoints x and solutions u (k, n), with A = M - t L, and `by_diagonal`
-    (n,) times the diagonal of dA. The entry -t L of each side changes by `slopes` (3, m, 3): with its weight, its length
-    and the time step. The derivative `by_mass` (n,) is that by the mass of each vertex, as part of A. A face has
+    (n,) times the diagonal of dA. The entry -t L of each side changes by `slopes` (3, m, 3): with the weight, length
+    and time step. The derivative `by_mass` (n,) is that by the mass of each vertex, as part of A. A face has
     `share` of its area, see `Elements`.
     """
     f: cython.Py_ssize_t

@@ -248,7 +248,7 @@ class SourceAssembler:
         return self._visible.seeds(*self._in_sight(sources, rim, self._visible))
 
     def lines(self, sources: SourceSet) -> SightLines:
-        """The straight lines that `SourceTerm.near` and `SourceTerm.far` have the lengths of, over the visible faces."""
+        """The straight lines whose lengths are `SourceTerm.near` and `SourceTerm.far`."""
         if self._visible is None:
             raise ValueError("straight lines need triangles")
         return self._visible.lines(*self._in_sight(sources, self._rim(sources), self._visible))
