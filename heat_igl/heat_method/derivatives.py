@@ -15,13 +15,14 @@ from typing import Protocol
 import numpy as np
 
 from heat_igl.errors import MeshError
+from heat_igl.heat_method.side_lengths import SidesOfMesh
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
-from heat_igl.intrinsic.length_derivatives import PlaceSlopes, carry_lengths, carry_lengths_back, check_carried
-from heat_igl.mesh import Mesh
+from heat_igl.intrinsic.length_derivatives import carry_lengths, carry_lengths_back, check_carried
+from heat_igl.intrinsic.place_derivatives import PlaceSlopes
 from heat_igl.operators import MetricSides, Surface
 from heat_igl.sources import SourceSet
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
-from heat_igl.unfolding import Change
+from heat_igl.unfolding import Change, SideChange
 
 __all__ = ["DistanceDerivative", "SidesDerivative"]
 
@@ -40,25 +41,11 @@ class SidesDerivative(Protocol):
     def pull_back(self, g: FloatArray) -> Change:
         """The derivative of the sum of distances times g (n,), finite."""
 
-    def push_forward(self, by_side: FloatArray, by_given: FloatArray) -> FloatArray:
-        """How the distances (n,) change when the sides (m, 3) change by `by_side`, and those before any flip too."""
+    def push_forward(self, change: SideChange) -> FloatArray:
+        """How the distances (n,) change with the sides and the places of source points."""
 
     def lengths(self) -> FloatArray:
         """The distances (n,) that are differentiated; any number at unreachable vertices."""
-
-
-class SidesOfMesh(Protocol):
-    """The lengths of the sides of a mesh's faces as functions of the positions of the vertices."""
-
-    @property
-    def mesh(self) -> Mesh:
-        """The mesh."""
-
-    def by_positions(self, by_side: FloatArray) -> FloatArray:
-        """The derivative (n, 3) by the positions, from that by the lengths (m, 3)."""
-
-    def push_positions(self, dV: FloatArray) -> FloatArray:
-        """How the lengths (m, 3) change when the vertices move by dV (n, 3)."""
 
 
 class DistanceDerivative:
@@ -148,19 +135,10 @@ class DistanceDerivative:
         MeshError
             If the solver has no positions.
         """
-        mesh = self._positions().mesh
+        slopes = self._place_slopes
         (row,) = self._rows(g, 1)
         _, by_place = self._by_sides(row)
-        points = self._sources.points
-        if by_place is None:
-            return np.zeros((len(points.faces), 3))
-        corners = mesh.V[mesh.F[points.faces]]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        per_area = 1 / np.einsum("px,px->p", normal, normal)
-        opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
-        # A coordinate rises by the height of its corner.
-        slopes = np.cross(normal[:, None], opposite) * per_area[:, None, None]
-        return np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
+        return np.zeros((0, 3)) if by_place is None else np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
 
     def by_time_step(self, g: ArrayLike) -> float:
         """The derivative by the time step t, all else fixed; 0 with ``refine``, which takes an order from the heat."""
@@ -187,13 +165,16 @@ class DistanceDerivative:
             raise ValueError(f"the solver knows no metric to change: make it with from_operators({function})")
         return self._sides
 
-    def push_forward(self, dV: ArrayLike) -> FloatArray:
-        """The directional derivative of all distances: how they change when the vertices move.
+    def push_forward(self, dV: ArrayLike, points: ArrayLike | None = None) -> FloatArray:
+        """The directional derivative of all distances: how they change when the vertices and the source points move.
 
         Parameters
         ----------
         dV : (n, 3) array_like
             Velocity of each vertex.
+        points : (p, 3) array_like, optional
+            Velocity of each source that is a point in a face, in the plane of the face and relative to it. Points
+            keep their barycentric coordinates if it is not given.
 
         Returns
         -------
@@ -203,30 +184,40 @@ class DistanceDerivative:
         Raises
         ------
         ValueError
-            If dV has another shape or is not finite, or if points are among the sources.
+            If dV or points have another shape or are not finite.
         MeshError
             If the solver has no vertices to move.
         """
-        sides = self._positions()
-        mesh = sides.mesh
-        moved = np.asarray(dV, np.float64)
-        if moved.shape != mesh.V.shape or not np.isfinite(moved).all():
-            raise ValueError(
-                f"dV must be {mesh.V.shape} finite numbers, one velocity per vertex; it has shape {moved.shape}"
-            )
-        return self._push_sides(sides.push_positions(moved))
+        sides, places = self._positions(), self._sources.points
+        moved = _velocities("dV", dV, sides.mesh.V.shape, "vertex")
+        by_side = self._on_faces(sides.push_positions(moved))
+        n_before, triangulation = len(self._faces.history), self._answer.triangulation
+        if not len(places.faces):
+            on_answer, _ = carry_lengths(triangulation, by_side, n_before)
+            change = SideChange(on_answer, None, by_side)
+        else:
+            by_place = np.zeros((len(places.faces), 3))
+            if points is not None:
+                velocity = _velocities("points", points, by_place.shape, "source point")
+                by_place = np.einsum("pcx,px->pc", self._place_slopes, velocity)
+            given = PlaceSlopes(places.faces, places.barycentric, by_place)
+            _, before = carry_lengths(self._faces, by_side, n_before, given)
+            on_answer, after = carry_lengths(triangulation, by_side, n_before, given)
+            change = SideChange(on_answer, after, by_side, before)
+        result = self._answer.push_forward(change)
+        result[self.unreachable] = 0.0
+        return result
 
-    def _push_sides(self, by_side: FloatArray) -> FloatArray:
-        """How the distances (n,) change when the sides (m, 3) of the faces of the mesh change."""
-        if len(self._sources.points.faces):
-            raise ValueError(
-                "directional derivatives are there for source vertices: multiply with the gradient instead"
-            )
-        by_side = self._on_faces(by_side)
-        on_answer = carry_lengths(self._answer.triangulation, by_side, len(self._faces.history))
-        change = self._answer.push_forward(on_answer, by_side)
-        change[self.unreachable] = 0.0
-        return change
+    @property
+    def _place_slopes(self) -> FloatArray:
+        """The slopes (p, 3, 3) of the coordinates of each source point in the plane of its face, in space."""
+        mesh, points = self._positions().mesh, self._sources.points
+        corners = mesh.V[mesh.F[points.faces]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        per_area = 1 / np.einsum("px,px->p", normal, normal)
+        opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+        # A coordinate rises by the height of its corner.
+        return np.asarray(np.cross(normal[:, None], opposite) * per_area[:, None, None])
 
     @cached_property
     def inexact(self) -> IntArray:
@@ -298,3 +289,11 @@ class DistanceDerivative:
         on_faces = np.zeros((len(kept), 3))
         np.put_along_axis(on_faces, self._merged.corner[which], by_side[which], axis=1)
         return on_faces
+
+
+def _velocities(name: str, given: ArrayLike, shape: tuple[int, ...], of: str) -> FloatArray:
+    """Velocities as finite float64 of the given shape."""
+    array = np.asarray(given, np.float64)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be {shape} finite numbers, one velocity per {of}; it has shape {array.shape}")
+    return array

@@ -39,7 +39,7 @@ def differentiated(
         vertices were added; and for what `HeatDerivative` refuses.
     """
     surface = parts.operators.surface
-    if isinstance(parts.last_steps, FrontSolver):
+    if isinstance(parts.last_steps, FrontSolver) and parts.operators.is_surface:
         raise ValueError(
             "fronts through faces that see their edges at several lengths have no derivative: let the metric or the "
             "speed change by less than 10 % from face to face"

@@ -15,7 +15,7 @@ from heat_igl.heat_method.parts import SolverParts
 from heat_igl.kernels import heat_adjoint as kernels
 from heat_igl.operators import ElementChange, Surface
 from heat_igl.runtime import LOWEST_HEAT
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["FieldDerivative", "FieldSlopes"]
 
@@ -70,8 +70,8 @@ class FieldDerivative:
         self._F = F = surface.triangulation.F
         self._imposed, self._known = imposed, known
         # Faces with a cold corner follow the gradient of the heat itself, and are not damped.
-        is_log = (u[F] >= LOWEST_HEAT).all(axis=1) if parts.fitted else np.zeros(len(F), bool)
-        is_plain = ~is_log
+        is_log: BoolArray = (u[F] >= LOWEST_HEAT).all(axis=1) if parts.fitted else np.zeros(len(F), bool)
+        is_plain: BoolArray = ~is_log
         is_plain[imposed] = is_log[imposed] = False
         self._plain = np.flatnonzero(is_plain)
         #: The rate that the field is compared with; negative on faces of another kind.
@@ -138,7 +138,7 @@ class FieldDerivative:
         k = self._imposed
         flux[k] -= elements.weight[k] * self._along(self._known, k) + e.weight[k] * self._along(by_known, k)
         n = len(by_heat)
-        return np.bincount(e.i.ravel(), flux.ravel(), n) - np.bincount(e.j.ravel(), flux.ravel(), n)
+        return np.asarray(np.bincount(e.i.ravel(), flux.ravel(), n) - np.bincount(e.j.ravel(), flux.ravel(), n))
 
     def _along(self, v: FloatArray, faces: IntArray | slice = slice(None)) -> FloatArray:
         """The differences (k, 3) of v (n,) along the sides of some faces."""

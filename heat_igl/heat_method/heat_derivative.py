@@ -7,6 +7,8 @@ edge.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from heat_igl.heat_method.field_derivative import FieldDerivative
@@ -20,8 +22,8 @@ from heat_igl.kernels import heat_adjoint as kernels
 from heat_igl.operators import ElementChange
 from heat_igl.sources import SourceSet, right_hand_side
 from heat_igl.steps import FlowDerivative, MatrixSlopes
-from heat_igl.typing import FloatArray
-from heat_igl.unfolding import Change
+from heat_igl.typing import FloatArray, IntArray
+from heat_igl.unfolding import Change, SideChange
 
 __all__ = ["HeatDerivative"]
 
@@ -104,17 +106,19 @@ class HeatDerivative:
         by_place = self._by_place(by_vertex, levels)
         return Change(by_side, by_place, values.by_given, float(by_t.sum()), values.by_place)
 
-    def push_forward(self, by_side: FloatArray, by_given: FloatArray) -> FloatArray:
-        """How the distances (n,) change when the sides of the triangles and of the faces before any flip change."""
-        parts, domain, term = self._parts, self._domain, self._term
+    def push_forward(self, change: SideChange) -> FloatArray:
+        """How the distances (n,) change with the sides and the places of points, after and before any flip."""
+        parts, domain, by_side = self._parts, self._domain, change.by_side
+        if change.by_given is None:
+            raise ValueError("known distances change with the sides of the faces before any flip")
         elements = self._elements.push_forward(by_side)
         of_face = domain.components[self.triangulation.F[:, 0]]
         of_h = np.bincount(of_face, (parts.mean_length_slopes * by_side).sum(axis=1), domain.n_components)
         by_t = self._steps_by_h * of_h
-        flow = self._flow_change(elements, by_side, by_t)
-        initial = np.bincount(term.vertex, flow.initial, domain.n)
+        flow = self._flow_change(elements, change, by_t)
+        initial: FloatArray = np.bincount(flow.vertex, flow.initial, domain.n)
         by_heat = self._flow.push_forward(initial, flow.product, flow.diagonal)
-        by_value = self._values.push_forward(by_side, by_given)
+        by_value = self._values.push_forward(by_side, SideChange(change.by_given, change.by_given_place))
         by_phi = self._poisson.solve(self._field.push_forward(elements, by_heat, self._at_vertices(by_value), by_t))
         return self._levels.push_forward(by_phi, by_heat, by_value, by_side, flow)[: domain.n_given]
 
@@ -129,11 +133,11 @@ class HeatDerivative:
             self._parts.flow_slopes, self._domain.components, by_weight, by_area, by_mass, by_side, by_t,
         )  # fmt: skip
 
-    def _flow_change(self, elements: ElementChange, by_side: FloatArray, by_t: FloatArray) -> FlowChange:
+    def _flow_change(self, elements: ElementChange, change: SideChange, by_t: FloatArray) -> FlowChange:
         """How the matrix of the heat flow and the initial heat change."""
         e, n, term, parts = self._elements, self._domain.n, self._term, self._parts
         of_weight, of_length, of_t = parts.flow_slopes
-        entry = of_weight * elements.weight + of_length * by_side
+        entry = of_weight * elements.weight + of_length * change.by_side
         entry += of_t * self._domain.expand_to_faces(by_t)[:, None]
         i, j, flat = e.i.ravel(), e.j.ravel(), entry.ravel()
 
@@ -143,20 +147,31 @@ class HeatDerivative:
 
         diagonal = elements.mass + np.bincount(i, flat, n) + np.bincount(j, flat, n)
         of_component = self._domain.components[term.vertex]
-        later = term.delay * (by_t / (2 * parts.time_steps))[of_component]
-        return FlowChange(term.heat_of(term.share) * later, product, diagonal)
+        vertex, label = term.vertex, term.label
+        initial = term.heat_of(term.share) * term.delay * (by_t / (2 * parts.time_steps))[of_component]
+        if change.by_place is not None:
+            corners, heat = self._points
+            vertex, label = np.append(vertex, corners), np.append(label, np.repeat(term.sources.points.label, 3))
+            initial = np.append(initial, heat[:, None] * change.by_place)
+        return FlowChange(vertex, label, initial, product, diagonal)
 
-    def _by_place(self, by_vertex: FloatArray, levels: LevelSlopes) -> FloatArray | None:
-        """The derivative (p, 3) by the coordinates of source points in the triangles that are solved on."""
+    @cached_property
+    def _points(self) -> tuple[IntArray, FloatArray]:
+        """The vertices (p, 3) that source points put heat on, and the heat (p,) of each."""
         points, term = self._term.sources.points, self._term
-        if not len(points.faces):
-            return None
         of_label = np.zeros(term.sources.n_labels)
         of_label[term.label] = term.heat_of(np.ones(len(term.label)))
         faces, _ = self.triangulation.locate(points.faces, points.barycentric)
-        corners = self.triangulation.F[faces]
+        return self.triangulation.F[faces], of_label[points.label]
+
+    def _by_place(self, by_vertex: FloatArray, levels: LevelSlopes) -> FloatArray | None:
+        """The derivative (p, 3) by the coordinates of source points in the triangles that are solved on."""
+        points = self._term.sources.points
+        if not len(points.faces):
+            return None
+        corners, heat = self._points
         by_heat = by_vertex[corners] + levels.by_part[corners] * levels.relative[points.label, None]
-        return np.asarray(of_label[points.label, None] * by_heat)
+        return np.asarray(heat[:, None] * by_heat)
 
     @property
     def _steps_by_h(self) -> FloatArray:

@@ -12,7 +12,7 @@ from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.operators import Surface
 from heat_igl.sources import SourceAssembler, SourceTerm
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.unfolding import PathLengths, from_lines
+from heat_igl.unfolding import PathLengths, SideChange, from_lines
 
 __all__ = ["KnownValues", "Spokes", "ValueSlopes", "spokes"]
 
@@ -98,13 +98,13 @@ class KnownValues:
             by_given, by_place = by_given + change.by_side, change.by_place
         return ValueSlopes(by_side, by_given, by_place)
 
-    def push_forward(self, by_side: FloatArray, by_given: FloatArray) -> FloatArray:
-        """How the values (k,) change when the sides of both triangulations change."""
+    def push_forward(self, by_side: FloatArray, given: SideChange) -> FloatArray:
+        """How the values (k,) change with the sides of the triangles, and with the faces before any flip."""
         change = np.zeros(len(self.value))
-        for of_sides, (side, which) in zip((by_side, by_given), self._edges, strict=True):
+        for of_sides, (side, which) in zip((by_side, given.by_side), self._edges, strict=True):
             change[which] = of_sides.ravel()[side]
         if self._lines is not None:
-            change[self._is_line] = self._lines.push_forward(by_given)[self.vertex[self._is_line]]
+            change[self._is_line] = self._lines.push_forward(given)[self.vertex[self._is_line]]
         return change
 
     def lengths(self) -> FloatArray:

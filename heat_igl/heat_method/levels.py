@@ -21,8 +21,10 @@ __all__ = ["FlowChange", "LevelSlopes", "PinnedLevels"]
 
 
 class FlowChange(NamedTuple):
-    """How the initial heat (e,) of a term's entries changes, the matrix A of the heat flow, and its diagonal (n,)."""
+    """How the heat flow changes: initial heat (e,) at vertices of sources, the matrix A, and its diagonal (n,)."""
 
+    vertex: IntArray
+    label: IntArray
     initial: FloatArray
     product: Callable[[FloatArray], FloatArray]
     diagonal: FloatArray
@@ -179,12 +181,12 @@ class PinnedLevels:
         term, anchors = self._term, self._term.anchors
         by_side = np.zeros(self._triangulation.l.size)
         is_taken = self._taken >= 0
-        by_value = np.bincount(self._taken[is_taken], g[is_taken], self._n_values)
+        by_value: FloatArray = np.bincount(self._taken[is_taken], g[is_taken], self._n_values)
         for end, side, which, sign in self._bounds:
             np.add.at(by_value, which, g[end])
             np.add.at(by_side, side, sign * g[end])
         by_phi = np.where(self._is_free, g, 0.0)
-        share = -np.bincount(self._components, by_phi, self._n_components)[self._anchor_component]
+        share: FloatArray = -np.bincount(self._components, by_phi, self._n_components)[self._anchor_component]
         share /= self._count[self._anchor_component]
         by_excess, by_heat, by_matrix = share, np.zeros(len(g)), None
         by_part = np.zeros(len(g))
@@ -211,8 +213,8 @@ class PinnedLevels:
         if self._weighted is not None:
             level = np.bincount(anchors.label, excess, len(self._of_label)) / self._of_label
             relative = (level - level[self._lowest])[term.label]
-            initial = flow.initial * self._relative[term.label] + self._heat * relative
-            initial = np.bincount(term.vertex, initial, len(by_phi))
+            initial: FloatArray = np.bincount(term.vertex, self._heat * relative, len(by_phi))
+            initial += np.bincount(flow.vertex, flow.initial * self._relative[flow.label], len(by_phi))
             weighted = self._weighted.push_forward(initial, flow.product, flow.diagonal)
             of_source = np.divide(
                 weighted - self._share * by_heat, self._u, out=np.zeros_like(by_phi), where=self._is_warm

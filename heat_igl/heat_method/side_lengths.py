@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from heat_igl.kernels import side_derivatives as kernels
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
 
-__all__ = ["SideLengths"]
+__all__ = ["SideLengths", "SidesOfMesh"]
+
+
+class SidesOfMesh(Protocol):
+    """The lengths of the sides of a mesh's faces as functions of the positions of the vertices."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh."""
+
+    def by_positions(self, by_side: FloatArray) -> FloatArray:
+        """The derivative (n, 3) by the positions, from that by the lengths (m, 3)."""
+
+    def push_positions(self, dV: FloatArray) -> FloatArray:
+        """How the lengths (m, 3) change when the vertices move by dV (n, 3)."""
 
 
 class SideLengths:

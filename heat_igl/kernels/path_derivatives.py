@@ -37,11 +37,13 @@ def _piece(
     slope: cython.pointer[cython.double],
     tangent: cython.pointer[cython.const[cython.double]],
     at_end: cython.pointer[cython.double],
+    end_moves: cython.pointer[cython.const[cython.double]],
 ) -> cython.double:
     """One piece of a line in a face with sides `side`, from one place to another: the derivative of its length.
 
     Added to `slope` (3,) by the sides, times `weight`, and to `at_end` (3,) by the coordinates of the other place, if
-    they are given; returned for the sides' own derivative, `tangent` (3,), if that is given.
+    they are given; returned for changes of the sides, `tangent` (3,), and of these coordinates, `end_moves` (3,), if
+    they are given.
     """
     d: Place
     c: cython.int
@@ -63,6 +65,8 @@ def _piece(
             total += by_side * tangent[c]
         if at_end != cython.NULL:
             at_end[c] -= 0.5 * weight * per_length * (d.c[i] * side[k] ** 2 + d.c[k] * side[i] ** 2)
+        if end_moves != cython.NULL:
+            total -= 0.5 * per_length * (d.c[i] * side[k] ** 2 + d.c[k] * side[i] ** 2) * end_moves[c]
     return total
 
 
@@ -75,12 +79,14 @@ def _along(
     slope: cython.pointer[cython.double],
     tangent: cython.pointer[cython.const[cython.double]],
     at_end: cython.pointer[cython.double],
+    end_moves: cython.pointer[cython.const[cython.double]],
 ) -> cython.double:
-    """All pieces of the line that was followed; as `_piece`, with `slope` and `tangent` of all sides."""
+    """All pieces of the line that was followed; as `_piece`, with the arrays of all sides and source points."""
     one: Place
     other: Place
     total: cython.double = 0.0
     none: cython.pointer[cython.double] = cython.NULL
+    nowhere: cython.pointer[cython.const[cython.double]] = cython.NULL
     of_face: cython.pointer[cython.double] = cython.NULL
     tangent_of_face: cython.pointer[cython.const[cython.double]] = cython.NULL
     j: cython.int
@@ -98,7 +104,9 @@ def _along(
         if tangent != cython.NULL:
             tangent_of_face = tangent + f
         sides = cython.address(lines.length[f])
-        total += _piece(sides, cython.address(one), cython.address(other), weight, of_face, tangent_of_face, none)
+        total += _piece(
+            sides, cython.address(one), cython.address(other), weight, of_face, tangent_of_face, none, nowhere
+        )
         # The same place in the face behind.
         f = gate.enter - gate.enter % 3
         one.c[0] = one.c[1] = one.c[2] = 0.0
@@ -115,9 +123,14 @@ def _along(
         place = at_end + 3 * lines.end.entry
         if lines.end.entry < 0:
             place = none
+    moves = end_moves
+    if end_moves != cython.NULL:
+        moves = end_moves + 3 * lines.end.entry
+        if lines.end.entry < 0:
+            moves = nowhere
     sides = cython.address(lines.length[f])
     return total + _piece(
-        sides, cython.address(one), cython.address(lines.end.at), weight, of_face, tangent_of_face, place
+        sides, cython.address(one), cython.address(lines.end.at), weight, of_face, tangent_of_face, place, moves
     )
 
 
@@ -163,7 +176,7 @@ def pull_back(
             if not lines.follow(v):
                 is_lost[v] = True
                 continue
-            _along(lines, weight[v], cython.address(by_side[0]), cython.NULL, at_end)
+            _along(lines, weight[v], cython.address(by_side[0]), cython.NULL, at_end, cython.NULL)
             weight[lines.end.row] += weight[v]
 
 
@@ -173,17 +186,22 @@ def push_forward(
     ways,
     order: cython.const[cython.int][::1],
     tangent: cython.const[cython.double][::1],
+    moves: cython.const[cython.double][:, ::1],
     change: cython.double[::1],
     is_lost: cython.uchar[::1],
 ):
     """The derivative of all path lengths, `change` (n + e,), for sides that change by `tangent` (3 m,).
 
-    `change` is what the sources' offsets change by before. Arguments as for `pull_back`.
+    The source points' coordinates change by `moves` (e, 3). `change` is what the sources' offsets change by before.
+    Other arguments as for `pull_back`.
     """
     lines = Lines(triangles, points, ways)
+    end_moves: cython.pointer[cython.const[cython.double]] = cython.NULL
     i: cython.Py_ssize_t
     v: cython.int
     with cython.nogil:
+        if moves.shape[0] > 0:
+            end_moves = cython.address(moves[0, 0])
         for i in range(order.shape[0]):
             v = order[i]
             if lines.kind[v] == AT_SOURCE:
@@ -191,5 +209,5 @@ def push_forward(
             if not lines.follow(v):
                 is_lost[v] = True
                 continue
-            change[v] = _along(lines, 1.0, cython.NULL, cython.address(tangent[0]), cython.NULL)
+            change[v] = _along(lines, 1.0, cython.NULL, cython.address(tangent[0]), cython.NULL, end_moves)
             change[v] += change[lines.end.row]
