@@ -311,20 +311,13 @@ def test_velocities_that_cannot_be_used() -> None:
     _, pull_back = HeatMethodSolver(mesh, refine="unfold").distance_vjp(0)
     with pytest.raises(ValueError, match=r"dV must be \(289, 3\) finite numbers"):
         pull_back.push_forward(np.ones(3))
-    _, of_heat = HeatMethodSolver(mesh, laplacian="cotan").distance_vjp(0)
-    with pytest.raises(ValueError, match="directional derivatives are there for distances by paths"):
-        of_heat.push_forward(mesh.V)
 
 
 def refused() -> list[Any]:
     curve = heat_igl.SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]])
-    point = SurfacePoints([3], [[0.2, 0.3, 0.5]])
     return [
         pytest.param({"refine": "exact"}, curve, "a curve is among them", id="curve"),
         pytest.param({"refine": "sweep"}, 0, "finds no paths to differentiate", id="sweep"),
-        pytest.param({"laplacian": "cotan"}, point, "points are among the sources", id="point"),
-        pytest.param({"laplacian": "cotan"}, OffsetSources([0, 9], [0, 0.1]), "some have offsets", id="offsets"),
-        pytest.param({"laplacian": "cotan", "boundary": "average"}, 0, "not 'average'", id="boundary"),
         pytest.param({"laplacian": "cotan", "backend": "iterative"}, 0, "cannot solve the adjoint", id="backend"),
         pytest.param({"laplacian": "intrinsic-delaunay-refined"}, 0, "more vertices than the mesh", id="refined"),
     ]
@@ -336,13 +329,6 @@ def test_what_has_no_derivative_is_refused(options: dict[str, Any], sources: Any
     mesh = moved(shapes.grid(40)) if options.get("refine") == "sweep" else MESHES["grid"]()
     with pytest.raises(ValueError, match=message):
         HeatMethodSolver(mesh, **options).distance_vjp(sources)
-
-
-def test_sources_at_a_shared_edge_are_refused() -> None:
-    solver = HeatMethodSolver(MESHES["book"](), laplacian="intrinsic-delaunay")
-    with pytest.raises(ValueError, match="next to an edge of more than two faces"):
-        solver.distance_vjp(5)
-    assert solver.distance_vjp(150)[1](np.ones(solver.n_vertices)).any()
 
 
 @pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")

@@ -1,8 +1,8 @@
 """Derivatives of an answer by the positions of the vertices, by edge lengths, by the sources and by the time step.
 
 All of them go by the lengths of the sides of the triangles that the answer was found on. From the answer to these
-lengths lead paths (`heat_igl.unfolding.path_lengths`) or the adjoint of the heat method
-(`heat_igl.heat_method.adjoint`), from there to the edges of the mesh the flips
+lengths lead paths (`heat_igl.unfolding.path_lengths`) or the steps of the heat method
+(`heat_igl.heat_method.heat_derivative`), from there to the edges of the mesh the flips
 (`heat_igl.intrinsic.length_derivatives`); the positions follow here.
 docs/derivatives.md derives each step.
 """
@@ -15,14 +15,14 @@ from typing import Protocol
 import numpy as np
 
 from heat_igl.errors import MeshError
+from heat_igl.heat_method.side_lengths import SidesOfMesh
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
-from heat_igl.intrinsic.length_derivatives import PlaceSlopes, carry_lengths, carry_lengths_back, check_carried
-from heat_igl.kernels import side_derivatives as kernels
-from heat_igl.mesh import Mesh
-from heat_igl.operators import Surface
+from heat_igl.intrinsic.length_derivatives import carry_lengths, carry_lengths_back, check_carried
+from heat_igl.intrinsic.place_derivatives import PlaceSlopes
+from heat_igl.operators import MetricSides, Surface
 from heat_igl.sources import SourceSet
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
-from heat_igl.unfolding import Change
+from heat_igl.unfolding import Change, SideChange
 
 __all__ = ["DistanceDerivative", "SidesDerivative"]
 
@@ -41,8 +41,8 @@ class SidesDerivative(Protocol):
     def pull_back(self, g: FloatArray) -> Change:
         """The derivative of the sum of distances times g (n,), finite."""
 
-    def push_forward(self, by_side: FloatArray) -> FloatArray:
-        """How the distances (n,) change when the sides (m, 3) change by `by_side`."""
+    def push_forward(self, change: SideChange) -> FloatArray:
+        """How the distances (n,) change with the sides and the places of source points."""
 
     def lengths(self) -> FloatArray:
         """The distances (n,) that are differentiated; any number at unreachable vertices."""
@@ -65,13 +65,17 @@ class DistanceDerivative:
     """
 
     def __init__(
-        self, distance: FloatArray, sources: SourceSet, surface: Surface, mesh: Mesh | None, answer: SidesDerivative
+        self,
+        distance: FloatArray,
+        sources: SourceSet,
+        surface: Surface,
+        sides: SidesOfMesh | None,
+        answer: SidesDerivative,
     ) -> None:
-        self.distance, self._sources, self._mesh, self._answer = distance, sources, mesh, answer
+        self.distance, self._sources, self._sides, self._answer = distance, sources, sides, answer
         if surface.faces is None:
             raise ValueError("the faces before any flip are not known: make the solver from a mesh or edge lengths")
         self._faces = surface.faces
-        self._given = surface.given_faces
         check_carried(answer.triangulation)
         self.unreachable: IntArray = np.flatnonzero(np.isinf(distance))
 
@@ -96,8 +100,8 @@ class DistanceDerivative:
         MeshError
             If the solver has no vertices to move: it was made from edge lengths or operators.
         """
-        mesh = self._positions()
-        result = [self._to_positions(mesh, self._by_sides(row)[0]) for row in self._rows(g)]
+        sides = self._positions()
+        result = [sides.by_positions(self._on_given_faces(self._by_sides(row)[0])) for row in self._rows(g)]
         return np.stack(result) if np.ndim(g) == 2 else result[0]
 
     def by_lengths(self, g: ArrayLike) -> FloatArray:
@@ -131,32 +135,46 @@ class DistanceDerivative:
         MeshError
             If the solver has no positions.
         """
-        mesh = self._positions()
+        slopes = self._place_slopes
         (row,) = self._rows(g, 1)
         _, by_place = self._by_sides(row)
-        points = self._sources.points
-        if by_place is None:
-            return np.zeros((len(points.faces), 3))
-        corners = mesh.V[mesh.F[points.faces]]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        per_area = 1 / np.einsum("px,px->p", normal, normal)
-        opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
-        # A coordinate rises by the height of its corner.
-        slopes = np.cross(normal[:, None], opposite) * per_area[:, None, None]
-        return np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
+        return np.zeros((0, 3)) if by_place is None else np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
 
     def by_time_step(self, g: ArrayLike) -> float:
         """The derivative by the time step t, all else fixed; 0 with ``refine``, which takes an order from the heat."""
         (row,) = self._rows(g, 1)
         return self._answer.pull_back(row).by_t
 
-    def push_forward(self, dV: ArrayLike) -> FloatArray:
-        """The directional derivative of all distances: how they change when the vertices move.
+    def by_metric(self, g: ArrayLike) -> FloatArray:
+        """The gradient by the metric, (m, 3, 3) or (m, 2, 2) as it was given to `metric_operators`; `g` (n,).
+
+        Symmetric on each face. Raises a ValueError without a metric, and if g has another shape or is not finite.
+        """
+        metric = self._metric("metric_operators(mesh, metric)")
+        (row,) = self._rows(g, 1)
+        return metric.by_metric(self._on_given_faces(self._by_sides(row)[0]))
+
+    def by_speed(self, g: ArrayLike) -> FloatArray:
+        """The gradient (m,) by the speeds that were given to `speed_operators`; `g` (n,), errors as for `by_metric`."""
+        metric = self._metric("speed_operators(mesh, speed)")
+        (row,) = self._rows(g, 1)
+        return metric.by_speed(self._on_given_faces(self._by_sides(row)[0]))
+
+    def _metric(self, function: str) -> MetricSides:
+        if not isinstance(self._sides, MetricSides):
+            raise ValueError(f"the solver knows no metric to change: make it with from_operators({function})")
+        return self._sides
+
+    def push_forward(self, dV: ArrayLike, points: ArrayLike | None = None) -> FloatArray:
+        """The directional derivative of all distances: how they change when the vertices and the source points move.
 
         Parameters
         ----------
         dV : (n, 3) array_like
             Velocity of each vertex.
+        points : (p, 3) array_like, optional
+            Velocity of each source that is a point in a face, in the plane of the face and relative to it. Points
+            keep their barycentric coordinates if it is not given.
 
         Returns
         -------
@@ -166,28 +184,40 @@ class DistanceDerivative:
         Raises
         ------
         ValueError
-            If dV has another shape or is not finite, or without ``refine``.
+            If dV or points have another shape or are not finite.
         MeshError
             If the solver has no vertices to move.
         """
-        mesh = self._positions()
-        moved = np.asarray(dV, np.float64)
-        if moved.shape != mesh.V.shape or not np.isfinite(moved).all():
-            raise ValueError(
-                f"dV must be {mesh.V.shape} finite numbers, one velocity per vertex; it has shape {moved.shape}"
-            )
-        directions, following, preceding = self._sides
-        by_side = np.einsum("mcx,mcx->mc", directions, moved[preceding] - moved[following])
-        return self.push_lengths_forward(by_side)
+        sides, places = self._positions(), self._sources.points
+        moved = _velocities("dV", dV, sides.mesh.V.shape, "vertex")
+        by_side = self._on_faces(sides.push_positions(moved))
+        n_before, triangulation = len(self._faces.history), self._answer.triangulation
+        if not len(places.faces):
+            on_answer, _ = carry_lengths(triangulation, by_side, n_before)
+            change = SideChange(on_answer, None, by_side)
+        else:
+            by_place = np.zeros((len(places.faces), 3))
+            if points is not None:
+                velocity = _velocities("points", points, by_place.shape, "source point")
+                by_place = np.einsum("pcx,px->pc", self._place_slopes, velocity)
+            given = PlaceSlopes(places.faces, places.barycentric, by_place)
+            _, before = carry_lengths(self._faces, by_side, n_before, given)
+            on_answer, after = carry_lengths(triangulation, by_side, n_before, given)
+            change = SideChange(on_answer, after, by_side, before)
+        result = self._answer.push_forward(change)
+        result[self.unreachable] = 0.0
+        return result
 
-    def push_lengths_forward(self, by_side: FloatArray) -> FloatArray:
-        """How the distances (n,) change when the sides (m, 3) of the mesh's faces, each there once, change."""
-        if len(self._sources.points.faces):
-            raise ValueError(
-                "directional derivatives are there for source vertices: multiply with the gradient instead"
-            )
-        on_answer = carry_lengths(self._answer.triangulation, by_side, len(self._faces.history))
-        return self._answer.push_forward(on_answer)
+    @property
+    def _place_slopes(self) -> FloatArray:
+        """The slopes (p, 3, 3) of the coordinates of each source point in the plane of its face, in space."""
+        mesh, points = self._positions().mesh, self._sources.points
+        corners = mesh.V[mesh.F[points.faces]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        per_area = 1 / np.einsum("px,px->p", normal, normal)
+        opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+        # A coordinate rises by the height of its corner.
+        return np.asarray(np.cross(normal[:, None], opposite) * per_area[:, None, None])
 
     @cached_property
     def inexact(self) -> IntArray:
@@ -200,13 +230,13 @@ class DistanceDerivative:
         distance = self.distance[reached]
         return np.asarray(reached[np.abs(self._answer.lengths()[reached] - distance) > _SAME * distance])
 
-    def _positions(self) -> Mesh:
-        if self._mesh is None:
+    def _positions(self) -> SidesOfMesh:
+        if self._sides is None:
             raise MeshError(
                 "the solver was made without positions, so there are no vertices to move: use by_lengths for the "
                 "derivative by edge lengths"
             )
-        return self._mesh
+        return self._sides
 
     def _rows(self, g: ArrayLike, most: int = 2) -> FloatArray:
         """`g` as rows (k, n), 0 at unreachable vertices."""
@@ -228,34 +258,42 @@ class DistanceDerivative:
         places = None if change.by_place is None else PlaceSlopes(points.faces, points.barycentric, change.by_place)
         triangulation, n_before = self._answer.triangulation, len(self._faces.history)
         by_side, by_place = carry_lengths_back(triangulation, change.by_side, n_before, places)
-        return by_side if change.by_given is None else by_side + change.by_given, by_place
-
-    def _to_positions(self, mesh: Mesh, by_side: FloatArray) -> FloatArray:
-        """The derivative (n, 3) by the positions, from that by the sides (m, 3)."""
-        by_position = np.zeros((mesh.n_vertices, 3))
-        kernels.pull_to_positions(self._faces.F, mesh.V, by_side, by_position)
-        return by_position
+        if change.by_given is not None:
+            by_side = by_side + change.by_given
+        if change.by_given_place is not None:
+            direct = PlaceSlopes(points.faces, points.barycentric, change.by_given_place)
+            by_given_place = carry_lengths_back(self._faces, np.zeros_like(by_side), n_before, direct)[1]
+            by_place = by_given_place if by_place is None else by_place + by_given_place
+        return by_side, by_place
 
     @cached_property
-    def _sides(self) -> tuple[FloatArray, IntArray, IntArray]:
-        """Unit vectors (m, 3, 3) along the sides of the faces, and the vertices (m, 3) that they lead from and to.
-
-        A side without length has no direction, and none is taken.
-        """
-        mesh, F = self._positions(), self._faces.F
-        following, preceding = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
-        along = mesh.V[preceding] - mesh.V[following]
-        length = np.sqrt(np.einsum("mcx,mcx->mc", along, along))
-        return along / np.where(length > 0, length, 1.0)[..., None], following, preceding
+    def _merged(self) -> Merged | None:
+        """The change that removed faces which were there twice; None if there were none."""
+        history = self._faces.history
+        return history[0] if history and isinstance(history[0], Merged) else None
 
     def _on_given_faces(self, by_side: FloatArray) -> FloatArray:
         """The derivative by the sides of the faces that the user gave, some of which may be there twice."""
-        if not self._faces.history or self._given is None:
+        if self._merged is None:
             return by_side
-        merged = self._faces.history[0]
-        if not isinstance(merged, Merged):
-            return by_side
-        kept, which = np.unique(merged.face, return_index=True)
-        on_given = np.zeros((len(merged.face), 3))
-        on_given[which] = np.take_along_axis(by_side[kept], merged.corner[which], axis=1)
+        kept, which = np.unique(self._merged.face, return_index=True)
+        on_given = np.zeros((len(self._merged.face), 3))
+        on_given[which] = np.take_along_axis(by_side[kept], self._merged.corner[which], axis=1)
         return on_given
+
+    def _on_faces(self, by_side: FloatArray) -> FloatArray:
+        """Changes of the sides (m, 3) of the faces that the user gave, for each face once."""
+        if self._merged is None:
+            return by_side
+        kept, which = np.unique(self._merged.face, return_index=True)
+        on_faces = np.zeros((len(kept), 3))
+        np.put_along_axis(on_faces, self._merged.corner[which], by_side[which], axis=1)
+        return on_faces
+
+
+def _velocities(name: str, given: ArrayLike, shape: tuple[int, ...], of: str) -> FloatArray:
+    """Velocities as finite float64 of the given shape."""
+    array = np.asarray(given, np.float64)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be {shape} finite numbers, one velocity per {of}; it has shape {array.shape}")
+    return array

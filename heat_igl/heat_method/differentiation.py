@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.heat_method.adjoint import HeatAdjoint
 from heat_igl.heat_method.derivatives import DistanceDerivative, SidesDerivative
+from heat_igl.heat_method.heat_derivative import HeatDerivative
 from heat_igl.heat_method.parts import SolverParts
+from heat_igl.heat_method.side_lengths import SideLengths
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.sources import SourceSet, right_hand_side
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import UnfoldingSolver
+from heat_igl.unfolding import FrontSolver, UnfoldingSolver
 
 __all__ = ["differentiated"]
 
@@ -25,7 +26,7 @@ def differentiated(
     distance : (n,) float64
         The answer.
     sources : SourceSet
-        Vertices and, with ``refine``, points in faces.
+        Vertices and points in faces.
     parts : SolverParts
         Of the solver that gave the answer.
     mesh : Mesh, PointCloud or None
@@ -35,10 +36,14 @@ def differentiated(
     ------
     ValueError
         If the domain is no surface of triangles, if a curve is among the sources, with ``refine="sweep"``, or where
-        vertices were added. Without ``refine`` also for points in faces, sources with offsets, a boundary condition
-        other than "neumann", and the iterative backend.
+        vertices were added; and for what `HeatDerivative` refuses.
     """
     surface = parts.operators.surface
+    if isinstance(parts.last_steps, FrontSolver) and parts.operators.is_surface:
+        raise ValueError(
+            "fronts through faces that see their edges at several lengths have no derivative: let the metric or the "
+            "speed change by less than 10 % from face to face"
+        )
     if surface is None or isinstance(mesh, PointCloud):
         raise ValueError("derivatives need a surface of triangles: this domain has none, or is a point cloud")
     if len(sources.segments.faces):
@@ -51,5 +56,6 @@ def differentiated(
             u = parts.heat_flow.solve(right_hand_side(parts.operators.n, [term]))[:, 0]
         answer = parts.last_steps.paths(sources, u)
     else:
-        answer = HeatAdjoint(parts, sources)
-    return distance, DistanceDerivative(distance, sources, surface, mesh, answer)
+        answer = HeatDerivative(parts, sources)
+    sides = parts.operators.metric if mesh is None else SideLengths(mesh)
+    return distance, DistanceDerivative(distance, sources, surface, sides, answer)

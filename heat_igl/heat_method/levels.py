@@ -1,31 +1,33 @@
 """The level of the integrated distance and the values known beside the sources, with their derivatives.
 
-`Integration.pin_levels` for sources that are vertices, step by step, remembering which value decided at each vertex.
+`Integration.pin_levels` step by step, remembering which value decided at each vertex.
 """
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
+from heat_igl.heat_method.integration import HEAT_ERROR
+from heat_igl.heat_method.known_values import KnownValues, spokes
 from heat_igl.heat_method.parts import SolverParts
-from heat_igl.intrinsic import IntrinsicTriangulation
-from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
-from heat_igl.sources import SourceTerm, right_hand_side
+from heat_igl.sources import SourceTerm, right_hand_side, take_shorter
+from heat_igl.steps import FlowDerivative, MatrixSlopes
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["LevelSlopes", "PinnedLevels"]
+__all__ = ["FlowChange", "LevelSlopes", "PinnedLevels"]
 
 
-class _Spokes(NamedTuple):
-    """Sides (k,) at known vertices: the position of the vertex among the known, the other end, the length."""
+class FlowChange(NamedTuple):
+    """How the heat flow changes: initial heat (e,) at vertices of sources, the matrix A, and its diagonal (n,)."""
 
-    side: IntArray
-    which: IntArray
-    end: IntArray
-    length: FloatArray
+    vertex: IntArray
+    label: IntArray
+    initial: FloatArray
+    product: Callable[[FloatArray], FloatArray]
+    diagonal: FloatArray
 
 
 class LevelSlopes(NamedTuple):
@@ -33,33 +35,49 @@ class LevelSlopes(NamedTuple):
 
     Attributes
     ----------
-    by_phi : (n,) float64
-        By the integrated phi, before its level is known.
-    by_heat : (n,) float64
-        By the heat.
-    pair : tuple of two (n,) float64, or None
-        The adjoint and the solution of one more heat solve, with several sources.
-    by_side, by_given : (m, 3), (m', 3) float64
-        By the sides of the triangles that are solved on, and of the faces before any flip, or None where those do not
-        count.
+    by_phi, by_heat : (n,) float64
+        By the integrated phi, before its level is known, and by the heat.
+    by_value : (k,) float64
+        By the known values.
+    by_side : (m, 3) float64
+        By the sides of the triangles that are solved on.
+    by_matrix : MatrixSlopes or None
+        By the matrix of the heat flow directly, with several sources.
+    by_part : (n,) float64
+        By the initial heat of a further heat flow: that of each source times its share of `relative`.
+    relative : (n_labels,) float64
+        The level of each source above the lowest.
     """
 
     by_phi: FloatArray
     by_heat: FloatArray
-    pair: tuple[FloatArray, FloatArray] | None
+    by_value: FloatArray
     by_side: FloatArray
-    by_given: FloatArray | None
+    by_matrix: MatrixSlopes | None
+    by_part: FloatArray
+    relative: FloatArray
+
+
+class _Bound(NamedTuple):
+    """Vertices (k,) that a side ties to a known value, and whether the length of the side is added or subtracted."""
+
+    end: IntArray
+    side: IntArray
+    which: IntArray
+    sign: float
 
 
 class PinnedLevels:
-    """Distance from phi, as `Integration.pin_levels` finds it from source vertices.
+    """Distance from phi, as `Integration.pin_levels` finds it.
 
     Parameters
     ----------
     parts : SolverParts
         Of the solver.
     term : SourceTerm
-        Source vertices without offsets.
+        Vertices and points, without those that others overtake.
+    values : KnownValues
+        Of the same term.
     phi, u : (n,) float64
         The integrated phi, and the heat.
 
@@ -69,131 +87,143 @@ class PinnedLevels:
         The answer, 0 where no source is reached.
     """
 
-    def __init__(self, parts: SolverParts, term: SourceTerm, phi: FloatArray, u: FloatArray) -> None:
-        domain = parts.operators
-        surface = domain.surface
-        if surface is None or surface.faces is None:
-            raise ValueError("levels are differentiated on triangles whose faces before any flip are known")
-        self._triangulations = surface.triangulation, surface.faces
-        self._parts, self._term, self._u = parts, term, u
+    def __init__(
+        self, parts: SolverParts, term: SourceTerm, values: KnownValues, phi: FloatArray, u: FloatArray
+    ) -> None:
+        domain, surface = parts.operators, parts.operators.surface
+        if surface is None:
+            raise ValueError("levels are differentiated on triangles")
+        self._parts, self._term, self._u, self._triangulation = parts, term, u, surface.triangulation
         self._components, self._n_components = domain.components, domain.n_components
-        anchors = term.anchors
-        component = self._components[anchors.vertex]
-        self._count = np.maximum(np.bincount(component, minlength=self._n_components), 1)
+        anchors, near, n_near = term.anchors, term.near, len(term.near.vertex)
+        self._anchor_component = self._components[anchors.vertex]
+        self._count = np.maximum(np.bincount(self._anchor_component, minlength=self._n_components), 1)
+        place = np.full(len(phi), -1)
+        place[near.vertex] = np.arange(n_near)
+        self._place, self._n_values = place, len(values.vertex)
         excess = phi[anchors.vertex] - anchors.value
-        self._weighted, of_source = self._levels_of_sources(excess), np.zeros(len(phi))
-        if self._weighted is not None:
-            of_source = self._weighted / u
-        rest = np.bincount(component, excess - of_source[anchors.vertex], self._n_components) / self._count
-        reached = np.isin(self._components, self._components[term.near.vertex])
+        of_source = self._levels_of_sources(excess)
+        rest = np.bincount(self._anchor_component, excess - of_source[anchors.vertex], self._n_components) / self._count
+        reached = np.isin(self._components, self._components[near.vertex])
+        start = np.full(self._n_components, np.inf)
+        np.minimum.at(start, self._components[near.vertex], near.value)
+        begin = np.where(reached, start[self._components], 0.0)
         distance = np.where(reached, phi - of_source - rest[self._components], 0.0)
-        self._is_free = reached & (distance > 0)
-        np.maximum(distance, 0.0, out=distance)
-        self._bounded: list[tuple[IntArray, IntArray, IntArray, float]] = []
-        if parts.t_damping is not None:
+        #: Which known value a vertex takes over, and which vertices phi decides at.
+        self._taken = np.full(len(phi), -1)
+        lowest = np.full(self._n_components, -1)
+        order = np.argsort(-near.value, kind="stable")
+        lowest[self._components[near.vertex[order]]] = order
+        below = reached & (distance <= begin)
+        self._taken[below] = lowest[self._components[below]]
+        np.maximum(distance, begin, out=distance)
+        shorter = np.flatnonzero(take_shorter(distance, term.far, HEAT_ERROR, begin))
+        self._taken[term.far.vertex[shorter]] = n_near + shorter
+        self._bounds: list[_Bound] = []
+        if parts.t_damping is not None or not term.sources.on_vertices_alone:
             self._bound(distance)
-        distance[term.near.vertex] = term.near.value
-        self._is_free[term.near.vertex] = False
+        distance[near.vertex] = near.value
+        self._taken[near.vertex] = np.arange(n_near)
+        self._bounds = [self._without(bound, near.vertex) for bound in self._bounds]
+        self._is_free: BoolArray = reached & (self._taken < 0)
+        for bound in self._bounds:
+            self._is_free[bound.end] = False
         self.distance = distance
 
-    def _levels_of_sources(self, excess: FloatArray) -> FloatArray | None:
-        """Heat (n,) weighted by the level of the source that it comes from; None with one source."""
+    def _levels_of_sources(self, excess: FloatArray) -> FloatArray:
+        """The level (n,) of the source that the heat at a vertex comes from; 0 with one source."""
         term = self._term
+        self._weighted: FlowDerivative | None = None
+        self._relative = np.zeros(term.sources.n_labels)
         count = np.bincount(term.anchors.label, minlength=term.sources.n_labels)
         if np.count_nonzero(count) < 2:
-            return None
-        level = np.bincount(term.anchors.label, excess, len(count)) / np.maximum(count, 1)
-        heat = right_hand_side(len(self._u), [term], [term.share * level[term.label]])
-        return np.asarray(self._parts.heat_flow.solve(heat)[:, 0])
+            return np.zeros_like(self._u)
+        self._of_label = np.maximum(count, 1)
+        level = np.bincount(term.anchors.label, excess, len(count)) / self._of_label
+        # Relative to the lowest, the only level where no heat arrives.
+        self._heat = np.where(count > 0, 1.0, 0.0)[term.label] * term.heat_of(term.share)
+        self._lowest = int(np.argmin(np.where(count > 0, level, np.inf)))
+        self._relative = np.where(count > 0, level - level[self._lowest], 0.0)
+        domain = self._parts.operators
+        heat = right_hand_side(domain.n, [term], [term.share * self._relative[term.label]])[:, 0]
+        self._weighted = FlowDerivative(self._parts.heat_flow, domain, heat)
+        self._is_warm = self._u > 0
+        self._share = np.divide(self._weighted.u, self._u, out=np.zeros_like(self._u), where=self._is_warm)
+        return np.asarray(level[self._lowest] + self._share)
 
     def _bound(self, distance: FloatArray) -> None:
         """Change distances by no more than the lengths of edges from the known ones; remember where that decides."""
         near = self._term.near
-        spokes = _spokes(self._triangulations[0], near.vertex)
+        side, which, end, length = spokes(self._triangulation, near.vertex)
         for sign in (-1.0, 1.0):
-            bound = sign * near.value[spokes.which] + spokes.length
+            bound = sign * near.value[which] + length
             order = np.argsort(-bound, kind="stable")
             best = np.full(len(distance), -1)
-            best[spokes.end[order]] = order
+            best[end[order]] = order
             ends = np.flatnonzero(best >= 0)
             chosen = best[ends]
             limit = sign * bound[chosen]
             beyond = sign * (distance[ends] - limit) > 0
-            distance[ends[beyond]] = limit[beyond]
-            self._is_free[ends[beyond]] = False
-            self._bounded = [(e[k], s[k], w[k], g) for e, s, w, g in self._bounded for k in [~np.isin(e, ends[beyond])]]
-            self._bounded.append((ends[beyond], spokes.side[chosen[beyond]], spokes.which[chosen[beyond]], sign))
+            ends, chosen = ends[beyond], chosen[beyond]
+            distance[ends] = limit[beyond]
+            self._taken[ends] = -1
+            self._bounds = [self._without(other, ends) for other in self._bounds]
+            self._bounds.append(_Bound(ends, side[chosen], which[chosen], sign))
+
+    @staticmethod
+    def _without(bound: _Bound, vertices: IntArray) -> _Bound:
+        """A bound where none of some vertices is tied."""
+        kept = ~np.isin(bound.end, vertices)
+        return _Bound(bound.end[kept], bound.side[kept], bound.which[kept], bound.sign)
 
     def pull_back(self, g: FloatArray) -> LevelSlopes:
         """The derivative of the sum of distances times g (n,)."""
         term, anchors = self._term, self._term.anchors
-        sides = np.zeros(self._triangulations[0].l.size)
-        by_value = g[term.near.vertex].copy()
-        is_near = np.zeros(len(g), bool)
-        is_near[term.near.vertex] = True
-        for ends, side, which, sign in self._bounded:
-            of_end = np.where(is_near[ends], 0.0, g[ends])
-            np.add.at(by_value, which, of_end)
-            np.add.at(sides, side, sign * of_end)
-        free = np.where(self._is_free, g, 0.0)
-        component = self._components[anchors.vertex]
-        share = -np.bincount(self._components, free, self._n_components)[component] / self._count[component]
-        by_phi, by_excess = free.copy(), share
-        by_heat, pair = np.zeros(len(g)), None
+        by_side = np.zeros(self._triangulation.l.size)
+        is_taken = self._taken >= 0
+        by_value: FloatArray = np.bincount(self._taken[is_taken], g[is_taken], self._n_values)
+        for end, side, which, sign in self._bounds:
+            np.add.at(by_value, which, g[end])
+            np.add.at(by_side, side, sign * g[end])
+        by_phi = np.where(self._is_free, g, 0.0)
+        share: FloatArray = -np.bincount(self._components, by_phi, self._n_components)[self._anchor_component]
+        share /= self._count[self._anchor_component]
+        by_excess, by_heat, by_matrix = share, np.zeros(len(g)), None
+        by_part = np.zeros(len(g))
         if self._weighted is not None:
-            by_source = -free
+            by_source = -by_phi
             np.add.at(by_source, anchors.vertex, -share)
-            with np.errstate(over="ignore"):
-                adjoint = self._parts.heat_flow.solve(by_source / self._u)
-            by_heat = -by_source * (self._weighted / self._u) / self._u
-            pair = adjoint, self._weighted
-            heat = right_hand_side(len(g), [term])[:, 0]
-            by_level = np.bincount(term.label, adjoint[term.vertex] * heat[term.vertex], term.sources.n_labels)
-            count = np.maximum(np.bincount(anchors.label, minlength=term.sources.n_labels), 1)
-            by_excess = share + (by_level / count)[anchors.label]
+            of_share = np.divide(by_source, self._u, out=np.zeros(len(g)), where=self._is_warm)
+            by_heat = -of_share * self._share
+            by_part, by_matrix = self._weighted.pull_back(of_share)
+            by_level = np.bincount(term.label, by_part[term.vertex] * self._heat, term.sources.n_labels)
+            by_level[self._lowest] += by_source.sum() - by_level.sum()
+            by_excess = share + (by_level / self._of_label)[anchors.label]
         np.add.at(by_phi, anchors.vertex, by_excess)
-        place = np.full(len(g), -1)
-        place[term.near.vertex] = np.arange(len(term.near.vertex))
-        np.add.at(by_value, place[anchors.vertex], -by_excess)
-        # The edges whose lengths the known distances are.
-        (on_triangles, place), (on_faces, place_before) = self._sides_of_values
-        np.add.at(sides, on_triangles, by_value[place])
-        by_given = None
-        if len(on_faces):
-            by_given = np.zeros(self._triangulations[1].l.shape)
-            np.add.at(by_given.ravel(), on_faces, by_value[place_before])
-        return LevelSlopes(by_phi, by_heat, pair, sides.reshape(-1, 3), by_given)
+        np.add.at(by_value, self._place[anchors.vertex], -by_excess)
+        return LevelSlopes(by_phi, by_heat, by_value, by_side.reshape(-1, 3), by_matrix, by_part, self._relative)
 
-    @cached_property
-    def _sides_of_values(self) -> list[tuple[IntArray, IntArray]]:
-        """In either triangulation, sides from sources whose lengths are known distances, and which of these."""
-        near, sources = self._term.near, self._term.sources
-        n = len(self._u)
-        value = np.full(n, np.nan)
-        value[near.vertex] = near.value
-        value[sources.vertices] = np.nan
-        place = np.full(n, -1)
-        place[near.vertex] = np.arange(len(near.vertex))
-        found: BoolArray = np.zeros(len(near.vertex), bool)
-        result = []
-        for triangulation in self._triangulations:
-            spokes = _spokes(triangulation, sources.vertices)
-            is_it = np.abs(spokes.length - value[spokes.end]) <= 1e-12 * spokes.length
-            at, first = np.unique(place[spokes.end[is_it]], return_index=True)
-            new = ~found[at]
-            result.append((spokes.side[is_it][first[new]], at[new]))
-            found[at] = True
-        return result
-
-
-def _spokes(triangulation: IntrinsicTriangulation, vertices: IntArray) -> _Spokes:
-    """All sides with one end among some vertices, an edge once for each of its sides and such ends."""
-    place = np.full(triangulation.n, -1)
-    place[vertices] = np.arange(len(vertices))
-    of_corner = place[triangulation.F.ravel()]
-    corner = np.flatnonzero(of_corner >= 0)
-    following, preceding = next_half_edge(corner), previous_half_edge(corner)
-    # The side opposite the next corner joins this one and the previous.
-    side, across = np.concatenate([following, preceding]), np.concatenate([preceding, following])
-    which = np.tile(of_corner[corner], 2)
-    return _Spokes(side, which, triangulation.F.ravel()[across], triangulation.l.ravel()[side])
+    def push_forward(
+        self, by_phi: FloatArray, by_heat: FloatArray, by_value: FloatArray, by_side: FloatArray, flow: FlowChange
+    ) -> FloatArray:
+        """How the distances (n,) change with phi, the heat (n,), the known values (k,), sides (m, 3) and the flow."""
+        term, anchors = self._term, self._term.anchors
+        excess = by_phi[anchors.vertex] - by_value[self._place[anchors.vertex]]
+        of_source = np.zeros_like(by_phi)
+        if self._weighted is not None:
+            level = np.bincount(anchors.label, excess, len(self._of_label)) / self._of_label
+            relative = (level - level[self._lowest])[term.label]
+            initial: FloatArray = np.bincount(term.vertex, self._heat * relative, len(by_phi))
+            initial += np.bincount(flow.vertex, flow.initial * self._relative[flow.label], len(by_phi))
+            weighted = self._weighted.push_forward(initial, flow.product, flow.diagonal)
+            of_source = np.divide(
+                weighted - self._share * by_heat, self._u, out=np.zeros_like(by_phi), where=self._is_warm
+            )
+            of_source += level[self._lowest]
+        rest = np.bincount(self._anchor_component, excess - of_source[anchors.vertex], self._n_components)
+        change = np.where(self._is_free, by_phi - of_source - (rest / self._count)[self._components], 0.0)
+        is_taken = self._taken >= 0
+        change[is_taken] = by_value[self._taken[is_taken]]
+        for end, side, which, sign in self._bounds:
+            change[end] = by_value[which] + sign * by_side.ravel()[side]
+        return np.asarray(change)

@@ -7,32 +7,15 @@ coordinates differ by delta, by a side l_ik is - delta_i delta_k l_ik over the l
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from heat_igl.intrinsic.history import BACK_CORNERS, Covered, Flipped, Merged, Refined, Turned
+from heat_igl.intrinsic.history import BACK_CORNERS, Covered, Flipped, Refined, Turned
 from heat_igl.intrinsic.layout import apex
+from heat_igl.intrinsic.place_derivatives import PlaceSlopes, carry_place, carry_place_back
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import FloatArray
 
-__all__ = ["carry_lengths", "PlaceSlopes", "carry_lengths_back", "check_carried"]
-
-
-class PlaceSlopes(NamedTuple):
-    """Points in faces that were given before any change, and the derivative of a number by their places.
-
-    Attributes
-    ----------
-    faces, barycentric : (p,) int64, (p, 3) float64
-        The points.
-    slopes : (p, 3) float64
-        By their coordinates, up to a constant in each row.
-    """
-
-    faces: IntArray
-    barycentric: FloatArray
-    slopes: FloatArray
+__all__ = ["carry_lengths", "carry_lengths_back", "check_carried"]
 
 
 def carry_lengths_back(
@@ -68,7 +51,7 @@ def carry_lengths_back(
         If vertices were added.
     """
     check_carried(triangulation)
-    visited = [] if places is None else _visited(triangulation, places)
+    visited = [] if places is None else places.visited(triangulation)
     slopes = None if places is None else places.slopes.copy()
     for i in range(len(triangulation.history) - 1, -1, -1):
         change = triangulation.history[i]
@@ -81,105 +64,46 @@ def carry_lengths_back(
                 m = change.n_faces
                 by_side = by_side[:m] + by_side[m:, BACK_CORNERS]
         if slopes is not None:
-            _carry_place_back(change, *visited[i], slopes, by_side)
+            carry_place_back(change, *visited[i], slopes, by_side)
     return by_side, slopes
 
 
-def _visited(triangulation: IntrinsicTriangulation, places: PlaceSlopes) -> list[tuple[IntArray, FloatArray]]:
-    """Faces and coordinates of points before each change."""
-    visited = [(places.faces, places.barycentric)]
-    for change in triangulation.history:
-        visited.append(change.carry(*visited[-1]))
-    return visited
+def carry_lengths(
+    triangulation: IntrinsicTriangulation, by_side: FloatArray, n_before: int = 0, places: PlaceSlopes | None = None
+) -> tuple[FloatArray, FloatArray | None]:
+    """How the sides of a triangulation change when those of earlier faces change.
 
+    Parameters
+    ----------
+    triangulation, n_before
+        As for `carry_lengths_back`.
+    by_side : (m', 3) float64
+        Changes of the sides of the earlier faces.
+    places : PlaceSlopes, optional
+        Points, with the changes of their coordinates in the given faces.
 
-def _carry_place_back(
-    change: Merged | Turned | Covered | Flipped | Refined,
-    faces: IntArray,
-    barycentric: FloatArray,
-    slopes: FloatArray,
-    by_side: FloatArray,
-) -> None:
-    """Carry derivatives by the places of points, which lie in `faces` before a change, back over it, in place."""
-    if isinstance(change, Merged):
-        slopes[:] = np.take_along_axis(slopes, change.corner[faces], axis=1)
-    elif isinstance(change, Turned):
-        slopes[:] = np.where(change.turned[faces, None], slopes[:, ::-1], slopes)
-    elif isinstance(change, Flipped):
-        _unflip_places(change, faces, barycentric, slopes, by_side)
-
-
-def _unflip_places(
-    change: Flipped, faces: IntArray, barycentric: FloatArray, slopes: FloatArray, by_side: FloatArray
-) -> None:
-    """The same over flips: a point keeps its place P in the quadrilateral of a, b, p and q laid out in the plane.
-
-    After the flip P = beta_p p + beta_q q + beta_o o with o = a or b. The derivative by P is called `pull`.
+    Returns
+    -------
+    by_side : (m, 3) float64
+        Changes of the sides.
+    by_place : (p, 3) float64 or None
+        Changes of the points' coordinates in the triangulation.
     """
-    moved, edge, in_second = change.moved(faces)
-    if not len(moved):
-        return
-    ab, pa, bp, aq, qb = change.lengths[:, edge]
-    (px, py), (qx, qy) = apex(ab, pa, bp), apex(ab, aq, qb)
-    after_faces, after = change.carry(faces, barycentric)
-    in_q = after_faces[moved] == change.mate[edge] // 3
-    corner = (np.where(in_q, change.mate[edge], change.half_edge[edge])[:, None] + np.arange(3)) % 3
-    first, at_o, last = np.take_along_axis(after[moved], corner, axis=1).T
-    of_first, of_o, of_last = np.take_along_axis(slopes[moved], corner, axis=1).T
-    at_p, at_q = np.where(in_q, last, first), np.where(in_q, first, last)
-    of_p, of_q = np.where(in_q, of_last, of_first) - of_o, np.where(in_q, of_first, of_last) - of_o
-    ox = np.where(in_q, ab, 0.0)
-    determinant = (px - ox) * -qy - (qx - ox) * py
-    pull_x = (-qy * of_p - py * of_q) / determinant
-    pull_y = ((px - ox) * of_q - (qx - ox) * of_p) / determinant
-    corner = (np.where(in_second, change.mate[edge], change.half_edge[edge])[:, None] + np.arange(3)) % 3
-    at_apex, at_tail, at_head = np.take_along_axis(barycentric[moved], corner, axis=1).T
-    at_b = np.where(in_second, at_tail, at_head)
-    by_p = np.where(in_second, 0.0, at_apex) - at_p
-    by_q = np.where(in_second, at_apex, 0.0) - at_q
-    of_ab = (at_b - np.where(in_q, at_o, 0.0)) * pull_x
-    of_ab_p, of_pa, of_bp = _apex_slopes((ab, pa, bp), (px, py), by_p * pull_x, by_p * pull_y)
-    of_ab_q, of_aq, of_qb = _apex_slopes((ab, aq, qb), (qx, qy), by_q * pull_x, -by_q * pull_y)
-    by_half_edge = by_side.reshape(-1)
-    half_edge, mate = change.half_edge[edge], change.mate[edge]
-    following, preceding = 1 - 3 * (half_edge % 3 == 2), -1 + 3 * (half_edge % 3 == 0)
-    np.add.at(by_half_edge, half_edge, of_ab + of_ab_p + of_ab_q)
-    np.add.at(by_half_edge, half_edge + following, of_bp)
-    np.add.at(by_half_edge, half_edge + preceding, of_pa)
-    following, preceding = 1 - 3 * (mate % 3 == 2), -1 + 3 * (mate % 3 == 0)
-    np.add.at(by_half_edge, mate + following, of_aq)
-    np.add.at(by_half_edge, mate + preceding, of_qb)
-    apex_x, apex_y = np.where(in_second, qx, px), np.where(in_second, -qy, py)
-    of_b, of_a = pull_x * ab, np.zeros(len(moved))
-    before = np.stack(
-        [pull_x * apex_x + pull_y * apex_y, np.where(in_second, of_b, of_a), np.where(in_second, of_a, of_b)], axis=1
-    )
-    slopes[moved[:, None], corner] = before
-
-
-def _apex_slopes(
-    sides: tuple[FloatArray, FloatArray, FloatArray],
-    place: tuple[FloatArray, FloatArray],
-    by_x: FloatArray,
-    by_y: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The derivative by base, left and right side of a triangle, from that by the place (x, y) of its `apex`."""
-    (base, left, right), (x, y) = sides, place
-    by_foot = by_x - by_y * x / y
-    return by_foot * (1 - x / base), by_foot * left / base + by_y * left / y, -by_foot * right / base
-
-
-def carry_lengths(triangulation: IntrinsicTriangulation, by_side: FloatArray, n_before: int = 0) -> FloatArray:
-    """How the sides (m, 3) of a triangulation change when those of earlier faces change by `by_side` (m', 3)."""
     by_side = by_side.copy()
-    for change in triangulation.history[n_before:]:
+    visited = [] if places is None else places.visited(triangulation)
+    slopes = None if places is None else places.slopes.copy()
+    for i, change in enumerate(triangulation.history):
+        if slopes is not None:
+            carry_place(change, *visited[i], slopes, by_side)
+        if i < n_before:
+            continue
         if isinstance(change, Flipped):
             _flip(change, by_side)
         elif isinstance(change, Turned):
             by_side[change.turned] = by_side[change.turned, ::-1]
         elif isinstance(change, Covered):
             by_side = np.concatenate([by_side, by_side[:, BACK_CORNERS]])
-    return by_side
+    return by_side, slopes
 
 
 def check_carried(triangulation: IntrinsicTriangulation) -> None:

@@ -25,9 +25,11 @@ def normalized(
     by_log_t: cython.double[::1],
     by_v: cython.double[::1],
 ):
-    """The derivative of p . (b - L phi), with b the divergence of the normalized field, see `HeatAdjoint`.
+    """The derivative of p . (b - L phi), with b the divergence of the normalized field, see
+    `heat_igl.heat_method.field_derivative`.
 
-    On each face b is s K v with s = 1 / |grad v|, or 1 / full_rate where the gradient is below that (m,), 0 for never.
+    On each face b is s K v with s = 1 / |grad v|, or 1 / full_rate where the gradient is below that (m,), 0 for never;
+    faces with a negative full_rate have no part in b.
     Written to `by_weight` (m, 3) and `by_area` (m,); added to `by_v` (n,), and to `by_log_t` the derivative by the
     logarithm of the time step of each component, of which each vertex has the number (n,).
     """
@@ -49,7 +51,7 @@ def normalized(
                 q[c] = p[i] - p[j]
                 by_weight[f, c] = q[c] * (phi[i] - phi[j])
                 largest = max(largest, fabs(d[c]))
-            if largest == 0.0:
+            if largest == 0.0 or full_rate[f] < 0.0:
                 continue
             # Squares of the differences of heat may vanish: the largest is made 1 first.
             scale: cython.double = 1.0 / largest
@@ -85,6 +87,7 @@ def elements(
     share: cython.double,
     x: cython.const[cython.double][:, ::1],
     u: cython.const[cython.double][:, ::1],
+    by_diagonal: cython.const[cython.double][::1],
     slopes: cython.const[cython.double][:, :, ::1],
     component: cython.const[cython.longlong][::1],
     by_weight: cython.const[cython.double][:, ::1],
@@ -95,9 +98,10 @@ def elements(
 ):
     """Add the derivative by the sides (m, 3), from those by the heat flow and by weights, areas and masses.
 
-    The heat flow gives -x . dA u for rows of adjoints x and solutions u (k, n), with A = M - t L. The entry -t L of
-    each side changes by `slopes` (3, m, 3): with its weight, its length and the time step. The derivative `by_mass`
-    (n,) is that by the mass of each vertex. A face has `share` of its area, see `Elements`.
+    The heat flow gives -x . dA u for rows of adjoints x and solutions u (k, n), with A = M - t L, and `by_diagonal`
+    (n,) times the diagonal of dA. The entry -t L of each side changes by `slopes` (3, m, 3): with the weight, length
+    and time step. The derivative `by_mass` (n,) is that by the mass of each vertex, as part of A. A face has
+    `share` of its area, see `Elements`.
     """
     f: cython.Py_ssize_t
     c: cython.int
@@ -118,7 +122,7 @@ def elements(
             for c in range(3):
                 i: cython.longlong = corner[(c + 1) % 3]
                 j: cython.longlong = corner[(c + 2) % 3]
-                flow: cython.double = 0.0
+                flow: cython.double = by_diagonal[i] + by_diagonal[j]
                 for k in range(x.shape[0]):
                     flow -= (x[k, i] - x[k, j]) * (u[k, i] - u[k, j])
                 of_weight[c] = by_weight[f, c] + flow * slopes[0, f, c]

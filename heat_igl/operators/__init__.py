@@ -7,11 +7,12 @@ from heat_igl.operators.connection import (
     face_rotations,
     with_rotations,
 )
-from heat_igl.operators.element_derivatives import Elements
+from heat_igl.operators.element_derivatives import ElementChange, Elements
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
 from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators, without_refinement
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian, divergence_matrix
 from heat_igl.operators.metric import fibre_metric, metric_operators
+from heat_igl.operators.metric_derivatives import MetricSides
 from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.point_clouds import point_cloud_operators
 from heat_igl.operators.polygons import polygon_operators
@@ -23,9 +24,11 @@ from heat_igl.operators.triangles import operators, tufted_operators, unfolding_
 
 __all__ = [
     "EdgeLengths",
+    "ElementChange",
     "Elements",
     "FaceRotations",
     "Laplacian",
+    "MetricSides",
     "MetricSimplices",
     "OnLaplacian",
     "Operators",

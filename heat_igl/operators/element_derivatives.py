@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from heat_igl.operators.matrices import Operators
-from heat_igl.typing import BoolArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Elements"]
+__all__ = ["ElementChange", "Elements"]
+
+
+class ElementChange(NamedTuple):
+    """How weights (m, 3), areas (m,) and the masses (n,) of vertices change."""
+
+    weight: FloatArray
+    area: FloatArray
+    mass: FloatArray
 
 
 class Elements:
@@ -65,3 +74,17 @@ class Elements:
         pair = np.empty(len(key), np.int64)
         pair[order] = np.cumsum(is_first) - 1
         return pair, order[is_first]
+
+    def push_forward(self, by_side: FloatArray) -> ElementChange:
+        """What sides that change by `by_side` (m, 3) change."""
+        # A weight is inner / (8 area), and the area changes by the length times the weight.
+        of_square = self.l * by_side
+        area = (of_square * self.weight).sum(axis=1)
+        of_inner = 2 * (of_square.sum(axis=1)[:, None] - 2 * of_square)
+        weight = (self.share**2 / 8 * of_inner - self.weight * area[:, None]) / self.area[:, None]
+        # The cell of a corner has a part for both sides there; in an obtuse face, half of the area for the obtuse one.
+        part = self.l**2 * weight / 4 + of_square * self.weight / 2
+        mass = part.sum(axis=1)[:, None] - part
+        is_obtuse = (self.weight < 0).any(axis=1)
+        mass[is_obtuse] = np.where(self.weight[is_obtuse] < 0, 0.5, 0.25) * area[is_obtuse, None]
+        return ElementChange(weight, area, np.bincount(self._triangulation.F.ravel(), mass.ravel(), minlength=self._n))

@@ -116,7 +116,8 @@ def without_refinement(domain: Operators) -> Operators:
         return domain
     given = intrinsic_operators(surface.faces)
     plain = changed_operators(surface.uncovered, surface.faces, surface.uncovered, given)
-    return replace(plain, surface=Surface(surface.uncovered, surface.faces, V=surface.V), contrast=domain.contrast)
+    surface = Surface(surface.uncovered, surface.faces, V=surface.V)
+    return replace(plain, surface=surface, contrast=domain.contrast, metric=domain.metric)
 
 
 def edge_length_operators(

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
+from heat_igl.operators.metric_derivatives import MetricSides
 from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.surface import Surface
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
@@ -75,6 +76,8 @@ class Operators:
         Tetrahedra, or triangles that do not fit together, for fronts that pass through them; None for other domains.
     contrast : float
         Largest ratio between faces of the length in the metric per length in space; 1 without a metric.
+    metric : MetricSides or None
+        The lengths of triangles in a metric, to be differentiated; None without one, and for fronts.
 
     Examples
     --------
@@ -106,6 +109,7 @@ class Operators:
     longest_distances: FloatArray | None = None
     simplices: MetricSimplices | None = None
     contrast: float = 1.0
+    metric: MetricSides | None = None
 
     @property
     def n(self) -> int:

@@ -14,6 +14,7 @@ from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, intrin
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
+from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
 from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.simplices import cotan_operators, longest_sides
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -89,7 +90,10 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
     check_laplacian(laplacian)
     mesh = as_simplices(mesh)
     _check_faces(mesh)
-    return operators_in_metric(mesh, _checked(metric, mesh), laplacian)
+    domain = operators_in_metric(mesh, _checked(metric, mesh), laplacian)
+    if domain.surface is None:
+        return domain
+    return replace(domain, metric=MetricSides.of(mesh, metric))
 
 
 def fibre_metric(directions: ArrayLike, along: ArrayLike, across: ArrayLike) -> FloatArray:
@@ -274,22 +278,11 @@ def _checked(metric: ArrayLike, mesh: Mesh) -> FloatArray:
     _raise_at_first(np.abs(g - transposed).max(axis=(1, 2)) > _ROUNDING * size, "metric", g, "must be symmetric")
     g = (g + transposed) / 2
     if p < g.shape[1]:
-        axes = _frames(mesh)
+        axes = plane_axes(mesh)
         g = axes @ g @ np.swapaxes(axes, 1, 2)
     smallest = np.linalg.eigvalsh(g)[:, 0]
     _raise_at_first(~(smallest > 0), "metric", np.asarray(metric), "must be positive definite on its face")
     return np.asarray(g)
-
-
-def _frames(mesh: Mesh) -> FloatArray:
-    """Axes (m, 2, 3) of triangles: along the edge from corner 0 to corner 1, and towards corner 2."""
-    corners = mesh.V[mesh.F]
-    x = corners[:, 1] - corners[:, 0]
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    y = corners[:, 2] - corners[:, 0]
-    y -= np.einsum("mk,mk->m", x, y)[:, None] * x
-    y /= np.linalg.norm(y, axis=1, keepdims=True)
-    return np.stack([x, y], axis=1)
 
 
 def checked_numbers(name: str, values: ArrayLike) -> FloatArray:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.operators.matrices import Operators
 from heat_igl.operators.metric import operators_in_metric
+from heat_igl.operators.metric_derivatives import MetricSides
 from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["speed_operators"]
@@ -57,7 +60,10 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     mesh = as_simplices(mesh)
     s = _checked(speed, mesh.n_faces)
     p = mesh.F.shape[1] - 1
-    return operators_in_metric(mesh, np.eye(p) / s[:, None, None] ** 2)
+    domain = operators_in_metric(mesh, np.eye(p) / s[:, None, None] ** 2)
+    if domain.surface is None:
+        return domain
+    return replace(domain, metric=MetricSides.of(mesh, np.eye(3) / s[:, None, None] ** 2))
 
 
 def _checked(speed: ArrayLike, m: int) -> FloatArray:

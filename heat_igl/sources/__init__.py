@@ -1,7 +1,7 @@
 """What a source is, the right-hand side it gives, and the exact distance near it."""
 
 from heat_igl.sources.assembly import NEAR_RADIUS, SourceAssembler, SourceTerm, right_hand_side, take_shorter
-from heat_igl.sources.near_field import NearField, Seeds
+from heat_igl.sources.near_field import NearField, Seeds, SightLines
 from heat_igl.sources.ordered import ordered_vertices
 from heat_igl.sources.oriented import Oriented, OrientedPoints, OrientedSet, oriented_set
 from heat_igl.sources.specification import (
@@ -24,6 +24,7 @@ __all__ = [
     "OrientedPoints",
     "OrientedSet",
     "Seeds",
+    "SightLines",
     "SourceAssembler",
     "SourcePoints",
     "SourceSegments",

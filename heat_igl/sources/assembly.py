@@ -10,8 +10,8 @@ import numpy as np
 
 from heat_igl.operators import Operators
 from heat_igl.runtime import SOURCE_HEAT
-from heat_igl.sources.near_field import NearField, Seeds
-from heat_igl.sources.specification import SourceSet
+from heat_igl.sources.near_field import NearField, Seeds, SightLines
+from heat_igl.sources.specification import SourcePoints, SourceSegments, SourceSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["NEAR_RADIUS", "SourceAssembler", "SourceTerm", "right_hand_side", "take_shorter"]
@@ -82,6 +82,12 @@ class SourceTerm:
         held = (self.mass > 0) & (at_vertex > 0)
         return self.largest_heat * float((self.mass[held] / at_vertex[held]).min(initial=1.0))
 
+    def heat_of(self, share: FloatArray) -> FloatArray:
+        """The initial heat (e,) of shares (e,) of the unit."""
+        # The unit is inside the exponential, since exp(-delay) alone would underflow.
+        with np.errstate(under="ignore"):
+            return np.asarray(share * np.exp(np.log(self.unit) - self.delay))
+
     def restricted(self, labels: IntArray, anchors: Seeds, kept: BoolArray) -> SourceTerm:
         """The term of the sources in `labels` alone, with other anchors and those of `near` that are `kept` (g,)."""
         alive = np.isin(self.label, labels)
@@ -103,10 +109,7 @@ def right_hand_side(n: int, terms: Sequence[SourceTerm], shares: Sequence[FloatA
     heat = np.zeros((n, len(terms)))
     shares = [term.share for term in terms] if shares is None else shares
     for column, term, share in zip(heat.T, terms, shares, strict=True):
-        # The unit is inside the exponential, since exp(-delay) alone would underflow.
-        with np.errstate(under="ignore"):
-            weights = share * np.exp(np.log(term.unit) - term.delay)
-        np.add.at(column, term.vertex, weights)
+        np.add.at(column, term.vertex, term.heat_of(share))
     return heat
 
 
@@ -237,10 +240,22 @@ class SourceAssembler:
             is_covered = surface.uncovered is not None and not (self._plain or self._unfolds)
             if not (is_covered and self._faces.meets_shared_edge(sources.vertices[rim])):
                 return _NONE, _NONE
+        return self._visible.seeds(*self._in_sight(sources, rim, self._visible))
+
+    def lines(self, sources: SourceSet) -> SightLines:
+        """The straight lines whose lengths are `SourceTerm.near` and `SourceTerm.far`."""
+        if self._visible is None:
+            raise ValueError("straight lines need triangles")
+        return self._visible.lines(*self._in_sight(sources, self._rim(sources), self._visible))
+
+    def _in_sight(
+        self, sources: SourceSet, rim: BoolArray, visible: NearField
+    ) -> tuple[SourcePoints, SourceSegments, FloatArray, Seeds]:
+        """Arguments of `NearField.seeds`."""
         vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
         points = sources.points.joined(sources.segments.ends())
-        radius = self._radius * self._h_at(np.arange(self._visible.triangulation.n))
-        return self._visible.seeds(points, sources.segments, radius, vertices)
+        radius = self._radius * self._h_at(np.arange(visible.triangulation.n))
+        return points, sources.segments, radius, vertices
 
     def _initial_heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from heat_igl.sources.specification import SourcePoints, SourceSegments, nearest
 from heat_igl.sources.windows import ROUNDING, SeenVertices, cross, joined
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["NearField", "Seeds"]
+__all__ = ["NearField", "Seeds", "SightLines"]
 
 # Number of triangles that a window may cross, one after another. On ordinary meshes the radius ends it long before.
 _MOST_LEVELS = 50
@@ -36,6 +37,25 @@ class Seeds:
     def at(self, chosen: BoolArray) -> Seeds:
         """Some of the seeds, by a mask (k,)."""
         return Seeds(self.vertex[chosen], self.value[chosen], self.label[chosen])
+
+
+class SightLines(NamedTuple):
+    """The straight lines from n vertices to the sources that they see.
+
+    Attributes
+    ----------
+    value : (n,) float64
+        Distance along the line, with the value at which it begins; ``inf`` without a line.
+    reach : (n,) float64
+        Length of the line.
+    entered, share : (n,) int64, (n,) float64
+        As for `SeenVertices`, -1 for lines inside a face.
+    """
+
+    value: FloatArray
+    reach: FloatArray
+    entered: IntArray
+    share: FloatArray
 
 
 class NearField:
@@ -82,8 +102,23 @@ class NearField:
         far : Seeds
             Corners of the sources' own faces beyond `radius`, at which another source may be nearer.
         """
-        points, segments = self._carried(points, segments)
         radius = np.broadcast_to(radius, self.triangulation.n)
+        found, own = self._found(points, segments, radius, vertices)
+        near = self._shortest(found, radius)
+        return near, own.at(~np.isin(own.vertex, near.vertex))
+
+    def lines(
+        self, points: SourcePoints, segments: SourceSegments, radius: float | FloatArray, vertices: Seeds | None = None
+    ) -> SightLines:
+        """The straight lines whose lengths `seeds` finds; arguments as for it."""
+        found, _ = self._found(points, segments, np.broadcast_to(radius, self.triangulation.n), vertices)
+        return found.lines()
+
+    def _found(
+        self, points: SourcePoints, segments: SourceSegments, radius: FloatArray, vertices: Seeds | None
+    ) -> tuple[_Nearest, Seeds]:
+        """The shortest straight line to each vertex, and the corners of the sources' own faces."""
+        points, segments = self._carried(points, segments)
         if vertices is not None:
             points = points.joined(self._as_points(vertices))
         from_points, seen_by_points = seen_from_points(points, self._adjacency)
@@ -104,8 +139,7 @@ class NearField:
                 break
             windows, seen = cross(windows, self._adjacency)
             found.add(seen)
-        near = self._shortest(found, radius)
-        return near, own.at(~np.isin(own.vertex, near.vertex))
+        return found, own
 
     def _shortest(self, found: _Nearest, radius: FloatArray) -> Seeds:
         """Seeds within `radius`, without the vertices that another reaches along an edge on a shorter path."""
@@ -154,15 +188,23 @@ class _Nearest:
         self._value = np.full(n, np.inf)
         self._label = np.full(n, -1)
         self._offset = np.zeros(n)
+        self._entered = np.full(n, -1)
+        self._share = np.zeros(n)
 
     def add(self, seen: SeenVertices) -> None:
         """Take over the values that are smaller than those so far."""
-        vertex, distance, offset, label = seen
+        vertex, distance, offset, label, entered, share = seen
         value = offset + distance
         order = np.argsort(-value, kind="stable")  # of several values for a vertex, the last one written stays
         better = order[value[order] < self._value[vertex[order]]]
         at = vertex[better]
         self._value[at], self._label[at], self._offset[at] = value[better], label[better], offset[better]
+        self._entered[at] = -1 if entered is None else entered[better]
+        self._share[at] = 0.0 if share is None else share[better]
+
+    def lines(self) -> SightLines:
+        """The lines behind the values so far."""
+        return SightLines(self._value, self._value - self._offset, self._entered, self._share)
 
     def at(self, vertex: IntArray) -> FloatArray:
         """The values at some vertices, ``inf`` for those without one."""

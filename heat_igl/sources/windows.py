@@ -36,12 +36,17 @@ class SeenVertices(NamedTuple):
         Value at which distance begins at the source.
     label : (k,) int64
         The source.
+    entered, share : (k,) int64, (k,) float64, or None
+        The half-edge opposite the vertex that the line crosses, and how far from its tail as a share of its length;
+        None for lines inside a face.
     """
 
     vertex: IntArray
     distance: FloatArray
     offset: FloatArray
     label: IntArray
+    entered: IntArray | None = None
+    share: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +175,8 @@ def cross(windows: Windows, adjacency: Adjacency) -> tuple[Windows, SeenVertices
         windows.distance(ax, ay)[is_seen],
         windows.offset[is_seen],
         windows.label[is_seen],
+        windows.half_edge[is_seen],
+        (x / base)[is_seen],
     )
     behind = []
     # Rays left of x leave through the side from the far corner to the origin, rays right of x through the other side.

@@ -7,6 +7,7 @@ sides at once; vector fields are stacked by coordinate like the rows of G: (d m,
 
 from heat_igl.steps.diffusion import Boundary, HeatFlow, check_boundary, diffuse, mass_unit
 from heat_igl.steps.fitted import fitted_laplacian
+from heat_igl.steps.flow_derivative import FlowDerivative, MatrixSlopes
 from heat_igl.steps.integration import PoissonProblem, integrate
 from heat_igl.steps.normalization import NormalizedDivergence, damping, normalize
 from heat_igl.steps.pattern import analysis
@@ -14,7 +15,9 @@ from heat_igl.steps.vector_diffusion import VectorHeatFlow
 
 __all__ = [
     "Boundary",
+    "FlowDerivative",
     "HeatFlow",
+    "MatrixSlopes",
     "NormalizedDivergence",
     "PoissonProblem",
     "VectorHeatFlow",

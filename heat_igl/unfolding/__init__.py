@@ -12,7 +12,7 @@ from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
 from heat_igl.unfolding.fronts import FrontSolver
 from heat_igl.unfolding.local import blocks_within, distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.path_derivatives import Change
-from heat_igl.unfolding.path_lengths import PathLengths
+from heat_igl.unfolding.path_lengths import PathLengths, SideChange, from_lines
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 from heat_igl.unfolding.solver import UnfoldingSolver
 from heat_igl.unfolding.within_store import read_distances_within, write_distances_within
@@ -29,6 +29,7 @@ __all__ = [
     "PathLengths",
     "Refine",
     "Refinement",
+    "SideChange",
     "UnfoldingSolver",
     "blocks_within",
     "directed_from_scratch",
@@ -37,6 +38,7 @@ __all__ = [
     "distances_within",
     "exact_distance",
     "exact_paths",
+    "from_lines",
     "in_circle",
     "nearest_vertices",
     "pair_distances",

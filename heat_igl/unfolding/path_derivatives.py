@@ -105,12 +105,15 @@ class Change(NamedTuple):
         By the sides of the faces before any flip, directly.
     by_t : float
         By the time step.
+    by_given_place : (p, 3) float64 or None
+        By the coordinates of source points in the faces before any flip, directly.
     """
 
     by_side: FloatArray
     by_place: FloatArray | None = None
     by_given: FloatArray | None = None
     by_t: float = 0.0
+    by_given_place: FloatArray | None = None
 
 
 class Paths:
@@ -185,25 +188,26 @@ class Paths:
         )
         return Change(by_side.reshape(-1, 3), by_place if e else None)
 
-    def push_forward(self, by_side: FloatArray) -> FloatArray:
-        """The derivative (n,) of all distances when the sides (m, 3) change by `by_side`."""
-        return self._summed(by_side, np.zeros(self.n + len(self.places.faces)))
+    def push_forward(self, by_side: FloatArray, by_place: FloatArray | None = None) -> FloatArray:
+        """The derivative (n,) of all distances when the sides (m, 3) change, and the coordinates (e, 3) of `places`."""
+        return self._summed(by_side, by_place, np.zeros(self.n + len(self.places.faces)))
 
     def lengths(self) -> FloatArray:
         """Distances (n,) summed along the paths; 0 where there is none."""
         # A line is homogeneous in the sides (Euler); to it comes the distance at which the source starts.
         distance, kind = self._ways[:2]
         starts = np.where(np.append(kind == _AT_SOURCE, np.ones(len(self.places.faces), bool)), distance, 0.0)
-        return self._summed(self._triangles.length, np.where(np.isfinite(starts), starts, 0.0))
+        return self._summed(self._triangles.length, None, np.where(np.isfinite(starts), starts, 0.0))
 
-    def _summed(self, by_side: FloatArray, change: FloatArray) -> FloatArray:
-        """Changes of distances (n,) when sides change, and distances at the sources by `change` (n + e,)."""
+    def _summed(self, by_side: FloatArray, by_place: FloatArray | None, change: FloatArray) -> FloatArray:
+        """Changes of distances (n,) when sides and places change, and distances at the sources by `change` (n + e,)."""
         kernels.push_forward(
             self._triangles,
             self._points,
             self._ways,
             self._order,
             np.ascontiguousarray(by_side).ravel(),
+            np.empty((0, 3)) if by_place is None else by_place,
             change,
             self.is_lost.view(np.uint8),
         )

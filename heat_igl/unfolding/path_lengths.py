@@ -2,17 +2,38 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.mesh import SurfacePoints
-from heat_igl.sources import SourceSet
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.sources import SightLines, SourceSet
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.path_derivatives import Change, Paths, Places, Starts, Ways, half_edge_arrays
 from heat_igl.unfolding.refinement import Refinement
 
-__all__ = ["PathLengths", "from_walks", "from_windows"]
+__all__ = ["PathLengths", "SideChange", "from_lines", "from_walks", "from_windows"]
+
+
+class SideChange(NamedTuple):
+    """How what an answer was found on changes.
+
+    Attributes
+    ----------
+    by_side : (m, 3) float64
+        The sides of the triangulation.
+    by_place : (p, 3) float64 or None
+        The coordinates of source points in it.
+    by_given, by_given_place : (m', 3), (p, 3) float64, or None
+        The same of the faces before any flip.
+    """
+
+    by_side: FloatArray
+    by_place: FloatArray | None = None
+    by_given: FloatArray | None = None
+    by_given_place: FloatArray | None = None
 
 
 class PathLengths:
@@ -64,27 +85,41 @@ class PathLengths:
 
         Of a point on a side, the triangle on the other side has a copy: it knows the derivative along the side alone.
         """
-        places, points = self._paths.places, self._points
-        if points is None:
+        if self._points is None:
             return by_place
+        result = np.zeros((len(self._points), 3))
+        for c, (known, point, corner) in enumerate(self._own_corners(self._points)):
+            np.add.at(result, (point, corner), by_place[known, c])
+        return result
+
+    def _at_places(self, by_point: FloatArray) -> FloatArray:
+        """The changes of all places, from those (p, 3) of the coordinates of each source point in its own triangle."""
+        if self._points is None:
+            return by_point
+        result = np.zeros((len(self._paths.places.faces), 3))
+        for c, (known, point, corner) in enumerate(self._own_corners(self._points)):
+            result[known, c] = by_point[point, corner]
+        return result
+
+    def _own_corners(self, points: SurfacePoints) -> list[tuple[BoolArray, IntArray, IntArray]]:
+        """For each corner of the places' triangles: whether the point's own triangle has it, the point, the corner."""
+        places = self._paths.places
         F = self._paths.corners(places.faces)
         if self._refinement is not None:
             F = self._refinement.vertex_of(F)
         own_faces, _ = self.triangulation.locate(points.faces, points.barycentric)
         own = self.triangulation.F[own_faces[places.point]]
-        result = np.zeros((len(points), 3))
-        for c in range(3):
-            # The corner of the point's own triangle with the same vertex.
-            same = own == F[:, [c]]
-            known = same.any(axis=1)
-            np.add.at(result, (places.point[known], same.argmax(axis=1)[known]), by_place[known, c])
-        return result
+        same = [own == F[:, [c]] for c in range(3)]
+        known = [at.any(axis=1) for at in same]
+        return [(k, places.point[k], at.argmax(axis=1)[k]) for at, k in zip(same, known, strict=True)]
 
-    def push_forward(self, by_side: FloatArray) -> FloatArray:
-        """How the distances (n,) change when the sides (m, 3) change by `by_side`."""
+    def push_forward(self, change: SideChange) -> FloatArray:
+        """How the distances (n,) change with the sides and the places of points, those of the triangulation alone."""
+        by_side = change.by_side
         if self._refinement is not None:
             by_side = self._refinement.on_tables(by_side)
-        return np.asarray(self._paths.push_forward(by_side)[self._rows])
+        by_place = None if change.by_place is None else self._at_places(change.by_place)
+        return np.asarray(self._paths.push_forward(by_side, by_place)[self._rows])
 
     def lengths(self) -> FloatArray:
         """Lengths (n,) of the paths; 0 at unreachable vertices."""
@@ -114,3 +149,16 @@ def from_windows(surface: ExactSurface, triangulation: IntrinsicTriangulation, s
     ways = Ways(found.distance, origin.entered, origin.crossing / length, found.distance - begins[origin.root])
     paths = Paths(half_edge_arrays(triangulation), places, ways, is_source=origin.root == np.arange(n))
     return PathLengths(triangulation, paths, np.arange(n), starts.points)
+
+
+def from_lines(triangulation: IntrinsicTriangulation, sources: SourceSet, lines: SightLines) -> PathLengths:
+    """The straight lines from vertices to the vertices and points that they see."""
+    starts, places = Starts.of(sources), Places.none()
+    if starts.points is not None and starts.point_offsets is not None:
+        placed = ExactSurface(triangulation).located(starts.points)
+        places = Places(*placed, starts.point_offsets[placed[2]])
+    is_source = np.zeros(triangulation.n, bool)
+    is_source[starts.vertices] = True
+    ways = Ways(lines.value, lines.entered, lines.share, lines.reach)
+    paths = Paths(half_edge_arrays(triangulation), places, ways, is_source)
+    return PathLengths(triangulation, paths, np.arange(triangulation.n), starts.points)

@@ -35,3 +35,31 @@ cdef enum:
     ALONG_EDGE = 1
     IN_FACE = 2
     ACROSS = 3
+
+
+cdef class Lines:
+    cdef const int[::1] vertex, twin, ring, first_inside, following, entered
+    cdef const double[::1] length, distance, share, reach
+    cdef const unsigned char[::1] aligned, kind
+    cdef const double[:, ::1] inside
+    cdef Gate[::1] gate
+    cdef int n_gates
+    cdef End end
+    # Of the line: the vertex that it begins at, its corner there, its direction and its length.
+    cdef int v, corner
+    cdef double ux, uy, extent
+
+    cdef int follow(self, int v) except -1 nogil
+    cdef int _cross(self) except -1 nogil
+    cdef bint _enter(self, int j, int g) noexcept nogil
+    cdef bint _turn_back(self) noexcept nogil
+    cdef int _step(self) except -2 nogil
+    cdef bint _meets(self, double x, double y, int f, int corner) noexcept nogil
+    cdef bint _is_on_way(self, double x, double y, double apart, double behind) noexcept nogil
+    cdef bint _meets_inside(
+        self, int f, int apex, int right, int left, Gate* gate, double x, double y
+    ) noexcept nogil
+    cdef int _row_of(self, int entry) noexcept nogil
+    cdef int _end_along(self, int h) noexcept nogil
+    cdef int _end_inside(self, int v, double corner) noexcept nogil
+    cdef double place_at(self, int j) noexcept nogil
