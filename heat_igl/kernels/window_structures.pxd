@@ -7,7 +7,9 @@ cdef struct Window:
     double x, depth      # the root laid out in the plane lies at (x, -depth); of a plane, the direction of the lines
     double start, stop   # from where to where along the half-edge
     double offset        # distance of the root; of a plane, the distance that it gives the tail
+    double turn_x, turn_y  # the half-edge as a unit vector in the frame of `corner`
     int root             # vertex, n + p for source point p, or after those, n + p + i for source segment i
+    int corner           # of the root, out of which the lines leave it: see `relax`; -1 of a plane
     short side           # of the apex: see the sides below
     bint is_plane
 
@@ -56,6 +58,8 @@ cdef struct Search:
     int* label
     int* entered
     double* crossing
+    int* corner          # NULL unless asked for, as the next
+    double* leaving      # two for each vertex
     double* emitted
     int* touched
     int n_touched

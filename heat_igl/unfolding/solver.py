@@ -17,7 +17,7 @@ from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
-from heat_igl.unfolding.refinement import TOLERANCE, Known, Refine, Refinement, WalkStarts
+from heat_igl.unfolding.refinement import TOLERANCE, Known, Refine, Refinement
 
 __all__ = ["UnfoldingDomain", "UnfoldingSolver", "UnfoldingTerm"]
 
@@ -304,15 +304,21 @@ class UnfoldingSolver:
         if self._refinement is None or by_windows:
             surface = self._exact if asked.segments is None else self._exact_on_given_faces
             found = surface.solve(
-                asked.vertices, asked.offsets, asked.points, asked.point_offsets, asked.segments, cutoff=self._cutoff
+                asked.vertices,
+                asked.offsets,
+                asked.points,
+                asked.point_offsets,
+                asked.segments,
+                cutoff=self._cutoff,
+                directed=asked.angles is not None,
             )
             if asked.labels is not None:
                 asked.labels[:] = found.origin.label
             if asked.angles is not None:
-                asked.angles[:] = self.path_directions.of_windows(found, self._starts(asked), asked.points)
+                asked.angles[:] = self.path_directions.of_windows(found, asked.points)
             return found.distance
         if asked.angles is not None:
-            return self._directed_walks(u, asked)
+            return self._directed_walks(self._refinement, u, asked)
         unfolded = self._refinement.unfold
         if self._sweeps:
             known, groups = self._known(term, points, earliest, asked), self._groups(term, points)
@@ -332,10 +338,10 @@ class UnfoldingSolver:
         """Whether directions are found by windows, as walks of a small tolerance would take as long."""
         if asked.angles is None or asked.tolerance is None or asked.tolerance >= TOLERANCE:
             return False
-        return asked.tolerance == 0 or self._walking.n <= _FEW_FOR_DIRECTIONS
+        return asked.tolerance == 0 or self._domain.components.size <= _FEW_FOR_DIRECTIONS
 
-    def _directed_walks(self, u: FloatArray, asked: _Asked) -> FloatArray:
-        refinement, starts = self._walking, self._starts(asked)
+    def _directed_walks(self, refinement: Refinement, u: FloatArray, asked: _Asked) -> FloatArray:
+        starts = refinement.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
         walk = refinement.walks(-u, starts, TOLERANCE if asked.tolerance is None else asked.tolerance)
         row = refinement.number
         if asked.labels is not None:
@@ -344,17 +350,10 @@ class UnfoldingSolver:
             asked.angles[:] = self.path_directions.of_walks(walk, asked.points)
         return np.asarray(walk["distance"][row])
 
-    def _starts(self, asked: _Asked) -> WalkStarts:
-        return self._walking.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
-
-    @cached_property
-    def _walking(self) -> Refinement:
-        return Refinement(self._surface.unfolding) if self._refinement is None else self._refinement
-
     @cached_property
     def path_directions(self) -> PathDirections:
         """Polar angles of the paths; a `MeshError` where vertices have no tangent plane."""
-        return PathDirections(self._surface, self._walking)
+        return PathDirections(self._surface, self._refinement)
 
     def _groups(self, term: UnfoldingTerm, points: SourcePoints) -> IntArray | None:
         """For each source, which curve it is a point of, or itself."""
