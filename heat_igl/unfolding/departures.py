@@ -77,7 +77,7 @@ def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None
 
     None if the faces there are not one oriented fan.
     """
-    F = mesh.F[(mesh.F == source).any(axis=1)]
+    F = mesh.F[np.unique(np.flatnonzero(mesh.F.ravel() == source) // 3)]
     used, numbers = np.unique(F, return_inverse=True)
     star = intrinsic_triangulation(Mesh(mesh.V[used], numbers.reshape(-1, 3)))
     centre = int(np.searchsorted(used, source))

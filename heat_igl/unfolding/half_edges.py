@@ -96,7 +96,7 @@ class HalfEdges:
         triangulation: IntrinsicTriangulation | None = None,
     ) -> None:
         m = len(vertex) // 3
-        if 3 * m + n >= 2**30:
+        if 3 * m + n >= 2**29:
             raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
         # By a power of two: no digit changes, and no square leaves the range of doubles.
         shift = _exponent(length)
@@ -228,7 +228,7 @@ def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
 
     Without a history of the flips; what is near vertex `start` comes first in memory.
     """
-    exponent = _exponent(np.ptp(mesh.V[mesh.F[:, 0]], axis=0))
+    exponent = _exponent(np.array([np.ptp(x[mesh.F[:, 0]]) for x in mesh.V.T]))  # a tenth of the time of rows
     vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, np.ldexp(1.0, -exponent))
     if (twin == -2).any():
         # Windows would go on in every copy of a face, and multiply.
