@@ -52,6 +52,20 @@ def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _arrive(
+    s: cython.pointer(Search), h: cython.int, w: cython.pointer(Window), distance: cython.double, at: cython.double
+) -> cython.void:
+    """A line of a window, through a point of h, reaches the corner opposite."""
+    x: cython.double = at - w.x
+    leaving_x: cython.double = x * w.turn_x - w.depth * w.turn_y
+    leaving_y: cython.double = x * w.turn_y + w.depth * w.turn_x
+    relax(s, s.vertex[h], distance, w.root, h, at, w.corner, leaving_x, leaving_y)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _reach_apex(
@@ -100,11 +114,11 @@ def _reach_apex(
                 apex.best = i
             continue
         # Just missed: over the end of the window, which costs next to nothing.
-        relax(s, s.vertex[h], _bent(w, b, apex.x, apex.y), w.root, h, b)
+        _arrive(s, h, w, _bent(w, b, apex.x, apex.y), b)
     if apex.best >= 0:
         w = windows + apex.best
         apex.best_at = backward(w, apex.x, apex.y)
-        relax(s, s.vertex[h], apex.nearest, w.root, h, apex.best_at)
+        _arrive(s, h, w, apex.nearest, apex.best_at)
 
 
 @cython.cfunc
@@ -122,6 +136,8 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
         out.depth = w.x * apex.sin_left + w.depth * apex.cos_left
     if out.depth <= 0.0:
         return False
+    out.turn_x = w.turn_x * apex.cos_left - w.turn_y * apex.sin_left
+    out.turn_y = w.turn_x * apex.sin_left + w.turn_y * apex.cos_left
     scale = w.depth * apex.cos_left
     out.start = w.start * w.depth / (scale - lateral(w, w.start) * apex.sin_left)
     out.stop = apex.left_length
@@ -149,6 +165,8 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
         out.depth = x * apex.sin_right + w.depth * apex.cos_right
     if out.depth <= 0.0:
         return False
+    out.turn_x = w.turn_x * apex.cos_right + w.turn_y * apex.sin_right
+    out.turn_y = w.turn_y * apex.cos_right - w.turn_x * apex.sin_right
     scale = w.depth * apex.cos_right
     out.stop = apex.right_length - (apex.length - w.stop) * w.depth / (scale + lateral(w, w.stop) * apex.sin_right)
     out.start = 0.0

@@ -5,7 +5,7 @@ the boundary; and where faces are not one fan, into all faces.
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.triangles import foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_lists import add, push
 from cython.cimports.heat_igl.kernels.window_structures import (
     BENDS,
@@ -31,8 +31,15 @@ def relax(
     root: cython.int,
     entered: cython.int,
     crossing: cython.double,
+    corner: cython.int,
+    x: cython.double,
+    y: cython.double,
 ) -> cython.void:
-    """Take a distance of v if it is shorter than the one known."""
+    """Take a distance of v if it is shorter than the one known.
+
+    The straight last part of the path leaves the root out of a corner, in the direction (x, y). The frame of a corner
+    begins with the side to the next corner of the face. In the face f of a source point it is that of corner 3 f.
+    """
     if distance >= s.distance[v]:
         return
     if s.distance[v] == INFINITY:
@@ -43,6 +50,10 @@ def relax(
     s.label[v] = s.label[root]
     s.entered[v] = entered
     s.crossing[v] = crossing
+    if s.corner != cython.NULL:
+        s.corner[v] = corner
+        s.leaving[2 * v] = x
+        s.leaving[2 * v + 1] = y
     if distance > s.last_key:
         return
     if s.kind[v] == UNKNOWN:
@@ -75,6 +86,8 @@ def _emit(
     one.stop = length - start if start > 0.0 else length
     one.offset = offset
     one.root = root
+    one.corner = k
+    one.turn_x, one.turn_y = (length - one.x) / right, -one.depth / right
     one.side = one.is_plane = 0
     if one.depth > 0.0:
         add(s, k, cython.address(one), 1, False)
@@ -87,8 +100,10 @@ def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset:
     """Distances along the two sides of corner k from its vertex v."""
     head: cython.int = next_half_edge(k)
     tail: cython.int = previous_half_edge(k)
-    relax(s, s.vertex[head], offset + s.length[tail], v, head, s.length[head])
-    relax(s, s.vertex[tail], offset + s.length[head], v, tail, 0.0)
+    a: cython.double = s.length[tail]
+    b: cython.double = s.length[head]
+    relax(s, s.vertex[head], offset + a, v, head, b, k, 1.0, 0.0)
+    relax(s, s.vertex[tail], offset + b, v, tail, 0.0, k, foot(a, b, s.length[k]), s.double_area[k // 3] / a)
 
 
 @cython.cfunc
@@ -256,11 +271,21 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
     length: cython.double
     left_length: cython.double
     right_length: cython.double
+    distance: cython.double
+    place_x: cython.double[3]
+    place_y: cython.double[3]
+    place_x[0] = place_y[0] = place_y[1] = 0.0
+    place_x[1] = s.length[3 * f + 2]
+    place_x[2] = foot(place_x[1], s.length[3 * f + 1], s.length[3 * f])
+    place_y[2] = s.double_area[f] / place_x[1]
+    x: cython.double = at[1] * place_x[1] + at[2] * place_x[2]
+    y: cython.double = at[2] * place_y[2]
     for c in range(3):
         h = 3 * f + c
         for i in range(3):
             corner[i] = 1.0 if i == c else 0.0
-        relax(s, s.vertex[h], offset + apart(s, f, corner, at), root, -1, 0.0)
+        distance = offset + apart(s, f, corner, at)
+        relax(s, s.vertex[h], distance, root, -1, 0.0, 3 * f, place_x[c] - x, place_y[c] - y)
         if at[c] <= 0.0:
             continue  # on the side itself, the source belongs to the face beyond it too
         length = s.length[h]
@@ -273,6 +298,9 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         one.stop = length
         one.offset = offset
         one.root = root
+        one.corner = 3 * f
+        one.turn_x = (place_x[(c + 1) % 3] - place_x[(c + 2) % 3]) / length
+        one.turn_y = (place_y[(c + 1) % 3] - place_y[(c + 2) % 3]) / length
         one.side = one.is_plane = 0
         if one.depth > 0.0:
             add(s, h, cython.address(one), 1, False)

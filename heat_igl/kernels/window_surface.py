@@ -8,7 +8,10 @@ from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_
 from cython.cimports.heat_igl.kernels.window_structures import BENDS, ENDS, JOINS, PASSED, Ray, Search
 from cython.cimports.libc.math import sqrt
 
-__all__ = ["shapes"]
+__all__ = ["SEVERAL_FANS", "shapes"]
+
+#: The kind of a vertex whose faces are several fans, or at an edge of more than two faces.
+SEVERAL_FANS = cython.cast(cython.int, JOINS)
 
 
 def shapes(

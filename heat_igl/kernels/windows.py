@@ -90,6 +90,9 @@ class Front:
         Takes the vertices that were reached.
     slot : (3 m,)
         Must come full of -1, and is again after a search.
+    corner, leaving : (n,), (2 n,), optional
+        Take in which direction the straight last parts of the paths leave their roots, see `window_sources.relax`: on
+        surfaces whose faces are oriented alike.
     tolerance : float
         The fraction of a distance by which another way must be shorter before a window is cut.
     """
@@ -117,6 +120,8 @@ class Front:
         touched: cython.int[::1],
         slot: cython.int[::1],
         tolerance: cython.double,
+        corner: cython.int[::1] = None,
+        leaving: cython.double[::1] = None,
     ) -> None:
         s: cython.pointer(Search) = cython.address(self.state)
         # The pointers hold as long as the arrays do.
@@ -140,6 +145,8 @@ class Front:
             crossing.base,
             touched.base,
             slot.base,
+            corner,
+            leaving,
         )
         s.vertex = cython.address(vertex[0])
         s.length = cython.address(length[0])
@@ -160,6 +167,10 @@ class Front:
         s.crossing = cython.address(crossing[0])
         s.touched = cython.address(touched[0])
         s.slot = cython.address(slot[0])
+        s.corner = cython.NULL
+        if corner is not None:
+            s.corner = cython.address(corner[0])
+            s.leaving = cython.address(leaving[0])
         s.is_delaunay = is_delaunay
         s.n = corner_of_vertex.shape[0]
         s.n_half_edges = vertex.shape[0]

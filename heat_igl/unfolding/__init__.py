@@ -1,5 +1,6 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
+from heat_igl.unfolding.departures import departures_from
 from heat_igl.unfolding.directions import PathAngles, in_circle
 from heat_igl.unfolding.distance import (
     directed_from_scratch,
@@ -32,6 +33,7 @@ __all__ = [
     "SideChange",
     "UnfoldingSolver",
     "blocks_within",
+    "departures_from",
     "directed_from_scratch",
     "distance_from_scratch",
     "distance_to_targets",

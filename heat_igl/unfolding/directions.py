@@ -8,15 +8,13 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import PolarAngles, carried_angles, lay_out, polar_angles
-from heat_igl.intrinsic.triangulation import previous_half_edge
-from heat_igl.kernels import departures
+from heat_igl.intrinsic.layout import apex
+from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSolution
-from heat_igl.unfolding.numbered import WalkStarts
 from heat_igl.unfolding.refinement import Refinement
-from heat_igl.unfolding.walks import INSIDE, unknown
 
 __all__ = ["PathAngles", "PathDirections", "in_circle"]
 
@@ -53,14 +51,14 @@ class PathAngles(NamedTuple):
 
 
 class PathDirections:
-    """Angles in the fans of a triangulation as polar angles of the mesh.
+    """Angles in the triangles, and in the fans of a `Refinement`, as polar angles of the mesh.
 
     Parameters
     ----------
     surface : Surface
         An oriented manifold of triangles whose faces are known.
-    refinement : Refinement
-        Its tables.
+    refinement : Refinement, optional
+        Its tables, for walks.
 
     Raises
     ------
@@ -68,76 +66,100 @@ class PathDirections:
         If the surface has no polar angles, see `polar_angles`.
     """
 
-    def __init__(self, surface: Surface, refinement: Refinement) -> None:
+    def __init__(self, surface: Surface, refinement: Refinement | None = None) -> None:
         if surface.faces is None:
             raise MeshError("directions need the faces of the mesh, which this domain does not know")
         #: Around the vertices of the triangulation.
         self.angles: PolarAngles = carried_angles(polar_angles(surface.faces), surface.unfolding)
-        self._refinement = refinement
         self._faces, self._triangulation = surface.faces, surface.unfolding
+        if refinement is not None:
+            self._number = refinement.number
+            self._begin, self._scale, self._on_boundary = self._fans(refinement)
+
+    def _fans(self, refinement: Refinement) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Of each row, the polar angle of the first spoke, from which angles in the fan count; scale, on_boundary."""
         t, n = refinement.tables, len(refinement.number)
         old_face = np.empty(len(refinement.face), np.int64)
         old_face[refinement.face] = np.arange(len(refinement.face))
         used = np.flatnonzero(np.diff(t.first))
         corner = t.turn["corner"][t.first[used]].astype(np.int64)
         first = previous_half_edge(3 * old_face[corner // 3] + corner % 3)
-        # Of each row, the polar angle of its first spoke, from which angles in its fan count.
-        self._begin, self._scale, self._on_boundary = np.zeros(n), np.ones(n), np.zeros(n, bool)
-        self._begin[used] = self.angles.leaving[first]
-        self._scale[refinement.number] = self.angles.scale
-        self._on_boundary[refinement.number] = self.angles.on_boundary
+        begin, scale, on_boundary = np.zeros(n), np.ones(n), np.zeros(n, bool)
+        begin[used] = self.angles.leaving[first]
+        scale[refinement.number] = self.angles.scale
+        on_boundary[refinement.number] = self.angles.on_boundary
+        return begin, scale, on_boundary
 
     def of_walks(self, walk: AnyArray, points: SurfacePoints | None = None) -> PathAngles:
         """The angles of walks (n + p,), with p sources at `points` in faces."""
-        n = len(self._begin)
+        n, scale, on_boundary = len(self._begin), self._scale, self._on_boundary
         row = np.flatnonzero(np.isfinite(walk["distance"][:n]) & (walk["fan"][:n] >= 0))
         root = walk["root"].astype(np.int64)
-        bends = row[(root[row] < n) & (walk["fan"][root[row]] >= 0)]
-        top, turning = self._handed_on(walk, root, bends)
-        # Where the part of the path that leaves the source ends.
-        first = top[row]
-        departure, source = walk["departure"][first], root[first]
-        at_vertex = source < n
-        departure[at_vertex] = self._polar(source[at_vertex], departure[at_vertex])
+        departure, back = np.full((2, n), np.nan)
+        departure[row] = walk["departure"][row]
+        at_vertex = row[root[row] < n]
+        source = root[at_vertex]
+        departure[at_vertex] = _polar(self._begin[source], departure[at_vertex], scale[source], on_boundary[source])
+        back[row] = _polar(self._begin[row], walk["angle"][row], scale[row], on_boundary[row])
         if points is not None:
-            departure[~at_vertex] += self._turns(points)[source[~at_vertex] - n]
-        found = np.full((3, n), np.nan)
-        found[0, row], found[1, row] = in_circle(departure), in_circle(self._polar(row, walk["angle"][row]))
-        found[2, row] = turning[row] - _WHOLE * np.rint(turning[row] / _WHOLE)
-        return PathAngles(*found[:, self._refinement.number])
+            inside = row[root[row] >= n]
+            departure[inside] += self._turns(points)[root[inside] - n]
+        found = _handed_on(row, root, departure, back, np.where(on_boundary, scale, 1.0))
+        return PathAngles(*found[:, self._number])
 
-    def of_windows(self, found: ExactSolution, starts: WalkStarts, points: SurfacePoints | None = None) -> PathAngles:
-        """The angles of exact paths from sources that begin at `starts`, p of them at `points` in faces."""
-        refinement, n, origin = self._refinement, len(self._begin), found.origin
-        number = refinement.number
-        walk = unknown(n + starts.n_points)
-        walk["root"] = -1
-        walk["distance"][number] = found.distance
-        walk["distance"][n:] = starts.offset[len(starts.offset) - starts.n_points :]
-        # Vertices first, then points.
-        rows = np.concatenate([number, n + np.arange(starts.n_points)])
-        has_root = origin.root >= 0
-        walk["root"][number[has_root]] = rows[origin.root[has_root]]
-        walk["root"][walk["root"] == np.arange(len(walk))] = -1
-        follows = np.flatnonzero(walk["root"] >= 0)
-        walk["reach"][follows] = walk["distance"][follows] - walk["distance"][walk["root"][follows]]
-        entered, crossing = np.full(n, -1, np.int32), np.zeros(n)
-        half_edge = origin.entered
-        entered[number] = np.where(half_edge >= 0, 3 * refinement.face[half_edge // 3] + half_edge % 3, -1)
-        crossing[number] = origin.crossing
-        first, inside = (np.empty(0, np.int32), np.empty(0, INSIDE)) if starts.points is None else starts.points
-        departures.depart(refinement.tables, walk, first, inside, entered, crossing)
-        # Paths inside the face of a source point.
-        seen = np.flatnonzero(starts.walk["fan"] >= 0)
-        seen = seen[walk["root"][starts.row[seen]] == starts.walk["root"][seen]]
-        for name in ("fan", "angle", "total", "departure"):
-            walk[name][starts.row[seen]] = starts.walk[name][seen]
-        return self.of_walks(walk, points)
+    def of_windows(self, found: ExactSolution, points: SurfacePoints | None = None) -> PathAngles:
+        """The angles of exact paths, of which `found` knows how they leave, with p sources at `points` in faces."""
+        angles, origin, n = self.angles, found.origin, len(found.distance)
+        if found.leaving is None:
+            raise ValueError("of_windows needs a solution that was asked for with directed=True")
+        row = np.flatnonzero((found.leaving.corner >= 0) & (origin.root >= 0))
+        corner, root, (x, y) = found.leaving.corner[row], origin.root[row], found.leaving.direction[row].T
+        departure, back = np.full((2, n), np.nan)
+        at_vertex = root < n
+        departure[row] = self._at_corners(corner, np.arctan2(y, x))
+        if not at_vertex.all() and points is not None:
+            turn = self._turns_in(points, root[~at_vertex] - n, corner[~at_vertex] // 3)
+            departure[row[~at_vertex]] = np.arctan2(y, x)[~at_vertex] + turn
+        # Over the half-edge opposite, or from the source point in the same face.
+        entered, crossing = origin.entered[row], origin.crossing[row]
+        over = entered >= 0
+        l, half_edge = self._triangulation.l.ravel(), entered[over]  # noqa: E741
+        fx, fy = apex(l[half_edge], l[previous_half_edge(half_edge)], l[next_half_edge(half_edge)])
+        seen = np.arctan2(fy * crossing[over], fx * (fx - crossing[over]) + fy * fy)
+        back[row[over]] = self._at_corners(half_edge, seen)
+        faces = corner[~over] // 3
+        if len(faces):
+            at = (self._triangulation.F[faces] == row[~over, None]).argmax(axis=1)
+            k, places = np.arange(len(faces)), lay_out(self._triangulation.l[faces])
+            ux, uy = (places[k, (at + 1) % 3] - places[k, at]).T
+            seen = np.arctan2(uy * x[~over] - ux * y[~over], -ux * x[~over] - uy * y[~over])
+            back[row[~over]] = self._at_corners(3 * faces + at, seen)
+        return PathAngles(*_handed_on(row, origin.root, departure, back, np.where(angles.on_boundary, angles.scale, 1)))
 
-    def _polar(self, rows: IntArray, angles: FloatArray) -> FloatArray:
-        """Polar angles (k,) of angles in the fans of vertices; at the boundary no further than the faces."""
-        found = self._begin[rows] + self._scale[rows] * angles
-        return np.where(self._on_boundary[rows], np.clip(found, 0.0, np.pi), found)
+    def _at_corners(self, corner: IntArray, seen: FloatArray) -> FloatArray:
+        """Polar angles (k,) of directions that are turned by `seen` from the side to the next corner."""
+        angles, v = self.angles, self._triangulation.F.ravel()[corner]
+        return _polar(angles.leaving[previous_half_edge(corner)], seen, angles.scale[v], angles.on_boundary[v])
+
+    def _turns_in(self, points: SurfacePoints, point: IntArray, faces: IntArray) -> FloatArray:
+        """By how much angles (k,) in triangles are turned from those in the given faces of points on them.
+
+        A point on a side is also in the triangle beyond.
+        """
+        home, inside = self._triangulation.locate(points.faces, points.barycentric)
+        turn = self._turns(points)[point]
+        beyond = np.flatnonzero(home[point] != faces)
+        sides = 3 * home[point[beyond], None] + np.arange(3)
+        leads_there = self._triangulation.twin[sides] // 3 == faces[beyond, None]
+        c = np.where(leads_there, inside[point[beyond]], np.inf).argmin(axis=1)
+        side = sides[np.arange(len(c)), c]
+        turn[beyond] += self._direction(side) + np.pi - self._direction(self._triangulation.twin[side])
+        return turn
+
+    def _direction(self, half_edge: IntArray) -> FloatArray:
+        """The angle (k,) of half-edges in their triangles, from the side of corners 0 and 1."""
+        angle, first = self.angles.corners.ravel(), half_edge - half_edge % 3
+        return np.choose(half_edge % 3, [np.pi - angle[first + 1], angle[first] - np.pi, np.zeros(len(half_edge))])
 
     def _turns(self, points: SurfacePoints) -> FloatArray:
         """The angle (p,) of corners 0 and 1 of the triangles that hold points, in the given faces.
@@ -161,22 +183,46 @@ class PathDirections:
             turn[better] = (angle - np.arctan2(dy, dx))[better]
         return turn
 
-    def _handed_on(self, walk: AnyArray, root: IntArray, bends: IntArray) -> tuple[IntArray, FloatArray]:
-        """The vertex on each path that its first bend leads to, and the sum of the turns at the bends.
 
-        `bends` are the rows whose paths come straight from a bend. Each step doubles the number that is skipped.
-        """
-        top, turning = np.arange(len(walk)), np.zeros(len(walk))
-        bend = root[bends]
-        top[bends] = bend
-        scale = np.where(self._on_boundary[bend], 1.0, self._scale[bend])
-        turning[bends] = scale * (walk["departure"][bends] - walk["angle"][bend]) - np.pi
-        while True:
-            further = top[top]
-            if (further == top).all():
-                return top, turning
-            turning += turning[top]
-            top = further
+def _polar(begin: FloatArray, angles: FloatArray, scale: FloatArray, on_boundary: BoolArray) -> FloatArray:
+    """Polar angles (k,) of angles in fans; at the boundary no further than the faces."""
+    found = begin + scale * angles
+    return np.where(on_boundary, np.clip(found, 0.0, np.pi), found)
+
+
+def _handed_on(row: IntArray, root: IntArray, departure: FloatArray, back: FloatArray, scale: FloatArray) -> FloatArray:
+    """Departure, direction back and turning (3, n) of whole paths, from those of the straight last parts.
+
+    Parameters
+    ----------
+    row : (k,) int64
+        The vertices that have a path.
+    root : (n,) int64
+        The bend or the source where the last part begins; n and more for source points.
+    departure, back : (n,) float64
+        Polar angles of the last part, at the root and at the vertex.
+    scale : (n,) float64
+        Of polar angles over angles as turns count them.
+    """
+    n = len(scale)
+    has_path = np.zeros(n, bool)
+    has_path[row] = True
+    bends = row[root[row] < n]
+    bends = bends[has_path[root[bends]]]
+    # The vertex that the part of the path before the first bend ends at. Each step doubles the number that is skipped.
+    top, turning, bend = np.arange(n), np.zeros(n), root[bends]
+    top[bends] = bend
+    turning[bends] = (departure[bends] - back[bend]) / scale[bend] - np.pi
+    while True:
+        further = top[top]
+        if (further == top).all():
+            break
+        turning += turning[top]
+        top = further
+    found = np.full((3, n), np.nan)
+    found[0, row], found[1, row] = in_circle(departure[top[row]]), in_circle(back[row])
+    found[2, row] = turning[row] - _WHOLE * np.rint(turning[row] / _WHOLE)
+    return found
 
 
 def _barycentric_step(corners: FloatArray, step: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import Sources, SourceSegments, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh, from_triangulation
-from heat_igl.unfolding.window_search import Found, Searched, search, starts_at
+from heat_igl.unfolding.window_search import Found, Leaving, Searched, search, starts_at
 
 __all__ = ["ExactSolution", "ExactSurface", "Origin", "exact_distance"]
 
@@ -61,6 +61,8 @@ class ExactSolution:
         Windows that were carried over an edge.
     n_crossings : int
         Lists of windows that crossed a face together.
+    leaving : Leaving or None
+        How the paths to the vertices leave the roots, if that was asked for: corners ``3 f + c`` of the triangulation.
     """
 
     distance: FloatArray
@@ -69,6 +71,7 @@ class ExactSolution:
     target_origin: Origin
     n_windows: int
     n_crossings: int
+    leaving: Leaving | None
 
 
 class ExactSurface:
@@ -107,6 +110,7 @@ class ExactSurface:
         cutoff: float = np.inf,
         targets: SurfacePoints | None = None,
         goals: IntArray | None = None,
+        directed: bool = False,
     ) -> ExactSolution:
         """Distances from vertices and points.
 
@@ -130,6 +134,8 @@ class ExactSurface:
         goals : (g,) int64, optional
             If given, the search ends once the distances of these vertices and of the targets are known; those of other
             vertices may then be too large or ``inf``.
+        directed : bool
+            Whether `ExactSolution.leaving` is asked for, on faces that are oriented alike.
 
         Returns
         -------
@@ -144,13 +150,14 @@ class ExactSurface:
             If there are segments or points, and the surface does not know the faces that they refer to.
         """
         starts = starts_at(self._half_edges, sources, offsets, points, point_offsets, segments)
-        done = search(self._half_edges, starts, cutoff=cutoff, targets=targets, goals=goals)
+        done = search(self._half_edges, starts, cutoff=cutoff, targets=targets, goals=goals, directed=directed)
         which = done.nearest_copy(0 if targets is None else len(targets))
         return ExactSolution(
             *self._result(done.found, done, self._half_edges.number, cutoff),
             *self._result(done.at_targets, done, which, cutoff),
             done.n_windows,
             done.n_crossings,
+            self._leaving(done),
         )
 
     def located(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray]:
@@ -160,6 +167,14 @@ class ExactSurface:
         """
         place = self._half_edges.located(points)
         return self._half_edges.face[place.faces].astype(np.int64), place.barycentric, place.point
+
+    def _leaving(self, done: Searched) -> Leaving | None:
+        """How paths leave the roots, in the caller's numbers."""
+        if done.leaving is None:
+            return None
+        edges = self._half_edges
+        corner, direction = (column[edges.number] for column in done.leaving)
+        return Leaving(edges.old_half_edge(corner), direction)
 
     def _result(self, found: Found, done: Searched, which: AnyArray, cutoff: float) -> tuple[FloatArray, Origin]:
         """Distance and origin of some of the places that the kernel found, in the caller's numbers and unit."""

@@ -19,8 +19,8 @@ __all__ = ["Glued", "HalfEdges", "Located", "Tables", "from_mesh", "from_triangu
 _ON_SIDE = 1e-13
 # A last bound on the work; meshes measured so far take less than one flip per face.
 _MOST_FLIPS_PER_FACE = 100
-# Half-edges and vertices that indices of 32 bits tell apart, with room for a bit of the kernels' own.
-_TOO_MANY = 2**30
+# Half-edges and vertices that indices of 32 bits tell apart, with room for two bits of the kernels' own.
+_TOO_MANY = 2**29
 # Powers of two up to here, and their inverses, are normal numbers.
 _LARGEST_EXPONENT = 1000
 # Areas are made of fourth powers of lengths, which are normal numbers up to here, far below 1 too.
@@ -274,7 +274,7 @@ def glued(mesh: Mesh) -> Glued:
     vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, 1.0)
     if not 1 / _LARGEST_LENGTH < length.max() < _LARGEST_LENGTH:
         # Once more in a unit in which no square leaves the range of doubles.
-        exponent = _exponent(np.ptp(mesh.V[mesh.F[:, :2]], axis=(0, 1)))
+        exponent = _exponent(np.array([np.ptp(x[mesh.F[:, :2]]) for x in mesh.V.T]))
         vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, np.ldexp(1.0, -exponent))
     return Glued(vertex, twin, ring, aligned, length, exponent, n_across)
 

@@ -16,7 +16,7 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
-from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles, WalkStarts
+from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles
 from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
 
@@ -299,7 +299,8 @@ class UnfoldingSolver:
     def _by_windows(self, asked: _Asked, cutoff: float) -> ExactSolution:
         has_curves = asked.curves is not None and len(asked.curves.faces) > 0
         surface = self._exact_on_given_faces if has_curves else self._exact
-        return surface.solve(*asked.starts, asked.curves if has_curves else None, cutoff=cutoff)
+        curves = asked.curves if has_curves else None
+        return surface.solve(*asked.starts, curves, cutoff=cutoff, directed=asked.angles is not None)
 
     def _takes_windows(self, sources: SourceSet) -> bool:
         """Whether distance from these sources is found by exact windows."""
@@ -320,10 +321,10 @@ class UnfoldingSolver:
             if asked.labels is not None:
                 asked.labels[:] = found.origin.label
             if asked.angles is not None:
-                asked.angles[:] = self.path_directions.of_windows(found, self._starts(asked), asked.starts[2])
+                asked.angles[:] = self.path_directions.of_windows(found, asked.starts[2])
             return found.distance
         if asked.angles is not None:
-            return self._directed_walks(u, asked)
+            return self._directed_walks(self._refinement, u, asked)
         unfolded = self._refinement.unfold
         if self._sweeps:
             unfolded = partial(self._refinement.sweep, known=_known(asked, near), groups=_groups(asked))
@@ -336,10 +337,10 @@ class UnfoldingSolver:
         """Whether directions are found by windows, as walks of a small tolerance would take as long."""
         if asked.angles is None or asked.tolerance is None or asked.tolerance >= TOLERANCE:
             return False
-        return asked.tolerance == 0 or self._walking.n <= _FEW_FOR_DIRECTIONS
+        return asked.tolerance == 0 or self._domain.components.size <= _FEW_FOR_DIRECTIONS
 
-    def _directed_walks(self, u: FloatArray, asked: _Asked) -> FloatArray:
-        refinement, starts = self._walking, self._starts(asked)
+    def _directed_walks(self, refinement: Refinement, u: FloatArray, asked: _Asked) -> FloatArray:
+        starts = refinement.starts(*asked.starts)
         walk = refinement.walks(-u, starts, TOLERANCE if asked.tolerance is None else asked.tolerance)
         row = refinement.number
         if asked.labels is not None:
@@ -348,17 +349,10 @@ class UnfoldingSolver:
             asked.angles[:] = self.path_directions.of_walks(walk, asked.starts[2])
         return np.asarray(walk["distance"][row])
 
-    def _starts(self, asked: _Asked) -> WalkStarts:
-        return self._walking.starts(*asked.starts)
-
-    @cached_property
-    def _walking(self) -> Refinement:
-        return Refinement(self._surface.unfolding) if self._refinement is None else self._refinement
-
     @cached_property
     def path_directions(self) -> PathDirections:
         """Polar angles of the paths; a `MeshError` where vertices have no tangent plane."""
-        return PathDirections(self._surface, self._walking)
+        return PathDirections(self._surface, self._refinement)
 
     def _points(self, sources: SourceSet) -> SourcePoints:
         """The points of a set, and those that stand for its curves."""

@@ -12,7 +12,7 @@ from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, Located
 
-__all__ = ["TOLERANCE", "Found", "Searched", "Starts", "search", "starts_at"]
+__all__ = ["TOLERANCE", "Found", "Leaving", "Searched", "Starts", "search", "starts_at"]
 
 #: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds
 #: up to. A larger number keeps a few windows more and changes no result.
@@ -63,6 +63,26 @@ class Found(NamedTuple):
         return cls(np.full(k, np.inf), nothing[0], np.full(n_labels, -1, np.int32), nothing[1], np.zeros(k))
 
 
+class Leaving(NamedTuple):
+    """How the straight last parts of the paths to n vertices leave the roots, on faces that are oriented alike.
+
+    Attributes
+    ----------
+    corner : (n,)
+        The corner of the root that the path leaves through; of a source point in face f, ``3 f``; -1 for none.
+    direction : (n, 2) float64
+        The direction in the plane of that corner, of any length. The first axis is the side to the next corner.
+    """
+
+    corner: AnyArray
+    direction: FloatArray
+
+    @classmethod
+    def of(cls, n: int) -> Leaving:
+        """Nothing found yet, at n vertices."""
+        return cls(np.full(n, -1, np.int32), np.zeros((n, 2)))
+
+
 class Searched(NamedTuple):
     """A search that is done.
 
@@ -78,6 +98,8 @@ class Searched(NamedTuple):
         At each of `place`.
     n_windows, n_crossings : int
         As in `ExactSolution`.
+    leaving : Leaving or None
+        At the vertices, if asked for.
     """
 
     starts: Starts
@@ -86,6 +108,7 @@ class Searched(NamedTuple):
     at_targets: Found
     n_windows: int
     n_crossings: int
+    leaving: Leaving | None
 
     def nearest_copy(self, n_targets: int) -> IntArray:
         """Of the copies of each target, the one with the smallest distance."""
@@ -102,12 +125,14 @@ def search(
     cutoff: float = np.inf,
     targets: SurfacePoints | None = None,
     goals: IntArray | None = None,
+    directed: bool = False,
 ) -> Searched:
     """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`."""
     place = edges.located(targets)
     n, t = edges.n, len(place.faces)
     found, at_targets = Found.of(n, n + len(starts.points.faces) + len(starts.segments.faces)), Found.of(t, 0)
     statistics = np.zeros(3, np.int64)
+    leaving = Leaving.of(n) if directed else None
     front = windows.Front(
         *edges.tables,
         found.distance,
@@ -119,6 +144,7 @@ def search(
         np.empty(n, np.int32),
         np.full(len(edges.tables.vertex), -1, np.int32),
         TOLERANCE,
+        *(() if leaving is None else (leaving.corner, leaving.direction.ravel())),
     )
     done = windows.search(
         front,
@@ -145,7 +171,7 @@ def search(
     )
     if not done:
         raise MemoryError("the windows of the exact distance do not fit into memory")
-    return Searched(starts, found, place, at_targets, *(int(count) for count in statistics[1:]))
+    return Searched(starts, found, place, at_targets, *(int(count) for count in statistics[1:]), leaving)
 
 
 def starts_at(
