@@ -90,7 +90,7 @@ def given() -> dict[str, Any]:
         "mask": inside, "is_inside": inside, "curve": curve, "other": other, "points": samples, "positions": around,
         "g": mesh.V[:, 0], "weights": np.ones(mesh.n_vertices), "vectors": np.ones((3, 2)) / 3,
         "speed": np.full(mesh.n_faces, 2.0), "metric": np.tile(np.eye(3), (mesh.n_faces, 1, 1)),
-        "surface": surface, "P": surface.V, "normals": ball.V + [0, 0, 0.05], "tetrahedra": shapes.box(6),
+        "surface": surface, "P": surface.V, "normals": np.add(ball.V, [0, 0, 0.05]), "tetrahedra": shapes.box(6),
     }  # fmt: skip
 
 
