@@ -20,7 +20,7 @@ import notebook_pages  # noqa: E402
 import reference_pages  # noqa: E402
 
 project = "heat_igl"
-author = "the heat_igl developers"
+author = project_copyright = "the heat_igl developers"
 version = release = heat_igl.__version__
 html_title = f"heat_igl {release}"
 html_theme_options = {
