@@ -91,15 +91,16 @@ def given() -> dict[str, Any]:
         "g": mesh.V[:, 0], "weights": np.ones(mesh.n_vertices), "vectors": np.ones((3, 2)) / 3,
         "speed": np.full(mesh.n_faces, 2.0), "metric": np.tile(np.eye(3), (mesh.n_faces, 1, 1)),
         "surface": surface, "P": surface.V, "normals": np.add(ball.V, [0, 0, 0.05]), "tetrahedra": shapes.box(6),
+        "paths": ["meshes/bunny.obj"],
     }  # fmt: skip
 
 
 PAGES = sorted(path.name for path in DOCS.glob("*.md") if "```python" in path.read_text(encoding="utf8"))
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if page not in TESTED_APART])
+@pytest.mark.parametrize("page", ["../README.md", *(page for page in PAGES if page not in TESTED_APART)])
 def test_the_blocks_of_a_page_run_from_top_to_bottom(page: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heat_igl.validation.samples.bunny_path", lambda: None)  # the smaller sample
+    monkeypatch.setattr(heat_igl, "sample_mesh", joined_cylinder)  # small, and the one that `given` refers to
     names = given()
     heat_igl.write_point_cloud("scan.ply", heat_igl.PointCloud(names["mesh"].V))
     Path("meshes").mkdir()
