@@ -52,6 +52,7 @@ default_role = "py:obj"  # for names between single backticks in docstrings
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 nb_execution_mode = "cache"  # sphinx-build -D nb_execution_mode=off: without their results
+nb_execution_cache_path = str(HERE / "_parts" / "executed")
 nb_execution_in_temp = True
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
