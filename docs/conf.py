@@ -16,10 +16,11 @@ import heat_igl
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
+import notebook_pages  # noqa: E402
 import reference_pages  # noqa: E402
 
 project = "heat_igl"
-author = "the heat_igl developers"
+author = project_copyright = "the heat_igl developers"
 version = release = heat_igl.__version__
 html_title = f"heat_igl {release}"
 html_theme_options = {
@@ -30,7 +31,7 @@ html_theme_options = {
 }
 
 extensions = [
-    "myst_parser",
+    "myst_nb" if notebook_pages.are_rendered() else "myst_parser",  # the first loads the second
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
@@ -50,6 +51,12 @@ default_role = "py:obj"  # for names between single backticks in docstrings
 
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
+nb_execution_mode = "cache"  # sphinx-build -D nb_execution_mode=off: without their results
+nb_execution_cache_path = str(HERE / "_parts" / "executed")
+nb_execution_in_temp = True
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_execution_show_tb = True
 bibtex_bibfiles = ["literature.bib"]
 bibtex_default_style = "plain"
 bibtex_reference_style = "author_year"
@@ -59,10 +66,12 @@ autosummary_generate = False  # see _generate_pages
 
 
 def _write_parts(*_: object) -> None:
-    """Write the tables of public names and the pictures of the gallery."""
+    """Write the tables of public names and of notebooks, and the pictures of the gallery; copy the notebooks."""
     parts = HERE / "_parts"
     parts.mkdir(exist_ok=True)
     (parts / "names.md").write_text(reference_pages.page(), encoding="utf8")
+    (parts / "notebooks.md").write_text(notebook_pages.page(), encoding="utf8")
+    notebook_pages.copy(HERE / "notebooks")
     importlib.import_module("gallery").main(["--out", str(parts)])
 
 

@@ -8,20 +8,22 @@ import heat_igl
 GROUPS = {
     "Distance": """geodesic_distance HeatMethodSolver HeatSolution Diagnostics LabelledDistance heat_method_distance
         unfolded_distance Refinement""",
-    "Only what is asked": "distances_within nearest_vertices pair_distances distance_matrix",
+    "Only what is asked": """distances_within nearest_vertices pair_distances distance_matrix
+        write_distances_within read_distances_within""",
     "Meshes, polygons and points": """Mesh PolygonMesh PointCloud as_mesh sample_mesh MeshReport ImageDomain
         image_domain closest_points ClosestPoints split_long_edges""",
     "Files": """read_mesh read_polygon_mesh read_point_cloud read_attributes write_mesh write_point_cloud
         write_curves""",
     "Sources": "SurfacePoints SurfaceCurve OffsetSources curve_on edge_curve",
     "Curves": """isolines offset_curves enclosed_areas sublevel_areas shortest_paths geodesic_path straighten
-        GeodesicPathSolver handle_loops geodesic_bezier trace_geodesic cut""",
+        GeodesicPathSolver handle_loops geodesic_bezier trace_geodesic cut CutMesh""",
     "Directions and tangent vectors": """tangent_frames TangentFrames log_map exp_map VectorHeatSolver
-        connection_laplacian""",
-    "Which side": "SignedHeatSolver",
+        Directions connection_laplacian""",
+    "Which side": "SignedHeatSolver OrientedPoints region_boundary volume_signed_distance VoxelBox",
     "Sampling": """farthest_points farthest_cells voronoi_cells VoronoiCells dual_triangulation geodesic_centre
         karcher_mean centroidal_voronoi CentroidalSites diameter sampling""",
-    "Operators of a domain": "Operators polygon_operators point_cloud_operators speed_operators metric_operators",
+    "Operators of a domain": """Operators polygon_operators point_cloud_operators speed_operators metric_operators
+        fibre_metric""",
     "Validation": "validate ValidationReport ValidationRow reference closed_forms metrics shapes baselines",
     "Pictures": "plots",
     "Many meshes": "cluster",

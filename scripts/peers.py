@@ -31,7 +31,7 @@ LARGEST = {
     "heat_igl exact": 1_000_000,
     "VTP": 500_000,
     "pygeodesic": 60_000,
-    "libigl exact": 60_000,
+    "libigl exact": 30_000,
     "gdist": 60_000,
 }
 # Where the child process of VTP finds the program.

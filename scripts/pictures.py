@@ -3,12 +3,13 @@
     python scripts/pictures.py                      # into docs/images: about three minutes
     python scripts/pictures.py --out DIRECTORY --picture bunny
 
-``bunny`` heads the README, ``paper`` makes those of docs/paper.md, ``theory`` those of docs/theory.md. Needs the extras
-``view`` and ``fast``, and the meshes of the pymeshlab wheel.
+``bunny`` heads the README, ``more`` there shows six pictures of the gallery; ``paper`` makes those of docs/paper.md,
+``theory`` those of docs/theory.md. Needs the extras ``view`` and ``fast``, and the meshes of the pymeshlab wheel.
 """
 
 from __future__ import annotations
 
+import importlib
 import shutil
 import subprocess
 import sys
@@ -38,11 +39,42 @@ def paper(out: Path) -> None:
             shutil.copyfile(Path(folder, f"figure_{name}.png"), out / f"paper_{name}.png")
 
 
+# Functions of docs/gallery.py, and what they show.
+MORE = {
+    "cells": "Voronoi cells",
+    "paths": "shortest paths",
+    "grown": "signed distance",
+    "directions": "log map",
+    "straightest": "straightest geodesics",
+    "cloud": "point clouds",
+}
+
+
+def more(out: Path) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.image import imread
+
+    sys.path.insert(0, str(SCRIPTS.parent / "docs"))
+    gallery = importlib.import_module("gallery")
+    figure = Figure(figsize=(9, 6.2), layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    with tempfile.TemporaryDirectory() as folder:
+        for panel, (name, title) in zip(figure.subplots(2, 3).flat, MORE.items(), strict=True):
+            path = Path(folder, f"{name}.png")
+            getattr(gallery, name)().save(path)
+            panel.imshow(imread(path))
+            panel.set_title(title)
+            panel.set_anchor("N")
+            panel.axis("off")
+    figure.savefig(out / "more.png", dpi=120)
+
+
 def theory(out: Path) -> None:
     subprocess.run([sys.executable, SCRIPTS / "theory_figures.py", "--out", out], check=True)
 
 
-PICTURES: dict[str, Callable[[Path], None]] = {"bunny": bunny, "paper": paper, "theory": theory}
+PICTURES: dict[str, Callable[[Path], None]] = {"bunny": bunny, "more": more, "paper": paper, "theory": theory}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -87,3 +87,18 @@ def test_notebook_uses_public_names_only(path: Path) -> None:
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("heat_igl"):
                 exported = __import__(str(node.module), fromlist=["*"]).__all__
                 assert {alias.name for alias in node.names} <= set(exported)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebook_opens_in_colab_and_installs_the_package_there(path: Path) -> None:
+    opening, install = cells(path)[:2]
+    assert f"/github/heat-igl/heat_igl/blob/main/notebooks/{path.name})" in "".join(opening["source"])
+    said: list[str] = []
+    shell = type("Shell", (), {"run_line_magic": lambda _, *line: said.append(" ".join(line))})
+    # Where the package is installed, as here, the cell does nothing.
+    for spec in (object(), None):
+        names = {"get_ipython": shell}
+        source = code(install).replace("importlib.util.find_spec(", "find(")
+        exec(source, {**names, "find": lambda name, spec=spec: spec if name == "heat_igl" else object()})
+    assert len(said) == 1
+    assert re.fullmatch(r"pip install -q 'heat-igl\[all\] @ git\+https://github.com/heat-igl/heat_igl'", said[0])

@@ -1,4 +1,4 @@
-"""The code blocks of the pages that newcomers read first: they run as they stand."""
+"""The code blocks of the documentation run as they stand, and the drawings of the theory are true."""
 
 from __future__ import annotations
 
@@ -55,6 +55,63 @@ def test_coming_from_another_library(block: str) -> None:
     assert any(key in names for key in ("phi", "line"))
 
 
+# Pages with tests of their own, and what single blocks of the others need.
+TESTED_APART = ("quickstart.md", "coming_from.md", "tasks.md")
+NEEDS = {"plot(": "matplotlib", "heat_igl.torch": "torch", "cluster.": "distributed", "xarray": "xarray"}
+ELSEWHERE = ("SLURMCluster",)  # runs on such a machine only
+
+
+def joined_cylinder() -> heat_igl.Mesh:
+    """A tube whose vertices are numbered as the pages say.
+
+    Edges join 3, 7, 12 and 40, and 3, 17 and 18. The loop from 3 by 40 and 900 back to 3 runs once around.
+    """
+    tube = shapes.cylinder(9, 150, length=40.0)
+    number = np.arange(tube.n_vertices)
+    for old, new in {90: 3, 91: 7, 92: 12, 93: 40, 99: 17, 108: 18, 96: 900}.items():
+        at = np.flatnonzero(number == new)[0]
+        number[[old, at]] = number[[at, old]]
+    return heat_igl.Mesh(tube.V[np.argsort(number)], number[tube.F])
+
+
+def given() -> dict[str, Any]:
+    """What the pages take for granted: names of the reader's own things."""
+    mesh = joined_cylinder()
+    ball = shapes.icosphere(2)
+    turn = np.linspace(0, 2 * np.pi, ball.n_vertices + 1)[:-1]
+    around = np.stack([0.97 * np.cos(turn), 0.97 * np.sin(turn), 20 + np.sin(turn)], axis=1)
+    surface = heat_igl.Mesh(0.3 * ball.V + 0.5, ball.F)
+    inside = heat_igl.HeatMethodSolver(mesh).distance(600) < 2
+    curve, other = (heat_igl.isolines(mesh, mesh.V[:, 2], level)[0][0] for level in (10.1, 30.1))
+    samples = heat_igl.closest_points(mesh, around).points
+    return {
+        "__name__": "__main__", "heat_igl": heat_igl, "np": np, "mesh": mesh, "V": mesh.V, "F": mesh.F,
+        "solver": heat_igl.HeatMethodSolver(mesh), "exact": heat_igl.geodesic_distance(mesh, 7) + 1, "sources": 7,
+        "mask": inside, "is_inside": inside, "curve": curve, "other": other, "points": samples, "positions": around,
+        "g": mesh.V[:, 0], "weights": np.ones(mesh.n_vertices), "vectors": np.ones((3, 2)) / 3,
+        "speed": np.full(mesh.n_faces, 2.0), "metric": np.tile(np.eye(3), (mesh.n_faces, 1, 1)),
+        "surface": surface, "P": surface.V, "normals": np.add(ball.V, [0, 0, 0.05]), "tetrahedra": shapes.box(6),
+        "paths": ["meshes/bunny.obj"],
+    }  # fmt: skip
+
+
+PAGES = sorted(path.name for path in DOCS.glob("*.md") if "```python" in path.read_text(encoding="utf8"))
+
+
+@pytest.mark.parametrize("page", ["../README.md", *(page for page in PAGES if page not in TESTED_APART)])
+def test_the_blocks_of_a_page_run_from_top_to_bottom(page: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(heat_igl, "sample_mesh", joined_cylinder)  # small, and the one that `given` refers to
+    names = given()
+    heat_igl.write_point_cloud("scan.ply", heat_igl.PointCloud(names["mesh"].V))
+    Path("meshes").mkdir()
+    heat_igl.write_mesh("meshes/bunny.obj", shapes.icosphere(3))
+    for block in blocks(page):
+        code = compile(block, page, "exec")
+        lacking = [module for text, module in NEEDS.items() if text in block and not importlib.util.find_spec(module)]
+        if not lacking and not any(text in block for text in ELSEWHERE):
+            exec(code, names)
+
+
 def test_the_drawn_strip_is_flat_and_true_to_length() -> None:
     figures = load_script("theory_figures")
     mesh = shapes.torus(14, 22, tube=0.5)
@@ -66,3 +123,19 @@ def test_the_drawn_strip_is_flat_and_true_to_length() -> None:
     np.testing.assert_allclose(sides, np.linalg.norm(np.roll(in_space, -1, axis=1) - in_space, axis=2), rtol=1e-12)
     np.testing.assert_allclose(way[:, 1], 0, atol=1e-9)  # one straight line
     np.testing.assert_allclose(way[-1, 0], path.lengths(mesh).sum(), rtol=1e-12)
+
+
+def test_a_site_is_checked_for_links_that_lead_nowhere_and_for_what_it_loads() -> None:
+    check = load_script("check_site")
+    Path("site/folder").mkdir(parents=True)
+    Path("site/index.html").write_text(
+        '<a href="folder/one.html#there">1</a><a href="folder/one.html#gone">2</a><a href="gone.html">3</a>'
+        '<a href="https://example.org">4</a><img src="https://example.org/x.png"><a id="top" href="#top">5</a>'
+    )
+    Path("site/folder/one.html").write_text('<p id="there"><a href="../index.html#top">back</a><a href="#no">no</a>')
+    assert check.faults(Path("site")) == [
+        "folder/one.html: #no names no place on that page",
+        "index.html loads https://example.org/x.png from outside",
+        "index.html: folder/one.html#gone names no place on that page",
+        "index.html: gone.html does not exist",
+    ]
