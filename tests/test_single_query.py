@@ -169,6 +169,6 @@ def test_a_solver_of_sweeps_keeps_spokes_and_makes_the_rest_again_for_points() -
         held = tracemalloc.get_traced_memory()[0]
     finally:
         tracemalloc.stop()
-    # 1014 with 400 for the spokes of the vertices and 300 for a factor; turns and steps would be 576 more.
+    # 1205 bytes for each, 384 of them spokes; turns and steps would be 576 more.
     assert held < 1400 * large.n_vertices
     assert np.isfinite(solver.distance(point)).all()
