@@ -73,6 +73,14 @@ def test_faces_that_do_not_fit_together_are_left_to_others() -> None:
     )
 
 
+def test_copies_of_faces_count_once() -> None:
+    query = single_query(Mesh(SMOOTH.V, np.concatenate([SMOOTH.F, SMOOTH.F[::3, ::-1]])), np.array([7]))
+    once = single_query(SMOOTH, np.array([7]))
+    assert query is not None
+    assert once is not None
+    np.testing.assert_array_equal(query.distance(), once.distance())
+
+
 @pytest.mark.parametrize(
     ("mesh", "sources"),
     [

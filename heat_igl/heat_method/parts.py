@@ -226,7 +226,7 @@ def prepare(
         # Before there are factors: most memory is needed while the tables are made.
         unfolding = UnfoldingSolver(domain, options.refine)
     unfolded = time.perf_counter()
-    problems = [] if found is None else _factored(domain, options, step, found, fitted)
+    problems = [] if found is None else _factored(domain, options, step, found, t_damping, fitted)
     factored = time.perf_counter()
     heat_flow = problems[0] if problems else None
     mass_unit = domain.mean_mass if heat_flow is None else heat_flow.mean_mass
@@ -235,10 +235,10 @@ def prepare(
     if unfolding is not None or found is None:
         last_steps = unfolding or UnfoldingSolver(domain, "exact")
     else:
-        divergence = NormalizedDivergence(domain, t_damping, found.order, fitted)
-        last_steps = Integration(domain, problems[0], divergence, problems[1], t_damping, fitted, assembler.edges)
+        heat_flow, poisson, divergence = problems
+        last_steps = Integration(domain, heat_flow, divergence, poisson, t_damping, fitted, assembler.edges)
     triangulation = None if domain.surface is None else domain.surface.triangulation
-    factors = [] if heat_flow is None else heat_flow.factors + [problem.factor for problem in problems[1:]]
+    factors = [] if heat_flow is None else heat_flow.factors + [problem.factor for problem in problems[1:2]]
     diagnostics = Diagnostics(
         t=_of_largest(step, domain),
         t_requested=_of_largest(requested, domain),
@@ -271,14 +271,29 @@ def prepare(
 
 
 def _factored(
-    domain: Operators, options: SolverOptions, step: float | FloatArray, found: Analysis, fitted: bool
+    domain: Operators,
+    options: SolverOptions,
+    step: float | FloatArray,
+    found: Analysis,
+    t_damping: float | FloatArray | None,
+    fitted: bool,
 ) -> list[Any]:
-    """The heat flow, and the Poisson problem unless `refine` takes the place of it."""
-    makers: list[Callable[[], Any]] = [lambda: HeatFlow(domain, step, options.boundary, options.backend, found, fitted)]
-    if options.refine is None:
-        makers.append(lambda: PoissonProblem(domain, options.backend, found))
-    # Both matrices at once: the backends run without the interpreter's lock.
-    return list(in_order(lambda make: make(), makers, max(1, min(len(makers), n_threads()))))
+    """The heat flow; unless `refine` takes the place of them, also the Poisson problem and the divergence."""
+
+    def flow() -> HeatFlow:
+        return HeatFlow(domain, step, options.boundary, options.backend, found, fitted)
+
+    if options.refine is not None:
+        return [flow()]
+    # Both matrices at once: the backends run without the interpreter's lock. The Poisson problem is done first, and
+    # the divergence follows on that thread.
+    makers: list[Callable[[], Any]] = [
+        lambda: PoissonProblem(domain, options.backend, found),
+        flow,
+        lambda: NormalizedDivergence(domain, t_damping, found.order, fitted),
+    ]
+    poisson, heat_flow, divergence = in_order(lambda make: make(), makers, min(2, n_threads()))
+    return [heat_flow, poisson, divergence]
 
 
 def _resolved(domain: Operators, options: SolverOptions) -> tuple[Operators, SolverOptions]:
