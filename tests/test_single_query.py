@@ -13,7 +13,7 @@ from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.intrinsic.fans import tables
 from heat_igl.kernels import bounds
 from heat_igl.mesh import connectivity
-from heat_igl.operators import unfolding_surface
+from heat_igl.operators import operators, unfolding_surface
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.half_edges import glued
 from heat_igl.unfolding.single_query import single_query
@@ -180,3 +180,9 @@ def test_a_solver_of_sweeps_keeps_spokes_and_makes_the_rest_again_for_points() -
     # 1205 bytes for each, 384 of them spokes; turns and steps would be 576 more.
     assert held < 1400 * large.n_vertices
     assert np.isfinite(solver.distance(point)).all()
+
+
+def test_matrices_hold_their_entries_alone() -> None:
+    domain = operators(SMOOTH)
+    for array in (domain.L.data, domain.L.indices, domain.M.data, domain.M.indices):
+        assert array.base is None or array.base.nbytes == array.nbytes
