@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 from pathlib import Path
 from types import ModuleType
@@ -12,6 +13,7 @@ import pytest
 from conftest import load_script
 
 import heat_igl
+from heat_igl import shapes
 
 
 @pytest.fixture(scope="module")
@@ -147,3 +149,28 @@ def test_the_page_on_peers_has_a_table_for_each_mesh() -> None:
     assert text.count("### cow, 9 vertices") == text.count("### bunny, 9 vertices") == 1
     assert "| heat_igl | 0.250 | 0.5000 | 0.1250 | 2 | 1.000 | 2.000 |" in text
     assert "| VTP | - | 0.5000 | - | - | 1.000 | - |" in text
+
+
+def test_large_meshes_in_processes_of_their_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    large = load_script("large_meshes")
+    page = tmp_path / "page.md"
+    page.write_text("<!-- large -->\n<!-- /large -->\n")
+    assert large.main(["--level", "5", "--output", str(tmp_path), "--docs", str(page)]) == 0
+    rows = json.loads((tmp_path / "large.json").read_text())["rows"]
+    assert [(row["method"], row["vertices"]) for row in rows] == [("unfold", 10242), ("sweep", 10242)]
+    for row in rows:
+        assert 0 < row["mean_error"] < row["max_error"] < 0.01
+        assert row["peak_memory"] is None or row["peak_memory"] > 1000 * row["vertices"]
+    assert "| sweep | 10242 |" in page.read_text()
+    assert "exit status -9 | - |" in large.markdown([{"method": "unfold", "failed": "exit status -9"}])
+    assert "10242" in capsys.readouterr().out
+
+
+def test_relative_errors_are_those_of_great_circles() -> None:
+    large = load_script("large_meshes")
+    V = shapes.icosphere(3).V
+    exact = np.arccos(np.clip(V @ V[5], -1, 1))
+    assert large.relative_errors(V, 5, exact) == pytest.approx((0, 0), abs=1e-7)
+    mean, largest = large.relative_errors(V, 5, 1.01 * exact)
+    assert mean == pytest.approx(0.01)
+    assert largest == pytest.approx(0.01 * exact.max() / np.pi)

@@ -128,6 +128,8 @@ def test_chosen_where_factors_would_not_fit(monkeypatch):
     assert HeatMethodSolver(mesh).diagnostics.backend != "iterative"
     monkeypatch.setattr(iterative, "available_memory", lambda: 0.99 * estimate)
     assert HeatMethodSolver(mesh).diagnostics.backend == "iterative"
+    # A refinement factors one matrix.
+    assert HeatMethodSolver(mesh, refine="sweep").diagnostics.backend != "iterative"
     monkeypatch.setattr(backends, "has_iterative", lambda: False)
     assert HeatMethodSolver(mesh).diagnostics.backend != "iterative"
 

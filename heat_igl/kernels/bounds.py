@@ -5,7 +5,7 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.half_edges import Spoke
 from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["incident_edges", "is_longer", "lengthen", "shorten", "spoke_edges"]
+__all__ = ["glued_edges", "incident_edges", "is_longer", "lengthen", "shorten", "spoke_edges"]
 
 
 def is_longer(
@@ -47,6 +47,35 @@ def incident_edges(ends: cython.const[cython.int][:, ::1], n: cython.int):
                 first[ends[e, c]] -= 1
                 incident[first[ends[e, c]]] = e
     return firsts, by_vertex
+
+
+def glued_edges(
+    F: cython.const[cython.longlong][:, ::1],
+    length: cython.const[cython.double][::1],
+    twin: cython.const[cython.longlong][::1],
+):
+    """Ends (e, 2) int32 and lengths (e,) of the edges of a triangulation, each once; of more than two faces, for each.
+
+    As an `IntrinsicTriangulation` has them, with the lengths (3 m,) in one row.
+    """
+    f: cython.Py_ssize_t
+    c: cython.int
+    e: cython.Py_ssize_t = 0
+    with cython.nogil:
+        for f in range(twin.shape[0]):
+            e += twin[f] < 0 or f < twin[f]
+    pairs, lengths = np.empty((e, 2), np.int32), np.empty(e)
+    ends: cython.int[:, ::1] = pairs
+    length_of: cython.double[::1] = lengths
+    e = 0
+    with cython.nogil:
+        for f in range(F.shape[0]):
+            for c in range(3):
+                if twin[3 * f + c] < 0 or 3 * f + c < twin[3 * f + c]:
+                    ends[e, 0], ends[e, 1] = F[f, (c + 1) % 3], F[f, (c + 2) % 3]
+                    length_of[e] = length[3 * f + c]
+                    e += 1
+    return pairs, lengths
 
 
 def spoke_edges(first: cython.const[cython.int][::1], spoke: cython.const[Spoke][::1]):

@@ -83,7 +83,8 @@ def cotangent_laplacian(cotangents: FloatArray, F: IntArray, n: int) -> sp.csc_m
     diagonal = -np.bincount(ends.ravel(), np.repeat(weight, 2), n)[used]
     tail, head = ends.T
     rows, columns = np.concatenate([tail, head, used]), np.concatenate([head, tail, used])
-    return sp.csc_matrix((np.concatenate([weight, weight, diagonal]), (rows, columns)), shape=(n, n))
+    # A copy: the sums of entries are in the first half of arrays that are as long as the entries were many.
+    return sp.csc_matrix((np.concatenate([weight, weight, diagonal]), (rows, columns)), shape=(n, n)).copy()
 
 
 def _assembled(

@@ -78,6 +78,7 @@ class HeatFlow:
         L = fitted_laplacian(operators, t) if fitted else operators.L
         step = operators.expand_to_vertices(t) if isinstance(t, np.ndarray) else t
         matrix = shifted(L, -step / self.mean_mass, mass / self.mean_mass)
+        del L  # as large as the matrix, and not needed while that is factored
         if analysis is None or not analysis.fits(matrix):
             analysis = analyse(matrix, backend)
         self.t = t

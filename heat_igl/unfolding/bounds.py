@@ -85,7 +85,6 @@ def shorten_along(edges: Sequence[tuple[AnyArray, FloatArray]], distance: FloatA
 
 def _sides(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, FloatArray]:
     """Ends (e, 2) and lengths (e,) of edges, each once."""
-    twin = triangulation.twin
-    half_edges = np.flatnonzero((twin < 0) | (np.arange(len(twin)) < twin))
-    ends = np.stack([triangulation.tail(half_edges), triangulation.head(half_edges)], axis=1, dtype=np.int32)
-    return ends, triangulation.l.ravel()[half_edges]
+    F, lengths = np.ascontiguousarray(triangulation.F), np.ascontiguousarray(triangulation.l)
+    ends, length = kernels.glued_edges(F, lengths.ravel(), triangulation.twin)
+    return ends, length

@@ -87,7 +87,7 @@ class Refinement(NumberedTriangles):
         super().__init__(made, number, n_sheets)
 
     @cached_property
-    def tables(self) -> Tables:
+    def tables(self) -> Tables:  # type: ignore[override]
         """What the kernels read; made again after `keep_for_sweeps`, if sources in faces or walks ask for it."""
         return _numbered_tables(self.triangulation, self._n_sheets)[2]
 

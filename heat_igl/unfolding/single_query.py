@@ -30,10 +30,13 @@ __all__ = ["SingleQuery", "single_query"]
 def single_query(mesh: Mesh, sources: IntArray) -> SingleQuery | None:
     """What distance from source vertices (k,) needs of a mesh; the mesh itself is not held.
 
-    None if neighbouring faces are not oriented alike, or more than two meet at an edge.
+    None if neighbouring faces are not oriented alike, or more than two meet at an edge, copies of a face counted once.
     """
     found = glued(mesh)
-    if found.n_across or (found.twin == -2).any():
+    if (found.twin == -2).any():
+        reduced, _ = mesh.without_duplicate_faces()
+        return None if reduced is mesh else single_query(reduced, sources)
+    if found.n_across:
         return None
     key = _along_edges(found, mesh.n_vertices, sources)
     found.flip(mesh.F)
