@@ -70,7 +70,9 @@ class FieldDerivative:
         self._F = F = surface.triangulation.F
         self._imposed, self._known = imposed, known
         # Faces with a cold corner follow the gradient of the heat itself, and are not damped.
-        is_log: BoolArray = (u[F] >= LOWEST_HEAT).all(axis=1) if parts.fitted else np.zeros(len(F), bool)
+        is_log: BoolArray = np.zeros(len(F), bool)
+        if parts.fitted:
+            is_log |= (u[F] >= LOWEST_HEAT).all(axis=1)
         is_plain: BoolArray = ~is_log
         is_plain[imposed] = is_log[imposed] = False
         self._plain = np.flatnonzero(is_plain)

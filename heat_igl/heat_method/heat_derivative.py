@@ -90,8 +90,8 @@ class HeatDerivative:
         n_near = len(term.near.vertex)
         by_value = levels.by_value.copy()
         by_value[:n_near] += field.by_known[self._values.vertex[:n_near]]
-        values = self._values.pull_back(by_value)
-        by_side, by_t = levels.by_side + values.by_side, field.by_t
+        by_side, by_t = levels.by_side, field.by_t
+        given = self._values.pull_back(by_value, by_side)
         self._add_elements(by_matrix, field.by_weight, field.by_area, by_side, by_t)
         # An initial heat falls by exp(-delay), and a delay is an offset over sqrt(t).
         delayed = by_initial * term.heat_of(term.share) * term.delay
@@ -104,7 +104,7 @@ class HeatDerivative:
                 self._domain.expand_to_faces(by_h)[:, None], parts.mean_length_slopes, out=field.by_weight
             )
         by_place = self._by_place(by_vertex, levels)
-        return Change(by_side, by_place, values.by_given, float(by_t.sum()), values.by_place)
+        return Change(by_side, by_place, given.by_side, float(by_t.sum()), given.by_place)
 
     def push_forward(self, change: SideChange) -> FloatArray:
         """How the distances (n,) change with the sides and the places of points, after and before any flip."""
@@ -116,7 +116,7 @@ class HeatDerivative:
         of_h = np.bincount(of_face, (parts.mean_length_slopes * by_side).sum(axis=1), domain.n_components)
         by_t = self._steps_by_h * of_h
         flow = self._flow_change(elements, change, by_t)
-        initial: FloatArray = np.bincount(flow.vertex, flow.initial, domain.n)
+        initial = np.asarray(np.bincount(flow.vertex, flow.initial, domain.n), np.float64)
         by_heat = self._flow.push_forward(initial, flow.product, flow.diagonal)
         by_value = self._values.push_forward(by_side, SideChange(change.by_given, change.by_given_place))
         by_phi = self._poisson.solve(self._field.push_forward(elements, by_heat, self._at_vertices(by_value), by_t))

@@ -126,6 +126,7 @@ class PinnedLevels:
         self._taken[near.vertex] = np.arange(n_near)
         self._bounds = [self._without(bound, near.vertex) for bound in self._bounds]
         self._is_free: BoolArray = reached & (self._taken < 0)
+        self._takers = np.flatnonzero(self._taken >= 0)
         for bound in self._bounds:
             self._is_free[bound.end] = False
         self.distance = distance
@@ -180,13 +181,14 @@ class PinnedLevels:
         """The derivative of the sum of distances times g (n,)."""
         term, anchors = self._term, self._term.anchors
         by_side = np.zeros(self._triangulation.l.size)
-        is_taken = self._taken >= 0
-        by_value: FloatArray = np.bincount(self._taken[is_taken], g[is_taken], self._n_values)
+        taken = self._takers
+        by_value = np.asarray(np.bincount(self._taken[taken], g[taken], self._n_values), np.float64)
         for end, side, which, sign in self._bounds:
             np.add.at(by_value, which, g[end])
             np.add.at(by_side, side, sign * g[end])
         by_phi = np.where(self._is_free, g, 0.0)
-        share: FloatArray = -np.bincount(self._components, by_phi, self._n_components)[self._anchor_component]
+        of_component = np.asarray(np.bincount(self._components, by_phi, self._n_components), np.float64)
+        share = -of_component[self._anchor_component]
         share /= self._count[self._anchor_component]
         by_excess, by_heat, by_matrix = share, np.zeros(len(g)), None
         by_part = np.zeros(len(g))
@@ -213,7 +215,7 @@ class PinnedLevels:
         if self._weighted is not None:
             level = np.bincount(anchors.label, excess, len(self._of_label)) / self._of_label
             relative = (level - level[self._lowest])[term.label]
-            initial: FloatArray = np.bincount(term.vertex, self._heat * relative, len(by_phi))
+            initial = np.asarray(np.bincount(term.vertex, self._heat * relative, len(by_phi)), np.float64)
             initial += np.bincount(flow.vertex, flow.initial * self._relative[flow.label], len(by_phi))
             weighted = self._weighted.push_forward(initial, flow.product, flow.diagonal)
             of_source = np.divide(
@@ -222,8 +224,7 @@ class PinnedLevels:
             of_source += level[self._lowest]
         rest = np.bincount(self._anchor_component, excess - of_source[anchors.vertex], self._n_components)
         change = np.where(self._is_free, by_phi - of_source - (rest / self._count)[self._components], 0.0)
-        is_taken = self._taken >= 0
-        change[is_taken] = by_value[self._taken[is_taken]]
+        change[self._takers] = by_value[self._taken[self._takers]]
         for end, side, which, sign in self._bounds:
             change[end] = by_value[which] + sign * by_side.ravel()[side]
         return np.asarray(change)

@@ -87,4 +87,5 @@ class Elements:
         mass = part.sum(axis=1)[:, None] - part
         is_obtuse = (self.weight < 0).any(axis=1)
         mass[is_obtuse] = np.where(self.weight[is_obtuse] < 0, 0.5, 0.25) * area[is_obtuse, None]
-        return ElementChange(weight, area, np.bincount(self._triangulation.F.ravel(), mass.ravel(), minlength=self._n))
+        of_vertex = np.bincount(self._triangulation.F.ravel(), mass.ravel(), minlength=self._n)
+        return ElementChange(weight, area, np.asarray(of_vertex, np.float64))
