@@ -19,6 +19,7 @@ from heat_igl.heat_method.parts import SolverParts
 from heat_igl.heat_method.several_sources import drop_overtaken
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels import heat_adjoint as kernels
+from heat_igl.kernels import heat_tangent as tangent
 from heat_igl.operators import ElementChange
 from heat_igl.sources import SourceSet, right_hand_side
 from heat_igl.steps import FlowDerivative, MatrixSlopes
@@ -139,13 +140,17 @@ class HeatDerivative:
         of_weight, of_length, of_t = parts.flow_slopes
         entry = of_weight * elements.weight + of_length * change.by_side
         entry += of_t * self._domain.expand_to_faces(by_t)[:, None]
-        i, j, flat = e.i.ravel(), e.j.ravel(), entry.ravel()
+        F = self.triangulation.F
 
         def product(v: FloatArray) -> FloatArray:
-            across = flat * (v[i] - v[j])
-            return np.asarray(elements.mass * v + np.bincount(i, across, n) - np.bincount(j, across, n))
+            result = elements.mass * v
+            tangent.multiply(F, entry, v, result)
+            return np.asarray(result)
 
-        diagonal = elements.mass + np.bincount(i, flat, n) + np.bincount(j, flat, n)
+        diagonal = elements.mass
+        if parts.heat_flow.boundary != "neumann":
+            ends = np.concatenate([e.i.ravel(), e.j.ravel()])
+            diagonal = diagonal + np.bincount(ends, np.tile(entry.ravel(), 2), n)
         of_component = self._domain.components[term.vertex]
         vertex, label = term.vertex, term.label
         initial = term.heat_of(term.share) * term.delay * (by_t / (2 * parts.time_steps))[of_component]
