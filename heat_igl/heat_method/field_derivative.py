@@ -84,20 +84,29 @@ class FieldDerivative:
     def pull_back(self, p: FloatArray) -> FieldSlopes:
         """The derivative of p . (b - L phi), with b the divergence of the field."""
         e, F, domain = self._elements, self._F, self._parts.operators
-        p, zeros = np.ascontiguousarray(p), np.zeros_like(self._u)
+        zeros = np.zeros_like(self._u)
         by_weight, by_area, by_log_t = np.empty_like(e.l), np.empty_like(e.area), np.zeros(domain.n_components)
         by_log, by_heat, by_known = zeros.copy(), zeros.copy(), zeros.copy()
+        of_vertex = np.stack([self._log_u, p, self._phi], axis=1)
         kernels.normalized(
-            F, e.weight, e.area, self._log_u, self._phi, p, self._rate_of_log, domain.components, by_weight, by_area,
-            by_log_t, by_log,
-        )  # fmt: skip
+            F, e.weight, e.area, of_vertex, self._rate_of_log, domain.components, by_weight, by_area, by_log_t, by_log
+        )
         if len(self._plain):
             k = self._plain
             of_weight, of_area = np.empty((len(k), 3)), np.empty(len(k))
+            of_vertex, any_rate = np.stack([self._u, p, zeros], axis=1), np.zeros(len(k))
             kernels.normalized(
-                F[k], e.weight[k], e.area[k], self._u, zeros, p, np.zeros(len(k)), domain.components, of_weight,
-                of_area, by_log_t, by_heat,
-            )  # fmt: skip
+                F[k],
+                e.weight[k],
+                e.area[k],
+                of_vertex,
+                any_rate,
+                domain.components,
+                of_weight,
+                of_area,
+                by_log_t,
+                by_heat,
+            )
             by_weight[k] += of_weight
             by_area[k] += of_area
         by_heat += np.divide(by_log, self._u, out=zeros, where=self._u > 0)

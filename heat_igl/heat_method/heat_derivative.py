@@ -129,9 +129,11 @@ class HeatDerivative:
         """Add the derivative by the sides (m, 3) and the time steps, from those by the elements and the heat flow."""
         e = self._elements
         by_mass = matrix.diagonal - np.einsum("kn,kn->n", matrix.x, matrix.u)
+        pairs = [column for pair in zip(matrix.x, matrix.u, strict=True) for column in pair]
+        of_vertex = np.stack([matrix.diagonal, by_mass, *pairs], axis=1)
         kernels.elements(
-            self.triangulation.F, e.l, e.weight, e.area, e.share, matrix.x, matrix.u, matrix.diagonal,
-            self._parts.flow_slopes, self._domain.components, by_weight, by_area, by_mass, by_side, by_t,
+            self.triangulation.F, e.l, e.weight, e.area, e.share, of_vertex, self._parts.flow_slopes,
+            self._domain.components, by_weight, by_area, by_side, by_t,
         )  # fmt: skip
 
     def _flow_change(self, elements: ElementChange, change: SideChange, by_t: FloatArray) -> FlowChange:

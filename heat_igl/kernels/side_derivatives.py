@@ -44,7 +44,7 @@ def push_to_sides(
     velocity: cython.const[cython.double][:, ::1],
     by_side: cython.double[:, ::1],
 ):
-    """Write to `by_side` (m, 3) how the sides opposite each corner change with the `velocity` (n, 3) of the vertices."""
+    """Write to `by_side` (m, 3) how the sides opposite each corner change, for a `velocity` (n, 3) of each vertex."""
     f: cython.Py_ssize_t
     c: cython.int
     d: cython.int
