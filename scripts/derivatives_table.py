@@ -4,11 +4,11 @@
     python scripts/derivatives_table.py bunny.obj cow.obj              # 20 random directions on each
     python scripts/derivatives_table.py MESH --directions 4 --output DIRECTORY
 
-Vertices at kinks are left out, which show by a second difference, and those that `inexact` lists. A kink of a path is
-the cut locus; one of the heat method is a face that begins to be damped there. For the heat method
-the vertices are moved by 0.01 edges first, since faces in flat squares are flipped by any motion; directions in which
-a flip falls between the two ends of a difference are left out, and all of them are counted. Costs are processor time
-on all threads, in queries.
+All vertices are moved by 0.01 edges first: in flat parts paths are equally long, and in flat squares any motion flips
+faces. Vertices at kinks are left out, which show by a second difference, and those that `inexact` lists. A kink of a
+path is the cut locus; one of the heat method is a face that begins to be damped there. Directions in which a flip falls
+between the two ends of a difference are left out for the heat method. All of these are counted. Costs are processor
+time on all threads, in queries.
 """
 
 from __future__ import annotations
@@ -40,6 +40,8 @@ SHAPES: dict[str, Callable[[], Mesh]] = {
     "book of 3 pages": lambda: shapes.book(3, 24),
     "square": lambda: shapes.grid(40),
 }
+# All vertices are moved by this many edges at random.
+_MOVED = 0.01
 # Steps of the differences in mean edge lengths: heat has more rounding.
 _STEP = {"exact": 1e-7, "unfold": 1e-7, "heat": 1e-6}
 # A second difference above this share of a step is a kink, and not the curvature of a smooth function.
@@ -52,10 +54,10 @@ def measured(mesh: Mesh, n_directions: int, seed: int) -> dict[str, Any]:
     # Random parts of the positions: no two paths are equally long then, and no four corners of faces on a circle.
     noise = rng.uniform(-1, 1, mesh.V.shape) * mesh.edge_lengths.mean()
     V = mesh.V - mesh.V.mean(axis=0)
+    moved = mesh.with_vertices(V + _MOVED * noise)
     source = int(rng.choice(np.unique(mesh.F)))
     row: dict[str, Any] = {"n": mesh.n_vertices}
     for name, options in METHODS.items():
-        moved = mesh.with_vertices(V + 0.01 * noise if name == "heat" else V)
         solver = HeatMethodSolver(moved, **options)
         distance, pull_back = solver.distance_vjp(source)
         directions = np.random.default_rng(seed + 1).standard_normal((n_directions, *V.shape))
@@ -96,8 +98,9 @@ def compared(
         ahead, behind = (one.distance(source) for one in two)
         with np.errstate(invalid="ignore"):
             smooth = exact & (np.abs(ahead - 2 * here + behind) <= _KINK[name] * step + 1e-12 * here)
+            slope = (ahead - behind) / (2 * step)
         kinks |= exact & ~smooth
-        expected = np.where(smooth, (ahead - behind) / (2 * step), 0.0)
+        expected = np.where(smooth, slope, 0.0)
         g = np.where(smooth, rng.standard_normal(len(here)), 0.0)
         rate = float((pull_back(g) * direction).sum())
         of_sums.append(abs(rate - float(g @ expected)) / float(np.linalg.norm(g * expected)))
