@@ -200,9 +200,7 @@ def test_points_on_a_cover_are_refused() -> None:
     assert HeatMethodSolver(MESHES["book"](), refine="exact").distance_vjp(POINTS)[1](np.ones(solver.n_vertices)).any()
 
 
-def test_the_table_measures_what_is_claimed(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_table_of_derivatives(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     script = load_script("derivatives_table")
     row = script.measured(script.roughened(heat_igl.shapes.icosphere(3)), n_directions=1, seed=0)
     for method, bound in (("exact", 1e-5), ("unfold", 1e-5), ("heat", 1e-4)):

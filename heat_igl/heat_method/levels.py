@@ -199,7 +199,8 @@ class PinnedLevels:
             by_heat = -of_share * self._share
             by_part, by_matrix = self._weighted.pull_back(of_share)
             by_level = np.bincount(term.label, by_part[term.vertex] * self._heat, term.sources.n_labels)
-            by_level[self._lowest] += by_source.sum() - by_level.sum()
+            # A level that is common to all sources is taken out by the mean over the anchors.
+            by_level[self._lowest] -= by_level.sum()
             by_excess = share + (by_level / self._of_label)[anchors.label]
         np.add.at(by_phi, anchors.vertex, by_excess)
         np.add.at(by_value, self._place[anchors.vertex], -by_excess)
@@ -221,7 +222,6 @@ class PinnedLevels:
             of_source = np.divide(
                 weighted - self._share * by_heat, self._u, out=np.zeros_like(by_phi), where=self._is_warm
             )
-            of_source += level[self._lowest]
         rest = np.bincount(self._anchor_component, excess - of_source[anchors.vertex], self._n_components)
         change = np.where(self._is_free, by_phi - of_source - (rest / self._count)[self._components], 0.0)
         change[self._takers] = by_value[self._taken[self._takers]]
