@@ -12,10 +12,10 @@ __all__ = ["elements", "multiply", "normalized"]
 def elements(
     F: cython.const[cython.longlong][:, ::1],
     length: cython.const[cython.double][:, ::1],
+    by_side: cython.const[cython.double][:, ::1],
     weight: cython.const[cython.double][:, ::1],
     area: cython.const[cython.double][::1],
     share: cython.double,
-    by_side: cython.const[cython.double][:, ::1],
     of_weight: cython.double[:, ::1],
     of_area: cython.double[::1],
     of_mass: cython.double[::1],

@@ -80,5 +80,5 @@ class Elements:
         """What sides that change by `by_side` (m, 3) change."""
         weight, area, mass = np.empty_like(self.l), np.empty_like(self.area), np.zeros(self._n)
         F = self._triangulation.F
-        kernels.elements(F, self.l, self.weight, self.area, self.share, by_side, weight, area, mass)
+        kernels.elements(F, self.l, by_side, self.weight, self.area, self.share, weight, area, mass)
         return ElementChange(weight, area, mass)
