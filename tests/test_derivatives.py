@@ -238,7 +238,10 @@ def test_points_in_faces_as_sources(options: dict[str, Any]) -> None:
     ahead, behind = (solver.distance(at(barycentric + e * change)) for e in (1e-6, -1e-6))
     motion = np.einsum("pc,pcx->px", change, mesh.V[mesh.F[faces]])
     rate = (g * (ahead - behind)).sum() / 2e-6
-    assert (pull_back.by_points(g) * motion).sum() == pytest.approx(rate, rel=1e-5)
+    by_points = (pull_back.by_points(g) * motion).sum()
+    assert by_points == pytest.approx(rate, rel=1e-5)
+    both = (pull_back.push_forward(direction, motion) * g).sum()
+    assert both == pytest.approx((pull_back(g) * direction).sum() + by_points, rel=1e-9)
 
 
 def test_one_distance_changes_at_rate_1_with_its_source_point() -> None:
@@ -311,12 +314,16 @@ def test_velocities_that_cannot_be_used() -> None:
     _, pull_back = HeatMethodSolver(mesh, refine="unfold").distance_vjp(0)
     with pytest.raises(ValueError, match=r"dV must be \(289, 3\) finite numbers"):
         pull_back.push_forward(np.ones(3))
+    _, of_point = HeatMethodSolver(mesh, refine="unfold").distance_vjp(SurfacePoints([3], [[0.2, 0.3, 0.5]]))
+    with pytest.raises(ValueError, match=r"points must be \(1, 3\) finite numbers, one velocity per source point"):
+        of_point.push_forward(mesh.V, [np.nan, 0, 0])
+    assert of_point.push_forward(mesh.V, np.zeros((1, 3))).shape == (289,)
 
 
 def refused() -> list[Any]:
     curve = heat_igl.SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]])
     return [
-        pytest.param({"refine": "exact"}, curve, "a curve is among them", id="curve"),
+        pytest.param({"refine": "exact"}, curve, "a curve is among the sources: place points on it", id="curve"),
         pytest.param({"refine": "sweep"}, 0, "finds no paths to differentiate", id="sweep"),
         pytest.param({"laplacian": "cotan", "backend": "iterative"}, 0, "cannot solve the adjoint", id="backend"),
         pytest.param({"laplacian": "intrinsic-delaunay-refined"}, 0, "more vertices than the mesh", id="refined"),

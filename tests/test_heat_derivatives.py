@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import load_script
 from test_derivatives import HEAT, MESHES, differences
 
 import heat_igl
@@ -98,7 +99,10 @@ def test_points_move_in_their_faces(sources: str) -> None:
     g[pull_back.inexact] = 0
     rate = (g * (solver.distance(moved_by(1e-6)) - solver.distance(moved_by(-1e-6)))).sum() / 2e-6
     motion = np.einsum("pc,pcx->px", change, mesh.V[mesh.F[POINTS.faces]])
-    assert (pull_back.by_points(g) * motion).sum() == pytest.approx(rate, rel=1e-5)
+    by_points = (pull_back.by_points(g) * motion).sum()
+    assert by_points == pytest.approx(rate, rel=1e-5)
+    change_of_all = pull_back.push_forward(np.zeros_like(mesh.V), motion) * g
+    assert change_of_all.sum() == pytest.approx(by_points, abs=1e-10 * np.abs(change_of_all).sum())
 
 
 def test_with_offsets_scaling_takes_their_derivative_too() -> None:
@@ -194,3 +198,17 @@ def test_points_on_a_cover_are_refused() -> None:
     with pytest.raises(ValueError, match="the triangles are a cover of the surface: take refine="):
         solver.distance_vjp(POINTS)
     assert HeatMethodSolver(MESHES["book"](), refine="exact").distance_vjp(POINTS)[1](np.ones(solver.n_vertices)).any()
+
+
+def test_the_table_of_derivatives(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    script = load_script("derivatives_table")
+    row = script.measured(script.roughened(heat_igl.shapes.icosphere(3)), n_directions=1, seed=0)
+    for method, bound in (("exact", 1e-5), ("unfold", 1e-5), ("heat", 1e-4)):
+        found = row[method]
+        assert max(found["sums"], found["norms"]) < bound
+        assert max(found[key] for key in script.IDENTITIES) < 1e-10
+        assert found["kinks"] < 0.1 * row["n"]
+    monkeypatch.setattr(script, "measured", lambda *_: row)
+    monkeypatch.setattr(script, "SHAPES", {"ball": lambda: heat_igl.shapes.icosphere(1)})
+    assert script.main([]) == 0
+    assert "| ball | 642 |" in capsys.readouterr().out

@@ -262,8 +262,10 @@ class DistanceDerivative:
             by_side = by_side + change.by_given
         if change.by_given_place is not None:
             direct = PlaceSlopes(points.faces, points.barycentric, change.by_given_place)
-            by_given_place = carry_lengths_back(self._faces, np.zeros_like(by_side), n_before, direct)[1]
-            by_place = by_given_place if by_place is None else by_place + by_given_place
+            _, by_given_place = carry_lengths_back(self._faces, np.zeros_like(by_side), n_before, direct)
+            if by_place is None or by_given_place is None:
+                return by_side, by_given_place
+            by_place = by_place + by_given_place
         return by_side, by_place
 
     @cached_property

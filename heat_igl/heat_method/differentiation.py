@@ -47,7 +47,9 @@ def differentiated(
     if surface is None or isinstance(mesh, PointCloud):
         raise ValueError("derivatives need a surface of triangles: this domain has none, or is a point cloud")
     if len(sources.segments.faces):
-        raise ValueError("derivatives are there for sources that are vertices or points, and a curve is among them")
+        raise ValueError(
+            "derivatives are there for vertices and points, and a curve is among the sources: place points on it"
+        )
     answer: SidesDerivative
     if isinstance(parts.last_steps, UnfoldingSolver):
         u = np.zeros(parts.operators.n)

@@ -13,6 +13,7 @@ import numpy as np
 
 from heat_igl.heat_method.parts import SolverParts
 from heat_igl.kernels import heat_adjoint as kernels
+from heat_igl.kernels import heat_tangent as tangent
 from heat_igl.operators import ElementChange, Surface
 from heat_igl.runtime import LOWEST_HEAT
 from heat_igl.typing import BoolArray, FloatArray, IntArray
@@ -70,7 +71,9 @@ class FieldDerivative:
         self._F = F = surface.triangulation.F
         self._imposed, self._known = imposed, known
         # Faces with a cold corner follow the gradient of the heat itself, and are not damped.
-        is_log: BoolArray = (u[F] >= LOWEST_HEAT).all(axis=1) if parts.fitted else np.zeros(len(F), bool)
+        is_log: BoolArray = np.zeros(len(F), bool)
+        if parts.fitted:
+            is_log |= (u[F] >= LOWEST_HEAT).all(axis=1)
         is_plain: BoolArray = ~is_log
         is_plain[imposed] = is_log[imposed] = False
         self._plain = np.flatnonzero(is_plain)
@@ -81,20 +84,29 @@ class FieldDerivative:
     def pull_back(self, p: FloatArray) -> FieldSlopes:
         """The derivative of p . (b - L phi), with b the divergence of the field."""
         e, F, domain = self._elements, self._F, self._parts.operators
-        p, zeros = np.ascontiguousarray(p), np.zeros_like(self._u)
+        zeros = np.zeros_like(self._u)
         by_weight, by_area, by_log_t = np.empty_like(e.l), np.empty_like(e.area), np.zeros(domain.n_components)
         by_log, by_heat, by_known = zeros.copy(), zeros.copy(), zeros.copy()
+        of_vertex = np.stack([self._log_u, p, self._phi], axis=1)
         kernels.normalized(
-            F, e.weight, e.area, self._log_u, self._phi, p, self._rate_of_log, domain.components, by_weight, by_area,
-            by_log_t, by_log,
-        )  # fmt: skip
+            F, e.weight, e.area, of_vertex, self._rate_of_log, domain.components, by_weight, by_area, by_log_t, by_log
+        )
         if len(self._plain):
             k = self._plain
             of_weight, of_area = np.empty((len(k), 3)), np.empty(len(k))
+            of_vertex, any_rate = np.stack([self._u, p, zeros], axis=1), np.zeros(len(k))
             kernels.normalized(
-                F[k], e.weight[k], e.area[k], self._u, zeros, p, np.zeros(len(k)), domain.components, of_weight,
-                of_area, by_log_t, by_heat,
-            )  # fmt: skip
+                F[k],
+                e.weight[k],
+                e.area[k],
+                of_vertex,
+                any_rate,
+                domain.components,
+                of_weight,
+                of_area,
+                by_log_t,
+                by_heat,
+            )
             by_weight[k] += of_weight
             by_area[k] += of_area
         by_heat += np.divide(by_log, self._u, out=zeros, where=self._u > 0)
@@ -112,35 +124,21 @@ class FieldDerivative:
         self, elements: ElementChange, by_heat: FloatArray, by_known: FloatArray, by_t: FloatArray
     ) -> FloatArray:
         """How b - L phi (n,) changes with the elements, the heat (n,), the known values (n,) and the time steps."""
-        e = self._elements
-        flux = elements.weight * self._along(self._phi)
+        e, F, domain = self._elements, self._F, self._parts.operators
         relative = np.divide(by_heat, self._u, out=np.zeros_like(by_heat), where=self._u > 0)
-        log_t = self._parts.operators.expand_to_faces(by_t / self._parts.time_steps)
-        warm = np.flatnonzero(self._rate_of_log >= 0)
-        for k, v, of_v, rate in (
-            (warm, self._log_u, relative, self._rate_of_log[warm]),
-            (self._plain, self._u, by_heat, np.zeros(len(self._plain))),
-        ):
-            d, of_d, weight, of_weight = self._along(v, k), self._along(of_v, k), e.weight[k], elements.weight[k]
-            # Squares of the differences of heat may vanish: the largest is made 1 first.
-            largest = np.abs(d).max(axis=1, keepdims=True, initial=0.0)
-            largest[largest == 0] = 1.0
-            d, of_d = d / largest, of_d / largest
-            energy = (weight * d**2).sum(axis=1)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                s = np.where(energy > 0, np.sqrt(e.area[k] / energy), 0.0)
-                by_energy = (of_weight * d**2 + 2 * weight * d * of_d).sum(axis=1) / energy
-            of_s = np.where(energy > 0, s / 2 * (elements.area[k] / e.area[k] - by_energy), 0.0)
-            damped = rate * s > largest[:, 0]
-            s[damped] = largest[damped, 0] / rate[damped]
-            of_s[damped] = s[damped] * log_t[k[damped]] / 2
-            flux[k] += of_s[:, None] * weight * d + s[:, None] * (of_weight * d + weight * of_d)
+        log_t, change = by_t / self._parts.time_steps, np.zeros(domain.n)
+        # -L phi, whose entries between the ends of sides are the weights.
+        tangent.multiply(F, elements.weight, self._phi, change)
+        tangent.normalized(
+            F, e.weight, e.area, self._log_u, relative, self._rate_of_log, domain.components, log_t, elements.weight,
+            elements.area, change,
+        )  # fmt: skip
+        k = self._plain
+        tangent.normalized(
+            F[k], e.weight[k], e.area[k], self._u, by_heat, np.zeros(len(k)), domain.components, log_t,
+            elements.weight[k], elements.area[k], change,
+        )  # fmt: skip
         k = self._imposed
-        flux[k] -= elements.weight[k] * self._along(self._known, k) + e.weight[k] * self._along(by_known, k)
-        n = len(by_heat)
-        return np.asarray(np.bincount(e.i.ravel(), flux.ravel(), n) - np.bincount(e.j.ravel(), flux.ravel(), n))
-
-    def _along(self, v: FloatArray, faces: IntArray | slice = slice(None)) -> FloatArray:
-        """The differences (k, 3) of v (n,) along the sides of some faces."""
-        e = self._elements
-        return np.asarray(v[e.i[faces]] - v[e.j[faces]])
+        tangent.multiply(F[k], -elements.weight[k], self._known, change)
+        tangent.multiply(F[k], -e.weight[k], by_known, change)
+        return change

@@ -19,6 +19,7 @@ from heat_igl.heat_method.parts import SolverParts
 from heat_igl.heat_method.several_sources import drop_overtaken
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels import heat_adjoint as kernels
+from heat_igl.kernels import heat_tangent as tangent
 from heat_igl.operators import ElementChange
 from heat_igl.sources import SourceSet, right_hand_side
 from heat_igl.steps import FlowDerivative, MatrixSlopes
@@ -90,8 +91,8 @@ class HeatDerivative:
         n_near = len(term.near.vertex)
         by_value = levels.by_value.copy()
         by_value[:n_near] += field.by_known[self._values.vertex[:n_near]]
-        values = self._values.pull_back(by_value)
-        by_side, by_t = levels.by_side + values.by_side, field.by_t
+        by_side, by_t = levels.by_side, field.by_t
+        given = self._values.pull_back(by_value, by_side)
         self._add_elements(by_matrix, field.by_weight, field.by_area, by_side, by_t)
         # An initial heat falls by exp(-delay), and a delay is an offset over sqrt(t).
         delayed = by_initial * term.heat_of(term.share) * term.delay
@@ -104,7 +105,7 @@ class HeatDerivative:
                 self._domain.expand_to_faces(by_h)[:, None], parts.mean_length_slopes, out=field.by_weight
             )
         by_place = self._by_place(by_vertex, levels)
-        return Change(by_side, by_place, values.by_given, float(by_t.sum()), values.by_place)
+        return Change(by_side, by_place, given.by_side, float(by_t.sum()), given.by_place)
 
     def push_forward(self, change: SideChange) -> FloatArray:
         """How the distances (n,) change with the sides and the places of points, after and before any flip."""
@@ -116,7 +117,7 @@ class HeatDerivative:
         of_h = np.bincount(of_face, (parts.mean_length_slopes * by_side).sum(axis=1), domain.n_components)
         by_t = self._steps_by_h * of_h
         flow = self._flow_change(elements, change, by_t)
-        initial: FloatArray = np.bincount(flow.vertex, flow.initial, domain.n)
+        initial = np.asarray(np.bincount(flow.vertex, flow.initial, domain.n), np.float64)
         by_heat = self._flow.push_forward(initial, flow.product, flow.diagonal)
         by_value = self._values.push_forward(by_side, SideChange(change.by_given, change.by_given_place))
         by_phi = self._poisson.solve(self._field.push_forward(elements, by_heat, self._at_vertices(by_value), by_t))
@@ -128,9 +129,11 @@ class HeatDerivative:
         """Add the derivative by the sides (m, 3) and the time steps, from those by the elements and the heat flow."""
         e = self._elements
         by_mass = matrix.diagonal - np.einsum("kn,kn->n", matrix.x, matrix.u)
+        pairs = [column for pair in zip(matrix.x, matrix.u, strict=True) for column in pair]
+        of_vertex = np.stack([matrix.diagonal, by_mass, *pairs], axis=1)
         kernels.elements(
-            self.triangulation.F, e.l, e.weight, e.area, e.share, matrix.x, matrix.u, matrix.diagonal,
-            self._parts.flow_slopes, self._domain.components, by_weight, by_area, by_mass, by_side, by_t,
+            self.triangulation.F, e.l, e.weight, e.area, e.share, of_vertex, self._parts.flow_slopes,
+            self._domain.components, by_weight, by_area, by_side, by_t,
         )  # fmt: skip
 
     def _flow_change(self, elements: ElementChange, change: SideChange, by_t: FloatArray) -> FlowChange:
@@ -139,13 +142,17 @@ class HeatDerivative:
         of_weight, of_length, of_t = parts.flow_slopes
         entry = of_weight * elements.weight + of_length * change.by_side
         entry += of_t * self._domain.expand_to_faces(by_t)[:, None]
-        i, j, flat = e.i.ravel(), e.j.ravel(), entry.ravel()
+        F = self.triangulation.F
 
         def product(v: FloatArray) -> FloatArray:
-            across = flat * (v[i] - v[j])
-            return np.asarray(elements.mass * v + np.bincount(i, across, n) - np.bincount(j, across, n))
+            result = elements.mass * v
+            tangent.multiply(F, entry, v, result)
+            return np.asarray(result)
 
-        diagonal = elements.mass + np.bincount(i, flat, n) + np.bincount(j, flat, n)
+        diagonal = elements.mass
+        if parts.heat_flow.boundary != "neumann":
+            ends = np.concatenate([e.i.ravel(), e.j.ravel()])
+            diagonal = diagonal + np.bincount(ends, np.tile(entry.ravel(), 2), n)
         of_component = self._domain.components[term.vertex]
         vertex, label = term.vertex, term.label
         initial = term.heat_of(term.share) * term.delay * (by_t / (2 * parts.time_steps))[of_component]

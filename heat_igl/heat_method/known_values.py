@@ -14,7 +14,7 @@ from heat_igl.sources import SourceAssembler, SourceTerm
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import PathLengths, SideChange, from_lines
 
-__all__ = ["KnownValues", "Spokes", "ValueSlopes", "spokes"]
+__all__ = ["GivenSlopes", "KnownValues", "Spokes", "spokes"]
 
 # A value is the length of an edge, or of another shortest line, if it differs by less than this share of it.
 _SAME = 1e-12
@@ -42,19 +42,18 @@ def spokes(triangulation: IntrinsicTriangulation, vertices: IntArray) -> Spokes:
     return Spokes(side, which, triangulation.F.ravel()[across], triangulation.l.ravel()[side])
 
 
-class ValueSlopes(NamedTuple):
-    """The derivative of a number by what known distances are made of.
+class GivenSlopes(NamedTuple):
+    """The derivative of a number by the faces before any flip, or None where they do not count.
 
     Attributes
     ----------
-    by_side, by_given : (m, 3), (m', 3) float64
-        By the sides of the triangles that are solved on, and of the faces before any flip.
+    by_side : (m', 3) float64 or None
+        By the sides.
     by_place : (p, 3) float64 or None
-        By the coordinates of the source points in the faces before any flip.
+        By the coordinates of the source points.
     """
 
-    by_side: FloatArray
-    by_given: FloatArray
+    by_side: FloatArray | None
     by_place: FloatArray | None
 
 
@@ -84,19 +83,24 @@ class KnownValues:
         self.vertex = np.concatenate([term.near.vertex, term.far.vertex])
         self.value = np.concatenate([term.near.value, term.far.value])
 
-    def pull_back(self, by_value: FloatArray) -> ValueSlopes:
-        """The derivative of the sum of the values times `by_value` (k,)."""
-        by_sides = [np.zeros(triangulation.l.size) for triangulation in self._triangulations]
-        for by_side, (side, which) in zip(by_sides, self._edges, strict=True):
-            np.add.at(by_side, side, by_value[which])
-        by_side, by_given = (array.reshape(-1, 3) for array in by_sides)
-        by_place = None
+    def pull_back(self, by_value: FloatArray, by_side: FloatArray) -> GivenSlopes:
+        """The derivative of the sum of the values times `by_value` (k,).
+
+        That by the sides (m, 3) of the triangles that are solved on is added to `by_side`.
+        """
+        (side, which), (side_of_face, which_of_face) = self._edges
+        np.add.at(by_side.reshape(-1), side, by_value[which])
+        by_given, by_place = None, None
+        if len(which_of_face):
+            by_given = np.zeros(self._triangulations[1].l.shape)
+            np.add.at(by_given.reshape(-1), side_of_face, by_value[which_of_face])
         if self._lines is not None:
             weight = np.zeros(self._triangulations[1].n)
             np.add.at(weight, self.vertex[self._is_line], by_value[self._is_line])
             change = self._lines.pull_back(weight)
-            by_given, by_place = by_given + change.by_side, change.by_place
-        return ValueSlopes(by_side, by_given, by_place)
+            by_given = change.by_side if by_given is None else by_given + change.by_side
+            by_place = change.by_place
+        return GivenSlopes(by_given, by_place)
 
     def push_forward(self, by_side: FloatArray, given: SideChange) -> FloatArray:
         """How the values (k,) change with the sides of the triangles, and with the faces before any flip."""

@@ -126,6 +126,7 @@ class PinnedLevels:
         self._taken[near.vertex] = np.arange(n_near)
         self._bounds = [self._without(bound, near.vertex) for bound in self._bounds]
         self._is_free: BoolArray = reached & (self._taken < 0)
+        self._takers = np.flatnonzero(self._taken >= 0)
         for bound in self._bounds:
             self._is_free[bound.end] = False
         self.distance = distance
@@ -180,13 +181,14 @@ class PinnedLevels:
         """The derivative of the sum of distances times g (n,)."""
         term, anchors = self._term, self._term.anchors
         by_side = np.zeros(self._triangulation.l.size)
-        is_taken = self._taken >= 0
-        by_value: FloatArray = np.bincount(self._taken[is_taken], g[is_taken], self._n_values)
+        taken = self._takers
+        by_value = np.asarray(np.bincount(self._taken[taken], g[taken], self._n_values), np.float64)
         for end, side, which, sign in self._bounds:
             np.add.at(by_value, which, g[end])
             np.add.at(by_side, side, sign * g[end])
         by_phi = np.where(self._is_free, g, 0.0)
-        share: FloatArray = -np.bincount(self._components, by_phi, self._n_components)[self._anchor_component]
+        of_component = np.asarray(np.bincount(self._components, by_phi, self._n_components), np.float64)
+        share = -of_component[self._anchor_component]
         share /= self._count[self._anchor_component]
         by_excess, by_heat, by_matrix = share, np.zeros(len(g)), None
         by_part = np.zeros(len(g))
@@ -197,7 +199,8 @@ class PinnedLevels:
             by_heat = -of_share * self._share
             by_part, by_matrix = self._weighted.pull_back(of_share)
             by_level = np.bincount(term.label, by_part[term.vertex] * self._heat, term.sources.n_labels)
-            by_level[self._lowest] += by_source.sum() - by_level.sum()
+            # A level that is common to all sources is taken out by the mean over the anchors.
+            by_level[self._lowest] -= by_level.sum()
             by_excess = share + (by_level / self._of_label)[anchors.label]
         np.add.at(by_phi, anchors.vertex, by_excess)
         np.add.at(by_value, self._place[anchors.vertex], -by_excess)
@@ -213,17 +216,15 @@ class PinnedLevels:
         if self._weighted is not None:
             level = np.bincount(anchors.label, excess, len(self._of_label)) / self._of_label
             relative = (level - level[self._lowest])[term.label]
-            initial: FloatArray = np.bincount(term.vertex, self._heat * relative, len(by_phi))
+            initial = np.asarray(np.bincount(term.vertex, self._heat * relative, len(by_phi)), np.float64)
             initial += np.bincount(flow.vertex, flow.initial * self._relative[flow.label], len(by_phi))
             weighted = self._weighted.push_forward(initial, flow.product, flow.diagonal)
             of_source = np.divide(
                 weighted - self._share * by_heat, self._u, out=np.zeros_like(by_phi), where=self._is_warm
             )
-            of_source += level[self._lowest]
         rest = np.bincount(self._anchor_component, excess - of_source[anchors.vertex], self._n_components)
         change = np.where(self._is_free, by_phi - of_source - (rest / self._count)[self._components], 0.0)
-        is_taken = self._taken >= 0
-        change[is_taken] = by_value[self._taken[is_taken]]
+        change[self._takers] = by_value[self._taken[self._takers]]
         for end, side, which, sign in self._bounds:
             change[end] = by_value[which] + sign * by_side.ravel()[side]
         return np.asarray(change)

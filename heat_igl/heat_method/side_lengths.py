@@ -47,9 +47,6 @@ class SideLengths:
 
     def push_positions(self, dV: FloatArray) -> FloatArray:
         """How the lengths (m, 3) change when the vertices move by dV (n, 3); not at all for sides without length."""
-        V, F = self.mesh.V, self.mesh.F
-        following, preceding = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
-        along = V[preceding] - V[following]
-        length = np.sqrt(np.einsum("mcx,mcx->mc", along, along))
-        along /= np.where(length > 0, length, 1.0)[..., None]
-        return np.asarray(np.einsum("mcx,mcx->mc", along, dV[preceding] - dV[following]))
+        by_side = np.empty(self.mesh.F.shape)
+        kernels.push_to_sides(self.mesh.F, self.mesh.V, np.ascontiguousarray(dV), by_side)
+        return by_side

@@ -15,9 +15,7 @@ def normalized(
     F: cython.const[cython.longlong][:, ::1],
     weight: cython.const[cython.double][:, ::1],
     area: cython.const[cython.double][::1],
-    v: cython.const[cython.double][::1],
-    phi: cython.const[cython.double][::1],
-    p: cython.const[cython.double][::1],
+    of_vertex: cython.const[cython.double][:, ::1],
     full_rate: cython.const[cython.double][::1],
     component: cython.const[cython.longlong][::1],
     by_weight: cython.double[:, ::1],
@@ -25,11 +23,10 @@ def normalized(
     by_log_t: cython.double[::1],
     by_v: cython.double[::1],
 ):
-    """The derivative of p . (b - L phi), with b the divergence of the normalized field, see
-    `heat_igl.heat_method.field_derivative`.
+    """The derivative of p . (b - L phi), see `heat_igl.heat_method.field_derivative`.
 
-    On each face b is s K v with s = 1 / |grad v|, or 1 / full_rate where the gradient is below that (m,), 0 for never;
-    faces with a negative full_rate have no part in b.
+    `of_vertex` (n, 3) are v, p and phi, beside each other in memory. On each face b is s K v with s = 1 / |grad v|, or
+    1 / full_rate where the gradient is below that (m,), 0 for never; faces with a negative full_rate have no part in b.
     Written to `by_weight` (m, 3) and `by_area` (m,); added to `by_v` (n,), and to `by_log_t` the derivative by the
     logarithm of the time step of each component, of which each vertex has the number (n,).
     """
@@ -47,9 +44,9 @@ def normalized(
             for c in range(3):
                 i: cython.longlong = corner[(c + 1) % 3]
                 j: cython.longlong = corner[(c + 2) % 3]
-                d[c] = v[i] - v[j]
-                q[c] = p[i] - p[j]
-                by_weight[f, c] = q[c] * (phi[i] - phi[j])
+                d[c] = of_vertex[i, 0] - of_vertex[j, 0]
+                q[c] = of_vertex[i, 1] - of_vertex[j, 1]
+                by_weight[f, c] = q[c] * (of_vertex[i, 2] - of_vertex[j, 2])
                 largest = max(largest, fabs(d[c]))
             if largest == 0.0 or full_rate[f] < 0.0:
                 continue
@@ -85,23 +82,20 @@ def elements(
     weight: cython.const[cython.double][:, ::1],
     area: cython.const[cython.double][::1],
     share: cython.double,
-    x: cython.const[cython.double][:, ::1],
-    u: cython.const[cython.double][:, ::1],
-    by_diagonal: cython.const[cython.double][::1],
+    of_vertex: cython.const[cython.double][:, ::1],
     slopes: cython.const[cython.double][:, :, ::1],
     component: cython.const[cython.longlong][::1],
     by_weight: cython.const[cython.double][:, ::1],
     by_area: cython.const[cython.double][::1],
-    by_mass: cython.const[cython.double][::1],
     by_side: cython.double[:, ::1],
     by_t: cython.double[::1],
 ):
     """Add the derivative by the sides (m, 3), from those by the heat flow and by weights, areas and masses.
 
-    The heat flow gives -x . dA u for rows of adjoints x and solutions u (k, n), with A = M - t L, and `by_diagonal`
-    (n,) times the diagonal of dA. The entry -t L of each side changes by `slopes` (3, m, 3): with the weight, length
-    and time step. The derivative `by_mass` (n,) is that by the mass of each vertex, as part of A. A face has
-    `share` of its area, see `Elements`.
+    The heat flow gives -x . dA u for adjoints x and solutions u, with A = M - t L, and the diagonal of dA times another
+    number at each vertex. `of_vertex` (n, 2 + 2 k) holds that number, the derivative by the mass of the vertex (as part
+    of A), and k pairs of x and u. The entry -t L of each side changes by `slopes` (3, m, 3): with the weight, length
+    and time step. A face has `share` of its area, see `Elements`.
     """
     f: cython.Py_ssize_t
     c: cython.int
@@ -116,15 +110,15 @@ def elements(
             is_obtuse: cython.bint = False
             for c in range(3):
                 corner[c] = F[f, c]
-                mass[c] = by_mass[corner[c]]
+                mass[c] = of_vertex[corner[c], 1]
                 all_masses += mass[c]
                 is_obtuse = is_obtuse or weight[f, c] < 0.0
             for c in range(3):
                 i: cython.longlong = corner[(c + 1) % 3]
                 j: cython.longlong = corner[(c + 2) % 3]
-                flow: cython.double = by_diagonal[i] + by_diagonal[j]
-                for k in range(x.shape[0]):
-                    flow -= (x[k, i] - x[k, j]) * (u[k, i] - u[k, j])
+                flow: cython.double = of_vertex[i, 0] + of_vertex[j, 0]
+                for k in range(2, of_vertex.shape[1], 2):
+                    flow -= (of_vertex[i, k] - of_vertex[j, k]) * (of_vertex[i, k + 1] - of_vertex[j, k + 1])
                 of_weight[c] = by_weight[f, c] + flow * slopes[0, f, c]
                 by_side[f, c] += flow * slopes[1, f, c]
                 change += flow * slopes[2, f, c]

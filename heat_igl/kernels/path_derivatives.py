@@ -77,8 +77,8 @@ def _along(
     lines: Lines,
     weight: cython.double,
     slope: cython.pointer[cython.double],
-    tangent: cython.pointer[cython.const[cython.double]],
     at_end: cython.pointer[cython.double],
+    tangent: cython.pointer[cython.const[cython.double]],
     end_moves: cython.pointer[cython.const[cython.double]],
 ) -> cython.double:
     """All pieces of the line that was followed; as `_piece`, with the arrays of all sides and source points."""
@@ -176,7 +176,7 @@ def pull_back(
             if not lines.follow(v):
                 is_lost[v] = True
                 continue
-            _along(lines, weight[v], cython.address(by_side[0]), cython.NULL, at_end, cython.NULL)
+            _along(lines, weight[v], cython.address(by_side[0]), at_end, cython.NULL, cython.NULL)
             weight[lines.end.row] += weight[v]
 
 
@@ -209,5 +209,5 @@ def push_forward(
             if not lines.follow(v):
                 is_lost[v] = True
                 continue
-            change[v] = _along(lines, 1.0, cython.NULL, cython.address(tangent[0]), cython.NULL, end_moves)
+            change[v] = _along(lines, 1.0, cython.NULL, cython.NULL, cython.address(tangent[0]), end_moves)
             change[v] += change[lines.end.row]

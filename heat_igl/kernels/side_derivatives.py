@@ -1,9 +1,9 @@
-"""From the derivative by the sides of faces to that by the positions of the vertices."""
+"""The derivative of the lengths of sides by the positions of the vertices, backwards and forth."""
 
 import cython
 from cython.cimports.libc.math import sqrt
 
-__all__ = ["pull_to_positions"]
+__all__ = ["pull_to_positions", "push_to_sides"]
 
 
 def pull_to_positions(
@@ -36,3 +36,27 @@ def pull_to_positions(
             for c in range(3):
                 for d in range(3):
                     by_position[corner[c], d] += along[(c + 1) % 3][d] - along[(c + 2) % 3][d]
+
+
+def push_to_sides(
+    F: cython.const[cython.longlong][:, ::1],
+    V: cython.const[cython.double][:, ::1],
+    velocity: cython.const[cython.double][:, ::1],
+    by_side: cython.double[:, ::1],
+):
+    """Write to `by_side` (m, 3) how the sides opposite each corner change, for a `velocity` (n, 3) of each vertex."""
+    f: cython.Py_ssize_t
+    c: cython.int
+    d: cython.int
+    with cython.nogil:
+        for f in range(F.shape[0]):
+            for c in range(3):
+                i: cython.longlong = F[f, (c + 1) % 3]
+                j: cython.longlong = F[f, (c + 2) % 3]
+                square: cython.double = 0.0
+                product: cython.double = 0.0
+                for d in range(3):
+                    along: cython.double = V[j, d] - V[i, d]
+                    square += along * along
+                    product += along * (velocity[j, d] - velocity[i, d])
+                by_side[f, c] = product / sqrt(square) if square > 0.0 else 0.0

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from heat_igl.kernels import heat_tangent as kernels
 from heat_igl.operators.matrices import Operators
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -77,14 +78,7 @@ class Elements:
 
     def push_forward(self, by_side: FloatArray) -> ElementChange:
         """What sides that change by `by_side` (m, 3) change."""
-        # A weight is inner / (8 area), and the area changes by the length times the weight.
-        of_square = self.l * by_side
-        area = (of_square * self.weight).sum(axis=1)
-        of_inner = 2 * (of_square.sum(axis=1)[:, None] - 2 * of_square)
-        weight = (self.share**2 / 8 * of_inner - self.weight * area[:, None]) / self.area[:, None]
-        # The cell of a corner has a part for both sides there; in an obtuse face, half of the area for the obtuse one.
-        part = self.l**2 * weight / 4 + of_square * self.weight / 2
-        mass = part.sum(axis=1)[:, None] - part
-        is_obtuse = (self.weight < 0).any(axis=1)
-        mass[is_obtuse] = np.where(self.weight[is_obtuse] < 0, 0.5, 0.25) * area[is_obtuse, None]
-        return ElementChange(weight, area, np.bincount(self._triangulation.F.ravel(), mass.ravel(), minlength=self._n))
+        weight, area, mass = np.empty_like(self.l), np.empty_like(self.area), np.zeros(self._n)
+        F = self._triangulation.F
+        kernels.elements(F, self.l, by_side, self.weight, self.area, self.share, weight, area, mass)
+        return ElementChange(weight, area, mass)
