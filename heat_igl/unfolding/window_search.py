@@ -171,7 +171,7 @@ def search(
     )
     if not done:
         raise MemoryError("the windows of the exact distance do not fit into memory")
-    return Searched(starts, found, place, at_targets, *(int(count) for count in statistics[1:]), leaving)
+    return Searched(starts, found, place, at_targets, int(statistics[1]), int(statistics[2]), leaving)
 
 
 def starts_at(
