@@ -193,6 +193,64 @@ def test_log_map_converges_on_the_sphere():
     assert errors[1] < 0.01
 
 
+@pytest.mark.parametrize("method", ["unfold", "solver"])
+def test_log_map_on_a_long_strip_is_that_of_the_plane(method):
+    mesh = shapes.strip(1500, 3)
+    source = 1
+    log = log_map(HeatMethodSolver(mesh, refine="unfold") if method == "solver" else mesh, source)
+    frames, line = tangent_frames(mesh), mesh.V - mesh.V[source]
+    flat = frames.from_world(line, np.full(mesh.n_vertices, source))
+    # Polar angles on the boundary are those of the half plane here: the scale is 1.
+    np.testing.assert_allclose(log, flat, atol=1e-9 * np.linalg.norm(line, axis=1).max())
+
+
+@pytest.mark.slow
+def test_directions_and_transport_on_a_large_sphere_are_finite_and_right():
+    mesh = shapes.icosphere(8)
+    p = mesh.V[0]
+    solver = heat_igl.VectorHeatSolver(mesh, refine="unfold")
+    frames = solver.frames
+    near = np.flatnonzero((mesh.V @ p > -0.9) & (mesh.V @ p < 1))
+    w = frames.to_world([[1.0, 0]], [0])[0]
+    carried = solver.transport(0, [1, 0])
+    found = HeatMethodSolver(mesh, refine="unfold").directions(0)
+    for values in (carried, found.departure, found.arrival, found.gradient, found.distance):
+        assert np.isfinite(values).all()
+    # Along great circles.
+    q = mesh.V[near]
+    expected = frames.from_world(w - (q @ w)[:, None] * (p + q) / (1 + q @ p)[:, None], near)
+    assert angle_between(*(np.arctan2(*v.T[::-1]) for v in (carried[near], expected))).mean() < np.radians(0.05)
+    away = q - (q @ p)[:, None] * p
+    departure = np.arctan2(*frames.from_world(away, np.zeros(len(near), int)).T[::-1])
+    assert angle_between(found.departure[near], departure).mean() < np.radians(0.1)
+    gradient = (q @ p)[:, None] * q - p
+    gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
+    assert np.einsum("kx,kx->k", found.gradient[near], gradient).min() > 1 - 1e-4
+
+
+@pytest.mark.parametrize("mesh", [perturbed(shapes.icosphere(3), 0.1), perturbed(shapes.torus(20, 40), 0.2)])
+def test_transport_around_a_triangle_of_paths_turns_by_the_excess_of_its_angles(mesh):
+    """The theorem of Gauss and Bonnet, for paths that do not bend."""
+    solver = heat_igl.VectorHeatSolver(mesh, refine="exact")
+    rng, found = np.random.default_rng(0), 0
+    while found < 4:
+        corners = rng.choice(mesh.n_vertices, 3, replace=False)
+        following, before = np.roll(corners, -1), np.roll(corners, 1)
+        logs = [log_map(mesh, int(corner)) @ [1, 1j] for corner in corners]
+        if max(abs(log[to]) for log, to in zip(logs, following, strict=True)) > 1.2 or not all(
+            straight(mesh, int(start))[end] for start, end in zip(corners, following, strict=True)
+        ):
+            continue
+        carried = [solver.transport(int(start), [1, 0])[end] for start, end in zip(corners, following, strict=True)]
+        turned = np.angle(np.prod([vector @ [1, 1j] for vector in carried]))
+        angles = [np.angle(log[b] / log[a]) for log, a, b in zip(logs, following, before, strict=True)]
+        # Counterclockwise, all angles at the corners are positive, and clockwise negative.
+        assert abs(np.sum(np.sign(angles))) == 3
+        excess = np.sum(angles) - np.sign(angles[0]) * np.pi
+        assert angle_between(np.array(turned), excess) < 1e-9
+        found += 1
+
+
 def test_labels_and_departures_of_several_sources(sphere):
     sources = [3, 900, 2000]
     for refine in REFINES:
