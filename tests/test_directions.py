@@ -225,7 +225,7 @@ def test_directions_and_transport_on_a_large_sphere_are_finite_and_right():
     assert angle_between(found.departure[near], departure).mean() < np.radians(0.1)
     gradient = (q @ p)[:, None] * q - p
     gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
-    assert np.einsum("kx,kx->k", found.gradient[near], gradient).min() > 1 - 1e-4
+    assert np.einsum("kx,kx->k", found.gradient[near], gradient).min() > 1 - 1e-3
 
 
 @pytest.mark.parametrize("mesh", [perturbed(shapes.icosphere(3), 0.1), perturbed(shapes.torus(20, 40), 0.2)])
