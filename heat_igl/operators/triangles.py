@@ -113,13 +113,12 @@ def unfolding_surface(mesh: Mesh) -> Surface:
 
 def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Merged, ...]]:
     """The mesh with each face once, and which faces became which."""
-    repeated = connectivity.duplicate_faces(mesh.F, mesh.n_vertices)
-    if not len(repeated):
+    reduced, kept = mesh.without_duplicate_faces()
+    if reduced is mesh:
         return mesh, ()
-    kept = np.delete(np.arange(mesh.n_faces), repeated)
     ascending = np.argsort(mesh.F, axis=1)
     first, inverse, _ = connectivity.unique_rows(np.take_along_axis(mesh.F, ascending, axis=1), mesh.n_vertices)
     copied = first[inverse]
     corner = np.empty_like(mesh.F)
     np.put_along_axis(corner, ascending, ascending[copied], axis=1)
-    return Mesh(mesh.V, mesh.F[kept]), (Merged(np.searchsorted(kept, copied), corner),)
+    return reduced, (Merged(np.searchsorted(kept, copied), corner),)
