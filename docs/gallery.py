@@ -200,6 +200,43 @@ def straightest() -> Picture:
     return plot(mesh, heat_igl.geodesic_distance(mesh, 0), sources=0, style="plain", curves=rays, view=(30, 50))
 
 
+def checkerboard() -> Picture:
+    """A checkerboard in the coordinates of the log map, which is exact as far as the cut locus."""
+    mesh = shapes.blob(6)
+    log = heat_igl.log_map(mesh, 0)
+    board = np.floor(log / 0.25).sum(axis=1) % 2
+    near = np.hypot(*log.T) < 2
+    return plot_field(mesh, np.where(near, board, 0.5), label="checkerboard", sources=0, colormap="gray")
+
+
+def transported() -> Picture:
+    """A vector at one vertex, transported along the shortest paths to evenly spread ones."""
+    mesh = shapes.blob(4)
+    vectors = heat_igl.VectorHeatSolver(mesh, refine="unfold").transport(0, [1.0, 0.0])
+    sites = heat_igl.farthest_points(mesh, 200)
+    short = [heat_igl.trace_geodesic(mesh, int(v), vectors[v], 0.12) for v in sites]
+    return plot(mesh, heat_igl.geodesic_distance(mesh, 0), sources=0, style="plain", curves=short)
+
+
+def loops() -> Picture:
+    """Closed geodesics around the handle of a torus."""
+    mesh = shapes.torus(120, 60)
+    dent = 1 + 0.12 * np.sin(3 * np.arctan2(mesh.V[:, 1], mesh.V[:, 0]))
+    mesh = heat_igl.Mesh(mesh.V * dent[:, None], mesh.F)
+    phi = heat_igl.geodesic_distance(mesh, 0)
+    return plot(mesh, phi, style="plain", colormap="Greys", curves=heat_igl.handle_loops(mesh), view=(30, 50))
+
+
+def bezier() -> Picture:
+    """A cubic Bezier curve by geodesics, the polygon of its control points, and distance from the mean of these."""
+    ball = shapes.icosphere(5)
+    mesh = heat_igl.Mesh(ball.V * [1.5, 1.0, 0.7], ball.F)
+    control = [int(np.argmax(ball.V @ place)) for place in ([-2, -1, 2], [-1, 2, 1], [1, -2, 1], [2, 1, 1])]
+    curves = [heat_igl.geodesic_bezier(mesh, control), heat_igl.geodesic_path(mesh, control)]
+    mean = heat_igl.karcher_mean(mesh, control)
+    return plot(mesh, heat_igl.geodesic_distance(mesh, mean), sources=mean, curves=curves, view=(15, 15))
+
+
 def extended() -> Picture:
     """Values at five vertices, extended to all others by the vector heat method."""
     mesh = shapes.blob(5)
@@ -247,7 +284,8 @@ def unfolded() -> Picture:
 
 ENTRIES = (
     torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, scribble, grown, noisy, heat, error,
-    unfolded, cut_locus, book, tetrahedra, polygons, cloud, maze, travel_time, directions, straightest, extended, asked,
+    unfolded, cut_locus, book, tetrahedra, polygons, cloud, maze, travel_time, directions, checkerboard, straightest,
+    transported, extended, loops, bezier, asked,
 )  # fmt: skip
 
 

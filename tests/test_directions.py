@@ -8,7 +8,7 @@ from conftest import flat_perturbed, perturbed
 
 import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, exp_map, log_map, shapes, tangent_frames
-from heat_igl.unfolding import ExactSurface
+from heat_igl.unfolding import ExactSurface, vectors_from
 
 REFINES = ["unfold", "exact"]
 
@@ -26,12 +26,12 @@ def walking(mesh: Mesh, refine: str) -> HeatMethodSolver:
     return solver
 
 
-def straight(mesh: Mesh, source: int) -> np.ndarray:
+def straight(mesh: Mesh, source: int | SurfacePoints) -> np.ndarray:
     """Mask (n,) of the vertices whose shortest path does not bend."""
-    return (
-        ExactSurface(heat_igl.operators.operators(mesh).surface.unfolding).solve(np.array([source])).origin.root
-        == source
-    )
+    surface = ExactSurface(heat_igl.operators.operators(mesh).surface.unfolding)
+    if isinstance(source, SurfacePoints):
+        return surface.solve(points=source).origin.root == mesh.n_vertices
+    return surface.solve(np.array([source])).origin.root == source
 
 
 @pytest.mark.parametrize("refine", REFINES)
@@ -91,18 +91,63 @@ def test_a_path_around_a_corner_departs_towards_the_corner_and_turns_there(refin
     np.testing.assert_allclose(found.gradient[behind], line[behind] / length[behind, None], atol=1e-7)
 
 
-@pytest.mark.parametrize("method", REFINES)
-def test_the_exponential_map_undoes_the_log_map_along_straight_paths(method, bunny):
+@pytest.mark.parametrize("way", ["unfold", "exact", "solver", "point"])
+def test_the_exponential_map_undoes_the_log_map_along_straight_paths(way, bunny):
     source = 17
-    log = log_map(bunny, source, method=method)
-    is_straight = straight(bunny, source)
+    face = int(np.argmax((source == bunny.F).any(axis=1)))
+    start = SurfacePoints([face], [[0.2, 0.3, 0.5]]) if way == "point" else source
+    if way == "solver":
+        log = log_map(HeatMethodSolver(bunny, refine="unfold"), start)
+    else:
+        log = log_map(bunny, start, method="exact" if way == "exact" else "unfold")
+    is_straight = straight(bunny, start)
     assert 0.1 < is_straight.mean() < 0.9
-    gap = np.linalg.norm(exp_map(bunny, source, log).positions(bunny) - bunny.V, axis=1)
+    gap = np.linalg.norm(exp_map(bunny, start, log).positions(bunny) - bunny.V, axis=1)
     diameter = np.hypot(*log.T).max()
-    # Walks take the other way around a hill at a few vertices.
-    share = 1.0 if method == "exact" else 0.9
-    assert (gap[is_straight] < 1e-6 * diameter).mean() >= share
-    np.testing.assert_allclose(np.hypot(*log.T), heat_igl.geodesic_distance(bunny, source, method=method), rtol=1e-3)
+    # The walks of a solver take the other way around a hill at a few vertices.
+    share, bound = (0.9, 1e-6) if way == "solver" else (1.0, 1e-12)
+    assert (gap[is_straight] < bound * diameter).mean() >= share
+    np.testing.assert_allclose(np.hypot(*log.T), heat_igl.geodesic_distance(bunny, start, method="exact"), rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        perturbed(shapes.torus(12, 40), 0.6),
+        perturbed(shapes.cylinder(12, 12), 0.3),
+        flat_perturbed(shapes.grid(8)),
+        shapes.with_slivers(perturbed(shapes.icosphere(2)), 0),
+    ],
+)
+def test_the_log_map_of_a_mesh_is_that_of_a_solver(mesh):
+    """One knows the polar angles of the source alone, and those of its edges that are Delaunay; the other all."""
+    solver = HeatMethodSolver(mesh, refine="exact")
+    sources = np.arange(0, mesh.n_vertices, mesh.n_vertices // 12)
+    known = [vectors_from(mesh, int(source)) for source in sources]
+    assert sum(vectors is not None for vectors in known) > 6
+    for source, vectors in zip(sources, known, strict=True):
+        expected = log_map(solver, source)
+        off = np.linalg.norm(log_map(mesh, source) - expected, axis=1)
+        # At the cut locus rounding decides between paths.
+        assert (off < 1e-9 * np.hypot(*expected.T).max()).mean() > 0.99
+        if vectors is not None:
+            np.testing.assert_array_equal(log_map(mesh, source), vectors)
+
+
+def test_the_log_map_of_a_vertex_needs_its_faces_and_edges():
+    grid = shapes.grid(4)
+    mesh = Mesh(np.concatenate([grid.V, [[9.0, 9, 9]]]), grid.F)
+    assert vectors_from(mesh, 25) is None
+    np.testing.assert_array_equal(log_map(mesh, 25), 0)
+    np.testing.assert_array_equal(log_map(mesh, 3)[25], 0)
+    twice = Mesh(grid.V, np.concatenate([grid.F, grid.F[:1]]))
+    np.testing.assert_allclose(log_map(twice, 3), log_map(grid, 3), atol=1e-12)
+    pinched = Mesh(np.concatenate([grid.V, grid.V[1:] - 2]), np.concatenate([grid.F, np.where(grid.F, grid.F + 24, 0)]))
+    with pytest.raises(heat_igl.MeshError, match="the faces at vertex 0 are not one fan"):
+        log_map(pinched, 7)
+    turned = Mesh(grid.V, np.concatenate([grid.F[:1, ::-1], grid.F[1:]]))
+    with pytest.raises(heat_igl.MeshError, match="has faces that are oriented differently"):
+        log_map(turned, 24)
 
 
 def test_departures_are_those_of_straightened_paths(bunny):
@@ -146,6 +191,64 @@ def test_log_map_converges_on_the_sphere():
         errors.append(np.abs(log - expected)[near].mean())
     assert errors[1] < 0.5 * errors[0]
     assert errors[1] < 0.01
+
+
+@pytest.mark.parametrize("method", ["unfold", "solver"])
+def test_log_map_on_a_long_strip_is_that_of_the_plane(method):
+    mesh = shapes.strip(1500, 3)
+    source = 1
+    log = log_map(HeatMethodSolver(mesh, refine="unfold") if method == "solver" else mesh, source)
+    frames, line = tangent_frames(mesh), mesh.V - mesh.V[source]
+    flat = frames.from_world(line, np.full(mesh.n_vertices, source))
+    # Polar angles on the boundary are those of the half plane here: the scale is 1.
+    np.testing.assert_allclose(log, flat, atol=1e-9 * np.linalg.norm(line, axis=1).max())
+
+
+@pytest.mark.slow
+def test_directions_and_transport_on_a_large_sphere_are_finite_and_right():
+    mesh = shapes.icosphere(8)
+    p = mesh.V[0]
+    solver = heat_igl.VectorHeatSolver(mesh, refine="unfold")
+    frames = solver.frames
+    near = np.flatnonzero((mesh.V @ p > -0.9) & (mesh.V @ p < 1))
+    w = frames.to_world([[1.0, 0]], [0])[0]
+    carried = solver.transport(0, [1, 0])
+    found = HeatMethodSolver(mesh, refine="unfold").directions(0)
+    for values in (carried, found.departure, found.arrival, found.gradient, found.distance):
+        assert np.isfinite(values).all()
+    # Along great circles.
+    q = mesh.V[near]
+    expected = frames.from_world(w - (q @ w)[:, None] * (p + q) / (1 + q @ p)[:, None], near)
+    assert angle_between(*(np.arctan2(*v.T[::-1]) for v in (carried[near], expected))).mean() < np.radians(0.05)
+    away = q - (q @ p)[:, None] * p
+    departure = np.arctan2(*frames.from_world(away, np.zeros(len(near), int)).T[::-1])
+    assert angle_between(found.departure[near], departure).mean() < np.radians(0.1)
+    gradient = (q @ p)[:, None] * q - p
+    gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
+    assert np.einsum("kx,kx->k", found.gradient[near], gradient).min() > 1 - 1e-3
+
+
+@pytest.mark.parametrize("mesh", [perturbed(shapes.icosphere(3), 0.1), perturbed(shapes.torus(20, 40), 0.2)])
+def test_transport_around_a_triangle_of_paths_turns_by_the_excess_of_its_angles(mesh):
+    """The theorem of Gauss and Bonnet, for paths that do not bend."""
+    solver = heat_igl.VectorHeatSolver(mesh, refine="exact")
+    rng, found = np.random.default_rng(0), 0
+    while found < 4:
+        corners = rng.choice(mesh.n_vertices, 3, replace=False)
+        following, before = np.roll(corners, -1), np.roll(corners, 1)
+        logs = [log_map(mesh, int(corner)) @ [1, 1j] for corner in corners]
+        if max(abs(log[to]) for log, to in zip(logs, following, strict=True)) > 1.2 or not all(
+            straight(mesh, int(start))[end] for start, end in zip(corners, following, strict=True)
+        ):
+            continue
+        carried = [solver.transport(int(start), [1, 0])[end] for start, end in zip(corners, following, strict=True)]
+        turned = np.angle(np.prod([vector @ [1, 1j] for vector in carried]))
+        angles = [np.angle(log[b] / log[a]) for log, a, b in zip(logs, following, before, strict=True)]
+        # Counterclockwise, all angles at the corners are positive, and clockwise negative.
+        assert abs(np.sum(np.sign(angles))) == 3
+        excess = np.sum(angles) - np.sign(angles[0]) * np.pi
+        assert angle_between(np.array(turned), excess) < 1e-9
+        found += 1
 
 
 def test_labels_and_departures_of_several_sources(sphere):

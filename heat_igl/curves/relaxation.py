@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from heat_igl.curves.straightest import Tracer
 from heat_igl.errors import SourceError
-from heat_igl.heat_method import HeatMethodSolver, VectorHeatSolver
+from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -80,11 +82,11 @@ def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> C
     Notes
     -----
     Lloyd's algorithm (1982) on the vertices, each with a third of the area of its faces, for the energy
-    sum of a_v d(v, nearest site)^2. The mean of a cell is the end of the mean of its log map at the site, by
-    `VectorHeatSolver`, at the nearest corner. The site moves there if this lowers the energy of its cell, or else the
-    same way in shorter steps. So the energy falls in every round, and the last round is one in which no site moves.
-    Distances are near-exact, see `HeatMethodSolver` with ``refine="unfold"``: a round asks for one distance and one
-    log map for each site.
+    sum of a_v d(v, nearest site)^2. The mean of a cell is the end of the mean of its log map at the site, at the
+    nearest corner. The site moves there if this lowers the energy of its cell, or else the same way in shorter steps.
+    So the energy falls in every round, and the last round is one in which no site moves. Distances and directions
+    are near-exact, see `HeatMethodSolver.directions` with ``refine="unfold"``: a round asks once for each site, and
+    again for shorter steps.
 
     Examples
     --------
@@ -112,28 +114,35 @@ class _Relaxation:
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
-        self._vectors = VectorHeatSolver(mesh, refine="unfold")
-        self._distances = HeatMethodSolver(mesh, refine="unfold")
+        self._solver = HeatMethodSolver(mesh, refine="unfold")
         self._tracer = Tracer(mesh)
         self._areas = np.bincount(mesh.F.ravel(), np.repeat(mesh.measures / 3, 3), mesh.n_vertices)
 
     def relaxed(self, sites: IntArray, rounds: int) -> CentroidalSites:
         """Sites moved for some rounds."""
-        sites, rows = sites.copy(), self._rows(sites)
+        sites, rows, angles = sites.copy(), *self._rows(sites)
         labels, energy = self._cells(rows)
         energies = [energy]
         for _ in range(rounds):
-            moved, new_rows = self._moved(sites, rows, labels)
-            if (moved == sites).all():
+            steps = self._means(rows, angles, labels)
+            if not self._move(sites, rows, angles, steps, labels):
                 break
-            sites, rows = moved, new_rows
             labels, energy = self._cells(rows)
             energies.append(energy)
         return CentroidalSites(sites, labels, np.array(energies))
 
-    def _rows(self, sites: IntArray) -> FloatArray:
-        """Distances (k, n) from each site."""
-        return np.asarray(self._distances.distances([[int(site)] for site in sites]))
+    def _rows(self, sites: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Distances (k, n) from each site, and the angles (k, n) at which the paths leave there."""
+        rows, angles = np.empty((2, len(sites), self._mesh.n_vertices))
+
+        def work(part: slice) -> None:
+            for i in range(part.start, part.stop):
+                found = self._solver.directions(int(sites[i]))
+                rows[i], angles[i] = found.distance, found.departure
+
+        bounds = np.linspace(0, len(sites), min(n_threads(), len(sites)) + 1).astype(int)
+        side_by_side(work, [slice(*ends) for ends in pairwise(bounds.tolist())])
+        return rows, angles
 
     def _cells(self, rows: FloatArray) -> tuple[IntArray, float]:
         nearest = rows.min(axis=0)
@@ -141,12 +150,10 @@ class _Relaxation:
         labels = np.where(reached, rows.argmin(axis=0), -1)
         return labels, float(self._areas[reached] @ nearest[reached] ** 2)
 
-    def _moved(self, sites: IntArray, rows: FloatArray, labels: IntArray) -> tuple[IntArray, FloatArray]:
-        """The sites after a round, and the distances from them."""
-        steps = np.array([self._mean(int(site), labels == i) for i, site in enumerate(sites)])
+    def _move(self, sites: IntArray, rows: FloatArray, angles: FloatArray, steps: FloatArray, labels: IntArray) -> bool:
+        """Move sites, with the distances and angles from them, by their steps or shorter ones; whether any moves."""
         own = np.array([self._of_cell(row, labels == i) for i, row in enumerate(rows)])
-        sites, rows = sites.copy(), rows.copy()
-        waiting = np.arange(len(sites))
+        waiting, moves_at_all = np.arange(len(sites)), False
         for _ in range(_SHORTER + 1):
             ends = self._tracer.exp(sites[waiting], steps[waiting])
             corner = self._mesh.F[ends.faces, ends.barycentric.argmax(axis=1)]
@@ -155,18 +162,25 @@ class _Relaxation:
             waiting, corner, steps = waiting[moves], corner[moves], steps / 2
             if not len(waiting):
                 break
-            trial = self._rows(corner)
+            trial, leaving = self._rows(corner)
             lower = np.array([self._of_cell(row, labels == i) < own[i] for i, row in zip(waiting, trial, strict=True)])
-            sites[waiting[lower]], rows[waiting[lower]] = corner[lower], trial[lower]
+            moved = waiting[lower]
+            sites[moved], rows[moved], angles[moved] = corner[lower], trial[lower], leaving[lower]
+            moves_at_all |= bool(lower.any())
             waiting = waiting[~lower]
             if not len(waiting):
                 break
-        return sites, rows
+        return moves_at_all
 
-    def _mean(self, site: int, cell: BoolArray) -> FloatArray:
-        """The mean (2,) of the log map of a site over a cell."""
-        area = self._areas * cell
-        return np.asarray(area @ self._vectors.log_map(site) / area.sum())
+    def _means(self, rows: FloatArray, angles: FloatArray, labels: IntArray) -> FloatArray:
+        """The mean (k, 2) of the log map of each site over its cell."""
+        found = np.empty((len(rows), 2))
+        for i, (row, angle) in enumerate(zip(rows, angles, strict=True)):
+            cell = labels == i
+            area = self._areas[cell]
+            moment = area * row[cell] / area.sum()
+            found[i] = moment @ np.cos(angle[cell]), moment @ np.sin(angle[cell])
+        return found
 
     def _of_cell(self, row: FloatArray, cell: BoolArray) -> float:
         return float(self._areas[cell] @ row[cell] ** 2)

@@ -188,16 +188,19 @@ def _coordinates(name: str, barycentric: ArrayLike, k: int) -> FloatArray:
         raise SourceError(f"{name} must be real numbers of shape ({k}, 3)") from None
     if array.shape != (k, 3):
         raise SourceError(f"{name} must have shape ({k}, 3), a row for each face, not {array.shape}")
-    wrong = ~(np.isfinite(array).all(axis=1) & (array.min(axis=1) >= -ON_SIDE_COMPUTED))
+    # By columns: along rows of three numbers, numpy takes ten times as long.
+    a, b, c = array.T
+    wrong = ~(np.isfinite(a + b + c) & (np.minimum(np.minimum(a, b), c) >= -ON_SIDE_COMPUTED))
     if wrong.any():
         first = int(np.flatnonzero(wrong)[0])
         raise SourceError(f"{name}[{first}] = {array[first].tolist()} must be finite and not negative")
-    wrong = np.abs(array.sum(axis=1) - 1) > ON_SIDE_COMPUTED
+    wrong = np.abs(a + b + c - 1) > ON_SIDE_COMPUTED
     if wrong.any():
         first = int(np.flatnonzero(wrong)[0])
         raise SourceError(f"{name}[{first}] = {array[first].tolist()} must sum to 1, not {array[first].sum():.12g}")
     array = np.maximum(array, 0.0)
-    return np.asarray(array / array.sum(axis=1, keepdims=True))
+    a, b, c = array.T
+    return np.asarray(array / (a + b + c)[:, None])
 
 
 def require_triangles(mesh: Mesh) -> None:

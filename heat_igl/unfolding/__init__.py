@@ -1,6 +1,5 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
-from heat_igl.unfolding.departures import departures_from
 from heat_igl.unfolding.directions import PathAngles, in_circle
 from heat_igl.unfolding.distance import (
     directed_from_scratch,
@@ -10,6 +9,7 @@ from heat_igl.unfolding.distance import (
 )
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
 from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
+from heat_igl.unfolding.from_vertex import vectors_from
 from heat_igl.unfolding.fronts import FrontSolver
 from heat_igl.unfolding.local import blocks_within, distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.path_derivatives import Change
@@ -33,7 +33,6 @@ __all__ = [
     "SideChange",
     "UnfoldingSolver",
     "blocks_within",
-    "departures_from",
     "directed_from_scratch",
     "distance_from_scratch",
     "distance_to_targets",
@@ -46,5 +45,6 @@ __all__ = [
     "pair_distances",
     "read_distances_within",
     "unfolded_distance",
+    "vectors_from",
     "write_distances_within",
 ]

@@ -1,4 +1,4 @@
-"""In which directions the exact paths from one vertex leave it, on a mesh that is asked once."""
+"""The exact log map of one vertex, on a mesh that is asked once."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from heat_igl.intrinsic import corner_angles, intrinsic_triangulation, polar_ang
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.kernels.window_surface import SEVERAL_FANS
 from heat_igl.mesh import Mesh
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
-from heat_igl.unfolding.window_search import Searched, search, starts_at
+from heat_igl.unfolding.window_search import Leaving, Searched, search, starts_at
 
-__all__ = ["departures_from"]
+__all__ = ["vectors_from"]
 
 # By how much the lengths of an edge before and after mollification may differ, relatively, and two angles.
 _SAME_LENGTH, _SAME_ANGLE = 1e-7, 1e-5
@@ -32,8 +32,8 @@ class _Spokes(NamedTuple):
     corner: IntArray
 
 
-def departures_from(mesh: Mesh, source: int) -> tuple[FloatArray, FloatArray] | None:
-    """Exact distance (n,), and the polar angle (n,) at which the path to each vertex leaves the source.
+def vectors_from(mesh: Mesh, source: int) -> FloatArray | None:
+    """Vectors (n, 2) of the exact distance, in the direction in which the path to each vertex leaves the source.
 
     For this, neither the polar angles of other vertices nor the history of the flips are needed.
 
@@ -46,9 +46,9 @@ def departures_from(mesh: Mesh, source: int) -> tuple[FloatArray, FloatArray] | 
 
     Returns
     -------
-    tuple or None
-        The angle is 0 at the source and where it does not reach. None if the faces are no oriented manifold, or if
-        fewer than two edges of the mesh at the source are left in the Delaunay triangulation.
+    (n, 2) float64 or None
+        In the frame of the source; 0 at the source and where it does not reach. None if the faces are no oriented
+        manifold, or if fewer than two edges of the mesh at the source are left in the Delaunay triangulation.
     """
     given = _given_spokes(mesh, source)
     if given is None:
@@ -62,14 +62,19 @@ def departures_from(mesh: Mesh, source: int) -> tuple[FloatArray, FloatArray] | 
     if first is None:
         return None
     done = search(edges, starts_at(edges, np.array([source]), None, None, None, None), directed=True)
-    if (edges.tables.kind == SEVERAL_FANS).any():
+    leaving = done.leaving
+    if leaving is None or (edges.tables.kind == SEVERAL_FANS).any():
         return None
     begin = np.zeros(len(edges.tables.vertex))
     begin[around.corner] = first + scale * around.angle
-    departure = _departures(done, begin, scale, int(edges.number[source]))
+    top, straight, seen = _first_parts(done, leaving, int(edges.number[source]))
+    angle = begin[leaving.corner[straight]] + scale * seen
     if on_boundary:
-        departure = np.clip(departure, 0.0, np.pi)
-    return edges.unscaled(done.found.distance[edges.number]), departure[edges.number]
+        angle = np.clip(angle, 0.0, np.pi)
+    unit = np.zeros((len(top), 2))
+    unit[straight, 0], unit[straight, 1] = np.cos(angle), np.sin(angle)
+    length = edges.unscaled(np.where(done.found.root < 0, 0.0, done.found.distance))
+    return np.asarray((length[:, None] * unit[top])[edges.number])
 
 
 def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None:
@@ -78,6 +83,8 @@ def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None
     None if the faces there are not one oriented fan.
     """
     F = mesh.F[np.unique(np.flatnonzero(mesh.F.ravel() == source) // 3)]
+    if not len(F):
+        return None
     used, numbers = np.unique(F, return_inverse=True)
     star = intrinsic_triangulation(Mesh(mesh.V[used], numbers.reshape(-1, 3)))
     centre = int(np.searchsorted(used, source))
@@ -93,19 +100,24 @@ def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None
 def _around(edges: HalfEdges, source: int) -> _Spokes:
     """The edges at a vertex of the tables, counterclockwise, with the sums of the angles of the faces before them."""
     t = edges.tables
-    start = corner = int(t.corner_of_vertex[edges.number[source]])
-    # Clockwise to the boundary, if there is one.
-    while (side := t.twin[previous_half_edge(corner)]) >= 0 and (before := int(previous_half_edge(side))) != start:
-        corner = before
-    if side < 0:
-        start = corner
-    corners, corner = [start], start
-    while (side := t.twin[next_half_edge(corner)]) >= 0 and (corner := int(next_half_edge(side))) != start:
-        corners.append(corner)
-    found = np.array(corners)
+    start = int(t.corner_of_vertex[edges.number[source]])
+    clockwise, is_closed = _fan(t.twin, start, 2)
+    found = np.array(_fan(t.twin, start if is_closed else clockwise[-1], 1)[0])
     angles = corner_angles(t.length.reshape(-1, 3)[found // 3])[np.arange(len(found)), found % 3]
     end = edges.old_vertex[t.vertex[next_half_edge(found)]]
     return _Spokes(end, edges.unscaled(t.length[previous_half_edge(found)]), np.cumsum(angles) - angles, found)
+
+
+def _fan(twin: AnyArray, start: int, step: int) -> tuple[list[int], bool]:
+    """The corners of a vertex from one on, counterclockwise for step 1 and clockwise for 2; whether they close up."""
+    corners = [start]
+    while True:
+        corner = corners[-1]
+        side = int(twin[corner - corner % 3 + (corner + step) % 3])
+        corner = side - side % 3 + (side + step) % 3
+        if side < 0 or corner == start:
+            return corners, side >= 0
+        corners.append(corner)
 
 
 def _first_angle(given: _Spokes, around: _Spokes, scale: float) -> float | None:
@@ -121,15 +133,17 @@ def _first_angle(given: _Spokes, around: _Spokes, scale: float) -> float | None:
     return None if np.abs(off - 2 * np.pi * np.rint(off / (2 * np.pi))).max() > _SAME_ANGLE else float(ahead[0])
 
 
-def _departures(done: Searched, begin: FloatArray, scale: float, source: int) -> FloatArray:
-    """Polar angle (n,) of the paths by the numbers of the tables; corners at the source begin at `begin` (3 m,)."""
+def _first_parts(done: Searched, leaving: Leaving, source: int) -> tuple[IntArray, IntArray, FloatArray]:
+    """Of each path, the vertex (n,) that the first straight part leads to; these vertices (k,), and angles (k,) there.
+
+    Angles count from the beginning of the corner out of which a path leaves the source.
+    """
     root = done.found.root.astype(np.int64)
-    corner, direction = done.leaving
-    top = np.arange(len(root))
-    bent = (root >= 0) & (root != source)
-    top[bent] = root[bent]
+    is_first = root == source
+    is_first[source] = False
+    top = np.where(is_first | (root < 0), np.arange(len(root)), root)
     while not ((further := top[top]) == top).all():
         top = further
-    angle = begin[corner] + scale * np.arctan2(direction[:, 1], direction[:, 0])
-    found = np.where((root >= 0) & (np.arange(len(root)) != source), angle[top], 0.0)
-    return np.asarray(found)
+    straight = np.flatnonzero(is_first)
+    x, y = leaving.direction[straight].T
+    return top, straight, np.arctan2(y, x)
