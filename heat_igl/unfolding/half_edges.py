@@ -14,8 +14,11 @@ from heat_igl.mesh.connectivity import duplicate_faces
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["HalfEdges", "Located", "Tables", "from_mesh", "from_triangulation", "rings"]
+__all__ = ["MARGIN", "HalfEdges", "Located", "Tables", "from_mesh", "from_triangulation", "rings"]
 
+#: Windows cross triangles that are this thin, in mean edge lengths: just more than rounding. With the margin of
+#: `mollify`, paths across needles were up to 3e-4 of themselves too long.
+MARGIN = 1e-12
 # A point whose barycentric coordinate is below this lies on the side of its face.
 _ON_SIDE = 1e-13
 # A last bound on the work; meshes measured so far take less than one flip per face.
@@ -246,8 +249,8 @@ def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
         if len(repeated):
             return from_mesh(Mesh(mesh.V, np.delete(mesh.F, repeated, axis=0)), start)
     if n_across:
-        return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-    added = mollify(length.reshape(-1, 3), mesh.F)
+        return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
+    added = mollify(length.reshape(-1, 3), mesh.F, MARGIN)
     if added.any():
         length += np.repeat(added, 3)
     gluing.flip(vertex, twin, ring, length, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * mesh.n_faces)
