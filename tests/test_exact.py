@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 import scipy.spatial
-from conftest import flat_perturbed, perturbed, shared_path, wheel_path
+from conftest import flat_perturbed, load_script, perturbed, shared_path, wheel_path
 from test_unfolding import exact as pygeodesic
 from test_unfolding import moebius_strip, random_disk, relative_error
 from test_unfolding_sources import COORDINATES, sheared, with_point
@@ -358,13 +359,36 @@ def test_threads_share_a_surface_and_the_bits_are_the_same():
     np.testing.assert_array_equal(together, one_by_one)
 
 
-def test_coincident_vertices_and_needles():
-    """Degenerate faces are mollified: an edge of length 0 gets one of 1e-8 of the mean."""
+def test_coincident_vertices():
+    """Degenerate faces are mollified: an edge of length 0 gets one of 1e-12 of the mean."""
     mesh = shapes.grid(6)
     V = mesh.V.copy()
     V[24] = V[25]
     truth = np.linalg.norm(V - V[0], axis=1)
-    np.testing.assert_allclose(exact_distance(V, mesh.F, 0), truth, rtol=1e-6)
+    np.testing.assert_allclose(exact_distance(V, mesh.F, 0), truth, rtol=1e-11)
+
+
+def test_paths_across_needles_are_no_longer_than_in_the_plane():
+    """A needle is crossed as it is: made longer by 1e-8, it would be a hundred times as high."""
+    height = 1e-6
+    V = np.array([[0, 0, 0], [1, 0, 0], [0.5, height, 0], [0.5, 2 * height, 0], [0.5, 1, 0], [0.4, -1, 0]])
+    F = np.array([[0, 1, 2], [0, 2, 3], [2, 1, 3], [0, 3, 4], [3, 1, 4], [1, 0, 5]])
+    for source in (4, 5):
+        truth = np.linalg.norm(V - V[source], axis=1)
+        np.testing.assert_allclose(exact_distance(V, F, source), truth, rtol=1e-10)
+
+
+def test_random_coarse_meshes():
+    """The script compares thousands; some kinds have a difference, and each has a cause."""
+    pytest.importorskip("pygeodesic")
+    script = load_script("random_exact")
+    found = [script.compared(seed) for seed in range(100)]
+    assert sum(bool(one.refused) for one in found) < 5
+    assert sum(one.n_values for one in found) > 10_000
+    causes = sum((one.causes for one in found), Counter())
+    assert causes["unexplained"] == 0
+    assert 0 < sum(causes.values()) < 50
+    assert {one.kind for one in found if one.causes} == {"needles"}
 
 
 def test_compiled_flips_are_those_of_the_triangulation():
