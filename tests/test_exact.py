@@ -13,7 +13,7 @@ from test_unfolding import exact as pygeodesic
 from test_unfolding import moebius_strip, random_disk, relative_error
 from test_unfolding_sources import COORDINATES, sheared, with_point
 
-from heat_igl import Mesh, SurfacePoints, read_mesh, shapes
+from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.kernels import gluing
@@ -373,9 +373,15 @@ def test_paths_across_needles_are_no_longer_than_in_the_plane():
     height = 1e-6
     V = np.array([[0, 0, 0], [1, 0, 0], [0.5, height, 0], [0.5, 2 * height, 0], [0.5, 1, 0], [0.4, -1, 0]])
     F = np.array([[0, 1, 2], [0, 2, 3], [2, 1, 3], [0, 3, 4], [3, 1, 4], [1, 0, 5]])
+    solver = HeatMethodSolver(V, F, refine="exact")
     for source in (4, 5):
         truth = np.linalg.norm(V - V[source], axis=1)
         np.testing.assert_allclose(exact_distance(V, F, source), truth, rtol=1e-10)
+        np.testing.assert_allclose(solver.distance(source), truth, rtol=1e-10)
+    point = SurfacePoints([3], [[0.2, 0.3, 0.5]])
+    truth = np.linalg.norm(V - point.positions(Mesh(V, F)), axis=1)
+    for found in (solver.distance(point), geodesic_distance((V, F), point, method="exact")):
+        np.testing.assert_allclose(found, truth, rtol=1e-10)
 
 
 def test_random_coarse_meshes():

@@ -360,3 +360,12 @@ def test_runs() -> None:
     run, within = grouping.enumerate_runs(counts)
     assert list(zip(run.tolist(), within.tolist(), strict=True)) == [(0, 0), (0, 1), (2, 0), (2, 1), (2, 2), (3, 0)]
     assert grouping.next_in_run(np.array([5, 6, 7, 8, 9, 4]), counts[counts > 0]).tolist() == [6, 5, 8, 9, 7, 4]
+
+
+def test_without_duplicate_faces_keeps_the_first_of_each():
+    V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
+    mesh = Mesh(V, [[0, 1, 2], [2, 1, 3], [1, 2, 0], [3, 2, 1], [2, 1, 3]])
+    reduced, kept = mesh.without_duplicate_faces()
+    assert kept.tolist() == [0, 1]
+    assert reduced.F.tolist() == [[0, 1, 2], [2, 1, 3]]
+    assert reduced.without_duplicate_faces()[0] is reduced

@@ -127,6 +127,21 @@ def test_degenerate_triangles_are_mollified_and_stay_finite():
         assert abs(domain.D @ domain.G - domain.L).max() <= 1e-10 * abs(domain.L).max()
 
 
+@pytest.mark.parametrize("laplacian", ["cotan", "intrinsic-delaunay"])
+def test_laplacian_of_triangles_has_the_bits_of_libigls(laplacian):
+    mesh = bad_sphere()
+    domain = operators(mesh, laplacian)
+    triangulation = domain.surface.triangulation
+    expected = (
+        igl.cotmatrix(mesh.V, mesh.F)
+        if laplacian == "cotan"
+        else igl.cotmatrix_intrinsic(triangulation.l, triangulation.F)
+    )
+    assert np.array_equal(domain.L.indptr, expected.indptr)
+    assert np.array_equal(domain.L.indices, expected.indices)
+    assert np.array_equal(domain.L.data, expected.data)
+
+
 def test_tetrahedral_laplacian_is_libigls_and_survives_flat_tetrahedra():
     good = perturbed(shapes.box(4), 0.2)
     expected = igl.cotmatrix(good.V, good.F)

@@ -221,7 +221,7 @@ def prepare(
     takes_heat = options.refine != "exact" and front_solver is None
     found = analysis(domain.L, options.backend, known) if takes_heat else None
     analysed = time.perf_counter()
-    problems = [] if found is None else _factored(domain, options, step, found, fitted)
+    problems = [] if found is None else _factored(domain, options, step, found, t_damping, fitted)
     factored = time.perf_counter()
     heat_flow = problems[0] if problems else None
     unfolds = options.refine is not None or front_solver is not None
@@ -233,10 +233,10 @@ def prepare(
     elif options.refine is not None or found is None:
         last_steps = UnfoldingSolver(domain, options.refine or "exact")
     else:
-        divergence = NormalizedDivergence(domain, t_damping, found.order, fitted)
-        last_steps = Integration(domain, problems[0], divergence, problems[1], t_damping, fitted, assembler.edges)
+        heat_flow, poisson, divergence = problems
+        last_steps = Integration(domain, heat_flow, divergence, poisson, t_damping, fitted, assembler.edges)
     triangulation = None if domain.surface is None else domain.surface.triangulation
-    factors = [] if heat_flow is None else heat_flow.factors + [problem.factor for problem in problems[1:]]
+    factors = [] if heat_flow is None else heat_flow.factors + [problem.factor for problem in problems[1:2]]
     diagnostics = Diagnostics(
         t=_of_largest(step, domain),
         t_requested=_of_largest(requested, domain),
@@ -269,14 +269,29 @@ def prepare(
 
 
 def _factored(
-    domain: Operators, options: SolverOptions, step: float | FloatArray, found: Analysis, fitted: bool
+    domain: Operators,
+    options: SolverOptions,
+    step: float | FloatArray,
+    found: Analysis,
+    t_damping: float | FloatArray | None,
+    fitted: bool,
 ) -> list[Any]:
-    """The heat flow, and the Poisson problem unless `refine` takes the place of it."""
-    makers: list[Callable[[], Any]] = [lambda: HeatFlow(domain, step, options.boundary, options.backend, found, fitted)]
-    if options.refine is None:
-        makers.append(lambda: PoissonProblem(domain, options.backend, found))
-    # Both matrices at once: the backends run without the interpreter's lock.
-    return list(in_order(lambda make: make(), makers, max(1, min(len(makers), n_threads()))))
+    """The heat flow; unless `refine` takes the place of them, also the Poisson problem and the divergence."""
+
+    def flow() -> HeatFlow:
+        return HeatFlow(domain, step, options.boundary, options.backend, found, fitted)
+
+    if options.refine is not None:
+        return [flow()]
+    # Both matrices at once: the backends run without the interpreter's lock. The Poisson problem is done first, and
+    # the divergence follows on that thread.
+    makers: list[Callable[[], Any]] = [
+        lambda: PoissonProblem(domain, options.backend, found),
+        flow,
+        lambda: NormalizedDivergence(domain, t_damping, found.order, fitted),
+    ]
+    poisson, heat_flow, divergence = in_order(lambda make: make(), makers, min(2, n_threads()))
+    return [heat_flow, poisson, divergence]
 
 
 def _resolved(domain: Operators, options: SolverOptions) -> tuple[Operators, SolverOptions]:

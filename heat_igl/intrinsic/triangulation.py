@@ -8,6 +8,7 @@ faces then do not determine the gluing, so it is stored (`IntrinsicTriangulation
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import igl
 import numpy as np
@@ -98,7 +99,7 @@ class IntrinsicTriangulation:
         """Mean length of `edges`."""
         return float(self.l.ravel()[self.edges].mean())
 
-    @property
+    @cached_property
     def areas(self) -> FloatArray:
         """Area (m,) of each triangle, by Heron's formula in Kahan's order."""
         return np.asarray(igl.doublearea(self.l, 0.0) / 2)

@@ -13,7 +13,7 @@ from heat_igl.mesh import Mesh, connectivity
 from heat_igl.mesh.mesh import checked_faces
 from heat_igl.operators.elements import TriangleElements
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
-from heat_igl.operators.simplices import longest_sides, padded
+from heat_igl.operators.simplices import cotangent_laplacian, longest_sides, padded
 from heat_igl.operators.suitability import fit_for_heat
 from heat_igl.operators.surface import Surface
 from heat_igl.typing import ArrayLike
@@ -39,7 +39,7 @@ def intrinsic_operators(
         Called with L as soon as it is known.
     """
     F, lengths, n = triangulation.F, triangulation.l, triangulation.n
-    L = padded(igl.cotmatrix_intrinsic(lengths, F), n)
+    L = cotangent_laplacian(igl.cotmatrix_entries(lengths), F, n)
     if on_laplacian is not None:
         on_laplacian(L)
     referenced = np.zeros(n, bool)

@@ -102,24 +102,26 @@ def tufted_operators(
     return changed_operators(triangulation, faces, intrinsic_delaunay(faces), mesh, on_laplacian)
 
 
-def unfolding_surface(mesh: Mesh) -> Surface:
-    """The triangles of a triangle mesh in which paths are unfolded, as `operators` has them, without any operator."""
+def unfolding_surface(mesh: Mesh, margin: float | None = None) -> Surface:
+    """The triangles of a triangle mesh in which paths are unfolded, as `operators` has them, without any operator.
+
+    Triangles thinner than `margin` are mollified, see `mollify`.
+    """
     history: tuple[Merged, ...] = ()
     if has_nonmanifold_edges(mesh):
         mesh, history = _without_duplicates(mesh)
-    faces = replace(intrinsic_triangulation(mesh), history=history)
+    faces = replace(intrinsic_triangulation(mesh, margin), history=history)
     return Surface(intrinsic_delaunay(faces), faces, V=mesh.V)
 
 
 def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Merged, ...]]:
     """The mesh with each face once, and which faces became which."""
-    repeated = connectivity.duplicate_faces(mesh.F, mesh.n_vertices)
-    if not len(repeated):
+    reduced, kept = mesh.without_duplicate_faces()
+    if reduced is mesh:
         return mesh, ()
-    kept = np.delete(np.arange(mesh.n_faces), repeated)
     ascending = np.argsort(mesh.F, axis=1)
     first, inverse, _ = connectivity.unique_rows(np.take_along_axis(mesh.F, ascending, axis=1), mesh.n_vertices)
     copied = first[inverse]
     corner = np.empty_like(mesh.F)
     np.put_along_axis(corner, ascending, ascending[copied], axis=1)
-    return Mesh(mesh.V, mesh.F[kept]), (Merged(np.searchsorted(kept, copied), corner),)
+    return reduced, (Merged(np.searchsorted(kept, copied), corner),)

@@ -12,7 +12,6 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
-from heat_igl.mesh.connectivity import duplicate_faces
 from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["graph_distance", "steiner_distance"]
@@ -43,7 +42,7 @@ def steiner_distance(mesh: MeshLike, sources: ArrayLike, tolerance: float = 2e-3
 def graph_distance(mesh: Mesh, sources: ArrayLike, points: int) -> FloatArray:
     """Lengths (k, n) of shortest paths in the graph whose edges hold `points` points each, evenly spaced."""
     # Of faces with the same vertices one will do; of an arc that is listed twice, the lengths would be summed.
-    once = np.setdiff1d(np.arange(mesh.n_faces), duplicate_faces(mesh.F, mesh.n_vertices))
+    _, once = mesh.without_duplicate_faces()
     arcs_of_face = 3 * points * (points + 1)
     if len(once) * arcs_of_face > LARGEST_GRAPH:
         raise MemoryError(f"{points} points on each of {len(mesh.edges)} edges make too large a graph")

@@ -164,14 +164,14 @@ def distance_to_targets(mesh: Mesh, sources: Sources, targets: Sources) -> Float
     vertices = np.empty(0, np.int64) if places is not None else named_vertices(targets, mesh.n_vertices, "targets")
     if places is not None:
         places.positions(mesh)  # which checks the faces
-    repeated = connectivity.duplicate_faces(mesh.F, mesh.n_vertices)
-    if len(repeated):
-        if places is not None or not chosen.on_vertices_alone:
-            raise MeshError(
-                f"face {repeated[0]} is there twice ({len(repeated)} are): with targets, places in faces need each "
-                "face once; remove the copies"
-            )
-        mesh = Mesh(mesh.V, np.delete(mesh.F, repeated, axis=0))
+    reduced, kept = mesh.without_duplicate_faces()
+    if reduced is not mesh and (places is not None or not chosen.on_vertices_alone):
+        repeated = np.setdiff1d(np.arange(mesh.n_faces), kept)
+        raise MeshError(
+            f"face {repeated[0]} is there twice ({len(repeated)} are): with targets, places in faces need each "
+            "face once; remove the copies"
+        )
+    mesh = reduced
     given, segments = intrinsic_triangulation(mesh, MARGIN), chosen.segments if len(chosen.segments.faces) else None
     points = SurfacePoints(chosen.points.faces, chosen.points.barycentric) if len(chosen.points.faces) else None
     found = ExactSurface(intrinsic_delaunay(given) if segments is None else given).solve(

@@ -10,7 +10,6 @@ from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, mollify
 from heat_igl.kernels import gluing, window_surface
 from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
-from heat_igl.mesh.connectivity import duplicate_faces
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
@@ -245,9 +244,9 @@ def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
         vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, np.ldexp(1.0, -exponent))
     if (twin == -2).any():
         # Windows would go on in every copy of a face, and multiply.
-        repeated = duplicate_faces(mesh.F, mesh.n_vertices)
-        if len(repeated):
-            return from_mesh(Mesh(mesh.V, np.delete(mesh.F, repeated, axis=0)), start)
+        reduced, _ = mesh.without_duplicate_faces()
+        if reduced is not mesh:
+            return from_mesh(reduced, start)
     if n_across:
         return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
     added = mollify(length.reshape(-1, 3), mesh.F, MARGIN)
