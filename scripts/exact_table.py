@@ -6,9 +6,9 @@
     python scripts/exact_table.py MESH --output DIRECTORY   # where exact.json and exact.md go
 
 Truth is pygeodesic's (extra ``validate``); meshes that it refuses have no such column. The program of VTP (Qin et al.
-2016) is called with ``-m FILE -s VERTEX``, each time beside exact distance from arrays. Local queries are compared with
-a query of the unfolding solver. Times are those of the processor, as VTP prints them, summed over threads. The rows of
-the matrix are those of the first vertices of a torus of 100 000.
+2016) is called with ``-m FILE -s VERTEX -o DISTANCES``, each time beside exact distance from arrays. Local queries are
+compared with a query of the unfolding solver. Times are those of the processor, as VTP prints them, summed over
+threads. The rows of the matrix are those of the first vertices of a torus of 100 000.
 """
 
 from __future__ import annotations
@@ -69,16 +69,24 @@ def measured(mesh: Mesh, n_sources: int, repeats: int, vtp: Path | None) -> dict
         ),
         "per query": processor_seconds(lambda: surface.solve(np.array([sources[0]])), repeats),
     }
+    with PeakMemory() as peak:
+        exact_distance(mesh.V.copy(), mesh.F.copy(), sources[0])
+    row["peak"] = peak.bytes
     try:
         others = [reference.measured("pygeodesic", mesh, source) for source in sources]
         pairs = zip(solutions, others, strict=True)
         row["difference"] = max(_difference(found.distance, other.distance) for found, other in pairs)
+        row["their peak"] = others[0].peak_memory
     except ReferenceSolverError as error:
         row["refused"] = str(error)
     if vtp is not None:
         # It ends in an error at edges of more than two faces.
         with contextlib.suppress(subprocess.CalledProcessError):
             row["vtp"], row["share"] = beside_vtp(vtp, mesh, sources[0], repeats)
+            theirs = [run_vtp(vtp, mesh, source)[1] for source in sources]
+            if all(len(distance) == mesh.n_vertices for distance in theirs):  # it drops some vertices of some meshes
+                pairs = zip(solutions, theirs, strict=True)
+                row["vtp difference"] = max(_difference(found.distance, other) for found, other in pairs)
     return row | local(mesh, sources[0], solutions[0].distance, repeats)
 
 
@@ -118,7 +126,7 @@ def beside_vtp(program: Path, mesh: Mesh, source: int, repeats: int) -> tuple[fl
     """Seconds of VTP, and exact distance from arrays as a share of them: medians of calls that take turns."""
     pairs = [
         (
-            vtp_seconds(program, mesh, source),
+            run_vtp(program, mesh, source)[0],
             processor_seconds(lambda: exact_distance(mesh.V.copy(), mesh.F.copy(), source), 1),
         )
         for _ in range(repeats)
@@ -127,14 +135,15 @@ def beside_vtp(program: Path, mesh: Mesh, source: int, repeats: int) -> tuple[fl
     return float(np.median(theirs)), float(np.median(ours / theirs))
 
 
-def vtp_seconds(program: Path, mesh: Mesh, source: int) -> float:
-    """The seconds of its propagation, as the program prints them."""
+def run_vtp(program: Path, mesh: Mesh, source: int) -> tuple[float, Any]:
+    """The seconds of its propagation, as the program prints them, and the distances that it writes."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "mesh.obj")
+        path, distances = Path(folder, "mesh.obj"), Path(folder, "distances.txt")
         write_mesh(path, mesh)
-        command = [str(program), "-m", str(path), "-s", str(source)]
+        command = [str(program), "-m", str(path), "-s", str(source), "-o", str(distances)]
         printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    return float(re.findall(r"propagation step took (\S+) seconds", printed)[0])
+        found = np.array(distances.read_text().split(), float)
+    return float(re.findall(r"propagation step took (\S+) seconds", printed)[0]), found
 
 
 def streamed(n_rows: int) -> dict[str, float]:
@@ -155,11 +164,15 @@ def _difference(distance: Any, other: Any) -> float:
     return float((np.abs(distance[there] - other[there]) / other[there]).max())
 
 
-_OPTIONAL = (("vtp", 3), ("share", 2), ("difference", 3))
+def _mebibytes(size: int | None) -> str:
+    return "-" if size is None else f"{size / 2**20:.1f}"
+
+
+_OPTIONAL = (("vtp", 3), ("share", 2), ("difference", 2), ("vtp difference", 2))
 
 
 def markdown(result: dict[str, Any]) -> str:
-    rows, shares = [], []
+    rows, shares, memory = [], [], []
     for name, row in result["meshes"].items():
         optional = (f"{row[key]:.{digits}g}" if key in row else "-" for key, digits in _OPTIONAL)
         timed = ("from arrays", "per query", "unfolded from arrays", "unfolded")
@@ -168,17 +181,22 @@ def markdown(result: dict[str, Any]) -> str:
         parts = (f"1/{row['unfolded'] / row[key]:.0f}" for key in ("within", "pair"))
         last = (f"{1e6 * row['pair']:.1f}", f"{row['nearest']:.2f}")
         shares.append((name, f"{row['unfolded']:.4f}", f"{row['held']:.0f}", *parts, *last))
+        memory.append((name, *(_mebibytes(row.get(key)) for key in ("peak", "their peak"))))
     times = ("from arrays, s", "per query, s", "unfolded from arrays, s", "per unfolded query, s")
     head = ("mesh", "vertices", "windows per edge", *times, "VTP, s", "from arrays / VTP")
     nearest = f"{_NEAREST} nearest of all, s"
     local_head = ("mesh", "unfolded query, s", "vertices within", "within", "pair", "pair, µs", nearest)
     lines = [
-        *table((*head, "largest relative difference"), rows),
+        *table((*head, "difference to pygeodesic", "to VTP"), rows),
         "",
         f"Local queries as a share of an unfolded one, of {_LOCAL}, preparation included: a radius "
         f"that holds {100 * _SHARE:.0f} % of the vertices around one of them, and pairs {_APART:g} mean edges apart.",
         "",
         *table(local_head, shares),
+        "",
+        "Peak memory above what the process held before.",
+        "",
+        *table(("mesh", "from arrays, MiB", "pygeodesic, MiB"), memory),
     ]
     if "matrix" in result:
         one = result["matrix"]

@@ -99,7 +99,7 @@ def with_holes(rng: np.random.Generator) -> Mesh:
     kept, is_at_hole = np.ones(mesh.n_faces, bool), np.zeros(mesh.n_vertices, bool)
     is_at_hole[mesh.boundary] = True
     for v in rng.permutation(mesh.n_vertices)[: rng.integers(1, 10)]:
-        around = (mesh.F == v).any(axis=1)
+        around = (v == mesh.F).any(axis=1)
         if not is_at_hole[mesh.F[around]].any():
             is_at_hole[mesh.F[around]] = True
             kept &= ~around

@@ -29,8 +29,8 @@ def mollify(l: FloatArray, F: IntArray, margin: float | None = None) -> FloatArr
     -------
     (m,) float64
         For each face, the smallest ``e >= 0`` for which the triangle inequalities of ``l + e`` hold in that component
-        by `margin` times the mean edge length there; exactly 0 if they already do, so that the lengths of a good mesh keep
-        every bit.
+        by `margin` times the mean edge length there; exactly 0 if they already do, so that the lengths of a good mesh
+        keep every bit.
     """
     least_slack = _MARGIN if margin is None else margin
     # By columns: sums and maxima over rows of three take ten times as long.
