@@ -224,6 +224,16 @@ def test_scales():
         np.testing.assert_allclose(surface.solve(np.array([0])).distance, d * scale, rtol=1e-12)
 
 
+def test_scale_of_a_small_component():
+    """Fourth powers of the edges of the small one are no doubles in the unit of the mesh."""
+    mesh = bumpy()
+    n = mesh.n_vertices
+    V, F = np.concatenate([mesh.V, 2.0**-60 * mesh.V]), np.concatenate([mesh.F, mesh.F + n])
+    d = exact_distance(mesh.V, mesh.F, 0)
+    found = exact_distance(V * 2.0**-198, F, n)
+    np.testing.assert_array_equal(found[n:], d * 2.0**-258)
+
+
 def test_each_goal_ends_the_search_with_its_own_bits():
     """On a rough surface the search must not end at the first path that arrives."""
     mesh = perturbed(shapes.icosphere(3), 0.5, 3)
