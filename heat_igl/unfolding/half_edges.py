@@ -112,16 +112,16 @@ class HalfEdges:
         vertex, twin, ring, aligned, length, self.number, self.face = gluing.breadth_first(
             vertex, twin, ring, aligned, _times_power(length, -shift), n, first_face
         )
-        derived = (
-            np.empty(m),
-            np.empty(3 * m),
-            np.full(n, -1, np.int32),
-            np.empty(3 * m, np.int32),
-            np.zeros(n, np.int32),
-            np.zeros(n, np.uint8),
-        )
-        is_delaunay = window_surface.shapes(vertex, length, twin, *derived)
-        self.tables = Tables(vertex, length, twin, aligned, ring, *derived, is_delaunay)
+        derived: dict[str, AnyArray] = {
+            "double_area": np.empty(m),
+            "bulge": np.empty(3 * m),
+            "corner_of_vertex": np.full(n, -1, np.int32),
+            "next_corner": np.empty(3 * m, np.int32),
+            "n_corners": np.zeros(n, np.int32),
+            "kind": np.zeros(n, np.uint8),
+        }
+        is_delaunay = window_surface.shapes(vertex, length, twin, **derived)
+        self.tables = Tables(vertex, length, twin, aligned, ring, **derived, is_delaunay=is_delaunay)
         self.old_vertex = np.empty(n, np.int64)
         self.old_vertex[self.number] = np.arange(n)
 
