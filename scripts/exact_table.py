@@ -2,11 +2,13 @@
 
     python scripts/exact_table.py bunny.obj cow.obj         # 4 sources on each
     python scripts/exact_table.py MESH --vtp PROGRAM        # the program prints the seconds of its propagation
+    python scripts/exact_table.py MESH --matrix 10000       # rows of the 5 % nearest vertices, into a store
     python scripts/exact_table.py MESH --output DIRECTORY   # where exact.json and exact.md go
 
 Truth is pygeodesic's (extra ``validate``); meshes that it refuses have no such column. The program of VTP (Qin et al.
-2016) is called with ``-m FILE -s VERTEX``. Local queries are compared with a query of the unfolding solver. Times are
-those of the processor, as VTP prints them, summed over threads.
+2016) is called with ``-m FILE -s VERTEX -o DISTANCES``, each time beside exact distance from arrays. Local queries are
+compared with a query of the unfolding solver. Times are those of the processor, as VTP prints them, summed over
+threads. The rows of the matrix are those of the first vertices of a torus of 100 000.
 """
 
 from __future__ import annotations
@@ -31,10 +33,13 @@ from heat_igl import (
     nearest_vertices,
     pair_distances,
     reference,
+    shapes,
     unfolded_distance,
+    write_distances_within,
     write_mesh,
 )
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
+from heat_igl.runtime import PeakMemory
 from heat_igl.unfolding import exact_distance
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.refinement import TOLERANCE
@@ -45,6 +50,8 @@ from scaffold import add_output, environment, option_parser, over_meshes, publis
 # Local queries: how many, the share of the vertices that a radius holds, and mean edges between the ends of a pair.
 _LOCAL, _SHARE, _APART = 1000, 0.01, 2.0
 _NEAREST = 32
+# The share of the vertices in each row of a matrix, and how many vertices there are around and along the torus.
+_IN_ROW, _TORUS = 0.05, (400, 250)
 
 
 def measured(mesh: Mesh, n_sources: int, repeats: int, vtp: Path | None) -> dict[str, Any]:
@@ -62,16 +69,24 @@ def measured(mesh: Mesh, n_sources: int, repeats: int, vtp: Path | None) -> dict
         ),
         "per query": processor_seconds(lambda: surface.solve(np.array([sources[0]])), repeats),
     }
+    with PeakMemory() as peak:
+        exact_distance(mesh.V.copy(), mesh.F.copy(), sources[0])
+    row["peak"] = peak.bytes
     try:
         others = [reference.measured("pygeodesic", mesh, source) for source in sources]
         pairs = zip(solutions, others, strict=True)
         row["difference"] = max(_difference(found.distance, other.distance) for found, other in pairs)
+        row["their peak"] = others[0].peak_memory
     except ReferenceSolverError as error:
         row["refused"] = str(error)
     if vtp is not None:
         # It ends in an error at edges of more than two faces.
         with contextlib.suppress(subprocess.CalledProcessError):
-            row["vtp"] = vtp_seconds(vtp, mesh, sources[0])
+            row["vtp"], row["share"] = beside_vtp(vtp, mesh, sources[0], repeats)
+            theirs = [run_vtp(vtp, mesh, source)[1] for source in sources]
+            if all(len(distance) == mesh.n_vertices for distance in theirs):  # it drops some vertices of some meshes
+                pairs = zip(solutions, theirs, strict=True)
+                row["vtp difference"] = max(_difference(found.distance, other) for found, other in pairs)
     return row | local(mesh, sources[0], solutions[0].distance, repeats)
 
 
@@ -107,14 +122,41 @@ def local(mesh: Mesh, source: int, distance: Any, repeats: int) -> dict[str, Any
     }
 
 
-def vtp_seconds(program: Path, mesh: Mesh, source: int) -> float:
-    """The seconds of its propagation, as the program prints them."""
+def beside_vtp(program: Path, mesh: Mesh, source: int, repeats: int) -> tuple[float, float]:
+    """Seconds of VTP, and exact distance from arrays as a share of them: medians of calls that take turns."""
+    pairs = [
+        (
+            run_vtp(program, mesh, source)[0],
+            processor_seconds(lambda: exact_distance(mesh.V.copy(), mesh.F.copy(), source), 1),
+        )
+        for _ in range(repeats)
+    ]
+    theirs, ours = np.array(pairs).T
+    return float(np.median(theirs)), float(np.median(ours / theirs))
+
+
+def run_vtp(program: Path, mesh: Mesh, source: int) -> tuple[float, Any]:
+    """The seconds of its propagation, as the program prints them, and the distances that it writes."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "mesh.obj")
+        path, distances = Path(folder, "mesh.obj"), Path(folder, "distances.txt")
         write_mesh(path, mesh)
-        command = [str(program), "-m", str(path), "-s", str(source)]
+        command = [str(program), "-m", str(path), "-s", str(source), "-o", str(distances)]
         printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    return float(re.findall(r"propagation step took (\S+) seconds", printed)[0])
+        found = np.array(distances.read_text().split(), float)
+    return float(re.findall(r"propagation step took (\S+) seconds", printed)[0]), found
+
+
+def streamed(n_rows: int) -> dict[str, float]:
+    """What it takes to write rows of a matrix of nearest vertices to a store."""
+    mesh = shapes.torus(*_TORUS)
+    radius = float(np.quantile(exact_distance(mesh.V, mesh.F, 0), _IN_ROW))
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.process_time()
+        with PeakMemory() as peak:
+            write_distances_within(Path(folder, "matrix"), mesh, radius, np.arange(n_rows))
+        seconds = time.process_time() - begin
+        size = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file())
+    return {"vertices": mesh.n_vertices, "rows": n_rows, "seconds": seconds, "peak": peak.bytes or 0, "size": size}
 
 
 def _difference(distance: Any, other: Any) -> float:
@@ -122,40 +164,64 @@ def _difference(distance: Any, other: Any) -> float:
     return float((np.abs(distance[there] - other[there]) / other[there]).max())
 
 
+def _mebibytes(size: int | None) -> str:
+    return "-" if size is None else f"{size / 2**20:.1f}"
+
+
+_OPTIONAL = (("vtp", 3), ("share", 2), ("difference", 2), ("vtp difference", 2))
+
+
 def markdown(result: dict[str, Any]) -> str:
-    rows, shares = [], []
+    rows, shares, memory = [], [], []
     for name, row in result["meshes"].items():
-        optional = (f"{row[key]:.3g}" if key in row else "-" for key in ("vtp", "difference"))
+        optional = (f"{row[key]:.{digits}g}" if key in row else "-" for key, digits in _OPTIONAL)
         timed = ("from arrays", "per query", "unfolded from arrays", "unfolded")
         seconds = (f"{row['windows per edge']:.2f}", *(f"{row[key]:.4f}" for key in timed))
         rows.append((name, f"{row['n']}", *seconds, *optional))
         parts = (f"1/{row['unfolded'] / row[key]:.0f}" for key in ("within", "pair"))
-        shares.append((name, f"{row['unfolded']:.3f}", f"{row['held']:.0f}", *parts, f"{row['nearest']:.2f}"))
+        last = (f"{1e6 * row['pair']:.1f}", f"{row['nearest']:.2f}")
+        shares.append((name, f"{row['unfolded']:.4f}", f"{row['held']:.0f}", *parts, *last))
+        memory.append((name, *(_mebibytes(row.get(key)) for key in ("peak", "their peak"))))
     times = ("from arrays, s", "per query, s", "unfolded from arrays, s", "per unfolded query, s")
-    head = ("mesh", "vertices", "windows per edge", *times, "VTP, s")
-    local_head = ("mesh", "unfolded query, s", "vertices within", "within", "pair", f"{_NEAREST} nearest of all, s")
+    head = ("mesh", "vertices", "windows per edge", *times, "VTP, s", "from arrays / VTP")
+    nearest = f"{_NEAREST} nearest of all, s"
+    local_head = ("mesh", "unfolded query, s", "vertices within", "within", "pair", "pair, µs", nearest)
     lines = [
-        *table((*head, "largest relative difference"), rows),
+        *table((*head, "difference to pygeodesic", "to VTP"), rows),
         "",
         f"Local queries as a share of an unfolded one, of {_LOCAL}, preparation included: a radius "
         f"that holds {100 * _SHARE:.0f} % of the vertices around one of them, and pairs {_APART:g} mean edges apart.",
         "",
         *table(local_head, shares),
+        "",
+        "Peak memory above what the process held before.",
+        "",
+        *table(("mesh", "from arrays, MiB", "pygeodesic, MiB"), memory),
     ]
+    if "matrix" in result:
+        one = result["matrix"]
+        lines += [
+            "",
+            f"{one['rows']} rows of {one['vertices']} columns into a store: {one['seconds']:.0f} s, "
+            f"{one['peak'] / 2**20:.0f} MiB of memory, {one['size'] / 2**20:.0f} MiB of store.",
+        ]
     return "\n".join(lines)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     parser = option_parser(__doc__)
-    parser.add_argument("meshes", type=Path, nargs="+", help="triangle meshes")
+    parser.add_argument("meshes", type=Path, nargs="*", help="triangle meshes")
     parser.add_argument("--sources", type=int, default=4, help="sources on each mesh (default 4)")
     parser.add_argument("--repeats", type=int, default=3, help="timed calls, of which the median counts (default 3)")
     parser.add_argument("--vtp", type=Path, metavar="PROGRAM", help="the program of VTP")
+    parser.add_argument("--matrix", type=int, default=0, metavar="ROWS", help="rows of a matrix to write (default 0)")
     add_output(parser, "exact")
     arguments = parser.parse_args(argv)
     vtp = None if arguments.vtp is None else arguments.vtp.resolve()
     found = over_meshes(arguments.meshes, lambda mesh: measured(mesh, arguments.sources, arguments.repeats, vtp))
     result = {"environment": environment(), "meshes": found}
+    if arguments.matrix:
+        result["matrix"] = streamed(arguments.matrix)
     publish(result, markdown(result), folder=arguments.output, name="exact")
     return 0
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 import scipy.spatial
-from conftest import flat_perturbed, perturbed, shared_path, wheel_path
+from conftest import flat_perturbed, load_script, perturbed, shared_path, wheel_path
 from test_unfolding import exact as pygeodesic
 from test_unfolding import moebius_strip, random_disk, relative_error
 from test_unfolding_sources import COORDINATES, sheared, with_point
 
-from heat_igl import Mesh, SurfacePoints, read_mesh, shapes
+from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.kernels import gluing
@@ -223,6 +224,16 @@ def test_scales():
         np.testing.assert_allclose(surface.solve(np.array([0])).distance, d * scale, rtol=1e-12)
 
 
+def test_scale_of_a_small_component():
+    """Fourth powers of the edges of the small one are no doubles in the unit of the mesh."""
+    mesh = bumpy()
+    n = mesh.n_vertices
+    V, F = np.concatenate([mesh.V, 2.0**-60 * mesh.V]), np.concatenate([mesh.F, mesh.F + n])
+    d = exact_distance(mesh.V, mesh.F, 0)
+    found = exact_distance(V * 2.0**-198, F, n)
+    np.testing.assert_array_equal(found[n:], d * 2.0**-258)
+
+
 def test_each_goal_ends_the_search_with_its_own_bits():
     """On a rough surface the search must not end at the first path that arrives."""
     mesh = perturbed(shapes.icosphere(3), 0.5, 3)
@@ -358,13 +369,42 @@ def test_threads_share_a_surface_and_the_bits_are_the_same():
     np.testing.assert_array_equal(together, one_by_one)
 
 
-def test_coincident_vertices_and_needles():
-    """Degenerate faces are mollified: an edge of length 0 gets one of 1e-8 of the mean."""
+def test_coincident_vertices():
+    """Degenerate faces are mollified: an edge of length 0 gets one of 1e-12 of the mean."""
     mesh = shapes.grid(6)
     V = mesh.V.copy()
     V[24] = V[25]
     truth = np.linalg.norm(V - V[0], axis=1)
-    np.testing.assert_allclose(exact_distance(V, mesh.F, 0), truth, rtol=1e-6)
+    np.testing.assert_allclose(exact_distance(V, mesh.F, 0), truth, rtol=1e-11)
+
+
+def test_paths_across_needles_are_no_longer_than_in_the_plane():
+    """A needle is crossed as it is: made longer by 1e-8, it would be a hundred times as high."""
+    height = 1e-6
+    V = np.array([[0, 0, 0], [1, 0, 0], [0.5, height, 0], [0.5, 2 * height, 0], [0.5, 1, 0], [0.4, -1, 0]])
+    F = np.array([[0, 1, 2], [0, 2, 3], [2, 1, 3], [0, 3, 4], [3, 1, 4], [1, 0, 5]])
+    solver = HeatMethodSolver(V, F, refine="exact")
+    for source in (4, 5):
+        truth = np.linalg.norm(V - V[source], axis=1)
+        np.testing.assert_allclose(exact_distance(V, F, source), truth, rtol=1e-10)
+        np.testing.assert_allclose(solver.distance(source), truth, rtol=1e-10)
+    point = SurfacePoints([3], [[0.2, 0.3, 0.5]])
+    truth = np.linalg.norm(V - point.positions(Mesh(V, F)), axis=1)
+    for found in (solver.distance(point), geodesic_distance((V, F), point, method="exact")):
+        np.testing.assert_allclose(found, truth, rtol=1e-10)
+
+
+def test_random_coarse_meshes():
+    """The script compares thousands; some kinds have a difference, and each has a cause."""
+    pytest.importorskip("pygeodesic")
+    script = load_script("random_exact")
+    found = [script.compared(seed) for seed in range(100)]
+    assert sum(bool(one.refused) for one in found) < 5
+    assert sum(one.n_values for one in found) > 10_000
+    causes = sum((one.causes for one in found), Counter())
+    assert causes["unexplained"] == 0
+    assert 0 < sum(causes.values()) < 50
+    assert {one.kind for one in found if one.causes} == {"needles"}
 
 
 def test_compiled_flips_are_those_of_the_triangulation():

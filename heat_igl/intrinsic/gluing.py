@@ -25,6 +25,7 @@ def from_edge_lengths(
     F: IntArray,
     n: int,
     facets: connectivity.Facets | None = None,
+    margin: float | None = None,
 ) -> IntrinsicTriangulation:
     """Triangles with given edge lengths, glued along sides with the same two vertices; degenerate ones are mollified.
 
@@ -38,6 +39,8 @@ def from_edge_lengths(
         Number of vertices.
     facets : Facets, optional
         The facets of F, if they are known.
+    margin : float, optional
+        See `mollify`.
 
     Raises
     ------
@@ -57,7 +60,7 @@ def from_edge_lengths(
     twin[a], twin[b] = b, a
     aligned = np.ones(F.size, bool)
     aligned[a] = aligned[b] = half_edge_tail(F, a) == half_edge_head(F, b)
-    added = mollify(lengths, F)
+    added = mollify(lengths, F, margin)
     return IntrinsicTriangulation(F, lengths + added[:, None], twin, aligned, n, lengthening=float(added.max()))
 
 
@@ -131,9 +134,9 @@ def _require_one_length(lengths: FloatArray, a: IntArray, b: IntArray) -> None:
         )
 
 
-def intrinsic_triangulation(mesh: Mesh) -> IntrinsicTriangulation:
-    """The triangles of `mesh` by their edge lengths; degenerate ones are mollified."""
-    return from_edge_lengths(igl.edge_lengths(mesh.V, mesh.F), mesh.F, mesh.n_vertices, mesh.facets)
+def intrinsic_triangulation(mesh: Mesh, margin: float | None = None) -> IntrinsicTriangulation:
+    """The triangles of `mesh` by their edge lengths; degenerate ones are mollified, see `mollify`."""
+    return from_edge_lengths(igl.edge_lengths(mesh.V, mesh.F), mesh.F, mesh.n_vertices, mesh.facets, margin)
 
 
 def oriented(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:

@@ -13,7 +13,7 @@ __all__ = ["mollify"]
 _MARGIN = 1e-8
 
 
-def mollify(l: FloatArray, F: IntArray) -> FloatArray:  # noqa: E741
+def mollify(l: FloatArray, F: IntArray, margin: float | None = None) -> FloatArray:  # noqa: E741
     """The length to add to the edges so that no triangle is degenerate (Sharp and Crane 2020, section 4.5).
 
     Parameters
@@ -22,22 +22,25 @@ def mollify(l: FloatArray, F: IntArray) -> FloatArray:  # noqa: E741
         Edge lengths, opposite each corner.
     F : (m, 3) int64
         Faces: each component has a mean edge length and an added length of its own.
+    margin : float, optional
+        1e-8 if not given.
 
     Returns
     -------
     (m,) float64
         For each face, the smallest ``e >= 0`` for which the triangle inequalities of ``l + e`` hold in that component
-        by 1e-8 of the mean edge length there; exactly 0 if they already do, so that the lengths of a good mesh keep
-        every bit.
+        by `margin` times the mean edge length there; exactly 0 if they already do, so that the lengths of a good mesh
+        keep every bit.
     """
+    least_slack = _MARGIN if margin is None else margin
     # By columns: sums and maxima over rows of three take ten times as long.
     total = sum(l.T)
     slack = np.min([total - 2 * side for side in l.T], axis=0)
-    if slack.min() >= _MARGIN * l.max():
+    if slack.min() >= least_slack * l.max():
         return np.zeros(len(l))
     component = connectivity.connected_components(F, int(F.max()) + 1)[F[:, 0]]
     n_faces = np.maximum(np.bincount(component), 1)
     least = np.full(len(n_faces), np.inf)
     np.minimum.at(least, component, slack)
     mean = np.bincount(component, total) / (3 * n_faces)
-    return np.asarray(np.maximum(0.0, _MARGIN * mean - least)[component])
+    return np.asarray(np.maximum(0.0, least_slack * mean - least)[component])

@@ -18,12 +18,12 @@ def shapes(
     vertex: cython.int[::1],
     length: cython.double[::1],
     twin: cython.int[::1],
+    kind: cython.uchar[::1],
+    n_corners: cython.int[::1],
     double_area: cython.double[::1],
     bulge: cython.double[::1],
     corner_of_vertex: cython.int[::1],
     next_corner: cython.int[::1],
-    n_corners: cython.int[::1],
-    kind: cython.uchar[::1],
 ) -> bool:
     """Fill what `search` reads of a surface, and say whether it is intrinsic Delaunay.
 
@@ -32,6 +32,10 @@ def shapes(
     vertex, length, twin : (3 m,)
         Vertex of each corner, length of each half-edge, and the half-edge glued to it: -1 on the boundary, -2 where
         more than two faces meet.
+    kind : (n,)
+        Takes JOINS at the ends of edges of more than two faces; the rest must come as UNKNOWN.
+    n_corners : (n,)
+        Takes the number of corners of each vertex; must come full of 0.
     double_area : (m,)
         Takes twice the area of each face.
     bulge : (3 m,)
@@ -39,10 +43,6 @@ def shapes(
         power ``x (x - length) + y (y + bulge)`` at the point (x, -y) of the frame of the half-edge.
     corner_of_vertex, next_corner : (n,), (3 m,)
         Take the corners of each vertex as linked lists that end with -1; the first must come full of -1.
-    n_corners : (n,)
-        Takes the number of corners of each vertex; must come full of 0.
-    kind : (n,)
-        Takes JOINS at the ends of edges of more than two faces; the rest must come as UNKNOWN.
     """
     m: cython.int = double_area.shape[0]
     f: cython.int

@@ -102,12 +102,15 @@ def tufted_operators(
     return changed_operators(triangulation, faces, intrinsic_delaunay(faces), mesh, on_laplacian)
 
 
-def unfolding_surface(mesh: Mesh) -> Surface:
-    """The triangles of a triangle mesh in which paths are unfolded, as `operators` has them, without any operator."""
+def unfolding_surface(mesh: Mesh, margin: float | None = None) -> Surface:
+    """The triangles of a triangle mesh in which paths are unfolded, as `operators` has them, without any operator.
+
+    Triangles thinner than `margin` are mollified, see `mollify`.
+    """
     history: tuple[Merged, ...] = ()
     if has_nonmanifold_edges(mesh):
         mesh, history = _without_duplicates(mesh)
-    faces = replace(intrinsic_triangulation(mesh), history=history)
+    faces = replace(intrinsic_triangulation(mesh, margin), history=history)
     return Surface(intrinsic_delaunay(faces), faces, V=mesh.V)
 
 

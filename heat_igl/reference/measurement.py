@@ -31,8 +31,8 @@ WINDOWS = "windows"
 #: The exact solvers of other packages, for a second opinion; the last one needs no extra.
 EXACT_SOLVERS = ("pygeodesic", "gdist", "igl")
 
-# Mollification moves distances by about 1e-8 of themselves, and on a single edge by 1e-8 of the mean edge.
-_MOLLIFIED = 1e-7
+# At needles, rounded lengths move distances by about 1e-8 of themselves.
+_AT_NEEDLES = 1e-7
 
 
 @dataclass(frozen=True)
@@ -168,9 +168,9 @@ def _by_windows(mesh: Mesh, seeds: IntArray) -> Measured:
     there = np.isin(mesh.components, mesh.components[seeds])
     if not (np.isfinite(distance) == there).all():
         raise ReferenceSolverError(f"{WINDOWS} did not reach the components of the sources: report this as a bug")
-    # If triangles have no height, all edges were made longer; see `mollify`.
-    slack = _MOLLIFIED * float(mesh.edge_lengths.mean())
-    require_between_bounds(WINDOWS, mesh, seeds, distance, tolerance=_MOLLIFIED, slack=slack)
+    # Where triangles have hardly any height, edges were rounded or made longer.
+    slack = _AT_NEEDLES * float(mesh.edge_lengths.mean())
+    require_between_bounds(WINDOWS, mesh, seeds, distance, tolerance=_AT_NEEDLES, slack=slack)
     return Measured(distance, 0.0, seconds, peak.bytes)
 
 

@@ -25,7 +25,7 @@ from heat_igl.sources import (
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.directions import PathAngles
 from heat_igl.unfolding.exact import ExactSurface
-from heat_igl.unfolding.half_edges import from_mesh
+from heat_igl.unfolding.half_edges import MARGIN, from_mesh
 from heat_igl.unfolding.local import positive
 from heat_igl.unfolding.numbered import TOLERANCE
 from heat_igl.unfolding.refinement import Refine
@@ -182,7 +182,7 @@ def distance_to_targets(mesh: Mesh, sources: Sources, targets: Sources) -> Float
             "face once; remove the copies"
         )
     mesh = reduced
-    given, segments = intrinsic_triangulation(mesh), chosen.segments if len(chosen.segments.faces) else None
+    given, segments = intrinsic_triangulation(mesh, MARGIN), chosen.segments if len(chosen.segments.faces) else None
     points = SurfacePoints(chosen.points.faces, chosen.points.barycentric) if len(chosen.points.faces) else None
     found = ExactSurface(intrinsic_delaunay(given) if segments is None else given).solve(
         chosen.vertices,

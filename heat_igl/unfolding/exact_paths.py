@@ -12,7 +12,7 @@ from heat_igl.kernels import window_paths
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.unfolding.half_edges import HalfEdges, from_triangulation
+from heat_igl.unfolding.half_edges import MARGIN, HalfEdges, from_triangulation
 from heat_igl.unfolding.window_search import Searched, search, starts_at
 
 __all__ = ["ExactPaths", "Starts", "exact_paths"]
@@ -87,7 +87,7 @@ def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: Fl
     MemoryError
         If the windows do not fit into memory.
     """
-    edges = from_triangulation(intrinsic_triangulation(mesh))
+    edges = from_triangulation(intrinsic_triangulation(mesh, MARGIN))
     is_corner = barycentric.max(axis=1) == 1
     vertex = np.full(len(faces), -1)
     vertex[is_corner] = mesh.F[faces[is_corner], barycentric[is_corner].argmax(axis=1)]

@@ -13,8 +13,11 @@ from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["Glued", "HalfEdges", "Located", "Tables", "from_mesh", "from_triangulation", "glued", "rings"]
+__all__ = ["MARGIN", "Glued", "HalfEdges", "Located", "Tables", "from_mesh", "from_triangulation", "glued", "rings"]
 
+#: Windows cross triangles that are this thin, in mean edge lengths: just more than rounding. With the margin of
+#: `mollify`, paths across needles were up to 3e-4 of themselves too long.
+MARGIN = 1e-12
 # A point whose barycentric coordinate is below this lies on the side of its face.
 _ON_SIDE = 1e-13
 # A last bound on the work; meshes measured so far take less than one flip per face.
@@ -111,16 +114,16 @@ class HalfEdges:
         vertex, twin, ring, aligned, length, self.number, self.face = gluing.breadth_first(
             vertex, twin, ring, aligned, _times_power(length, -shift), n, first_face
         )
-        derived = (
-            np.empty(m),
-            np.empty(3 * m),
-            np.full(n, -1, np.int32),
-            np.empty(3 * m, np.int32),
-            np.zeros(n, np.int32),
-            np.zeros(n, np.uint8),
-        )
-        is_delaunay = window_surface.shapes(vertex, length, twin, *derived)
-        self.tables = Tables(vertex, length, twin, aligned, ring, *derived, is_delaunay)
+        derived: dict[str, AnyArray] = {
+            "double_area": np.empty(m),
+            "bulge": np.empty(3 * m),
+            "corner_of_vertex": np.full(n, -1, np.int32),
+            "next_corner": np.empty(3 * m, np.int32),
+            "n_corners": np.zeros(n, np.int32),
+            "kind": np.zeros(n, np.uint8),
+        }
+        is_delaunay = window_surface.shapes(vertex, length, twin, **derived)
+        self.tables = Tables(vertex, length, twin, aligned, ring, **derived, is_delaunay=is_delaunay)
         self.old_vertex = np.empty(n, np.int64)
         self.old_vertex[self.number] = np.arange(n)
 
@@ -251,10 +254,10 @@ class Glued(NamedTuple):
     exponent: int
     n_across: int
 
-    def flip(self, F: IntArray) -> None:
-        """Mollify and flip in place to the intrinsic Delaunay triangulation; F (m, 3) are the faces before."""
+    def flip(self, F: IntArray, margin: float | None = None) -> None:
+        """Mollify by a margin and flip in place to the intrinsic Delaunay triangulation; F (m, 3) are the faces before."""
         sides = self.length.reshape(-1, 3)
-        added = mollify(sides, F)
+        added = mollify(sides, F, margin)
         if added.any():
             sides += added[:, None]
         gluing.flip(self.vertex, self.twin, self.ring, self.length, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * len(F))
@@ -291,8 +294,8 @@ def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
         if reduced is not mesh:
             return from_mesh(reduced, start)
     if found.n_across:
-        return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-    found.flip(mesh.F)
+        return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
+    found.flip(mesh.F, MARGIN)
     first_face = int(np.argmax(found.vertex == start)) // 3
     return HalfEdges(*found[:5], mesh.n_vertices, found.exponent, first_face)
 

@@ -7,15 +7,17 @@ from dataclasses import replace
 from functools import cached_property, partial
 from typing import NamedTuple, Protocol
 
+import igl
 import numpy as np
 
-from heat_igl.mesh import SurfacePoints
-from heat_igl.operators import Surface
+from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.operators import Surface, unfolding_surface
 from heat_igl.sources import NEAR_RADIUS, NearField, SourcePoints, SourceSegments, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
+from heat_igl.unfolding.half_edges import MARGIN
 from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles
 from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
@@ -103,6 +105,17 @@ class _Asked(NamedTuple):
         return vertices, of_vertices, places, of_points if places else None
 
 
+def _as_thin_as_given(surface: Surface) -> Surface:
+    """Of triangles that were mollified for the heat, those that windows cross: paths over them are not made longer."""
+    given, faces = surface.given_faces, surface.faces
+    if given is None or faces is None or surface.V is None or faces.lengthening == 0:
+        return surface
+    added = faces.l - igl.edge_lengths(surface.V, faces.F)
+    if np.abs(added - 0.5 * faces.lengthening).max() > 0.51 * faces.lengthening:
+        return surface  # lengths of another metric
+    return unfolding_surface(Mesh(surface.V, given), MARGIN)
+
+
 class UnfoldingSolver:
     """`Refinement` of a domain, asked by sets of sources and their heat.
 
@@ -133,6 +146,8 @@ class UnfoldingSolver:
         surface = domain.surface
         if surface is None:
             raise ValueError(f"refine={refine!r} unfolds triangles by their edge lengths, and this domain has none")
+        if refine == "exact":
+            surface = _as_thin_as_given(surface)
         self._refinement = None if refine == "exact" else Refinement(surface.unfolding)
         #: Whether distances do not depend on the heat.
         self.is_exact = self._refinement is None or costs_little_to_be_exact(self._refinement, refine)
