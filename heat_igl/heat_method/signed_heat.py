@@ -49,6 +49,8 @@ class _Pieces(NamedTuple):
         Length of each segment; h for a point.
     label : (q,) int64
         Curve, region or set of points.
+    is_point : (q,) bool
+        Which are points.
     """
 
     faces: IntArray
@@ -56,6 +58,7 @@ class _Pieces(NamedTuple):
     normal: AnyArray
     weight: FloatArray
     label: IntArray
+    is_point: BoolArray
 
 
 class SignedHeatSolver:
@@ -231,6 +234,7 @@ class SignedHeatSolver:
             np.concatenate([-1j * _unit(along), _unit(normal)]),
             np.concatenate([length, np.full(len(normal), self._domain.mean_edge_length)]),
             np.concatenate([chosen.label, chosen.point_label]),
+            np.arange(len(chosen.faces) + len(normal)) >= len(chosen.faces),
         )
 
     def _integrated(self, pieces: _Pieces, level: Level) -> FloatArray:
@@ -282,9 +286,11 @@ class SignedHeatSolver:
         np.add.at(ones, corners, share)
         scale = SOURCE_HEAT / ones.max()
         ones = self._heat_flow.solve((scale * ones)[:, None])[:, 0]
-        # Heat of the values over heat of ones is their mean over some edges: what that leaves is extended in turn.
-        for _ in range(_LEVEL_ROUNDS):
+        # Heat of the values over heat of ones is their mean over some edges. What that leaves of the values on segments
+        # is extended in turn, but not of those at points: samples are off by noise, which the mean removes.
+        for k in range(1 if pieces.is_point.all() else _LEVEL_ROUNDS):
             rest = values - np.einsum("qc,qc->q", pieces.barycentric, extended[corners])
+            rest[pieces.is_point] *= k == 0
             largest = max(float(np.abs(rest).max()), np.finfo(float).tiny)
             b = np.zeros(n)
             np.add.at(b, corners, share * (rest / largest)[:, None])
