@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -252,11 +253,12 @@ class SignedHeatSolver:
             )
         Y = self._vector_flow.solve(b * (SOURCE_HEAT / largest))
         # Step 2: the unit field in faces.
-        at_faces = Y[self._triangulation.F]
-        # Dividing by the largest first keeps squares in range.
-        size = np.abs(at_faces).max(axis=1, keepdims=True)
-        at_faces = np.divide(at_faces, size, out=np.zeros_like(at_faces), where=size > LOWEST_HEAT)
-        X = _unit((self._rotations.of_triangulation * at_faces).sum(axis=1))
+        # Dividing by the largest first keeps squares in range. Corner by corner is faster than along an axis of three.
+        at_vertices = np.abs(Y)
+        size = reduce(np.maximum, (at_vertices[corner] for corner in self._triangulation.F.T))
+        scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > LOWEST_HEAT)
+        turned = zip(self._rotations.of_triangulation.T, self._triangulation.F.T, strict=True)
+        X = _unit(reduce(np.add, (rotation * (scale * Y[corner]) for rotation, corner in turned)))
         # Step 3: L phi = D X.
         phi = self._poisson.solve(self._D @ np.concatenate([X.real, X.imag]))
         return phi - self._level(phi, pieces, share, level)
