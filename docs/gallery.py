@@ -161,6 +161,38 @@ def noisy() -> Picture:
     return plot_field(mesh, phi, label="signed distance", spacing=0.05, sources=points)
 
 
+def tool_path() -> Picture:
+    """A pocket on a turned part: offsets inwards, on which a tool clears it, and one outwards, the clearance."""
+    # A flange, a cone and a shaft: a section (radius, height), turned about the y axis.
+    section = np.array([(0.9, 0), (0.9, 0.4), (0.75, 0.4), (0.35, 1), (0.35, 1.4)])
+    ends = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(section, axis=0), axis=1))])
+    x, y, along = shapes.cylinder(300, 150, ends[-1]).V.T
+    radius, height = (np.interp(along - along.min(), ends, column) for column in section.T)
+    turned = np.stack([radius * y, height, radius * x], axis=1)
+    part = heat_igl.Mesh(turned, shapes.cylinder(300, 150).F)
+    # The shortest closed polygon through six points.
+    angle, reach = np.radians([-45, 0, 45, 40, 0, -40]), np.array([0.9, 0.9, 0.9, 0.48, 0.58, 0.48])
+    corners = np.stack([reach * np.sin(angle), [0.15, 0.15, 0.15, 0.8, 0.65, 0.8], reach * np.cos(angle)], axis=1)
+    contour = heat_igl.geodesic_path(part, heat_igl.closest_points(part, [*corners, corners[0]]).points)
+    phi = heat_igl.SignedHeatSolver(part, refine="unfold").distance(contour)
+    paths = heat_igl.isolines(part, phi, [*np.arange(-0.06, phi.min(), -0.06), 0.06])
+    drawn = [contour, *(curve for level in paths for curve in level)]
+    return plot_field(part, phi, label="signed distance", limits=(-0.4, 0.4), curves=drawn, view=(0, 25))
+
+
+def pieces() -> Picture:
+    """A surface cut along a curve and two offsets of it, the pieces moved apart."""
+    mesh, axis = shapes.blob(5), np.array([0.2, 1, 0.3])
+    phi = heat_igl.SignedHeatSolver(mesh, refine="unfold").distance(heat_igl.isolines(mesh, mesh.V @ axis, 0))
+    found = heat_igl.cut(mesh, heat_igl.isolines(mesh, phi, [-0.4, 0, 0.4]))
+    carried, parts = found.carry(phi), found.split()
+    moved = [part.mesh.V + 2 * carried[part.vertices].mean() * axis for part in parts]
+    first = np.cumsum([0, *(len(V) for V in moved)])
+    F = np.concatenate([part.mesh.F + start for part, start in zip(parts, first, strict=False)])
+    values = np.concatenate([carried[part.vertices] for part in parts])
+    return plot_field(heat_igl.Mesh(np.concatenate(moved), F), values, label="signed distance", view=(20, 20))
+
+
 def tetrahedra() -> Picture:
     """Distance through a solid, by the heat method on tetrahedra."""
     mesh = shapes.box(12, (2.0, 1.0, 1.0))
@@ -283,9 +315,9 @@ def unfolded() -> Picture:
 
 
 ENTRIES = (
-    torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, scribble, grown, noisy, heat, error,
-    unfolded, cut_locus, book, tetrahedra, polygons, cloud, maze, travel_time, directions, checkerboard, straightest,
-    transported, extended, loops, bezier, asked,
+    torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, scribble, grown, noisy, tool_path, pieces,
+    heat, error, unfolded, cut_locus, book, tetrahedra, polygons, cloud, maze, travel_time, directions, checkerboard,
+    straightest, transported, extended, loops, bezier, asked,
 )  # fmt: skip
 
 

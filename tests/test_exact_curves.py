@@ -17,6 +17,7 @@ from heat_igl import (
     OffsetSources,
     SurfaceCurve,
     SurfacePoints,
+    closest_points,
     geodesic_distance,
     isolines,
     shapes,
@@ -144,3 +145,32 @@ def test_segments_need_the_faces_of_the_mesh():
     segments = source_set(isolines(sheared, sheared.V[:, 0], 0.43)[0][0], sheared.n_vertices, sheared.F).segments
     with pytest.raises(ValueError, match="were not flipped"):
         delaunay(sheared).solve(segments=segments)
+
+
+@pytest.mark.parametrize("refine", ["sweep", "unfold"])
+@pytest.mark.parametrize("source", ["curve", "points", "both, later"])
+def test_refined_distance_is_exact_near_points_and_curves(refine, source):
+    mesh = shapes.blob(4)
+    curve = isolines(mesh, mesh.V @ [0.3, 0.5, 0.8], 0.4)[0][0]
+    points = closest_points(mesh, mesh.V[[40, 900]] + 0.02).points
+    h = mesh.edge_lengths.mean()
+    # A later source begins within the reach of the earlier one.
+    later = [OffsetSources(curve, 3 + 2 * h), OffsetSources(points, 3)]
+    given = {"curve": curve, "points": points, "both, later": later}
+    sources = given[source]
+    exact = HeatMethodSolver(mesh, refine="exact").voronoi(sources)
+    found = HeatMethodSolver(mesh, refine=refine).voronoi(sources)
+    near = exact.distance - exact.distance.min() < 5 * h
+    assert 50 < near.sum() < mesh.n_vertices / 2
+    np.testing.assert_allclose(found.distance[near], exact.distance[near], rtol=1e-12)
+    np.testing.assert_array_equal(found.labels[near], exact.labels[near])
+
+
+def test_curves_are_exact_in_small_components():
+    large, small = shapes.blob(4), shapes.icosphere(2)
+    curve = isolines(small, small.V @ [0.3, 0.5, 0.8], 0.2)[0][0]
+    both = Mesh(np.concatenate([small.V, large.V + 9]), np.concatenate([small.F, large.F + small.n_vertices]))
+    found = HeatMethodSolver(both, refine="unfold").distance(curve)
+    exact = HeatMethodSolver(small, refine="exact").distance(curve)
+    np.testing.assert_allclose(found[: small.n_vertices], exact, rtol=1e-12)
+    assert np.isinf(found[small.n_vertices :]).all()

@@ -46,7 +46,8 @@ def signed(
     if picture is not None:
         from heat_igl.drawing import plots
 
-        drawn = plots.plot_field(loaded, np.where(np.isfinite(phi), phi, np.nan), label="signed distance")
+        shown = np.where(np.isfinite(phi), phi, np.nan)
+        drawn = plots.plot_field(loaded, shown, label="signed distance", curves=drawn_on)
     if output is not None:
         write_distance(output, loaded, phi)
     if drawn is not None and picture is not None:

@@ -107,8 +107,9 @@ def left_of_closed(
         in_vertex, on_edge = n_zero == 2, n_zero == 1
         on_curve[mesh.F[sources.faces[in_vertex], barycentric[in_vertex].argmax(axis=1)]] = True
         is_met[mesh.facets.of_face[sources.faces[on_edge], barycentric[on_edge].argmin(axis=1)]] = True
-    joins = mesh.edges[~is_met & ~on_curve[mesh.edges].any(axis=1)]
-    graph = sp.coo_array((np.ones(len(joins), np.int8), tuple(joins.T)), shape=(n, n))
+    tail, head = mesh.edges.T
+    joins = ~(is_met | on_curve[tail] | on_curve[head])
+    graph = sp.coo_array((np.ones(int(joins.sum()), np.int8), (tail[joins], head[joins])), shape=(n, n))
     n_regions, region = csgraph.connected_components(graph, directed=False)
     seen = _seen(triangulation, sources)
     # Of the segments in a face, each corner sees the nearest, and of equally near ones that under the largest angle.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -49,6 +50,8 @@ class _Pieces(NamedTuple):
         Length of each segment; h for a point.
     label : (q,) int64
         Curve, region or set of points.
+    is_point : (q,) bool
+        Which are points.
     """
 
     faces: IntArray
@@ -56,6 +59,7 @@ class _Pieces(NamedTuple):
     normal: AnyArray
     weight: FloatArray
     label: IntArray
+    is_point: BoolArray
 
 
 class SignedHeatSolver:
@@ -240,6 +244,7 @@ class SignedHeatSolver:
             np.concatenate([-1j * _unit(along), _unit(normal)]),
             np.concatenate([length, np.full(len(normal), self._domain.mean_edge_length)]),
             np.concatenate([chosen.label, chosen.point_label]),
+            np.arange(len(chosen.faces) + len(normal)) >= len(chosen.faces),
         )
 
     def _integrated(self, pieces: _Pieces, level: Level) -> FloatArray:
@@ -257,11 +262,12 @@ class SignedHeatSolver:
             )
         Y = self._vector_flow.solve(b * (SOURCE_HEAT / largest))
         # Step 2: the unit field in faces.
-        at_faces = Y[self._triangulation.F]
-        # Dividing by the largest first keeps squares in range.
-        size = np.abs(at_faces).max(axis=1, keepdims=True)
-        at_faces = np.divide(at_faces, size, out=np.zeros_like(at_faces), where=size > LOWEST_HEAT)
-        X = _unit((self._rotations.of_triangulation * at_faces).sum(axis=1))
+        # Dividing by the largest first keeps squares in range. Corner by corner is faster than along an axis of three.
+        at_vertices = np.abs(Y)
+        size = reduce(np.maximum, (at_vertices[corner] for corner in self._triangulation.F.T))
+        scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > LOWEST_HEAT)
+        turned = zip(self._rotations.of_triangulation.T, self._triangulation.F.T, strict=True)
+        X = _unit(reduce(np.add, (rotation * (scale * Y[corner]) for rotation, corner in turned)))
         # Step 3: L phi = D X.
         phi = self._poisson.solve(self._D @ np.concatenate([X.real, X.imag]))
         return phi - self._level(phi, pieces, share, level)
@@ -291,9 +297,11 @@ class SignedHeatSolver:
         np.add.at(ones, corners, share)
         scale = SOURCE_HEAT / ones.max()
         ones = self._heat_flow.solve((scale * ones)[:, None])[:, 0]
-        # Heat of the values over heat of ones is their mean over some edges: what that leaves is extended in turn.
-        for _ in range(_LEVEL_ROUNDS):
+        # Heat of the values over heat of ones is their mean over some edges. What that leaves of the values on segments
+        # is extended in turn, but not of those at points: samples are off by noise, which the mean removes.
+        for k in range(1 if pieces.is_point.all() else _LEVEL_ROUNDS):
             rest = values - np.einsum("qc,qc->q", pieces.barycentric, extended[corners])
+            rest[pieces.is_point] *= k == 0
             largest = max(float(np.abs(rest).max()), np.finfo(float).tiny)
             b = np.zeros(n)
             np.add.at(b, corners, share * (rest / largest)[:, None])

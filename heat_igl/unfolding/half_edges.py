@@ -255,7 +255,7 @@ class Glued(NamedTuple):
     n_across: int
 
     def flip(self, F: IntArray, margin: float | None = None) -> None:
-        """Mollify by a margin and flip in place to the intrinsic Delaunay triangulation; F (m, 3) are the faces before."""
+        """Mollify and flip in place to the intrinsic Delaunay triangulation; F (m, 3) are the faces before."""
         sides = self.length.reshape(-1, 3)
         added = mollify(sides, F, margin)
         if added.any():

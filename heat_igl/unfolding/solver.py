@@ -82,27 +82,19 @@ def require_share(tolerance: float | None) -> None:
 
 
 class _Asked(NamedTuple):
-    """What distance starts from; `labels` and `angles` are filled if given.
+    """What distance starts from, and when; `labels` and `angles` are filled if given.
 
-    Offsets count from the earliest on the component. `points` are those of `sources` and, unless windows take curves
-    as they are (`curves`), those that stand for curves.
+    Without `segments`, points stand for curves.
     """
 
-    sources: SourceSet
-    points: SourcePoints
-    curves: SourceSegments | None
+    vertices: IntArray
+    offsets: FloatArray | None
+    points: SurfacePoints | None
+    point_offsets: FloatArray | None
+    segments: SourceSegments | None
     labels: IntArray | None
     angles: FloatArray | None
     tolerance: float | None
-
-    @property
-    def starts(self) -> tuple[IntArray, FloatArray | None, SurfacePoints | None, FloatArray | None]:
-        """Vertices and points with their offsets, None if all are 0, as `Refinement` and `ExactSurface` take them."""
-        vertices, of_vertices, of_points = self.sources.vertices, self.sources.vertex_offset, self.points.offset
-        places = SurfacePoints(self.points.faces, self.points.barycentric) if len(self.points.faces) else None
-        if not (of_vertices.any() or of_points.any()):
-            return vertices, None, places, None
-        return vertices, of_vertices, places, of_points if places else None
 
 
 def _as_thin_as_given(surface: Surface) -> Surface:
@@ -251,24 +243,20 @@ class UnfoldingSolver:
         earliest, relative = self._from_earliest(sources)
         by_windows = self._takes_windows(sources)
         takes_curves = by_windows and angles is None
-        asked = _Asked(
-            relative,
-            relative.points if takes_curves else self._points(relative),
-            relative.segments if takes_curves and len(relative.segments.faces) else None,
-            labels,
-            angles,
-            self._tolerance if tolerance is None else tolerance,
+        points = relative.points if takes_curves else self._points(relative)
+        asked = _asked(relative, points, takes_curves)._replace(
+            labels=labels, angles=angles, tolerance=self._tolerance if tolerance is None else tolerance
         )
         by_windows = by_windows or self._is_straight(asked)
-        near = self._near(asked, by_windows)
-        distance = self._unfolded(u, asked, near, by_windows)
+        near = None if takes_curves else self._near(relative, by_windows)
+        distance = self._unfolded(u, asked, near, _groups(relative, points), by_windows)
         start = self._domain.expand_to_vertices(earliest)
         if sources.offsets.any():
             distance += start
         if origin is not None and labels is not None:
             origin[:] = labels
         if labels is not None:
-            labels[:] = _labels(sources, asked.points)[labels]
+            labels[:] = _labels(sources, points)[labels]
         if near is not None:
             at = np.flatnonzero(np.isfinite(near.distance))
             distance[at] = start[at] + near.distance[at]
@@ -277,7 +265,7 @@ class UnfoldingSolver:
         if not by_windows:
             self._bounds.shorten(distance, labels)
             if self._sweeps:
-                self._bounds.lengthen(distance, sources, asked.points)
+                self._bounds.lengthen(distance, sources, points)
         return distance
 
     def _from_earliest(self, sources: SourceSet) -> tuple[FloatArray, SourceSet]:
@@ -296,26 +284,21 @@ class UnfoldingSolver:
             segments=replace(segments, offset=late[2]),
         )
 
-    def _near(self, asked: _Asked, by_windows: bool) -> ExactSolution | None:
-        """Exact distance around points and curves; None if all distances are, or if there are none.
+    def _near(self, sources: SourceSet, by_windows: bool) -> ExactSolution | None:
+        """Exact distance around points and curves; None if windows find it anyway, or if there are none.
 
         Sweeps begin with that around several vertices as well.
         """
-        sources, segments = asked.sources, asked.sources.segments
-        if by_windows and (asked.curves is not None or not len(segments.faces)):
-            return None
+        has_curves = len(sources.segments.faces) > 0
         is_known = self._sweeps and len(sources.vertices) > 1
-        if sources.on_vertices_alone and not is_known:
+        if not has_curves and (by_windows or (sources.on_vertices_alone and not is_known)):
             return None
         edges = _KNOWN_RADIUS if sources.on_vertices_alone else NEAR_RADIUS
         cutoff = edges * self._domain.mean_edge_length + float(sources.offsets.max())
-        return self._by_windows(asked._replace(points=sources.points, curves=segments), cutoff)
-
-    def _by_windows(self, asked: _Asked, cutoff: float) -> ExactSolution:
-        has_curves = asked.curves is not None and len(asked.curves.faces) > 0
-        surface = self._exact_on_given_faces if has_curves else self._exact
-        curves = asked.curves if has_curves else None
-        return surface.solve(*asked.starts, curves, cutoff=cutoff, directed=asked.angles is not None)
+        surface, asked = self._exact_on_given_faces if has_curves else self._exact, _asked(sources, sources.points)
+        return surface.solve(
+            asked.vertices, asked.offsets, asked.points, asked.point_offsets, asked.segments, cutoff=cutoff
+        )
 
     def _takes_windows(self, sources: SourceSet) -> bool:
         """Whether distance from these sources is found by exact windows."""
@@ -329,24 +312,48 @@ class UnfoldingSolver:
     def _component_sizes(self) -> IntArray:
         return np.bincount(self._domain.components)
 
-    def _unfolded(self, u: FloatArray, asked: _Asked, near: ExactSolution | None, by_windows: bool) -> FloatArray:
-        """Distances (n,), each component's from where it begins."""
+    def _unfolded(
+        self,
+        u: FloatArray,
+        asked: _Asked,
+        near: ExactSolution | None,
+        groups: IntArray | None,
+        by_windows: bool,
+    ) -> FloatArray:
+        """Distances (n,) from vertices and points, each component's from where it begins."""
         if self._refinement is None or by_windows:
-            found = self._by_windows(asked, self._cutoff)
+            surface = self._exact if asked.segments is None else self._exact_on_given_faces
+            found = surface.solve(
+                asked.vertices,
+                asked.offsets,
+                asked.points,
+                asked.point_offsets,
+                asked.segments,
+                cutoff=self._cutoff,
+                directed=asked.angles is not None,
+            )
             if asked.labels is not None:
                 asked.labels[:] = found.origin.label
             if asked.angles is not None:
-                asked.angles[:] = self.path_directions.of_windows(found, asked.starts[2])
+                asked.angles[:] = self.path_directions.of_windows(found, asked.points)
             return found.distance
         if asked.angles is not None:
             return self._directed_walks(self._refinement, u, asked)
         unfolded = self._refinement.unfold
         if self._sweeps:
-            unfolded = partial(self._refinement.sweep, known=_known(asked, near), groups=_groups(asked))
+            # Which point of a curve is nearest is not known.
+            known = None if groups is not None else _known(asked, near)
+            unfolded = partial(self._refinement.sweep, known=known, groups=groups)
         elif asked.tolerance is not None:
             unfolded = partial(unfolded, tolerance=asked.tolerance)
-        vertices, offsets, points, point_offsets = asked.starts
-        return unfolded(-u, vertices, offsets=offsets, points=points, point_offsets=point_offsets, labels=asked.labels)
+        return unfolded(
+            -u,
+            asked.vertices,
+            offsets=asked.offsets,
+            points=asked.points,
+            point_offsets=asked.point_offsets,
+            labels=asked.labels,
+        )
 
     def _is_straight(self, asked: _Asked) -> bool:
         """Whether directions are found by windows, as walks of a small tolerance would take as long."""
@@ -355,13 +362,13 @@ class UnfoldingSolver:
         return asked.tolerance == 0 or self._domain.components.size <= _FEW_FOR_DIRECTIONS
 
     def _directed_walks(self, refinement: Refinement, u: FloatArray, asked: _Asked) -> FloatArray:
-        starts = refinement.starts(*asked.starts)
+        starts = refinement.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
         walk = refinement.walks(-u, starts, TOLERANCE if asked.tolerance is None else asked.tolerance)
         row = refinement.number
         if asked.labels is not None:
             asked.labels[:] = walk["label"][row]
         if asked.angles is not None:
-            asked.angles[:] = self.path_directions.of_walks(walk, asked.starts[2])
+            asked.angles[:] = self.path_directions.of_walks(walk, asked.points)
         return np.asarray(walk["distance"][row])
 
     @cached_property
@@ -382,23 +389,39 @@ def _labels(sources: SourceSet, points: SourcePoints) -> IntArray:
     return np.concatenate([sources.vertex_label, points.label, sources.segments.label, [-1]])
 
 
-def _groups(asked: _Asked) -> IntArray | None:
-    """For each source, which curve it is a point of, or itself."""
-    segments, label = asked.sources.segments, asked.points.label
-    if not len(segments.faces):
+def _asked(sources: SourceSet, points: SourcePoints, takes_curves: bool = True) -> _Asked:
+    """Distance from the vertices of a set, from `points`, and from the curves of the set if windows take them."""
+    of_vertices, of_points = sources.vertex_offset, points.offset
+    differ = bool(of_vertices.any() or of_points.any())
+    places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
+    return _Asked(
+        sources.vertices,
+        of_vertices if differ else None,
+        places,
+        of_points if differ and places else None,
+        sources.segments if takes_curves and len(sources.segments.faces) else None,
+        None,
+        None,
+        None,
+    )
+
+
+def _groups(sources: SourceSet, points: SourcePoints) -> IntArray | None:
+    """For each source, which curve it is a point of, or itself; None if there are no curves."""
+    if not len(sources.segments.faces):
         return None
-    k = len(asked.sources.vertices)
-    groups = np.arange(k + len(label))
-    of_curve = np.isin(label, segments.label)
-    groups[k:][of_curve] = len(groups) + label[of_curve]
+    k = len(sources.vertices)
+    groups = np.arange(k + len(points.label))
+    of_curve = np.isin(points.label, sources.segments.label)
+    groups[k:][of_curve] = len(groups) + points.label[of_curve]
     return groups
 
 
 def _known(asked: _Asked, near: ExactSolution | None) -> Known | None:
-    """Vertices that a sweep begins with. Which point of a curve is nearest is not known."""
-    if near is None or len(asked.sources.segments.faces):
+    """Vertices that a sweep begins with."""
+    if near is None:
         return None
     is_found = np.isfinite(near.distance)
-    is_found[asked.sources.vertices] = False
+    is_found[asked.vertices] = False
     vertex = np.flatnonzero(is_found)
     return Known(vertex, near.distance[vertex], near.origin.label[vertex])
