@@ -2,10 +2,9 @@
 
     python scripts/clouds_table.py [--sizes 5000 50000] [--noise 0 0.01] [--sources 6] [--seed 0] [--json FILE]
 
-Random points on a sphere of radius 1, a torus of radii 1 and 0.4, a cylinder of radius 1 and height 3, and a square with
-sides of length 1; for each number at most 144 000 on the torus. Prints,
-as a Markdown table, the mean of |d - exact| / exact over points and sources in percent, seconds to make the solver, and
-seconds for one query. Noise is Gaussian in all coordinates, of the given standard deviation. Needs the extra ``bench``;
+Random points on a sphere of radius 1, a torus of radii 1 and 0.4 (at most 144 000), a cylinder of radius 1 and height
+3, and a square with sides of length 1. Prints, as a Markdown table, the mean of |d - exact| / exact over points and
+sources in percent, seconds to make the solver, and seconds for one query. Noise is Gaussian in all coordinates, of the given standard deviation. Needs the extra ``bench``;
 docs/clouds.md shows the table.
 """
 
