@@ -4,8 +4,8 @@
 
 Random points on a sphere of radius 1, a torus of radii 1 and 0.4 (at most 144 000), a cylinder of radius 1 and height
 3, and a square with sides of length 1. Prints, as a Markdown table, the mean of |d - exact| / exact over points and
-sources in percent, seconds to make the solver, and seconds for one query. Noise is Gaussian in all coordinates, of the given standard deviation. Needs the extra ``bench``;
-docs/clouds.md shows the table.
+sources in percent, seconds to make the solver, and seconds for one query. Noise is Gaussian in all coordinates, of the
+given standard deviation. Needs the extra ``bench``; docs/clouds.md shows the table.
 """
 
 from __future__ import annotations
