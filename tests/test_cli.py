@@ -208,8 +208,8 @@ def test_interrupt(tmp_path: Path) -> None:
         # A process started in the background inherits that interrupts are ignored; a user's is not.
         "import signal, sys, time; from heat_igl import cli; from heat_igl.cli import comparison\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "def read_mesh(path):\n    print('ready', flush=True)\n    time.sleep(60)\n"
-        "comparison.read_mesh = read_mesh; sys.exit(cli.run(['info', 'a.off']))"
+        "def read_mesh_or_cloud(path):\n    print('ready', flush=True)\n    time.sleep(60)\n"
+        "comparison.read_mesh_or_cloud = read_mesh_or_cloud; sys.exit(cli.run(['info', 'a.off']))"
     )
     with subprocess.Popen(
         [sys.executable, "-c", code], cwd=tmp_path, env=ENVIRONMENT, stdout=-1, stderr=-1, text=True
@@ -385,7 +385,7 @@ def test_a_fault_of_the_package_is_not_hidden(sphere: Path, monkeypatch: pytest.
     def broken(_: object) -> None:
         raise TypeError("a bug")
 
-    monkeypatch.setattr(comparison, "read_mesh", broken)
+    monkeypatch.setattr(comparison, "read_mesh_or_cloud", broken)
     with pytest.raises(TypeError, match="a bug"):
         cli.run(["info", str(sphere)])
 

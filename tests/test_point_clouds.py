@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 
 import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import HeatMethodSolver, MeshError, PointCloud, farthest_points, read_point_cloud, shapes
+from heat_igl import HeatMethodSolver, MeshError, PointCloud, cli, farthest_points, read_point_cloud, shapes
+from heat_igl.drawing.discs import discs
+from heat_igl.io import ply
 from heat_igl.mesh.cloud_triangles import cloud_triangles
 from heat_igl.mesh.neighbourhoods import neighbourhoods, without_noise
 
@@ -379,6 +382,78 @@ def test_npy_of_another_shape(tmp_path) -> None:
     np.save(tmp_path / "a.npy", np.zeros((5, 4)))
     with pytest.raises(MeshError, match=r"must have shape \(n, 3\), or \(n, 6\) with normals"):
         read_point_cloud(tmp_path / "a.npy")
+
+
+def test_attributes_of_points_go_to_ply(tmp_path) -> None:
+    cloud = PointCloud(sphere(40), sphere(40))
+    heat_igl.write_point_cloud(tmp_path / "a.ply", cloud, distance=np.append(np.inf, np.arange(39.0)))
+    again = read_point_cloud(tmp_path / "a.ply")
+    np.testing.assert_array_equal(again.P, cloud.P)
+    _, others = ply.read_vertices(tmp_path / "a.ply", (tmp_path / "a.ply").read_bytes())
+    assert others["distance"].tolist() == [np.inf, *range(39)]
+    for name, values, message in (
+        ("a.xyz", {"d": np.zeros(40)}, r"holds no attributes of points \(d\); .ply does"),
+        ("a.ply", {"nx": np.zeros(40)}, "nx must be another name"),
+        ("a.ply", {"d": np.zeros((40, 2))}, r"d must .* have shape \(n,\)"),
+        ("a.ply", {"d": np.zeros(39)}, r"d must have shape \(40,\)"),
+    ):
+        with pytest.raises(MeshError, match=message):
+            heat_igl.write_point_cloud(tmp_path / name, cloud, **values)
+
+
+@pytest.mark.parametrize("kind", ["ply", "obj", "xyz", "npy", "pcd ascii"])
+def test_the_command_line_takes_clouds(tmp_path, kind: str, capsys) -> None:
+    P = sphere(40).astype(np.float32).astype(np.float64)
+    path, out = written(tmp_path, kind, P, P), tmp_path / "out.npy"
+    assert cli.run(["distance", str(path), "--source=3", f"--output={out}", "--json=-"]) == 0
+    expected = heat_igl.geodesic_distance(read_point_cloud(path), 3)
+    np.testing.assert_array_equal(np.load(out), expected)
+    assert json.loads(capsys.readouterr().out)["point_cloud"]["n_vertices"] == 40
+    assert cli.run(["info", str(path)]) == 0
+
+
+def test_a_file_with_faces_is_a_mesh(tmp_path, capsys) -> None:
+    for name in ("mesh.ply", "mesh.obj"):
+        heat_igl.write_mesh(tmp_path / name, shapes.icosphere(1))
+        assert cli.run(["distance", str(tmp_path / name), "--source=3", "--json=-"]) == 0
+        assert json.loads(capsys.readouterr().out)["mesh"]["n_triangles"] == 80
+    heat_igl.write_point_cloud(tmp_path / "cloud.ply", PointCloud(sphere(40)))
+    assert cli.run(["distance", str(tmp_path / "cloud.ply"), "--source=3", f"--output={tmp_path / 'a.vtu'}"]) != 0
+    assert "points with distances go to .ply, .npy or .csv files" in capsys.readouterr().err
+
+
+# Pictures.
+
+
+def test_discs_lie_in_the_tangent_planes_and_continue_the_values() -> None:
+    P = plane(400)
+    cloud = PointCloud(P)
+    slope = np.array([3.0, -2.0, 0.0])
+    mesh, values = discs(cloud, P @ slope)
+    np.testing.assert_array_equal(mesh.V[:400], P)
+    assert np.abs(mesh.V[:, 2]).max() < 1e-12
+    inner = np.isin(mesh.F[:, 0], np.flatnonzero((np.abs(P[:, :2] - 0.5) < 0.3).all(axis=1)))
+    corners = mesh.F[inner]
+    np.testing.assert_allclose(values[corners], mesh.V[corners] @ slope, atol=1e-9)
+    # No gap: every point inside lies on a disc.
+    radius = np.linalg.norm(mesh.V[mesh.F[:, 1]] - mesh.V[mesh.F[:, 0]], axis=1)
+    at = 0.3 + 0.4 * np.random.default_rng(0).random((2000, 2))
+    distance = np.linalg.norm(at[:, None] - P[None, :, :2], axis=2)
+    assert (distance < radius.reshape(400, -1).min(axis=1)).any(axis=1).mean() > 0.98
+    flat, as_given = discs(cloud, P @ slope, is_flat=True)
+    np.testing.assert_array_equal(as_given[flat.F].max(axis=1), as_given[flat.F[:, 0]])
+
+
+def test_a_picture_of_a_cloud_with_an_outlier_and_labels(tmp_path) -> None:
+    pytest.importorskip("matplotlib")
+    cloud = PointCloud(np.append(sphere(300), [[0, 0, 2.0]], axis=0))
+    distance = HeatMethodSolver(cloud, refine="unfold").distance([3, 9])
+    assert np.isinf(distance[-1])
+    heat_igl.plots.plot(cloud, distance, sources=[3, 9]).save(tmp_path / "a.png")
+    labels = HeatMethodSolver(cloud).voronoi([3, 9]).labels
+    heat_igl.plots.plot_labels(cloud, labels, sources=[3, 9]).save(tmp_path / "b.png")
+    for name in ("a.png", "b.png"):
+        assert (tmp_path / name).stat().st_size > 5000
 
 
 # The kernel.

@@ -207,6 +207,35 @@ def test_spikes_are_refused():
         polygon_operators(PolygonMesh(V, [[0, 1, 2, 3, 4, 5]]))
 
 
+def zigzags(columns: int, rows: int, rise: float) -> PolygonMesh:
+    """Octagons of three parallelograms up and down; from a rise of 1 on, no point of one sees every side."""
+    x, y = np.meshgrid(np.arange(3 * columns + 1), np.arange(rows + 1))
+    V = np.stack([x, y + rise * (x % 2)], axis=2).reshape(-1, 2)
+    width = 3 * columns + 1
+    first = (np.arange(rows)[:, None] * width + 3 * np.arange(columns)).ravel()
+    steps = np.array([0, 1, 2, 3, width + 3, width + 2, width + 1, width])
+    return PolygonMesh(V, first[:, None] + steps)
+
+
+@pytest.mark.parametrize("rise", [0.3, 3.0])
+def test_concave_polygons_cover_the_plane_once(rise):
+    mesh = zigzags(4, 12, rise)
+    domain = polygon_operators(mesh)
+    assert domain.weights.sum() == pytest.approx(12 * 12, rel=1e-12)
+    assert domain.M.sum() == pytest.approx(12 * 12, rel=1e-9)
+    assert (domain.M.diagonal() > 0).all()
+    assert abs(domain.D @ domain.G - domain.L).max() < 1e-9 * abs(domain.L).max()
+    inner = ~domain.boundary
+    np.testing.assert_allclose((domain.L @ mesh.V)[inner], 0, atol=1e-9)
+
+
+def test_polygons_far_from_planar_have_triangles_that_agree():
+    """Folded by more than a right angle along the diagonal that a fan leaves out."""
+    mesh = PolygonMesh([[0, 0, 0], [1, 0, 3], [1, 1, -3], [0, 1, 3], [-1, 0.5, -3]], [[0, 1, 2, 3, 4]])
+    domain = polygon_operators(mesh)
+    assert domain.weights.sum() == pytest.approx(mesh.triangles.measures.sum(), rel=1e-9)
+
+
 def test_a_corner_on_a_straight_side_is_fine():
     """Where two small neighbours meet a large polygon."""
     mesh = PolygonMesh([*SQUARE, [0.5, 0, 0], [0.5, -0.5, 0], [0, -0.5, 0], [1, -0.5, 0]],

@@ -98,11 +98,18 @@ def test_edges():
     np.testing.assert_allclose(around.positions(mesh), mesh.V[[0, 1, 6, 5, 0]], atol=1e-15)
 
 
+def test_positions_in_the_plane():
+    mesh, at = shapes.grid(4), [[0.2, 0.3], [0.8, 0.1]]
+    found, expected = (closest_points(mesh, np.pad(at, ((0, 0), (0, k)))) for k in (0, 1))
+    np.testing.assert_array_equal(found.points.barycentric, expected.points.barycentric)
+    np.testing.assert_allclose(curve_on(mesh, at).positions(mesh)[[0, -1]], np.pad(at, ((0, 0), (0, 1))), atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("positions", "options", "message"),
     [
         ([[0, 0, 0]], {}, "two corners of a curve or more, not 1"),
-        ([[0, 0], [1, 1]], {}, r"positions must have shape \(k, 3\), a row for each, not \(2, 2\)"),
+        ([[0] * 4, [1] * 4], {}, r"positions must have shape \(k, 3\), a row for each, not \(2, 4\)"),
         ([[0, 0, 0], [1, np.nan, 0]], {}, r"positions\[1\] = \[1.0, nan, 0.0\] is not finite"),
         ([["a", 0, 0], [1, 0, 0]], {}, "positions must be real numbers"),
         ([[0.5, 0.5, 0], [0.5, 0.5, 0]], {}, "all in one place"),

@@ -271,6 +271,22 @@ def test_references_of_ones_own() -> None:
         validate(mesh, 0, ["heat"], known)
 
 
+def test_rows_of_other_domains() -> None:
+    """Methods of this package take the points of a cloud, not its triangles; fronts are right in a solid."""
+    P = np.random.default_rng(0).standard_normal((1500, 3))
+    cloud = heat_igl.PointCloud(P / np.linalg.norm(P, axis=1, keepdims=True))
+    report = validate(cloud, [[0], [9]], ["heat", "unfold"], closed_forms.sphere)
+    by_heat = HeatMethodSolver(cloud)
+    assert report.rows[0].parameters["t"] == by_heat.t
+    np.testing.assert_array_equal(report.distances["heat"], by_heat.distances([0, 9]))
+    errors = [row.errors.mean for row in report.rows if row.errors is not None]
+    assert errors[1] < 0.4 * errors[0] < 0.01
+    box = shapes.box(6)
+    inside = validate(box, [[0], [100, 7]], ["heat"], closed_forms.convex_solid).rows[0].errors
+    assert inside is not None
+    assert inside.mean < 1e-6
+
+
 def test_what_counts_as_one_set_of_sources() -> None:
     mesh = shapes.grid(5)
     mask = np.zeros(mesh.n_vertices, bool)

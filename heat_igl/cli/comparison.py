@@ -13,10 +13,10 @@ from rich.progress import Progress
 
 import heat_igl
 from heat_igl.cli.error_table import print_report
-from heat_igl.cli.options import JsonOption, MeshArgument, positive
+from heat_igl.cli.options import JsonOption, MeshOrCloudArgument, positive
 from heat_igl.cli.output import check_json, check_outputs, print_json, print_rows, prints_json, say
 from heat_igl.drawing.output import Picture
-from heat_igl.io import read_mesh
+from heat_igl.io import read_mesh_or_cloud
 from heat_igl.reference.guarded import TIMEOUT
 from heat_igl.validation import METHODS, draw_sources
 
@@ -25,17 +25,17 @@ __all__ = ["info", "validate"]
 _DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
 
 
-def info(mesh: MeshArgument, json_file: JsonOption = None) -> None:
-    """Describe a mesh: sizes, defects, and properties that affect distances."""
+def info(mesh: MeshOrCloudArgument, json_file: JsonOption = None) -> None:
+    """Describe a mesh or the triangles of a point cloud: sizes, defects, and properties that affect distances."""
     check_json(json_file)
-    report = read_mesh(mesh).report()
+    report = read_mesh_or_cloud(mesh).report()
     values = [getattr(report, field.name) for field in fields(report)]
     plain = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
     print_rows([(*row, value) for row, value in zip(report.rows(), plain, strict=True)], json_file)
 
 
 def validate(
-    mesh: MeshArgument,
+    mesh: MeshOrCloudArgument,
     sources: Annotated[int, typer.Option(min=1, help="Single source vertices, one distance from each.")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="For drawing them.")] = 0,
     methods: Annotated[str, typer.Option(help=f"Separated by commas: {', '.join(METHODS)}.")] = _DEFAULT_METHODS,
@@ -49,7 +49,7 @@ def validate(
     ] = None,
 ) -> None:
     """Errors of methods against a reference, with time and memory."""
-    loaded = read_mesh(mesh)
+    loaded = read_mesh_or_cloud(mesh)
     drawn_sources = draw_sources(loaded, sources, seed)
     check_outputs(loaded, None, picture)
     check_json(json_file)

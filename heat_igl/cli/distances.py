@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 
 import heat_igl
-from heat_igl.cli.options import JsonOption, MeshArgument, choice, position, positive
+from heat_igl.cli.options import JsonOption, MeshArgument, MeshOrCloudArgument, choice, position, positive
 from heat_igl.cli.output import Row, check_curves, check_json, check_outputs, print_rows, write_distance
 from heat_igl.errors import SourceError
 from heat_igl.heat_method import (
@@ -27,8 +27,8 @@ from heat_igl.heat_method import (
     SolverOptions,
     geodesic_distance,
 )
-from heat_igl.io import is_flat, read_mesh
-from heat_igl.mesh import Mesh, closest_points
+from heat_igl.io import is_flat, read_mesh, read_mesh_or_cloud
+from heat_igl.mesh import Mesh, PointCloud, closest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import FloatArray
 
@@ -43,7 +43,7 @@ _MOST_LINES = 10000
 
 
 def distance(
-    mesh: MeshArgument,
+    mesh: MeshOrCloudArgument,
     source: Annotated[list[int] | None, typer.Option(help="Source vertex, counted from 0; repeat for several.")] = None,
     at: Annotated[
         list[str] | None, typer.Option(metavar="X,Y,Z", help="Source at the closest point of the surface; repeatable.")
@@ -69,7 +69,7 @@ def distance(
     json_file: JsonOption = None,
 ) -> None:
     """Distance from one or more sources: vertices, or points of the surface."""
-    loaded = read_mesh(mesh)
+    loaded = read_mesh_or_cloud(mesh)
     if not source and not at:
         raise SourceError("no source: name vertices with --source, or positions with --at x,y,z")
     vertices = vertex_sources(np.array(source), loaded.n_vertices) if source else None
@@ -99,7 +99,7 @@ def distance(
     print_rows([*rows, *(("wrote", str(path)) for path in written)], json_file)
 
 
-def _method(method: str | None, options: SolverOptions, mesh: Mesh) -> DistanceMethod:
+def _method(method: str | None, options: SolverOptions, mesh: Mesh | PointCloud) -> DistanceMethod:
     """The method that is meant: options of the heat method ask for it, and tetrahedra leave no other."""
     given = [field.name for field in fields(options) if getattr(options, field.name) != field.default]
     if method not in (None, "heat") and given:
@@ -108,12 +108,16 @@ def _method(method: str | None, options: SolverOptions, mesh: Mesh) -> DistanceM
             "them away"
         )
     if method is None:
-        method = "heat" if given or mesh.is_tetrahedral else "unfold"
+        method = "heat" if given or _is_tetrahedral(mesh) else "unfold"
     return cast(DistanceMethod, method)
 
 
+def _is_tetrahedral(mesh: Mesh | PointCloud) -> bool:
+    return isinstance(mesh, Mesh) and mesh.is_tetrahedral
+
+
 def _measured(
-    mesh: Mesh, sources: Any, method: DistanceMethod, options: SolverOptions, cutoff: float | None
+    mesh: Mesh | PointCloud, sources: Any, method: DistanceMethod, options: SolverOptions, cutoff: float | None
 ) -> tuple[FloatArray, list[Row]]:
     """The distance, and remarks on how it was found."""
     start = time.perf_counter()
@@ -135,9 +139,9 @@ def _measured(
     ]
 
 
-def _warm_up(mesh: Mesh, method: DistanceMethod, options: SolverOptions) -> None:
+def _warm_up(mesh: Mesh | PointCloud, method: DistanceMethod, options: SolverOptions) -> None:
     """Measure on a small mesh, so that times are of the work alone, without loading libraries for the first time."""
-    small = Mesh(*_CORNER) if mesh.is_tetrahedral else Mesh(*_PYRAMID)
+    small = Mesh(*_CORNER) if _is_tetrahedral(mesh) else Mesh(*_PYRAMID)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         _measured(small, 0, method, options, None)
@@ -175,7 +179,9 @@ def isolines(
     print_rows([*rows, ("distances", f"{spacing:g} apart", levels.tolist()), ("wrote", str(output))], json_file)
 
 
-def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, picture: Path | None) -> list[Path]:
+def _write(
+    mesh: Mesh | PointCloud, phi: FloatArray, sources: Any, output: Path | None, picture: Path | None
+) -> list[Path]:
     drawn = None
     if picture is not None:
         from heat_igl.drawing import plot
@@ -190,14 +196,15 @@ def _write(mesh: Mesh, phi: FloatArray, sources: Any, output: Path | None, pictu
     return [path for path in (output, picture) if path is not None]
 
 
-def _summary(path: Path, mesh: Mesh, phi: FloatArray) -> list[Row]:
+def _summary(path: Path, mesh: Mesh | PointCloud, phi: FloatArray) -> list[Row]:
     finite = np.isfinite(phi)
     farthest = int(np.argmax(np.where(finite, phi, -1.0)))
-    kind = "tetrahedra" if mesh.is_tetrahedral else "triangles"
+    kind = "tetrahedra" if _is_tetrahedral(mesh) else "triangles"
+    name, points = ("point cloud", "points") if isinstance(mesh, PointCloud) else ("mesh", "vertices")
     counts = {"path": str(path), "n_vertices": mesh.n_vertices, f"n_{kind}": mesh.n_faces}
     greatest, mean, unreachable = float(phi[farthest]), float(phi[finite].mean()), int((~finite).sum())
     rows: list[Row] = [
-        ("mesh", f"{path}: {mesh.n_vertices} vertices, {mesh.n_faces} {kind}", counts),
+        (name, f"{path}: {mesh.n_vertices} {points}, {mesh.n_faces} {kind}", counts),
         ("farthest", f"{greatest:.6g} at vertex {farthest}", {"distance": greatest, "vertex": farthest}),
     ]
     if unreachable:

@@ -11,6 +11,7 @@ EXAMPLES = {
         "distance bunny.obj --source 1234 --output distance.ply --picture distance.png",
         "distance bunny.obj --source 12 --source 40 --cutoff 0.1 --output distance.npy",
         "distance bunny.obj --at 0.3,0.1,0 --method exact --json -",
+        "distance scan.xyz --source 1234 --output distance.ply --picture distance.png",
     ),
     "isolines": (
         "isolines bunny.obj --source 1234 --spacing 0.05 --output lines.obj",

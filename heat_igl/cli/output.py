@@ -14,8 +14,8 @@ from rich.console import Console
 from rich.text import Text
 
 from heat_igl.errors import MeshError, MissingExtraError
-from heat_igl.io import CURVE_SUFFIXES, complete_file, write_mesh
-from heat_igl.mesh import Mesh
+from heat_igl.io import CURVE_SUFFIXES, complete_file, write_mesh, write_point_cloud
+from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.typing import FloatArray
 
 __all__ = [
@@ -118,12 +118,17 @@ def check_page(path: Path) -> None:
     check_writable(path)
 
 
-def check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> None:
+def check_outputs(mesh: Mesh | PointCloud, output: Path | None, picture: Path | None) -> None:
     """Check that mesh and distance can be written to `output`, and a picture to `picture`."""
     if output is not None:
-        accepted = ((".vtu",) if mesh.is_tetrahedral else (".ply", ".vtu", ".vtp", ".gii")) + ARRAY_SUFFIXES
+        kind = "distances"
+        with_mesh: tuple[str, ...] = (".ply", ".vtu", ".vtp", ".gii")
+        if isinstance(mesh, PointCloud):
+            kind, with_mesh = "points with distances", (".ply",)
+        elif mesh.is_tetrahedral:
+            kind, with_mesh = "tetrahedra with distances", (".vtu",)
+        accepted = with_mesh + ARRAY_SUFFIXES
         if output.suffix.lower() not in accepted:
-            kind = "tetrahedra with distances" if mesh.is_tetrahedral else "distances"
             raise MeshError(f"--output {output}: {kind} go to {', '.join(accepted[:-1])} or {accepted[-1]} files")
         for suffix, package, extra in ((".vtu", "meshio", "io"), (".gii", "nibabel", "neuro")):
             if output.suffix.lower() == suffix:
@@ -138,11 +143,14 @@ def check_outputs(mesh: Mesh, output: Path | None, picture: Path | None) -> None
         check_writable(picture)
 
 
-def write_distance(path: Path, mesh: Mesh, distance: FloatArray) -> None:
-    """Write a distance: with the mesh, or alone to one of the `ARRAY_SUFFIXES`."""
+def write_distance(path: Path, mesh: Mesh | PointCloud, distance: FloatArray) -> None:
+    """Write a distance: with the mesh or the points, or alone to one of the `ARRAY_SUFFIXES`."""
     suffix = path.suffix.lower()
     if suffix not in ARRAY_SUFFIXES:
-        write_mesh(path, mesh, distance=distance)
+        if isinstance(mesh, PointCloud):
+            write_point_cloud(path, mesh, distance=distance)
+        else:
+            write_mesh(path, mesh, distance=distance)
         return
     with complete_file(path) as temporary, temporary.open("wb") as file:
         if suffix == ".npy":

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ from heat_igl.drawing.line_drawing import write_line_drawing
 from heat_igl.drawing.output import Picture
 from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, Scene, Style, check_style, colours, scene
 from heat_igl.drawing.shading import colour_numbers
-from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, PointCloud, SurfaceCurve, as_mesh, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
@@ -59,7 +58,7 @@ def plot(
     Parameters
     ----------
     mesh : mesh
-        Triangles or tetrahedra; the boundary of tetrahedra is drawn.
+        Triangles or tetrahedra, of which the boundary is drawn; points of a `PointCloud` are drawn as discs.
     distance : (n,) array_like
         Distance, as returned by a solver; ``inf`` is drawn grey.
     sources : optional
@@ -96,7 +95,7 @@ def plot(
     MissingExtraError
         If matplotlib is not installed.
     """
-    mesh = as_simplices(mesh)
+    mesh = _drawn(mesh)
     check_style(style)
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
     return lay_out(seen, _lines_in_space(mesh, curves, seen), style, colours(colormap), label, "unreachable")
@@ -144,7 +143,7 @@ def plot_field(
     ValueError, SourceError, MissingExtraError
         As for `plot`.
     """
-    mesh = as_simplices(mesh)
+    mesh = _drawn(mesh)
     if limits is None:
         limits = _limits(values)
     has_signs = limits is not None and limits[0] < 0 < limits[1]
@@ -191,16 +190,17 @@ def plot_labels(
     Ten colours that differ in hue are given out in the order of the labels, each label the first colour that no
     neighbour has; where all ten are taken, the one that comes next.
     """
-    mesh = as_simplices(mesh)
+    mesh = _drawn(mesh)
     given: AnyArray = np.asarray(labels)
     if given.dtype.kind not in "iu":
         raise ValueError(f"labels must be integers, not {given.dtype}")
     table = colours("tab10", is_trimmed=False)
     if given.shape != (mesh.n_vertices,):
         raise ValueError(f"labels must have shape ({mesh.n_vertices},), one per vertex, but they have {given.shape}")
-    values = np.where(given < 0, np.inf, colour_numbers(given, mesh.edges, _N_COLOURS) + 0.5)
-    seen = scene(mesh, values, name="labels", sources=sources, limits=(0, _N_COLOURS), view=view, up=up)
-    seen = replace(seen, is_categorical=True)
+    values = np.where(given < 0, np.inf, colour_numbers(given, as_simplices(mesh).edges, _N_COLOURS) + 0.5)
+    seen = scene(
+        mesh, values, name="labels", sources=sources, limits=(0, _N_COLOURS), view=view, up=up, is_categorical=True
+    )  # fmt: skip
     return lay_out(seen, _lines_in_space(mesh, curves, seen), "plain", table, "", "no label")
 
 
@@ -224,6 +224,13 @@ def _limits(values: ArrayLike) -> tuple[float, float] | None:
     return -reach, reach
 
 
-def _lines_in_space(mesh: Mesh, curves: Sequence[SurfaceCurve], seen: Scene) -> list[FloatArray]:
+def _drawn(mesh: MeshLike) -> Mesh | PointCloud:
+    """What is drawn: triangles or tetrahedra, or the points of a cloud."""
+    found = as_mesh(mesh)
+    return found if isinstance(found, PointCloud) else as_simplices(found)
+
+
+def _lines_in_space(mesh: Mesh | PointCloud, curves: Sequence[SurfaceCurve], seen: Scene) -> list[FloatArray]:
     """The vertices of each curve (k, 3) in viewer coordinates: right, up and near."""
-    return [(curve.positions(mesh) - seen.centre) / seen.unit @ seen.turn.T for curve in curves]
+    surface = as_simplices(mesh)
+    return [(curve.positions(surface) - seen.centre) / seen.unit @ seen.turn.T for curve in curves]

@@ -8,9 +8,10 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from heat_igl.drawing.camera import default_rotation, rotation
+from heat_igl.drawing.discs import discs
 from heat_igl.drawing.shading import isoline_spacing
 from heat_igl.errors import MissingExtraError
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.sources import Sources, source_set
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
@@ -96,7 +97,7 @@ class Scene:
 
 
 def scene(
-    mesh: Mesh,
+    mesh: Mesh | PointCloud,
     values: ArrayLike,
     *,
     name: str = "distance",
@@ -105,10 +106,11 @@ def scene(
     limits: tuple[float, float] | None = None,
     view: tuple[float, float] | None = None,
     up: str = "y",
+    is_categorical: bool = False,
 ) -> Scene:
-    """Validate the input of a picture and return the scene.
+    """Validate the input of a picture and return the scene; the points of a cloud become discs.
 
-    The parameters are those of `heat_igl.drawing.plot` and `heat_igl.drawing.plot_field`.
+    The parameters are those of `heat_igl.drawing.plot` and `heat_igl.drawing.plot_field`, and `Scene.is_categorical`.
 
     Raises
     ------
@@ -119,7 +121,7 @@ def scene(
         If `sources` are invalid.
     """
     checked = _checked(name, values, mesh.n_vertices)
-    vertices, dots, lines = _places(mesh, sources)
+    vertices, dots, lines = _places(as_simplices(mesh), sources)
     if up not in _PERMUTATION:
         raise ValueError(f"up must be 'x', 'y' or 'z', not {up!r}")
     finite = checked[np.isfinite(checked)]
@@ -131,6 +133,8 @@ def scene(
     if not (np.isfinite(step) and step > 0) or across / step > 1000:
         raise ValueError(f"spacing must be a positive number, and no less than {across / 1000:.2g}, not {spacing!r}")
 
+    if isinstance(mesh, PointCloud):
+        mesh, checked = discs(mesh, checked, is_categorical)
     F = mesh.facets.vertices[mesh.facets.n_faces == 1] if mesh.is_tetrahedral else mesh.F
     used = np.unique(F)
     centre = (mesh.V[used].min(axis=0) + mesh.V[used].max(axis=0)) / 2
@@ -147,6 +151,7 @@ def scene(
     return Scene(
         V=V, F=F, used=used, centre=centre, unit=unit, turn=turn @ upright, values=checked,
         limits=(low, high if high > low else low + 1.0), step=step, vertices=vertices, dots=dots, lines=lines,
+        is_categorical=is_categorical,
     )  # fmt: skip
 
 

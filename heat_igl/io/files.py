@@ -25,6 +25,7 @@ from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = [
     "MESH_SUFFIXES",
+    "checked_attributes",
     "checked_path",
     "file_bytes",
     "is_mesh_path",
@@ -227,7 +228,7 @@ def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, /, **attributes: Ar
         raise MeshError(
             f"{path}: this format holds no vertex attributes ({', '.join(attributes)}); {_those_with('attributes')} do"
         )
-    arrays = _arrays(attributes, mesh.n_vertices)
+    arrays = checked_attributes(attributes, mesh.n_vertices)
     with replacing(path) as temporary:
         form.write(temporary, mesh, arrays)
         pack(path, temporary)
@@ -296,7 +297,8 @@ def _mesh(path: Path, contents: Contents) -> Mesh:
         raise MeshError(f"{path}: {error}") from None
 
 
-def _arrays(attributes: Mapping[str, ArrayLike], n: int) -> dict[str, FloatArray]:
+def checked_attributes(attributes: Mapping[str, ArrayLike], n: int) -> dict[str, FloatArray]:
+    """Attributes of n vertices as arrays of double precision; a MeshError that names the one that cannot be."""
     found = {}
     for name, values in attributes.items():
         if not _ATTRIBUTE_NAME.fullmatch(name) or name in ("x", "y", "z"):

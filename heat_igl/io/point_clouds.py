@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +13,13 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.io import pcd, ply
 from heat_igl.io.atomic import replacing
-from heat_igl.io.files import checked_path, file_bytes
+from heat_igl.io.files import MESH_SUFFIXES, checked_attributes, checked_path, file_bytes, read_mesh
 from heat_igl.io.packed import form_suffix, pack
 from heat_igl.io.text import Text, format_rows
-from heat_igl.mesh import PointCloud
-from heat_igl.typing import FloatArray
+from heat_igl.mesh import Mesh, PointCloud
+from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["POINT_CLOUD_SUFFIXES", "read_point_cloud", "write_point_cloud"]
+__all__ = ["POINT_CLOUD_SUFFIXES", "read_mesh_or_cloud", "read_point_cloud", "write_point_cloud"]
 
 _Points = tuple[FloatArray, FloatArray | None]
 
@@ -64,7 +65,26 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
         raise MeshError(f"{path}: {error}") from None
 
 
-def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud) -> None:
+def read_mesh_or_cloud(path: str | os.PathLike[str]) -> Mesh | PointCloud:
+    """Read a mesh by `read_mesh`, or a point cloud by `read_point_cloud` where the file holds no faces.
+
+    Raises
+    ------
+    MeshError
+        As `read_mesh` and `read_point_cloud`.
+    MissingExtraError
+        As `read_mesh`.
+    """
+    path = checked_path(path, (*MESH_SUFFIXES, ".xyz", ".npy", ".pcd"), (*MESH_SUFFIXES, *POINT_CLOUD_SUFFIXES))
+    suffix = form_suffix(path)
+    if suffix not in MESH_SUFFIXES:
+        return read_point_cloud(path)
+    if suffix in _FACES and not _FACES[suffix].search(file_bytes(path)):
+        return read_point_cloud(path)
+    return read_mesh(path)
+
+
+def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud, /, **attributes: ArrayLike) -> None:
     """Write a point cloud, with its normals if it has any, to a file.
 
     Parameters
@@ -74,11 +94,14 @@ def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud) -> None:
         An existing file is replaced only when the new one is complete.
     cloud : PointCloud
         Points are read back exactly.
+    **attributes : (n,) array_like of real numbers
+        Further properties of each point, in .ply alone.
 
     Raises
     ------
     MeshError
-        If the extension is another, or the file cannot be written.
+        If the extension is another, the format holds no attributes, one of them has the wrong shape or type, or the
+        file cannot be written.
 
     Examples
     --------
@@ -89,8 +112,15 @@ def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud) -> None:
     True
     """
     path = checked_path(path, tuple(_WRITERS), tuple(_WRITERS))
+    suffix = form_suffix(path)
+    if attributes and suffix != ".ply":
+        raise MeshError(f"{path}: this format holds no attributes of points ({', '.join(attributes)}); .ply does")
+    arrays = checked_attributes(attributes, cloud.n_vertices)
     with replacing(path) as temporary:
-        _WRITERS[form_suffix(path)](temporary, cloud)
+        if suffix == ".ply":
+            _to_ply(temporary, cloud, arrays)
+        else:
+            _WRITERS[suffix](temporary, cloud)
         pack(path, temporary)
 
 
@@ -154,9 +184,20 @@ _FORMATS: dict[str, Callable[[Path, bytes], _Points]] = {
 
 POINT_CLOUD_SUFFIXES = tuple(_FORMATS)
 
+# What a file of a format for meshes holds if it has faces.
+_FACES = {
+    ".ply": re.compile(rb"^element\s+face\s+0*[1-9]", re.MULTILINE),
+    ".obj": re.compile(rb"^\s*f\s", re.MULTILINE),
+}
 
-def _to_ply(path: Path, cloud: PointCloud) -> None:
-    ply.write_vertices(path, dict(zip(("x", "y", "z", "nx", "ny", "nz"), _rows(cloud).T, strict=False)))
+
+def _to_ply(path: Path, cloud: PointCloud, attributes: Mapping[str, FloatArray] | None = None) -> None:
+    columns = dict(zip(("x", "y", "z", "nx", "ny", "nz"), _rows(cloud).T, strict=False))
+    for name, values in (attributes or {}).items():
+        if name in columns or values.ndim != 1:
+            raise MeshError(f"{path}: {name} must be another name than those of coordinates, and have shape (n,)")
+        columns[name] = values
+    ply.write_vertices(path, columns)
 
 
 def _to_obj(path: Path, cloud: PointCloud) -> None:

@@ -6,10 +6,8 @@ cdef extern from *:
     #define STRAIGHT 1e4
     // Height of a triangle over its base below which spheres about the corners lose too many digits where they meet.
     #define FLAT 1e-3
-    // Part by which a way may be longer than a straight line and still be one.
-    #define STRAIGHT_LINE 1e-6
     """
-    double GAIN, STRAIGHT, FLAT, STRAIGHT_LINE
+    double GAIN, STRAIGHT, FLAT
 
 cdef enum:
     # Visits per vertex up to which the kernel goes back at once to nearer vertices that have become stale.

@@ -6,7 +6,8 @@ refracted. Seen from a vertex, the source lies behind the opposite side of a sim
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, GO_BACK, MOST_VISITS, STRAIGHT, STRAIGHT_LINE
+from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, GO_BACK, MOST_VISITS, STRAIGHT
+from cython.cimports.heat_igl.kernels.lines import STRAIGHT_LINE, straight
 from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["advance"]
@@ -231,11 +232,8 @@ class _Fronts:
     @cython.exceptval(check=False)
     def line(self, v: cython.int, label: cython.int) -> cython.double:
         """Length of the straight line from a source to v."""
-        s: cython.int = self.sources[label]
-        x: cython.double = self.positions[v, 0] - self.positions[s, 0]
-        y: cython.double = self.positions[v, 1] - self.positions[s, 1]
-        z: cython.double = self.positions[v, 2] - self.positions[s, 2]
-        return sqrt(x * x + y * y + z * z)
+        source: cython.int = self.sources[label]
+        return straight(cython.address(self.positions[v, 0]), cython.address(self.positions[source, 0]))
 
     @cython.cfunc
     @cython.inline

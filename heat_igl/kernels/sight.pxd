@@ -6,10 +6,8 @@ cdef extern from *:
     #define ON_SIDE 1e-9
     // Part of the way to the middle of a tetrahedron by which the ends of a line are moved inside.
     #define NUDGE 1e-6
-    // Part by which a way may be longer than a straight line and still be one.
-    #define STRAIGHT_LINE 1e-6
     """
-    double GAIN, ON_SIDE, NUDGE, STRAIGHT_LINE
+    double GAIN, ON_SIDE, NUDGE
 
 cdef enum:
     # Sources that a vertex looks for each time, the nearest first.

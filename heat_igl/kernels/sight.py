@@ -2,16 +2,9 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.sight import (
-    GAIN,
-    MOST_LOOKS,
-    MOST_PASSES,
-    MOST_STEPS,
-    NUDGE,
-    ON_SIDE,
-    STRAIGHT_LINE,
-)
-from cython.cimports.libc.math import INFINITY, fabs, sqrt
+from cython.cimports.heat_igl.kernels.lines import STRAIGHT_LINE, straight
+from cython.cimports.heat_igl.kernels.sight import GAIN, MOST_LOOKS, MOST_PASSES, MOST_STEPS, NUDGE, ON_SIDE
+from cython.cimports.libc.math import INFINITY, fabs
 
 __all__ = ["look_around"]
 
@@ -158,11 +151,9 @@ class _Sight:
     @cython.exceptval(check=False)
     def line(self, v: cython.int, label: cython.int) -> cython.double:
         """The value at v along the straight line from a source."""
-        s: cython.int = self.sources[label]
-        x: cython.double = self.positions[v, 0] - self.positions[s, 0]
-        y: cython.double = self.positions[v, 1] - self.positions[s, 1]
-        z: cython.double = self.positions[v, 2] - self.positions[s, 2]
-        return self.offset[label] + sqrt(x * x + y * y + z * z)
+        source: cython.int = self.sources[label]
+        away: cython.double = straight(cython.address(self.positions[v, 0]), cython.address(self.positions[source, 0]))
+        return self.offset[label] + away
 
     @cython.cfunc
     @cython.inline

@@ -52,7 +52,7 @@ def closest_points(mesh: MeshLike, positions: ArrayLike) -> ClosestPoints:
     mesh : mesh
         Triangles.
     positions : (k, 3) or (3,) array_like
-        Positions in the mesh's unit.
+        Positions in the mesh's unit; (k, 2) in the plane z = 0.
 
     Returns
     -------
@@ -83,6 +83,8 @@ def checked_points(positions: ArrayLike) -> FloatArray:
         array = np.atleast_2d(np.array(positions, dtype=np.float64))
     except (TypeError, ValueError):
         raise SourceError("positions must be real numbers of shape (k, 3)") from None
+    if array.ndim == 2 and array.shape[1] == 2:
+        array = np.pad(array, ((0, 0), (0, 1)))
     if array.ndim != 2 or array.shape[1] != 3 or not len(array):
         raise SourceError(f"positions must have shape (k, 3), a row for each, not {array.shape}")
     wrong = ~np.isfinite(array).all(axis=1)

@@ -22,6 +22,9 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
     operators on these triangles back to the vertices of the mesh: L = P^T L' P, M the lumped P^T M' P, and G = G' P
     with a row block for each triangle, so that L = D G holds (Bunge et al. 2020, section 3).
 
+    Of a polygon so concave, or so far from planar, that the virtual vertex does not see every side, those triangles
+    would overlap. Such a polygon is replaced by its triangles in ``mesh.triangles``.
+
     Parameters
     ----------
     mesh : PolygonMesh
@@ -37,7 +40,7 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
     Raises
     ------
     MeshError
-        If a polygon has no area, or one so concave that the virtual vertex leaves a vertex of the mesh without mass.
+        If a polygon has no area, or a side on one line with the virtual vertex.
 
     Examples
     --------
@@ -63,6 +66,9 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
     F = np.stack([corners, following, mesh.n_vertices + owner], axis=1)
     areas = igl.doublearea(refined, F) / 2 if np.isfinite(refined).all() else np.zeros(len(F))
     _check_areas(mesh, areas, owner, sides / unit)
+    hidden = (mesh.degree > 3) & _is_unseen(refined, F, owner)
+    if hidden.any():
+        return polygon_operators(_with_triangles(mesh, hidden))
     boundary = np.zeros(mesh.n_vertices, bool)
     outer = first[n_polygons == 1]
     boundary[corners[outer]] = boundary[following[outer]] = True
@@ -99,6 +105,25 @@ def _mean_distance(mesh: PolygonMesh, owner: IntArray) -> float:
     incidence = sp.csr_array((np.ones(len(owner), np.int8), (mesh.corners, owner)), shape=size)
     pairs = sp.triu(incidence @ incidence.T, 1).tocoo()
     return float(np.linalg.norm(mesh.V[pairs.row] - mesh.V[pairs.col], axis=1).mean())
+
+
+def _is_unseen(refined: FloatArray, F: IntArray, owner: IntArray) -> BoolArray:
+    """Which polygons (m,) have a triangle that is turned over against the polygon."""
+    a, b, c = (refined[F[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    begin = np.flatnonzero(np.diff(owner, prepend=-1))
+    vector_area = np.add.reduceat(normals, begin)
+    turned = np.einsum("tx,tx->t", normals, vector_area[owner]) < 0
+    return np.asarray(np.logical_or.reduceat(turned, begin))
+
+
+def _with_triangles(mesh: PolygonMesh, chosen: BoolArray) -> PolygonMesh:
+    """The mesh with triangles in place of the chosen polygons."""
+    end = np.cumsum(mesh.degree - 2)
+    found: list[IntArray] = []
+    for i, polygon in enumerate(mesh.polygons):
+        found += list(mesh.triangles.F[end[i] - len(polygon) + 2 : end[i]]) if chosen[i] else [polygon]
+    return PolygonMesh(mesh.V, found)
 
 
 def _check_areas(mesh: PolygonMesh, areas: FloatArray, owner: IntArray, sides: FloatArray) -> None:

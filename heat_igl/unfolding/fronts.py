@@ -50,27 +50,36 @@ class FrontSolver(UnfoldingSolver):
     def _edge_graph(self) -> sp.csr_array:
         return connectivity.shortest_edge_graph(*self._simplices.edges, self._simplices.n)
 
+    def _order(self, vertices: IntArray, straight: bool = False) -> AnyArray:
+        """All vertices, from near to far: by the straight line from the only source, or by edges."""
+        if straight:
+            far = np.linalg.norm(self._V - self._V[vertices[0]], axis=1)
+        else:
+            far = connectivity.edge_distance(self._edge_graph, vertices)
+        return np.argsort(far, kind="stable").astype(np.int32)
+
     def _distance(self, sources: SourceSet, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
-        del u  # the order is that of Dijkstra's algorithm
+        del u  # the order is that of straight lines or of Dijkstra's algorithm
         n = self._simplices.n
         vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
-        order = np.argsort(connectivity.edge_distance(self._edge_graph, sources.vertices), kind="stable")
-        order = order.astype(np.int32)
         distance = np.full(n, np.inf)
         distance[vertices] = offset
         begin = distance.copy()
         label: AnyArray = np.full(n, -1, np.int32)
         label[vertices] = np.arange(len(vertices))
-        mesh = order, self._corners, self._first, self._incident
-        of_vertices = distance, begin, label
+        mesh, of_vertices = (self._corners, self._first, self._incident), (distance, begin, label)
         is_stale = np.ones(n, np.uint8)
+        straight = len(self._V) > 0 and len(vertices) == 1
+        order = self._order(sources.vertices, straight)
         # Straight lines as far as they go, then ways that bend; behind a bend, the source of another way may be seen.
         for _ in range(2):
             if len(self._V):
-                is_stale = look_around(*mesh, self._V, vertices, offset, *of_vertices)
+                is_stale = look_around(order, *mesh, self._V, vertices, offset, *of_vertices)
             if not is_stale.any():
                 break
-            advance(*mesh, self._lengths, self._slowness, *of_vertices, is_stale, self._V, vertices)
+            if straight:
+                order = self._order(sources.vertices)
+            advance(order, *mesh, self._lengths, self._slowness, *of_vertices, is_stale, self._V, vertices)
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, [-1]])[label]
         return distance

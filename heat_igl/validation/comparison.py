@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from heat_igl.errors import FactorizationError, MeshError, MissingExtraError, ReferenceSolverError, SourceError
-from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_mesh, as_simplices
 from heat_igl.reference import MEMORY, TIMEOUT, edge_paths, straight_lines
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -35,7 +35,8 @@ def validate(
     Parameters
     ----------
     mesh : mesh
-        Triangles; for tetrahedra, give a `reference` of your own.
+        Triangles; for tetrahedra, give a `reference` of your own, such as `heat_igl.closed_forms.convex_solid`. Of a
+        `PointCloud`, own methods take the points, and native ones and the reference the triangles.
     sources : sources, or sequence of sources
         One set of sources (an index, a sequence of indices, a mask), or a sequence of sets, with one distance for each:
         ``[3, 7]`` is one set of two vertices, ``[[3], [7]]`` are two sets of one vertex.
@@ -78,7 +79,9 @@ def validate(
     >>> [(row.method, round(row.errors.mean, 2)) for row in report.rows]
     [('heat', 0.0), ('unfold', 0.0)]
     """
-    mesh = as_simplices(mesh)
+    given = as_mesh(mesh)
+    mesh = as_simplices(given)
+    domain = given if isinstance(given, PointCloud) else mesh
     sets = _source_sets(sources, mesh.n_vertices)
     chosen = [resolved(method) for method in methods]
     if len({label for label, _ in chosen}) < len(chosen):
@@ -103,7 +106,7 @@ def validate(
             elif failure is not None and method == label:
                 raise ReferenceSolverError(failure)
             else:
-                found = run(mesh, sets, method, prepare, bounds, counter)
+                found = run(domain, sets, method, prepare, bounds, counter)
         except (ReferenceSolverError, MissingExtraError, FactorizationError, MeshError) as error:
             counter.end_method()
             rows.append(ValidationRow(method, failure=str(error)))

@@ -14,7 +14,7 @@ import numpy as np
 from heat_igl import reference
 from heat_igl.errors import AccuracyWarning, ReferenceSolverError
 from heat_igl.heat_method import HeatMethodSolver
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
 
@@ -29,7 +29,7 @@ class Solver(Protocol):
         ...
 
 
-Prepare = Callable[[Mesh], Solver]
+Prepare = Callable[[Any], Solver]
 Method = str | tuple[str, Prepare]
 Progress = Callable[[str, int, int], None]
 
@@ -115,14 +115,14 @@ def resolved(method: Method) -> tuple[str, Prepare | None]:
     return method, None
 
 
-def _heat_solver(mesh: Mesh, options: Mapping[str, Any]) -> Solver:
-    if mesh.is_tetrahedral and "refine" in options:
+def _heat_solver(mesh: Mesh | PointCloud, options: Mapping[str, Any]) -> Solver:
+    if isinstance(mesh, Mesh) and mesh.is_tetrahedral and "refine" in options:
         raise ReferenceSolverError(f"refine={options['refine']!r} unfolds triangles, and the mesh holds tetrahedra")
     return HeatMethodSolver(mesh, **options)
 
 
 def run(
-    mesh: Mesh,
+    mesh: Mesh | PointCloud,
     sets: list[IntArray],
     label: str,
     prepare: Prepare | None,
@@ -132,7 +132,7 @@ def run(
     """Distances from each set of sources by a method from `resolved`; `bounds` are timeout and memory."""
     counter.begin_method(len(sets))
     if prepare is None:
-        return _run_native(mesh, sets, label, bounds, counter)
+        return _run_native(as_simplices(mesh), sets, label, bounds, counter)
     distances, seconds = [], []
     with PeakMemory() as peak, _accuracy_notes() as notes:
         start = time.perf_counter()

@@ -1,0 +1,73 @@
+"""Points drawn as discs: a small polygon in the tangent plane of each, in the colours of the values around it."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+
+from heat_igl.mesh import Mesh, PointCloud
+from heat_igl.typing import FloatArray
+
+__all__ = ["discs"]
+
+# Radius in shares of the mean length of the edges at a point: neighbouring discs overlap, so no gaps show.
+_RADIUS = 0.8
+_CORNERS, _FEW_CORNERS = 8, 4
+# Above this number of points a disc is a few pixels wide, and a square does.
+_MANY = 20_000
+
+
+def discs(cloud: PointCloud, values: FloatArray, is_flat: bool = False) -> tuple[Mesh, FloatArray]:
+    """A polygon around each point, split into triangles, and values at its vertices.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        n points.
+    values : (n,) float64
+        Value of each point; ``inf`` for none.
+    is_flat : bool
+        Whether a disc has the value of the point everywhere; else values grow across it as they do around the point.
+
+    Returns
+    -------
+    (Mesh, (N,) float64)
+        The first n vertices are the points, and have the given values.
+    """
+    triangles = cloud.triangles
+    n, V = cloud.n_vertices, triangles.V
+    k = _CORNERS if n <= _MANY else _FEW_CORNERS
+    normals = igl.per_vertex_normals(V, triangles.F) if cloud.normals is None else cloud.normals
+    normals = np.where(
+        np.isfinite(normals).all(axis=1, keepdims=True) & (normals != 0).any(axis=1)[:, None], normals, 1
+    )
+    x = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    y = np.cross(normals, x) / np.linalg.norm(normals, axis=1, keepdims=True)
+    ends = triangles.edges.ravel()
+    number = np.bincount(ends, minlength=n)
+    length = np.bincount(ends, np.repeat(triangles.edge_lengths, 2), n) / np.maximum(number, 1)
+    length[number == 0] = triangles.edge_lengths.mean()
+    angle = 2 * np.pi * np.arange(k) / k
+    across = np.cos(angle)[:, None] * x[:, None] + np.sin(angle)[:, None] * y[:, None]
+    rim = _RADIUS * length[:, None, None] * across
+    slope = np.zeros((n, 3)) if is_flat else _slopes(triangles, values)
+    finite = values[np.isfinite(values)]
+    on_rim = values[:, None] + np.einsum("nkx,nx->nk", rim, slope)
+    on_rim = np.where(np.isfinite(values)[:, None], np.clip(on_rim, finite.min(), finite.max()), values[:, None])
+    corner = n + np.arange(n * k).reshape(n, k)
+    F = np.stack([np.repeat(np.arange(n), k), corner.ravel(), np.roll(corner, -1, axis=1).ravel()], axis=1)
+    return Mesh(np.concatenate([V, (V[:, None] + rim).reshape(-1, 3)]), F), np.append(values, on_rim.ravel())
+
+
+def _slopes(triangles: Mesh, values: FloatArray) -> FloatArray:
+    """The gradient (n, 3) of values at each vertex, the mean of the faces around it by area; 0 beside ``inf``."""
+    known = np.where(np.isfinite(values), values, 0.0)
+    G = igl.grad(triangles.V, triangles.F)
+    per_face = (G @ known).reshape(3, -1).T
+    weights = triangles.measures * np.isfinite(values)[triangles.F].all(axis=1) * np.isfinite(per_face).all(axis=1)
+    weighted = np.where(weights[:, None] > 0, per_face, 0.0) * weights[:, None]
+    of_corner = triangles.F.ravel()
+    total = np.bincount(of_corner, np.repeat(weights, 3), len(values))
+    sums = [np.bincount(of_corner, np.repeat(column, 3), len(values)) for column in weighted.T]
+    return np.stack(sums, axis=1) / np.maximum(total, np.finfo(float).tiny)[:, None]
