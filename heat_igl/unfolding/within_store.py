@@ -18,8 +18,8 @@ from heat_igl.unfolding.local import blocks_within
 __all__ = ["read_distances_within", "write_distances_within"]
 
 _FORMAT = "heat_igl distances within a radius, compressed sparse rows, 1"
-# Entries of a chunk of the store: 16 MiB of distances.
-_CHUNK = 2**21
+# Entries of a chunk of the store, 16 MiB of distances, and of the rows that are in memory at a time.
+_CHUNK, _IN_MEMORY = 2**21, 2**22
 
 
 def write_distances_within(
@@ -61,7 +61,7 @@ def write_distances_within(
     if target.exists():
         raise FileExistsError(f"{target} exists: name a new directory for the distances")
     triangles = as_simplices(mesh)
-    blocks = blocks_within(triangles, radius, sources)
+    blocks = blocks_within(triangles, radius, sources, _IN_MEMORY)
     block = next(blocks)  # before anything is written, so that wrong arguments leave nothing behind
     partial = target.with_name(f"{target.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
