@@ -94,6 +94,9 @@ class Operators:
     simplices: MetricSimplices | None = None
     contrast: float = 1.0
 
+    def __repr__(self) -> str:
+        return f"Operators({self.n} vertices, {len(self.weights)} faces)"
+
     @property
     def n(self) -> int:
         """Number of vertices."""
