@@ -101,7 +101,8 @@ class CutMesh:
     _old_corners: IntArray
 
     def __repr__(self) -> str:
-        return f"CutMesh({self.mesh.n_vertices} vertices, {self.mesh.n_faces} triangles, {len(self.edges)} edges on curves)"
+        counts = f"{self.mesh.n_vertices} vertices, {self.mesh.n_faces} triangles"
+        return f"CutMesh({counts}, {len(self.edges)} edges on curves)"
 
     def carry(self, values: ArrayLike) -> AnyArray:
         """Values at the vertices of the new mesh, from values (n, ...) at those of the old one, linear in its faces."""
