@@ -411,3 +411,16 @@ def test_meshes_without_paths_are_told_apart():
         handle_loops(box)
     with pytest.raises(MeshError, match="not one fan"):
         handle_loops(shapes.book(3, 2))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_loops_that_begin_on_an_edge_are_straightened(axis: int) -> None:
+    """Isolines begin on edges, so the last crossing is on the side on which the loop begins."""
+    torus = shapes.torus(16, 10)
+    for level in (0.0, 0.05, 0.1, 0.3):
+        for loop in heat_igl.isolines(torus, torus.V[:, axis], level)[0]:
+            shortest = heat_igl.straighten(torus, loop)
+            assert shortest.is_closed
+            assert shortest.lengths(torus).sum() <= loop.lengths(torus).sum() * (1 + 1e-12)
+            again = heat_igl.straighten(torus, shortest) if shortest.lengths(torus).any() else shortest
+            assert again.lengths(torus).sum() == pytest.approx(shortest.lengths(torus).sum())

@@ -96,6 +96,33 @@ def test_what_results_are_fits_a_line():
     assert repr(lost) == "VoronoiCells(1 cells, 163 vertices, 1 unreached)"
 
 
+def test_solvers_and_results_fit_a_line():
+    vectors, signed = heat_igl.VectorHeatSolver(MESH), heat_igl.SignedHeatSolver(MESH, refine="unfold")
+    near_exact = HeatMethodSolver(MESH, refine="unfold")
+    loop = heat_igl.isolines(MESH, PHI, 1.0)[0]
+    pieces = heat_igl.cut(MESH, loop)
+    image = heat_igl.image_domain(np.ones((3, 4), bool))
+    for found, text in (
+        (vectors, f"VectorHeatSolver(162 vertices, t={vectors.t:.4g}, backend="),
+        (heat_igl.VectorHeatSolver(MESH, refine="unfold"), "VectorHeatSolver(162 vertices, t="),
+        (signed, f"SignedHeatSolver(162 vertices, t={signed.t:.4g}, refine='unfold', backend="),
+        (heat_igl.GeodesicPathSolver(MESH), "GeodesicPathSolver(162 vertices)"),
+        (SOLVER.solve(0), f"HeatSolution(162 vertices, t={SOLVER.t:.4g})"),
+        (near_exact.directions(0), "Directions(162 vertices)"),
+        (heat_igl.tangent_frames(MESH), "TangentFrames(162 vertices)"),
+        (SOLVER.operators, "Operators(162 vertices, 320 faces)"),
+        (pieces, f"CutMesh({pieces.mesh.n_vertices} vertices, {pieces.mesh.n_faces} triangles, "),
+        (pieces.split()[0], "MeshPiece("),
+        (image, "ImageDomain(12 of 12 pixels)"),
+        (heat_igl.OffsetSources([1, 2], [0.5, 0.1]), "OffsetSources(2 offsets)"),
+        (MESH, "Mesh(162 vertices, 320 triangles)"),
+        (heat_igl.PointCloud(MESH.V), "PointCloud(162 points)"),
+    ):
+        assert repr(found).startswith(text)
+        assert "\n" not in repr(found)
+        assert len(repr(found)) < 100
+
+
 def test_curves_are_written_from_lists_of_any_depth(tmp_path):
     levels = heat_igl.isolines(MESH, PHI, [0.5, 1, 1.5])
     flat = [curve for level in levels for curve in level]

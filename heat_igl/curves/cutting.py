@@ -42,6 +42,9 @@ class MeshPiece:
     vertices: IntArray
     faces: IntArray
 
+    def __repr__(self) -> str:
+        return f"MeshPiece({self.mesh.n_vertices} vertices, {self.mesh.n_faces} triangles)"
+
     def boundary_loops(self) -> list[IntArray]:
         """The vertices along each loop of the boundary, with the piece on the left, from the smallest on.
 
@@ -105,6 +108,10 @@ class CutMesh:
     edges: IntArray
     curve: IntArray
     _old_corners: IntArray
+
+    def __repr__(self) -> str:
+        counts = f"{self.mesh.n_vertices} vertices, {self.mesh.n_faces} triangles"
+        return f"CutMesh({counts}, {len(self.edges)} edges on curves)"
 
     def carry(self, values: ArrayLike) -> AnyArray:
         """Values at the vertices of the new mesh, from values (n, ...) at those of the old one, linear in its faces."""

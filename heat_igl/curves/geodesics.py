@@ -142,6 +142,9 @@ class GeodesicPathSolver:
         self._corner_at = corners(self._mesh)
         self._router: Router | None = None
 
+    def __repr__(self) -> str:
+        return f"GeodesicPathSolver({self._mesh.n_vertices} vertices)"
+
     def straighten(self, curve: SurfaceCurve) -> SurfaceCurve:
         """The locally shortest curve of the class of a curve; see `heat_igl.straighten`."""
         if not isinstance(curve, SurfaceCurve):

@@ -204,12 +204,12 @@ def plot_labels(
     return lay_out(seen, _lines_in_space(mesh, curves, seen), "plain", table, "", "no label")
 
 
-def picture(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **options: Any) -> None:
+def picture(path: str | os.PathLike[str], mesh: MeshLike, distance: ArrayLike, **options: Any) -> None:
     """Draw a distance and write the picture to `path`: `plot` with the same options, then `Picture.save`."""
     plot(mesh, distance, **options).save(path)
 
 
-def write_html(path: str | os.PathLike[str], mesh: Mesh, distance: ArrayLike, **options: Any) -> None:
+def write_html(path: str | os.PathLike[str], mesh: MeshLike, distance: ArrayLike, **options: Any) -> None:
     """Write an interactive page to `path`: `page` with the same options, then `Page.save`."""
     page(mesh, distance, **options).save(path)
 

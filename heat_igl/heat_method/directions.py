@@ -63,6 +63,9 @@ class Directions:
     gradient: FloatArray
     start: SurfacePoints
 
+    def __repr__(self) -> str:
+        return f"Directions({len(self.distance)} vertices)"
+
 
 def directions(
     distance: FloatArray, labels: IntArray, angles: PathAngles, start: SurfacePoints, frames: TangentFrames

@@ -132,6 +132,9 @@ class SignedHeatSolver:
         self._D = divergence_matrix(gradient, self._triangulation.areas)
         self._unsigned = HeatMethodSolver._of(parts)
 
+    def __repr__(self) -> str:
+        return repr(self._unsigned).replace("HeatMethodSolver", "SignedHeatSolver", 1)
+
     @property
     def operators(self) -> Operators:
         """L and M of the triangulation that is solved on."""

@@ -132,3 +132,6 @@ class HeatSolution:
     distance: FloatArray
     t: float
     diagnostics: Diagnostics
+
+    def __repr__(self) -> str:
+        return f"HeatSolution({len(self.distance)} vertices, t={self.t:.4g})"

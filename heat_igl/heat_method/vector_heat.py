@@ -153,6 +153,9 @@ class VectorHeatSolver:
         self._vector_flow = VectorHeatFlow(domain, rotations, t, parts.options.backend, mass=mass)
         self._pattern = abs(rotations).tocsr()
 
+    def __repr__(self) -> str:
+        return repr(self._distance_solver).replace("HeatMethodSolver", "VectorHeatSolver", 1)
+
     @property
     def frames(self) -> TangentFrames:
         """The frames in which vectors are given."""

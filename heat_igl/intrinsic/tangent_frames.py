@@ -64,6 +64,9 @@ class TangentFrames:
     sides: FloatArray
     face_normals: FloatArray
 
+    def __repr__(self) -> str:
+        return f"TangentFrames({len(self.x)} vertices)"
+
     def from_world(self, vectors: ArrayLike, vertices: ArrayLike | None = None) -> FloatArray:
         """Components (k, 2) along x and y of vectors (k, 3) in space: their normal parts are left out.
 

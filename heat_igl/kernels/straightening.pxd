@@ -33,7 +33,7 @@ cdef class Course:
     cdef void begin(self, int face, int vertex, const Place* start) noexcept nogil
     cdef int last_face(self) noexcept nogil
     cdef int turn(self, int v, int f, int goal, int other) except -1 nogil
-    cdef double straighten(self, int end_vertex, const Place* ends_on) except -1 nogil
+    cdef double straighten(self, int end_vertex, Place* ends_on) except -1 nogil
     cdef int _pull(self, Place* end, const Place* ends_on, bint slides) except -1 nogil
     cdef int _repair(self) except -1 nogil
     cdef int _shorter_way(self, int i) noexcept nogil

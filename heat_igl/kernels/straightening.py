@@ -73,26 +73,24 @@ class Course:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def straighten(self, end_vertex: cython.int, ends_on: cython.pointer[cython.const[Place]]) -> cython.double:
+    def straighten(self, end_vertex: cython.int, ends_on: cython.pointer[Place]) -> cython.double:
         """Append the segments of a locally shortest path through the strip; returns the length.
 
         It ends at `end_vertex`, or, if that is -1, at the nearest point of the segment between two places `ends_on` in
-        the last face.
+        the last face, which move with the end of the strip into the face before.
         """
         c: cython.int
-        segment: Place[2]
         end: Place
         slides: cython.bint = False
         if end_vertex < 0:
-            segment[0], segment[1] = ends_on[0], ends_on[1]
             for c in range(3):
-                end.c[c] = 0.5 * (segment[0].c[c] + segment[1].c[c])
-                slides = slides or segment[0].c[c] != segment[1].c[c]
+                end.c[c] = 0.5 * (ends_on[0].c[c] + ends_on[1].c[c])
+                slides = slides or ends_on[0].c[c] != ends_on[1].c[c]
         shortest: cython.double = INFINITY
         failures: cython.int = 0
         while True:
-            self._trim(end_vertex, cython.address(end), segment)
-            self._pull(cython.address(end), segment, slides)
+            self._trim(end_vertex, cython.address(end), ends_on)
+            self._pull(cython.address(end), ends_on, slides)
             length: cython.double = self.layout.length()
             # Rounding can make two ways around a vertex look shorter than one another.
             failures = 0 if length < shortest * (1.0 - 1e-13) else failures + 1

@@ -46,6 +46,9 @@ class ImageDomain:
     mesh: Mesh
     index: IntArray
 
+    def __repr__(self) -> str:
+        return f"ImageDomain({int((self.index >= 0).sum())} of {self.index.size} pixels)"
+
     def vertices(self, pixels: ArrayLike) -> IntArray:
         """The vertices at the centres of some pixels, to be used as sources.
 

@@ -111,6 +111,9 @@ class Operators:
     contrast: float = 1.0
     metric: MetricSides | None = None
 
+    def __repr__(self) -> str:
+        return f"Operators({self.n} vertices, {len(self.weights)} faces)"
+
     @property
     def n(self) -> int:
         """Number of vertices."""

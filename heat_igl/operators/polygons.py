@@ -7,14 +7,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError
-from heat_igl.mesh import PolygonMesh, connectivity
+from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_mesh, connectivity
 from heat_igl.operators.matrices import Operators
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["polygon_operators"]
 
 
-def polygon_operators(mesh: PolygonMesh) -> Operators:
+def polygon_operators(mesh: MeshLike) -> Operators:
     """The operators of a polygon mesh, for `HeatMethodSolver.from_operators`.
 
     Each polygon gets a virtual vertex, the affine combination of its corners with the least sum of squared areas of the
@@ -27,8 +27,8 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
 
     Parameters
     ----------
-    mesh : PolygonMesh
-        n vertices.
+    mesh : mesh
+        Polygons with n vertices, triangles among them, as `as_mesh` takes them.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
     Raises
     ------
     MeshError
-        If a polygon has no area, or a side on one line with the virtual vertex.
+        If the mesh has no polygons; if a polygon has no area, or a side on one line with the virtual vertex.
 
     Examples
     --------
@@ -52,6 +52,7 @@ def polygon_operators(mesh: PolygonMesh) -> Operators:
     >>> int(distance.argmax())
     6
     """
+    mesh = _polygons(mesh)
     corners, following, m = mesh.corners, mesh.following, mesh.n_faces
     owner = np.repeat(np.arange(m), mesh.degree)
     sides = np.linalg.norm(mesh.V[corners] - mesh.V[following], axis=1)
@@ -97,6 +98,15 @@ def _chords(V: FloatArray, L: sp.csc_matrix) -> sp.csc_matrix:
     """Distances in space (n, n) of the vertices that L couples: all pairs of a polygon."""
     columns = np.repeat(np.arange(L.shape[1]), np.diff(L.indptr))
     return sp.csc_matrix((np.linalg.norm(V[L.indices] - V[columns], axis=1), L.indices, L.indptr), shape=L.shape)
+
+
+def _polygons(mesh: MeshLike) -> PolygonMesh:
+    found = as_mesh(mesh)
+    if isinstance(found, Mesh) and not found.is_tetrahedral:
+        return PolygonMesh(found.V, list(found.F))
+    if not isinstance(found, PolygonMesh):
+        raise MeshError(f"polygon_operators needs polygons, not {found!r}: see operators and point_cloud_operators")
+    return found
 
 
 def _mean_distance(mesh: PolygonMesh, owner: IntArray) -> float:

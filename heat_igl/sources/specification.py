@@ -60,6 +60,9 @@ class OffsetSources:
     sources: Sources
     offsets: FloatArray
 
+    def __repr__(self) -> str:
+        return f"OffsetSources({np.size(self.offsets)} offsets)"
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "offsets", _checked_offsets(self.offsets))
 
