@@ -37,8 +37,7 @@ def polygon_operators(mesh: MeshLike) -> Operators:
     Raises
     ------
     MeshError
-        If the mesh has no polygons; if a polygon has no area, or is so concave that the virtual vertex leaves a vertex
-        of the mesh without mass.
+        If a polygon has no area, or one so concave that the virtual vertex leaves a vertex of the mesh without mass.
 
     Examples
     --------
