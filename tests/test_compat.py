@@ -426,7 +426,7 @@ def test_wrong_curves_name_the_node(sphere: Mesh) -> None:
     for nodes, message in (
         ([(3, []), (9999, [])], r"curves\[0\]\[1\] = 9999 is no vertex: indices run from 0 to 641"),
         ([(-1, [0.5]), (3, [])], r"curves\[0\]\[0\] = -1 is no edge"),
-        ([(3, []), (3, [0.1] * 4)], r"curves\[0\]\[1\] has 4 coordinates: a face has 2 or 3"),
+        ([(3, []), (3, [0.1] * 4)], r"curves\[0\]\[1\] has 4 coordinates: a face has two or three"),
         ([(3, [])], r"curves\[0\] has 1 points: a curve needs two or more"),
     ):
         with pytest.raises(ValueError, match=message):

@@ -40,7 +40,7 @@ def polygon_operators(mesh: MeshLike) -> Operators:
     Raises
     ------
     MeshError
-        If the mesh has no polygons; if a polygon has no area, or a side on one line with the virtual vertex.
+        If a polygon has no area, or a side on one line with the virtual vertex.
 
     Examples
     --------
