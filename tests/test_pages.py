@@ -87,7 +87,8 @@ def given() -> dict[str, Any]:
     return {
         "__name__": "__main__", "heat_igl": heat_igl, "np": np, "mesh": mesh, "V": mesh.V, "F": mesh.F,
         "solver": heat_igl.HeatMethodSolver(mesh), "exact": heat_igl.geodesic_distance(mesh, 7) + 1, "sources": 7,
-        "mask": inside, "is_inside": inside, "curve": curve, "other": other, "points": samples, "positions": around,
+        "mask": inside, "is_inside": inside, "curve": curve, "other": other, "curves": [curve, other],
+        "points": samples, "positions": around,
         "g": mesh.V[:, 0], "weights": np.ones(mesh.n_vertices), "vectors": np.ones((3, 2)) / 3,
         "speed": np.full(mesh.n_faces, 2.0), "metric": np.tile(np.eye(3), (mesh.n_faces, 1, 1)),
         "surface": surface, "P": surface.V, "normals": np.add(ball.V, [0, 0, 0.05]), "tetrahedra": shapes.box(6),
