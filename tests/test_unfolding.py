@@ -352,3 +352,10 @@ def test_bad_arguments():
         unfolded_distance(grid.V, grid.F, 99)
     with pytest.raises(ValueError, match="tolerance must lie between 0 and 1, not -1"):
         unfolded_distance(grid.V, grid.F, 0, tolerance=-1)
+
+
+@pytest.mark.parametrize("method", ["unfold", "sweep"])
+def test_an_order_of_another_length_is_refused(method):
+    surface = Refinement(intrinsic_delaunay(intrinsic_triangulation(shapes.grid(3))))
+    with pytest.raises(ValueError, match=r"key must have a number for each of 16 vertices, but its shape is \(3,\)"):
+        getattr(surface, method)(np.zeros(3), np.array([0]))

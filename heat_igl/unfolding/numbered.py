@@ -132,6 +132,8 @@ class NumberedTriangles:
 
     def _order(self, key: FloatArray) -> AnyArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
+        if np.shape(key) != (self.n,):
+            raise ValueError(f"key must have a number for each of {self.n} vertices, but its shape is {np.shape(key)}")
         on_sheets = np.tile(key, self._n_sheets) if self._n_sheets > 1 else np.ascontiguousarray(key)
         return np.asarray(self.number[ascending(on_sheets)])
 

@@ -187,7 +187,7 @@ class Refinement(NumberedTriangles):
         Raises
         ------
         ValueError
-            If `tolerance` is not a number from 0 to 1.
+            If `tolerance` is not a number from 0 to 1, or `key` has another length.
         """
         if not 0 <= tolerance <= 1:
             raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
