@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 import heat_igl
 from heat_igl import Mesh, MeshError
@@ -369,3 +371,18 @@ def test_without_duplicate_faces_keeps_the_first_of_each():
     assert kept.tolist() == [0, 1]
     assert reduced.F.tolist() == [[0, 1, 2], [2, 1, 3]]
     assert reduced.without_duplicate_faces()[0] is reduced
+
+
+def test_edges_and_components_of_random_triangles():
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        n = int(rng.integers(3, 40))
+        F = np.array([rng.choice(n, 3, replace=False) for _ in range(rng.integers(1, 30))])
+        sides = np.sort(F[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+        vertices, of_face, counts = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+        found = connectivity.facets(F, n)
+        assert found.vertices.tolist() == vertices.tolist()
+        assert found.of_face.ravel().tolist() == of_face.ravel().tolist()
+        assert found.n_faces.tolist() == counts.tolist()
+        graph = sp.coo_array((np.ones(len(sides)), tuple(sides.T)), shape=(n, n))
+        assert connectivity.connected_components(F, n).tolist() == connected_components(graph)[1].tolist()

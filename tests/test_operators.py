@@ -11,6 +11,7 @@ from conftest import SHARED, perturbed
 from heat_igl import Mesh, MeshError, read_mesh, shapes
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_gradient, intrinsic_triangulation
 from heat_igl.operators import Operators, cotan_operators, intrinsic_operators, operators
+from heat_igl.operators.simplices import cotangent_laplacian
 
 
 def bad_sphere() -> Mesh:
@@ -140,6 +141,27 @@ def test_laplacian_of_triangles_has_the_bits_of_libigls(laplacian):
     assert np.array_equal(domain.L.indptr, expected.indptr)
     assert np.array_equal(domain.L.indices, expected.indices)
     assert np.array_equal(domain.L.data, expected.data)
+
+
+def test_laplacian_of_glued_triangles_sums_what_belongs_together():
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        n = int(rng.integers(2, 20))
+        F = rng.integers(0, n, (int(rng.integers(1, 25)), 3))
+        weight = rng.normal(size=F.shape)
+        expected = np.zeros((n, n))
+        # An edge may join a vertex with itself: what it adds off the diagonal it takes from the diagonal.
+        for corner in range(3):
+            i, j, w = F[:, (corner + 1) % 3], F[:, (corner + 2) % 3], weight[:, corner]
+            for row, column, sign in ((i, j, 1), (j, i, 1), (i, i, -1), (j, j, -1)):
+                np.add.at(expected, (row, column), sign * w)
+        L = cotangent_laplacian(weight, F, n)
+        np.testing.assert_allclose(L.toarray(), expected, atol=1e-13)
+        assert L.has_canonical_format
+        one, other = F.ravel().tolist(), np.roll(F, 1, axis=1).ravel().tolist()
+        pattern = {*zip(one, other, strict=True), *zip(other, one, strict=True), *zip(one, one, strict=True)}
+        assert {*zip(*(ends.tolist() for ends in L.nonzero()), strict=True)} <= pattern
+        assert L.nnz == len(pattern)
 
 
 def test_tetrahedral_laplacian_is_libigls_and_survives_flat_tetrahedra():

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError
+from heat_igl.kernels import assembling
 from heat_igl.mesh import Mesh
 from heat_igl.operators.elements import TriangleElements
 from heat_igl.operators.matrices import OnLaplacian, Operators, laplacian_of_gradient
@@ -76,15 +77,8 @@ def cotangent_laplacian(cotangents: FloatArray, F: IntArray, n: int) -> sp.csc_m
     n : int
         Number of vertices; one that no triangle uses has an empty row.
     """
-    weight = cotangents.ravel()
-    # In the order of libigl, in which each diagonal entry is rounded.
-    ends = F[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2).astype(np.int32)
-    used = np.flatnonzero(np.bincount(ends[:, 0], minlength=n))
-    diagonal = -np.bincount(ends.ravel(), np.repeat(weight, 2), n)[used]
-    tail, head = ends.T
-    rows, columns = np.concatenate([tail, head, used]), np.concatenate([head, tail, used])
-    # A copy: the sums of entries are in the first half of arrays that are as long as the entries were many.
-    return sp.csc_matrix((np.concatenate([weight, weight, diagonal]), (rows, columns)), shape=(n, n)).copy()
+    indptr, indices, data = assembling.laplacian(F.astype(np.int32), np.ascontiguousarray(cotangents).ravel(), n)
+    return sp.csc_matrix((data, indices, indptr), shape=(n, n))
 
 
 def _assembled(

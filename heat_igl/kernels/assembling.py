@@ -1,0 +1,122 @@
+"""The sparse Laplacian from a weight on each side of each triangle, assembled by counting."""
+
+import cython
+import numpy as np
+
+__all__ = ["laplacian"]
+
+
+def laplacian(F: cython.const[cython.int][:, ::1], weight: cython.const[cython.double][::1], n: cython.Py_ssize_t):
+    """L of triangles: sums of weights off the diagonal, on it minus the sum of the row.
+
+    Parameters
+    ----------
+    F : (m, 3) int32
+        Vertices of each triangle.
+    weight : (3 m,) float64
+        Of the side opposite each corner.
+    n : int
+        Number of vertices; one that no triangle uses has an empty row.
+
+    Returns
+    -------
+    indptr, indices : (n + 1,) int32, (nnz,) int32
+        The pattern, row indices ascending; zeros are stored.
+    data : (nnz,) float64
+        The entries. Those of the diagonal are summed in the order of libigl's `cotmatrix`, for the same bits.
+    """
+    size: cython.Py_ssize_t = 6 * F.shape[0]
+    by_row: cython.uint[::1] = np.empty(size, np.uint32)
+    by_column: cython.uint[::1] = np.empty(size, np.uint32)
+    begin: cython.longlong[::1] = np.zeros(n + 1, np.int64)
+    diagonal: cython.double[::1] = np.zeros(n)
+    pointers, rows, values = np.zeros(n + 1, np.int32), np.empty(size + n, np.int32), np.empty(size + n)
+    indptr: cython.int[::1] = pointers
+    indices: cython.int[::1] = rows
+    data: cython.double[::1] = values
+    e: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    count: cython.int = 0
+    with cython.nogil:
+        for e in range(size):
+            by_column[e] = e
+            j = _column(F, e)
+            diagonal[j] += weight[e >> 1]
+            begin[j + 1] += 1
+        for j in range(n):
+            begin[j + 1] += begin[j]
+        # By row, which is the column of the other entry of the side; then, rows remaining in order, by column.
+        _distribute(F, by_column, by_row, begin, 1)
+        _distribute(F, by_row, by_column, begin, 0)
+        for j in range(n):
+            count = _fill_column(F, weight, by_column[begin[j] : begin[j + 1]], j, -diagonal[j], count, indices, data)
+            indptr[j + 1] = count
+    return pointers, rows[:count].copy(), values[:count].copy()
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _column(F: cython.const[cython.int][:, ::1], entry: cython.Py_ssize_t) -> cython.int:
+    """The column of an entry: entry 2 h of side h is in that of its tail, 2 h + 1 in that of its head."""
+    side: cython.Py_ssize_t = entry >> 1
+    f: cython.Py_ssize_t = side // 3
+    c: cython.Py_ssize_t = side - 3 * f + 1 + (entry & 1)
+    return F[f, c - 3 if c > 2 else c]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _distribute(
+    F: cython.const[cython.int][:, ::1],
+    entries: cython.uint[::1],
+    sorted_entries: cython.uint[::1],
+    begin: cython.longlong[::1],
+    other: cython.uint,
+) -> cython.void:
+    """Sort entries by column, or by the column of the other one of the side; `begin` is the same before and after."""
+    i: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    for i in range(entries.shape[0]):
+        j = _column(F, entries[i] ^ other)
+        sorted_entries[begin[j]] = entries[i]
+        begin[j] += 1
+    for i in range(begin.shape[0] - 1, 0, -1):
+        begin[i] = begin[i - 1]
+    begin[0] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _fill_column(
+    F: cython.const[cython.int][:, ::1],
+    weight: cython.const[cython.double][::1],
+    entries: cython.uint[::1],
+    j: cython.int,
+    diagonal: cython.double,
+    count: cython.int,
+    indices: cython.int[::1],
+    data: cython.double[::1],
+) -> cython.int:
+    """Append the entries of column j, and the diagonal; returns the number of all entries so far."""
+    i: cython.Py_ssize_t
+    row: cython.int
+    last: cython.int = -1
+    for i in range(entries.shape[0]):
+        row = _column(F, entries[i] ^ 1)
+        if last < j <= row:
+            indices[count], data[count] = j, diagonal
+            last = j
+            count += 1
+        if row != last:
+            indices[count], data[count] = row, 0.0
+            last = row
+            count += 1
+        data[count - 1] += weight[entries[i] >> 1]
+    if -1 < last < j:
+        indices[count], data[count] = j, diagonal
+        count += 1
+    return count

@@ -1,0 +1,137 @@
+"""Edges of triangles and connected components, by counting instead of comparing."""
+
+import cython
+import numpy as np
+
+__all__ = ["components", "edges_of_triangles"]
+
+
+def edges_of_triangles(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ssize_t):
+    """The distinct edges of triangles, in lexicographic order.
+
+    Parameters
+    ----------
+    F : (m, 3) int64
+        Vertices of each triangle.
+    n : int
+        Number of vertices.
+
+    Returns
+    -------
+    vertices : (k, 2) int64
+        The ends of each edge, ascending.
+    of_face : (m, 3) int64
+        The edge opposite each corner.
+    n_faces : (k,) int64
+        Number of sides of triangles at each edge.
+    """
+    size: cython.Py_ssize_t = 3 * F.shape[0]
+    by_upper, by_both, number = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size, np.int64)
+    order: cython.longlong[::1] = by_upper
+    sorted_sides: cython.longlong[::1] = by_both
+    edge: cython.longlong[::1] = number
+    place: cython.longlong[::1] = np.empty(n + 1, np.int64)
+    i: cython.Py_ssize_t
+    k: cython.longlong = -1
+    lower: cython.longlong = -1
+    upper: cython.longlong = -1
+    with cython.nogil:
+        for i in range(size):
+            sorted_sides[i] = i
+        _by_end(F, sorted_sides, order, place, False)
+        _by_end(F, order, sorted_sides, place, True)
+        for i in range(size):
+            h: cython.longlong = sorted_sides[i]
+            if _end(F, h, True) != lower or _end(F, h, False) != upper:
+                k += 1
+                lower, upper = _end(F, h, True), _end(F, h, False)
+            edge[h] = k
+    ends, counts = np.empty((k + 1, 2), np.int64), np.zeros(k + 1, np.int64)
+    vertices: cython.longlong[:, ::1] = ends
+    n_faces: cython.longlong[::1] = counts
+    with cython.nogil:
+        for i in range(size):
+            vertices[edge[i], 0], vertices[edge[i], 1] = _end(F, i, True), _end(F, i, False)
+            n_faces[edge[i]] += 1
+    return ends, number.reshape(-1, 3), counts
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _end(
+    F: cython.const[cython.longlong][:, ::1], half_edge: cython.longlong, is_lower: cython.bint
+) -> cython.longlong:
+    """The lower or the upper end of the side opposite a corner."""
+    f: cython.longlong = half_edge // 3
+    c: cython.longlong = half_edge - 3 * f
+    a: cython.longlong = F[f, 1 if c == 0 else 0]
+    b: cython.longlong = F[f, 1 if c == 2 else 2]
+    return min(a, b) if is_lower else max(a, b)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _by_end(
+    F: cython.const[cython.longlong][:, ::1],
+    sides: cython.longlong[::1],
+    ordered: cython.longlong[::1],
+    place: cython.longlong[::1],
+    is_lower: cython.bint,
+) -> cython.void:
+    """Sort sides by one of their ends; those with the same end stay in order. `place` (n + 1,) is working space."""
+    i: cython.Py_ssize_t
+    v: cython.longlong
+    place[:] = 0
+    for i in range(sides.shape[0]):
+        place[_end(F, sides[i], is_lower) + 1] += 1
+    for i in range(place.shape[0] - 1):
+        place[i + 1] += place[i]
+    for i in range(sides.shape[0]):
+        v = _end(F, sides[i], is_lower)
+        ordered[place[v]] = sides[i]
+        place[v] += 1
+
+
+def components(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ssize_t):
+    """Labels (n,) int64 of the connected components, ascending by their lowest vertex (Galler and Fischer 1964).
+
+    `F` (m, k) int64 has the vertices of each face; a vertex that no face uses is a component of its own.
+    """
+    labels = np.arange(n)
+    above: cython.longlong[::1] = labels  # a vertex of the same component, not above this one; then the label
+    f: cython.Py_ssize_t
+    c: cython.Py_ssize_t
+    v: cython.Py_ssize_t
+    count: cython.longlong = 0
+    with cython.nogil:
+        for f in range(F.shape[0]):
+            for c in range(1, F.shape[1]):
+                _join(above, F[f, 0], F[f, c])
+        for v in range(n):
+            if above[v] == v:
+                above[v] = count
+                count += 1
+            else:
+                above[v] = above[above[v]]
+    return labels
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _join(above: cython.longlong[::1], a: cython.longlong, b: cython.longlong) -> cython.void:
+    """Put the component of the higher lowest vertex below that of the other; paths are halved on the way."""
+    while above[a] != a:
+        above[a] = above[above[a]]
+        a = above[a]
+    while above[b] != b:
+        above[b] = above[above[b]]
+        b = above[b]
+    if a < b:
+        above[b] = a
+    else:
+        above[a] = b
