@@ -697,6 +697,7 @@ def test_a_hanging_child_does_not_outlive_a_killed_caller_for_long() -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+@pytest.mark.filterwarnings("ignore:.*fork.*JAX:RuntimeWarning")  # which the tests of the adapter have loaded
 def test_a_fork_gets_a_child_of_its_own() -> None:
     mesh = rectangle(5, 5, 1, 1)
     expected = reference.exact(mesh, 0, solver="igl")
