@@ -403,6 +403,7 @@ def test_attributes_of_points_go_to_ply(tmp_path) -> None:
 
 @pytest.mark.parametrize("kind", ["ply", "obj", "xyz", "npy", "pcd ascii"])
 def test_the_command_line_takes_clouds(tmp_path, kind: str, capsys) -> None:
+    pytest.importorskip("typer")
     P = sphere(40).astype(np.float32).astype(np.float64)
     path, out = written(tmp_path, kind, P, P), tmp_path / "out.npy"
     assert cli.run(["distance", str(path), "--source=3", f"--output={out}", "--json=-"]) == 0
@@ -413,6 +414,7 @@ def test_the_command_line_takes_clouds(tmp_path, kind: str, capsys) -> None:
 
 
 def test_a_file_with_faces_is_a_mesh(tmp_path, capsys) -> None:
+    pytest.importorskip("typer")
     for name in ("mesh.ply", "mesh.obj"):
         heat_igl.write_mesh(tmp_path / name, shapes.icosphere(1))
         assert cli.run(["distance", str(tmp_path / name), "--source=3", "--json=-"]) == 0
