@@ -106,11 +106,18 @@ def test_the_blocks_of_a_page_run_from_top_to_bottom(page: str, monkeypatch: pyt
     heat_igl.write_point_cloud("scan.ply", heat_igl.PointCloud(names["mesh"].V))
     Path("meshes").mkdir()
     heat_igl.write_mesh("meshes/bunny.obj", shapes.icosphere(3))
+    ran = []
     for block in blocks(page):
         code = compile(block, page, "exec")
         lacking = [module for text, module in NEEDS.items() if text in block and not importlib.util.find_spec(module)]
         if not lacking and not any(text in block for text in ELSEWHERE):
             exec(code, names)
+            ran.append(block)
+    assert ran, "no block of the page could run here"
+    for name in ("phi", "d", "distance"):  # what the pages call a distance
+        if isinstance(names.get(name), np.ndarray):
+            assert not np.isnan(names[name]).any(), name
+            assert np.isfinite(names[name]).any(), name
 
 
 def test_the_drawn_strip_is_flat_and_true_to_length() -> None:

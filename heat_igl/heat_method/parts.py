@@ -236,19 +236,19 @@ def prepare(
         # Before there are factors: most memory is needed while the tables are made.
         unfolding = UnfoldingSolver(domain, options.refine)
     unfolded = time.perf_counter()
-    problems = [] if found is None else _factored(domain, options, step, found, t_damping, fitted)
+    heat_flow, poisson, divergence = (
+        (None, None, None) if found is None else _factored(domain, options, step, found, t_damping, fitted)
+    )
     factored = time.perf_counter()
-    heat_flow = problems[0] if problems else None
     mass_unit = domain.mean_mass if heat_flow is None else heat_flow.mean_mass
     assembler = SourceAssembler(domain, step, mass_unit, plain=not damped, unfolds=unfolding is not None)
     last_steps: Integration | UnfoldingSolver
-    if unfolding is not None or found is None:
+    if heat_flow is None or poisson is None or divergence is None:
         last_steps = unfolding or UnfoldingSolver(domain, "exact")
     else:
-        heat_flow, poisson, divergence = problems
         last_steps = Integration(domain, heat_flow, divergence, poisson, t_damping, fitted, assembler.edges)
     triangulation = None if domain.surface is None else domain.surface.triangulation
-    factors = [] if heat_flow is None else heat_flow.factors + [problem.factor for problem in problems[1:2]]
+    factors = ([] if heat_flow is None else heat_flow.factors) + ([] if poisson is None else [poisson.factor])
     diagnostics = Diagnostics(
         t=_of_largest(step, domain),
         t_requested=_of_largest(requested, domain),
@@ -287,14 +287,14 @@ def _factored(
     found: Analysis,
     t_damping: float | FloatArray | None,
     fitted: bool,
-) -> list[Any]:
-    """The heat flow; unless `refine` takes the place of them, also the Poisson problem and the divergence."""
+) -> tuple[HeatFlow, PoissonProblem | None, NormalizedDivergence | None]:
+    """The heat flow, the Poisson problem and the divergence; None for those that `refine` takes the place of."""
 
     def flow() -> HeatFlow:
         return HeatFlow(domain, step, options.boundary, options.backend, found, fitted)
 
     if options.refine is not None:
-        return [flow()]
+        return flow(), None, None
     # Both matrices at once: the backends run without the interpreter's lock. The Poisson problem is done first, and
     # the divergence follows on that thread.
     makers: list[Callable[[], Any]] = [
@@ -303,7 +303,7 @@ def _factored(
         lambda: NormalizedDivergence(domain, t_damping, found.order, fitted),
     ]
     poisson, heat_flow, divergence = in_order(lambda make: make(), makers, min(2, n_threads()))
-    return [heat_flow, poisson, divergence]
+    return heat_flow, poisson, divergence
 
 
 def _resolved(domain: Operators, options: SolverOptions) -> tuple[Operators, SolverOptions]:
