@@ -40,114 +40,115 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
     n: cython.int = V.shape[0]
     vertices, twins, rings = np.empty((3, 3 * m), np.int32)
     alignment, lengths = np.ones(3 * m, np.uint8), np.empty(3 * m)
-    mesh = _Gluing()
-    mesh.vertex, mesh.twin, mesh.ring, mesh.aligned = vertices, twins, rings, alignment
+    vertex: cython.int[::1] = vertices
+    twin: cython.int[::1] = twins
+    ring: cython.int[::1] = rings
+    aligned: cython.uchar[::1] = alignment
     length: cython.double[::1] = lengths
     end: cython.int[::1] = np.zeros(n + 1, np.int32)
     by_lower: cython.int[::1] = np.empty(3 * m, np.int32)
     # The first half-edge to each vertex from the lower vertex in `seen_from`.
     seen: cython.int[::1] = np.empty(n, np.int32)
     seen_from: cython.int[::1] = np.full(n, -1, np.int32)
+    n_across: cython.int = 0
+    f: cython.int
+    c: cython.int
     h: cython.int
     i: cython.int = 0
     lower: cython.int
     with cython.nogil:
-        mesh.separate(F)
-        mesh.sort_by_lower_vertex(end, by_lower)
+        for f in range(m):
+            for c in range(3):
+                vertex[3 * f + c] = F[f, c]
+                twin[3 * f + c] = -1
+                ring[3 * f + c] = 3 * f + c
+        _sort_by_lower_end(vertex, end, by_lower)
         for lower in range(n):
             while i < end[lower]:
                 h = by_lower[i]
                 i += 1
-                tail: cython.int = mesh.vertex[next_half_edge(h)]
-                head: cython.int = mesh.vertex[previous_half_edge(h)]
+                tail: cython.int = vertex[next_half_edge(h)]
+                head: cython.int = vertex[previous_half_edge(h)]
                 upper: cython.int = head if tail == lower else tail
                 if seen_from[upper] != lower:
-                    seen_from[upper], seen[upper] = lower, h
+                    seen_from[upper] = lower
+                    seen[upper] = h
                     x: cython.double = V[tail, 0] - V[head, 0]
                     y: cython.double = V[tail, 1] - V[head, 1]
                     z: cython.double = V[tail, 2] - V[head, 2]
                     x, y, z = scale * x, scale * y, scale * z
                     length[h] = sqrt(x * x + y * y + z * z)
                 else:
-                    length[h] = length[seen[upper]]
-                    mesh.join(seen[upper], h)
-    return vertices, twins, rings, alignment, lengths, mesh.n_across
+                    p: cython.int = seen[upper]
+                    length[h] = length[p]
+                    n_across += _join(twin, ring, aligned, p, h, vertex[next_half_edge(p)] != tail)
+    return vertices, twins, rings, alignment, lengths, n_across
 
 
-@cython.final
-@cython.cclass
-class _Gluing:
-    """Faces that are being glued; the arrays are those that `glue` returns."""
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _sort_by_lower_end(
+    vertex: cython.const[cython.int][::1], end: cython.int[::1], by_lower: cython.int[::1]
+) -> cython.void:
+    """Sort half-edges by the end with the smaller number, by counting.
 
-    vertex: cython.int[::1]
-    twin: cython.int[::1]
-    ring: cython.int[::1]
-    aligned: cython.uchar[::1]
-    n_across: cython.int
+    `end` (n + 1,), given as zeros, is set to the end in `by_lower` (3 m,) of the half-edges of each lower vertex.
+    """
+    h: cython.int
+    i: cython.int
+    tail: cython.int
+    head: cython.int
+    lower: cython.int
+    for h in range(vertex.shape[0]):
+        tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
+        end[(tail if tail < head else head) + 1] += 1
+    for i in range(end.shape[0] - 1):
+        end[i + 1] += end[i]
+    # Now end[v] is the beginning for vertex v, and moves on with each half-edge.
+    for h in range(vertex.shape[0]):
+        tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
+        lower = tail if tail < head else head
+        by_lower[end[lower]] = h
+        end[lower] += 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def separate(self, F: cython.const[cython.longlong][:, ::1]) -> cython.void:
-        """Begin with faces of which none is glued."""
-        f: cython.int
-        c: cython.int
-        for f in range(F.shape[0]):
-            for c in range(3):
-                self.vertex[3 * f + c] = F[f, c]
-                self.twin[3 * f + c] = -1
-                self.ring[3 * f + c] = 3 * f + c
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def lower_end(self, h: cython.int) -> cython.int:
-        """The end of half-edge h with the smaller number."""
-        tail: cython.int = self.vertex[next_half_edge(h)]
-        head: cython.int = self.vertex[previous_half_edge(h)]
-        return tail if tail < head else head
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _join(
+    twin: cython.int[::1],
+    ring: cython.int[::1],
+    aligned: cython.uchar[::1],
+    p: cython.int,
+    h: cython.int,
+    is_aligned: cython.bint,
+) -> cython.int:
+    """Glue half-edge h to the first one of the same edge, p, and to all others there.
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def sort_by_lower_vertex(self, end: cython.int[::1], by_lower: cython.int[::1]) -> cython.void:
-        """Sort half-edges by their lower end, by counting.
+    `is_aligned` says whether p and h run in opposite directions.
 
-        `end` (n + 1,), given as zeros, is set to the end in `by_lower` (3 m,) of the half-edges of each lower vertex.
-        """
-        h: cython.int
-        i: cython.int
-        lower: cython.int
-        for h in range(self.vertex.shape[0]):
-            end[self.lower_end(h) + 1] += 1
-        for i in range(end.shape[0] - 1):
-            end[i + 1] += end[i]
-        # Now end[v] is the beginning for vertex v, and moves on with each half-edge.
-        for h in range(self.vertex.shape[0]):
-            lower = self.lower_end(h)
-            by_lower[end[lower]] = h
-            end[lower] += 1
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def join(self, p: cython.int, h: cython.int) -> cython.void:
-        """Glue half-edge h to the first one of the same edge, p, and to all others there."""
-        q: cython.int = self.twin[p]
-        if q == -1:
-            self.twin[p], self.twin[h] = h, p
-            if self.vertex[next_half_edge(p)] == self.vertex[next_half_edge(h)]:
-                self.aligned[p] = self.aligned[h] = False
-                self.n_across += 2
-            return
-        if q >= 0:
-            self.n_across -= 0 if self.aligned[p] else 2
-            self.aligned[p] = self.aligned[q] = True
-            self.twin[p] = self.twin[q] = -2
-            self.ring[p], self.ring[q] = q, p
-        self.twin[h] = -2
-        self.ring[h] = self.ring[p]
-        self.ring[p] = h
+    Returns how many more half-edges are glued to one that runs in the same direction.
+    """
+    q: cython.int = twin[p]
+    across: cython.int = 0
+    if q == -1:
+        twin[p], twin[h] = h, p
+        if not is_aligned:
+            aligned[p] = aligned[h] = False
+            across = 2
+        return across
+    if q >= 0:
+        across = 0 if aligned[p] else -2
+        aligned[p] = aligned[q] = True
+        twin[p] = twin[q] = -2
+        ring[p], ring[q] = q, p
+    twin[h] = -2
+    ring[h] = ring[p]
+    ring[p] = h
+    return across
 
 
 @cython.cfunc
