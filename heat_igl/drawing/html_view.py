@@ -43,7 +43,20 @@ __all__ = ["Page", "page"]
 _AS_GIVEN = "Distance as given."
 _LOG_MAP = "log map"
 _SIGNED_COLOURS = "RdBu_r"
-_SCRIPTS = ("sweep.js", "polar.js", "geometry.js", "shaders.js", "view.js")
+# One script in the end: each file uses names of those before it.
+_SCRIPTS = (
+    "sweep.js",
+    "polar.js",
+    "geometry.js",
+    "shaders.js",
+    "arrays.js",
+    "camera.js",
+    "picking.js",
+    "renderer.js",
+    "colour_scale.js",
+    "pointer.js",
+    "view.js",
+)
 _FRAME = (
     '<iframe srcdoc="{}" sandbox="allow-scripts allow-downloads" '
     'style="width: 100%; height: 520px; border: 1px solid #ccc"></iframe>'
@@ -180,13 +193,12 @@ def page(
         (name, "float" if array.dtype.kind == "f" else "int", array.size) for name, array in arrays.items()
     ]
     folder = files("heat_igl.drawing") / "page"
-    parts = {name: (folder / name).read_text(encoding="utf8") for name in ("page.html", *_SCRIPTS)}
     return Page(
-        Template(parts["page.html"]).substitute(
+        Template((folder / "page.html").read_text(encoding="utf8")).substitute(
             title=html.escape(title),
             meta=_in_script(meta),
             data=base64.b64encode(_packed(list(arrays.values()))).decode(),
-            **{Path(name).stem: parts[name] for name in _SCRIPTS},
+            scripts="\n".join((folder / name).read_text(encoding="utf8") for name in _SCRIPTS),
         )
     )
 

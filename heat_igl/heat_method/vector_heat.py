@@ -5,31 +5,22 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import AccuracyWarning, MeshError, SourceError
-from heat_igl.heat_method.directions import carried
+from heat_igl.errors import MeshError, SourceError
+from heat_igl.heat_method.heat_transport import HeatTransport
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.outward_field import OutwardField
 from heat_igl.heat_method.parts import prepare
+from heat_igl.heat_method.path_transport import PathTransport
 from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.linear import Backend
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.operators import Operators, edge_rotations, operators
-from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, warn_caller
 from heat_igl.sources import Sources, ordered_vertices
-from heat_igl.steps import VectorHeatFlow
-from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import Refine
 
 __all__ = ["VectorHeatSolver"]
-
-# Vectors shorter than this share of the longest at a neighbour are rounding: those that arrive cancel.
-_CANCELLED = 1e-10
-# The time step of vectors in that of heat, for t = h^2. At h^2 / 2, transport on spheres is wrong by 1.5 to 2 times as
-# much; vectors are farther from their shortest paths with longer steps.
-_VECTOR_STEP = 2.0
-# Tolerance of the walks, for directions.
-_STRAIGHT = 1e-6
 
 
 class VectorHeatSolver:
@@ -97,15 +88,19 @@ class VectorHeatSolver:
         domain = operators(triangles, "intrinsic-delaunay")
         if domain.surface is None:
             raise MeshError("tangent vectors need triangles, and the mesh holds tetrahedra")
-        self._outward: OutwardField | None = None
-        self._prepare(domain, SolverOptions(t_coef, t, refine=refine, backend=backend))
-        if self._follows_paths:
+        options = SolverOptions(t_coef, t, refine=refine, backend=backend)
+        self._distance_solver = HeatMethodSolver._of(prepare(domain, options))
+        #: How values and vectors travel from the sources: by diffusion, or along the shortest paths.
+        self._transport: HeatTransport | PathTransport
+        if refine in ("unfold", "exact"):
+            self._transport = PathTransport(self._distance_solver, self._frames.angles)
             return
-        self._outward = OutwardField(domain.surface)
         triangulation = domain.surface.triangulation
         # Thirds of the triangles: with Voronoi areas, transport on spheres is wrong by 5 to 10 % more.
         mass = np.bincount(triangulation.F.ravel(), np.repeat(triangulation.areas / 3, 3), domain.n)
-        self._factor(domain, edge_rotations(domain), mass.astype(np.float64))
+        self._transport = HeatTransport(
+            self._distance_solver, edge_rotations(domain), mass.astype(np.float64), OutwardField(domain.surface)
+        )
 
     @classmethod
     def from_operators(
@@ -137,21 +132,10 @@ class VectorHeatSolver:
         if rotations.shape != domain.L.shape:
             raise ValueError(f"rotations must have the shape of L, {domain.L.shape}, not {rotations.shape}")
         solver = cls.__new__(cls)
-        solver._frames = solver._outward = None
-        solver._prepare(domain, SolverOptions(t_coef, t, backend=backend))
-        solver._factor(domain, rotations)
+        solver._frames = None
+        solver._distance_solver = HeatMethodSolver._of(prepare(domain, SolverOptions(t_coef, t, backend=backend)))
+        solver._transport = HeatTransport(solver._distance_solver, rotations)
         return solver
-
-    def _prepare(self, domain: Operators, options: SolverOptions) -> None:
-        self._distance_solver = HeatMethodSolver._of(prepare(domain, options))
-        self._follows_paths = options.refine in ("unfold", "exact")
-
-    def _factor(self, domain: Operators, rotations: sp.csc_matrix, mass: FloatArray | None = None) -> None:
-        parts = self._distance_solver._parts
-        self._heat_flow = parts.heat_flow
-        t = parts.diagnostics.t * (_VECTOR_STEP if parts.options.default_time_step else 1.0)
-        self._vector_flow = VectorHeatFlow(domain, rotations, t, parts.options.backend, mass=mass)
-        self._pattern = abs(rotations).tocsr()
 
     def __repr__(self) -> str:
         return repr(self._distance_solver).replace("HeatMethodSolver", "VectorHeatSolver", 1)
@@ -206,9 +190,7 @@ class VectorHeatSolver:
         """
         vertices = self._vertices(sources)
         given = checked_vectors("values", np.reshape(values, (-1, 1)), len(vertices), 1)[:, 0]
-        if self._follows_paths:
-            return self._along_paths(vertices, given)
-        return self._extended(vertices, given)
+        return self._transport.extend(vertices, given)
 
     def transport(self, sources: Sources, vectors: ArrayLike) -> FloatArray:
         """Tangent vectors at vertices, transported to all along shortest geodesics.
@@ -240,11 +222,7 @@ class VectorHeatSolver:
         """
         vertices = self._vertices(sources)
         given = checked_vectors("vectors", vectors, len(vertices), 2)
-        if self._follows_paths:
-            found = self._along_paths(vertices, given @ [1, 1j], turned=True)
-            return np.stack([found.real, found.imag], axis=1)
-        lengths = self._extended(vertices, np.hypot(*given.T))
-        found = self._directions(vertices, given @ [1, 1j]) * lengths
+        found = self._transport.transport(vertices, given)
         return np.stack([found.real, found.imag], axis=1)
 
     def log_map(self, source: int) -> FloatArray:
@@ -279,76 +257,7 @@ class VectorHeatSolver:
         vertices = self._vertices(source)
         if len(vertices) != 1:
             raise SourceError(f"source must be one vertex, not {len(vertices)}")
-        if self._follows_paths:
-            distance, _, angles, _ = self._distance_solver._paths(source, _STRAIGHT)
-            return TangentFrames.from_angles(
-                np.nan_to_num(angles.departure), np.where(np.isfinite(distance), distance, 0.0)
-            )
-        if self._outward is None:
-            raise MeshError("the log map needs the triangles around the source, which this domain does not have")
-        v = int(vertices[0])
-        at, outward = self._outward.dipole(v)
-        n = self.operators.n
-        b = np.zeros((n, 2), complex)
-        largest = np.abs(outward).max(initial=0.0)
-        np.add.at(b[:, 0], at, SOURCE_HEAT * (outward / largest if largest > 0 else outward))
-        b[v, 1] = SOURCE_HEAT
-        radial, axis = (_unit(Y) for Y in self._vector_flow.solve(b).T)
-        direction = self._outward.to_polar(v, _unit(radial * axis.conj()))
-        neighbour, exact = self._outward.ring(v)
-        direction[neighbour] = np.exp(1j * exact)
-        distance = self._distance_solver.distance(v)
-        reached = np.isfinite(distance)
-        length = np.where(reached, distance, 0.0)
-        return np.stack([length * direction.real, length * direction.imag], axis=1)
-
-    def _along_paths(self, vertices: IntArray, numbers: AnyArray, turned: bool = False) -> AnyArray:
-        """The number (n,) of the nearest source, `turned` as a tangent vector on the way; 0 without a source."""
-        _, labels, angles, _ = self._distance_solver._paths(vertices, _STRAIGHT)
-        # A source that is named twice has the mean of the numbers.
-        _, which, count = np.unique(vertices, return_inverse=True, return_counts=True)
-        total = np.zeros(len(count), numbers.dtype)
-        np.add.at(total, which, numbers)
-        nearest = np.where(labels < 0, 0.0, (total / count)[which][labels])
-        return nearest * carried(angles, labels, vertices, self.frames.angles) if turned else nearest
+        return self._transport.log_map(int(vertices[0]))
 
     def _vertices(self, sources: Sources) -> IntArray:
         return ordered_vertices(sources, self.operators.n)
-
-    def _extended(self, vertices: IntArray, values: FloatArray) -> FloatArray:
-        """`extend`, by two heat flows."""
-        largest = float(np.abs(values).max())
-        b = np.zeros((self.operators.n, 2))
-        np.add.at(b[:, 0], vertices, values / largest if largest > 0 else values)
-        np.add.at(b[:, 1], vertices, 1.0)
-        unit = SOURCE_HEAT / b[:, 1].max()
-        u, phi = self._heat_flow.solve(b * unit).T
-        warm = phi > LOWEST_HEAT
-        cold = self.reaches(vertices) & ~warm
-        if cold.any():
-            warn_caller(
-                f"heat does not reach {int(cold.sum())} vertices in double precision, vertex {int(np.argmax(cold))} "
-                "first: they get 0; raise t",
-                AccuracyWarning,
-            )
-        ratio = np.divide(u, phi, out=np.zeros_like(u), where=warm) * largest
-        # A mean of the values: what is beyond them is rounding.
-        return np.where(warm, np.clip(ratio, values.min(), values.max()), 0.0)
-
-    def _directions(self, vertices: IntArray, vectors: AnyArray) -> AnyArray:
-        """Unit numbers (n,), the directions of vectors that flow from the sources, or 0."""
-        b = np.zeros(self.operators.n, complex)
-        largest = float(np.abs(vectors).max())
-        np.add.at(b, vertices, vectors / largest if largest > 0 else vectors)
-        most = np.bincount(vertices).max()
-        Y = self._vector_flow.solve(b * (SOURCE_HEAT / most))
-        size = np.abs(Y)
-        # The diagonal is in every row, so that none is empty.
-        nearby = np.maximum.reduceat(size[self._pattern.indices], self._pattern.indptr[:-1])
-        return _unit(np.where(size > _CANCELLED * nearby, Y, 0.0))
-
-
-def _unit(Y: AnyArray) -> AnyArray:
-    """Complex numbers divided by their size; 0 where that is too small for a direction."""
-    size = np.abs(Y)
-    return np.divide(Y, size, out=np.zeros_like(Y), where=size > LOWEST_HEAT)

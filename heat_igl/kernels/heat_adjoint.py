@@ -6,7 +6,7 @@ A side c of a face runs between the corners c + 1 and c + 2; differences along i
 """
 
 import cython
-from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.heat_igl.kernels.face_fields import FaceField, normalize
 
 __all__ = ["elements", "normalized"]
 
@@ -35,9 +35,9 @@ def normalized(
     corner: cython.longlong[3]
     d: cython.double[3]
     q: cython.double[3]
+    field: FaceField
     with cython.nogil:
         for f in range(F.shape[0]):
-            largest: cython.double = 0.0
             by_area[f] = 0.0
             for c in range(3):
                 corner[c] = F[f, c]
@@ -47,31 +47,21 @@ def normalized(
                 d[c] = of_vertex[i, 0] - of_vertex[j, 0]
                 q[c] = of_vertex[i, 1] - of_vertex[j, 1]
                 by_weight[f, c] = q[c] * (of_vertex[i, 2] - of_vertex[j, 2])
-                largest = max(largest, fabs(d[c]))
-            if largest == 0.0 or full_rate[f] < 0.0:
+            if not normalize(d, cython.address(weight[f, 0]), area[f], full_rate[f], cython.address(field)):
                 continue
-            # Squares of the differences of heat may vanish: the largest is made 1 first.
-            scale: cython.double = 1.0 / largest
-            energy: cython.double = 0.0
             by_s: cython.double = 0.0
             for c in range(3):
-                d[c] = d[c] * scale
-                energy += weight[f, c] * d[c] * d[c]
                 by_s += weight[f, c] * q[c] * d[c]
-            if not energy > 0.0:
-                continue
-            s: cython.double = sqrt(area[f] / energy)
+            s: cython.double = field.s
             by_energy: cython.double = 0.0
-            if full_rate[f] * s * scale > 1.0:
-                # As d has been scaled, so is s.
-                s = largest / full_rate[f]
+            if field.is_damped:
                 by_log_t[component[corner[0]]] += 0.5 * by_s * s
             else:
-                by_energy = -0.5 * by_s * s / energy
+                by_energy = -0.5 * by_s * s / field.energy
                 by_area[f] = 0.5 * by_s * s / area[f]
             for c in range(3):
                 by_weight[f, c] += s * q[c] * d[c] + by_energy * d[c] * d[c]
-                q[c] = (s * q[c] + 2.0 * by_energy * d[c]) * weight[f, c] * scale
+                q[c] = (s * q[c] + 2.0 * by_energy * d[c]) * weight[f, c] * field.scale
             for c in range(3):
                 by_v[corner[c]] += q[(c + 2) % 3] - q[(c + 1) % 3]
 

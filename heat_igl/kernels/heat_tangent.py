@@ -4,7 +4,7 @@ Sides are those of `heat_igl.kernels.heat_adjoint`: c runs between the corners c
 """
 
 import cython
-from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.heat_igl.kernels.face_fields import FaceField, normalize
 
 __all__ = ["elements", "multiply", "normalized"]
 
@@ -101,34 +101,27 @@ def normalized(
     corner: cython.longlong[3]
     d: cython.double[3]
     of_d: cython.double[3]
+    field: FaceField
     with cython.nogil:
         for f in range(F.shape[0]):
-            largest: cython.double = 0.0
             for c in range(3):
                 corner[c] = F[f, c]
             for c in range(3):
                 i: cython.longlong = corner[(c + 1) % 3]
                 j: cython.longlong = corner[(c + 2) % 3]
                 d[c], of_d[c] = v[i] - v[j], of_v[i] - of_v[j]
-                largest = max(largest, fabs(d[c]))
-            if largest == 0.0 or full_rate[f] < 0.0:
+            if not normalize(d, cython.address(weight[f, 0]), area[f], full_rate[f], cython.address(field)):
                 continue
-            # Squares of the differences of heat may vanish: the largest is made 1 first.
-            scale: cython.double = 1.0 / largest
-            energy: cython.double = 0.0
             of_energy: cython.double = 0.0
             for c in range(3):
-                d[c], of_d[c] = d[c] * scale, of_d[c] * scale
-                energy += weight[f, c] * d[c] * d[c]
+                of_d[c] = of_d[c] * field.scale
                 of_energy += of_weight[f, c] * d[c] * d[c] + 2.0 * weight[f, c] * d[c] * of_d[c]
-            if not energy > 0.0:
-                continue
-            s: cython.double = sqrt(area[f] / energy)
-            of_s: cython.double = 0.5 * s * (of_area[f] / area[f] - of_energy / energy)
-            if full_rate[f] * s * scale > 1.0:
-                # As d has been scaled, so is s.
-                s = largest / full_rate[f]
+            s: cython.double = field.s
+            of_s: cython.double
+            if field.is_damped:
                 of_s = 0.5 * s * of_log_t[component[corner[0]]]
+            else:
+                of_s = 0.5 * s * (of_area[f] / area[f] - of_energy / field.energy)
             for c in range(3):
                 flux: cython.double = of_s * weight[f, c] * d[c]
                 flux += s * (of_weight[f, c] * d[c] + weight[f, c] * of_d[c])

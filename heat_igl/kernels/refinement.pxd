@@ -11,3 +11,17 @@ cdef extern from *:
 cdef enum:
     # A walk to a circumcenter crosses few triangles, since the triangulation is Delaunay.
     MOST_STEPS = 200
+
+# A point by the barycentric coordinates in a face; face -1 for no point.
+cdef struct Location:
+    long long face
+    double u, v, w
+
+# The straight walk in the plane of the first face: from, to, and the difference.
+cdef struct Ray:
+    double ox, oy, tx, ty, dx, dy
+
+# The side by which the walk leaves a face: the half-edge, and the ends of it to the right (r) and left (s) of the ray.
+cdef struct Exit:
+    long long h
+    double rx, ry, sx, sy

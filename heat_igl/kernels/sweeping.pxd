@@ -4,10 +4,8 @@ cdef extern from *:
     #define NEGLIGIBLE 3e-4
     // In a flat domain it is exact, provided that all changes are passed on.
     #define SWEEP_ROUNDING 1e-12
-    // Part of an edge by which a source has to lie beyond it: circles about its ends, nearly touching, lose digits.
-    #define CLOSE 1e-3
     """
-    double NEGLIGIBLE, SWEEP_ROUNDING, CLOSE
+    double NEGLIGIBLE, SWEEP_ROUNDING
 
 cdef enum:
     # Visits per vertex up to which the sweep goes back at once, and after which it gives up. Heat's order takes 1.1 in

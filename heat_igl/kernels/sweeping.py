@@ -1,14 +1,23 @@
 """Kernel of the sweep: distance by unfolding two triangles at a time, in a given order.
 
 Seen from a vertex v, a source lies behind the side ab of a triangle at v, at the intersection of circles about a and b.
-The triangle beyond ab has the third corner w, which is nearer to the source and so places it more accurately.
+The triangle beyond ab has the third corner w, which is nearer to the source and so places it more accurately:
+planar_updates.pxd has the formulas. Here is which vertex is updated when, and from which corners.
 """
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.half_edges import HalfEdges, Spoke
+from cython.cimports.heat_igl.kernels.half_edges import HalfEdges
+from cython.cimports.heat_igl.kernels.planar_updates import (
+    across_side,
+    across_two,
+    beyond_side,
+    comes_nearer_to_a,
+    front_across_side,
+    over_one,
+)
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
-from cython.cimports.heat_igl.kernels.sweeping import CACHED, CLOSE, GIVE_UP, GO_BACK, NEGLIGIBLE, SWEEP_ROUNDING
+from cython.cimports.heat_igl.kernels.sweeping import CACHED, GIVE_UP, GO_BACK, NEGLIGIBLE, SWEEP_ROUNDING
 from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["sweep"]
@@ -144,13 +153,13 @@ class _Sweep:
             if not min(da, db) < best:
                 continue
             if not self.has_labels:
-                squared = _across(da, db, s)
+                squared = across_side(da, db, s)
             elif self.label[s.neighbour] == self.label[s.next_neighbour]:
                 begin = self.offset[self.label[s.neighbour]]
-                squared = begin + sqrt(_across(da - begin, db - begin, s))
+                squared = begin + sqrt(across_side(da - begin, db - begin, s))
                 squared = squared * squared
             elif self.is_of_one_curve(self.label[s.neighbour], self.label[s.next_neighbour]):
-                squared = _across_straight(da, db, s)
+                squared = front_across_side(da, db, s)
                 squared = squared * squared
             else:
                 squared = self.between_cells(k, best, cython.address(ignored))
@@ -195,12 +204,12 @@ class _Sweep:
             if self.label[s.next_neighbour] != source[0]:
                 if not self.is_of_one_curve(source[0], self.label[s.next_neighbour]):
                     return self.between_cells(k, INFINITY, source)
-                if not _comes_nearer_to_a(da, db, s):
+                if not comes_nearer_to_a(da, db, s):
                     source[0] = self.label[s.next_neighbour]
                 return across
             begin = self.offset[source[0]]
         if w >= 0 and self.d[w] < across and (not self.has_labels or self.label[w] == source[0]):
-            squared: cython.double = _across_two(da - begin, db - begin, self.d[w] - begin, s)
+            squared: cython.double = across_two(da - begin, db - begin, self.d[w] - begin, s)
             if squared < INFINITY:
                 return begin + sqrt(squared)
         return across
@@ -229,9 +238,9 @@ class _Sweep:
             return best
         begin: cython.double = self.offset[self.label[w]]
         if self.label[w] == self.label[s.neighbour]:
-            best = begin + sqrt(_over_one(self.d[s.neighbour] - begin, self.d[w] - begin, True, s))
+            best = begin + sqrt(over_one(self.d[s.neighbour] - begin, self.d[w] - begin, True, s))
         elif self.label[w] == self.label[s.next_neighbour]:
-            best = begin + sqrt(_over_one(self.d[s.next_neighbour] - begin, self.d[w] - begin, False, s))
+            best = begin + sqrt(over_one(self.d[s.next_neighbour] - begin, self.d[w] - begin, False, s))
         source[0] = self.label[w]
         return best
 
@@ -296,7 +305,7 @@ class _Sweep:
                 not self.is_stale[a]
                 and db < da
                 and 2.0 * da * s.along < right * right
-                and _beyond_side(s.base, s.along, s.height, left, db, dv) < da * da * self.kept(a)
+                and beyond_side(s.base, s.along, s.height, left, db, dv) < da * da * self.kept(a)
             ):
                 self.is_stale[a] = True
                 lowest = min(lowest, self.rank[a])
@@ -304,7 +313,7 @@ class _Sweep:
                 not self.is_stale[b]
                 and da < db
                 and 2.0 * db * (s.base - s.along) < left * left
-                and _beyond_side(s.base, s.base - s.along, s.height, right, da, dv) < db * db * self.kept(b)
+                and beyond_side(s.base, s.base - s.along, s.height, right, da, dv) < db * db * self.kept(b)
             ):
                 self.is_stale[b] = True
                 lowest = min(lowest, self.rank[b])
@@ -317,151 +326,3 @@ class _Sweep:
     def kept(self, v: cython.int) -> cython.double:
         """The part of v's distance above which a smaller one is no news."""
         return 1 - SWEEP_ROUNDING if self.is_flat[v] else 1 - NEGLIGIBLE
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _across(da: cython.double, db: cython.double, s: cython.pointer[cython.const[Spoke]]) -> cython.double:
-    """Squared distance from v of the source that is at distances da and db from the ends of the side opposite v.
-
-    ``inf`` unless the straight line between them crosses that side. Without branches, which at random cost more than
-    the arithmetic.
-    """
-    x: cython.double = 0.5 * ((da - db) * (da + db) / s.base + s.base)
-    y_squared: cython.double = da * da - x * x
-    y: cython.double = sqrt(max(y_squared, 0.0))
-    crossing: cython.double = x * s.height + s.along * y  # times y + height
-    squared: cython.double = (s.along - x) * (s.along - x) + (s.height + y) * (s.height + y)
-    return squared if (y_squared >= 0) & (crossing >= 0) & (crossing <= (y + s.height) * s.base) else INFINITY
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _across_straight(da: cython.double, db: cython.double, s: cython.pointer[cython.const[Spoke]]) -> cython.double:
-    """Distance at v of a straight front that is at distances da and db at the ends of the side opposite v.
-
-    ``inf`` unless the straight line in which it comes to v crosses that side.
-    """
-    slope: cython.double = (db - da) / s.base
-    rise_squared: cython.double = 1.0 - slope * slope
-    rise: cython.double = sqrt(max(rise_squared, 0.0))
-    foot: cython.double = s.along * rise - s.height * slope  # times rise
-    is_crossed: cython.bint = (foot >= 0) & (foot <= rise * s.base)
-    return da + slope * s.along + rise * s.height if is_crossed else INFINITY
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _comes_nearer_to_a(da: cython.double, db: cython.double, s: cython.pointer[cython.const[Spoke]]) -> cython.bint:
-    """Whether a straight front comes to v across the side ab nearer to a than to b."""
-    slope: cython.double = (db - da) / s.base
-    rise: cython.double = sqrt(max(1.0 - slope * slope, 0.0))
-    return s.along * rise - s.height * slope < 0.5 * rise * s.base
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _across_two(
-    da: cython.double, db: cython.double, dw: cython.double, s: cython.pointer[cython.const[Spoke]]
-) -> cython.double:
-    """Squared distance from v of the source behind ab, as the corner w beyond ab and one of a and b know it.
-
-    The line to the source as a and b know it leaves the farther triangle between w and p, one of them; it is drawn anew
-    to the intersection of circles about p and w. If that is on the other side of w, the path bends at w. ``inf`` if a
-    and b know better: the source lies in the farther triangle, or hidden by p.
-    """
-    # a in the origin, b on the first axis, v above it, w at (wx, -wy).
-    wx: cython.double = s.beyond_along
-    wy: cython.double = s.beyond_depth
-    x: cython.double = 0.5 * ((da - db) * (da + db) / s.base + s.base)
-    y: cython.double = sqrt(max(da * da - x * x, 0.0))
-    ux: cython.double = s.along - wx
-    uy: cython.double = s.height + wy
-    is_right: cython.bint = ux * (y + s.height) < uy * (s.along - x)
-    sign: cython.double = 1.0 if is_right else -1.0
-    px: cython.double = 0.0 if is_right else s.base
-    dp: cython.double = da if is_right else db
-    ex: cython.double = wx - px
-    square: cython.double = ex * ex + wy * wy
-    if not sign * (y * ex - (x - px) * wy) > CLOSE * square:
-        return INFINITY
-    along: cython.double = 0.5 * ((dp - dw) * (dp + dw) / square + 1.0)
-    h: cython.double = sign * sqrt(max(dp * dp / square - along * along, 0.0))
-    sx: cython.double = s.along - px - along * ex + h * wy
-    sy: cython.double = s.height + along * wy + h * ex
-    if sign * (ux * sy - uy * sx) > 0:
-        bent: cython.double = sqrt(ux * ux + uy * uy) + dw
-        return bent * bent
-    return sx * sx + sy * sy if sign * ((s.along - px) * sy - s.height * sx) >= 0 else INFINITY
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _over_one(
-    dp: cython.double, dw: cython.double, is_right: cython.bint, s: cython.pointer[cython.const[Spoke]]
-) -> cython.double:
-    """Squared distance from v of the source at distances dp from one end of ab, a if `is_right`, and dw from w.
-
-    ``inf`` unless the straight line between them crosses ab, and then passes between that end and w.
-    """
-    # a in the origin, b on the first axis, v above it, w at (wx, -wy).
-    sign: cython.double = 1.0 if is_right else -1.0
-    px: cython.double = 0.0 if is_right else s.base
-    ex: cython.double = s.beyond_along - px
-    wy: cython.double = s.beyond_depth
-    square: cython.double = ex * ex + wy * wy
-    along: cython.double = 0.5 * ((dp - dw) * (dp + dw) / square + 1.0)
-    h_squared: cython.double = dp * dp / square - along * along
-    if not (square > 0 and h_squared >= 0):
-        return INFINITY
-    h: cython.double = sign * sqrt(h_squared)
-    # From the source to v, as in `_across_two`.
-    sx: cython.double = s.along - px - along * ex + h * wy
-    sy: cython.double = s.height + along * wy + h * ex
-    ux: cython.double = s.along - s.beyond_along
-    uy: cython.double = s.height + wy
-    crossing: cython.double = s.along * sy - s.height * sx  # of ab, times sy
-    if (
-        sy > 0
-        and 0.0 <= crossing <= s.base * sy
-        and sign * ((s.along - px) * sy - s.height * sx) >= 0
-        and sign * (ux * sy - uy * sx) <= 0
-    ):
-        return sx * sx + sy * sy
-    return INFINITY
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _beyond_side(
-    base: cython.double,
-    along: cython.double,
-    height: cython.double,
-    side: cython.double,
-    db: cython.double,
-    dv: cython.double,
-) -> cython.double:
-    """Squared distance of a by a straight line over the side vb, of length `side`; ``inf`` if there is none.
-
-    a lies in the origin, b on the first axis, v at (along, height).
-    """
-    per_side: cython.double = 1.0 / (side * side)
-    x: cython.double = 0.5 * ((dv - db) * (dv + db) * per_side + 1.0)
-    y_squared: cython.double = dv * dv * per_side - x * x
-    if not y_squared >= 0:
-        return INFINITY
-    y: cython.double = sqrt(y_squared)
-    sx: cython.double = along + x * (base - along) + y * height
-    sy: cython.double = height - x * height + y * (base - along)
-    return sx * sx + sy * sy if sy >= 0 and along * sy <= height * sx else INFINITY

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels import dissection as kernel
+from heat_igl.kernels import dissection, graphs
 from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 
 __all__ = ["Dissection", "dissect"]
@@ -63,7 +63,7 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
     n = len(ends) - 1
     # A vertex with very many neighbours belongs to every separator.
     is_hub = np.diff(ends) > max(10 * np.sqrt(n), 64)
-    others = kernel.along_surface(ends, neighbours, is_hub.view(np.uint8))
+    others = graphs.breadth_first(ends, neighbours, is_hub.view(np.uint8))
     order = np.concatenate([others, np.flatnonzero(is_hub).astype(np.int32)])
     inner = n - int(is_hub.sum())
     is_start, parent = np.zeros(n, np.uint8), np.full(n, -1, np.int64)
@@ -74,17 +74,17 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
         """Dissect order[low:high], or cut it once if it is large, and return the pieces left to dissect."""
         some = np.arange(high - low, dtype=np.int32)
         parent_here = parent[low:high]
-        rest = kernel.dissect_pieces(*graph, some, is_start[low:high], parent_here, large)
+        rest = dissection.dissect_pieces(*graph, some, is_start[low:high], parent_here, large)
         order[low:high] = order[low:high][some]
         parent_here[:] = np.where(parent_here < 0, above, parent_here + low)
         return [
-            (kernel.subgraph(*graph, some[first:end]), low + first, low + end, above if up < 0 else up + low)
+            (graphs.subgraph(*graph, some[first:end]), low + first, low + end, above if up < 0 else up + low)
             for first, end, up in rest.tolist()
         ]
 
     pieces = [
         (graph, low, high, inner if inner < n else -1)
-        for graph, low, high in _apart(*kernel.subgraph(ends, neighbours, order[:inner]))
+        for graph, low, high in _apart(*graphs.subgraph(ends, neighbours, order[:inner]))
     ]
     running: set[Future[list[Any]]] = set()
     while pieces or running:

@@ -27,14 +27,6 @@ function discRadii(V, F) {
   return Float32Array.from(total, (sum, v) => 0.62 * (count[v] ? sum / count[v] : all));
 }
 
-// A round number near a sixteenth.
-function roundSpacing(largest) {
-  const power = 10 ** Math.floor(Math.log10(largest / 16));
-  const steps = [1, 2, 5, 10, 20, 50].map((digit) => digit * power);
-  const off = (step) => Math.abs(Math.log(largest / 16 / step));
-  return steps.reduce((best, step) => (off(step) < off(best) ? step : best));
-}
-
 // Needles: one on one triangle in each cell of a grid. Side of the cells, in units of half the extent of the surface, and sizes of a needle in sides of a cell.
 const CELL = 0.085, LENGTH = 0.75, WIDTH = 0.2;
 
