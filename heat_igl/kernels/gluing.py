@@ -7,9 +7,9 @@ mesh that is asked once; `heat_igl.intrinsic` does the same with numpy, and keep
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge, twice_area
-from cython.cimports.libc.math import sqrt
+from cython.cimports.libc.math import INFINITY, sqrt
 
-__all__ = ["breadth_first", "flip", "glue"]
+__all__ = ["breadth_first", "flip", "glue", "has_needles"]
 
 
 def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double][:, ::1], scale: cython.double):
@@ -45,110 +45,118 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
     ring: cython.int[::1] = rings
     aligned: cython.uchar[::1] = alignment
     length: cython.double[::1] = lengths
-    end: cython.int[::1] = np.zeros(n + 1, np.int32)
-    by_lower: cython.int[::1] = np.empty(3 * m, np.int32)
-    # The first half-edge to each vertex from the lower vertex in `seen_from`.
-    seen: cython.int[::1] = np.empty(n, np.int32)
-    seen_from: cython.int[::1] = np.full(n, -1, np.int32)
-    n_across: cython.int = 0
-    f: cython.int
-    c: cython.int
     h: cython.int
-    i: cython.int = 0
-    lower: cython.int
+    sides: cython.int[:, ::1] = np.empty((3 * m, 2), np.int32)
+    begin: cython.int[::1] = np.zeros(n + 1, np.int32)
+    seen: cython.int[::1] = np.zeros(n, np.int32)
+    n_across: cython.int = 0
     with cython.nogil:
-        for f in range(m):
-            for c in range(3):
-                vertex[3 * f + c] = F[f, c]
-                twin[3 * f + c] = -1
-                ring[3 * f + c] = 3 * f + c
-        _sort_by_lower_end(vertex, end, by_lower)
-        for lower in range(n):
-            while i < end[lower]:
-                h = by_lower[i]
-                i += 1
-                tail: cython.int = vertex[next_half_edge(h)]
-                head: cython.int = vertex[previous_half_edge(h)]
-                upper: cython.int = head if tail == lower else tail
-                if seen_from[upper] != lower:
-                    seen_from[upper] = lower
-                    seen[upper] = h
-                    x: cython.double = V[tail, 0] - V[head, 0]
-                    y: cython.double = V[tail, 1] - V[head, 1]
-                    z: cython.double = V[tail, 2] - V[head, 2]
-                    x, y, z = scale * x, scale * y, scale * z
-                    length[h] = sqrt(x * x + y * y + z * z)
-                else:
-                    p: cython.int = seen[upper]
-                    length[h] = length[p]
-                    n_across += _join(twin, ring, aligned, p, h, vertex[next_half_edge(p)] != tail)
+        _by_lower_end(F, vertex, sides, begin)
+        _glue_sides(V, scale, sides, begin, seen, vertex, twin, ring, aligned, length)
+        n_across = 3 * m
+        for h in range(3 * m):
+            n_across -= aligned[h]
     return vertices, twins, rings, alignment, lengths, n_across
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def _sort_by_lower_end(
-    vertex: cython.const[cython.int][::1], end: cython.int[::1], by_lower: cython.int[::1]
+def _by_lower_end(
+    F: cython.const[cython.longlong][:, ::1],
+    vertex: cython.int[::1],
+    sides: cython.int[:, ::1],
+    begin: cython.int[::1],
 ) -> cython.void:
-    """Sort half-edges by the end with the smaller number, by counting.
+    """Copy the faces, and put their half-edges, each with the upper end, in the order of the lower end.
 
-    `end` (n + 1,), given as zeros, is set to the end in `by_lower` (3 m,) of the half-edges of each lower vertex.
+    `begin` (n + 1,), which must come full of 0, takes where the half-edges of each lower end begin, moved by one vertex:
+    those of v end at ``begin[v]``.
     """
-    h: cython.int
+    f: cython.int
     i: cython.int
-    tail: cython.int
-    head: cython.int
-    lower: cython.int
-    for h in range(vertex.shape[0]):
-        tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
-        end[(tail if tail < head else head) + 1] += 1
-    for i in range(end.shape[0] - 1):
-        end[i + 1] += end[i]
-    # Now end[v] is the beginning for vertex v, and moves on with each half-edge.
-    for h in range(vertex.shape[0]):
-        tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
-        lower = tail if tail < head else head
-        by_lower[end[lower]] = h
-        end[lower] += 1
+    at: cython.int
+    a: cython.int
+    b: cython.int
+    c: cython.int
+    for f in range(F.shape[0]):
+        a, b, c = cython.cast(cython.int, F[f, 0]), cython.cast(cython.int, F[f, 1]), cython.cast(cython.int, F[f, 2])
+        vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2] = a, b, c
+        begin[min(b, c) + 1] += 1
+        begin[min(c, a) + 1] += 1
+        begin[min(a, b) + 1] += 1
+    for i in range(begin.shape[0] - 1):
+        begin[i + 1] += begin[i]
+    for f in range(F.shape[0]):
+        a, b, c = vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2]
+        at = begin[min(b, c)]
+        begin[min(b, c)] = at + 1
+        sides[at, 0], sides[at, 1] = 3 * f, max(b, c)
+        at = begin[min(c, a)]
+        begin[min(c, a)] = at + 1
+        sides[at, 0], sides[at, 1] = 3 * f + 1, max(c, a)
+        at = begin[min(a, b)]
+        begin[min(a, b)] = at + 1
+        sides[at, 0], sides[at, 1] = 3 * f + 2, max(a, b)
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def _join(
+def _glue_sides(
+    V: cython.const[cython.double][:, ::1],
+    scale: cython.double,
+    sides: cython.int[:, ::1],
+    end: cython.int[::1],
+    seen: cython.int[::1],
+    vertex: cython.int[::1],
     twin: cython.int[::1],
     ring: cython.int[::1],
     aligned: cython.uchar[::1],
-    p: cython.int,
-    h: cython.int,
-    is_aligned: cython.bint,
-) -> cython.int:
-    """Glue half-edge h to the first one of the same edge, p, and to all others there.
-
-    `is_aligned` says whether p and h run in opposite directions.
-
-    Returns how many more half-edges are glued to one that runs in the same direction.
-    """
-    q: cython.int = twin[p]
-    across: cython.int = 0
-    if q == -1:
-        twin[p], twin[h] = h, p
-        if not is_aligned:
-            aligned[p] = aligned[h] = False
-            across = 2
-        return across
-    if q >= 0:
-        across = 0 if aligned[p] else -2
-        aligned[p] = aligned[q] = True
-        twin[p] = twin[q] = -2
-        ring[p], ring[q] = q, p
-    twin[h] = -2
-    ring[h] = ring[p]
-    ring[p] = h
-    return across
+    length: cython.double[::1],
+) -> cython.void:
+    """Glue half-edges that have both ends in common, and measure them. `seen` (n,) is working space, full of 0."""
+    lower: cython.int
+    upper: cython.int
+    first: cython.int
+    i: cython.int = 0
+    h: cython.int
+    p: cython.int
+    q: cython.int
+    x: cython.double
+    y: cython.double
+    z: cython.double
+    for lower in range(V.shape[0]):
+        first = i
+        while i < end[lower]:
+            h, upper = sides[i, 0], sides[i, 1]
+            p = seen[upper]
+            if not (first <= p < i and sides[p, 1] == upper):
+                # The first half-edge of this edge.
+                seen[upper] = i
+                i += 1
+                x, y, z = V[upper, 0] - V[lower, 0], V[upper, 1] - V[lower, 1], V[upper, 2] - V[lower, 2]
+                x, y, z = scale * x, scale * y, scale * z
+                length[h] = sqrt(x * x + y * y + z * z)
+                twin[h], ring[h] = -1, h
+                continue
+            i += 1
+            p = sides[p, 0]
+            length[h] = length[p]
+            ring[h] = h
+            if twin[p] == -1:
+                twin[p], twin[h] = h, p
+                if vertex[next_half_edge(p)] == vertex[next_half_edge(h)]:
+                    aligned[p] = aligned[h] = False
+                continue
+            if twin[p] >= 0:
+                q = twin[p]
+                aligned[p] = aligned[q] = True
+                twin[p] = twin[q] = -2
+                ring[p], ring[q] = q, p
+            twin[h] = -2
+            ring[h] = ring[p]
+            ring[p] = h
 
 
 @cython.cfunc
@@ -162,6 +170,22 @@ def _move(ring: cython.int[::1], old: cython.int, new: cython.int) -> cython.voi
     ring[h] = new
     ring[new] = ring[old]
     ring[old] = old
+
+
+def has_needles(length: cython.double[::1], margin: cython.double) -> bool:
+    """Whether in some face two sides (3 m,) exceed the third by less than `margin` times the longest side of all."""
+    h: cython.Py_ssize_t
+    total: cython.double
+    longest: cython.double
+    least: cython.double = INFINITY
+    longest_of_all: cython.double = 0.0
+    with cython.nogil:
+        for h in range(0, length.shape[0], 3):
+            total = length[h] + length[h + 1] + length[h + 2]
+            longest = max(max(length[h], length[h + 1]), length[h + 2])
+            longest_of_all = max(longest_of_all, longest)
+            least = min(least, total - 2.0 * longest)
+    return least < margin * longest_of_all
 
 
 def flip(
@@ -181,15 +205,20 @@ def flip(
     flips.vertex, flips.twin, flips.ring, flips.length = vertex, twin, ring, length
     flips.area = np.empty(twin.shape[0] // 3)
     flips.waiting, flips.is_waiting = np.empty(twin.shape[0], np.int32), np.zeros(twin.shape[0], np.uint8)
+    flips.is_obtuse = np.empty(twin.shape[0], np.uint8)
     n_flips: cython.longlong = 0
     f: cython.int
     h: cython.int
     first: cython.int
+    beyond: cython.int
     with cython.nogil:
         for f in range(twin.shape[0] // 3):
             flips.area[f] = twice_area(length[3 * f], length[3 * f + 1], length[3 * f + 2])
+            flips.compare(3 * f)
         for first in range(twin.shape[0]):
-            if twin[first] < first:
+            # Without a branch for each test: which half-edge of an edge comes first is as good as random.
+            beyond = max(first, twin[first])
+            if (twin[first] < first) | (flips.is_obtuse[first] == 0) & (flips.is_obtuse[beyond] == 0):
                 continue
             flips.waiting[0], flips.is_waiting[first] = first, True
             flips.n_waiting = 1
@@ -213,6 +242,7 @@ class _Flips:
     ring: cython.int[::1]
     length: cython.double[::1]
     area: cython.double[::1]  # twice that of each face
+    is_obtuse: cython.uchar[::1]  # the angle opposite each half-edge; between two that are not, no edge is flipped
     waiting: cython.int[::1]
     is_waiting: cython.uchar[::1]
     n_waiting: cython.int
@@ -220,6 +250,18 @@ class _Flips:
     diagonal: cython.double
     area_of_f: cython.double
     area_of_g: cython.double
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def compare(self, h: cython.int) -> cython.void:
+        """Which angles of a face are obtuse, that begins with half-edge h: the terms are those of `improves`."""
+        a: cython.double = self.length[h] * self.length[h]
+        b: cython.double = self.length[h + 1] * self.length[h + 1]
+        c: cython.double = self.length[h + 2] * self.length[h + 2]
+        self.is_obtuse[h] = b + c < a
+        self.is_obtuse[h + 1] = c + a < b
+        self.is_obtuse[h + 2] = a + b < c
 
     @cython.cfunc
     @cython.nogil
@@ -286,6 +328,8 @@ class _Flips:
         self.twin[after_h], self.twin[after_t] = after_t, after_h
         self.glue(after_t, h, of_aq)
         self.glue(after_h, t, of_bp)
+        self.compare(h - h % 3)
+        self.compare(t - t % 3)
         self.wait(h)
         self.wait(previous_half_edge(h))
         self.wait(t)
@@ -341,10 +385,10 @@ def breadth_first(
     n_met: cython.int = 0
     n_done: cython.int = 0
     n_numbered: cython.int = 0
+    has_many: cython.bint = False
     first: cython.int
     c: cython.int
     f: cython.int
-    i: cython.int
     h: cython.int
     t: cython.int
     v: cython.int
@@ -367,20 +411,23 @@ def breadth_first(
                     new_length[3 * n_done + c] = length[h + c]
                     new_aligned[3 * n_done + c] = aligned[h + c]
                     t = twin[h + c]
-                    if t >= 0 and place[t // 3] < 0:
-                        place[t // 3] = n_met
-                        face[n_met] = t // 3
-                        n_met += 1
+                    if t >= 0:
+                        f = t // 3
+                        if place[f] < 0:
+                            place[f] = n_met
+                            face[n_met] = f
+                            n_met += 1
+                        t = 3 * place[f] + t % 3
+                    has_many |= t == -2
+                    new_twin[3 * n_done + c] = t
+                    new_ring[3 * n_done + c] = 3 * n_done + c
                 n_done += 1
         for v in range(n):
             if number[v] < 0:
                 number[v] = n_numbered
                 n_numbered += 1
-        for i in range(m):
-            for c in range(3):
-                h = 3 * face[i] + c
-                t = twin[h]
-                new_twin[3 * i + c] = 3 * place[t // 3] + t % 3 if t >= 0 else t
-                t = ring[h]
-                new_ring[3 * i + c] = 3 * i + c if t == h else 3 * place[t // 3] + t % 3
+        if has_many:
+            for h in range(3 * m):
+                t = ring[3 * face[h // 3] + h % 3]
+                new_ring[h] = 3 * place[t // 3] + t % 3
     return vertices, twins, rings, alignment, lengths, numbers, faces

@@ -15,6 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError
+from heat_igl.kernels import mesh_arrays
 from heat_igl.mesh import connectivity
 from heat_igl.mesh.quadrilaterals import first_quadrilateral
 from heat_igl.mesh.report import MeshReport, mesh_report
@@ -58,8 +59,8 @@ def checked_positions(V: ArrayLike) -> FloatArray:
     with np.errstate(over="ignore"):
         positions = np.zeros((len(array), 3))
         positions[:, : array.shape[1]] = array
-    bad = ~np.isfinite(positions)
-    if bad.any():
+    if not mesh_arrays.all_finite(positions):
+        bad = ~np.isfinite(positions)
         row, column = (int(i) for i in np.argwhere(bad)[0])
         raise MeshError(
             f"V[{row}, {column}] is {positions[row, column]} ({int(bad.any(axis=1).sum())} of {len(positions)} "
@@ -93,19 +94,20 @@ def checked_faces(F: ArrayLike, n: int | None, *, may_repeat: bool = False) -> I
             f"F must have shape (m, 3) for triangles or (m, 4) for tetrahedra, but it has shape {array.shape}"
         )
     n = int(array.max()) + 1 if n is None else n
-    outside = (array < 0) | (array >= n)
-    if outside.any():
+    faces = np.array(array, dtype=np.int64, order="C", copy=True)
+    fault = mesh_arrays.first_fault(faces, n)
+    if fault == mesh_arrays.OUTSIDE:
+        outside = (array < 0) | (array >= n)
         row, column = (int(i) for i in np.argwhere(outside)[0])
         hint = "; the indices look 1-based, subtract 1" if array.min() == 1 and array.max() == n else ""
         raise MeshError(
             f"F[{row}, {column}] = {array[row, column]} is no vertex ({int(outside.any(axis=1).sum())} of {len(array)} "
             f"faces are affected): there are {n} vertices, so indices run from 0 to {n - 1}{hint}"
         )
-    faces = np.array(array, dtype=np.int64, order="C", copy=True)
-    repeats = np.zeros(len(faces), bool)
-    for one, other in combinations(faces.T, 2):
-        repeats |= one == other
-    if repeats.any() and not may_repeat:
+    if fault == mesh_arrays.REPEATS and not may_repeat:
+        repeats = np.zeros(len(faces), bool)
+        for one, other in combinations(faces.T, 2):
+            repeats |= one == other
         row = int(np.flatnonzero(repeats)[0])
         raise MeshError(
             f"F[{row}] = {faces[row].tolist()} repeats a vertex ({int(repeats.sum())} of {len(faces)} faces do): "
@@ -166,11 +168,9 @@ class Mesh:
             )
 
     def _hold(self, positions: FloatArray, faces: IntArray) -> None:
-        is_used = np.zeros(len(positions), bool)
-        is_used[faces] = True
-        used = positions[is_used]
+        low, high = mesh_arrays.bounds(positions, faces)
         with np.errstate(over="ignore"):
-            extent = float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
+            extent = float(np.linalg.norm(high - low))
         if extent == 0:
             raise MeshError("all vertices in V that F uses lie in one point: there is no distance to measure")
         if not _SMALLEST_EXTENT < extent < _LARGEST_EXTENT:

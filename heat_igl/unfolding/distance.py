@@ -201,7 +201,7 @@ def _from_vertices(mesh: Mesh, sources: SourceSet, cutoff: float) -> FloatArray:
     faces = _within_reach(mesh, sources, cutoff)
     if faces.mean() > _MOST_OF_IT:
         surface = ExactSurface(from_mesh(mesh, int(sources.vertices[0])))
-        return surface.solve(sources.vertices, sources.vertex_offset, cutoff=cutoff).distance
+        return surface.distance(sources.vertices, sources.vertex_offset, cutoff)
     distance = np.full(mesh.n_vertices, np.inf)
     distance[sources.vertices] = np.where(sources.vertex_offset <= cutoff, sources.vertex_offset, np.inf)
     used, numbers = np.unique(mesh.F[faces], return_inverse=True)
@@ -209,7 +209,7 @@ def _from_vertices(mesh: Mesh, sources: SourceSet, cutoff: float) -> FloatArray:
     if is_there.any():
         at = np.searchsorted(used, sources.vertices[is_there])
         surface = ExactSurface(from_mesh(Mesh(mesh.V[used], numbers.reshape(-1, 3)), int(at[0])))
-        distance[used] = surface.solve(at, sources.vertex_offset[is_there], cutoff=cutoff).distance
+        distance[used] = surface.distance(at, sources.vertex_offset[is_there], cutoff)
     return distance
 
 

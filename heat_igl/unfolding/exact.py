@@ -160,6 +160,15 @@ class ExactSurface:
             self._leaving(done),
         )
 
+    def distance(self, sources: IntArray, offsets: FloatArray | None = None, cutoff: float = np.inf) -> FloatArray:
+        """Distance (n,) from vertices alone, as `solve` finds it, without the origins of the paths."""
+        edges = self._half_edges
+        done = search(edges, starts_at(edges, sources, offsets, None, None, None), cutoff=cutoff)
+        distance = edges.unscaled(done.found.distance[edges.number])
+        if cutoff < np.inf:
+            distance[distance > cutoff] = np.inf
+        return distance
+
     def located(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray]:
         """Triangles that hold points of the mesh, coordinates in them, and which point each is.
 
@@ -225,4 +234,4 @@ def exact_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, cutoff: floa
     if mesh.is_tetrahedral:
         raise MeshError("exact distance needs triangles, but F has 4 columns")
     chosen = vertex_sources(sources, mesh.n_vertices)
-    return ExactSurface(from_mesh(mesh, int(chosen[0]))).solve(chosen, cutoff=cutoff).distance
+    return ExactSurface(from_mesh(mesh, int(chosen[0]))).distance(chosen, cutoff=cutoff)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -124,8 +125,13 @@ class HalfEdges:
         }
         is_delaunay = window_surface.shapes(vertex, length, twin, **derived)
         self.tables = Tables(vertex, length, twin, aligned, ring, **derived, is_delaunay=is_delaunay)
-        self.old_vertex = np.empty(n, np.int64)
-        self.old_vertex[self.number] = np.arange(n)
+
+    @cached_property
+    def old_vertex(self) -> IntArray:
+        """The caller's number (n,) of each vertex."""
+        vertex = np.empty(self.n, np.int64)
+        vertex[self.number] = np.arange(self.n)
+        return vertex
 
     def scaled(self, lengths: FloatArray | float) -> FloatArray:
         """Lengths of the caller in the unit of the tables."""

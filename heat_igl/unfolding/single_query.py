@@ -120,7 +120,7 @@ class SingleQuery:
         ring, aligned = np.arange(size, dtype=np.int32), np.ones(size, np.uint8)
         edges = HalfEdges(sides.vertex, sides.twin, ring, aligned, sides.length, len(self.number), self.exponent)
         rows = self.number[self.sources].astype(np.int64)
-        return ExactSurface(edges).solve(rows, np.zeros(len(rows))).distance[self.number]
+        return ExactSurface(edges).distance(rows)[self.number]
 
 
 def _along_edges(found: Glued, n: int, sources: IntArray) -> FloatArray:
