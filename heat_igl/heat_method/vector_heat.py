@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import AccuracyWarning, MeshError, SourceError
+from heat_igl.errors import AccuracyWarning, MeshError, SourceError, real_numbers
 from heat_igl.heat_method.directions import carried
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.outward_field import OutwardField
@@ -205,7 +205,7 @@ class VectorHeatSolver:
         The ratio u / phi of two heat flows, that of the values and that of ones (equation 5 of the paper).
         """
         vertices = self._vertices(sources)
-        given = checked_vectors("values", np.reshape(values, (-1, 1)), len(vertices), 1)[:, 0]
+        given = checked_vectors("values", real_numbers("values", values).reshape(-1, 1), len(vertices), 1)[:, 0]
         if self._follows_paths:
             return self._along_paths(vertices, given)
         return self._extended(vertices, given)
