@@ -1,10 +1,16 @@
-"""Errors and warnings, one class per remedy."""
+"""Errors and warnings, one class per remedy.
+
+`positive`, `require_choice` and `real_numbers` check single arguments for all rooms, in the same words.
+"""
 
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+
+import numpy as np
+import numpy.typing as npt
 
 __all__ = [
     "AccuracyWarning",
@@ -150,3 +156,47 @@ class AccuracyWarning(UserWarning):
     >>> solver.diagnostics.t_raised
     True
     """
+
+
+def shown(value: object) -> str:
+    """`value` as an error message shows it: on one line, and arrays by their shape."""
+    shape, dtype = getattr(value, "shape", None), getattr(value, "dtype", None)
+    if shape and dtype is not None:
+        return f"an array of {dtype} of shape {tuple(shape)}"
+    text = repr(value)
+    return text if len(text) <= 80 and "\n" not in text else f"this {type(value).__name__}"
+
+
+def is_number(value: object) -> bool:
+    """Whether `value` is a real number. Truth values and texts that look like numbers are mistakes of the caller."""
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
+def positive(name: str, value: object, *, infinite: bool = False) -> float:
+    """`value` as a float; a ValueError that calls it `name` if it is not a positive number.
+
+    With `infinite`, infinity is one.
+    """
+    try:
+        number = float(value) if is_number(value) else np.nan  # type: ignore[arg-type]
+    except OverflowError:
+        number = np.inf
+    if not (number > 0 and (infinite or np.isfinite(number))):
+        raise ValueError(f"{name} must be a positive number, not {shown(value)}")
+    return number
+
+
+def require_choice(name: str, value: object, choices: Iterable[str | None]) -> None:
+    """Raise a ValueError that calls `value` `name` and lists the `choices` if it is none of them."""
+    known = list(choices)
+    # Arrays compare entry by entry.
+    if not (isinstance(value, (str, type(None))) and value in known):
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, known))}, not {shown(value)}")
+
+
+def real_numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """`values` as a new float64 array; a ValueError that calls them `name` if they are no real numbers."""
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} must be real numbers in an array, not {shown(values)}") from None

@@ -145,6 +145,147 @@ def source_cases() -> Iterator[Case]:
         yield source_case(f"mask of {length}", np.ones(length, bool), f"has {length} entries.*has 42 vertices")
 
 
+# --- other arguments --------------------------------------------------------------------------------------------------
+
+
+def argument_case(name: str, run: Callable[[heat_igl.Mesh], Any], *patterns: str, error: str = "ValueError") -> Case:
+    return Case(f"argument: {name}", lambda _: run(heat_igl.shapes.icosphere(1)), patterns, error)
+
+
+def number_cases() -> Iterator[Case]:
+    """Single numbers: other types, arrays, which are named by their shape, and numbers that make no sense."""
+    ways: dict[str, Callable[[heat_igl.Mesh, Any], Any]] = {
+        "cutoff": lambda mesh, value: heat_igl.geodesic_distance(mesh, 0, cutoff=value),
+        "t": lambda mesh, value: heat_igl.HeatMethodSolver(mesh, t=value),
+        "radius": lambda mesh, value: heat_igl.distances_within(mesh, value),
+        "longest": lambda mesh, value: heat_igl.split_long_edges(mesh, value),
+        "tolerance": lambda mesh, value: heat_igl.curve_on(mesh, mesh.V[mesh.F[0, :2]], tolerance=value),
+        "spacing": lambda _, value: heat_igl.VoxelBox((0, 0, 0), value, (2, 2, 2)),
+    }
+    for name, ask in ways.items():
+        yield argument_case(f"{name}, neighbour", lambda mesh, ask=ask: ask(mesh, 1.0))
+        for bad in (0, -1.0, np.nan, True, "1", [1.0], 1j, None if name == "radius" else (), np.ones(50)):
+            shape = r"not an array of float64 of shape \(50,\)$" if isinstance(bad, np.ndarray) else "not "
+            refused = f"{name} must be a positive number, {shape}"
+            yield argument_case(f"{name} = {bad!r:.20}", lambda mesh, ask=ask, bad=bad: ask(mesh, bad), refused)
+
+
+def choice_cases() -> Iterator[Case]:
+    ways: dict[str, Callable[[heat_igl.Mesh, Any], Any]] = {
+        name: lambda mesh, value, name=name: heat_igl.HeatMethodSolver(mesh, **{name: value})
+        for name in ("laplacian", "boundary", "magnitude", "refine", "backend")
+    }
+    ways["method"] = lambda mesh, value: heat_igl.geodesic_distance(mesh, 0, method=value)
+    for name, ask in ways.items():
+        for bad in ("guess", 1, np.ones(50), ["unfold"]):
+            refused = f"{name} must be one of .*, not "
+            yield argument_case(f"{name} = {bad!r:.20}", lambda mesh, ask=ask, bad=bad: ask(mesh, bad), refused)
+
+
+def argument_cases() -> Iterator[Case]:
+    yield from number_cases()
+    yield from choice_cases()
+    far = argument_case(
+        "positions that overflow",
+        lambda mesh: heat_igl.closest_points(mesh, [[0, 0, 1], [0, 1e200, 0]]),
+        r"positions\[1\] = \[0.0, 1e\+200, 0.0\] is too far away",
+        error="SourceError",
+    )
+    yield far
+    yield argument_case("far positions, neighbour", lambda mesh: heat_igl.closest_points(mesh, [[0, 1e149, 0]]))
+    yield argument_case(
+        "endless line", lambda mesh: heat_igl.trace_geodesic(mesh, 0, (1, 0), 1e300), r"length has the length 1e\+300"
+    )
+    yield argument_case(
+        "endless lines", lambda mesh: heat_igl.exp_map(mesh, 0, [[1, 0], [1e200, 0]]), r"vectors\[1\] has the length 1e"
+    )
+    yield argument_case("long line, neighbour", lambda mesh: heat_igl.exp_map(mesh, 0, [[1e4, 0]]))
+    ragged = [[1.0, 2.0], [3.0]]
+    for name, ask in {
+        "vectors": lambda mesh: heat_igl.exp_map(mesh, 0, ragged),
+        "direction": lambda mesh: heat_igl.trace_geodesic(mesh, 0, ragged, 1.0),
+        "values": lambda mesh: heat_igl.VectorHeatSolver(mesh).extend([0, 1], ragged),
+        "values of isolines": lambda mesh: heat_igl.isolines(mesh, ragged, [0.5]),
+        "weights": lambda mesh: heat_igl.geodesic_centre(mesh, mesh, [0, 1], ragged),
+        "g": lambda mesh: heat_igl.HeatMethodSolver(mesh, refine="unfold").distance_vjp(0)[1](ragged),
+        "reference": lambda mesh: heat_igl.validate(mesh, 0, methods=["heat"], reference=ragged),
+        "origin": lambda _: heat_igl.VoxelBox(ragged, 1.0, (2, 2, 2)),
+    }.items():
+        argument = name.partition(" ")[0]
+        yield argument_case(f"{name}, ragged", ask, f"^{argument} must be real numbers.*, not ")
+    for name, bad, refused in (
+        ("shape", (2, 2, 2.5), r"shape must be three whole numbers of at least 2, not \(2, 2, 2.5\)"),
+        ("shape", (2000, 2000, 2000), r"over 1e\+09 points"),
+        ("shape", 3, "shape must be three whole numbers"),
+        ("origin", (0, 0), "origin must be three finite numbers"),
+    ):
+        given = {"origin": (0, 0, 0), "spacing": 1.0, "shape": (2, 2, 2), name: bad}
+        yield argument_case(f"{name} = {bad}", lambda _, given=given: heat_igl.VoxelBox(**given), refused)
+    for name, bad in (("points", 1), ("points", np.inf), ("points", "9"), ("margin", -1), ("margin", np.nan)):
+        given = {"points": 8, name: bad}
+        yield argument_case(
+            f"{name} = {bad!r}", lambda mesh, given=given: heat_igl.VoxelBox.around(mesh, **given), f"{name} must be a "
+        )
+    for bad in (0, "float16", True, [1]):
+        yield argument_case(
+            f"dtype = {bad!r}",
+            lambda mesh, bad=bad: heat_igl.HeatMethodSolver(mesh).distances([0], dtype=bad),
+            "dtype must be float64 or float32, not ",
+        )
+    for bad in ([[0.0]], 3, "abc"):
+        yield argument_case(
+            f"out = {bad!r}",
+            lambda mesh, bad=bad: heat_igl.HeatMethodSolver(mesh).distances([0], out=bad),
+            r"out must be an array of float64 or float32 of shape \(1, 42\), not ",
+        )
+    for bad in (3, np.array(3), "abc", heat_igl.SurfacePoints([0], [[1, 0, 0]])):
+        yield argument_case(
+            f"source_sets = {bad!r}",
+            lambda mesh, bad=bad: heat_igl.HeatMethodSolver(mesh).distances(bad),
+            "source_sets must be a sequence of sets of sources, not .*: try distance",
+            error="SourceError",
+        )
+    for bad in ((), "heat", 3, [3], [("mine", 3)]):
+        yield argument_case(
+            f"methods = {bad!r}",
+            lambda mesh, bad=bad: heat_igl.validate(mesh, 0, methods=bad),
+            "methods must be a sequence of methods|methods is empty|a method is a name or a pair",
+        )
+    yield argument_case(
+        "reference with NaN",
+        lambda mesh: heat_igl.validate(mesh, 0, methods=["heat"], reference=np.full(42, np.nan)),
+        r"reference\[0, 0\] is NaN: vertices that no source reaches are inf",
+    )
+    yield argument_case(
+        "p = 65", lambda mesh: heat_igl.karcher_mean(mesh, [0, 1], p=65), "p must be a number from 1 to 64"
+    )
+    yield argument_case(
+        "pieces = 10^12",
+        lambda mesh: heat_igl.geodesic_bezier(mesh, [0, 1], 10**12),
+        "pieces must be an integer from 1",
+    )
+    yield argument_case(
+        "factors that overflow", lambda _: heat_igl.fibre_metric([[1, 0, 0]], 1e300, 1), r"along\[0\] = 1e\+300 must be"
+    )
+    yield argument_case(
+        "paths down an infinite distance",
+        lambda mesh: heat_igl.shortest_paths(mesh, np.full(42, np.inf), [3], 0),
+        r"from targets\[0\] no source can be reached",
+        error="SourceError",
+    )
+    for name, ask in {
+        "cells": lambda mesh: heat_igl.dual_triangulation(mesh, np.zeros(42, int)),
+        "cloud": heat_igl.point_cloud_operators,
+        "polygons": lambda mesh: heat_igl.PolygonMesh(mesh.V, 3),
+    }.items():
+        yield argument_case(f"{name} of another kind", ask, f"{name} must be .*, not ", error="MeshError")
+    yield argument_case(
+        "offset_curves by a mesh",
+        lambda mesh: heat_igl.offset_curves(mesh, mesh, 0, 1.0),
+        "solver must be a HeatMethod",
+    )
+
+
 # --- files, token by token --------------------------------------------------------------------------------------------
 
 # x: a coordinate, i: an index, n and m: the counts of vertices and faces.
@@ -490,6 +631,7 @@ GENERATORS: tuple[Callable[[], Iterator[Case]], ...] = (
     whole_file_cases,
     path_cases,
     write_cases,
+    argument_cases,
 )
 
 

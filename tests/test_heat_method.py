@@ -245,7 +245,7 @@ def test_magnitude():
     assert (HeatMethodSolver(mesh, laplacian="cotan").solve(20).magnitude == 1).all()
     assert HeatMethodSolver(mesh, laplacian="cotan", magnitude="damped").solve(20).magnitude.min() < 1
     assert (HeatMethodSolver(shapes.box(3)).solve(0).magnitude == 1).all()
-    with pytest.raises(ValueError, match="magnitude must be 'auto', 'unit' or 'damped', not 'log'"):
+    with pytest.raises(ValueError, match="magnitude must be one of 'auto', 'unit', 'damped', not 'log'"):
         HeatMethodSolver(mesh, magnitude="log")
 
 

@@ -41,11 +41,11 @@ def test_options_have_the_same_names_and_defaults_everywhere(make, others):
         (
             "laplacian",
             "graph",
-            "laplacian must be 'auto', 'intrinsic-delaunay', 'intrinsic-delaunay-refined' or 'cotan', not 'graph'",
+            "laplacian must be one of 'auto', 'intrinsic-delaunay', 'intrinsic-delaunay-refined', 'cotan', not 'graph'",
         ),
-        ("boundary", "robin", "boundary must be 'neumann', 'dirichlet' or 'average', not 'robin'"),
-        ("magnitude", "log", "magnitude must be 'auto', 'unit' or 'damped', not 'log'"),
-        ("refine", "fold", "refine must be None, 'sweep', 'unfold' or 'exact', not 'fold'"),
+        ("boundary", "robin", "boundary must be one of 'neumann', 'dirichlet', 'average', not 'robin'"),
+        ("magnitude", "log", "magnitude must be one of 'auto', 'unit', 'damped', not 'log'"),
+        ("refine", "fold", "refine must be one of None, 'sweep', 'unfold', 'exact', not 'fold'"),
         ("backend", "magma", "backend must be one of 'auto', .*, not 'magma'"),
     ],
 )

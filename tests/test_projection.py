@@ -115,7 +115,6 @@ def test_positions_in_the_plane():
         ([[0.5, 0.5, 0], [0.5, 0.5, 0]], {}, "all in one place"),
         ([[0.5, 0.5, 0], [0.5, 0.5, 2]], {}, r"leaves the surface by .* on the line from positions\[0\].*tolerance is"),
         ([[0, 0, 0], [1, 0, 0], [1.2, 0.4, 0]], {"tolerance": 0.1}, r"line from positions\[1\]"),
-        ([[0, 0, 0], [1, 1, 0]], {"tolerance": -1.0}, "tolerance must be a positive length, not -1.0"),
     ],
 )
 def test_refused_polylines(positions, options, message):

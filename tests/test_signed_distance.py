@@ -336,7 +336,7 @@ def test_bad_curves():
     ):
         with pytest.raises(SourceError, match=match):
             solver.distance(curves)
-    with pytest.raises(ValueError, match="level must be 'zero', 'constant' or 'none', not 'all'"):
+    with pytest.raises(ValueError, match="level must be one of 'zero', 'constant', 'none', not 'all'"):
         solver.distance(circle, level="all")
     with pytest.raises(SourceError, match=r"normals must have shape \(1, 3\), not \(1, 2\)"):
         OrientedPoints(point, [[1, 0]])

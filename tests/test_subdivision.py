@@ -88,7 +88,7 @@ def test_new_vertices_lie_in_the_middle():
 def test_lengths_that_make_no_sense():
     mesh = shapes.grid(2)
     for longest in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="longest must be a positive length"):
+        with pytest.raises(ValueError, match="longest must be a positive number"):
             split_long_edges(mesh, longest)
     with pytest.raises(ValueError, match="longest = 1e-09 would cut the edges into"):
         split_long_edges(mesh, 1e-9)
@@ -96,5 +96,5 @@ def test_lengths_that_make_no_sense():
 
 
 def test_tetrahedra_are_refused():
-    with pytest.raises(MeshError, match="wants triangles"):
+    with pytest.raises(MeshError, match="needs triangles"):
         split_long_edges(shapes.box(1), 0.5)

@@ -341,7 +341,7 @@ def test_without_factorization_as_with(bumpy):
 def test_bad_arguments():
     grid = shapes.grid(3)
     assert HeatMethodSolver(grid, refine="sweep").distance(0)[-1] == pytest.approx(np.sqrt(2))
-    with pytest.raises(ValueError, match="refine must be None, 'sweep', 'unfold' or 'exact', not 'fold'"):
+    with pytest.raises(ValueError, match="refine must be one of None, 'sweep', 'unfold', 'exact', not 'fold'"):
         HeatMethodSolver(grid, refine="fold")
     with pytest.raises(ValueError, match="this domain has none"):
         HeatMethodSolver(shapes.box(1), refine="unfold")

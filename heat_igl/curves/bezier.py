@@ -7,11 +7,13 @@ import numpy as np
 from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.curves.places import Waypoints, mixed_places, snapped
 from heat_igl.curves.shortening import Shortened, as_curve
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, shown
 from heat_igl.mesh import MeshLike, SurfaceCurve, as_simplices
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["geodesic_bezier"]
+
+_MOST_PIECES = 1_000_000
 
 
 def geodesic_bezier(mesh: MeshLike, points: Waypoints, pieces: int = 32) -> SurfaceCurve:
@@ -56,8 +58,8 @@ def geodesic_bezier(mesh: MeshLike, points: Waypoints, pieces: int = 32) -> Surf
     >>> curve.positions(mesh).round(6)[[0, -1]].tolist()
     [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
     """
-    if isinstance(pieces, bool) or not isinstance(pieces, int | np.integer) or pieces < 1:
-        raise ValueError(f"pieces must be a positive integer, not {pieces!r}")
+    if isinstance(pieces, bool) or not isinstance(pieces, int | np.integer) or not 1 <= pieces <= _MOST_PIECES:
+        raise ValueError(f"pieces must be an integer from 1 to {_MOST_PIECES}, not {shown(pieces)}")
     triangles = as_simplices(mesh)
     solver = GeodesicPathSolver(triangles)
     faces, barycentric = mixed_places("points", triangles, points)

@@ -119,7 +119,10 @@ class CutMesh:
         n = len(self.places) - len(self._old_corners)
         if array.shape[:1] != (n,):
             raise ValueError(f"values must have {n} rows, one for each vertex of the old mesh, not shape {array.shape}")
-        added = np.einsum("kc,kc...->k...", self.places.barycentric[n:], array[self._old_corners])
+        weight, corners = self.places.barycentric[n:], array[self._old_corners]
+        # A corner without weight may be infinitely far away, and 0 times infinity is NaN.
+        counts = (weight > 0).reshape(*weight.shape, *(1,) * (array.ndim - 1))
+        added = np.einsum("kc,kc...->k...", weight, np.where(counts, corners, 0))
         return np.concatenate([array, added])
 
     @cached_property

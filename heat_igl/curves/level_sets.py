@@ -7,11 +7,13 @@ follows from the faces, so rounding cannot open a loop or draw a segment twice.
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, positive, shown
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices, crossings, joined_segments, level_segments
 from heat_igl.sources import Sources
@@ -101,8 +103,9 @@ def offset_curves(mesh: MeshLike, solver: HeatMethodSolver, sources: Sources, ra
     1.0
     """
     mesh = as_simplices(mesh)
-    if not (np.isfinite(radius) and radius > 0):
-        raise ValueError(f"radius must be a positive number, not {radius!r}")
+    radius = positive("radius", radius)
+    if not isinstance(solver, HeatMethodSolver):
+        raise ValueError(f"solver must be a HeatMethodSolver of the mesh, not {shown(solver)}")
     if solver.n_vertices != mesh.n_vertices:
         raise ValueError(
             f"solver was made for {solver.n_vertices} vertices, but mesh has {mesh.n_vertices}: pass the mesh it is for"
@@ -189,9 +192,11 @@ def _checked(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> tuple[FloatArr
 
 
 def _real(name: str, array: ArrayLike) -> FloatArray:
-    found: AnyArray = np.asarray(array)
-    if found.dtype.kind not in "iuf":
-        raise ValueError(f"{name} must be real numbers, not {found.dtype}")
+    found: AnyArray | None = None
+    with suppress(ValueError):  # of ragged lists
+        found = np.asarray(array)
+    if found is None or found.dtype.kind not in "iuf":
+        raise ValueError(f"{name} must be real numbers, not {shown(array) if found is None else found.dtype}")
     return found.astype(np.float64)
 
 

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, require_choice
 from heat_igl.heat_method import HeatMethodSolver, VectorHeatSolver
 from heat_igl.mesh import MeshLike, SurfacePoints, as_simplices
 from heat_igl.sources import Sources, ordered_vertices
@@ -80,8 +80,7 @@ def log_map(
         _require_one(source, mesh.n_vertices)
         found = mesh.directions(source, tolerance=_TOLERANCE)
         return _vectors(found.distance, found.departure)
-    if method not in get_args(LogMapMethod):
-        raise ValueError(f"method must be one of {', '.join(map(repr, get_args(LogMapMethod)))}, not {method!r}")
+    require_choice("method", method, get_args(LogMapMethod))
     triangles = as_simplices(mesh)
     if method == "vector-heat":
         return VectorHeatSolver(triangles).log_map(_one_vertex(source, triangles.n_vertices))

@@ -9,7 +9,7 @@ import numpy as np
 from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.curves.places import Waypoints, mixed_places
 from heat_igl.curves.straightest import Tracer
-from heat_igl.errors import AccuracyWarning, SourceError
+from heat_igl.errors import AccuracyWarning, SourceError, is_number, shown
 from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices
 from heat_igl.runtime import warn_caller
@@ -26,6 +26,8 @@ _MOST_STEPS = 500
 _NEAREST = 1e-12
 # From this number of points on, one factorization pays.
 _MANY = 4
+# With higher powers, distances far from 1 overflow or vanish.
+_LARGEST_POWER = 64
 
 
 def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = None, p: float = 2) -> SurfacePoints:
@@ -197,6 +199,8 @@ def _checked_weights(weights: ArrayLike | None, k: int) -> FloatArray:
 
 
 def _checked_power(p: float) -> float:
-    if isinstance(p, bool) or not isinstance(p, int | float | np.integer | np.floating) or not 1 <= p < np.inf:
-        raise ValueError(f"p must be a number of at least 1, not {p!r}: 2 for the mean, 1 for the median")
+    if not is_number(p) or not 1 <= p <= _LARGEST_POWER:
+        raise ValueError(
+            f"p must be a number from 1 to {_LARGEST_POWER}, not {shown(p)}: 2 for the mean, 1 for the median"
+        )
     return float(p)

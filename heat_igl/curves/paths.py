@@ -102,6 +102,7 @@ def shortest_paths(
     else:
         values = _values(mesh, distance, sources)
         paths = _straightened(mesh, values, sources, face, barycentric, np.arange(len(face)))
+        _refuse_lost(~np.isin(np.arange(len(face)), list(paths)))
         chosen = _source_set(mesh, values == 0 if sources is None else sources)
         longer = _too_long(mesh, values - chosen.offsets.min(), paths, face, barycentric)
         if len(longer):

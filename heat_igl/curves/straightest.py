@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, real_numbers, shown
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.kernels import straightest
 from heat_igl.mesh import ON_SIDE, Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, ordered_vertices
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = ["Tracer", "exp_map", "trace_geodesic"]
 
@@ -21,6 +21,8 @@ __all__ = ["Tracer", "exp_map", "trace_geodesic"]
 kernel: Any = straightest
 # Fewer geodesics than this are traced on one thread.
 _FEW = 500
+# Lines of more edges are refused: a tenth of a second each, and half a gigabyte if they are stored.
+_MOST_EDGES = 1e7
 
 
 def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length: float) -> SurfaceCurve:
@@ -79,10 +81,12 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
     begin = tracer.starts("start", start)
     if len(begin.faces) != 1:
         raise SourceError(f"start must be one vertex or point, not {len(begin.faces)}")
-    if np.ndim(direction) != 1:
-        raise ValueError(f"direction must be one vector (2,) or (3,), but it has shape {np.shape(direction)}")
+    vector = real_numbers("direction", direction)
+    if vector.ndim != 1:
+        raise ValueError(f"direction must be one vector (2,) or (3,), but it has shape {vector.shape}")
     distance = _checked_length(length)
-    turn, size = tracer.directions("direction", begin, direction)
+    tracer.refuse_endless("length", np.array([distance]))
+    turn, size = tracer.directions("direction", begin, vector)
     if not size[0] > 0:
         raise ValueError(f"direction = {np.asarray(direction).tolist()} is 0 in the tangent plane: it needs a length")
     return tracer.curve(begin, turn, np.array([distance]))
@@ -165,15 +169,27 @@ class Tracer:
     def exp(self, source: Sources, vectors: ArrayLike) -> SurfacePoints:
         """The exponential map; see `exp_map`."""
         begin = self.starts("source", source)
-        array: AnyArray = np.asarray(vectors)
+        array = real_numbers("vectors", vectors)
         k = len(array) if array.ndim == 2 else 1
         if len(begin.faces) == 1:
             begin = begin.repeated(k)
         elif len(begin.faces) != k:
             raise SourceError(f"source must be one point, or one for each of the {k} vectors, not {len(begin.faces)}")
-        turn, size = self.directions("vectors", begin, vectors)
+        turn, size = self.directions("vectors", begin, array)
+        self.refuse_endless("vectors", size)
         found = self.ends(begin, turn, size)
         return SurfacePoints(found.faces, found.barycentric)
+
+    def refuse_endless(self, name: str, lengths: FloatArray) -> None:
+        """Raise ValueError for lengths (k,) that would take minutes to trace, which another unit is the reason of."""
+        edges = lengths / self._mesh.edge_lengths.mean()
+        if (edges > _MOST_EDGES).any():
+            first = int(np.argmax(edges > _MOST_EDGES))
+            raise ValueError(
+                f"{name if len(edges) == 1 else f'{name}[{first}]'} has the length {lengths[first]:.4g}, which is "
+                f"{edges[first]:.2g} mean edge lengths, and a line may have {_MOST_EDGES:.0e}: give it in the unit of "
+                "the mesh"
+            )
 
     def starts(self, name: str, points: Sources) -> _Starts:
         """Starts of geodesics: vertices in the order given, or points in faces."""
@@ -255,5 +271,5 @@ def _checked_length(length: float) -> float:
     except (TypeError, ValueError):
         number = np.nan
     if not (np.isfinite(number) and number >= 0):
-        raise ValueError(f"length must be a finite number of at least 0, not {length!r}")
+        raise ValueError(f"length must be a finite number of at least 0, not {shown(length)}")
     return number

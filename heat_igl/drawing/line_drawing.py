@@ -12,6 +12,7 @@ from heat_igl.drawing.camera import to_pixels
 from heat_igl.drawing.raster import rasterize, visible_runs
 from heat_igl.drawing.scene import scene
 from heat_igl.drawing.surface_image import fitted
+from heat_igl.errors import require_choice
 from heat_igl.io import complete_file, write_svg
 from heat_igl.mesh import MeshLike, as_simplices, flat_curves
 from heat_igl.typing import FloatArray
@@ -68,8 +69,7 @@ def write_line_drawing(
     target = Path(os.fspath(path))
     if target.suffix.lower() != ".svg":
         raise ValueError(f"{target}: line drawings go to .svg files")
-    if hidden not in get_args(Hidden):
-        raise ValueError(f"hidden must be one of {', '.join(map(repr, get_args(Hidden)))}, not {hidden!r}")
+    require_choice("hidden", hidden, get_args(Hidden))
     mesh = as_simplices(mesh)
     seen = scene(mesh, np.zeros(mesh.n_vertices), view=view, up=up)
     scale, centre = fitted(seen, _PIXELS, _PIXELS, 0.02 * _PIXELS)

@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl.drawing.camera import default_rotation, rotation
 from heat_igl.drawing.discs import discs
 from heat_igl.drawing.shading import isoline_spacing
-from heat_igl.errors import MissingExtraError
+from heat_igl.errors import MissingExtraError, real_numbers, require_choice
 from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.sources import Sources, source_set
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -195,12 +195,11 @@ def colours(colormap: str, is_trimmed: bool = True) -> Any:
 
 def check_style(style: str) -> None:
     """Raise ValueError if `style` is not a `Style`."""
-    if style not in get_args(Style):
-        raise ValueError(f"style must be one of {', '.join(map(repr, get_args(Style)))}, not {style!r}")
+    require_choice("style", style, get_args(Style))
 
 
 def _checked(name: str, values: ArrayLike, n: int) -> FloatArray:
-    checked = np.asarray(values, dtype=np.float64)
+    checked = real_numbers(name, values)
     if checked.shape != (n,):
         raise ValueError(f"{name} must have shape ({n},), one per vertex, but it has {checked.shape}")
     if np.isnan(checked).any():

@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence, Sized
 import numpy as np
 import numpy.typing as npt
 
-from heat_igl.errors import AccuracyWarning, SourceError
-from heat_igl.heat_method.options import positive
+from heat_igl.errors import AccuracyWarning, SourceError, positive, shown
 from heat_igl.runtime import (
     block_size,
     float_type,
@@ -97,13 +96,17 @@ class BatchedSolver(ABC):
         more: 40 bytes per face. For sources inside faces it may be three times as much. The number of threads is that
         of the processors, or ``HEAT_IGL_NUM_THREADS``.
         """
-        if not hasattr(source_sets, "__len__"):
-            raise SourceError(f"source_sets must be a sequence of sets of sources, not {source_sets!r}: try distance")
+        if not _is_list(source_sets) or not isinstance(source_sets, Sized):
+            raise SourceError(
+                f"source_sets must be a sequence of sets of sources, not {shown(source_sets)}: try distance"
+            )
         beyond = checked_cutoff(cutoff)
         chosen = list(self._named(source_sets))
         shape = (len(chosen), self.n_vertices)
         if out is None:
             out = np.empty(shape, float_type(dtype))
+        elif not hasattr(out, "shape") or not hasattr(out, "dtype"):
+            raise ValueError(f"out must be an array of float64 or float32 of shape {shape}, not {shown(out)}")
         elif tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f" or np.dtype(out.dtype).itemsize < 4:
             # Half precision ends at 65504: larger distances would read inf, like vertices that no source reaches.
             raise ValueError(
@@ -148,8 +151,10 @@ class BatchedSolver(ABC):
         while rows are being used.
         """
         row_type = float_type(dtype)
-        if not isinstance(source_sets, Iterable):
-            raise SourceError(f"source_sets must be an iterable of sets of sources, not {source_sets!r}: try distance")
+        if not _is_list(source_sets):
+            raise SourceError(
+                f"source_sets must be an iterable of sets of sources, not {shown(source_sets)}: try distance"
+            )
         n_sets = len(source_sets) if isinstance(source_sets, Sized) else None
         blocks = self._blocks(self._named(source_sets), n_sets)
         return (row.astype(row_type) for rows in blocks for row in rows)
@@ -185,6 +190,12 @@ class BatchedSolver(ABC):
             yield rows
 
 
+def _is_list(source_sets: object) -> bool:
+    """Whether these are several entries, and neither a text nor a single number in an array."""
+    single = isinstance(source_sets, (str, bytes)) or getattr(source_sets, "ndim", 1) == 0
+    return isinstance(source_sets, Iterable) and not single
+
+
 def checked_cutoff(value: float | None) -> float | None:
     """The cutoff as a float; None for none, which infinity is too.
 
@@ -193,7 +204,10 @@ def checked_cutoff(value: float | None) -> float | None:
     ValueError
         If it is not a positive number.
     """
-    return None if value is None or value == np.inf else positive("cutoff", value)
+    if value is None:
+        return None
+    cutoff = positive("cutoff", value, infinite=True)
+    return None if cutoff == np.inf else cutoff
 
 
 def cut_off(distances: FloatArray, cutoff: float | None) -> FloatArray:

@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, real_numbers
 from heat_igl.heat_method.side_lengths import SidesOfMesh
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
 from heat_igl.intrinsic.length_derivatives import carry_lengths, carry_lengths_back, check_carried
@@ -240,7 +240,7 @@ class DistanceDerivative:
 
     def _rows(self, g: ArrayLike, most: int = 2) -> FloatArray:
         """`g` as rows (k, n), 0 at unreachable vertices."""
-        array = np.asarray(g, np.float64)
+        array = real_numbers("g", g)
         n = len(self.distance)
         if not 1 <= array.ndim <= most or array.shape[-1] != n:
             also = f" or (k, {n})" if most == 2 else ""
@@ -295,7 +295,7 @@ class DistanceDerivative:
 
 def _velocities(name: str, given: ArrayLike, shape: tuple[int, ...], of: str) -> FloatArray:
     """Velocities as finite float64 of the given shape."""
-    array = np.asarray(given, np.float64)
+    array = real_numbers(name, given)
     if array.shape != shape or not np.isfinite(array).all():
         raise ValueError(f"{name} must be {shape} finite numbers, one velocity per {of}; it has shape {array.shape}")
     return array

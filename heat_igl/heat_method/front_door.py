@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, require_choice
 from heat_igl.heat_method.batches import checked_cutoff, cut_off
 from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.mesh import MeshLike, as_mesh, as_simplices
@@ -81,11 +81,10 @@ def geodesic_distance(
     >>> geodesic_distance((V, F), 0).tolist()
     [0.0, 3.0, 5.0, 4.0]
     """
-    if method not in get_args(DistanceMethod):
-        raise ValueError(f"method must be one of {', '.join(map(repr, get_args(DistanceMethod)))}, not {method!r}")
+    require_choice("method", method, get_args(DistanceMethod))
     beyond = checked_cutoff(cutoff)
     if targets is not None and method in ("heat", "sweep"):
-        raise ValueError(f'targets end the search with method="unfold" or "exact", not with {method!r}')
+        raise ValueError(f"targets need method='unfold' or 'exact', whose search can end at them, not {method!r}")
     if method == "heat":
         return HeatMethodSolver(as_mesh(mesh)).distance(sources, beyond)
     triangles = as_simplices(mesh)
@@ -93,8 +92,8 @@ def geodesic_distance(
         if method == "sweep":
             return HeatMethodSolver(triangles, refine="sweep").distance(sources, beyond)
         raise MeshError(
-            f'method={method!r} needs triangles, and the mesh holds tetrahedra: take method="sweep", exact where the '
-            "way is a straight line"
+            f"method={method!r} needs triangles, but the mesh holds tetrahedra: take method='sweep', the most accurate "
+            "one for tetrahedra, or method='heat'"
         )
     if targets is not None:
         return np.asarray(cut_off(distance_to_targets(triangles, sources, targets), beyond))

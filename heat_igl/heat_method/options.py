@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-import numpy as np
-
+from heat_igl.errors import positive, require_choice
 from heat_igl.linear import Backend
 from heat_igl.operators import Laplacian, Operators, check_laplacian
-from heat_igl.steps import Boundary, check_boundary
+from heat_igl.steps import Boundary
 from heat_igl.unfolding import Refine
 
-__all__ = ["Backend", "Boundary", "Laplacian", "Magnitude", "Refine", "SolverOptions", "positive"]
+__all__ = ["Backend", "Boundary", "Laplacian", "Magnitude", "Refine", "SolverOptions"]
 
 Magnitude = Literal["auto", "unit", "damped"]
 
@@ -46,13 +45,10 @@ class SolverOptions:
             if value is not None:
                 object.__setattr__(self, name, positive(name, value))
         check_laplacian(self.laplacian)
-        check_boundary(self.boundary)
-        if self.magnitude not in get_args(Magnitude):
-            raise ValueError(f"magnitude must be 'auto', 'unit' or 'damped', not {self.magnitude!r}")
-        if self.refine is not None and self.refine not in get_args(Refine):
-            raise ValueError(f"refine must be None, 'sweep', 'unfold' or 'exact', not {self.refine!r}")
-        if self.backend not in get_args(Backend):
-            raise ValueError(f"backend must be one of {', '.join(map(repr, get_args(Backend)))}, not {self.backend!r}")
+        require_choice("boundary", self.boundary, get_args(Boundary))
+        require_choice("magnitude", self.magnitude, get_args(Magnitude))
+        require_choice("refine", self.refine, (None, *get_args(Refine)))
+        require_choice("backend", self.backend, get_args(Backend))
 
         if self.refine is not None and self.laplacian == "intrinsic-delaunay-refined":
             raise ValueError(
@@ -86,13 +82,3 @@ class SolverOptions:
         if self.magnitude == "auto":
             return domain.is_surface and self.laplacian != "cotan"
         return self.magnitude == "damped"
-
-
-def positive(name: str, value: float) -> float:
-    """`value` as a float; a ValueError that calls it `name` if it is not a positive number."""
-    # Text that looks like a number is a mistake upstream, and so is a truth value.
-    is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    number = float(value) if is_number else np.nan
-    if not (np.isfinite(number) and number > 0):
-        raise ValueError(f"{name} must be a positive number, not {value!r}")
-    return number

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import MeshError, SourceError, require_choice
 from heat_igl.heat_method.curve_sides import has_gaps, left_of_closed, left_of_nearest, zero_curve_in_gaps
 from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.options import SolverOptions
@@ -190,8 +190,7 @@ class SignedHeatSolver:
         sign of the integrated value instead, unless there is `refine`. The diffused normals of all curves are added: if
         curves contradict each other, the longer pieces decide.
         """
-        if level not in get_args(Level):
-            raise ValueError(f"level must be 'zero', 'constant' or 'none', not {level!r}")
+        require_choice("level", level, get_args(Level))
         chosen = oriented_set(curves, self._mesh)
         size, left = self._refined(chosen, level) if self._refines else self._from_heat(chosen, level)
         reached = np.isfinite(size)

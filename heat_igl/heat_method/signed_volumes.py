@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import MeshError, SourceError
-from heat_igl.heat_method.options import positive
+from heat_igl.errors import MeshError, SourceError, is_number, positive, real_numbers, shown
 from heat_igl.heat_method.time_step import smallest_time_step
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_mesh, as_simplices
 from heat_igl.operators import Operators, operators
@@ -23,6 +22,8 @@ __all__ = ["VoxelBox", "volume_signed_distance"]
 # share of the largest, since transforms in double precision leave few digits of it there.
 _NEXT_STEP = 4.0
 _LOST = 1e-10
+# A box with more points is a mistake in the unit: 8e9 bytes for each number that is stored at every point.
+_MOST_POINTS = 1e9
 
 
 @dataclass(frozen=True)
@@ -56,19 +57,24 @@ class VoxelBox:
     shape: Sequence[int]
 
     def __post_init__(self) -> None:
-        origin = tuple(float(number) for number in self.origin)
-        if len(origin) != 3 or not np.isfinite(origin).all():
-            raise ValueError(f"origin must be three finite numbers, not {self.origin!r}")
-        shape = tuple(int(number) for number in self.shape)
-        if len(shape) != 3 or min(shape) < 2 or shape != tuple(self.shape):
-            raise ValueError(f"shape must be three whole numbers of at least 2, not {self.shape!r}")
-        object.__setattr__(self, "origin", origin)
+        origin, shape = real_numbers("origin", self.origin), real_numbers("shape", self.shape)
+        if origin.shape != (3,) or not np.isfinite(origin).all():
+            raise ValueError(f"origin must be three finite numbers, not {shown(self.origin)}")
+        if shape.shape != (3,) or not (np.isfinite(shape) & (shape >= 2) & (shape % 1 == 0)).all():
+            raise ValueError(f"shape must be three whole numbers of at least 2, not {shown(self.shape)}")
+        if shape.prod() > _MOST_POINTS:
+            raise ValueError(f"shape = {shown(self.shape)} has over {_MOST_POINTS:.0e} points: make spacing larger")
+        object.__setattr__(self, "origin", tuple(origin.tolist()))
         object.__setattr__(self, "spacing", positive("spacing", self.spacing))
-        object.__setattr__(self, "shape", shape)
+        object.__setattr__(self, "shape", tuple(int(number) for number in shape))
 
     @classmethod
     def around(cls, mesh: MeshLike, points: int, margin: float = 0.2) -> VoxelBox:
         """A box around a mesh: `points` along its longest side, and a share `margin` of that side beyond each end."""
+        if not is_number(points) or not 2 <= points < np.inf:
+            raise ValueError(f"points must be a whole number of at least 2, not {shown(points)}")
+        if not is_number(margin) or not 0 <= margin < np.inf:
+            raise ValueError(f"margin must be a number of at least 0, not {shown(margin)}")
         V = as_mesh(mesh).V
         low, size = V.min(axis=0), np.ptp(V, axis=0)
         outside = margin * size.max()

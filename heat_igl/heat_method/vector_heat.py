@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import MeshError, SourceError, real_numbers
 from heat_igl.heat_method.heat_transport import HeatTransport
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.outward_field import OutwardField
@@ -189,7 +189,7 @@ class VectorHeatSolver:
         The ratio u / phi of two heat flows, that of the values and that of ones (equation 5 of the paper).
         """
         vertices = self._vertices(sources)
-        given = checked_vectors("values", np.reshape(values, (-1, 1)), len(vertices), 1)[:, 0]
+        given = checked_vectors("values", real_numbers("values", values).reshape(-1, 1), len(vertices), 1)[:, 0]
         return self._transport.extend(vertices, given)
 
     def transport(self, sources: Sources, vectors: ArrayLike) -> FloatArray:

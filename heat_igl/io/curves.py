@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from heat_igl.errors import MissingExtraError
+from heat_igl.errors import MissingExtraError, real_numbers, shown
 from heat_igl.io.atomic import replacing
 from heat_igl.io.text import format_rows
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, as_simplices, flat_curves
@@ -73,7 +73,9 @@ def write_curves(
     3
     """
     mesh = as_simplices(mesh)
-    target = Path(os.fspath(path))
+    if not isinstance(path, (str, os.PathLike)):
+        raise ValueError(f"path must be a string or a path, not {shown(path)}")
+    target = Path(path)
     write = _FORMATS.get(target.suffix.lower())
     if write is None:
         raise ValueError(f"{target}: curves go to {', '.join(CURVE_SUFFIXES)} files, not '{target.suffix}'")
@@ -95,9 +97,9 @@ def write_curves(
 
 
 def _checked_projection(projection: ArrayLike) -> FloatArray:
-    matrix = np.asarray(projection, np.float64)
+    matrix = real_numbers("projection", projection)
     if matrix.shape != (2, 3) or not np.isfinite(matrix).all():
-        raise ValueError(f"projection must be a finite array of shape (2, 3), not {projection!r}")
+        raise ValueError(f"projection must be a finite array of shape (2, 3), not {shown(projection)}")
     return matrix
 
 

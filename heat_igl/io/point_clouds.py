@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, shown
 from heat_igl.io import pcd, ply
 from heat_igl.io.atomic import replacing
 from heat_igl.io.files import MESH_SUFFIXES, checked_attributes, checked_path, file_bytes, read_mesh
@@ -115,6 +115,8 @@ def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud, /, **attr
     suffix = form_suffix(path)
     if attributes and suffix != ".ply":
         raise MeshError(f"{path}: this format holds no attributes of points ({', '.join(attributes)}); .ply does")
+    if not isinstance(cloud, PointCloud):
+        raise MeshError(f"cloud must be a PointCloud, not {shown(cloud)}: write_mesh writes meshes")
     arrays = checked_attributes(attributes, cloud.n_vertices)
     with replacing(path) as temporary:
         if suffix == ".ply":

@@ -15,6 +15,7 @@ from typing import Literal, get_args
 
 import scipy.sparse as sp
 
+from heat_igl.errors import require_choice
 from heat_igl.linear.iterative import IterativeAnalysis, factors_fit, has_iterative
 from heat_igl.linear.multifrontal import MultifrontalAnalysis
 from heat_igl.linear.protocols import Analysis, Factorization
@@ -53,8 +54,7 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto", n_factors: int = 
     ValueError
         If there is no such backend.
     """
-    if backend not in get_args(Backend):
-        raise ValueError(f"backend must be one of {', '.join(map(repr, get_args(Backend)))}, not {backend!r}")
+    require_choice("backend", backend, get_args(Backend))
     return _ANALYSES[_choice(pattern, n_factors) if backend == "auto" else backend](pattern)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, shown
 from heat_igl.mesh.grouping import next_in_run
 from heat_igl.mesh.mesh import Mesh, checked_positions
 from heat_igl.mesh.triangulation import triangulated
@@ -74,7 +74,7 @@ class PolygonMesh:
         _check(corners, degree, len(positions))
         for array in (corners, degree):
             array.setflags(write=False)
-        triangles = Mesh(positions, triangulated(positions, corners, degree, partial(_shown, corners, degree)))
+        triangles = Mesh(positions, triangulated(positions, corners, degree, partial(_named, corners, degree)))
         object.__setattr__(self, "V", triangles.V)
         object.__setattr__(self, "corners", corners)
         object.__setattr__(self, "degree", degree)
@@ -122,6 +122,8 @@ def which_repeat_a_vertex(corners: IntArray, degree: IntArray) -> BoolArray:
 
 def _flattened(polygons: Sequence[Sequence[int] | IntArray] | IntArray) -> tuple[IntArray, IntArray]:
     """The corners of all polygons, one polygon after the other, and the number of corners of each."""
+    if not isinstance(polygons, Iterable) or getattr(polygons, "ndim", 1) == 0:
+        raise MeshError(f"polygons must be a sequence of polygons, not {shown(polygons)}")
     if not hasattr(polygons, "__len__") or not len(polygons):
         raise MeshError("polygons is empty: a mesh needs at least one")
     rows: list[AnyArray] = []
@@ -136,17 +138,17 @@ def _flattened(polygons: Sequence[Sequence[int] | IntArray] | IntArray) -> tuple
     return np.concatenate(rows).astype(np.int64), np.array([len(row) for row in rows])
 
 
-def _shown(corners: IntArray, degree: IntArray, i: int) -> str:
+def _named(corners: IntArray, degree: IntArray, i: int) -> str:
     begin = int(degree[:i].sum())
     return f"polygons[{i}] = {corners[begin : begin + degree[i]].tolist()}"
 
 
 def _check(corners: IntArray, degree: IntArray, n: int) -> None:
-    shown = partial(_shown, corners, degree)
+    name = partial(_named, corners, degree)
     short = degree < 3
     if short.any():
         raise MeshError(
-            f"{shown(int(np.argmax(short)))} needs three corners or more ({int(short.sum())} of {len(degree)} "
+            f"{name(int(np.argmax(short)))} needs three corners or more ({int(short.sum())} of {len(degree)} "
             "polygons have fewer)"
         )
     outside = (corners < 0) | (corners >= n)
@@ -154,12 +156,12 @@ def _check(corners: IntArray, degree: IntArray, n: int) -> None:
         owner = np.repeat(np.arange(len(degree)), degree)[outside]
         hint = "; the indices look 1-based, subtract 1" if corners.min() == 1 and corners.max() == n else ""
         raise MeshError(
-            f"{shown(int(owner[0]))} holds {corners[outside][0]}, which is no vertex ({len(np.unique(owner))} of "
+            f"{name(int(owner[0]))} holds {corners[outside][0]}, which is no vertex ({len(np.unique(owner))} of "
             f"{len(degree)} polygons are affected): V has {n} rows, so indices run from 0 to {n - 1}{hint}"
         )
     repeated = which_repeat_a_vertex(corners, degree)
     if repeated.any():
         raise MeshError(
-            f"{shown(int(np.argmax(repeated)))} repeats a vertex ({int(repeated.sum())} of {len(degree)} polygons do): "
+            f"{name(int(np.argmax(repeated)))} repeats a vertex ({int(repeated.sum())} of {len(degree)} polygons do): "
             "split such polygons, or remove them if they have no area"
         )

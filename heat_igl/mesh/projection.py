@@ -17,6 +17,8 @@ __all__ = ["ClosestPoints", "Projector", "checked_points", "closest_points"]
 
 # A face is flat when twice its area is at most this share of the square of the longest side.
 _FLAT = 1e-12
+# The square of a larger coordinate, summed over three, may overflow; libigl then returns a face that is none.
+_FARTHEST = 1e150
 
 
 class ClosestPoints(NamedTuple):
@@ -91,6 +93,13 @@ def checked_points(positions: ArrayLike) -> FloatArray:
     if wrong.any():
         first = int(np.flatnonzero(wrong)[0])
         raise SourceError(f"positions[{first}] = {array[first].tolist()} is not finite")
+    far = (abs(array) > _FARTHEST).any(axis=1)
+    if far.any():
+        first = int(np.flatnonzero(far)[0])
+        raise SourceError(
+            f"positions[{first}] = {array[first].tolist()} is too far away: coordinates end at {_FARTHEST:.0e}, so "
+            "that squares do not overflow"
+        )
     return array
 
 

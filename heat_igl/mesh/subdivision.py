@@ -6,11 +6,9 @@ much longer than the mean are too coarse for both.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, positive
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.typing import BoolArray, FloatArray, IntArray
@@ -63,10 +61,8 @@ def split_long_edges(mesh: MeshLike, longest: float | None = None) -> Mesh:
     """
     surface = as_simplices(mesh)
     if surface.is_tetrahedral:
-        raise MeshError("split_long_edges wants triangles, and F holds tetrahedra")
-    longest = float(surface.edge_lengths.mean()) if longest is None else longest
-    if not (math.isfinite(longest) and longest > 0):
-        raise ValueError(f"longest must be a positive length, not {longest!r}")
+        raise MeshError("split_long_edges needs triangles, but F holds tetrahedra")
+    longest = float(surface.edge_lengths.mean()) if longest is None else positive("longest", longest)
     pieces = float(np.ceil(surface.edge_lengths / longest).sum())
     if pieces > _MOST_PIECES:
         raise ValueError(f"longest = {longest:.3g} would cut the edges into {pieces:.3g} pieces: make it longer")

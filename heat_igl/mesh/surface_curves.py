@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, positive
 from heat_igl.mesh.grouping import Groups, enumerate_runs, group_by_label
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
@@ -64,6 +64,8 @@ def curve_on(
     SourceError
         If the polyline is farther from the surface than `tolerance`, or the closest points jump from one part of it to
         another; if there are fewer than two different corners, or a position is not finite.
+    ValueError
+        If `tolerance` is not a positive number.
 
     Examples
     --------
@@ -78,10 +80,7 @@ def curve_on(
     if len(corners) < 2:
         raise SourceError(f"positions must be two corners of a curve or more, not {len(corners)}")
     h = float(mesh.edge_lengths.mean())
-    if tolerance is None:
-        tolerance = h
-    elif not (np.isfinite(tolerance) and tolerance > 0):
-        raise SourceError(f"tolerance must be a positive length, not {tolerance!r}")
+    tolerance = h if tolerance is None else positive("tolerance", tolerance)
     ends = np.concatenate([corners, corners[:1]]) if closed else corners
     lengths = np.linalg.norm(np.diff(ends, axis=0), axis=1)
     if not lengths.any():

@@ -10,6 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 import scipy.sparse as sp
 
+from heat_igl.errors import require_choice
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
 from heat_igl.operators.metric_derivatives import MetricSides
 from heat_igl.operators.metric_simplices import MetricSimplices
@@ -215,9 +216,7 @@ class Operators:
 
 def check_laplacian(laplacian: str) -> None:
     """Raise a ValueError if there is no such `Laplacian`."""
-    if laplacian not in get_args(Laplacian):
-        *others, last = map(repr, get_args(Laplacian))
-        raise ValueError(f"laplacian must be {', '.join(others)} or {last}, not {laplacian!r}")
+    require_choice("laplacian", laplacian, get_args(Laplacian))
 
 
 def divergence_matrix(gradient_rows: sp.csr_matrix, weights: FloatArray) -> sp.csc_matrix:

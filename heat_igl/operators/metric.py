@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, real_numbers
 from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, intrinsic_delaunay, lay_out, mollify
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
@@ -19,7 +19,7 @@ from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.simplices import cotan_operators, longest_sides
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
-__all__ = ["checked_numbers", "fibre_metric", "metric_operators", "operators_in_metric"]
+__all__ = ["fibre_metric", "metric_operators", "operators_in_metric"]
 
 # Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken
 # for its length. Beyond, fronts are refracted at the edge.
@@ -123,19 +123,24 @@ def fibre_metric(directions: ArrayLike, along: ArrayLike, across: ArrayLike) -> 
     >>> g[0].tolist()
     [[0.25, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]]
     """
-    w = checked_numbers("directions", directions)
+    w = real_numbers("directions", directions)
     if w.ndim != 2 or w.shape[1] != 3:
         raise ValueError(f"directions must have shape (m, 3), one per face, not {w.shape}")
-    length = np.linalg.norm(w, axis=1)
+    with np.errstate(over="ignore"):
+        length = np.linalg.norm(w, axis=1)
     _raise_at_first(~((length > 0) & np.isfinite(length)), "directions", w, "is no direction")
     factors = []
     for name, given in (("along", along), ("across", across)):
-        factor = checked_numbers(name, given)
+        factor = real_numbers(name, given)
         if factor.shape not in ((), (len(w),)):
             raise ValueError(f"{name} must be a number or have shape ({len(w)},), not {factor.shape}")
         factor = np.broadcast_to(factor, len(w))
-        _raise_at_first(~((factor > 0) & np.isfinite(factor)), name, factor, "must be positive and finite")
-        factors.append(factor[:, None, None] ** 2)
+        with np.errstate(over="ignore", under="ignore"):
+            square = factor**2
+        _raise_at_first(
+            ~((factor > 0) & (square > 0) & np.isfinite(square)), name, factor, "must be positive and finite"
+        )
+        factors.append(square[:, None, None])
     unit = w / length[:, None]
     projection = unit[:, :, None] * unit[:, None]
     return np.asarray(factors[0] * projection + factors[1] * (np.eye(3) - projection))
@@ -268,7 +273,7 @@ def _check_faces(mesh: Mesh) -> None:
 def _checked(metric: ArrayLike, mesh: Mesh) -> FloatArray:
     """The metric (m, p, p) in the planes of triangles or in space."""
     m, p = mesh.n_faces, mesh.F.shape[1] - 1
-    g = checked_numbers("metric", metric)
+    g = real_numbers("metric", metric)
     shapes = [(m, 3, 3)] if p == 3 else [(m, 3, 3), (m, 2, 2)]
     if g.shape not in shapes:
         raise ValueError(f"metric must have shape {' or '.join(map(str, shapes))}, one per face, not {g.shape}")
@@ -283,14 +288,6 @@ def _checked(metric: ArrayLike, mesh: Mesh) -> FloatArray:
     smallest = np.linalg.eigvalsh(g)[:, 0]
     _raise_at_first(~(smallest > 0), "metric", np.asarray(metric), "must be positive definite on its face")
     return np.asarray(g)
-
-
-def checked_numbers(name: str, values: ArrayLike) -> FloatArray:
-    """`values` as float64; a ValueError that calls them `name` if they are no real numbers."""
-    try:
-        return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be real numbers, not {type(values).__name__}") from None
 
 
 def _raise_at_first(bad: AnyArray, name: str, values: AnyArray, problem: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from heat_igl.errors import MeshError, shown
 from heat_igl.mesh import PointCloud
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators
 from heat_igl.operators.triangles import operators, tufted_operators
@@ -43,6 +44,8 @@ def point_cloud_operators(
     >>> bool(np.allclose(domain.L @ np.ones(domain.n), 0))
     True
     """
+    if not isinstance(cloud, PointCloud):
+        raise MeshError(f"cloud must be a PointCloud, not {shown(cloud)}")
     mesh = cloud.triangles
     # The triangles of scattered points are even enough.
     laplacian = "intrinsic-delaunay" if laplacian == "auto" else laplacian

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from heat_igl.errors import MissingExtraError
+from heat_igl.errors import MissingExtraError, shown
 from heat_igl.runtime.threads import pool
 from heat_igl.typing import AnyArray
 
@@ -112,7 +112,10 @@ def float_type(dtype: npt.DTypeLike | None) -> np.dtype[Any]:
     ValueError
         If `dtype` is neither float64 nor float32.
     """
-    found = np.dtype(np.float64 if dtype is None else dtype)
+    try:
+        found = np.dtype(np.float64 if dtype is None else dtype)
+    except TypeError:
+        raise ValueError(f"dtype must be float64 or float32, not {shown(dtype)}") from None
     if found not in (np.float64, np.float32):
         raise ValueError(f"dtype must be float64 or float32, not {found}")
     return found

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import MeshError, SourceError, real_numbers
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.mesh import MeshLike, SurfacePoints, as_simplices
 from heat_igl.sampling.queries import as_solver, checked_vertices, distance_rows
@@ -84,7 +84,7 @@ def geodesic_centre(
 def _weights(weights: ArrayLike | None, k: int) -> FloatArray:
     if weights is None:
         return np.ones(k)
-    array = np.asarray(weights, dtype=np.float64)
+    array = real_numbers("weights", weights)
     if array.shape != (k,) or not (np.isfinite(array) & (array > 0)).all():
         raise ValueError(f"weights must be {k} positive numbers, one for each point")
     return array

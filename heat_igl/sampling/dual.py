@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, shown
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.sampling.voronoi import VoronoiCells
 from heat_igl.typing import IntArray
@@ -52,6 +52,8 @@ def dual_triangulation(mesh: MeshLike, cells: VoronoiCells) -> Mesh:
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("a dual triangulation needs triangles, but F has 4 columns")
+    if not isinstance(cells, VoronoiCells):
+        raise MeshError(f"cells must be VoronoiCells, as farthest_cells returns them, not {shown(cells)}")
     if len(cells.labels) != mesh.n_vertices:
         raise MeshError(f"the cells have {len(cells.labels)} vertices and the mesh {mesh.n_vertices}: pass its own")
     k = len(cells.sites)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -19,7 +19,7 @@ Boundary = Literal["neumann", "dirichlet", "average"]
 
 def check_boundary(boundary: str) -> None:
     """Raise a ValueError if there is no such `Boundary`."""
-    if boundary not in ("neumann", "dirichlet", "average"):
+    if not isinstance(boundary, str) or boundary not in get_args(Boundary):
         raise ValueError(f"boundary must be 'neumann', 'dirichlet' or 'average', not {boundary!r}")
 
 

@@ -10,7 +10,7 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, positive
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices, connectivity
 from heat_igl.operators import Surface, unfolding_surface
@@ -26,7 +26,6 @@ from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.directions import PathAngles
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN, from_mesh
-from heat_igl.unfolding.local import positive
 from heat_igl.unfolding.numbered import TOLERANCE
 from heat_igl.unfolding.refinement import Refine
 from heat_igl.unfolding.single_query import single_query
@@ -98,7 +97,7 @@ def unfolded_distance(
     """
     if sources is None:
         F, sources = None, F
-    beyond = np.inf if cutoff is None else positive("cutoff", cutoff)
+    beyond = np.inf if cutoff is None else positive("cutoff", cutoff, infinite=True)
     return distance_from_scratch(as_simplices(V, F), sources, "unfold", tolerance, beyond)
 
 

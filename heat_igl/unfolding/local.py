@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import MeshError, SourceError, positive
 from heat_igl.kernels import windows
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.runtime import n_threads, side_by_side
@@ -18,7 +18,7 @@ from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
 from heat_igl.unfolding.window_search import TOLERANCE
 
-__all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distances", "positive"]
+__all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distances"]
 
 # Sources that a thread takes at a time: few enough that all threads end together.
 _CHUNK = 64
@@ -61,7 +61,7 @@ def distances_within(mesh: MeshLike, radius: float, sources: Sources | None = No
     >>> near.indices[:5].tolist(), near.data[:5].round(6).tolist()
     ([48, 49, 50, 51, 52], [2.0, 1.0, 0.0, 1.0, 2.0])
     """
-    limit = positive("radius", radius)
+    limit = positive("radius", radius, infinite=True)
     triangles = _triangles(mesh)
     chosen = _chosen(sources, triangles)
     return _rows_within(from_mesh(triangles, int(chosen[0])), chosen, limit)
@@ -84,7 +84,7 @@ def blocks_within(
     scipy.sparse.csr_array
         Shape (rows, n).
     """
-    limit = positive("radius", radius)
+    limit = positive("radius", radius, infinite=True)
     triangles = _triangles(mesh)
     chosen = _chosen(sources, triangles)
     edges = from_mesh(triangles, int(chosen[0]))
@@ -327,14 +327,6 @@ def _triangles(mesh: MeshLike) -> Mesh:
 
 def _chosen(sources: Sources | None, mesh: Mesh) -> IntArray:
     return np.arange(mesh.n_vertices) if sources is None else named_vertices(sources, mesh.n_vertices)
-
-
-def positive(name: str, value: float) -> float:
-    """A number as a float; ValueError naming it if it is not positive."""
-    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    if not is_number or not value > 0:
-        raise ValueError(f"{name} must be a positive number, not {value!r}")
-    return float(value)
 
 
 def _checked_pairs(pairs: ArrayLike, n: int) -> IntArray:

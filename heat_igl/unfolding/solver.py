@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 import igl
 import numpy as np
 
+from heat_igl.errors import is_number, shown
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.operators import Surface, unfolding_surface
 from heat_igl.sources import NEAR_RADIUS, NearField, SourcePoints, SourceSegments, SourceSet
@@ -77,8 +78,8 @@ def costs_little_to_be_exact(triangles: NumberedTriangles, refine: Refine) -> bo
 
 def require_share(tolerance: float | None) -> None:
     """Refuse a tolerance that is not a number from 0 to 1."""
-    if tolerance is not None and not 0 <= tolerance <= 1:
-        raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
+    if tolerance is not None and not (is_number(tolerance) and 0 <= tolerance <= 1):
+        raise ValueError(f"tolerance must lie between 0 and 1, not {shown(tolerance)}")
 
 
 class _Asked(NamedTuple):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MissingExtraError
+from heat_igl.errors import MissingExtraError, shown
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.unfolding.local import blocks_within
@@ -57,7 +57,7 @@ def write_distances_within(
     >>> abs(stored - heat_igl.distances_within(mesh, 2.5)).nnz
     0
     """
-    zarr, target = _zarr(), Path(path)
+    zarr, target = _zarr(), _path(path)
     if target.exists():
         raise FileExistsError(f"{target} exists: name a new directory for the distances")
     triangles = as_simplices(mesh)
@@ -117,21 +117,27 @@ def read_distances_within(path: str | os.PathLike[str], rows: slice | None = Non
     """
     zarr = _zarr()
     try:
-        group = zarr.open_group(Path(path), mode="r")
+        group = zarr.open_group(_path(path), mode="r")
     except (FileNotFoundError, FileExistsError, NotADirectoryError, ValueError):
         group = None
     if group is None or group.attrs.get("format") != _FORMAT:
         raise ValueError(f"{path} holds no distances of write_distances_within")
     k, n = group.attrs["shape"]
-    start, stop, step = (rows or slice(None)).indices(k)
-    if step != 1:
-        raise ValueError(f"rows must be consecutive, not {rows}: read them all, and select")
+    if rows is not None and not (isinstance(rows, slice) and rows.step in (None, 1)):
+        raise ValueError(f"rows must be a slice of consecutive rows, not {shown(rows)}: read them all, and select")
+    start, stop, _ = (slice(None) if rows is None else rows).indices(k)
     stop = max(start, stop)
     indptr = np.asarray(group["indptr"][start : stop + 1])
     entries = slice(int(indptr[0]), int(indptr[-1]))
     return sp.csr_array(
         (group["data"][entries], group["indices"][entries], indptr - indptr[0]), shape=(stop - start, n)
     )
+
+
+def _path(path: str | os.PathLike[str]) -> Path:
+    if not isinstance(path, (str, os.PathLike)):
+        raise TypeError(f"path must be a string or a path, not {shown(path)}")
+    return Path(path)
 
 
 def _zarr() -> Any:

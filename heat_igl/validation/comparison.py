@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from heat_igl.errors import FactorizationError, MeshError, MissingExtraError, ReferenceSolverError, SourceError
+from heat_igl.errors import (
+    FactorizationError,
+    MeshError,
+    MissingExtraError,
+    ReferenceSolverError,
+    SourceError,
+    real_numbers,
+    shown,
+)
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_mesh, as_simplices
 from heat_igl.reference import MEMORY, TIMEOUT, edge_paths, straight_lines
 from heat_igl.sources import Sources, vertex_sources
@@ -83,7 +91,11 @@ def validate(
     mesh = as_simplices(given)
     domain = given if isinstance(given, PointCloud) else mesh
     sets = _source_sets(sources, mesh.n_vertices)
+    if not isinstance(methods, Iterable) or isinstance(methods, str):
+        raise ValueError(f"methods must be a sequence of methods, not {shown(methods)}")
     chosen = [resolved(method) for method in methods]
+    if not chosen:
+        raise ValueError("methods is empty: name one at least, such as 'heat'")
     if len({label for label, _ in chosen}) < len(chosen):
         raise ValueError(f"methods must have different names, not {', '.join(label for label, _ in chosen)}")
     counter = Counter(progress, len(sets) * (len(chosen) + (reference is not None)))
@@ -159,10 +171,13 @@ def _truths(
         given: AnyArray = np.stack([reference(mesh, sources) for sources in sets])
         label = getattr(reference, "__name__", "function")
     else:
-        given, label = np.atleast_2d(np.asarray(reference, dtype=np.float64)), "given distances"
+        given, label = np.atleast_2d(real_numbers("reference", reference)), "given distances"
     counter.end_method()
     if given.shape != (len(sets), mesh.n_vertices):
         raise ValueError(f"reference must have shape ({len(sets)}, {mesh.n_vertices}), not {given.shape}")
+    if np.isnan(given).any():
+        case, vertex = np.argwhere(np.isnan(given))[0].tolist()
+        raise ValueError(f"reference[{case}, {vertex}] is NaN: vertices that no source reaches are inf")
     return label, given, None
 
 

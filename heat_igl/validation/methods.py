@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from heat_igl import reference
-from heat_igl.errors import AccuracyWarning, ReferenceSolverError
+from heat_igl.errors import AccuracyWarning, ReferenceSolverError, shown
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.runtime import PeakMemory
@@ -105,6 +105,8 @@ def resolved(method: Method) -> tuple[str, Prepare | None]:
         If the name is unknown, or if a pair has a name from `METHODS`.
     """
     if not isinstance(method, str):
+        if not (isinstance(method, tuple) and len(method) == 2 and isinstance(method[0], str) and callable(method[1])):
+            raise ValueError(f"a method is a name or a pair (name, function that makes a solver), not {shown(method)}")
         if method[0] in METHODS:
             raise ValueError(f"{method[0]!r} names a method of the package: give yours another name")
         return method
