@@ -90,8 +90,9 @@ class CurveLevels:
     def _smooth(self, values: FloatArray, on_curves: _OnCurves) -> FloatArray:
         """The function g (n,) with the least sum of |grad g|^2 over the surface and (g - values)^2 / h over the curves.
 
-        With the multiplier s = (values - g) / h on the curves, which is a source, -L g = B^T W s and (B L^+ B^T W + h) s
-        = values up to constants: conjugate gradients in the inner product of W, on each component by itself.
+        With B the values on the curves and W their lengths, s = (values - g) / h is a source: -L g = B^T W s. So
+        (h - B L^+ B^T W) s = values up to constants, by conjugate gradients in the inner product of W, on each component
+        by itself.
         """
         h = self._domain.mean_edge_lengths[on_curves.component]
         expand, at = self._domain.expand_to_vertices, on_curves.component
@@ -167,6 +168,6 @@ class _OnCurves:
         return _ratio(self.total(values), self.length)
 
 
-def _ratio(of: FloatArray, to: FloatArray) -> FloatArray:
-    """of / to, and 0 if `to` is not positive."""
-    return np.divide(of, to, out=np.zeros_like(of), where=to > 0)
+def _ratio(above: FloatArray, below: FloatArray) -> FloatArray:
+    """Quotients, 0 where `below` is not positive."""
+    return np.divide(above, below, out=np.zeros_like(above), where=below > 0)

@@ -21,7 +21,7 @@ from heat_igl.operators import Operators, divergence_matrix, edge_rotations, fac
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set
 from heat_igl.steps import PoissonProblem, VectorHeatFlow
-from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, BoolArray, FloatArray
 from heat_igl.unfolding import Refine
 
 __all__ = ["Level", "SignedHeatSolver"]
