@@ -91,8 +91,8 @@ class CurveLevels:
         """The function g (n,) with the least sum of |grad g|^2 over the surface and (g - values)^2 / h over the curves.
 
         With B the values on the curves and W their lengths, s = (values - g) / h is a source: -L g = B^T W s. So
-        (h - B L^+ B^T W) s = values up to constants, by conjugate gradients in the inner product of W, on each component
-        by itself.
+        (h - B L^+ B^T W) s = values up to constants, by conjugate gradients in the inner product of W, on each
+        component by itself.
         """
         h = self._domain.mean_edge_lengths[on_curves.component]
         expand, at = self._domain.expand_to_vertices, on_curves.component
@@ -161,7 +161,7 @@ class _OnCurves:
 
     def total(self, values: FloatArray) -> FloatArray:
         """Integral (n_components,) of values (q,) over the pieces on each component."""
-        return np.bincount(self.component, self.pieces.weight * values, self._n_components)
+        return np.asarray(np.bincount(self.component, self.pieces.weight * values, self._n_components), np.float64)
 
     def mean(self, values: FloatArray) -> FloatArray:
         """Mean (n_components,) of values (q,) on each component; 0 without pieces."""
