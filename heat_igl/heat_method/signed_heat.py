@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import Literal, NamedTuple, get_args
+from typing import get_args
 
 import numpy as np
 
 from heat_igl.errors import MeshError, SourceError, require_choice
+from heat_igl.heat_method.curve_levels import CurveLevels, Level, Pieces
 from heat_igl.heat_method.curve_sides import has_gaps, left_of_closed, left_of_nearest, zero_curve_in_gaps
 from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.options import SolverOptions
@@ -20,46 +21,16 @@ from heat_igl.operators import Operators, divergence_matrix, edge_rotations, fac
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set
 from heat_igl.steps import PoissonProblem, VectorHeatFlow
-from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, BoolArray, FloatArray
 from heat_igl.unfolding import Refine
 
 __all__ = ["Level", "SignedHeatSolver"]
 
-Level = Literal["zero", "constant", "none"]
-
 # Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
 # alike (docs/signed.md).
 _T_COEF = 0.25
-# Values on the curves are extended so many times, each time what is left of them. On random levels of five meshes 0.05
-# mean edge lengths are left by 1 at most, 0.03 by 2, 0.018 by 4, 0.011 by 8; each takes a tenth of a query.
-_LEVEL_ROUNDS = 4
 # Normals that sum to less than this share of the length of the curves have cancelled.
 _CANCELLED = 1e-9
-
-
-class _Pieces(NamedTuple):
-    """Segments and points of oriented sources, as they are diffused.
-
-    Attributes
-    ----------
-    faces, barycentric : (q,) int64, (q, 3) float64
-        The middle of each segment, and the points.
-    normal : (q,) complex128
-        Unit normal to the right of a segment, or of a point, in the plane of the face.
-    weight : (q,) float64
-        Length of each segment; h for a point.
-    label : (q,) int64
-        Curve, region or set of points.
-    is_point : (q,) bool
-        Which are points.
-    """
-
-    faces: IntArray
-    barycentric: FloatArray
-    normal: AnyArray
-    weight: FloatArray
-    label: IntArray
-    is_point: BoolArray
 
 
 class SignedHeatSolver:
@@ -130,6 +101,7 @@ class SignedHeatSolver:
         self._domain = domain
         gradient = intrinsic_gradient(self._triangulation).tocsr()
         self._D = divergence_matrix(gradient, self._triangulation.areas)
+        self._levels = CurveLevels(domain, self._mesh.F, self._heat_flow, self._poisson)
         self._unsigned = HeatMethodSolver._of(parts)
 
     def __repr__(self) -> str:
@@ -222,7 +194,7 @@ class SignedHeatSolver:
         closing = zero_curve_in_gaps(self._mesh, phi, size, self._domain.mean_edge_length)
         return size if closing is None else np.minimum(size, self._unsigned.distance(closing)), left
 
-    def _pieces(self, chosen: OrientedSet) -> _Pieces:
+    def _pieces(self, chosen: OrientedSet) -> Pieces:
         """Segments and points with their normals in the planes of their faces."""
         flat = lay_out(self._faces.l[chosen.faces]) @ np.array([1, 1j])
         along = np.einsum("sc,sc->s", chosen.end - chosen.start, flat)
@@ -239,7 +211,7 @@ class SignedHeatSolver:
                 f"normals[{first}] is that of the face, and has no direction on the surface "
                 f"({int(across.sum())} normals are like that): give the normals of the curve that the points sample"
             )
-        return _Pieces(
+        return Pieces(
             np.concatenate([chosen.faces, chosen.point_faces]),
             np.concatenate([(chosen.start + chosen.end) / 2, chosen.point_barycentric]),
             # To the right of a segment is its direction turned by -90 degrees.
@@ -249,7 +221,7 @@ class SignedHeatSolver:
             np.arange(len(chosen.faces) + len(normal)) >= len(chosen.faces),
         )
 
-    def _integrated(self, pieces: _Pieces, level: Level) -> FloatArray:
+    def _integrated(self, pieces: Pieces, level: Level) -> FloatArray:
         """The signed distance (n,): steps 1 to 3 of the method, and the level."""
         # Step 1: diffuse the normals, integrated against the hat functions.
         corners = self._mesh.F[pieces.faces]
@@ -272,45 +244,7 @@ class SignedHeatSolver:
         X = _unit(reduce(np.add, (rotation * (scale * Y[corner]) for rotation, corner in turned)))
         # Step 3: L phi = D X.
         phi = self._poisson.solve(self._D @ np.concatenate([X.real, X.imag]))
-        return phi - self._level(phi, pieces, share, level)
-
-    def _level(self, phi: FloatArray, pieces: _Pieces, share: FloatArray, level: Level) -> FloatArray:
-        """Values of the integrated distance on the curves, extended to all vertices (n,), to be subtracted from it."""
-        domain, corners = self._domain, self._mesh.F[pieces.faces]
-        value = np.einsum("qc,qc->q", pieces.barycentric, phi[corners])
-        component = domain.components[corners[:, 0]]
-        weight = np.bincount(component, pieces.weight, domain.n_components)
-        total = np.bincount(component, pieces.weight * value, domain.n_components)
-        mean = np.divide(total, weight, out=np.full(domain.n_components, -np.inf), where=weight > 0)
-        at_vertices = domain.expand_to_vertices(mean)
-        if level == "none":
-            return np.asarray(at_vertices)
-        rest = value - mean[component]
-        if level == "constant":
-            _, group = np.unique(np.stack([pieces.label, component]), axis=1, return_inverse=True)
-            group = group.ravel()
-            rest -= (np.bincount(group, pieces.weight * rest) / np.bincount(group, pieces.weight))[group]
-        return np.asarray(at_vertices + self._extended(rest, pieces, share))
-
-    def _extended(self, values: FloatArray, pieces: _Pieces, share: FloatArray) -> FloatArray:
-        """A function (n,) that takes `values` (q,) on the curves, and elsewhere that at the nearest place on them."""
-        n, corners = self.n_vertices, self._mesh.F[pieces.faces]
-        ones, extended = np.zeros(n), np.zeros(n)
-        np.add.at(ones, corners, share)
-        scale = SOURCE_HEAT / ones.max()
-        ones = self._heat_flow.solve((scale * ones)[:, None])[:, 0]
-        # Heat of the values over heat of ones is their mean over some edges. What that leaves of the values on segments
-        # is extended in turn, but not of those at points: samples are off by noise, which the mean removes.
-        for k in range(1 if pieces.is_point.all() else _LEVEL_ROUNDS):
-            rest = values - np.einsum("qc,qc->q", pieces.barycentric, extended[corners])
-            rest[pieces.is_point] *= k == 0
-            largest = max(float(np.abs(rest).max()), np.finfo(float).tiny)
-            b = np.zeros(n)
-            np.add.at(b, corners, share * (rest / largest)[:, None])
-            u = self._heat_flow.solve((scale * b)[:, None])[:, 0]
-            ratio = np.divide(u, ones, out=np.zeros(n), where=ones > LOWEST_HEAT)
-            extended += largest * np.clip(ratio, -1, 1)
-        return extended
+        return phi - self._levels.of(phi, pieces, level)
 
 
 def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, IntrinsicTriangulation]:

@@ -132,8 +132,9 @@ class NearField:
         for _ in range(_MOST_LEVELS):
             nearest = windows.nearest()
             ends = self.triangulation.tail(windows.half_edge), self.triangulation.head(windows.half_edge)
-            by_corner = np.minimum(*(found.at(vertex) for vertex in ends))
-            useful = windows.offset + nearest < by_corner + base[windows.half_edge]
+            tail, head = (found.at(vertex) for vertex in ends)
+            useful = windows.offset + nearest < np.minimum(tail, head) + base[windows.half_edge]
+            useful &= windows.are_nearer_than(tail, head, base[windows.half_edge])
             windows = windows.at((nearest < radius[ends[0]]) & useful)
             if not len(windows):
                 break

@@ -11,10 +11,13 @@ from heat_igl.typing import FloatArray
 
 __all__ = ["seen_from_points", "seen_from_segments"]
 
+# Places in one face are the same if their coordinates agree to half of one over this.
+_SAME_PLACE = 1e9
+
 
 def seen_from_points(points: SourcePoints, adjacency: Adjacency) -> tuple[list[Windows], list[SeenVertices]]:
     """Windows on the sides of each point's face, and the corners of the face."""
-    points = _in_all_faces(points, adjacency)
+    points = _once(_in_all_faces(points, adjacency))
     f = points.faces
     corners = lay_out(adjacency.triangulation.l[f])
     p = np.einsum("kc,kcx->kx", points.barycentric, corners)
@@ -28,6 +31,13 @@ def seen_from_points(points: SourcePoints, adjacency: Adjacency) -> tuple[list[W
         leaving = Windows(3 * f + c, p[:, 0], p[:, 1], one, 0 * one, 0 * one, one, points.label, points.offset)
         windows.append(enter(leaving.at(facing), corners[facing], adjacency))
     return windows, seen
+
+
+def _once(points: SourcePoints) -> SourcePoints:
+    """The points, each once in each face: a segment of a curve begins at the end of another."""
+    keys = np.column_stack([points.faces, np.rint(points.barycentric * _SAME_PLACE), points.label, points.offset])
+    _, first = np.unique(keys, axis=0, return_index=True)
+    return SourcePoints(points.faces[first], points.barycentric[first], points.label[first], points.offset[first])
 
 
 def _in_all_faces(points: SourcePoints, adjacency: Adjacency) -> SourcePoints:
