@@ -70,8 +70,8 @@ def _by_lower_end(
 ) -> cython.void:
     """Copy the faces, and put their half-edges, each with the upper end, in the order of the lower end.
 
-    `begin` (n + 1,), which must come full of 0, takes where the half-edges of each lower end begin, moved by one vertex:
-    those of v end at ``begin[v]``.
+    `begin` (n + 1,), which must come full of 0, takes where the half-edges of each lower end begin, moved by one
+    vertex: those of v end at ``begin[v]``.
     """
     f: cython.int
     i: cython.int
