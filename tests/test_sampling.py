@@ -279,11 +279,7 @@ def test_centre_refuses_what_has_none(square):
     solver = heat_igl.HeatMethodSolver(mesh)
     with pytest.raises(heat_igl.SourceError, match="no place is reached from all"):
         heat_igl.geodesic_centre(mesh, solver, [0, 200])
-    with pytest.raises(
-        ValueError, match=r"weights must be 2 positive numbers, .* but have shape \(3,\)"
-    ):
-        heat_igl.geodesic_centre(mesh, solver, [0, 1], [1.0, 2.0, 3.0])
-    with pytest.raises(ValueError, match=r"weights\[1\] = 0.0 is not a positive number"):
+    with pytest.raises(ValueError, match="weights must be 2 positive numbers"):
         heat_igl.geodesic_centre(mesh, solver, [0, 1], [1.0, 0.0])
     with pytest.raises(heat_igl.SourceError, match=r"points\[0\] = 900 is no vertex"):
         heat_igl.geodesic_centre(mesh, solver, [900])

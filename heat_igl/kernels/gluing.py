@@ -6,10 +6,21 @@ mesh that is asked once; `heat_igl.intrinsic` does the same with numpy, and keep
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge, twice_area
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.libc.math import sqrt
 
 __all__ = ["breadth_first", "flip", "glue"]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _double_area(a: cython.double, b: cython.double, c: cython.double) -> cython.double:
+    """Twice the area by the sides: Heron's formula as a product of differences, which needles need."""
+    s: cython.double = 0.5 * (a + b + c)
+    product: cython.double = s * (s - a) * (s - b) * (s - c)
+    return 2.0 * sqrt(product) if product > 0.0 else 0.0
 
 
 def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double][:, ::1], scale: cython.double):
@@ -45,110 +56,75 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
     ring: cython.int[::1] = rings
     aligned: cython.uchar[::1] = alignment
     length: cython.double[::1] = lengths
-    end: cython.int[::1] = np.zeros(n + 1, np.int32)
+    begin: cython.int[::1] = np.zeros(n + 1, np.int32)
     by_lower: cython.int[::1] = np.empty(3 * m, np.int32)
-    # The first half-edge to each vertex from the lower vertex in `seen_from`.
     seen: cython.int[::1] = np.empty(n, np.int32)
     seen_from: cython.int[::1] = np.full(n, -1, np.int32)
-    n_across: cython.int = 0
     f: cython.int
     c: cython.int
     h: cython.int
-    i: cython.int = 0
+    p: cython.int
+    q: cython.int
+    i: cython.int
+    tail: cython.int
+    head: cython.int
     lower: cython.int
+    upper: cython.int
+    n_across: cython.int = 0
+    x: cython.double
+    y: cython.double
+    z: cython.double
     with cython.nogil:
         for f in range(m):
             for c in range(3):
                 vertex[3 * f + c] = F[f, c]
                 twin[3 * f + c] = -1
                 ring[3 * f + c] = 3 * f + c
-        _sort_by_lower_end(vertex, end, by_lower)
+        for h in range(3 * m):
+            tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
+            begin[(tail if tail < head else head) + 1] += 1
+        for i in range(n):
+            begin[i + 1] += begin[i]
+        for h in range(3 * m):
+            tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
+            lower = tail if tail < head else head
+            by_lower[begin[lower]] = h
+            begin[lower] += 1
+        # Now begin[v] is where the half-edges whose lower vertex is v end.
+        i = 0
         for lower in range(n):
-            while i < end[lower]:
+            while i < begin[lower]:
                 h = by_lower[i]
                 i += 1
-                tail: cython.int = vertex[next_half_edge(h)]
-                head: cython.int = vertex[previous_half_edge(h)]
-                upper: cython.int = head if tail == lower else tail
+                tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
+                upper = head if tail == lower else tail
                 if seen_from[upper] != lower:
                     seen_from[upper] = lower
                     seen[upper] = h
-                    x: cython.double = V[tail, 0] - V[head, 0]
-                    y: cython.double = V[tail, 1] - V[head, 1]
-                    z: cython.double = V[tail, 2] - V[head, 2]
+                    x = V[tail, 0] - V[head, 0]
+                    y = V[tail, 1] - V[head, 1]
+                    z = V[tail, 2] - V[head, 2]
                     x, y, z = scale * x, scale * y, scale * z
                     length[h] = sqrt(x * x + y * y + z * z)
-                else:
-                    p: cython.int = seen[upper]
-                    length[h] = length[p]
-                    n_across += _join(twin, ring, aligned, p, h, vertex[next_half_edge(p)] != tail)
+                    continue
+                p = seen[upper]
+                length[h] = length[p]
+                if twin[p] == -1:
+                    twin[p], twin[h] = h, p
+                    if vertex[next_half_edge(p)] == tail:
+                        aligned[p] = aligned[h] = False
+                        n_across += 2
+                    continue
+                if twin[p] >= 0:
+                    q = twin[p]
+                    n_across -= 0 if aligned[p] else 2
+                    aligned[p] = aligned[q] = True
+                    twin[p] = twin[q] = -2
+                    ring[p], ring[q] = q, p
+                twin[h] = -2
+                ring[h] = ring[p]
+                ring[p] = h
     return vertices, twins, rings, alignment, lengths, n_across
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _sort_by_lower_end(
-    vertex: cython.const[cython.int][::1], end: cython.int[::1], by_lower: cython.int[::1]
-) -> cython.void:
-    """Sort half-edges by the end with the smaller number, by counting.
-
-    `end` (n + 1,), given as zeros, is set to the end in `by_lower` (3 m,) of the half-edges of each lower vertex.
-    """
-    h: cython.int
-    i: cython.int
-    tail: cython.int
-    head: cython.int
-    lower: cython.int
-    for h in range(vertex.shape[0]):
-        tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
-        end[(tail if tail < head else head) + 1] += 1
-    for i in range(end.shape[0] - 1):
-        end[i + 1] += end[i]
-    # Now end[v] is the beginning for vertex v, and moves on with each half-edge.
-    for h in range(vertex.shape[0]):
-        tail, head = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
-        lower = tail if tail < head else head
-        by_lower[end[lower]] = h
-        end[lower] += 1
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _join(
-    twin: cython.int[::1],
-    ring: cython.int[::1],
-    aligned: cython.uchar[::1],
-    p: cython.int,
-    h: cython.int,
-    is_aligned: cython.bint,
-) -> cython.int:
-    """Glue half-edge h to the first one of the same edge, p, and to all others there.
-
-    `is_aligned` says whether p and h run in opposite directions.
-
-    Returns how many more half-edges are glued to one that runs in the same direction.
-    """
-    q: cython.int = twin[p]
-    across: cython.int = 0
-    if q == -1:
-        twin[p], twin[h] = h, p
-        if not is_aligned:
-            aligned[p] = aligned[h] = False
-            across = 2
-        return across
-    if q >= 0:
-        across = 0 if aligned[p] else -2
-        aligned[p] = aligned[q] = True
-        twin[p] = twin[q] = -2
-        ring[p], ring[q] = q, p
-    twin[h] = -2
-    ring[h] = ring[p]
-    ring[p] = h
-    return across
 
 
 @cython.cfunc
@@ -187,7 +163,7 @@ def flip(
     first: cython.int
     with cython.nogil:
         for f in range(twin.shape[0] // 3):
-            flips.area[f] = twice_area(length[3 * f], length[3 * f + 1], length[3 * f + 2])
+            flips.area[f] = _double_area(length[3 * f], length[3 * f + 1], length[3 * f + 2])
         for first in range(twin.shape[0]):
             if twin[first] < first:
                 continue
@@ -262,8 +238,8 @@ class _Flips:
         x = 0.5 * ((pa - bp) * (pa + bp) - (aq - qb) * (aq + qb)) / ab
         y = (self.area[f] + self.area[g]) / ab
         self.diagonal = sqrt(x * x + y * y)
-        self.area_of_f = twice_area(pa, aq, self.diagonal)
-        self.area_of_g = twice_area(qb, bp, self.diagonal)
+        self.area_of_f = _double_area(pa, aq, self.diagonal)
+        self.area_of_g = _double_area(qb, bp, self.diagonal)
         return self.area_of_f > 0.0 and self.area_of_g > 0.0
 
     @cython.cfunc

@@ -85,12 +85,8 @@ def _weights(weights: ArrayLike | None, k: int) -> FloatArray:
     if weights is None:
         return np.ones(k)
     array = np.asarray(weights, dtype=np.float64)
-    if array.shape != (k,):
-        raise ValueError(f"weights must be {k} positive numbers, one for each point, but have shape {array.shape}")
-    bad = ~(np.isfinite(array) & (array > 0))
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise ValueError(f"weights[{first}] = {array[first]} is not a positive number ({int(bad.sum())} are not)")
+    if array.shape != (k,) or not (np.isfinite(array) & (array > 0)).all():
+        raise ValueError(f"weights must be {k} positive numbers, one for each point")
     return array
 
 
