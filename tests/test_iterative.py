@@ -9,7 +9,7 @@ from conftest import perturbed, shared_path
 
 import heat_igl
 from heat_igl import FactorizationError, HeatMethodSolver, Mesh, shapes
-from heat_igl.linear import backends, iterative
+from heat_igl.linear import backends, factor_memory, iterative
 from heat_igl.operators import operators
 
 pytest.importorskip("pyamg")
@@ -123,10 +123,10 @@ def test_negative_weights_are_refused(cow):
 
 def test_chosen_where_factors_would_not_fit(monkeypatch):
     mesh = shapes.icosphere(3)
-    estimate = 2 * iterative.factor_bytes(642, heat_matrix(mesh).nnz)
-    monkeypatch.setattr(iterative, "available_memory", lambda: 1.01 * estimate)
+    estimate = 2 * factor_memory.factor_bytes(642, heat_matrix(mesh).nnz)
+    monkeypatch.setattr(factor_memory, "available_memory", lambda: 1.01 * estimate)
     assert HeatMethodSolver(mesh).diagnostics.backend != "iterative"
-    monkeypatch.setattr(iterative, "available_memory", lambda: 0.99 * estimate)
+    monkeypatch.setattr(factor_memory, "available_memory", lambda: 0.99 * estimate)
     assert HeatMethodSolver(mesh).diagnostics.backend == "iterative"
     # A refinement factors one matrix.
     assert HeatMethodSolver(mesh, refine="sweep").diagnostics.backend != "iterative"
@@ -139,11 +139,11 @@ def test_estimate_bounds_what_the_factors_hold():
     for mesh in (shapes.torus(200, 200), perturbed(shapes.box(16))):
         A = heat_matrix(mesh)
         held = backends.factorize(A, "multifrontal").n_bytes
-        assert 1 < iterative.factor_bytes(A.shape[0], A.nnz) / held < 4
+        assert 1 < factor_memory.factor_bytes(A.shape[0], A.nnz) / held < 4
 
 
 def test_memory_is_known_here():
-    assert iterative.available_memory() > 2**27
+    assert factor_memory.available_memory() > 2**27
 
 
 def test_pickled_copy_gives_the_same_bits():

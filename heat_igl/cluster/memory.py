@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 from heat_igl.cluster.store import rows_per_block
-from heat_igl.linear.iterative import factor_bytes
+from heat_igl.linear.factor_memory import factor_bytes
 from heat_igl.mesh import Mesh, PointCloud
 
 __all__ = ["PROCESS_MEMORY", "memory_for_solvers", "physical_memory", "solver_memory"]

@@ -143,7 +143,7 @@ def page(
     Returns
     -------
     Page
-        Displayed by notebooks; `Page.save` writes it to a file. The size is 35 kB plus 50 to 55 bytes per vertex. It
+        Displayed by notebooks; `Page.save` writes it to a file. The size is 40 kB plus 50 to 55 bytes per vertex. It
         needs a browser with WebGL 2 and DecompressionStream (2023 or later).
 
     Raises

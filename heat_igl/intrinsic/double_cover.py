@@ -6,7 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
-from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
+from heat_igl.intrinsic.history import BACK_CORNERS
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["double_cover"]
@@ -15,8 +16,19 @@ __all__ = ["double_cover"]
 def double_cover(triangulation: IntrinsicTriangulation) -> tuple[IntArray, FloatArray, IntArray]:
     """The oriented double cover: each face as it is on one sheet and turned over on the other, glued along equal sides.
 
-    Vertex v becomes v and v + n, one for each orientation of the faces around it. Turning a face over swaps corners
-    1 and 2. Fans that meet in v alone are assigned to the two copies arbitrarily: in v, a path may change sheets.
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        m triangles on n vertices, of a surface that cannot be oriented.
+
+    Returns
+    -------
+    F, l : (2 m, 3) int64, (2 m, 3) float64
+        Faces and lengths of their sides; face f is f on the first sheet and m + f on the second. Turning a face over
+        swaps corners 1 and 2. Vertex v becomes v and v + n, one for each orientation of the faces around it. Fans that
+        meet in v alone are assigned to the two copies arbitrarily: in v, a path may change sheets.
+    twin : (6 m,) int64
+        The half-edge glued to each; -1 on the boundary and at edges of more than two faces.
     """
     F, n = triangulation.F, triangulation.n
     size = F.size
@@ -31,16 +43,12 @@ def double_cover(triangulation: IntrinsicTriangulation) -> tuple[IntArray, Float
     for sheet in (0, 1):
         there = np.where(other_sheet, 1 - sheet, sheet)
         twin[sheet_of_first[sheet * size + glued]] = sheet_of_first[there * size + mate]
-    vertex = np.concatenate([F.ravel(), F[:, [0, 2, 1]].ravel()])
-    lengths = np.concatenate([triangulation.l, triangulation.l[:, [0, 2, 1]]])
+    vertex = np.concatenate([F.ravel(), F[:, BACK_CORNERS].ravel()])
+    lengths = np.concatenate([triangulation.l, triangulation.l[:, BACK_CORNERS]])
     # Corners around one vertex of the cover are linked through the sides that they share.
     half_edge = np.flatnonzero(twin >= 0)
-    following, preceding = (
-        half_edge - half_edge % 3 + (half_edge + 1) % 3,
-        half_edge - half_edge % 3 + (half_edge + 2) % 3,
-    )
-    mate = twin[half_edge]
-    mate_following, mate_preceding = mate - mate % 3 + (mate + 1) % 3, mate - mate % 3 + (mate + 2) % 3
+    following, preceding = next_half_edge(half_edge), previous_half_edge(half_edge)
+    mate_following, mate_preceding = next_half_edge(twin[half_edge]), previous_half_edge(twin[half_edge])
     links = sp.coo_array(
         (
             np.ones(2 * len(half_edge), np.int8),

@@ -130,7 +130,7 @@ def _require_one_length(lengths: FloatArray, a: IntArray, b: IntArray) -> None:
         one, other = int(a[differs][0]), int(b[differs][0])
         raise MeshError(
             f"l gives the edge between faces {one // 3} and {other // 3} two lengths, {lengths.flat[one]} and "
-            f"{lengths.flat[other]} ({int(differs.sum())} edges differ)"
+            f"{lengths.flat[other]} ({int(differs.sum())} edges differ): make them equal, to {_SAME_LENGTH:g} of each"
         )
 
 

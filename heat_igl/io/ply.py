@@ -43,9 +43,6 @@ class _Element(NamedTuple):
     n: int
     properties: list[_Property]
 
-    def has_list(self) -> bool:
-        return any(prop.count_dtype for prop in self.properties)
-
 
 class _Column(NamedTuple):
     values: AnyArray

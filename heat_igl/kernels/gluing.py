@@ -6,10 +6,21 @@ mesh that is asked once; `heat_igl.intrinsic` does the same with numpy, and keep
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge, twice_area
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["breadth_first", "flip", "glue", "has_needles"]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _double_area(a: cython.double, b: cython.double, c: cython.double) -> cython.double:
+    """Twice the area by the sides: Heron's formula as a product of differences, which needles need."""
+    s: cython.double = 0.5 * (a + b + c)
+    product: cython.double = s * (s - a) * (s - b) * (s - c)
+    return 2.0 * sqrt(product) if product > 0.0 else 0.0
 
 
 def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double][:, ::1], scale: cython.double):
@@ -38,7 +49,7 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
     """
     m: cython.int = F.shape[0]
     n: cython.int = V.shape[0]
-    vertices, twins, rings = np.empty((3, 3 * m), np.int32)
+    vertices, twins, rings = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)
     alignment, lengths = np.ones(3 * m, np.uint8), np.empty(3 * m)
     vertex: cython.int[::1] = vertices
     twin: cython.int[::1] = twins
@@ -213,7 +224,7 @@ def flip(
     beyond: cython.int
     with cython.nogil:
         for f in range(twin.shape[0] // 3):
-            flips.area[f] = twice_area(length[3 * f], length[3 * f + 1], length[3 * f + 2])
+            flips.area[f] = _double_area(length[3 * f], length[3 * f + 1], length[3 * f + 2])
             flips.compare(3 * f)
         for first in range(twin.shape[0]):
             # Without a branch for each test: which half-edge of an edge comes first is as good as random.
@@ -304,8 +315,8 @@ class _Flips:
         x = 0.5 * ((pa - bp) * (pa + bp) - (aq - qb) * (aq + qb)) / ab
         y = (self.area[f] + self.area[g]) / ab
         self.diagonal = sqrt(x * x + y * y)
-        self.area_of_f = twice_area(pa, aq, self.diagonal)
-        self.area_of_g = twice_area(qb, bp, self.diagonal)
+        self.area_of_f = _double_area(pa, aq, self.diagonal)
+        self.area_of_g = _double_area(qb, bp, self.diagonal)
         return self.area_of_f > 0.0 and self.area_of_g > 0.0
 
     @cython.cfunc

@@ -28,7 +28,6 @@ def search(q: Query, v: cython.int) -> cython.void:
     top: cython.int = _first_cones(q, v)
     steps: cython.int = 0
     has_points: cython.bint = q.first_inside.shape[0] > 0
-    turned: Savings
     side: View  # of a cone that has been split
     while top > 0 and steps < q.max_steps:
         top -= 1
@@ -38,7 +37,6 @@ def search(q: Query, v: cython.int) -> cython.void:
         view: View = cone.view
         a: cython.int = cone.a
         b: cython.int = cone.b
-        first = cython.address(q.t.spoke[view.spoke])
         while steps < q.max_steps:
             steps += 1
             if view.h < 0:
@@ -58,16 +56,7 @@ def search(q: Query, v: cython.int) -> cython.void:
                 continue
             w = cython.address(q.walk[step.vertex])
             if w.distance < INFINITY:
-                turned.right = turned.left = -1.0
-                back: cython.double = atan2(wx * view.by - wy * view.bx, wx * (wx - view.bx) + wy * (wy - view.by))
-                there: cython.double = step.direction + back
-                if w.fan == step.fan:
-                    turned = savings(there, w)
-                bend: cython.double = turned.left if turned.left >= turned.right else -turned.right
-                if max(turned.right, turned.left) < -STRAIGHT:
-                    bend = REAL_BEND
-                distance: cython.double = sqrt(wx * wx + wy * wy) + w.distance
-                take(q, distance, step.vertex, wx, wy, bend, view.spoke, -first.along, -first.height, there)
+                _take_over(q, view, step.vertex, wx, wy, step.direction, w.fan == step.fan)
                 if w.fan == NO_FAN:
                     break
             # Between a and w, with w as the left limit; and between w and b.
@@ -87,6 +76,37 @@ def search(q: Query, v: cython.int) -> cython.void:
                 if right < limit:
                     top = _push(q, top, right, side, a, step.vertex)
                 a = step.vertex
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _take_over(
+    q: Query,
+    view: View,
+    end: cython.int,
+    x: cython.double,
+    y: cython.double,
+    direction: cython.double,
+    has_direction: cython.bint,
+) -> cython.void:
+    """Note the path straight to vertex `end` at (x, y), which ends the faces of a view, and on by that one's own path.
+
+    `direction` is that of the edge from `end` to b, in the fan of the path if `has_direction`.
+    """
+    w = cython.address(q.walk[end])
+    first = cython.address(q.t.spoke[view.spoke])
+    turned: Savings
+    turned.right = turned.left = -1.0
+    there: cython.double = direction + atan2(x * view.by - y * view.bx, x * (x - view.bx) + y * (y - view.by))
+    if has_direction:
+        turned = savings(there, w)
+    bend: cython.double = turned.left if turned.left >= turned.right else -turned.right
+    if max(turned.right, turned.left) < -STRAIGHT:
+        bend = REAL_BEND
+    distance: cython.double = sqrt(x * x + y * y) + w.distance
+    take(q, distance, end, x, y, bend, view.spoke, -first.along, -first.height, there)
 
 
 @cython.cfunc

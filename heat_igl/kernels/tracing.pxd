@@ -7,21 +7,8 @@ cdef extern from *:
     #define TOO_LONG 1e-3
     // Of two paths the second is taken when it is shorter by this part: not for its rounding.
     #define GAIN 1e-9
-    // A straight way to a source is taken when it is not longer than the distance says, to rounding.
-    #define PATH_ROUNDING 1e-9
     """
-    double TOO_LONG, GAIN, PATH_ROUNDING
-
-# A segment in a face that paths may end on, and the distance at which it begins.
-cdef struct Goal:
-    double start[3]
-    double end[3]
-    double offset
-
-# The nearest goal from a point, -1 if there is none; the face that it lies in; and the distance by it.
-cdef struct Nearest:
-    int goal, face
-    double distance
+    double TOO_LONG, GAIN
 
 # How a way goes on from a point of a face: into `face`, through half-edge `enter`, to `goal` in it; each -1 if none.
 cdef struct WayOn:

@@ -4,6 +4,7 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.aiming import aim, aim_from_vertex
 from cython.cimports.heat_igl.kernels.descent import Departure, Descent, leave_face, leave_vertex, nowhere, steepest
+from cython.cimports.heat_igl.kernels.goals import Goals, Nearest
 from cython.cimports.heat_igl.kernels.straightening import Course
 from cython.cimports.heat_igl.kernels.surfaces import (
     Place,
@@ -11,13 +12,11 @@ from cython.cimports.heat_igl.kernels.surfaces import (
     apart,
     at_corner,
     corner_of,
-    difference,
     moved,
     only_corner,
-    product,
     side_of,
 )
-from cython.cimports.heat_igl.kernels.tracing import GAIN, PATH_ROUNDING, TOO_LONG, Goal, Nearest, WayOn
+from cython.cimports.heat_igl.kernels.tracing import GAIN, TOO_LONG, WayOn
 from cython.cimports.libc.math import INFINITY
 
 __all__ = ["trace"]
@@ -35,7 +34,7 @@ def trace(
     tracer = _Tracer()
     tracer.s = Surface(surface, d)
     tracer.is_source = goals.is_source.view(np.uint8)
-    tracer.first_inside, tracer.inside, tracer.escape = goals.first_inside, goals.inside, goals.escape
+    tracer.goals, tracer.escape = Goals(goals.first_inside, goals.inside), goals.escape
     tracer.course = Course(tracer.s, int(np.diff(surface.first_corner).max()))
     tracer.max_steps = max_steps
     array = np.zeros(face.shape[0] + 1, np.int64)
@@ -59,13 +58,20 @@ class _Tracer:
     s: Surface
     course: Course
     is_source: cython.const[cython.uchar][::1]
-    first_inside: cython.const[cython.int][::1]
-    inside: cython.const[Goal][::1]
+    goals: Goals
     escape: cython.const[cython.int][::1]
     max_steps: cython.longlong
-    # Of the path being traced: whether it aims, and which part of the distance is left.
+    # Of the path being traced: whether it aims, and the part of the distance that is left.
     aims: cython.bint
     left: cython.double
+    # The vertex that it has reached, or -1 for a point in or on the side of a face; free at a vertex at which it began,
+    # in no face in particular. The length of the parts that are straightened; descent goes on below the floor.
+    vertex: cython.int
+    face: cython.int
+    x: Place
+    is_free: cython.bint
+    length: cython.double
+    floor: cython.double
 
     @cython.cfunc
     @cython.nogil
@@ -100,96 +106,112 @@ class _Tracer:
 
         Returns the length plus the distance at the end; inf if there is no way.
         """
-        x: Place = target[0]
-        corner: Place
-        v: cython.int = -1
-        if only_corner(target) >= 0:
-            v = self.s.triangle[face].vertex[only_corner(target)]
-        f: cython.int = face
-        is_free: cython.bint = v >= 0  # still at a vertex, and in no face in particular
-        floor: cython.double = INFINITY  # descent goes on below this
-        most: cython.double = self.value(face, target)  # of the length, when aiming
-        length: cython.double = 0.0
         steps: cython.longlong = 0
-        way: Departure
-        goal: Nearest
-        self.left = most
-        self.course.begin(face, v, target)
+        most: cython.double = self.value(face, target)  # of the length, when aiming
+        self.begin(face, target)
         while True:
             steps += 1
             if steps > self.max_steps or self.left < -most:
                 if self.aims:
                     return INFINITY  # a distance that says nothing may lead around in circles
                 if steps > self.max_steps:
-                    floor = -INFINITY
-            if v >= 0:
-                if self.is_source[v]:
-                    return length + self.course.straighten(v, cython.NULL) + self.s.d[v]
-                goal = self.goal_around(v, False)
-                way = nowhere()
-                if goal.goal < 0 and self.s.d[v] < floor:
-                    way = aim_from_vertex(self.s, v) if self.aims else leave_vertex(self.s, v)
-                    if self.aims or way.face < 0:
-                        floor = self.s.d[v]
-                if goal.goal < 0 and way.face < 0:
-                    goal = self.goal_around(v, True)
-                    if goal.goal < 0:
-                        way = self.escape_from(v)
-                        if way.face < 0:
-                            return INFINITY
-                if goal.goal >= 0:
-                    way.face, way.vertex = goal.face, -1
-                if is_free:
-                    self.course.face = f = way.face
-                    is_free = False
-                elif not self.course.turn(v, f, way.face, way.vertex):
-                    # Only this vertex joins the two faces: the path cannot pass anywhere else.
-                    length += self.course.straighten(v, cython.NULL)
-                    self.course.begin(way.face, v, cython.address(x))
-                f = way.face if way.vertex < 0 else self.course.last_face()
-                if goal.goal >= 0:
-                    return length + self.end_on(goal.goal)
-                if way.vertex >= 0:
-                    v = way.vertex
-                    continue
-                corner = at_corner(corner_of(self.s, f, v))
-                self.left = self.s.d[v] - apart(self.s, f, cython.address(corner), cython.address(way.at))
-                x = way.at
-                v = -1
-            # At a point of face f that is no vertex: on a side of it, or (at the start) inside.
-            out: Place
-            on: WayOn = self.way_on(f, cython.address(x), steps == 1, cython.address(out))
-            h: cython.int = 3 * f + side_of(cython.address(x))
-            if on.enter >= 0 and on.enter != h:
-                x = moved(self.s, h, on.enter, cython.address(x))
-                f = on.face
-                self.course.strip.push(h, on.enter)
-            if on.goal >= 0:
-                return length + self.end_on(on.goal)
-            if on.face < 0:
-                # Level, or a valley along the side.
-                v = self.lowest_vertex(f, cython.address(x))
-                continue
-            if self.aims:
-                self.left -= apart(self.s, f, cython.address(x), cython.address(out))
-                x = out
-            else:
-                down: Descent = steepest(self.s, f)
-                leave_face(cython.address(x), down.rate)
-            if only_corner(cython.address(x)) >= 0:
-                v = self.s.triangle[f].vertex[only_corner(cython.address(x))]
+                    self.floor = -INFINITY
+            if self.vertex >= 0 and self.step_from_vertex():
+                return self.length
+            if self.vertex < 0 and self.step_across_face(steps == 1):
+                return self.length
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def begin(self, face: cython.int, target: cython.pointer[cython.const[Place]]) -> cython.void:
+        """Begin a path at a point of a face."""
+        self.face, self.vertex, self.x = face, -1, target[0]
+        if only_corner(target) >= 0:
+            self.vertex = self.s.triangle[face].vertex[only_corner(target)]
+        self.is_free = self.vertex >= 0
+        self.floor, self.length, self.left = INFINITY, 0.0, self.value(face, target)
+        self.course.begin(face, self.vertex, target)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def step_from_vertex(self) -> cython.int:
+        """Go on from a vertex, along an edge or to the other side of a face; whether the path has ended."""
+        v: cython.int = self.vertex
+        if self.is_source[v]:
+            self.length = self.length + self.course.straighten(v, cython.NULL) + self.s.d[v]
+            return 1
+        goal: Nearest = self.goals.around(self.s, v, False)
+        way: Departure = nowhere()
+        if goal.goal < 0 and self.s.d[v] < self.floor:
+            way = aim_from_vertex(self.s, v) if self.aims else leave_vertex(self.s, v)
+            if self.aims or way.face < 0:
+                self.floor = self.s.d[v]
+        if goal.goal < 0 and way.face < 0:
+            goal = self.goals.around(self.s, v, True)
+            if goal.goal < 0:
+                way = self.escape_from(v)
+                if way.face < 0:
+                    self.length = INFINITY
+                    return 1
+        if goal.goal >= 0:
+            way.face, way.vertex = goal.face, -1
+        if self.is_free:
+            self.course.face = self.face = way.face
+            self.is_free = False
+        elif not self.course.turn(v, self.face, way.face, way.vertex):
+            # Only this vertex joins the two faces: the path cannot pass anywhere else.
+            self.length += self.course.straighten(v, cython.NULL)
+            self.course.begin(way.face, v, cython.address(self.x))
+        self.face = way.face if way.vertex < 0 else self.course.last_face()
+        if goal.goal >= 0:
+            self.length += self.end_on(goal.goal)
+            return 1
+        self.vertex = way.vertex
+        if way.vertex < 0:
+            corner: Place = at_corner(corner_of(self.s, self.face, v))
+            self.left = self.s.d[v] - apart(self.s, self.face, cython.address(corner), cython.address(way.at))
+            self.x = way.at
+        return 0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def step_across_face(self, is_first: cython.bint) -> cython.int:
+        """Go on from a point that is no vertex: on a side or, at the start, inside; whether the path has ended."""
+        out: Place
+        on: WayOn = self.way_on(self.face, cython.address(self.x), is_first, cython.address(out))
+        h: cython.int = 3 * self.face + side_of(cython.address(self.x))
+        if on.enter >= 0 and on.enter != h:
+            self.x = moved(self.s, h, on.enter, cython.address(self.x))
+            self.face = on.face
+            self.course.strip.push(h, on.enter)
+        if on.goal >= 0:
+            self.length += self.end_on(on.goal)
+            return 1
+        if on.face < 0:
+            # Level, or a valley along the side.
+            self.vertex = self.lowest_vertex(self.face, cython.address(self.x))
+            return 0
+        if self.aims:
+            self.left -= apart(self.s, self.face, cython.address(self.x), cython.address(out))
+            self.x = out
+        else:
+            down: Descent = steepest(self.s, self.face)
+            leave_face(cython.address(self.x), down.rate)
+        if only_corner(cython.address(self.x)) >= 0:
+            self.vertex = self.s.triangle[self.face].vertex[only_corner(cython.address(self.x))]
+        return 0
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def end_on(self, goal: cython.int) -> cython.double:
         """Straighten the path to a goal; returns the length plus the offset of the goal."""
-        c: cython.int
         ends: Place[2]
-        row = cython.address(self.inside[goal])
-        for c in range(3):
-            ends[0].c[c], ends[1].c[c] = row.start[c], row.end[c]
-        return self.course.straighten(-1, ends) + row.offset
+        self.goals.ends(goal, ends)
+        return self.course.straighten(-1, ends) + self.goals.inside[goal].offset
 
     @cython.cfunc
     @cython.nogil
@@ -221,7 +243,7 @@ class _Tracer:
         better: cython.double
         k: cython.int
         if side_of(x) < 0:
-            goal = self.goal_in(f, x, False)
+            goal = self.goals.in_face(self.s, f, x, False)
             if self.aims:
                 better = -aim(self.s, f, x, self.left, INFINITY, out)
             else:
@@ -236,7 +258,7 @@ class _Tracer:
         for k in range(self.s.first_side[edge], self.s.first_side[edge + 1]):
             g: cython.int = self.s.side[k]
             there: Place = moved(self.s, h, g, x)
-            goal = self.goal_in(g // 3, cython.address(there), False)
+            goal = self.goals.in_face(self.s, g // 3, cython.address(there), False)
             if goal.goal >= 0:
                 way.face, way.enter, way.goal = g // 3, g, goal.goal
                 return way
@@ -277,64 +299,3 @@ class _Tracer:
             if x.c[c] > 0.0 and (lowest < 0 or self.s.d[t.vertex[c]] < self.s.d[t.vertex[lowest]]):
                 lowest = c
         return t.vertex[lowest]
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def goal_in(self, f: cython.int, x: cython.pointer[cython.const[Place]], at_any_cost: cython.bint) -> Nearest:
-        """The nearest goal inside face f from point x; none if the distance at x is less, unless `at_any_cost`."""
-        best: Nearest
-        best.goal, best.face, best.distance = -1, f, INFINITY
-        i: cython.int
-        if self.first_inside[f] == self.first_inside[f + 1]:
-            return best
-        for i in range(self.first_inside[f], self.first_inside[f + 1]):
-            distance: cython.double = self.distance_to(f, i, x) + self.inside[i].offset
-            if distance < best.distance:
-                best.goal, best.distance = i, distance
-        t = cython.address(self.s.triangle[f])
-        here: cython.double = (
-            x.c[0] * self.s.d[t.vertex[0]] + x.c[1] * self.s.d[t.vertex[1]] + x.c[2] * self.s.d[t.vertex[2]]
-        )
-        if not (at_any_cost or best.distance <= here * (1.0 + PATH_ROUNDING)):
-            best.goal, best.distance = -1, INFINITY
-        return best
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def distance_to(self, f: cython.int, goal: cython.int, x: cython.pointer[cython.const[Place]]) -> cython.double:
-        """How far point x of face f is from a goal in that face."""
-        c: cython.int
-        start: Place
-        end: Place
-        for c in range(3):
-            start.c[c], end.c[c] = self.inside[goal].start[c], self.inside[goal].end[c]
-        along: Place = difference(cython.address(end), cython.address(start))
-        off: Place = difference(x, cython.address(start))
-        squared: cython.double = product(self.s, f, cython.address(along), cython.address(along))
-        share: cython.double = 0.0
-        if squared > 0.0:
-            share = product(self.s, f, cython.address(off), cython.address(along)) / squared
-        share = min(max(share, 0.0), 1.0)
-        for c in range(3):
-            start.c[c] = start.c[c] + share * along.c[c]
-        return apart(self.s, f, x, cython.address(start))
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def goal_around(self, v: cython.int, at_any_cost: cython.bint) -> Nearest:
-        """The nearest goal inside the faces at vertex v."""
-        best: Nearest
-        best.goal, best.face, best.distance = -1, -1, INFINITY
-        k: cython.int
-        for k in range(self.s.first_corner[v], self.s.first_corner[v + 1]):
-            f: cython.int = self.s.corner[k] // 3
-            if self.first_inside[f] == self.first_inside[f + 1]:
-                continue
-            x: Place = at_corner(self.s.corner[k] % 3)
-            found: Nearest = self.goal_in(f, cython.address(x), at_any_cost)
-            if found.distance < best.distance:
-                best = found
-        return best

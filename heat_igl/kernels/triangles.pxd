@@ -23,9 +23,3 @@ cdef inline double area(double a, double b, double c) noexcept nogil:
         swapped = a; a = b; b = swapped
     cdef double product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))
     return 0.25 * sqrt(product) if product > 0.0 else 0.0
-
-cdef inline double twice_area(double a, double b, double c) noexcept nogil:
-    # Twice the area of a triangle by its sides: Heron's formula as a product of differences, which needles need.
-    cdef double s = 0.5 * (a + b + c)
-    cdef double product = s * (s - a) * (s - b) * (s - c)
-    return 2.0 * sqrt(product) if product > 0.0 else 0.0

@@ -70,30 +70,14 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
 
     Returns the vertex to visit first if the walk meets one that is not visited yet, -1 otherwise.
     """
-    spoke = cython.address(q.t.spoke[k])
     view: View
     right: Limit
     left: Limit
-    first_x: cython.double = -spoke.along
-    first_y: cython.double = -spoke.height
-    view.ax, view.ay = first_x, first_y
-    view.bx, view.by = first_x + spoke.base, first_y
-    view.h, view.spoke = q.t.turn[k].across, k
-    view.rx, view.ry, view.lx, view.ly = view.ax, view.ay, view.bx, view.by
-    right_advice = cython.address(q.advice[k - q.t.first[v]])
-    left_advice = cython.address(q.advice[spoke.next - q.t.first[v]])
-    right.vertex, right.length = spoke.neighbour, spoke.length
-    left.vertex, left.length = spoke.next_neighbour, q.t.spoke[spoke.next].length
-    right.there, left.there = q.t.turn[k].there, q.t.turn[spoke.next].there
-    right.saving = right_advice.saving if right_advice.side == SAYS_LEFT else -1.0
-    left.saving = left_advice.saving if left_advice.side == SAYS_RIGHT else -1.0
-    right.x, right.y, left.x, left.y = view.ax, view.ay, view.bx, view.by
-    distance: cython.double
-    if _may_agree(q, cython.address(right), cython.address(left)):
-        distance = _common_source(q, right, left)
-        if distance < INFINITY:
-            take(q, distance, right.vertex, right.x, right.y, right.saving, k, first_x, first_y, 0.0)
-            return -1
+    view = _cone_over(q, v, k, cython.address(right), cython.address(left))
+    first_x: cython.double = view.ax
+    first_y: cython.double = view.ay
+    if _take_common_source(q, cython.address(right), cython.address(left), k):
+        return -1
     has_points: cython.bint = q.first_inside.shape[0] > 0
     far: cython.double = 4.0 * q.found.distance * q.found.distance
     wait_for: cython.int = -1
@@ -145,20 +129,68 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
             gain: cython.double = 0.5 * most * most * length * reach
             enough: cython.double = q.tolerance * min(length + w.distance, SHARE * length) * (length + reach)
             if gain < enough and right.saving > 0.0 and left.saving > 0.0:
-                if _may_agree(q, cython.address(right), cython.address(left)):
-                    distance = _common_source(q, right, left)
-                    if distance < INFINITY:
-                        take(q, distance, right.vertex, right.x, right.y, right.saving, k, first_x, first_y, 0.0)
+                _take_common_source(q, cython.address(right), cython.address(left), k)
                 break
         if view.ax * view.ax + view.ay * view.ay > far and view.bx * view.bx + view.by * view.by > far:
             break
-    distance = right.length + q.walk[right.vertex].distance
-    bend = right.saving if right.saving > 0.0 else REAL_BEND
-    take(q, distance, right.vertex, right.x, right.y, bend, k, first_x, first_y, right.there)
-    distance = left.length + q.walk[left.vertex].distance
-    bend = -left.saving if left.saving > 0.0 else REAL_BEND
-    take(q, distance, left.vertex, left.x, left.y, bend, k, first_x, first_y, left.there)
+    _take_limit(q, cython.address(right), 1.0, k)
+    _take_limit(q, cython.address(left), -1.0, k)
     return wait_for
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _cone_over(
+    q: Query, v: cython.int, k: cython.int, right: cython.pointer[Limit], left: cython.pointer[Limit]
+) -> View:
+    """The view from v through the corner left of the spoke k of v; sets the limits to the ends of the side opposite."""
+    spoke = cython.address(q.t.spoke[k])
+    view: View
+    view.ax, view.ay = -spoke.along, -spoke.height
+    view.bx, view.by = view.ax + spoke.base, view.ay
+    view.h, view.spoke = q.t.turn[k].across, k
+    view.rx, view.ry, view.lx, view.ly = view.ax, view.ay, view.bx, view.by
+    right_advice = cython.address(q.advice[k - q.t.first[v]])
+    left_advice = cython.address(q.advice[spoke.next - q.t.first[v]])
+    right.vertex, right.length = spoke.neighbour, spoke.length
+    left.vertex, left.length = spoke.next_neighbour, q.t.spoke[spoke.next].length
+    right.there, left.there = q.t.turn[k].there, q.t.turn[spoke.next].there
+    right.saving = right_advice.saving if right_advice.side == SAYS_LEFT else -1.0
+    left.saving = left_advice.saving if left_advice.side == SAYS_RIGHT else -1.0
+    right.x, right.y, left.x, left.y = view.ax, view.ay, view.bx, view.by
+    return view
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _take_limit(q: Query, limit: cython.pointer[Limit], side: cython.double, k: cython.int) -> cython.void:
+    """Note the path over a limit of the cone at spoke k: the right one, for `side` 1, or the left one, for -1."""
+    spoke = cython.address(q.t.spoke[k])
+    distance: cython.double = limit.length + q.walk[limit.vertex].distance
+    bend: cython.double = side * limit.saving if limit.saving > 0.0 else REAL_BEND
+    take(q, distance, limit.vertex, limit.x, limit.y, bend, k, -spoke.along, -spoke.height, limit.there)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _take_common_source(
+    q: Query, right: cython.pointer[Limit], left: cython.pointer[Limit], k: cython.int
+) -> cython.bint:
+    """Note the straight path between the limits of the cone at spoke k, if both see one source; whether they do."""
+    if not _may_agree(q, right, left):
+        return False
+    distance: cython.double = _common_source(q, right[0], left[0])
+    if not distance < INFINITY:
+        return False
+    spoke = cython.address(q.t.spoke[k])
+    take(q, distance, right.vertex, right.x, right.y, right.saving, k, -spoke.along, -spoke.height, 0.0)
+    return True
 
 
 @cython.cfunc

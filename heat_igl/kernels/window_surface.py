@@ -4,8 +4,9 @@ Half-edge ``3 f + c`` is the side of face f opposite its corner c; the corner ca
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge, twice_area
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_structures import BENDS, ENDS, JOINS, PASSED, Ray, Search
+from cython.cimports.libc.math import sqrt
 
 __all__ = ["SEVERAL_FANS", "shapes"]
 
@@ -58,7 +59,7 @@ def shapes(
             h = 3 * f
             a, b, d = length[h], length[h + 1], length[h + 2]
             # A needle without height would have no circle.
-            area = twice_area(a, b, d) + 1e-20 * a * a
+            area = _double_area(a, b, d) + 1e-20 * a * a
             double_area[f] = area
             bulge[h] = a * (b * b + d * d - a * a) / (2.0 * area)
             bulge[h + 1] = b * (a * a + d * d - b * b) / (2.0 * area)
@@ -75,6 +76,17 @@ def shapes(
                 kind[vertex[next_half_edge(h)]] = kind[vertex[previous_half_edge(h)]] = JOINS
                 is_delaunay = False
     return is_delaunay
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _double_area(a: cython.double, b: cython.double, c: cython.double) -> cython.double:
+    """Twice the area of a triangle by its sides: Heron's formula as a product of differences, which needles need."""
+    s: cython.double = 0.5 * (a + b + c)
+    product: cython.double = s * (s - a) * (s - b) * (s - c)
+    return 2.0 * sqrt(product) if product > 0.0 else 0.0
 
 
 @cython.cfunc

@@ -16,7 +16,8 @@ from typing import Literal, get_args
 import scipy.sparse as sp
 
 from heat_igl.errors import require_choice
-from heat_igl.linear.iterative import IterativeAnalysis, factors_fit, has_iterative
+from heat_igl.linear.factor_memory import factors_fit
+from heat_igl.linear.iterative import IterativeAnalysis, has_iterative
 from heat_igl.linear.multifrontal import MultifrontalAnalysis
 from heat_igl.linear.protocols import Analysis, Factorization
 from heat_igl.linear.superlu import SuperLUAnalysis

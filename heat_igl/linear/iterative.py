@@ -1,52 +1,21 @@
-"""Linear systems too large to factor: relaxation for heat, multigrid for Poisson. Knows matrices, never meshes.
-
-Heat falls by hundreds of decades over a mesh, and only its *relative* accuracy gives far directions: an iteration that
-stops at a residual would lose them. The heat matrix on a Delaunay triangulation is an M-matrix, so Gauss-Seidel from 0
-with a right-hand side that is nowhere negative adds up numbers of one sign and rises towards the solution at every
-unknown. Visiting unknowns outward from the source, a band that is already right follows the front, and each unknown is
-visited some tens to hundreds of times, however large the mesh.
-"""
+"""The backend without factors, for systems too large to factor: relaxation for heat, multigrid for Poisson."""
 
 from __future__ import annotations
 
 import importlib.util
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import FactorizationError, MissingExtraError
-from heat_igl.kernels.relaxation import relax
-from heat_igl.runtime import n_threads
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.errors import FactorizationError
+from heat_igl.linear.multigrid import Multigrid
+from heat_igl.linear.relaxation import Relaxation
+from heat_igl.typing import BoolArray, IntArray
 
-__all__ = [
-    "IterativeAnalysis",
-    "Multigrid",
-    "Relaxation",
-    "available_memory",
-    "factors_fit",
-    "has_iterative",
-    "iterative",
-]
+__all__ = ["IterativeAnalysis", "has_iterative", "iterative"]
 
-# Relative change per sweep below which an unknown is left alone. The remaining error adds up along the way from the
-# source, to at most some 1e-8 on slivers; distances see the differences of neighbours only.
-_TOLERANCE = 1e-11
-# A sweep goes out by one level of unknowns at a time; slivers need a thousand more.
-_MOST_SWEEPS = 200_000
-# Relative residual of the Poisson problem; the largest error measured is 1e-11 of the largest value.
-_RESIDUAL = 1e-10
-_MOST_ITERATIONS = 300
 # A matrix has an excess of the diagonal in every row, or it does not; this is rounding.
 _EXCESS = 1e-13
-# Bytes per row of each of two factors while they are made, on log2 n and on n^(1/3): the multifrontal ones of spheres
-# and tori of 150k vertices took 25 to 37, those of a box of 30k vertices 35. Rather too much than too little.
-_BYTES_SURFACE = 45.0
-_BYTES_VOLUME = 100.0
 
 
 class IterativeAnalysis:
@@ -65,143 +34,6 @@ class IterativeAnalysis:
     def factorize(self, A: sp.csc_matrix, free: BoolArray | None = None) -> Relaxation | Multigrid:
         """See `iterative`."""
         return iterative(A, free)
-
-
-class Relaxation:
-    """Gauss-Seidel in breadth-first order from the right-hand side, to relative accuracy.
-
-    Parameters
-    ----------
-    A : (n, n) sparse matrix
-        Symmetric positive definite, with an inverse that has no negative entry: an M-matrix, or one with a few small
-        positive entries off the diagonal such as obtuse angles at a boundary bring.
-    free : (n,) bool, optional
-        Rows and columns to keep; the solution is 0 on the others.
-    """
-
-    backend = "iterative"
-    nonzeros = 0
-
-    def __init__(self, A: sp.csc_matrix, free: BoolArray | None = None) -> None:
-        self._arguments = A, free
-        self._part = _Part(A, free)
-        self.n_bytes = self._part.n_bytes
-
-    def solve(self, b: FloatArray) -> FloatArray:
-        """Solve A x = b for one right-hand side (n,) or several (n, k); columns run on all processors.
-
-        Raises
-        ------
-        FactorizationError
-            If the solution for a right-hand side that is nowhere negative is negative somewhere.
-        """
-        return self._part.solve(b, self._column, n_threads())
-
-    def _column(self, b: FloatArray) -> FloatArray:
-        if (b < 0).any():
-            return self._rising(np.maximum(b, 0)) - self._rising(np.maximum(-b, 0))
-        return self._rising(b)
-
-    def _rising(self, b: FloatArray) -> FloatArray:
-        A = self._part.matrix  # symmetric: columns are rows
-        x, sweeps = relax(
-            A.indptr.astype(np.int32, copy=False),
-            A.indices.astype(np.int32, copy=False),
-            A.data.astype(np.float64, copy=False),
-            b.astype(np.float64, copy=False),
-            _TOLERANCE,
-            _MOST_SWEEPS,
-        )
-        if sweeps < 0 or (x < 0).any():
-            raise FactorizationError(
-                f"relaxation failed ({'no end' if sweeps < 0 else 'negative heat'}): edges with negative weights let "
-                'heat turn negative; use laplacian="intrinsic-delaunay", or a direct backend'
-            )
-        return np.asarray(x)
-
-    def __reduce__(self) -> tuple[type[Relaxation], tuple[sp.csc_matrix, BoolArray | None]]:
-        return Relaxation, self._arguments
-
-
-class Multigrid:
-    """Conjugate gradients, preconditioned by pyamg's classical (Ruge-Stueben) multigrid, to a residual of 1e-10.
-
-    Parameters
-    ----------
-    A : (n, n) sparse matrix
-        Symmetric positive definite on the vertices that are free.
-    free : (n,) bool, optional
-        Rows and columns to keep; the solution is 0 on the others.
-
-    Raises
-    ------
-    MissingExtraError
-        If pyamg is not installed.
-
-    Notes
-    -----
-    Beside smoothed aggregation it is set up in a fraction of the time and memory and needs about as many iterations on
-    Laplacians of triangulations; and it uses no random numbers.
-    """
-
-    backend = "iterative"
-    nonzeros = 0
-
-    def __init__(self, A: sp.csc_matrix, free: BoolArray | None = None) -> None:
-        try:
-            import pyamg
-        except ImportError:
-            raise MissingExtraError.of('backend="iterative"', "pyamg", "fast") from None
-        self._arguments = A, free
-        self._part = _Part(A, free)
-        part = self._part.matrix  # symmetric: columns are rows
-        rows = sp.csr_matrix((part.data, part.indices, part.indptr), shape=part.shape)
-        self._levels: Any = pyamg.ruge_stuben_solver(rows, max_coarse=500)
-        self.n_bytes = int(self._part.n_bytes * self._levels.operator_complexity())
-
-    def solve(self, b: FloatArray) -> FloatArray:
-        """Solve A x = b for one right-hand side (n,) or several (n, k).
-
-        Raises
-        ------
-        FactorizationError
-            If the iteration does not converge.
-        """
-        return self._part.solve(b, self._column, 1)
-
-    def _column(self, b: FloatArray) -> FloatArray:
-        x, status = self._levels.solve(b, tol=_RESIDUAL, maxiter=_MOST_ITERATIONS, accel="cg", return_info=True)
-        if status != 0:
-            raise FactorizationError(
-                f"conjugate gradients did not converge in {_MOST_ITERATIONS} iterations ({len(b)} rows): is the mesh "
-                'full of slivers? Use laplacian="intrinsic-delaunay", or a direct backend'
-            )
-        return np.asarray(x)
-
-    def __reduce__(self) -> tuple[type[Multigrid], tuple[sp.csc_matrix, BoolArray | None]]:
-        return Multigrid, self._arguments
-
-
-class _Part:
-    """The principal submatrix of A on the free rows, and solutions that are 0 on the others."""
-
-    def __init__(self, A: sp.csc_matrix, free: BoolArray | None) -> None:
-        self._free = None if free is None or free.all() else np.flatnonzero(free)
-        self.matrix = (A if self._free is None else A[self._free][:, self._free]).tocsc()
-        self.n_bytes = self.matrix.data.nbytes + self.matrix.indices.nbytes + self.matrix.indptr.nbytes
-
-    def solve(self, b: FloatArray, column_solve: Callable[[FloatArray], FloatArray], n_threads: int) -> FloatArray:
-        kept = b if self._free is None else b[self._free]
-        columns = kept.reshape(len(kept), -1)
-        if columns.shape[1] == 1 or n_threads == 1:
-            solved = [column_solve(np.ascontiguousarray(column)) for column in columns.T]
-        else:
-            with ThreadPoolExecutor(min(n_threads, columns.shape[1])) as pool:
-                solved = list(pool.map(column_solve, np.ascontiguousarray(columns.T)))
-        x = np.zeros(b.shape)
-        into = x.reshape(len(x), -1)
-        into[slice(None) if self._free is None else self._free] = np.stack(solved, axis=1)
-        return x
 
 
 def iterative(A: sp.csc_matrix, free: BoolArray | None = None) -> Relaxation | Multigrid:
@@ -233,34 +65,3 @@ def iterative(A: sp.csc_matrix, free: BoolArray | None = None) -> Relaxation | M
 def has_iterative() -> bool:
     """Whether the library that `iterative` needs is installed."""
     return importlib.util.find_spec("pyamg") is not None
-
-
-def factors_fit(A: sp.csc_matrix, n_factors: int = 2) -> bool:
-    """Whether factors with the pattern of `A`, heat's and Poisson's, would fit into the memory available now."""
-    return n_factors * factor_bytes(A.shape[0], A.nnz) < available_memory()
-
-
-def factor_bytes(n: int, n_entries: int) -> float:
-    """An estimate of the memory that a factor of an (n, n) matrix takes while it is made, before it is.
-
-    Nested dissection leaves of the order of n log n entries on surfaces and n^(4/3) in volumes. The average row tells
-    which: by Euler's formula it has 7 entries on a triangulated surface, and 13 to 15 in a volume. (A lattice of right
-    angles, whose diagonals weigh nothing, is taken for a surface.)
-    """
-    is_volume = n_entries > 10 * n
-    return float(n * (_BYTES_VOLUME * n ** (1 / 3) if is_volume else _BYTES_SURFACE * np.log2(max(n, 2))))
-
-
-def available_memory() -> float:
-    """Bytes that can be allocated without swapping, as far as the system tells; infinite if it does not."""
-    try:
-        with open("/proc/meminfo") as lines:
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return 1024.0 * int(line.split()[1])
-    except OSError:
-        pass
-    try:
-        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return float("inf")

@@ -1,17 +1,10 @@
-"""Execution: threads, blocks of right-hand sides, memory, compiled kernels, the range of doubles, warnings."""
+"""Execution: threads, blocks of right-hand sides, progress, memory, the range of doubles, warnings, module aliases."""
 
-from heat_igl.runtime.blocks import (
-    WORKING_MEMORY,
-    block_size,
-    float_type,
-    in_blocks,
-    in_order,
-    progress_bar,
-    rich_progress,
-    row_writer,
-)
+from heat_igl.runtime.blocks import WORKING_MEMORY, block_size, in_blocks, in_order
 from heat_igl.runtime.heat_range import LARGEST_EXPONENT, LOWEST_HEAT, RANGE_LIMIT, SOURCE_HEAT
 from heat_igl.runtime.memory import PeakMemory, release_free_memory, resident_memory
+from heat_igl.runtime.progress import progress_bar, rich_progress
+from heat_igl.runtime.rows import float_type, row_writer
 from heat_igl.runtime.threads import n_threads, pool, side_by_side
 from heat_igl.runtime.warn import held_warnings, warn_caller
 

@@ -1,21 +1,15 @@
-"""Many right-hand sides in blocks: block size, order, output and progress."""
+"""Many right-hand sides in blocks: the size of a block, and blocks on several threads with results in order."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import TypeVar
 
-import numpy as np
-import numpy.typing as npt
-
-from heat_igl.errors import MissingExtraError, shown
 from heat_igl.runtime.threads import pool
-from heat_igl.typing import AnyArray
 
-__all__ = ["WORKING_MEMORY", "block_size", "float_type", "in_blocks", "in_order", "progress_bar", "row_writer"]
+__all__ = ["WORKING_MEMORY", "block_size", "in_blocks", "in_order"]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -102,80 +96,3 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], n_threads: i
                 future.cancel()
     if failure is not None:
         raise failure
-
-
-def float_type(dtype: npt.DTypeLike | None) -> np.dtype[Any]:
-    """The floating-point type of returned distances; float64 if `dtype` is None.
-
-    Raises
-    ------
-    ValueError
-        If `dtype` is neither float64 nor float32.
-    """
-    try:
-        found = np.dtype(np.float64 if dtype is None else dtype)
-    except TypeError:
-        raise ValueError(f"dtype must be float64 or float32, not {shown(dtype)}") from None
-    if found not in (np.float64, np.float32):
-        raise ValueError(f"dtype must be float64 or float32, not {found}")
-    return found
-
-
-@contextmanager
-def progress_bar(description: str, total: int, shown: bool = True) -> Iterator[Callable[[int], None]]:
-    """A context with a progress bar on standard error; the value is a function that advances the bar by n rows.
-
-    With ``shown=False`` there is no bar, and the function does nothing.
-
-    Raises
-    ------
-    MissingExtraError
-        If rich is not installed.
-    """
-    if not shown:
-        yield lambda _: None
-        return
-    with rich_progress() as bar:
-        task = bar.add_task(description, total=total)
-        yield lambda n_rows: bar.advance(task, n_rows)
-
-
-def rich_progress() -> Any:
-    """Progress bars of rich on standard error, without tasks yet; a context manager.
-
-    Raises
-    ------
-    MissingExtraError
-        If rich is not installed.
-    """
-    with MissingExtraError.guard("progress=True", "rich", "cli"):
-        from rich.console import Console
-        from rich.progress import MofNCompleteColumn, Progress
-    columns = (*Progress.get_default_columns(), MofNCompleteColumn())
-    return Progress(*columns, console=Console(stderr=True))
-
-
-def row_writer(out: Any) -> Callable[[AnyArray], None]:
-    """A function that writes successive blocks of rows to `out` (k, n), from the first row on.
-
-    If `out` has chunks, as zarr arrays have, rows are collected until they fill a chunk or reach the end of `out`:
-    writing a part of a chunk would compress the whole chunk again. Other arrays receive every block at once.
-    """
-    chunks = getattr(out, "shards", None) or getattr(out, "chunks", None)
-    height = int(chunks[0]) if chunks else 1
-    waiting: list[AnyArray] = []
-    position = 0
-
-    def write(rows: AnyArray) -> None:
-        nonlocal position
-        waiting.append(rows)
-        n_waiting = sum(len(block) for block in waiting)
-        is_last = position + n_waiting == out.shape[0]
-        n_ready = n_waiting if is_last else n_waiting - n_waiting % height
-        if n_ready:
-            ready = waiting[0] if len(waiting) == 1 else np.concatenate(waiting)
-            out[position : position + n_ready] = ready[:n_ready]
-            waiting[:] = [ready[n_ready:].copy()] if n_ready < n_waiting else []
-            position += n_ready
-
-    return write

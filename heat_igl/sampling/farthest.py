@@ -22,7 +22,7 @@ def farthest_points(solver: HeatMethodSolver | MeshLike, k: int, *, start: Array
     Parameters
     ----------
     solver : HeatMethodSolver or mesh
-        Of any domain, or whatever `as_mesh` takes, for a near-exact solver; asked k - 1 times.
+        Of any domain, or whatever `as_mesh` takes, for a near-exact solver; asked k times.
     k : int
         Number of vertices.
     start : int, sequence of int, or (n,) mask of bool
@@ -51,7 +51,7 @@ def farthest_points(solver: HeatMethodSolver | MeshLike, k: int, *, start: Array
 
 
 def farthest_cells(solver: HeatMethodSolver | MeshLike, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
-    """The Voronoi cells of `farthest_points`, for one query more; arguments and errors as there.
+    """The Voronoi cells of `farthest_points`, for the same queries; arguments and errors as there.
 
     Examples
     --------

@@ -6,7 +6,7 @@ import numpy as np
 
 from heat_igl.operators import Operators, TriangleElements
 from heat_igl.runtime import LOWEST_HEAT
-from heat_igl.steps.descending import Triangles, normalized_divergence, triangles
+from heat_igl.steps.triangle_divergence import DivergenceTables, divergence_tables, normalized_divergence
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["NormalizedDivergence", "damping", "lowest_full_rate", "normalize"]
@@ -55,7 +55,7 @@ def normalize(operators: Operators, u: FloatArray, of_log: bool = False) -> Floa
 def damping(
     operators: Operators, u: FloatArray, t: float | FloatArray, full_rate: float | None = None, fitted: bool = False
 ) -> FloatArray:
-    """How sure the direction of X is on each face: 1 almost everywhere, less if heat arrives from several sides.
+    """The magnitude of the field on each face: 1 almost everywhere, less if heat arrives from several sides.
 
     A front of heat falls by the same factor over each length, |grad log u| = 1 / sqrt(t) for small faces and in a
     fitted flow, else by arccosh(1 + l^2 / (2 t)) over an edge of length l on large ones. If fronts meet, at the cut
@@ -79,9 +79,8 @@ def damping(
     Returns
     -------
     (m,) or (m, k) float64
-        Factor of X on each face, between 0 and 1; 1 if u is not positive. On faces with a corner on the boundary,
-        at which an insulated boundary mirrors the front, a slower rate is enough, and the factor
-        is 1 if the flow is not `fitted`.
+        Factor of X on each face, between 0 and 1; 1 if u is not positive. On faces with a corner on the boundary, which
+        mirrors the front if it is insulated, a slower rate is enough, and the factor is 1 if the flow is not `fitted`.
     """
     return _share_of_rate(operators, u, lowest_full_rate(operators, t, fitted, full_rate))
 
@@ -144,11 +143,11 @@ class NormalizedDivergence:
     ) -> None:
         self._arguments = operators, t, order, fitted
         self._full_rate: FloatArray | None = None
-        self._kernel: Triangles | None = None
+        self._tables: DivergenceTables | None = None
         full_rate = None if t is None else lowest_full_rate(operators, t, fitted)
         if isinstance(operators.gradient, TriangleElements):
             full_rate = np.zeros(len(operators.weights)) if full_rate is None else full_rate
-            self._kernel = triangles(operators.gradient, operators.weights, full_rate, order)
+            self._tables = divergence_tables(operators.gradient, operators.weights, full_rate, order)
         else:
             self._full_rate = full_rate
             _ = operators.D  # made on first use otherwise, in the middle of the first query
@@ -156,8 +155,8 @@ class NormalizedDivergence:
     def divergence(self, u: FloatArray) -> FloatArray:
         """Integrated divergence (n, k) for heat (n, k)."""
         operators, _, _, fitted = self._arguments
-        if self._kernel is not None:
-            return normalized_divergence(self._kernel, u, LOWEST_HEAT, fitted)
+        if self._tables is not None:
+            return normalized_divergence(self._tables, u, LOWEST_HEAT, fitted)
         divergence = np.empty(u.shape)
         # One column at a time: the field of all takes more memory than the caches hold.
         for column, of_column in zip(np.ascontiguousarray(u.T), divergence.T, strict=True):

@@ -10,10 +10,10 @@ from heat_igl.kernels.divergence import divergence_of_descent
 from heat_igl.operators import TriangleElements
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Triangles", "normalized_divergence", "triangles"]
+__all__ = ["DivergenceTables", "divergence_tables", "normalized_divergence"]
 
 
-class Triangles(NamedTuple):
+class DivergenceTables(NamedTuple):
     """All that the divergence takes of a triangulation, a row per face, so that a pass reads little memory.
 
     Attributes
@@ -33,9 +33,9 @@ class Triangles(NamedTuple):
     numbers: FloatArray
 
 
-def triangles(
+def divergence_tables(
     elements: TriangleElements, weights: FloatArray, full_rate: FloatArray, order: IntArray | None
-) -> Triangles:
+) -> DivergenceTables:
     """The tables of `elements`, for faces of area `weights` (m,) and vertices visited in `order`.
 
     `full_rate` (m,) is the rate of decay from which on a direction is trusted fully, 0 for any.
@@ -53,10 +53,10 @@ def triangles(
     with np.errstate(divide="ignore"):
         for column, values in enumerate((*elements.frames(), weights, full_rate**-2.0)):
             numbers[:, column] = values[by_first]
-    return Triangles(order, corners[by_first], numbers)
+    return DivergenceTables(order, corners[by_first], numbers)
 
 
-def normalized_divergence(t: Triangles, u: FloatArray, smallest: float, of_log: bool = False) -> FloatArray:
+def normalized_divergence(t: DivergenceTables, u: FloatArray, smallest: float, of_log: bool = False) -> FloatArray:
     """Integrated divergence (n, k) of -grad u / |grad u|, times |grad log u| / full_rate if that is below 1.
 
     It follows the gradient of log u if `of_log`, on faces with no corner below `smallest`. It is 0 if no
