@@ -49,7 +49,7 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
     """
     m: cython.int = F.shape[0]
     n: cython.int = V.shape[0]
-    vertices, twins, rings = np.empty((3, 3 * m), np.int32)
+    vertices, twins, rings = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)
     alignment, lengths = np.ones(3 * m, np.uint8), np.empty(3 * m)
     vertex: cython.int[::1] = vertices
     twin: cython.int[::1] = twins
