@@ -57,8 +57,20 @@ def test_local_queries_are_the_full_search_to_the_bit(name):
         order = np.lexsort((np.arange(n), every[v]))[:9]
         np.testing.assert_array_equal(indices[v], np.where(reached[v, order], order, -1))
         np.testing.assert_array_equal(distances[v], every[v, order])
-    pairs = np.random.default_rng(3).integers(0, n, (300, 2))
-    np.testing.assert_array_equal(pair_distances(mesh, pairs), every[pairs[:, 0], pairs[:, 1]])
+    pairs = np.random.default_rng(3).permutation(n * n)[:300]
+    shared = np.column_stack([pairs % 5, pairs // n])  # several second vertices for each first one
+    np.testing.assert_array_equal(pair_distances(mesh, shared), every[shared[:, 0], shared[:, 1]])
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_single_pairs_are_the_full_search(name):
+    """With one second vertex less is looked at: of paths that are equally long, another may be measured."""
+    mesh = MESHES[name]()
+    rng, n, every = np.random.default_rng(3), mesh.n_vertices, full(mesh)
+    for _ in range(3):
+        first, second = rng.permutation(n), rng.permutation(n)
+        found = pair_distances(mesh, np.column_stack([first, second]))
+        np.testing.assert_allclose(found, every[first, second], rtol=4e-15)
 
 
 def test_rows_are_those_of_the_sources_in_their_order():
@@ -169,8 +181,8 @@ def test_a_search_costs_what_it_touches(monkeypatch):
     original = local._Workspace
 
     class Kept(original):  # type: ignore[misc, valid-type]
-        def __init__(self, edges):
-            super().__init__(edges)
+        def __init__(self, *arguments):
+            super().__init__(*arguments)
             kept.append([array.copy() for array in self._state])
             kept.append(self._state)
 

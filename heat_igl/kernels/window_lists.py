@@ -8,8 +8,8 @@ triangulations the key is the distance of the nearest point of the windows.
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.triangles import next_half_edge
-from cython.cimports.heat_igl.kernels.window_structures import Entry, List, Search, Window
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.window_structures import Entry, List, Search, Window, reach, straight
 from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdlib import free, malloc, realloc
 from cython.cimports.libc.string import memcpy, memmove
@@ -217,11 +217,44 @@ def _free_list(s: cython.pointer(Search)) -> cython.int:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def _towards_goal(
+    s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int
+) -> cython.int:
+    """Keep the windows over e through which the goal may be as near as by the path known; how many they are.
+
+    No path from a point of e to the goal is shorter than the straight line from an end of e, less the way to that end.
+    With the distance of the point, this only falls from the one end to the other, so it is least at an end of the window.
+    """
+    i: cython.int
+    k: cython.int = 0
+    w: cython.pointer(Window)
+    # As seen by the windows, whose frame begins at the head of e.
+    from_tail: cython.double = straight(s, s.vertex[previous_half_edge(e)])
+    from_head: cython.double = straight(s, s.vertex[next_half_edge(e)]) - s.length[e]
+    for i in range(n):
+        w = run + i
+        if w.offset + reach(w, w.stop) + (from_tail - w.stop) > s.within:
+            continue
+        if w.offset + reach(w, w.start) + (from_head + w.start) > s.within:
+            continue
+        if k < i:
+            run[k] = run[i]
+        k += 1
+    return k
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def add(
     s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int, in_front: cython.bint
 ) -> cython.void:
     """Windows over half-edge e, out of its face; their frame runs from the head of e to its tail."""
     t: cython.int = s.twin[e]
+    if s.aim >= 0:
+        n = _towards_goal(s, e, run, n)
+        if n == 0:
+            return
     if t >= 0:
         _append(s, t, run, n, in_front, not s.aligned[e])
     elif t == -2:

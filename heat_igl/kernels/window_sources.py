@@ -16,6 +16,7 @@ from cython.cimports.heat_igl.kernels.window_structures import (
     Ray,
     Search,
     Window,
+    straight,
 )
 from cython.cimports.heat_igl.kernels.window_surface import beyond, classify, third, turn
 from cython.cimports.libc.math import INFINITY, sqrt
@@ -56,6 +57,11 @@ def relax(
         s.leaving[2 * v + 1] = y
     if distance > s.last_key:
         return
+    if s.aim >= 0:
+        if v == s.aim:
+            s.within = min(s.within, with_rounding(distance))
+        elif distance + straight(s, v) > s.within:
+            return
     if s.kind[v] == UNKNOWN:
         s.kind[v] = classify(s, v)
     if s.kind[v] != PASSED:
@@ -308,6 +314,55 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
     while j >= 0:
         take(s, j, offset + apart(s, f, s.target + 3 * j, at), root)
         j = s.next_target[j]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def with_rounding(distance: cython.double) -> cython.double:
+    """More than a distance, by more than rounding of it and of the lengths of needles; edges have a length of about 1."""
+    return distance * (1.0 + 1e-9) + 1e-10
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython.void:
+    """Let the search from v be one for the distance of `goal` alone, and bound that by a path along edges.
+
+    From each vertex, the path takes the edge that makes the way to the goal shortest, were it straight from there on. Where
+    that comes no nearer to the goal, there is no bound.
+    """
+    k: cython.int
+    h: cython.int
+    i: cython.int
+    best: cython.int
+    length: cython.double = 0.0
+    along: cython.double
+    left: cython.double
+    shortest: cython.double
+    s.aim = goal
+    s.within = INFINITY
+    left = straight(s, v)
+    while v != goal:
+        shortest = INFINITY
+        best = -1
+        k = s.corner_of_vertex[v]
+        while k >= 0:
+            for i in range(2):
+                h = next_half_edge(k) if i == 0 else previous_half_edge(k)
+                along = s.length[third(k, h)]
+                if along + straight(s, s.vertex[h]) < shortest:
+                    shortest = along + straight(s, s.vertex[h])
+                    best = s.vertex[h]
+            k = s.next_corner[k]
+        if best < 0 or straight(s, best) >= left:
+            return
+        v = best
+        left = straight(s, v)
+        length += shortest - left
+    s.within = with_rounding(length)
 
 
 @cython.cfunc

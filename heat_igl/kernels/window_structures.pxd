@@ -90,6 +90,11 @@ cdef struct Search:
     int* goal
     bint stops_early
     double slack
+    # With one goal: which, -1 for none, positions of the vertices in the unit of the lengths, and what is longer, by more
+    # than rounding, than a path to the goal.
+    int aim
+    double* position
+    double within
     int* target_face
     int* first_target
     int* next_target
@@ -162,6 +167,14 @@ cdef inline void nearest_on(const double* side, const double* ends, const double
         share = min(max(product(side, off, along) / square, 0.0), 1.0)
     for c in range(3):
         found[c] = ends[c] + share * along[c]
+
+
+# Length of the straight line in space from a vertex to the goal.
+cdef inline double straight(const Search* s, int v) noexcept nogil:
+    cdef double x = s.position[3 * v] - s.position[3 * s.aim]
+    cdef double y = s.position[3 * v + 1] - s.position[3 * s.aim + 1]
+    cdef double z = s.position[3 * v + 2] - s.position[3 * s.aim + 2]
+    return sqrt(x * x + y * y + z * z)
 
 
 # What a window adds to its offset at a point of its half-edge.

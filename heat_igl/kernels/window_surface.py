@@ -143,14 +143,20 @@ def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
         n_seen += 1
         was_below = ray.sine < 0.0
         turn(s, k, side, cython.address(ray))
-        if was_below != (ray.sine < 0.0):
-            n_half_turns += 1
-        side = third(k, side)
-        ahead = beyond(s, k, side)
-        if ahead < 0:
-            break
-        k = ahead
-        side = s.twin[side]
+        n_half_turns += was_below != (ray.sine < 0.0)
+        if side == previous_half_edge(k) and s.aligned[next_half_edge(k)]:
+            # The usual case, with fewer steps that wait for one another.
+            side = s.twin[next_half_edge(k)]
+            if side < 0:
+                break
+            k = next_half_edge(side)
+        else:
+            side = third(k, side)
+            ahead = beyond(s, k, side)
+            if ahead < 0:
+                break
+            k = ahead
+            side = s.twin[side]
         if k == start:
             if n_seen < n_corners:
                 return JOINS

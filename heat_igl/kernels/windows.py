@@ -13,7 +13,7 @@ This module has what Python calls: `search` for one question about all vertices,
 import cython
 from cython.cimports.heat_igl.kernels.window_lists import allocate, empty_front, free_front, push
 from cython.cimports.heat_igl.kernels.window_search import forget, narrow, run
-from cython.cimports.heat_igl.kernels.window_sources import start_at
+from cython.cimports.heat_igl.kernels.window_sources import aim_at, start_at
 from cython.cimports.heat_igl.kernels.window_structures import Search
 
 __all__ = ["Front", "search", "search_each"]
@@ -95,6 +95,9 @@ class Front:
         surfaces whose faces are oriented alike.
     tolerance : float
         The fraction of a distance by which another way must be shorter before a window is cut.
+    position : (3 n,), optional
+        Of the vertices in space, in the unit of the lengths, which are no shorter than in space: `search_each` then leaves
+        out what is too far from the only goal of a source along straight lines.
     """
 
     def __init__(
@@ -122,6 +125,7 @@ class Front:
         tolerance: cython.double,
         corner: cython.int[::1] = None,
         leaving: cython.double[::1] = None,
+        position: cython.const[cython.double][::1] = None,
     ) -> None:
         s: cython.pointer(Search) = cython.address(self.state)
         # The pointers hold as long as the arrays do.
@@ -147,6 +151,7 @@ class Front:
             slot.base,
             corner,
             leaving,
+            position,
         )
         s.vertex = cython.address(vertex[0])
         s.length = cython.address(length[0])
@@ -171,6 +176,10 @@ class Front:
         if corner is not None:
             s.corner = cython.address(corner[0])
             s.leaving = cython.address(leaving[0])
+        s.position = cython.NULL
+        if position is not None:
+            s.position = cython.cast(cython.p_double, cython.address(position[0]))
+        s.aim = -1
         s.is_delaunay = is_delaunay
         s.n = corner_of_vertex.shape[0]
         s.n_half_edges = vertex.shape[0]
@@ -231,6 +240,10 @@ def search_each(
             if s.stops_early:
                 s.n_goals = cython.cast(cython.int, first_goal[i + 1] - first_goal[i])
                 s.goal = cython.address(goal[0]) + first_goal[i]
+            s.aim = -1
+            if s.stops_early and s.n_goals == 1 and s.position != cython.NULL:
+                aim_at(s, source[i], s.goal[0])
+                s.cutoff = s.within
             start_at(s, source[i], 0.0, 0)
             if not s.failed:
                 run(s)

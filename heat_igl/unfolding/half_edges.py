@@ -14,7 +14,20 @@ from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["MARGIN", "Glued", "HalfEdges", "Located", "Tables", "from_mesh", "from_triangulation", "glued", "rings"]
+__all__ = [
+    "MARGIN",
+    "NO_POINTS",
+    "NO_SEGMENTS",
+    "Glued",
+    "HalfEdges",
+    "Located",
+    "Numbered",
+    "Tables",
+    "from_mesh",
+    "from_triangulation",
+    "glued",
+    "rings",
+]
 
 #: Windows cross triangles that are this thin, in mean edge lengths: just more than rounding. With the margin of
 #: `mollify`, paths across needles were up to 3e-4 of themselves too long.
@@ -66,10 +79,15 @@ class Located(NamedTuple):
     point: IntArray
 
 
-class HalfEdges:
-    """The tables of one surface, with vertices and faces numbered anew.
+#: No points, and no segments, in any triangles.
+NO_POINTS = Located(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, np.int64))
+NO_SEGMENTS = Located(np.empty(0, np.int32), np.empty((0, 2, 3)), np.empty(0, np.int64))
 
-    Parameters
+
+class Numbered(NamedTuple):
+    """Triangles by their sides, numbered in the order of a front: what `gluing.breadth_first` returns.
+
+    Attributes
     ----------
     vertex, twin, ring : (3 m,) int32
         Vertex of each corner; the half-edge glued to each, -1 on the boundary and -2 where more than two faces meet;
@@ -78,43 +96,42 @@ class HalfEdges:
         Whether glued faces run along their half-edge in opposite directions.
     length : (3 m,) float64
         Of each half-edge.
-    n : int
-        Number of vertices.
-    exponent : int
-        Lengths are in units of ``2 ** exponent``.
-    first_face : int
-        The face from which faces and vertices are numbered.
-    triangulation : IntrinsicTriangulation, optional
-        What the tables were made from, to locate points.
-
-    Raises
-    ------
-    MeshError
-        If there are too many triangles for 32-bit indices.
+    number : (n,) int32
+        Number of each vertex of the caller.
+    face : (m,) int32
+        The caller's number of each face.
     """
 
-    def __init__(
-        self,
-        vertex: AnyArray,
-        twin: AnyArray,
-        ring: AnyArray,
-        aligned: AnyArray,
-        length: FloatArray,
-        n: int,
-        exponent: int,
-        first_face: int = 0,
-        triangulation: IntrinsicTriangulation | None = None,
-    ) -> None:
-        m = len(vertex) // 3
-        if 3 * m + n >= _TOO_MANY:
-            raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
+    vertex: AnyArray
+    twin: AnyArray
+    ring: AnyArray
+    aligned: AnyArray
+    length: FloatArray
+    number: AnyArray
+    face: AnyArray
+
+
+class HalfEdges:
+    """The tables of one surface, with vertices and faces numbered anew.
+
+    Parameters
+    ----------
+    numbered : Numbered
+        The triangles. Their lengths are scaled in place.
+    exponent : int
+        Lengths are in units of ``2 ** exponent``.
+    triangulation : IntrinsicTriangulation, optional
+        What the tables were made from, to locate points.
+    """
+
+    def __init__(self, numbered: Numbered, exponent: int, triangulation: IntrinsicTriangulation | None = None) -> None:
+        vertex, twin, ring, aligned, length, self.number, self.face = numbered
+        m, n = len(self.face), len(self.number)
         # By a power of two: no digit changes, and no square leaves the range of doubles.
         shift = _exponent(length)
+        _times_power(length, -shift, out=length)
         self.n, self.exponent = n, exponent + shift
         self._triangulation = triangulation
-        vertex, twin, ring, aligned, length, self.number, self.face = gluing.breadth_first(
-            vertex, twin, ring, aligned, _times_power(length, -shift), n, first_face
-        )
         derived: dict[str, AnyArray] = {
             "double_area": np.empty(m),
             "bulge": np.empty(3 * m),
@@ -155,7 +172,7 @@ class HalfEdges:
             If the tables come from `from_mesh`, which keeps no history of its flips.
         """
         if points is None:
-            return Located(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, np.int64))
+            return NO_POINTS
         if self._triangulation is None:
             raise ValueError("this surface knows vertices only: make it from a triangulation")
         faces, barycentric = self._triangulation.locate(points.faces, points.barycentric)
@@ -171,7 +188,7 @@ class HalfEdges:
             If the triangles are not those that the segments were given in.
         """
         if segments is None:
-            return Located(np.empty(0, np.int32), np.empty((0, 2, 3)), np.empty(0, np.int64))
+            return NO_SEGMENTS
         if self._triangulation is None or self._triangulation.n_flips:
             raise ValueError("segments need triangles that were not flipped: make this surface from those of the mesh")
         ends = [self._triangulation.locate(segments.faces, end) for end in (segments.start, segments.end)]
@@ -208,7 +225,9 @@ class HalfEdges:
     def by_face(self, located: Located) -> tuple[AnyArray, AnyArray]:
         """The first point of each triangle, and the next point of the same triangle; -1 for none."""
         faces = located.faces
-        first = np.full(len(self.face) if len(faces) else 0, -1, np.int32)
+        if not len(faces):
+            return faces, faces
+        first = np.full(len(self.face), -1, np.int32)
         following = np.full(len(faces), -1, np.int32)
         order = np.argsort(faces, kind="stable")
         first[faces[order][::-1]] = order[::-1]
@@ -225,18 +244,27 @@ class HalfEdges:
 
 
 def from_triangulation(triangulation: IntrinsicTriangulation) -> HalfEdges:
-    """The tables of a triangulation."""
+    """The tables of a triangulation.
+
+    Raises
+    ------
+    MeshError
+        If there are too many triangles for 32-bit indices.
+    """
+    m = len(triangulation.F)
+    if 3 * m + triangulation.n >= _TOO_MANY:
+        raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
     exponent = _exponent(triangulation.l)
-    return HalfEdges(
+    numbered = gluing.breadth_first(
         triangulation.F.ravel().astype(np.int32),
         triangulation.twin.astype(np.int32),
         rings(triangulation),
         triangulation.aligned.astype(np.uint8),
         np.ldexp(triangulation.l.ravel(), -exponent),
         triangulation.n,
-        exponent,
-        triangulation=triangulation,
+        0,
     )
+    return HalfEdges(Numbered(*numbered), exponent, triangulation)
 
 
 class Glued(NamedTuple):
@@ -303,7 +331,10 @@ def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
         return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
     found.flip(mesh.F, MARGIN)
     first_face = int(np.argmax(found.vertex == start)) // 3
-    return HalfEdges(*found[:5], mesh.n_vertices, found.exponent, first_face)
+    numbered = Numbered(*gluing.breadth_first(*found[:5], mesh.n_vertices, first_face))
+    exponent = found.exponent
+    del found  # before there are more tables
+    return HalfEdges(numbered, exponent)
 
 
 def _following(half_edge: IntArray) -> IntArray:
@@ -316,11 +347,11 @@ def _exponent(lengths: FloatArray) -> int:
     return int(np.frexp(lengths.mean())[1])
 
 
-def _times_power(lengths: FloatArray | float, exponent: int) -> FloatArray:
-    """Lengths times ``2 ** exponent``."""
+def _times_power(lengths: FloatArray | float, exponent: int, out: FloatArray | None = None) -> FloatArray:
+    """Lengths times ``2 ** exponent``, in place of `out` if that is given."""
     if abs(exponent) > _LARGEST_EXPONENT:
-        return np.asarray(np.ldexp(lengths, exponent))
-    return np.asarray(np.asarray(lengths) * 2.0**exponent)  # the same bits, ten times as fast
+        return np.asarray(np.ldexp(lengths, exponent, out=out))
+    return np.asarray(np.multiply(lengths, 2.0**exponent, out=out))  # the same bits, ten times as fast
 
 
 def rings(triangulation: IntrinsicTriangulation) -> AnyArray:

@@ -98,12 +98,16 @@ def blocks_within(
 
 
 def _rows_within(edges: HalfEdges, chosen: IntArray, limit: float) -> sp.csr_array:
-    parts = _in_chunks(edges, chosen, lambda work, part: _within(work, part, edges.scaled(limit)))
+    number = edges.number[chosen]
+    order = np.argsort(number, kind="stable")
+    parts = _in_chunks(edges, number[order], lambda work, part: _within(work, part, edges.scaled(limit)))
     counts = np.concatenate([part.counts for part in parts])
     ends = np.concatenate([[0], np.cumsum(counts)])
     columns = np.concatenate([part.vertex for part in parts])
     values = edges.unscaled(np.concatenate([part.distance for part in parts]))
     found = sp.csr_array((values, columns, ends), shape=(len(chosen), edges.n))
+    if (np.diff(order) != 1).any():
+        found = found[np.argsort(order)]
     found.sort_indices()
     return found
 
@@ -151,12 +155,14 @@ def nearest_vertices(mesh: MeshLike, k: int, sources: Sources | None = None) -> 
     edges = from_mesh(triangles, int(chosen[0]))
     # More than all vertices cannot be found.
     wanted = min(int(k), triangles.n_vertices)
-    parts = _in_chunks(edges, chosen, lambda work, part: _nearest(work, part, wanted))
+    number = edges.number[chosen]
+    order = np.argsort(number, kind="stable")
+    parts = _in_chunks(edges, number[order], lambda work, part: _nearest(work, part, wanted))
     indices = np.full((len(chosen), int(k)), -1, np.int64)
     distances = np.full((len(chosen), int(k)), np.inf)
-    there = np.arange(int(k)) < np.concatenate([part.counts for part in parts])[:, None]
-    indices[there] = np.concatenate([part.vertex for part in parts])
-    distances[there] = edges.unscaled(np.concatenate([part.distance for part in parts]))
+    i, j = np.nonzero(np.arange(int(k)) < np.concatenate([part.counts for part in parts])[:, None])
+    indices[order[i], j] = np.concatenate([part.vertex for part in parts])
+    distances[order[i], j] = edges.unscaled(np.concatenate([part.distance for part in parts]))
     return indices, distances
 
 
@@ -169,6 +175,7 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike) -> FloatArray:
         Triangles: whatever `as_mesh` takes.
     pairs : (p, 2) array_like of int
         Vertices. Pairs with the same first vertex share one search, which ends at the farthest of the second ones.
+        A search for one pair leaves out what is too far from the second vertex along a straight line in space.
 
     Returns
     -------
@@ -195,13 +202,16 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike) -> FloatArray:
     joined = np.flatnonzero(components[first] == components[second])
     if not len(joined):
         return distance
-    joined = joined[np.argsort(first[joined], kind="stable")]
-    sources, begin = np.unique(first[joined], return_index=True)
-    edges = from_mesh(triangles, int(sources[0]))
+    edges = from_mesh(triangles, int(first[joined].min()))
+    joined = joined[np.argsort(edges.number[first[joined]], kind="stable")]
+    sources, begin = np.unique(edges.number[first[joined]], return_index=True)
     ends = np.append(begin, len(joined))
     goals = edges.number[second[joined]]
     parts = _in_chunks(
-        edges, sources, lambda work, part: _to_goals(work, part, goals[ends[part.start] : ends[part.stop]], ends)
+        edges,
+        sources,
+        lambda work, part: _to_goals(work, part, goals[ends[part.start] : ends[part.stop]], ends),
+        edges.scaled(triangles.V[edges.old_vertex]).ravel(),
     )
     distance[joined] = edges.unscaled(np.concatenate([part.distance for part in parts]))
     return distance
@@ -226,7 +236,7 @@ class _Near(NamedTuple):
 class _Workspace:
     """What searches of one thread write, in the state in which each must find it."""
 
-    def __init__(self, edges: HalfEdges) -> None:
+    def __init__(self, edges: HalfEdges, position: FloatArray | None) -> None:
         n = edges.n
         self._names = edges.old_vertex
         self._state = (
@@ -239,7 +249,7 @@ class _Workspace:
             np.empty(n, np.int32),
             np.full(len(edges.tables.vertex), -1, np.int32),
         )
-        self._front = windows.Front(*edges.tables, *self._state, TOLERANCE)
+        self._front = windows.Front(*edges.tables, *self._state, TOLERANCE, position=position)
 
     def search(
         self,
@@ -298,10 +308,17 @@ def _to_goals(work: _Workspace, part: _Chunk, goals: AnyArray, ends: IntArray) -
     return _Near(np.diff(first), _NO_VERTICES, value)
 
 
-def _in_chunks(edges: HalfEdges, sources: IntArray, search: Callable[[_Workspace, _Chunk], _Near]) -> list[_Near]:
-    """What `search` finds from consecutive sources, on all processors; in the order of the sources."""
+def _in_chunks(
+    edges: HalfEdges,
+    sources: AnyArray,
+    search: Callable[[_Workspace, _Chunk], _Near],
+    position: FloatArray | None = None,
+) -> list[_Near]:
+    """What `search` finds from consecutive sources, on all processors; in the order of the sources.
+
+    Sources are numbers in the tables: in ascending order, what searches read often is in the caches from the last one.
+    """
     starts = range(0, len(sources), _CHUNK)
-    numbers = edges.number[sources]
     waiting = deque(enumerate(starts))
     parts: list[Any] = [None] * len(starts)
 
@@ -312,9 +329,9 @@ def _in_chunks(edges: HalfEdges, sources: IntArray, search: Callable[[_Workspace
             except IndexError:  # another thread took the last one
                 return
             stop = min(start + _CHUNK, len(sources))
-            parts[i] = search(workspace, _Chunk(start, stop, numbers[start:stop]))
+            parts[i] = search(workspace, _Chunk(start, stop, sources[start:stop]))
 
-    side_by_side(run, [_Workspace(edges) for _ in range(min(n_threads(), len(starts)))])
+    side_by_side(run, [_Workspace(edges, position) for _ in range(min(n_threads(), len(starts)))])
     return parts
 
 

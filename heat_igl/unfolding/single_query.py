@@ -20,7 +20,7 @@ from heat_igl.mesh import Mesh, connectivity
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import shorten_along
 from heat_igl.unfolding.exact import ExactSurface
-from heat_igl.unfolding.half_edges import Glued, HalfEdges, glued
+from heat_igl.unfolding.half_edges import Glued, HalfEdges, Numbered, glued
 from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles
 from heat_igl.unfolding.solver import FEW, costs_little_to_be_exact, require_share
 
@@ -118,9 +118,9 @@ class SingleQuery:
     def _by_windows(self, sides: Sides) -> FloatArray:
         size = len(sides.vertex)
         ring, aligned = np.arange(size, dtype=np.int32), np.ones(size, np.uint8)
-        edges = HalfEdges(sides.vertex, sides.twin, ring, aligned, sides.length, len(self.number), self.exponent)
-        rows = self.number[self.sources].astype(np.int64)
-        return ExactSurface(edges).distance(rows)[self.number]
+        face = np.arange(size // 3, dtype=np.int32)
+        numbered = Numbered(sides.vertex, sides.twin, ring, aligned, sides.length, self.number, face)
+        return ExactSurface(HalfEdges(numbered, self.exponent)).distance(self.sources)
 
 
 def _along_edges(found: Glued, n: int, sources: IntArray) -> FloatArray:

@@ -10,7 +10,7 @@ from heat_igl.kernels import windows
 from heat_igl.mesh import SurfacePoints
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.unfolding.half_edges import HalfEdges, Located
+from heat_igl.unfolding.half_edges import NO_POINTS, NO_SEGMENTS, HalfEdges, Located
 
 __all__ = ["TOLERANCE", "Found", "Leaving", "Searched", "Starts", "search", "starts_at"]
 
@@ -185,6 +185,9 @@ def starts_at(
     """Sources for the kernel, as `ExactSurface.solve` takes them; points at corners become vertices."""
     k, p = len(sources), 0 if points is None else len(points)
     begin = np.zeros(k) if offsets is None else edges.scaled(np.asarray(offsets, np.float64))
+    if points is None and segments is None:
+        nothing, label = np.zeros(0), np.append(np.arange(k), -1)
+        return Starts(edges.number[sources], begin, NO_POINTS, nothing, NO_SEGMENTS, nothing, label[k:], label)
     late = np.zeros(p) if point_offsets is None else edges.scaled(np.asarray(point_offsets, np.float64))
     counted = np.arange(p)
     if segments is not None:
