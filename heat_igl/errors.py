@@ -1,6 +1,6 @@
 """Errors and warnings, one class per remedy.
 
-`positive`, `require_choice` and `real_numbers` check single arguments for all rooms, in the same words.
+`positive`, `require_choice`, `real_numbers` and `as_array` check single arguments for all rooms, in the same words.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -200,3 +201,11 @@ def real_numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} must be real numbers in an array, not {shown(values)}") from None
+
+
+def as_array(name: str, values: npt.ArrayLike | None, error: type[ValueError] = ValueError) -> npt.NDArray[Any]:
+    """`values` as an array of any type; an `error` that calls them `name` if the rows differ in length."""
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise error(f"{name} must be an array, but rows or entries differ in length") from None

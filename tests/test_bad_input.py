@@ -213,6 +213,16 @@ def argument_cases() -> Iterator[Case]:
     }.items():
         argument = name.partition(" ")[0]
         yield argument_case(f"{name}, ragged", ask, f"^{argument} must be real numbers.*, not ")
+    for name, ask in {
+        "distance": lambda mesh: heat_igl.shortest_paths(mesh, ragged, [3], 0),
+        "vectors": lambda mesh: heat_igl.tangent_frames(mesh).from_world(ragged),
+        "vertices": lambda mesh: heat_igl.edge_curve(mesh, ragged),
+        "faces": lambda mesh: heat_igl.region_boundary(mesh, faces=ragged),
+        "values": lambda _: heat_igl.image_domain(np.ones((3, 3), bool)).image(ragged),
+    }.items():
+        kind = "SourceError" if name in ("vertices", "faces") else "ValueError"
+        refused = f"^{name} must be an array, but rows or entries differ in length"
+        yield argument_case(f"{name}, entries of different lengths", ask, refused, error=kind)
     for name, bad, refused in (
         ("shape", (2, 2, 2.5), r"shape must be three whole numbers of at least 2, not \(2, 2, 2.5\)"),
         ("shape", (2000, 2000, 2000), r"over 1e\+09 points"),
@@ -245,11 +255,11 @@ def argument_cases() -> Iterator[Case]:
             "source_sets must be a sequence of sets of sources, not .*: try distance",
             error="SourceError",
         )
-    for bad in ((), "heat", 3, [3], [("mine", 3)]):
+    for bad in ("heat", 3, [3], [("mine", 3)]):
         yield argument_case(
             f"methods = {bad!r}",
             lambda mesh, bad=bad: heat_igl.validate(mesh, 0, methods=bad),
-            "methods must be a sequence of methods|methods is empty|a method is a name or a pair",
+            "methods must be a sequence of methods|a method is a name or a pair",
         )
     yield argument_case(
         "reference with NaN",
@@ -279,6 +289,12 @@ def argument_cases() -> Iterator[Case]:
         "polygons": lambda mesh: heat_igl.PolygonMesh(mesh.V, 3),
     }.items():
         yield argument_case(f"{name} of another kind", ask, f"{name} must be .*, not ", error="MeshError")
+    yield argument_case(
+        "a surface far larger than the voxels",
+        lambda mesh: heat_igl.volume_signed_distance(heat_igl.VoxelBox.around(mesh, 8), (mesh.V * 1e30, mesh.F)),
+        "surface is too large for the domain",
+        error="SourceError",
+    )
     yield argument_case(
         "offset_curves by a mesh",
         lambda mesh: heat_igl.offset_curves(mesh, mesh, 0, 1.0),

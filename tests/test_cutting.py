@@ -174,3 +174,19 @@ def test_bad_input():
     tetrahedron = Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 1, 2, 3]])
     with pytest.raises(MeshError, match="the mesh is tetrahedral"):
         cut(tetrahedron, SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]]))
+
+
+def test_infinite_values_are_carried_to_the_vertices_that_lie_among_them():
+    """A corner without weight may be infinitely far away: the new vertex on an edge keeps the finite mean of two."""
+    mesh = square()
+    values = mesh.V[:, 0].copy()
+    line = curve_on(mesh, [[0.1, 0.55, 0], [0.9, 0.55, 0]])
+    found = cut(mesh, line)
+    values[mesh.V[:, 1] > 0.9] = np.inf  # a strip that the line does not touch
+    values[mesh.V[:, 1] < 0.2] = np.inf
+    new = found.carry(values)
+    assert not np.isnan(new).any()
+    assert np.isfinite(new[mesh.n_vertices :]).all()
+    beside = values.copy()
+    beside[mesh.F[found.places.faces[-1]]] = np.inf
+    assert not np.isnan(found.carry(beside)).any()

@@ -115,7 +115,7 @@ def test_a_store_holds_the_matrix(tmp_path, monkeypatch):
             np.testing.assert_array_equal(getattr(some, part), getattr(truth, part))
     with pytest.raises(FileExistsError, match="near exists: name a new directory"):
         write_distances_within(path, mesh, 0.5)
-    with pytest.raises(ValueError, match="rows must be consecutive"):
+    with pytest.raises(ValueError, match="rows must be a slice of consecutive rows"):
         read_distances_within(path, slice(0, 10, 2))
     with pytest.raises(ValueError, match="holds no distances"):
         read_distances_within(tmp_path)

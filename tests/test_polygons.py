@@ -180,7 +180,7 @@ def test_fans_and_pickles():
         ([[0, 1, 2], [0, 1, 2, 1]], r"polygons\[1\] = \[0, 1, 2, 1\] repeats a vertex"),
         ([[0, 1, 2.5]], r"polygons\[0\] must be a sequence of vertex indices"),
         ([[0, 1, 2], 7], r"polygons\[1\] must be a sequence of vertex indices"),
-        (7, "polygons is empty"),
+        (7, "polygons must be a sequence of polygons, not 7"),
     ],
 )
 def test_wrong_polygons_are_refused(polygons, message):

@@ -3,7 +3,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heat_igl import OffsetSources, SourceError, SurfaceCurve, SurfacePoints
+from heat_igl import (
+    HeatMethodSolver,
+    OffsetSources,
+    SourceError,
+    SurfaceCurve,
+    SurfacePoints,
+    shapes,
+    shortest_paths,
+)
 from heat_igl.sources import source_set, vertex_sources
 
 
@@ -129,3 +137,18 @@ def test_only_triangles_hold_points():
         source_set([0, SurfacePoints([0], CENTRE)], 5, None)
     with pytest.raises(SourceError, match="here, not SurfacePoints"):
         vertex_sources(SurfacePoints([0], CENTRE), 5)
+
+
+@pytest.mark.parametrize("refine", [None, "sweep", "unfold", "exact"])
+def test_a_curve_without_length_is_a_point(refine):
+    """The path from a vertex to itself emits no heat."""
+    mesh = shapes.icosphere(2)
+    solver = HeatMethodSolver(mesh, refine=refine)
+    (path,) = shortest_paths(mesh, None, targets=3, sources=3)
+    np.testing.assert_array_equal(solver.distance(path), solver.distance(3))
+    inside = [[0.2, 0.5, 0.3]]
+    curve = SurfaceCurve([7, 7], [*inside, *inside], [*inside, *inside])
+    found = solver.voronoi([curve, 5])
+    np.testing.assert_array_equal(found.distance, solver.distance([SurfacePoints([7], inside), 5]))
+    assert found.labels[5] == 1
+    assert (found.labels[mesh.F[7]] == 0).all()

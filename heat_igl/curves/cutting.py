@@ -11,7 +11,7 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
 from heat_igl.curves.face_cutting import Point, cut_triangle
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import MeshError, SourceError, as_array
 from heat_igl.intrinsic import lay_out
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices, named_entries
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -115,15 +115,15 @@ class CutMesh:
 
     def carry(self, values: ArrayLike) -> AnyArray:
         """Values at the vertices of the new mesh, from values (n, ...) at those of the old one, linear in its faces."""
-        array = np.asarray(values)
+        given = as_array("values", values)
         n = len(self.places) - len(self._old_corners)
-        if array.shape[:1] != (n,):
-            raise ValueError(f"values must have {n} rows, one for each vertex of the old mesh, not shape {array.shape}")
-        weight, corners = self.places.barycentric[n:], array[self._old_corners]
+        if given.shape[:1] != (n,):
+            raise ValueError(f"values must have {n} rows, one for each vertex of the old mesh, not shape {given.shape}")
+        weight, corners = self.places.barycentric[n:], given[self._old_corners]
         # A corner without weight may be infinitely far away, and 0 times infinity is NaN.
-        counts = (weight > 0).reshape(*weight.shape, *(1,) * (array.ndim - 1))
+        counts = (weight > 0).reshape(*weight.shape, *(1,) * (given.ndim - 1))
         added = np.einsum("kc,kc...->k...", weight, np.where(counts, corners, 0))
-        return np.concatenate([array, added])
+        return np.concatenate([given, added])
 
     @cached_property
     def sides(self) -> IntArray:

@@ -8,11 +8,11 @@ import scipy.sparse.csgraph as csgraph
 
 from heat_igl.curves import tracing
 from heat_igl.curves.places import places, snapped
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import MeshError, SourceError, as_array
 from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.sources import Sources, SourceSet, source_set
-from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import exact_paths
 
 __all__ = ["shortest_paths"]
@@ -175,12 +175,12 @@ def _source_set(mesh: Mesh, sources: Sources) -> SourceSet:
 def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver, sources: Sources | None) -> FloatArray:
     if isinstance(distance, HeatMethodSolver):
         distance = distance.distance(_required(distance, sources))
-    array: AnyArray = np.asarray(distance)
-    if array.dtype.kind not in "iuf" or array.shape != (mesh.n_vertices,):
+    given = as_array("distance", distance)
+    if given.dtype.kind not in "iuf" or given.shape != (mesh.n_vertices,):
         raise ValueError(
-            f"distance must be real numbers of shape ({mesh.n_vertices},), not {array.dtype} of shape {array.shape}"
+            f"distance must be real numbers of shape ({mesh.n_vertices},), not {given.dtype} of shape {given.shape}"
         )
-    values = array.astype(np.float64)
+    values = given.astype(np.float64)
     bad = np.isnan(values) | (values < 0)
     if bad.any():
         first = int(np.argmax(bad))

@@ -28,9 +28,10 @@ from heat_igl.drawing.line_drawing import write_line_drawing
 from heat_igl.drawing.output import Picture
 from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, Scene, Style, check_style, colours, scene
 from heat_igl.drawing.shading import colour_numbers
+from heat_igl.errors import as_array
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, SurfaceCurve, as_mesh, as_simplices
 from heat_igl.sources import Sources
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray
+from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = [
     "Page", "Picture", "page", "picture", "plot", "plot_field", "plot_labels", "write_html", "write_line_drawing",
@@ -191,7 +192,7 @@ def plot_labels(
     neighbour has; where all ten are taken, the one that comes next.
     """
     mesh = _drawn(mesh)
-    given: AnyArray = np.asarray(labels)
+    given = as_array("labels", labels)
     if given.dtype.kind not in "iu":
         raise ValueError(f"labels must be integers, not {given.dtype}")
     table = colours("tab10", is_trimmed=False)

@@ -167,7 +167,13 @@ def _sampled(surface: MeshLike, spacing: float) -> _Samples:
     kept = area > 0
     corners, normals, area = corners[kept], normals[kept] / (2 * area[kept])[:, None], area[kept]
     longest = np.max([np.linalg.norm(corners[:, i] - corners[:, i - 1], axis=1) for i in range(3)], axis=0)
-    count = np.maximum(np.ceil(longest / spacing), 1).astype(np.int64)
+    count = np.maximum(np.ceil(longest / spacing), 1)
+    if (count**2).sum() > _MOST_POINTS:
+        raise SourceError(
+            f"surface is too large for the domain: the longest edge is {longest.max():.4g}, and points are "
+            f"{spacing:.4g} apart"
+        )
+    count = count.astype(np.int64)
     parts = []
     for k in np.unique(count):
         chosen = np.flatnonzero(count == k)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import igl
 import numpy as np
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, real_numbers
 from heat_igl.intrinsic.history import Turned
 from heat_igl.intrinsic.mollification import mollify
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, half_edge_head, half_edge_tail
@@ -113,7 +113,7 @@ def from_gluing(l: ArrayLike, F: IntArray, n: int, twin: ArrayLike) -> Intrinsic
 
 
 def _checked_lengths(l: ArrayLike, F: IntArray) -> FloatArray:  # noqa: E741
-    lengths = np.array(l, dtype=np.float64)
+    lengths = real_numbers("l", l)
     if lengths.shape != F.shape:
         raise MeshError(f"l must have one length per side of F, shape {F.shape}, but it has shape {lengths.shape}")
     bad = ~(np.isfinite(lengths) & (lengths >= 0))

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import igl
 import numpy as np
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, as_array
 from heat_igl.intrinsic.gluing import intrinsic_triangulation
 from heat_igl.intrinsic.polar_angles import PolarAngles, polar_angles
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = ["TangentFrames", "checked_vectors", "tangent_frames"]
 
@@ -297,16 +297,13 @@ def checked_vectors(name: str, vectors: ArrayLike, k: int | None, size: int) -> 
     ValueError
         If the shape is another, or a number is not finite; the message names the first offender.
     """
-    try:
-        array: AnyArray = np.asarray(vectors)
-    except ValueError as error:
-        raise ValueError(f"{name} must have shape (k, {size}): {error}") from None
-    if array.dtype.kind not in "iuf":
-        raise ValueError(f"{name} must hold real numbers, not {array.dtype}")
-    found = np.atleast_2d(array.astype(np.float64))
+    given = as_array(name, vectors)
+    if given.dtype.kind not in "iuf":
+        raise ValueError(f"{name} must hold real numbers, not {given.dtype}")
+    found = np.atleast_2d(given.astype(np.float64))
     if found.ndim != 2 or found.shape[1] != size or (k is not None and len(found) != k):
         wanted = "k" if k is None else k
-        raise ValueError(f"{name} must have shape ({wanted}, {size}), but it has shape {array.shape}")
+        raise ValueError(f"{name} must have shape ({wanted}, {size}), but it has shape {given.shape}")
     bad = ~np.isfinite(found).all(axis=1)
     if bad.any():
         first = int(np.argmax(bad))
@@ -315,11 +312,11 @@ def checked_vectors(name: str, vectors: ArrayLike, k: int | None, size: int) -> 
 
 
 def _indices(name: str, indices: ArrayLike, n: int) -> IntArray:
-    array: AnyArray = np.atleast_1d(np.asarray(indices))
-    if array.ndim != 1 or array.dtype.kind not in "iu":
-        raise MeshError(f"{name} must be indices (k,), not {array.dtype} of shape {array.shape}")
-    outside = (array < 0) | (array >= n)
+    given = np.atleast_1d(as_array(name, indices, MeshError))
+    if given.ndim != 1 or given.dtype.kind not in "iu":
+        raise MeshError(f"{name} must be indices (k,), not {given.dtype} of shape {given.shape}")
+    outside = (given < 0) | (given >= n)
     if outside.any():
         first = int(np.argmax(outside))
-        raise MeshError(f"{name}[{first}] = {array[first]} is out of range: indices run from 0 to {n - 1}")
-    return array.astype(np.int64)
+        raise MeshError(f"{name}[{first}] = {given[first]} is out of range: indices run from 0 to {n - 1}")
+    return given.astype(np.int64)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import MeshError, SourceError, as_array, shown
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.voxels import TETRAHEDRA_PER_VOXEL, voxel_tetrahedra
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, IntArray
@@ -62,7 +62,7 @@ class ImageDomain:
         SourceError
             If `pixels` is no mask of the image's shape, or selects no pixel of the domain.
         """
-        chosen = np.asarray(pixels)
+        chosen = as_array("pixels", pixels, SourceError)
         if chosen.shape != self.index.shape or chosen.dtype.kind != "b":
             raise SourceError(
                 f"pixels must be a boolean image of shape {self.index.shape}, not {chosen.dtype} of {chosen.shape}"
@@ -80,12 +80,14 @@ class ImageDomain:
         ValueError
             If `values` has another length.
         """
-        array = np.asarray(values)
-        if array.shape != (self.mesh.n_vertices,):
-            raise ValueError(f"values must have shape ({self.mesh.n_vertices},), one per vertex, not {array.shape}")
+        given = as_array("values", values)
+        if given.shape != (self.mesh.n_vertices,):
+            raise ValueError(f"values must have shape ({self.mesh.n_vertices},), one per vertex, not {given.shape}")
+        if np.ndim(outside):
+            raise ValueError(f"outside must be a number, not {shown(outside)}")
         inside = self.index >= 0
-        image = np.full(self.index.shape, outside, dtype=np.result_type(array.dtype, np.min_scalar_type(outside)))
-        image[inside] = array[self.index[inside]]
+        image = np.full(self.index.shape, outside, dtype=np.result_type(given.dtype, np.min_scalar_type(outside)))
+        image[inside] = given[self.index[inside]]
         return image
 
     def per_face(self, image: ArrayLike) -> AnyArray:
@@ -96,10 +98,10 @@ class ImageDomain:
         ValueError
             If `image` has another shape.
         """
-        array = np.asarray(image)
-        if array.shape != self.index.shape:
-            raise ValueError(f"image must have shape {self.index.shape}, not {array.shape}")
-        return np.repeat(array[self.index >= 0], TETRAHEDRA_PER_VOXEL if self.index.ndim == 3 else _FACES_PER_PIXEL)
+        given = as_array("image", image)
+        if given.shape != self.index.shape:
+            raise ValueError(f"image must have shape {self.index.shape}, not {given.shape}")
+        return np.repeat(given[self.index >= 0], TETRAHEDRA_PER_VOXEL if self.index.ndim == 3 else _FACES_PER_PIXEL)
 
 
 def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> ImageDomain:

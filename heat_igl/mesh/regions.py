@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, as_array
 from heat_igl.mesh.level_segments import Segments, joined_segments, level_segments
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import SurfaceCurve, require_triangles
-from heat_igl.typing import AnyArray, ArrayLike, BoolArray
+from heat_igl.typing import ArrayLike, BoolArray
 
 __all__ = ["region_boundary"]
 
@@ -76,7 +76,7 @@ def _along_edges(mesh: Mesh, is_inside: BoolArray) -> Segments:
 
 
 def _checked_mask(name: str, mask: ArrayLike | None, size: int) -> BoolArray:
-    array: AnyArray = np.asarray(mask)
-    if array.dtype.kind != "b" or array.shape != (size,):
-        raise SourceError(f"{name} must be a mask of bool of shape ({size},), not {array.dtype} of shape {array.shape}")
-    return array
+    given = as_array(name, mask, SourceError)
+    if given.dtype.kind != "b" or given.shape != (size,):
+        raise SourceError(f"{name} must be a mask of bool of shape ({size},), not {given.dtype} of shape {given.shape}")
+    return given

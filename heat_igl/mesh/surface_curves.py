@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import SourceError, positive
+from heat_igl.errors import SourceError, as_array, positive
 from heat_igl.mesh.grouping import Groups, enumerate_runs, group_by_label
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
@@ -124,7 +124,7 @@ def edge_curve(mesh: MeshLike, vertices: ArrayLike, *, closed: bool = False) -> 
     """
     mesh = as_simplices(mesh)
     require_triangles(mesh)
-    path = np.atleast_1d(np.asarray(vertices))
+    path = np.atleast_1d(as_array("vertices", vertices, SourceError))
     if path.ndim != 1 or path.dtype.kind not in "iu" or len(path) < 2:
         raise SourceError(f"vertices must be two vertex indices or more, not {path.dtype} of shape {path.shape}")
     path = np.append(path, path[0]) if closed else path

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, as_array
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = [
     "ON_SIDE",
@@ -175,10 +175,10 @@ def flat_curves(curves: NestedCurves, place: str = "curves") -> list[SurfaceCurv
 
 
 def _face_indices(name: str, faces: ArrayLike) -> IntArray:
-    array: AnyArray = np.atleast_1d(np.asarray(faces))
-    if array.ndim != 1 or array.dtype.kind not in "iu" or not len(array):
-        raise SourceError(f"{name} must be one face index or more, not {array.dtype} of shape {array.shape}")
-    return np.array(array, dtype=np.int64)
+    given = np.atleast_1d(as_array(name, faces, SourceError))
+    if given.ndim != 1 or given.dtype.kind not in "iu" or not len(given):
+        raise SourceError(f"{name} must be one face index or more, not {given.dtype} of shape {given.shape}")
+    return np.array(given, dtype=np.int64)
 
 
 def _coordinates(name: str, barycentric: ArrayLike, k: int) -> FloatArray:

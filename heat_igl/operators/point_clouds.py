@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from heat_igl.errors import MeshError, shown
 from heat_igl.mesh import PointCloud
-from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators
+from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
 from heat_igl.operators.triangles import operators, tufted_operators
 
 __all__ = ["point_cloud_operators"]
@@ -46,6 +46,7 @@ def point_cloud_operators(
     """
     if not isinstance(cloud, PointCloud):
         raise MeshError(f"cloud must be a PointCloud, not {shown(cloud)}")
+    check_laplacian(laplacian)
     mesh = cloud.triangles
     # The triangles of scattered points are even enough.
     laplacian = "intrinsic-delaunay" if laplacian == "auto" else laplacian

@@ -285,7 +285,12 @@ class _Builder:
             self._points.append((sources, self._counted(len(sources))))
         elif isinstance(sources, SurfaceCurve):
             self._check_faces(sources.faces)
-            self._curves.append((sources, int(self._counted(1)[0])))
+            label = self._counted(1)
+            if (sources.start == sources.end).all():
+                # A curve without length, such as the path from a vertex to itself, gives no heat. It is a point.
+                self._points.append((SurfacePoints(sources.faces[:1], sources.start[:1]), label))
+            else:
+                self._curves.append((sources, int(label[0])))
         elif isinstance(sources, Sequence) and any(isinstance(part, _PLACES) for part in sources):
             for i, part in enumerate(sources):
                 try:

@@ -29,7 +29,7 @@ from heat_igl.unfolding.half_edges import MARGIN, from_mesh
 from heat_igl.unfolding.numbered import TOLERANCE
 from heat_igl.unfolding.refinement import Refine
 from heat_igl.unfolding.single_query import single_query
-from heat_igl.unfolding.solver import UnfoldingSolver
+from heat_igl.unfolding.solver import UnfoldingSolver, require_share
 
 __all__ = ["directed_from_scratch", "distance_from_scratch", "distance_to_targets", "unfolded_distance"]
 
@@ -97,6 +97,7 @@ def unfolded_distance(
     """
     if sources is None:
         F, sources = None, F
+    require_share(tolerance)
     beyond = np.inf if cutoff is None else positive("cutoff", cutoff, infinite=True)
     return distance_from_scratch(as_simplices(V, F), sources, "unfold", tolerance, beyond)
 

@@ -91,11 +91,9 @@ def validate(
     mesh = as_simplices(given)
     domain = given if isinstance(given, PointCloud) else mesh
     sets = _source_sets(sources, mesh.n_vertices)
-    if not isinstance(methods, Iterable) or isinstance(methods, str):
+    if not isinstance(methods, Iterable) or isinstance(methods, str) or getattr(methods, "ndim", 1) == 0:
         raise ValueError(f"methods must be a sequence of methods, not {shown(methods)}")
     chosen = [resolved(method) for method in methods]
-    if not chosen:
-        raise ValueError("methods is empty: name one at least, such as 'heat'")
     if len({label for label, _ in chosen}) < len(chosen):
         raise ValueError(f"methods must have different names, not {', '.join(label for label, _ in chosen)}")
     counter = Counter(progress, len(sets) * (len(chosen) + (reference is not None)))
