@@ -1,0 +1,10 @@
+cdef extern from *:
+    """
+    // Least weight of a neighbour.
+    #define LEAST_WEIGHT 1e-3
+    // Points on a line leave a quadric undetermined; so much on the diagonal, per neighbour, makes the smallest one.
+    #define DIAGONAL 1e-9
+    // Lengths are divided by no less.
+    #define TINY 2.3e-308
+    """
+    double LEAST_WEIGHT, DIAGONAL, TINY
