@@ -2,10 +2,10 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.local_planes import DIAGONAL, LEAST_WEIGHT, TINY
+from cython.cimports.heat_igl.kernels.local_planes import BENT, DIAGONAL, FLATTER, LEAST_WEIGHT, TINY
 from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["onto_quadrics", "principal_axes"]
+__all__ = ["onto_quadrics", "principal_axes", "tangent_planes"]
 
 
 def principal_axes(
@@ -38,6 +38,57 @@ def principal_axes(
         for row in range(index.shape[0]):
             _axes(P, index[row], square[row], axes[row], variances[row], work)
     return found, spread
+
+
+def tangent_planes(
+    P: cython.const[cython.double][:, ::1],
+    index: cython.int[:, ::1],
+    square: cython.const[cython.double][:, ::1],
+):
+    """The principal axes of neighbourhoods, which are made smaller where they are not flat.
+
+    Where the points vary much along the normal, two thirds, a half and a third of the neighbours are tried, and those
+    taken that are flatter.
+
+    Parameters
+    ----------
+    P, index, square
+        As for `principal_axes`; neighbours that are left out become -1 in `index`.
+
+    Returns
+    -------
+    axes : (b, 3, 3) float64
+        As of `principal_axes`.
+    radius : (b,) float64
+        Distance of the farthest neighbour that is left.
+    """
+    k: cython.Py_ssize_t = index.shape[1]
+    found, radii = np.empty((index.shape[0], 3, 3)), np.empty(index.shape[0])
+    axes: cython.double[:, :, ::1] = found
+    radius: cython.double[::1] = radii
+    trial: cython.double[:, ::1] = np.empty((3, 3))
+    variances: cython.double[::1] = np.empty(3)
+    work: cython.double[:, ::1] = np.empty((7, 3))
+    row: cython.Py_ssize_t
+    sixths: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    with cython.nogil:
+        for row in range(index.shape[0]):
+            size: cython.Py_ssize_t = k
+            _axes(P, index[row], square[row], axes[row], variances, work)
+            bend: cython.double = variances[0] / max(variances[1], TINY)
+            for sixths in range(4, 1, -1):
+                fewer: cython.Py_ssize_t = 1 + (k - 1) * sixths // 6
+                if bend <= BENT or fewer < 8:
+                    break
+                _axes(P, index[row, :fewer], square[row, :fewer], trial, variances, work)
+                if variances[0] < FLATTER * bend * variances[1]:
+                    bend, size = variances[0] / variances[1], fewer
+                    axes[row, :, :] = trial
+            radius[row] = sqrt(square[row, size - 1])
+            for j in range(size, k):
+                index[row, j] = -1
+    return found, radii
 
 
 @cython.cfunc

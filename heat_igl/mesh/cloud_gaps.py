@@ -8,7 +8,7 @@ import numpy as np
 
 from heat_igl.kernels.incidence import components
 from heat_igl.kernels.local_delaunay import fitting_triangles
-from heat_igl.mesh.connectivity import facets
+from heat_igl.mesh.connectivity import ascending_rows, connected_components, facets, unique_rows
 from heat_igl.mesh.grouping import group_by_label, next_in_run
 from heat_igl.mesh.neighbourhoods import Neighbourhoods
 from heat_igl.typing import BoolArray, FloatArray, IntArray
@@ -49,13 +49,29 @@ def with_gaps_closed(P: FloatArray, F: IntArray, near: Neighbourhoods, is_settle
 def with_one_fan(F: IntArray, is_pinched: BoolArray) -> IntArray:
     """The triangles without those that touch the others in a vertex alone: around each vertex, the largest fan.
 
-    `is_pinched` (n,) are the vertices at which several fans meet, see `pinched_vertices`.
+    `is_pinched` (n,) are the vertices at which several fans meet, see `pinched_vertices`. No vertices are cut off:
+    where several fans are the only connection between parts, they stay.
     """
+    n, given = len(is_pinched), F
     while is_pinched.any():
         around = np.flatnonzero(is_pinched[F].any(axis=1))
         F = np.delete(F, around[_in_smaller_fans(F[around], is_pinched)], axis=0)
-        is_pinched = pinched_vertices(F, np.zeros(len(is_pinched), bool))
-    return F
+        is_pinched = pinched_vertices(F, np.zeros(n, bool))
+    return F if F is given else _with_parts_joined(given, F, n)
+
+
+def _with_parts_joined(given: IntArray, kept: IntArray, n: int) -> IntArray:
+    """The triangles `kept`, and of the `given` ones those at parts that would be cut off: all but the largest."""
+    before, after = connected_components(given, n), connected_components(kept, n)
+    size = np.bincount(after)[after]
+    largest = np.zeros(int(before.max()) + 1, np.int64)
+    np.maximum.at(largest, before, size)
+    # Of equal parts, the first is the one that the others are joined to.
+    first = np.full(len(largest), n)
+    np.minimum.at(first, before, np.where(size == largest[before], after, n))
+    is_cut_off = after != first[before]
+    rows = np.concatenate([kept, given[is_cut_off[given].any(axis=1)]])
+    return rows[np.sort(unique_rows(ascending_rows(rows), n)[0])]
 
 
 def pinched_vertices(F: IntArray, is_settled: BoolArray) -> BoolArray:

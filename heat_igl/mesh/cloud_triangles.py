@@ -31,7 +31,9 @@ _OTHER_SHEET = -0.25
 
 
 def cloud_triangles(P: FloatArray, near: Neighbourhoods, oriented: bool) -> IntArray:
-    """Triangles (m, 3) int32 on points; an edge has at most two, and around each point they make one fan.
+    """Triangles (m, 3) int32 on points; an edge has at most two.
+
+    Around each point they make one fan, unless several fans are the only connection between parts of the surface.
 
     Parameters
     ----------

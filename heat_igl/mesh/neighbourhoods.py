@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from heat_igl.kernels.local_planes import onto_quadrics, principal_axes
+from heat_igl.kernels.local_planes import onto_quadrics, principal_axes, tangent_planes
 from heat_igl.kernels.point_tree import arrange, nearest
 from heat_igl.runtime import in_order, n_threads
 from heat_igl.typing import FloatArray, IntArray
@@ -71,7 +71,7 @@ class Neighbourhoods:
     Attributes
     ----------
     index : (n, k + 1) int32
-        The points themselves and their neighbours, by distance.
+        The points themselves and their neighbours, by distance; -1 after the last.
     radius : (n,) float64
         Distance of the farthest of them.
     axes : (n, 3, 3) float64
@@ -82,6 +82,11 @@ class Neighbourhoods:
     radius: FloatArray
     axes: FloatArray
 
+    @property
+    def has_shrunk(self) -> bool:
+        """Whether some neighbourhoods were made smaller."""
+        return bool((self.index[:, -1] < 0).any())
+
 
 def point_tree(P: FloatArray) -> PointTree:
     """The k-d tree of the points P (n, 3)."""
@@ -90,11 +95,12 @@ def point_tree(P: FloatArray) -> PointTree:
     return PointTree(positions, order.astype(np.int64), box)
 
 
-def neighbourhoods(tree: PointTree, normals: FloatArray | None = None) -> Neighbourhoods:
+def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: bool = True) -> Neighbourhoods:
     """Neighbours and tangent planes of the points of `tree`.
 
     Planes are found by principal components unless the normals (n, 3) of ``tree.P`` are given. Points weigh
-    1 - (d / r)^2, for d the distance and r the radius of the neighbourhood.
+    1 - (d / r)^2, for d the distance and r the radius of the neighbourhood. Neighbourhoods that are far from flat, at
+    edges and thin parts, are made smaller if that makes them flatter, unless `shrinks` is False.
     """
     P = tree.P
     k = min(_K, len(P) - 1)
@@ -102,8 +108,14 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None) -> Neighb
 
     def fill(rows: slice) -> None:
         index, square = tree.nearest(np.arange(rows.start, min(rows.stop, len(P))), k + 1)
-        found.index[rows], found.radius[rows] = index, np.sqrt(square[:, -1])
-        found.axes[rows] = principal_axes(P, index, square)[0] if normals is None else _completed(normals[rows])
+        found.radius[rows] = np.sqrt(square[:, -1])
+        if normals is not None:
+            found.axes[rows] = _completed(normals[rows])
+        elif shrinks:
+            found.axes[rows], found.radius[rows] = tangent_planes(P, index, square)
+        else:
+            found.axes[rows] = principal_axes(P, index, square)[0]
+        found.index[rows] = index
 
     _in_blocks(fill, len(P))
     return found

@@ -10,8 +10,9 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.kernels.agreeing import orient
 from heat_igl.mesh.cloud_triangles import cloud_triangles, with_points
+from heat_igl.mesh.connectivity import connected_components
 from heat_igl.mesh.mesh import Mesh, checked_positions
-from heat_igl.mesh.neighbourhoods import neighbourhoods, point_tree, without_noise
+from heat_igl.mesh.neighbourhoods import Neighbourhoods, PointTree, neighbourhoods, point_tree, without_noise
 from heat_igl.mesh.report import MeshReport
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -126,8 +127,7 @@ class PointCloud:
         tree = without_noise(point_tree(self.P[distinct]))
         number = distinct[tree.order]
         normals = None if self.normals is None else self.normals[number]
-        near = neighbourhoods(tree, normals)
-        triangles = cloud_triangles(tree.P, near, oriented=normals is not None)
+        near, triangles = _near_and_triangles(tree, normals)
         if not len(triangles):
             raise MeshError(
                 "no three points of P are neighbours on a surface: the points are too few or too unevenly spaced"
@@ -224,6 +224,24 @@ def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:
     directions[rows] /= largest[rows]
     directions[rows] /= np.linalg.norm(directions[rows], axis=1, keepdims=True)
     return directions
+
+
+def _near_and_triangles(tree: PointTree, normals: FloatArray | None) -> tuple[Neighbourhoods, IntArray]:
+    """The neighbourhoods of points, and the triangles (m, 3) int32: of as few parts as larger neighbourhoods make."""
+    near = neighbourhoods(tree, normals)
+    F = cloud_triangles(tree.P, near, oriented=normals is not None)
+    parts = _n_parts(F, len(tree.P))
+    if near.has_shrunk and parts != 1:
+        larger = neighbourhoods(tree, shrinks=False)
+        joined = cloud_triangles(tree.P, larger, oriented=False)
+        if _n_parts(joined, len(tree.P)) < parts or not parts:
+            return larger, joined
+    return near, F
+
+
+def _n_parts(F: IntArray, n: int) -> int:
+    """How many parts the triangles F (m, 3) make, without points in no triangle."""
+    return len(np.unique(connected_components(F, n)[F])) if len(F) else 0
 
 
 def _orient(P: FloatArray, F: IntArray, normals: FloatArray | None) -> None:
