@@ -17,6 +17,8 @@ from heat_igl.mesh.cloud_gaps import pinched_vertices, with_one_fan
 from heat_igl.mesh.cloud_triangles import cloud_triangles
 from heat_igl.mesh.neighbourhoods import neighbourhoods, point_tree, without_noise
 
+HEAT = {"magnitude": "damped"}
+
 
 def sphere(n: int, seed: int = 0) -> np.ndarray:
     P = np.random.default_rng(seed).standard_normal((n, 3))
@@ -91,20 +93,31 @@ def test_a_grid_of_cocircular_points_has_no_gap() -> None:
 # Distance.
 
 
-@pytest.mark.parametrize(("refine", "most"), [(None, 0.012), ("unfold", 0.002)])
-def test_distance_on_a_sphere(refine: heat_igl.unfolding.Refine | None, most: float) -> None:
+@pytest.mark.parametrize(("options", "most"), [(HEAT, 0.012), ({}, 0.003), ({"refine": "unfold"}, 0.002)])
+def test_distance_on_a_sphere(options: dict[str, str], most: float) -> None:
     P = sphere(4000)
-    distances = HeatMethodSolver(PointCloud(P), refine=refine).distances([0, 1, 2])
+    distances = HeatMethodSolver(PointCloud(P), **options).distances([0, 1, 2])
     assert mean_error(distances, np.stack([on_sphere(P, i) for i in range(3)])) < most
 
 
-@pytest.mark.parametrize(("refine", "most"), [(None, 0.012), ("unfold", 0.001)])
-def test_distance_on_a_cylinder_with_two_boundaries(refine: heat_igl.unfolding.Refine | None, most: float) -> None:
+@pytest.mark.parametrize(("options", "most"), [(HEAT, 0.012), ({}, 0.002), ({"refine": "unfold"}, 0.001)])
+def test_distance_on_a_cylinder_with_two_boundaries(options: dict[str, str], most: float) -> None:
     P, at = cylinder(4000)
     difference = np.abs(at - at[0])
     difference[:, 0] = np.minimum(difference[:, 0], 2 * np.pi - difference[:, 0])
-    distance = HeatMethodSolver(PointCloud(P), refine=refine).distance(0)
+    distance = HeatMethodSolver(PointCloud(P), **options).distance(0)
     assert mean_error(distance, np.linalg.norm(difference, axis=1)) < most
+
+
+def test_points_are_swept_unless_heat_is_asked_for() -> None:
+    cloud = PointCloud(sphere(1500))
+    sweep = HeatMethodSolver(cloud, refine="sweep").distance(0)
+    default = HeatMethodSolver(cloud)
+    np.testing.assert_array_equal(default.distance(0), sweep)
+    # What was left open is chosen anew for other points.
+    np.testing.assert_array_equal(default.with_vertices(2 * cloud.P).distance(0), 2 * sweep)
+    for named in (HEAT, {"t_coef": 1.0}, {"boundary": "dirichlet"}, {"laplacian": "intrinsic-delaunay-refined"}):
+        assert not np.array_equal(HeatMethodSolver(cloud, **named).distance(0), sweep)
 
 
 def test_unfolding_is_exact_in_a_plane_where_straight_lines_stay_inside() -> None:
@@ -120,7 +133,7 @@ def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary() -> None:
     P = plane(3000)
     cloud = PointCloud(P)
     truth = np.linalg.norm(P - P[0], axis=1)
-    of_cloud = HeatMethodSolver(cloud).distance(0)
+    of_cloud = HeatMethodSolver(cloud, magnitude="damped").distance(0)
     of_mesh = HeatMethodSolver(cloud.triangles, t_coef=1, laplacian="intrinsic-delaunay").distance(0)
     assert mean_error(of_cloud, truth) < mean_error(of_mesh, truth)
 
@@ -128,7 +141,7 @@ def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary() -> None:
 def test_even_points_are_solved_on_as_their_mesh_is() -> None:
     """Random points take a larger time step than the vertices of a mesh."""
     mesh = shapes.icosphere(4)
-    of_cloud, of_mesh = HeatMethodSolver(PointCloud(mesh.V)), HeatMethodSolver(mesh)
+    of_cloud, of_mesh = HeatMethodSolver(PointCloud(mesh.V), magnitude="damped"), HeatMethodSolver(mesh)
     assert of_cloud.t == pytest.approx(of_mesh.t, rel=1e-6)
     np.testing.assert_allclose(of_cloud.distance(0), of_mesh.distance(0), rtol=1e-6)
     solver = HeatMethodSolver(PointCloud(sphere(1000)))
