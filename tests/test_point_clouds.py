@@ -12,8 +12,12 @@ import heat_igl
 from heat_igl import HeatMethodSolver, MeshError, PointCloud, cli, farthest_points, read_point_cloud, shapes
 from heat_igl.drawing.discs import discs
 from heat_igl.io import ply
+from heat_igl.kernels.local_planes import onto_quadrics, principal_axes
+from heat_igl.mesh.cloud_gaps import pinched_vertices, with_one_fan
 from heat_igl.mesh.cloud_triangles import cloud_triangles
-from heat_igl.mesh.neighbourhoods import neighbourhoods, without_noise
+from heat_igl.mesh.neighbourhoods import neighbourhoods, point_tree, without_noise
+
+HEAT = {"magnitude": "damped"}
 
 
 def sphere(n: int, seed: int = 0) -> np.ndarray:
@@ -89,20 +93,31 @@ def test_a_grid_of_cocircular_points_has_no_gap() -> None:
 # Distance.
 
 
-@pytest.mark.parametrize(("refine", "most"), [(None, 0.012), ("unfold", 0.002)])
-def test_distance_on_a_sphere(refine: heat_igl.unfolding.Refine | None, most: float) -> None:
+@pytest.mark.parametrize(("options", "most"), [(HEAT, 0.012), ({}, 0.003), ({"refine": "unfold"}, 0.002)])
+def test_distance_on_a_sphere(options: dict[str, str], most: float) -> None:
     P = sphere(4000)
-    distances = HeatMethodSolver(PointCloud(P), refine=refine).distances([0, 1, 2])
+    distances = HeatMethodSolver(PointCloud(P), **options).distances([0, 1, 2])
     assert mean_error(distances, np.stack([on_sphere(P, i) for i in range(3)])) < most
 
 
-@pytest.mark.parametrize(("refine", "most"), [(None, 0.012), ("unfold", 0.001)])
-def test_distance_on_a_cylinder_with_two_boundaries(refine: heat_igl.unfolding.Refine | None, most: float) -> None:
+@pytest.mark.parametrize(("options", "most"), [(HEAT, 0.012), ({}, 0.002), ({"refine": "unfold"}, 0.001)])
+def test_distance_on_a_cylinder_with_two_boundaries(options: dict[str, str], most: float) -> None:
     P, at = cylinder(4000)
     difference = np.abs(at - at[0])
     difference[:, 0] = np.minimum(difference[:, 0], 2 * np.pi - difference[:, 0])
-    distance = HeatMethodSolver(PointCloud(P), refine=refine).distance(0)
+    distance = HeatMethodSolver(PointCloud(P), **options).distance(0)
     assert mean_error(distance, np.linalg.norm(difference, axis=1)) < most
+
+
+def test_points_are_swept_unless_heat_is_asked_for() -> None:
+    cloud = PointCloud(sphere(1500))
+    sweep = HeatMethodSolver(cloud, refine="sweep").distance(0)
+    default = HeatMethodSolver(cloud)
+    np.testing.assert_array_equal(default.distance(0), sweep)
+    # What was left open is chosen anew for other points.
+    np.testing.assert_array_equal(default.with_vertices(2 * cloud.P).distance(0), 2 * sweep)
+    for named in (HEAT, {"t_coef": 1.0}, {"boundary": "dirichlet"}, {"laplacian": "intrinsic-delaunay-refined"}):
+        assert not np.array_equal(HeatMethodSolver(cloud, **named).distance(0), sweep)
 
 
 def test_unfolding_is_exact_in_a_plane_where_straight_lines_stay_inside() -> None:
@@ -118,7 +133,7 @@ def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary() -> None:
     P = plane(3000)
     cloud = PointCloud(P)
     truth = np.linalg.norm(P - P[0], axis=1)
-    of_cloud = HeatMethodSolver(cloud).distance(0)
+    of_cloud = HeatMethodSolver(cloud, magnitude="damped").distance(0)
     of_mesh = HeatMethodSolver(cloud.triangles, t_coef=1, laplacian="intrinsic-delaunay").distance(0)
     assert mean_error(of_cloud, truth) < mean_error(of_mesh, truth)
 
@@ -126,7 +141,7 @@ def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary() -> None:
 def test_even_points_are_solved_on_as_their_mesh_is() -> None:
     """Random points take a larger time step than the vertices of a mesh."""
     mesh = shapes.icosphere(4)
-    of_cloud, of_mesh = HeatMethodSolver(PointCloud(mesh.V)), HeatMethodSolver(mesh)
+    of_cloud, of_mesh = HeatMethodSolver(PointCloud(mesh.V), magnitude="damped"), HeatMethodSolver(mesh)
     assert of_cloud.t == pytest.approx(of_mesh.t, rel=1e-6)
     np.testing.assert_allclose(of_cloud.distance(0), of_mesh.distance(0), rtol=1e-6)
     solver = HeatMethodSolver(PointCloud(sphere(1000)))
@@ -144,14 +159,16 @@ def test_uneven_density() -> None:
 def test_noise_is_taken_away_and_clean_points_stay() -> None:
     P = sphere(20_000)
     noisy = P + 0.01 * np.random.default_rng(1).standard_normal(P.shape)
-    radius = np.linalg.norm(without_noise(noisy), axis=1)
+    radius = np.linalg.norm(without_noise(point_tree(noisy)).P, axis=1)
     assert radius.std() < 0.3 * np.linalg.norm(noisy, axis=1).std()
     assert mean_error(HeatMethodSolver(PointCloud(noisy)).distance(0), on_sphere(P, 0)) < 0.03
-    assert without_noise(P) is P
+    clean = point_tree(P)
+    assert without_noise(clean) is clean
     # Ridges and bumps of a few spacings are detail.
     x, y = np.random.default_rng(2).random((2, 20_000))
     waves = np.stack([x, y, 0.02 * np.abs((40 * x + 3 * y) % 2 - 1)], axis=1)
-    assert without_noise(waves) is waves
+    detailed = point_tree(waves)
+    assert without_noise(detailed) is detailed
 
 
 # What scans bring along.
@@ -463,9 +480,9 @@ def test_a_picture_of_a_cloud_with_an_outlier_and_labels(tmp_path) -> None:
 
 def test_a_star_is_the_delaunay_star() -> None:
     """In a plane no triangle of a star holds another point in its circle."""
-    P = plane(400)
-    near = neighbourhoods(P)
-    F = cloud_triangles(P, near, oriented=False)
+    tree = point_tree(plane(400))
+    P = tree.P
+    F = cloud_triangles(P, neighbourhoods(tree), oriented=False)
     a, b, c = (P[F[:, i], :2] for i in range(3))
     # Circumcentre relative to a.
     u, v = b - a, c - a
@@ -492,3 +509,97 @@ def test_vectors_on_a_cloud():
     P = heat_igl.shapes.icosphere(3).V
     vectors = heat_igl.VectorHeatSolver(heat_igl.PointCloud(P), refine="exact").log_map(0)
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), np.arccos(np.clip(P @ P[0], -1, 1)), atol=0.01)
+
+
+# The triangles fit together.
+
+
+def is_a_surface(F: np.ndarray, n: int) -> bool:
+    """Whether the neighbours of each vertex make one path along the sides opposite to it, open or closed."""
+    paths = [[] for _ in range(n)]
+    for a, b, c in F.tolist():
+        paths[a].append((b, c))
+        paths[b].append((c, a))
+        paths[c].append((a, b))
+    for sides in filter(None, paths):
+        used, degree = np.unique(sides, return_counts=True)
+        reached, grown = {int(used[0])}, True
+        while grown:
+            before = len(reached)
+            reached.update(*(side for side in sides if not reached.isdisjoint(side)))
+            grown = len(reached) > before
+        if degree.max() > 2 or len(reached) < len(used):
+            return False
+    return True
+
+
+@pytest.mark.parametrize(("around_tube", "around_hole"), [(12, 24), (18, 18), (30, 30), (50, 50), (24, 60)])
+def test_points_of_a_regular_torus_make_a_closed_surface(around_tube: int, around_hole: int) -> None:
+    """Four points of each cell lie on a circle, and three points of a meridian on a line in a tangent plane."""
+    mesh = shapes.torus(around_tube, around_hole)
+    cloud = PointCloud(mesh.V)
+    report = cloud.report()
+    assert (report.euler_characteristic, report.n_boundary_loops, cloud.n_faces) == (0, 0, mesh.n_faces)
+    assert is_a_surface(cloud.F, mesh.n_vertices)
+    heat_igl.tangent_frames(cloud.triangles)
+
+
+def test_of_several_fans_at_a_vertex_the_largest_stays() -> None:
+    F = shapes.grid(6).F.astype(np.int32)
+    n = int(F.max()) + 1
+    at = n // 2
+    around = np.flatnonzero((F - at == 0).any(axis=1))
+    # Two triangles without a common edge: the other four are in two fans.
+    second = next(f for f in around if len(np.intersect1d(F[f], F[around[0]])) == 1)
+    F = np.delete(F, [around[0], second], axis=0)
+    is_pinched = pinched_vertices(F, np.zeros(n, bool))
+    assert np.flatnonzero(is_pinched).tolist() == [at]
+    kept = with_one_fan(F, is_pinched)
+    assert not is_a_surface(F, n)
+    assert is_a_surface(kept, n)
+    assert len(F) - len(kept) in (1, 2)
+    assert (heat_igl.Mesh(np.eye(n, 3), kept).components == 0).all()
+
+
+def test_fans_stay_that_are_the_only_connection() -> None:
+    F = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 5, 6], [0, 6, 7]], np.int32)
+    is_pinched = pinched_vertices(F, np.zeros(8, bool))
+    assert is_pinched.tolist() == [True] + 7 * [False]
+    np.testing.assert_array_equal(np.sort(with_one_fan(F, is_pinched), axis=1), F)
+
+
+# Neighbours.
+
+
+@pytest.mark.parametrize("n", [4, 33, 3000])
+def test_nearest_points_are_those_of_scipy(n: int) -> None:
+    from scipy.spatial import KDTree
+
+    P = np.random.default_rng(n).standard_normal((n, 3)) * [1, 10, 0.01]
+    tree = point_tree(P)
+    np.testing.assert_array_equal(tree.P, P[tree.order])
+    k = min(n, 20)
+    chosen = np.random.default_rng(0).permutation(n)[: n // 2]
+    index, square = tree.nearest(chosen, k)
+    distance, expected = KDTree(tree.P).query(tree.P[chosen], k)
+    np.testing.assert_array_equal(index, expected)
+    np.testing.assert_allclose(square, distance**2, rtol=1e-12)
+
+
+def test_quadrics_and_principal_axes() -> None:
+    """A point of a paraboloid stays on it, and axes are numpy's eigenvectors."""
+    x, y = np.random.default_rng(0).uniform(-1, 1, (2, 40))
+    height = 0.3 * x**2 - 0.2 * x * y + 0.1 * x + 0.05
+    P = np.concatenate([[[0, 0, 0.4]], np.stack([x, y, height], axis=1)])
+    index = np.concatenate([[0], 1 + np.argsort(np.linalg.norm(P[1:] - P[0], axis=1))]).astype(np.int32)[None]
+    square = np.square(P[index[0]] - P[0]).sum(axis=1)[None]
+    moved, deviation = onto_quadrics(P[1:], index[:, 1:] - 1, square[:, 1:], np.eye(3)[None])
+    np.testing.assert_allclose(moved, P[index[:, 1]], atol=1e-6)
+    assert deviation < 1e-6
+    axes, variances = principal_axes(P, index, square)
+    weights = np.maximum(1 - square[0] / square[0, -1], 1e-3)
+    expected, vectors = np.linalg.eigh(
+        np.cov((P[index[0]] - P[0]).T / np.sqrt(square[0, -1]), aweights=weights, ddof=0)
+    )
+    np.testing.assert_allclose(variances[0], expected, rtol=1e-9)
+    np.testing.assert_allclose(np.abs(axes[0][::-1] @ vectors), np.eye(3), atol=1e-9)

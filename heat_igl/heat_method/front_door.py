@@ -46,7 +46,8 @@ def geodesic_distance(
         to 50 000 vertices, see `unfolded_distance`. "sweep" unfolds two triangles at a time. Both go through the
         vertices in the order of Dijkstra's algorithm; polygons are cut into triangles. "heat" is `HeatMethodSolver`
         with its defaults; on polygons it takes `polygon_operators`. "exact" is the polyhedral distance by windows.
-        Tetrahedra take "sweep" and "heat", which both are fronts there, see `FrontSolver`.
+        Tetrahedra take "sweep" and "heat", which both are fronts there, see `FrontSolver`. On a `PointCloud`, whose
+        solver sweeps by default, "heat" takes the order of the vertices from heat.
     cutoff : float, optional
         Distances beyond this are ``inf``. With "unfold" and "exact", the others are exact, and the search ends there.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints, optional

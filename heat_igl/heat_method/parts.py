@@ -157,8 +157,8 @@ class SolverParts:
 def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysis | None = None) -> SolverParts:
     """The parts of a solver on `mesh`; a `known` order of elimination is taken if it fits."""
     start = time.perf_counter()
-    if isinstance(mesh, PointCloud) and options.t_coef is None:
-        options = replace(options, t_coef=_t_coef_of_points(mesh.triangles))
+    if isinstance(mesh, PointCloud):
+        options = _for_points(mesh, options)
     begun: list[Future[Analysis]] = []
     with pool(1) as beside:
 
@@ -177,6 +177,13 @@ def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysi
         known = begun[0].result() if begun else known
     waited = time.perf_counter() - start - seconds
     return prepare(domain, options, known, seconds, waited, mesh.V)
+
+
+def _for_points(cloud: PointCloud, options: SolverOptions) -> SolverOptions:
+    """The options with those left open chosen for a cloud: on scattered points the sweep is far nearer than heat."""
+    if options.refine is None and options.leaves_heat and options.laplacian == "auto":
+        options = replace(options, refine="sweep")
+    return options if options.t_coef is not None else replace(options, t_coef=_t_coef_of_points(cloud.triangles))
 
 
 def _t_coef_of_points(triangles: Mesh) -> float:

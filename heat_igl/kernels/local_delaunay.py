@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.libc.math import atan2, sqrt
+from cython.cimports.libc.math import atan2, fabs, sqrt
 
 __all__ = ["delaunay_stars", "fitting_triangles"]
 
@@ -20,12 +20,25 @@ def delaunay_stars(
 
     `axes` (n, 3, 3) are the tangents and the normal of each of the points P (n, 3); rows of `neighbours` (n, k) ascend
     by distance. Triangles with a circumscribed circle of a radius above `largest` (n,) are left out, and neighbours
-    whose normals have a product below `least_cosine`. Returns the triangles (s, 3) int32, the point itself first, and
-    their radii (s,).
+    whose normals have a product below `least_cosine`.
+
+    Returns
+    -------
+    triangles : (s, 3) int32
+        Star by star, the point itself first, and around each point counterclockwise.
+    radii : (s,) float64
+        Of the circumscribed circles.
+    sizes : (end - begin,) int32
+        Number of triangles of each star.
+    is_closed : (end - begin,) uint8
+        Whether a star goes all the way around its point.
     """
     n: cython.Py_ssize_t = end - begin
     k: cython.Py_ssize_t = neighbours.shape[1]
     corners, radii = np.empty((n * k, 3), np.int32), np.empty(n * k)
+    sizes, closed = np.empty(n, np.int32), np.zeros(n, np.uint8)
+    size: cython.int[::1] = sizes
+    is_closed: cython.uchar[::1] = closed
     found: cython.int[:, ::1] = corners
     radius: cython.double[::1] = radii
     star: cython.double[:, ::1] = np.empty((k + 1, 3))
@@ -35,28 +48,29 @@ def delaunay_stars(
     i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(begin, end):
-            m = _star(i, P, axes, neighbours, largest[i], least_cosine, star, members, stack, found, radius, m)
-    return corners[:m].copy(), radii[:m].copy()
+            before: cython.Py_ssize_t = m
+            count: cython.Py_ssize_t = _neighbours_around(i, P, axes, neighbours, least_cosine, star, members)
+            if count >= 2:
+                top: cython.Py_ssize_t = _visible_hull(count, star, stack)
+                m = _triangles(i, top, star, members, stack, largest[i], found, radius, m)
+                is_closed[i - begin] = m - before == top
+            size[i - begin] = cython.cast(cython.int, m - before)
+    return corners[:m].copy(), radii[:m].copy(), sizes, closed
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _star(
+def _neighbours_around(
     i: cython.Py_ssize_t,
     P: cython.const[cython.double][:, ::1],
     axes: cython.const[cython.double][:, :, ::1],
     neighbours: cython.const[cython.int][:, ::1],
-    largest: cython.double,
     least_cosine: cython.double,
     star: cython.double[:, ::1],
     members: cython.int[::1],
-    stack: cython.int[::1],
-    found: cython.int[:, ::1],
-    radius: cython.double[::1],
-    m: cython.Py_ssize_t,
 ) -> cython.Py_ssize_t:
-    """Append the triangles of point i to the m that are found; return how many there are then.
+    """Put the neighbours of point i into `star` and `members`, sorted by angle and inverted; return how many there are.
 
     The inversion p / |p|^2 takes circles through the point to straight lines: the star of the point is the part of the
     convex hull of the inverted neighbours that it sees, found by Graham's scan.
@@ -68,10 +82,9 @@ def _star(
         j: cython.Py_ssize_t = neighbours[i, a]
         if j < 0 or j == i:
             continue
-        cosine: cython.double = (
-            axes[i, 2, 0] * axes[j, 2, 0] + axes[i, 2, 1] * axes[j, 2, 1] + axes[i, 2, 2] * axes[j, 2, 2]
-        )
-        if cosine < least_cosine:
+        if least_cosine > -1.0 and (
+            axes[i, 2, 0] * axes[j, 2, 0] + axes[i, 2, 1] * axes[j, 2, 1] + axes[i, 2, 2] * axes[j, 2, 2] < least_cosine
+        ):
             continue
         dx: cython.double = P[j, 0] - P[i, 0]
         dy: cython.double = P[j, 1] - P[i, 1]
@@ -82,17 +95,18 @@ def _star(
         # A point above the centre has no direction in the plane.
         if square <= 1e-12 * (dx * dx + dy * dy + dz * dz) or square <= 0.0:
             continue
-        angle: cython.double = atan2(y, x)
+        # Grows with the angle, and needs no arctangent.
+        angle: cython.double = y / (fabs(x) + fabs(y))
+        if x < 0.0:
+            angle = 2.0 - angle
         b = size
         while b > 0 and star[b - 1, ANGLE] > angle:
             _copy(star, members, b - 1, b)
             b -= 1
         star[b, ANGLE], star[b, X], star[b, Y] = angle, x / square, y / square
-        members[b] = j
+        members[b] = cython.cast(cython.int, j)
         size += 1
-    if size < 2:
-        return m
-    return _visible_hull(i, size, star, members, stack, largest, found, radius, m)
+    return size
 
 
 @cython.cfunc
@@ -109,9 +123,36 @@ def _copy(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _visible_hull(
+def _visible_hull(size: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.Py_ssize_t:
+    """The scan around the point, from the neighbour that is nearest in the plane: `stack` gets the corners of the hull.
+
+    Returns how many sides there are; the last corner is the first.
+    """
+    a: cython.Py_ssize_t
+    first: cython.Py_ssize_t = 0
+    for a in range(size):
+        if _square(star, a) > _square(star, first):
+            first = a
+    top: cython.Py_ssize_t = 0
+    stack[0] = cython.cast(cython.int, first)
+    for a in range(1, size + 1):
+        # The last round comes back to the first, which stays in any case.
+        following: cython.Py_ssize_t = first + a
+        if following >= size:
+            following -= size
+        while top > 0 and _is_hidden(star, stack[top - 1], stack[top], following):
+            top -= 1
+        top += 1
+        stack[top] = cython.cast(cython.int, following)
+    return top
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _triangles(
     i: cython.Py_ssize_t,
-    size: cython.Py_ssize_t,
+    top: cython.Py_ssize_t,
     star: cython.double[:, ::1],
     members: cython.int[::1],
     stack: cython.int[::1],
@@ -120,21 +161,8 @@ def _visible_hull(
     radius: cython.double[::1],
     m: cython.Py_ssize_t,
 ) -> cython.Py_ssize_t:
-    """The scan around the point, from the neighbour that is nearest in the plane, and the triangles that it leaves."""
+    """Append the triangles of point i on the sides of the hull to the m that are found; return how many there are."""
     a: cython.Py_ssize_t
-    first: cython.Py_ssize_t = 0
-    for a in range(size):
-        if _square(star, a) > _square(star, first):
-            first = a
-    top: cython.Py_ssize_t = 0
-    stack[0] = first
-    for a in range(1, size + 1):
-        # The last round comes back to the first, which stays in any case.
-        following: cython.Py_ssize_t = first if a == size else (first + a) % size
-        while top > 0 and _is_hidden(star, stack[top - 1], stack[top], following):
-            top -= 1
-        top += 1
-        stack[top] = following
     for a in range(top):
         p: cython.Py_ssize_t = stack[a]
         q: cython.Py_ssize_t = stack[a + 1]
@@ -144,7 +172,7 @@ def _visible_hull(
         side: cython.double = sqrt(dx * dx + dy * dy)
         # The line through two inverted points is 1 / (2 R) away from the point; beyond half a turn there is no face.
         if turn > 0.0 and side <= 2.0 * largest * turn:
-            found[m, 0], found[m, 1], found[m, 2] = i, members[p], members[q]
+            found[m, 0], found[m, 1], found[m, 2] = cython.cast(cython.int, i), members[p], members[q]
             radius[m] = 0.5 * side / turn
             m += 1
     return m

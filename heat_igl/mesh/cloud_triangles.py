@@ -10,21 +10,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from heat_igl.kernels.agreeing import agreement
 from heat_igl.kernels.local_delaunay import delaunay_stars, fitting_triangles
-from heat_igl.mesh.connectivity import ascending_rows, facets, unique_rows
+from heat_igl.mesh.cloud_gaps import pinched_vertices, with_gaps_closed, with_one_fan
+from heat_igl.mesh.connectivity import ascending_rows
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.neighbourhoods import Neighbourhoods
 from heat_igl.runtime import in_order, n_threads
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["cloud_triangles", "with_points"]
 
 # Largest radius of a circumscribed circle, in shares of the radius of the neighbourhood. Below one half, all points
 # inside the circle are known; a little more bridges the gaps of random points.
 _LARGEST_RADIUS = 0.6
-# The same for gaps, whose sides are known to belong to the surface.
-_LARGEST_GAP = 0.9
-_MOST_ROUNDS = 20
 # Points whose stars are found at a time.
 _BLOCK = 1 << 14
 # Product of two normals below which neighbours belong to different sheets; at right angles they may share an edge.
@@ -32,7 +31,9 @@ _OTHER_SHEET = -0.25
 
 
 def cloud_triangles(P: FloatArray, near: Neighbourhoods, oriented: bool) -> IntArray:
-    """Triangles (m, 3) on points; an edge has at most two.
+    """Triangles (m, 3) int32 on points; an edge has at most two.
+
+    Around each point they make one fan, unless several fans are the only connection between parts of the surface.
 
     Parameters
     ----------
@@ -43,62 +44,48 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, oriented: bool) -> IntA
     oriented : bool
         Whether the normals tell the sides of a surface apart: neighbours with opposite normals are left out.
     """
-    corners, radii = _stars(P, near, _OTHER_SHEET if oriented else -2.0)
-    rows = ascending_rows(corners).astype(np.int64)
-    first, inverse, counts = unique_rows(rows, len(P))
-    radius = np.zeros(len(first))
-    np.maximum.at(radius, inverse, radii)
-    order = np.lexsort((radius, -counts))
-    candidates = rows[first[order]].astype(np.int32)
+    agreed, others, is_settled = _triangles_of_stars(P, near, _OTHER_SHEET if oriented else -2.0)
+    # Around a settled point nothing is left to do.
+    is_open = ~is_settled[agreed].all(axis=1)
+    F, candidates = agreed[is_open], others[~is_settled[others].any(axis=1)]
     # The angle of a corner is the same number in every star that has the triangle.
-    fits = fitting_triangles(P, near.axes, candidates, int((counts == 3).sum()))
-    F = candidates[fits]
-    for _ in range(_MOST_ROUNDS):
-        ears = _ears(P, F, _LARGEST_GAP * near.radius)
-        both = np.concatenate([F, ears])
-        fits = fitting_triangles(P, near.axes, both, len(F))
-        if fits.sum() == len(F):
-            break
-        F = both[fits]
-    return _with_isolated_points(P, F.astype(np.int64), near)
+    both = np.concatenate([F, candidates])
+    F = both[fitting_triangles(P, near.axes, both, len(F))]
+    F = with_gaps_closed(P, F, near, is_settled)
+    is_pinched = pinched_vertices(F, is_settled)
+    F = with_one_fan(np.concatenate([agreed[~is_open], F]), is_pinched)
+    return _with_isolated_points(P, F, near)
 
 
-def _stars(P: FloatArray, near: Neighbourhoods, least_cosine: float) -> tuple[IntArray, FloatArray]:
-    """The triangles (s, 3) of the Delaunay stars of all points, and the radii (s,) of their circles."""
+def _triangles_of_stars(
+    P: FloatArray, near: Neighbourhoods, least_cosine: float
+) -> tuple[IntArray, IntArray, BoolArray]:
+    """The triangles (m, 3) int32 in three Delaunay stars, and those in two or one, in the order that they are taken.
+
+    Also returns which points (n,) are settled: all around them there are triangles in three stars.
+    """
     largest = _LARGEST_RADIUS * near.radius
 
-    def of_block(begin: int) -> tuple[IntArray, FloatArray]:
+    def stars_of(begin: int) -> tuple[IntArray, FloatArray, IntArray, IntArray]:
         end = min(begin + _BLOCK, len(P))
-        corners, radii = delaunay_stars(P, near.axes, near.index, largest, least_cosine, begin, end)
-        return corners, radii
+        corners, radii, sizes, is_closed = delaunay_stars(P, near.axes, near.index, largest, least_cosine, begin, end)
+        return corners, radii, sizes, is_closed
 
-    corners, radii = zip(*in_order(of_block, range(0, len(P), _BLOCK), n_threads()), strict=True)
-    return np.concatenate(corners), np.concatenate(radii)
+    blocks = range(0, len(P), _BLOCK)
+    corners, radii, sizes, is_closed = map(np.concatenate, zip(*in_order(stars_of, blocks, n_threads()), strict=True))
+    first = np.zeros(len(P) + 1, np.int64)
+    np.cumsum(sizes, out=first[1:])
 
+    def agreement_of(begin: int) -> tuple[IntArray, FloatArray, IntArray]:
+        count, radius, is_settled = agreement(first, corners, radii, is_closed, begin, min(begin + _BLOCK, len(P)))
+        return count, radius, is_settled
 
-def _ears(P: FloatArray, F: IntArray, largest: FloatArray) -> IntArray:
-    """Triangles (k, 3) on two successive edges of the boundary, smallest first, with circles no larger than allowed."""
-    found = facets(F.astype(np.int64), len(P))
-    outer = found.vertices[found.n_faces == 1]
-    ends = group_by_label(np.concatenate([outer[:, 0], outer[:, 1]]), len(P))
-    other = np.concatenate([outer[:, 1], outer[:, 0]])
-    # More than two boundary edges meet at touching gaps; an ear may be cut there in a later round.
-    at = np.flatnonzero(np.diff(ends.first) == 2)
-    before, after = other[ends.members[ends.first[at]]], other[ends.members[ends.first[at] + 1]]
-    ears = np.stack([before, at, after], axis=1)
-    radius = _circumradius(P[ears])
-    small = radius < largest[ears].min(axis=1)
-    return np.asarray(ears[small][np.argsort(radius[small], kind="stable")], dtype=np.int32)
-
-
-def _circumradius(corners: FloatArray) -> FloatArray:
-    """Radius (k,) of the circle around each triangle (k, 3, 3); ``inf`` for corners on a line."""
-    a, b = corners[:, 0] - corners[:, 1], corners[:, 2] - corners[:, 1]
-    double_area = np.linalg.norm(np.cross(a, b), axis=1)
-    sides = [np.linalg.norm(side, axis=1) for side in (a, b, a - b)]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        radius = (sides[0] / double_area) * sides[1] * sides[2] / 2
-    return np.asarray(np.where(double_area > 0, radius, np.inf))
+    count, radius, is_settled = map(np.concatenate, zip(*in_order(agreement_of, blocks, n_threads()), strict=True))
+    others = np.flatnonzero((count == 1) | (count == 2))
+    rows = ascending_rows(corners[others])
+    # Those in more stars first, then the smaller ones.
+    order = np.lexsort((*rows.T[::-1], radius[others], -count[others].astype(int)))
+    return corners[count == 3], rows[order], is_settled.astype(bool)
 
 
 def _with_isolated_points(P: FloatArray, F: IntArray, near: Neighbourhoods) -> IntArray:
@@ -115,7 +102,7 @@ def _with_isolated_points(P: FloatArray, F: IntArray, near: Neighbourhoods) -> I
     vertex = of_used[position]
     # Outliers are farther away than a neighbour would be.
     close = distance <= near.radius[vertex]
-    return with_points(P, F, near.axes, isolated[close], vertex[close])
+    return with_points(P, F, near.axes, isolated[close].astype(np.int32), vertex[close])
 
 
 def with_points(P: FloatArray, F: IntArray, axes: FloatArray, points: IntArray, vertices: IntArray) -> IntArray:

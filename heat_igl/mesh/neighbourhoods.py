@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from heat_igl.kernels.local_planes import onto_quadrics, principal_axes, tangent_planes
+from heat_igl.kernels.point_tree import arrange, nearest
 from heat_igl.runtime import in_order, n_threads
 from heat_igl.typing import FloatArray, IntArray
 
-if TYPE_CHECKING:
-    from scipy.spatial import KDTree
-
-__all__ = ["Neighbourhoods", "neighbourhoods", "without_noise"]
+__all__ = ["Neighbourhoods", "PointTree", "neighbourhoods", "point_tree", "without_noise"]
 
 # Nearest points from which the plane of a point and its triangles are found.
 _K = 30
 # Points at a time: bounds the memory for their neighbours.
 _BLOCK = 1 << 12
+# Points in a leaf of the tree, about.
+_LEAF = 16
 
 # Noise in shares of the spacing. Heights that vary by a share e of the spacing lengthen edges by the share e^2, so
 # below this one noise costs less than the heat method.
@@ -29,10 +29,39 @@ _THICKNESS = 0.05
 _LARGEST_K = 120
 _MOST_PASSES = 8
 # Noise is looked for at this many points.
-_SAMPLE = 4000
+_SAMPLE = 1000
 # Deviations from a quadric of half as many neighbours, in shares of those from the quadric of all: noise deviates from
 # both alike, 0.68 to 1 in measurements, detail from the smaller one by less, 0.14 to 0.58.
 _NOISE_NOT_DETAIL = 0.63
+
+
+@dataclass(frozen=True, eq=False)
+class PointTree:
+    """Points sorted into a k-d tree, so that those near to each other are near in memory, too.
+
+    Attributes
+    ----------
+    P : (n, 3) float64
+        The points, leaf by leaf.
+    order : (n,) int64
+        Which of the given points each is.
+    box : (2 b - 1, 6) float64
+        Least and greatest coordinates in each node of the tree, whose b leaves are last.
+    """
+
+    P: FloatArray
+    order: IntArray
+    box: FloatArray
+
+    def nearest(self, chosen: IntArray, k: int) -> tuple[IntArray, FloatArray]:
+        """The k nearest points (b, k) int32 of some of `P`, themselves first, and the squared distances (b, k)."""
+        index, square = nearest(self.P, self.box, np.asarray(chosen, np.int32), k)
+        return index, square
+
+    def moved(self, P: FloatArray) -> PointTree:
+        """The tree of other positions (n, 3) of the same points, in the order of this tree."""
+        tree = point_tree(P)
+        return replace(tree, order=self.order[tree.order])
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +71,7 @@ class Neighbourhoods:
     Attributes
     ----------
     index : (n, k + 1) int32
-        The points themselves and their neighbours, by distance.
+        The points themselves and their neighbours, by distance; -1 after the last.
     radius : (n,) float64
         Distance of the farthest of them.
     axes : (n, 3, 3) float64
@@ -53,84 +82,86 @@ class Neighbourhoods:
     radius: FloatArray
     axes: FloatArray
 
+    @property
+    def has_shrunk(self) -> bool:
+        """Whether some neighbourhoods were made smaller."""
+        return bool((self.index[:, -1] < 0).any())
 
-def neighbourhoods(P: FloatArray, normals: FloatArray | None = None) -> Neighbourhoods:
-    """Neighbours and tangent planes of the points P (n, 3), by principal components unless `normals` (n, 3) are given.
 
-    Points weigh 1 - (d / r)^2, for d the distance and r the radius of the neighbourhood.
+def point_tree(P: FloatArray) -> PointTree:
+    """The k-d tree of the points P (n, 3)."""
+    levels = max(int(len(P) / _LEAF).bit_length(), 1)
+    order, positions, box = arrange(P, levels)
+    return PointTree(positions, order.astype(np.int64), box)
+
+
+def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: bool = True) -> Neighbourhoods:
+    """Neighbours and tangent planes of the points of `tree`.
+
+    Planes are found by principal components unless the normals (n, 3) of ``tree.P`` are given. Points weigh
+    1 - (d / r)^2, for d the distance and r the radius of the neighbourhood. Neighbourhoods that are far from flat, at
+    edges and thin parts, are made smaller if that makes them flatter, unless `shrinks` is False.
     """
+    P = tree.P
     k = min(_K, len(P) - 1)
     found = Neighbourhoods(np.empty((len(P), k + 1), np.int32), np.empty(len(P)), np.empty((len(P), 3, 3)))
-    tree = _tree(P)
 
     def fill(rows: slice) -> None:
-        distance, index = tree.query(P[rows], k + 1)
-        found.index[rows], found.radius[rows] = index, distance[:, -1]
-        if normals is None:
-            found.axes[rows] = _principal_axes(P, P[rows], distance, index)[0]
+        index, square = tree.nearest(np.arange(rows.start, min(rows.stop, len(P))), k + 1)
+        found.radius[rows] = np.sqrt(square[:, -1])
+        if normals is not None:
+            found.axes[rows] = _completed(normals[rows])
+        elif shrinks:
+            found.axes[rows], found.radius[rows] = tangent_planes(P, index, square)
+        else:
+            found.axes[rows] = principal_axes(P, index, square)[0]
+        found.index[rows] = index
 
     _in_blocks(fill, len(P))
-    if normals is not None:
-        found.axes[:] = _completed(normals)
     return found
 
 
-def without_noise(P: FloatArray) -> FloatArray:
-    """The points (n, 3), moved onto quadrics fitted to their neighbours if they are noisy; else `P` itself.
+def without_noise(tree: PointTree) -> PointTree:
+    """The points, moved onto quadrics fitted to their neighbours if they are noisy; else `tree` itself.
 
     Points are noisy if neighbours deviate from the quadric by more than 1 / 20 of their spacing at half of the points,
     and this is not detail, from which a quadric of half as many neighbours would deviate by less. Then all points are
     moved along their normals, until the deviation is smaller.
     """
-    k = _K
-    if len(P) <= 4 * k:
-        return P
-    most = min(_LARGEST_K, len(P) // 4)
-    sample = np.unique(np.linspace(0, len(P) - 1, _SAMPLE).astype(np.int64))
-    tree = _tree(P)
-    few, all_k = (float(np.median(_onto_quadrics(P, tree, P[sample], size)[1])) for size in (k // 2, k))
+    k, n = _K, len(tree.P)
+    if n <= 4 * k:
+        return tree
+    most = min(_LARGEST_K, n // 4)
+    sample = np.unique(np.linspace(0, n - 1, _SAMPLE).astype(np.int64))
+    few, all_k = (float(np.median(_onto_quadrics(tree, sample, size)[1])) for size in (k // 2, k))
     if few < max(_NOISE, _NOISE_NOT_DETAIL * all_k):
-        return P
+        return tree
     for _ in range(_MOST_PASSES):
-        tree = _tree(P)
-        _, noise, thickness = _onto_quadrics(P, tree, P[sample], k)
+        _, noise, thickness = _onto_quadrics(tree, sample, k)
         while np.median(thickness) > _THICKNESS and k < most:
             k = min(2 * k, most)
-            _, noise, thickness = _onto_quadrics(P, tree, P[sample], k)
+            _, noise, thickness = _onto_quadrics(tree, sample, k)
         if np.median(noise) <= _NOISE:
             break
-        P = _onto_quadrics(P, tree, P, k)[0]
-    return P
+        tree = tree.moved(_onto_quadrics(tree, np.arange(n), k)[0])
+    return tree
 
 
-def _onto_quadrics(P: FloatArray, tree: KDTree, at: FloatArray, k: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points (b, 3) of P moved onto quadrics that are fitted to k neighbours.
+def _onto_quadrics(tree: PointTree, chosen: IntArray, k: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Some points (b, 3) of the tree, moved onto quadrics that are fitted to k neighbours.
 
     Also returns the noise (b,) in shares of the spacing, and the ratio (b,) of the two smaller variances.
     """
-    moved, noise, thickness = np.empty_like(at), np.empty(len(at)), np.empty(len(at))
+    moved, noise, thickness = np.empty((len(chosen), 3)), np.empty(len(chosen)), np.empty(len(chosen))
 
     def fill(rows: slice) -> None:
-        distance, index = tree.query(at[rows], k + 1)
-        radius = np.maximum(distance[:, -1:], np.finfo(float).tiny)
-        axes, variances = _principal_axes(P, at[rows], distance, index)
-        weights = np.sqrt(_weights(distance))
-        local = np.matmul(P[index] - at[rows, None], axes.transpose(0, 2, 1)) / radius[:, :, None]
-        x, y, z = np.moveaxis(local, 2, 0)
-        A = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2) * weights[:, :, None]
-        b = (z * weights)[:, :, None]
-        normal_matrix = np.matmul(A.transpose(0, 2, 1), A)
-        # Points on a line leave a quadric undetermined; the shift takes the smallest.
-        normal_matrix += 1e-9 * weights.shape[1] * np.eye(6)
-        c = np.linalg.solve(normal_matrix, np.matmul(A.transpose(0, 2, 1), b))
-        residual = (b - np.matmul(A, c))[:, :, 0]
-        freedom = np.maximum(1 - 6 / k, 0.5) * (weights**2).sum(axis=1)
-        noise[rows] = np.sqrt((residual**2).sum(axis=1) / freedom) * np.sqrt(k / np.pi)
+        index, square = tree.nearest(chosen[rows], k + 1)
+        axes, variances = principal_axes(tree.P, index, square)
+        moved[rows], noise[rows] = onto_quadrics(tree.P, index, square, axes)
         thickness[rows] = variances[:, 0] / np.maximum(variances[:, 1], np.finfo(float).tiny)
-        moved[rows] = at[rows] + (c[:, 0] * radius) * axes[:, 2]
 
-    _in_blocks(fill, len(at))
-    return moved, noise, thickness
+    _in_blocks(fill, len(chosen))
+    return moved, noise * np.sqrt(k / np.pi), thickness
 
 
 def _in_blocks(fill: Callable[[slice], None], n: int) -> None:
@@ -139,35 +170,9 @@ def _in_blocks(fill: Callable[[slice], None], n: int) -> None:
         pass
 
 
-def _weights(distance: FloatArray) -> FloatArray:
-    radius = np.maximum(distance[:, -1:], np.finfo(float).tiny)
-    return np.asarray(np.maximum(1 - (distance / radius) ** 2, 1e-3))
-
-
-def _principal_axes(
-    P: FloatArray, at: FloatArray, distance: FloatArray, index: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Tangents and normal (b, 3, 3) of some points, and the variances (b, 3) of their neighbours, ascending."""
-    weights = _weights(distance)
-    # In units of the radius: squares of tiny lengths would underflow.
-    radius = np.maximum(distance[:, -1], np.finfo(float).tiny)
-    local = (P[index] - at[:, None]) / radius[:, None, None]
-    weights /= weights.sum(axis=1, keepdims=True)
-    local -= np.matmul(weights[:, None], local)
-    variances, vectors = np.linalg.eigh(np.matmul((local * weights[:, :, None]).transpose(0, 2, 1), local))
-    return vectors.transpose(0, 2, 1)[:, ::-1], variances
-
-
 def _completed(normals: FloatArray) -> FloatArray:
     """Orthonormal axes (n, 3, 3) whose last rows are the unit vectors `normals` (n, 3)."""
     least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     x = np.cross(normals, least)
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     return np.stack([x, np.cross(normals, x), normals], axis=1)
-
-
-def _tree(P: FloatArray) -> KDTree:
-    """A k-d tree of the points."""
-    from scipy.spatial import KDTree  # takes as long to import as the rest of the package
-
-    return KDTree(P)

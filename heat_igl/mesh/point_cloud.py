@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import igl
 import numpy as np
 
 from heat_igl.errors import MeshError
+from heat_igl.kernels.agreeing import orient
 from heat_igl.mesh.cloud_triangles import cloud_triangles, with_points
+from heat_igl.mesh.connectivity import connected_components
 from heat_igl.mesh.mesh import Mesh, checked_positions
-from heat_igl.mesh.neighbourhoods import neighbourhoods, without_noise
+from heat_igl.mesh.neighbourhoods import Neighbourhoods, PointTree, neighbourhoods, point_tree, without_noise
 from heat_igl.mesh.report import MeshReport
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -122,19 +123,21 @@ class PointCloud:
         """
         # Copies of a point would compete for the same triangles.
         distinct, original = _distinct(self.P)
-        normals = None if self.normals is None else self.normals[distinct]
-        positions = without_noise(self.P[distinct])
-        near = neighbourhoods(positions, normals)
-        F = distinct[cloud_triangles(positions, near, oriented=normals is not None)]
-        if not len(F):
+        # From here to the triangles, points are numbered by the tree, in which neighbours are near in memory.
+        tree = without_noise(point_tree(self.P[distinct]))
+        number = distinct[tree.order]
+        normals = None if self.normals is None else self.normals[number]
+        near, triangles = _near_and_triangles(tree, normals)
+        if not len(triangles):
             raise MeshError(
                 "no three points of P are neighbours on a surface: the points are too few or too unevenly spaced"
             )
-        V = positions[original]
-        copies = np.delete(np.arange(len(V)), distinct)
-        return Mesh(
-            V, _oriented(V, with_points(V, F, near.axes[original], copies, distinct[original[copies]]), self.normals)
-        )
+        _orient(tree.P, triangles, normals)
+        F, V = number[triangles], np.empty_like(self.P)
+        V[number] = tree.P
+        if len(distinct) < len(V):
+            F = _with_copies(V, F, near.axes[np.argsort(tree.order)], distinct, original)
+        return Mesh(V, F)
 
     @property
     def components(self) -> IntArray:
@@ -176,6 +179,10 @@ def _check_extent(P: FloatArray) -> None:
 
 def _distinct(P: FloatArray) -> tuple[IntArray, IntArray]:
     """The points (k,) that are no copy of an earlier one, and which of them each of the n points equals."""
+    # Copies have the same sum, whatever the factors.
+    total = np.sort(P[:, 0] + np.sqrt(2) * P[:, 1] + np.sqrt(3) * P[:, 2])
+    if (total[1:] > total[:-1]).all():
+        return np.arange(len(P)), np.arange(len(P))
     order = np.lexsort(P.T)
     is_new = np.ones(len(P), bool)
     is_new[1:] = (P[order[1:]] != P[order[:-1]]).any(axis=1)
@@ -219,12 +226,39 @@ def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:
     return directions
 
 
-def _oriented(V: FloatArray, F: IntArray, normals: FloatArray | None) -> IntArray:
-    """The triangles F (m, 3), reversed until neighbours are oriented alike, and each part like most of the normals."""
-    F, part = igl.bfs_orient(F)
+def _near_and_triangles(tree: PointTree, normals: FloatArray | None) -> tuple[Neighbourhoods, IntArray]:
+    """The neighbourhoods of points, and the triangles (m, 3) int32: of as few parts as larger neighbourhoods make."""
+    near = neighbourhoods(tree, normals)
+    F = cloud_triangles(tree.P, near, oriented=normals is not None)
+    parts = _n_parts(F, len(tree.P))
+    if near.has_shrunk and parts != 1:
+        larger = neighbourhoods(tree, shrinks=False)
+        joined = cloud_triangles(tree.P, larger, oriented=False)
+        if _n_parts(joined, len(tree.P)) < parts or not parts:
+            return larger, joined
+    return near, F
+
+
+def _n_parts(F: IntArray, n: int) -> int:
+    """How many parts the triangles F (m, 3) make, without points in no triangle."""
+    return len(np.unique(connected_components(F, n)[F])) if len(F) else 0
+
+
+def _orient(P: FloatArray, F: IntArray, normals: FloatArray | None) -> None:
+    """Turn triangles of F (m, 3) until neighbours are oriented alike, and each part like most of the normals."""
+    part = orient(F, len(P))
     if normals is not None:
-        area = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
+        area = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
         along = np.bincount(part, np.einsum("fx,fx->f", area, normals[F].sum(axis=1)))
         turned = along[part] < 0
         F[turned] = F[turned, ::-1]
-    return np.asarray(F, np.int64)
+
+
+def _with_copies(V: FloatArray, F: IntArray, axes: FloatArray, distinct: IntArray, original: IntArray) -> IntArray:
+    """The triangles with the copies of points put into them; V gets the positions of the copies.
+
+    Each of the points is a copy of ``distinct[original]``; the tangents `axes` (k, 3, 3) are those of `distinct`.
+    """
+    V[:] = V[distinct[original]]
+    copies = np.delete(np.arange(len(V)), distinct)
+    return with_points(V, F, axes[original], copies, distinct[original[copies]])

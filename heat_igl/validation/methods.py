@@ -120,6 +120,9 @@ def resolved(method: Method) -> tuple[str, Prepare | None]:
 def _heat_solver(mesh: Mesh | PointCloud, options: Mapping[str, Any]) -> Solver:
     if isinstance(mesh, Mesh) and mesh.is_tetrahedral and "refine" in options:
         raise ReferenceSolverError(f"refine={options['refine']!r} unfolds triangles, and the mesh holds tetrahedra")
+    if isinstance(mesh, PointCloud) and not options:
+        # By default a solver on points sweeps.
+        return HeatMethodSolver(mesh, magnitude="damped")
     return HeatMethodSolver(mesh, **options)
 
 

@@ -1,0 +1,293 @@
+"""Planes and quadrics fitted to the neighbours of points. Points weigh 1 - (d / r)^2, at distance d of radius r."""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.local_planes import BENT, DIAGONAL, FLATTER, LEAST_WEIGHT, TINY
+from cython.cimports.libc.math import fabs, sqrt
+
+__all__ = ["onto_quadrics", "principal_axes", "tangent_planes"]
+
+
+def principal_axes(
+    P: cython.const[cython.double][:, ::1],
+    index: cython.const[cython.int][:, ::1],
+    square: cython.const[cython.double][:, ::1],
+):
+    """Tangents and normals of points, by principal components.
+
+    Parameters
+    ----------
+    P : (n, 3) float64
+        All points.
+    index, square : (b, k) int32, (b, k) float64
+        Neighbours of some points, by distance and each point first, and the squared distances.
+
+    Returns
+    -------
+    axes : (b, 3, 3) float64
+        Directions of most, less and least variance in rows, orthonormal.
+    variances : (b, 3) float64
+        In squares of the radius of the neighbourhood, ascending.
+    """
+    found, spread = np.empty((index.shape[0], 3, 3)), np.empty((index.shape[0], 3))
+    axes: cython.double[:, :, ::1] = found
+    variances: cython.double[:, ::1] = spread
+    work: cython.double[:, ::1] = np.empty((7, 3))
+    row: cython.Py_ssize_t
+    with cython.nogil:
+        for row in range(index.shape[0]):
+            _axes(P, index[row], square[row], axes[row], variances[row], work)
+    return found, spread
+
+
+def tangent_planes(
+    P: cython.const[cython.double][:, ::1],
+    index: cython.int[:, ::1],
+    square: cython.const[cython.double][:, ::1],
+):
+    """The principal axes of neighbourhoods, which are made smaller where they are not flat.
+
+    Where the points vary much along the normal, two thirds, a half and a third of the neighbours are tried, and those
+    taken that are flatter.
+
+    Parameters
+    ----------
+    P, index, square
+        As for `principal_axes`; neighbours that are left out become -1 in `index`.
+
+    Returns
+    -------
+    axes : (b, 3, 3) float64
+        As of `principal_axes`.
+    radius : (b,) float64
+        Distance of the farthest neighbour that is left.
+    """
+    k: cython.Py_ssize_t = index.shape[1]
+    found, radii = np.empty((index.shape[0], 3, 3)), np.empty(index.shape[0])
+    axes: cython.double[:, :, ::1] = found
+    radius: cython.double[::1] = radii
+    trial: cython.double[:, ::1] = np.empty((3, 3))
+    variances: cython.double[::1] = np.empty(3)
+    work: cython.double[:, ::1] = np.empty((7, 3))
+    row: cython.Py_ssize_t
+    sixths: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    with cython.nogil:
+        for row in range(index.shape[0]):
+            size: cython.Py_ssize_t = k
+            _axes(P, index[row], square[row], axes[row], variances, work)
+            bend: cython.double = variances[0] / max(variances[1], TINY)
+            for sixths in range(4, 1, -1):
+                fewer: cython.Py_ssize_t = 1 + (k - 1) * sixths // 6
+                if bend <= BENT or fewer < 8:
+                    break
+                _axes(P, index[row, :fewer], square[row, :fewer], trial, variances, work)
+                if variances[0] < FLATTER * bend * variances[1]:
+                    bend, size = variances[0] / variances[1], fewer
+                    axes[row, :, :] = trial
+            radius[row] = sqrt(square[row, size - 1])
+            for j in range(size, k):
+                index[row, j] = -1
+    return found, radii
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _weight(square: cython.const[cython.double][::1], j: cython.Py_ssize_t) -> cython.double:
+    return max(1.0 - square[j] / max(square[square.shape[0] - 1], TINY), LEAST_WEIGHT)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _axes(
+    P: cython.const[cython.double][:, ::1],
+    index: cython.const[cython.int][::1],
+    square: cython.const[cython.double][::1],
+    axes: cython.double[:, ::1],
+    variances: cython.double[::1],
+    work: cython.double[:, ::1],
+) -> cython.void:
+    """The axes and variances of one point; `work` (7, 3) holds the covariance, the eigenvectors and a mean."""
+    x: cython.int
+    y: cython.int
+    j: cython.Py_ssize_t
+    for x in range(7):
+        for y in range(3):
+            work[x, y] = 1.0 if x == y + 3 else 0.0
+    # In units of the radius: squares of tiny lengths would underflow.
+    scale: cython.double = 1.0 / max(sqrt(square[square.shape[0] - 1]), TINY)
+    total: cython.double = 0.0
+    for j in range(index.shape[0]):
+        weight: cython.double = _weight(square, j)
+        dx: cython.double = (P[index[j], 0] - P[index[0], 0]) * scale
+        dy: cython.double = (P[index[j], 1] - P[index[0], 1]) * scale
+        dz: cython.double = (P[index[j], 2] - P[index[0], 2]) * scale
+        total += weight
+        work[6, 0] += weight * dx
+        work[6, 1] += weight * dy
+        work[6, 2] += weight * dz
+        work[0, 0] += weight * dx * dx
+        work[0, 1] += weight * dx * dy
+        work[0, 2] += weight * dx * dz
+        work[1, 1] += weight * dy * dy
+        work[1, 2] += weight * dy * dz
+        work[2, 2] += weight * dz * dz
+    for x in range(3):
+        for y in range(x, 3):
+            work[x, y] = work[x, y] / total - (work[6, x] / total) * (work[6, y] / total)
+            work[y, x] = work[x, y]
+    for _sweep in range(30):
+        if not (_rotate(work, 0, 1) | _rotate(work, 0, 2) | _rotate(work, 1, 2)):
+            break
+    lowest: cython.int = 0 if work[0, 0] <= work[1, 1] else 1
+    highest: cython.int = 1 - lowest
+    if work[2, 2] < work[lowest, lowest]:
+        lowest = 2
+    elif work[2, 2] > work[highest, highest]:
+        highest = 2
+    # Of three numbers that add up to 3, the one in the middle.
+    middle: cython.int = 3 - lowest - highest
+    variances[0], variances[1], variances[2] = work[lowest, lowest], work[middle, middle], work[highest, highest]
+    for x in range(3):
+        axes[0, x], axes[1, x], axes[2, x] = work[3 + highest, x], work[3 + middle, x], work[3 + lowest, x]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _rotate(work: cython.double[:, ::1], p: cython.int, q: cython.int) -> cython.bint:
+    """One rotation of Jacobi's eigenvalue algorithm; False if entry (p, q) is zero already.
+
+    Rows 3 to 5 of `work` gather the eigenvectors.
+    """
+    entry: cython.double = work[p, q]
+    if fabs(entry) <= 1e-17 * (fabs(work[p, p]) + fabs(work[q, q])):
+        return False
+    half: cython.double = 0.5 * (work[q, q] - work[p, p]) / entry
+    tangent: cython.double = 1.0 / (fabs(half) + sqrt(half * half + 1.0))
+    if half < 0.0:
+        tangent = -tangent
+    cosine: cython.double = 1.0 / sqrt(tangent * tangent + 1.0)
+    sine: cython.double = tangent * cosine
+    r: cython.int = 3 - p - q
+    work[p, p] -= tangent * entry
+    work[q, q] += tangent * entry
+    work[p, q] = work[q, p] = 0.0
+    along: cython.double = work[r, p]
+    across: cython.double = work[r, q]
+    work[r, p] = work[p, r] = cosine * along - sine * across
+    work[r, q] = work[q, r] = sine * along + cosine * across
+    x: cython.int
+    for x in range(3):
+        along, across = work[3 + p, x], work[3 + q, x]
+        work[3 + p, x], work[3 + q, x] = cosine * along - sine * across, sine * along + cosine * across
+    return True
+
+
+def onto_quadrics(
+    P: cython.const[cython.double][:, ::1],
+    index: cython.const[cython.int][:, ::1],
+    square: cython.const[cython.double][:, ::1],
+    axes: cython.const[cython.double][:, :, ::1],
+):
+    """Points moved along their normals onto quadrics that are fitted to their neighbours.
+
+    Parameters
+    ----------
+    P, index, square
+        As for `principal_axes`.
+    axes : (b, 3, 3) float64
+        Tangents and normals.
+
+    Returns
+    -------
+    moved : (b, 3) float64
+        The new positions.
+    deviation : (b,) float64
+        Standard deviation of the neighbours from the quadric, in radii of the neighbourhood.
+    """
+    positions, deviations = np.empty((index.shape[0], 3)), np.empty(index.shape[0])
+    moved: cython.double[:, ::1] = positions
+    deviation: cython.double[::1] = deviations
+    local: cython.double[:, ::1] = np.empty((index.shape[1], 7))
+    system: cython.double[:, ::1] = np.empty((6, 7))
+    row: cython.Py_ssize_t
+    x: cython.int
+    with cython.nogil:
+        for row in range(index.shape[0]):
+            _terms(P, index[row], square[row], axes[row], local)
+            deviation[row] = _fit(local, square[row], system)
+            height: cython.double = system[0, 6] * sqrt(square[row, square.shape[1] - 1])
+            for x in range(3):
+                moved[row, x] = P[index[row, 0], x] + height * axes[row, 2, x]
+    return positions, deviations
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _terms(
+    P: cython.const[cython.double][:, ::1],
+    index: cython.const[cython.int][::1],
+    square: cython.const[cython.double][::1],
+    axes: cython.const[cython.double][:, ::1],
+    local: cython.double[:, ::1],
+) -> cython.void:
+    """The terms 1, x, y, xx, xy, yy of a quadric at each neighbour, in units of the radius, and the height z."""
+    scale: cython.double = 1.0 / max(sqrt(square[square.shape[0] - 1]), TINY)
+    j: cython.Py_ssize_t
+    for j in range(index.shape[0]):
+        dx: cython.double = (P[index[j], 0] - P[index[0], 0]) * scale
+        dy: cython.double = (P[index[j], 1] - P[index[0], 1]) * scale
+        dz: cython.double = (P[index[j], 2] - P[index[0], 2]) * scale
+        x: cython.double = dx * axes[0, 0] + dy * axes[0, 1] + dz * axes[0, 2]
+        y: cython.double = dx * axes[1, 0] + dy * axes[1, 1] + dz * axes[1, 2]
+        local[j, 0], local[j, 1], local[j, 2] = 1.0, x, y
+        local[j, 3], local[j, 4], local[j, 5] = x * x, x * y, y * y
+        local[j, 6] = dx * axes[2, 0] + dy * axes[2, 1] + dz * axes[2, 2]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _fit(
+    local: cython.double[:, ::1], square: cython.const[cython.double][::1], system: cython.double[:, ::1]
+) -> cython.double:
+    """Least squares by the normal equations: the coefficients in column 6 of `system` (6, 7); returns the deviation."""
+    j: cython.Py_ssize_t
+    a: cython.int
+    b: cython.int
+    c: cython.int
+    k: cython.Py_ssize_t = local.shape[0]
+    total: cython.double = 0.0
+    for a in range(6):
+        for b in range(a, 7):
+            system[a, b] = DIAGONAL * k if a == b else 0.0
+    for j in range(k):
+        weight: cython.double = _weight(square, j)
+        total += weight
+        for a in range(6):
+            for b in range(a, 7):
+                system[a, b] += weight * local[j, a] * local[j, b]
+    # Gaussian elimination; the matrix is symmetric and positive definite, so its upper half is enough.
+    for c in range(6):
+        for a in range(c + 1, 6):
+            factor: cython.double = system[c, a] / system[c, c]
+            for b in range(a, 7):
+                system[a, b] -= factor * system[c, b]
+    for c in range(5, -1, -1):
+        for b in range(c + 1, 6):
+            system[c, 6] -= system[c, b] * system[b, 6]
+        system[c, 6] /= system[c, c]
+    squares: cython.double = 0.0
+    for j in range(k):
+        off: cython.double = local[j, 6]
+        for a in range(6):
+            off -= system[a, 6] * local[j, a]
+        squares += _weight(square, j) * off * off
+    # Six coefficients take six degrees of freedom from the neighbours.
+    return sqrt(squares / (total * max(1.0 - 6.0 / (k - 1.0), 0.5)))
