@@ -7,12 +7,14 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from heat_igl.kernels.bends import bend_around
 from heat_igl.kernels.fronts import advance
 from heat_igl.kernels.sight import look_around
 from heat_igl.mesh import connectivity
 from heat_igl.operators import MetricSimplices
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.reflex_edges import reflex_edges
 from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = ["FrontSolver"]
@@ -47,6 +49,15 @@ class FrontSolver(UnfoldingSolver):
         self._V = np.empty((0, 3)) if simplices.V is None else np.ascontiguousarray(simplices.V)
 
     @cached_property
+    def _bends(self) -> tuple[AnyArray, FloatArray, FloatArray]:
+        """Edges around which ways bend (e, 2), their directions out of the body (e, 3), longest edges at vertices (n,)."""
+        edges, outward = reflex_edges(self._simplices.corners, self._V)
+        reach = np.zeros(self._simplices.n)
+        pairs, lengths = self._simplices.edges
+        np.maximum.at(reach, pairs.ravel(), np.repeat(lengths, 2))
+        return edges.astype(np.int32), outward, reach
+
+    @cached_property
     def _edge_graph(self) -> sp.csr_array:
         return connectivity.shortest_edge_graph(*self._simplices.edges, self._simplices.n)
 
@@ -69,17 +80,38 @@ class FrontSolver(UnfoldingSolver):
         label[vertices] = np.arange(len(vertices))
         mesh, of_vertices = (self._corners, self._first, self._incident), (distance, begin, label)
         is_stale = np.ones(n, np.uint8)
-        straight = len(self._V) > 0 and len(vertices) == 1
-        order = self._order(sources.vertices, straight)
-        # Straight lines as far as they go, then ways that bend; behind a bend, the source of another way may be seen.
-        for _ in range(2):
-            if len(self._V):
-                is_stale = look_around(order, *mesh, self._V, vertices, offset, *of_vertices)
-            if not is_stale.any():
-                break
-            if straight:
-                order = self._order(sources.vertices)
+        order = self._order(sources.vertices, straight=len(self._V) > 0 and len(vertices) == 1)
+        if len(self._V):
+            is_stale = self._follow_lines(order, vertices, offset, *of_vertices)
+        if is_stale.any():
+            order = self._order(sources.vertices)
             advance(order, *mesh, self._lengths, self._slowness, *of_vertices, is_stale, self._V, vertices)
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, [-1]])[label]
         return distance
+
+    def _follow_lines(
+        self,
+        order: AnyArray,
+        vertices: AnyArray,
+        offset: FloatArray,
+        distance: FloatArray,
+        begin: FloatArray,
+        label: AnyArray,
+    ) -> AnyArray:
+        """Lower distance to straight lines and to ways that bend around edges; returns what was not reached (n,)."""
+        mesh, of_vertices = (self._corners, self._first, self._incident, self._V), (distance, begin, label)
+        look_around(order, *mesh, vertices, offset, *of_vertices)
+        edges, outward, reach = self._bends
+        k=0
+        if len(edges):
+            rank = np.empty(self._simplices.n, np.int64)
+            rank[self._order(vertices)] = np.arange(self._simplices.n)
+            near = np.argsort(rank[edges].max(axis=1), kind="stable")
+            way = np.where(label >= 0, -1, -2).astype(np.int32)
+            k = bend_around(
+                edges[near], outward[near], *mesh, reach, vertices, offset, *of_vertices, way
+            )
+        import os
+        if os.environ.get("SAY"): print(len(edges), k, np.isinf(distance).sum())
+        return np.isinf(distance).astype(np.uint8)
