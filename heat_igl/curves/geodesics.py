@@ -13,9 +13,6 @@ from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["GeodesicPathSolver", "geodesic_path", "straighten"]
 
-# Straightened paths whose lengths differ by a smaller share are one path.
-_SAME_LENGTH = 1e-11
-
 
 def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
     """The locally shortest curve of the class of a curve.
@@ -191,16 +188,7 @@ class GeodesicPathSolver:
         """The geodesics between checked places (k,), each from one to the next."""
         # Each of the two ways may lead past a hill on the longer side.
         ways = (self._routes.legs(faces, barycentric, crosses=crosses) for crosses in (True, False))
-        return [self._shorter(*pair) for pair in zip(*ways, strict=True)]
-
-    def _shorter(self, one: Course, other: Course) -> Shortened:
-        """The shorter of the geodesics of two courses between the same places."""
-        plain = [self._shortener.shortest(course, tries_sides=False).length for course in (one, other)]
-        first = self._shortener.shortest(one)
-        if abs(plain[0] - plain[1]) <= _SAME_LENGTH * plain[0]:
-            return first
-        second = self._shortener.shortest(other)
-        return second if second.length < first.length else first
+        return [self._shortener.shorter(*pair) for pair in zip(*ways, strict=True)]
 
     @property
     def _routes(self) -> Router:

@@ -9,6 +9,7 @@ import numpy as np
 
 from heat_igl.curves.places import snapped
 from heat_igl.curves.tracing import surface
+from heat_igl.curves.words import crossing_letters
 from heat_igl.errors import SourceError
 from heat_igl.kernels import shortening
 from heat_igl.mesh import Mesh, SurfaceCurve
@@ -114,22 +115,38 @@ class Shortener:
         # the boundary. On edges of more than two faces there are more than two sides.
         sums[mesh.facets.vertices[mesh.facets.n_faces != 2]] = np.inf
         half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
-        self._kernel = kernel.Shortener(self.surface, half_turn, int(np.diff(self.surface.first_corner).max()))
+        most_corners = int(np.diff(self.surface.first_corner).max())
+        apexes = _apexes(triangle["length"])
+        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, crossing_letters(mesh), apexes)
 
-    def shortest(self, course: Course, *, is_closed: bool = False, tries_sides: bool = True) -> Shortened:
-        """The locally shortest curve of the class of a course: between the ends, or as a loop.
-
-        With `tries_sides`, vertices are passed on the other side where that makes the curve shorter.
-        """
+    def shortest(self, course: Course, *, is_closed: bool = False) -> Shortened:
+        """The locally shortest curve of the class of a course: between the ends, or as a loop."""
         faces, joins, ends = course
-        stuck, *found = self._kernel.shorten(faces, joins, ends, is_closed, tries_sides)
+        stuck, *found = self._kernel.shorten(faces, joins, ends, is_closed)
         if stuck >= 0:
             # A vertex alone joins two faces: the loop passes there in any case, so it is a path from there to there.
             vertex = joins[stuck, 2]
             faces, joins = np.roll(faces, -stuck - 1), np.roll(joins, -stuck - 1, axis=0)[:-1]
             at = (self.surface.triangle["vertex"][faces[[0, -1]]] == vertex).astype(float)
-            _, *found = self._kernel.shorten(faces, np.ascontiguousarray(joins), at, False, tries_sides)
+            _, *found = self._kernel.shorten(faces, np.ascontiguousarray(joins), at, False)
         return Shortened(*found)
+
+    def shorter(self, one: Course, other: Course) -> Shortened:
+        """The shorter of the locally shortest paths of two courses with the same first and last place."""
+        found = self._kernel.shorter(one.faces, one.joins, other.faces, other.joins, one.ends)
+        if found is None:
+            return min(self.shortest(one), self.shortest(other), key=lambda path: path.length)
+        return Shortened(*found[1:])
+
+
+def _apexes(length: FloatArray) -> FloatArray:
+    """The corner (3 m, 2) opposite each half-edge: its place along the edge and its height, both in edge lengths."""
+    a, b, c = (np.roll(length, -1, axis=1)), np.roll(length, -2, axis=1), length
+    # a is opposite the corner where the edge begins, so it runs from its end to the apex.
+    along = ((b - a) * (b + a) / c + c) / (2 * c)
+    half = (a + b + c) / 2
+    height = 2 * np.sqrt(np.maximum(half * (half - a) * (half - b) * (half - c), 0)) / c**2
+    return np.stack([along.ravel(), height.ravel()], axis=1)
 
 
 def as_curve(parts: Sequence[Shortened], *, is_closed: bool) -> SurfaceCurve:

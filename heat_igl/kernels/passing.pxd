@@ -24,23 +24,29 @@ cdef struct Choice:
     int vertex, first, last
 
 
+cdef class Saved:
+    cdef Strip strip
+    cdef int face
+    cdef Place start
+
+    cdef int save(self, Course course) except -1 nogil
+    cdef int restore(self, Course course) except -1 nogil
+
+
 cdef class Passing:
     cdef Course course
-    cdef Strip kept
+    cdef Saved kept
     cdef const double[::1] half_turn
     cdef Choice[::1] choice
     cdef int count
     cdef int[::1] tried
     cdef int n_tried
     cdef double largest_loss
-    cdef int face
-    cdef Place start
 
     cdef int propose(self) except -1 nogil
     cdef int note(self, int j, int side, double saved) except -1 nogil
     cdef bint is_tried(self, int v) noexcept nogil
     cdef int lead(self, int i) except -1 nogil
-    cdef int restore(self) except -1 nogil
 
 
 cdef int copy(Strip this, Strip there) except -1 nogil

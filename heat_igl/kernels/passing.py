@@ -12,9 +12,34 @@ from cython.cimports.heat_igl.kernels.straightening import Course
 from cython.cimports.heat_igl.kernels.strips import Sides, Strip
 from cython.cimports.libc.math import INFINITY, acos, cos, sqrt
 
-__all__ = ["Passing"]
+__all__ = ["Passing", "Saved"]
 
 _CHOICE = np.dtype([("saved", "f8"), ("vertex", "i4"), ("first", "i4"), ("last", "i4")], align=True)
+
+
+@cython.final
+@cython.cclass
+class Saved:
+    """The strip of a course and where it starts, to go back to."""
+
+    def __init__(self):
+        self.strip = Strip()
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def save(self, course: Course) -> cython.int:
+        """Save a course as it is now."""
+        self.face, self.start = course.face, course.start
+        return copy(course.strip, self.strip)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def restore(self, course: Course) -> cython.int:
+        """Make a course what was saved."""
+        course.face, course.start = self.face, self.start
+        return copy(self.strip, course.strip)
 
 
 @cython.final
@@ -27,7 +52,7 @@ class Passing:
 
     def __init__(self, course: Course, half_turn):
         self.course, self.half_turn = course, half_turn
-        self.kept, self.choice = Strip(), np.empty(MOST_CHOICES, _CHOICE)
+        self.kept, self.choice = Saved(), np.empty(MOST_CHOICES, _CHOICE)
         self.tried = np.empty(MOST_TRIED, np.int32)
 
     @cython.cfunc
@@ -38,8 +63,8 @@ class Passing:
 
         Laid flat, a path around one vertex is shorter on the other side if it spans more than half of the angles there.
         """
-        copy(self.course.strip, self.kept)
-        self.face, self.start, self.count = self.course.face, self.course.start, 0
+        self.kept.save(self.course)
+        self.count = 0
         i: cython.int
         j: cython.int
         side: cython.int
@@ -115,8 +140,8 @@ class Passing:
         choice: Choice = self.choice[i]
         self.tried[self.n_tried] = choice.vertex
         self.n_tried += 1
-        h: cython.int = self.kept.crossing[choice.first].leave
-        g: cython.int = self.kept.crossing[choice.last].enter
+        h: cython.int = self.kept.strip.crossing[choice.first].leave
+        g: cython.int = self.kept.strip.crossing[choice.last].enter
         if h // 3 == g // 3:
             return 0
         before: Sides
@@ -127,24 +152,15 @@ class Passing:
         )
         if count < 0:
             return 0
-        self.course.face, self.course.start, self.course.strip.count = self.face, self.start, 0
+        self.course.face, self.course.start, self.course.strip.count = self.kept.face, self.kept.start, 0
         j: cython.int
         for j in range(choice.first):
-            self.course.strip.push(self.kept.crossing[j].leave, self.kept.crossing[j].enter)
+            self.course.strip.push(self.kept.strip.crossing[j].leave, self.kept.strip.crossing[j].enter)
         for j in range(count):
             self.course.strip.push(self.course.detour.way[j].leave, self.course.detour.way[j].enter)
-        for j in range(choice.last + 1, self.kept.count):
-            self.course.strip.push(self.kept.crossing[j].leave, self.kept.crossing[j].enter)
+        for j in range(choice.last + 1, self.kept.strip.count):
+            self.course.strip.push(self.kept.strip.crossing[j].leave, self.kept.strip.crossing[j].enter)
         return 1
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
-    def restore(self) -> cython.int:
-        """Go back to the strip that was kept."""
-        copy(self.kept, self.course.strip)
-        self.course.face, self.course.start = self.face, self.start
-        return 0
 
 
 @cython.cfunc

@@ -7,11 +7,12 @@ with every such step unless the loop is locally shortest at the base too.
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.passing import LARGEST_LOSS, Passing, copy
-from cython.cimports.heat_igl.kernels.shortening import BOTH_WAYS, GAIN, MOST_BASES
+from cython.cimports.heat_igl.kernels.fans import Fan
+from cython.cimports.heat_igl.kernels.passing import LARGEST_LOSS, Passing, Saved, copy
+from cython.cimports.heat_igl.kernels.shortening import BOTH_WAYS, GAIN, MOST_BASES, SAME_LENGTH
 from cython.cimports.heat_igl.kernels.straightening import Course
-from cython.cimports.heat_igl.kernels.surfaces import SNAP, Place, Surface, at_corner, corner_of, only_corner, side_of
-from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.heat_igl.kernels.surfaces import SNAP, Place, Surface, corner_of, only_corner, side_of
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 __all__ = ["Shortener"]
 
@@ -23,13 +24,18 @@ class Shortener:
 
     course: Course
     passing: Passing
-    tries_sides: cython.bint
+    fan: Fan
+    one: Saved
+    two: Saved
+    n_parts: cython.int  # of a path that vertices alone hold together; all but the last are done
     length: cython.double
     end: Place  # where the curve ends in the last face; for a loop, the start there
 
-    def __init__(self, surface, half_turn, most_corners):
+    def __init__(self, surface, half_turn, most_corners, letter, apex):
         self.course = Course(Surface(surface, np.empty(0)), most_corners)
         self.passing = Passing(self.course, half_turn)
+        self.fan = Fan(self.course, len(half_turn), letter, apex)
+        self.one, self.two = Saved(), Saved()
 
     def shorten(
         self,
@@ -37,22 +43,67 @@ class Shortener:
         join: cython.const[cython.int][:, ::1],
         ends: cython.const[cython.double][:, ::1],
         is_closed: cython.bint,
-        tries_sides: cython.bint,
     ):
         """The shortest curve of a class: its length, faces, and the ends of its segments.
 
-        With `tries_sides`, vertices are passed on the other side where that makes the curve shorter. First comes -1, or
-        the number of the join at which only a vertex holds a loop together; then there is no curve.
+        First comes -1, or the number of the join at which only a vertex holds a loop together; then there is no curve.
         """
         stuck: cython.int
-        self.course.n_segments = 0
-        self.length = 0.0
-        self.tries_sides = tries_sides
         # A loop is straightened from many bases.
         self.passing.largest_loss = 0.0 if is_closed else LARGEST_LOSS
         with cython.nogil:
             stuck = self.follow(face, join, ends, is_closed)
+            if stuck < 0:
+                self.length += self.tighten() if is_closed else self.shortcut(self.pass_better(self.settle()))
+                self.course.emit(cython.address(self.end))
         return stuck, self.length, *self.course.segments()
+
+    def shorter(
+        self,
+        face: cython.const[cython.int][::1],
+        join: cython.const[cython.int][:, ::1],
+        other_face: cython.const[cython.int][::1],
+        other_join: cython.const[cython.int][:, ::1],
+        ends: cython.const[cython.double][:, ::1],
+    ):
+        """The shorter of the shortest paths of two courses with the same ends, as `shorten` returns it.
+
+        None if vertices alone hold one of them together.
+        """
+        self.passing.largest_loss = LARGEST_LOSS
+        with cython.nogil:
+            self.follow(face, join, ends, False)
+            plain: cython.double = self.settle()
+            is_split: cython.bint = self.n_parts > 1
+            self.one.save(self.course)
+            end: Place = self.end
+            self.follow(other_face, other_join, ends, False)
+            if not is_split and self.n_parts == 1:
+                self.length = self.shortcut(self.choose(plain, end, self.settle()))
+                self.course.emit(cython.address(self.end))
+            else:
+                is_split = True
+        return None if is_split else (-1, self.length, *self.course.segments())
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def choose(self, plain: cython.double, end: Place, length: cython.double) -> cython.double:
+        """Lead a settled path past better sides, and so the one that was saved, if it is another; keep the shorter."""
+        is_same: cython.bint = fabs(plain - length) <= SAME_LENGTH * plain
+        length = self.pass_better(length)
+        if is_same:
+            return length
+        self.two.save(self.course)
+        other_end: Place = self.end
+        self.one.restore(self.course)
+        self.end = end
+        plain = self.pass_better(self.settle())
+        if plain <= length:
+            return plain
+        self.two.restore(self.course)
+        self.end = other_end
+        return self.settle()
 
     @cython.cfunc
     @cython.nogil
@@ -64,10 +115,12 @@ class Shortener:
         ends: cython.const[cython.double][:, ::1],
         is_closed: cython.bint,
     ) -> cython.int:
-        """Append the segments of the shortened curve; -1, or the join at which a loop is stuck."""
+        """Make the strip of a course; -1, or the join at which a loop is stuck."""
         x: Place
         c: cython.int
         i: cython.int
+        self.course.n_segments = 0
+        self.length, self.n_parts = 0.0, 1
         for c in range(3):
             x.c[c], self.end.c[c] = ends[0, c], ends[1, c]
         self.course.begin(face[0], self.vertex_at(face[0], cython.address(x)), cython.address(x))
@@ -82,60 +135,64 @@ class Shortener:
                     return i
                 self.length += self.course.straighten(v, cython.NULL)
                 self.course.begin(f, v, cython.address(x))
-        if is_closed:
-            self.length = self.tighten()
-        else:
-            i = self.course.n_segments
-            self.length += self.pass_better(i, self.straighten_to_end())
+                self.n_parts += 1
         return -1
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def straighten_to_end(self) -> cython.double:
-        """Straighten the path to `end`, and append it; returns its length."""
+    def settle(self) -> cython.double:
+        """Lead the strip until the path to `end` is locally shortest; returns the length."""
         v: cython.int = self.vertex_at(self.course.last_face(), cython.address(self.end))
-        length: cython.double
-        if v >= 0:
-            length = self.course.straighten(v, cython.NULL)
-            self.end = at_corner(corner_of(self.course.s, self.course.last_face(), v))
-            return length
         ends: Place[2]
         ends[0] = ends[1] = self.end
-        length = self.course.straighten(-1, ends)
-        self.end = ends[0]
-        return length
+        return self.course.settle(v, ends, cython.address(self.end))
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def pass_better(self, first: cython.int, length: cython.double) -> cython.double:
-        """Lead a straightened path of this length past vertices on the other side as long as that makes it shorter.
-
-        Its segments begin with `first`. Returns the length.
-        """
+    def pass_better(self, length: cython.double) -> cython.double:
+        """Lead a settled path of this length past vertices on the other side while that makes it shorter; the length."""
         i: cython.int
         self.passing.n_tried = 0
         is_better: cython.bint = True
-        while is_better and self.tries_sides and self.passing.propose() > 0:
+        while is_better and self.passing.propose() > 0:
             end: Place = self.end
             is_better = False
             for i in range(self.passing.count):
                 if not self.passing.lead(i):
                     continue
                 self.end = end
-                self.course.n_segments = first
-                trial: cython.double = self.straighten_to_end()
+                trial: cython.double = self.settle()
                 if trial < length * (1.0 - GAIN):
                     length = trial
                     is_better = True
                     break
             if not is_better:
-                self.passing.restore()
+                self.passing.kept.restore(self.course)
                 self.end = end
-                self.course.n_segments = first
-                self.straighten_to_end()
+                self.settle()
         return length
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def shortcut(self, length: cython.double) -> cython.double:
+        """Take shortcuts along straight lines, and better sides from there, while there are any; returns the length."""
+        i: cython.int = 0
+        while True:
+            end: Place = self.end
+            i = self.fan.shorten(i, cython.address(self.end))
+            if i < 0:
+                return length
+            trial: cython.double = self.settle()
+            if trial < length * (1.0 - GAIN):
+                length = self.pass_better(trial)
+            else:
+                self.fan.kept.restore(self.course)
+                self.end = end
+                self.settle()
+                i += 1
 
     @cython.cfunc
     @cython.nogil
@@ -149,25 +206,25 @@ class Shortener:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def tighten(self) -> cython.double:
-        """Append the shortest loop of the class of one that begins and ends in the first face; returns its length."""
-        first: cython.int = self.course.n_segments
+        """Lead the strip to the shortest loop of the class of one that begins and ends in the first face; returns its length."""
         shortest: cython.double = INFINITY
         n_stalled: cython.int = 0
         length: cython.double = 0.0
         for _ in range(MOST_BASES):
-            self.course.n_segments = first
-            length = self.straighten_to_end()
+            length = self.settle()
             if self.slide(length):
-                self.course.n_segments = first
-                length = self.straighten_to_end()
+                length = self.settle()
             if not length < shortest * (1.0 - GAIN):
-                length = self.pass_better(first, length)
+                length = self.pass_better(length)
             # One more base shows whether the loop is straight at the one before.
             n_stalled = 0 if length < shortest * (1.0 - GAIN) else n_stalled + 1
+            if n_stalled == BOTH_WAYS:
+                length = self.shortcut(length)
+                if not length < shortest * (1.0 - GAIN):
+                    break
+                n_stalled = 0
             shortest = min(shortest, length)
-            if n_stalled == BOTH_WAYS or self.course.strip.count == 0:
-                break
-            if not self.move_base():
+            if self.course.strip.count == 0 or not self.move_base():
                 break
         return length
 
@@ -285,10 +342,10 @@ class Shortener:
     def turn_ring(self, at: cython.int) -> cython.int:
         """Make the strip begin after the crossing `at` and end before it."""
         j: cython.int
-        copy(self.course.strip, self.passing.kept)
+        copy(self.course.strip, self.one.strip)
         self.course.strip.count = 0
-        for j in range(at + 1, self.passing.kept.count):
-            self.course.strip.push(self.passing.kept.crossing[j].leave, self.passing.kept.crossing[j].enter)
+        for j in range(at + 1, self.one.strip.count):
+            self.course.strip.push(self.one.strip.crossing[j].leave, self.one.strip.crossing[j].enter)
         for j in range(at):
-            self.course.strip.push(self.passing.kept.crossing[j].leave, self.passing.kept.crossing[j].enter)
+            self.course.strip.push(self.one.strip.crossing[j].leave, self.one.strip.crossing[j].enter)
         return 0

@@ -74,13 +74,24 @@ class Course:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def straighten(self, end_vertex: cython.int, ends_on: cython.pointer[Place]) -> cython.double:
-        """Append the segments of a locally shortest path through the strip; returns the length.
+        """Append the segments of a locally shortest path through the strip; returns the length. See `settle`."""
+        end: Place
+        length: cython.double = self.settle(end_vertex, ends_on, cython.address(end))
+        self.emit(cython.address(end))
+        return length
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def settle(
+        self, end_vertex: cython.int, ends_on: cython.pointer[Place], end: cython.pointer[Place]
+    ) -> cython.double:
+        """Lead the strip until the shortest path in it is locally shortest; returns the length, and `end` where it ends.
 
         It ends at `end_vertex`, or, if that is -1, at the nearest point of the segment between two places `ends_on` in
         the last face, which move with the end of the strip into the face before.
         """
         c: cython.int
-        end: Place
         slides: cython.bint = False
         if end_vertex < 0:
             for c in range(3):
@@ -89,15 +100,14 @@ class Course:
         shortest: cython.double = INFINITY
         failures: cython.int = 0
         while True:
-            self._trim(end_vertex, cython.address(end), ends_on)
-            self._pull(cython.address(end), ends_on, slides)
+            self._trim(end_vertex, end, ends_on)
+            self._pull(end, ends_on, slides)
             length: cython.double = self.layout.length()
             # Rounding can make two ways around a vertex look shorter than one another.
             failures = 0 if length < shortest * (1.0 - 1e-13) else failures + 1
             shortest = min(shortest, length)
             if failures > 3 or not self._repair():
                 break
-        self._emit(cython.address(end))
         return length
 
     @cython.cfunc
@@ -227,7 +237,7 @@ class Course:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def _emit(self, end: cython.pointer[cython.const[Place]]) -> cython.int:
+    def emit(self, end: cython.pointer[cython.const[Place]]) -> cython.int:
         """Append the segments of the path through the strip, without those of no length."""
         k: cython.int = self.strip.count
         if self.n_segments + k + 1 > self.segment.shape[0]:
