@@ -37,7 +37,7 @@ class PoissonProblem:
         free = operators.referenced.copy()
         # The first vertex of every component; components without faces are not free anyway.
         free[np.unique(operators.components, return_index=True)[1]] = False
-        # Here, and only here, the sign changes: L is negative semidefinite, and what is factored must be positive definite.
+        # Here, and only here, the sign changes: L is negative semidefinite, factors need a positive definite matrix.
         matrix = shifted(operators.L, -1.0, np.zeros(operators.n))
         if analysis is None or not analysis.fits(matrix):
             analysis = analyse(matrix, backend)
