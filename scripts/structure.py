@@ -9,8 +9,9 @@ functions too; imports under ``if TYPE_CHECKING`` are listed apart. A room stand
 else one above the highest that it imports. A *back-arrow* leads from a room to one that follows it in the table of
 ARCHITECTURE.md: no other list of the order exists, tests/test_architecture.py checks the imports against it, and its
 sentences are the first ones of the rooms' docstrings. A *body* is what a function does, without its docstring, comments
-and blank lines. A *repeated passage* is a run of six or more lines that stands in two places, in the package, the tests
-or the scripts; white space, comments, imports, blank lines and lines of brackets alone do not count.
+and blank lines; those of compiled loops are counted apart. A *repeated passage* is a run of six or more lines that
+stands in two places, in the package, the tests or the scripts; white space, comments, imports, blank lines and lines of
+brackets alone do not count.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import combinations, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csgraph
@@ -41,6 +42,7 @@ BOUNDS = {
     "rooms, heat_igl/__init__.py and scripts": 25,
     "arrows, theirs and those for types too": 160,
     "longest bodies": 60,
+    "longest bodies of kernels": 80,
     "longest classes": 300,
     "repeated passages": 10,
 }
@@ -218,25 +220,34 @@ def _docstring_lines(tree: ast.AST) -> set[int]:
     return found
 
 
-def lengths(package: Path) -> tuple[list[Length], list[Length]]:
-    """Bodies of functions outside kernels, and classes, the longest first."""
-    bodies, classes = [], []
+class Lengths(NamedTuple):
+    """Bodies of functions, those in kernels, which cannot be parted freely, apart; and classes; the longest first."""
+
+    bodies: list[Length]
+    kernels: list[Length]
+    classes: list[Length]
+
+
+def lengths(package: Path) -> Lengths:
+    """The lengths of all functions and classes."""
+    found = Lengths([], [], [])
     for path in sorted(package.rglob("*.py")):
         text = path.read_text(encoding="utf8")
         tree = ast.parse(text)
         is_code, skipped = _code_lines(text), _docstring_lines(tree)
         place = str(path.relative_to(package.parent))
+        bodies = found.kernels if "kernels" in path.parts else found.bodies
         for node in ast.walk(tree):
             if not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
                 continue
             is_class = isinstance(node, ast.ClassDef)
-            if not is_class and "kernels" in path.parts:  # a compiled loop cannot be parted freely
-                continue
             first = node.lineno if is_class else node.body[0].lineno
             span = range(first, (node.end_lineno or first) + 1)
             n = sum(is_code[line - 1] and line not in skipped for line in span)
-            (classes if is_class else bodies).append(Length(place, node.lineno, node.name, n))
-    return sorted(bodies, key=lambda each: -each.lines), sorted(classes, key=lambda each: -each.lines)
+            (found.classes if is_class else bodies).append(Length(place, node.lineno, node.name, n))
+    for each in found:
+        each.sort(key=lambda length: -length.lines)
+    return found
 
 
 # Repeated passages.
@@ -321,7 +332,12 @@ def measured(root: Path, most: int) -> dict[str, Any]:
     real, for_types = arrows(package)
     outside = [[package / "__init__.py"], sorted((root / "scripts").glob("*.py"))]
     around = [set().union(*_visited(paths, list(real), package).values()) for paths in outside]
-    bodies, classes = lengths(package)
+    longest = {
+        name: [asdict(each) for each in found[:most]]
+        for name, found in zip(
+            ("longest bodies", "longest bodies of kernels", "longest classes"), lengths(package), strict=True
+        )
+    }
     passages = repeated(source_texts(root))
     return {
         "rooms": sentences(package),
@@ -330,16 +346,14 @@ def measured(root: Path, most: int) -> dict[str, Any]:
         "floors": floors(real),
         "back-arrows": back_arrows(real, order),
         "circles": circles(real),
-        "longest bodies": [asdict(each) for each in bodies[:most]],
-        "longest classes": [asdict(each) for each in classes[:most]],
+        **longest,
         "repeated passages": [asdict(each) for each in passages],
         "counts": {
             "rooms": len(real),
             "arrows": sum(map(len, real.values())),
             "back-arrows": len(back_arrows(real, order)),
             "circles": len(circles(real)),
-            "longest bodies": bodies[0].lines,
-            "longest classes": classes[0].lines,
+            **{name: found[0]["lines"] if found else 0 for name, found in longest.items()},
             "repeated passages": len(passages),
             "rooms, heat_igl/__init__.py and scripts": len(real) + len(around),
             "arrows, theirs and those for types too": sum(map(len, [*real.values(), *for_types.values(), *around])),
@@ -361,9 +375,9 @@ def markdown(result: Mapping[str, Any], most: int) -> str:
     for title, name in (("Arrows against the order", "back-arrows"), ("Circles", "circles")):
         if result[name]:
             parts.append([f"{title}:", "", *(f"- {' '.join(each)}" for each in result[name])])
-    for title, name in (("Longest bodies", "longest bodies"), ("Longest classes", "longest classes")):
+    for name in ("longest bodies", "longest bodies of kernels", "longest classes"):
         rows = [(f"{each['path']}:{each['line']}", each["name"], str(each["lines"])) for each in result[name]]
-        parts.append([f"{title}:", "", *table(["place", "name", "lines"], rows, (0, 1))])
+        parts.append([f"{name.capitalize()}:", "", *table(["place", "name", "lines"], rows, (0, 1))])
     rows = [(each["first"], each["second"], str(each["lines"])) for each in result["repeated passages"][:most]]
     parts.append(["Repeated passages:", "", *table(["place", "the same", "lines"], rows, (0, 1))])
     return "\n\n".join("\n".join(lines) for lines in parts)

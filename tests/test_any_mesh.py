@@ -13,7 +13,7 @@ import pytest
 import scipy.sparse as sp
 
 import heat_igl
-from heat_igl import Mesh, plots, reference, shapes
+from heat_igl import Mesh, applications, plots, reference, shapes
 from heat_igl.validation import metrics
 
 MESH = shapes.torus(16, 10)
@@ -85,6 +85,7 @@ CALLS: dict[str, Call] = {
     "plots.plot_labels": lambda mesh: plots.plot_labels(mesh, LABELS),
     "plots.write_html": lambda mesh: written(lambda path: plots.write_html(path, mesh, PHI), "a.html"),
     "plots.write_line_drawing": lambda mesh: written(lambda path: plots.write_line_drawing(path, mesh, LOOPS), "a.svg"),
+    "applications.EdgeSearch": lambda mesh: applications.EdgeSearch(mesh).path(0, 40).vertices,
     "reference.edge_paths": lambda mesh: reference.edge_paths(mesh, 0),
     "reference.exact": lambda mesh: reference.exact(mesh, 0),
     "reference.straight_lines": lambda mesh: reference.straight_lines(mesh, 0),
@@ -139,6 +140,7 @@ def test_every_function_with_a_mesh_is_called() -> None:
     found = public(heat_igl) | {f"plots.{name}" for name in public(plots)}
     found |= {f"reference.{name}" for name in public(reference) - IN_PROCESSES}
     found |= {f"metrics.{name}" for name in public(metrics)}
+    found |= {f"applications.{name}" for name in public(applications)}
     assert found <= set(CALLS)
 
 

@@ -219,6 +219,9 @@ def test_heat_that_is_not_positive_is_reported():
     domain = operators(Mesh(V, [[0, 1, 2], [0, 3, 1], [1, 4, 2]]), "cotan")
     with pytest.warns(AccuracyWarning, match="no positive heat arrives at"):
         distance = baselines.varadhan(domain, 0, t=1.0)
+    with pytest.warns(AccuracyWarning, match="no positive heat arrives at") as caught:
+        baselines.log_heat_kernel(domain, 0, 0.01)
+    assert caught[0].filename == __file__
     assert np.isfinite(distance).all()
     assert (distance >= 0).all()
 

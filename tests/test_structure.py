@@ -61,7 +61,7 @@ def test_the_table_of_rooms_keeps_its_order_and_takes_first_sentences(tmp_path: 
     assert structure.table_order(f"| `x` | y |\n<!-- rooms -->\n{text}\n<!-- /rooms -->\n") == ["high", "low", "other"]
 
 
-def test_lengths_count_code_and_leave_kernels_out(tmp_path: Path) -> None:
+def test_lengths_count_code_and_keep_kernels_apart(tmp_path: Path) -> None:
     made = package(
         tmp_path,
         low='''
@@ -85,8 +85,9 @@ class Box:
 ''',
         kernels____init__="def compiled():\n    return 1\n",
     )
-    bodies, classes = structure.lengths(made)
+    bodies, kernels, classes = structure.lengths(made)
     assert [(each.name, each.lines) for each in bodies] == [("open", 4)]
+    assert [(each.name, each.lines) for each in kernels] == [("compiled", 1)]
     assert [(each.name, each.lines) for each in classes] == [("Box", 7)]
 
 

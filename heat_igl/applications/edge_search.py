@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import SourceError
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = ["EdgePath", "EdgeSearch"]
@@ -50,8 +50,8 @@ class EdgeSearch:
 
     Parameters
     ----------
-    mesh : Mesh
-        Triangles or tetrahedra, n vertices.
+    mesh : mesh
+        Whatever `as_mesh` takes; n vertices.
     landmark_distances : (k, n) array_like, optional
         Distances from k landmarks, one row each, as returned by ``solver.distances(landmarks)``. Distances along edges
         give the best bounds. Without landmarks the search is Dijkstra's algorithm.
@@ -79,7 +79,8 @@ class EdgeSearch:
     (True, True)
     """
 
-    def __init__(self, mesh: Mesh, landmark_distances: ArrayLike | None = None) -> None:
+    def __init__(self, mesh: MeshLike, landmark_distances: ArrayLike | None = None) -> None:
+        mesh = as_simplices(mesh)
         n = mesh.n_vertices
         a, b = mesh.edges.T
         graph = sp.csr_array(

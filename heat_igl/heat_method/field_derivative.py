@@ -67,7 +67,7 @@ class FieldDerivative:
         imposed: IntArray,
         known: FloatArray,
     ) -> None:
-        self._parts, self._elements, self._u, self._phi = parts, parts.elements, u, phi
+        self._parts, self._elements, self._u, self._phi = parts, parts.slopes.elements, u, phi
         self._F = F = surface.triangulation.F
         self._imposed, self._known = imposed, known
         # Faces with a cold corner follow the gradient of the heat itself, and are not damped.
@@ -78,7 +78,7 @@ class FieldDerivative:
         is_plain[imposed] = is_log[imposed] = False
         self._plain = np.flatnonzero(is_plain)
         #: The rate that the field is compared with; negative on faces of another kind.
-        self._rate_of_log = np.where(is_log, parts.full_rate, -1.0)
+        self._rate_of_log = np.where(is_log, parts.slopes.full_rate, -1.0)
         self._log_u = np.log(u, out=np.zeros_like(u), where=u > 0)
 
     def pull_back(self, p: FloatArray) -> FieldSlopes:

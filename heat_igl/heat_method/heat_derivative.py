@@ -60,7 +60,8 @@ class HeatDerivative:
             raise ValueError("the heat method is differentiated on triangles")
         self.triangulation: IntrinsicTriangulation = surface.triangulation
         _check(parts, sources, self.triangulation)
-        self._poisson, self._parts, self._domain, self._elements = last_steps.poisson, parts, domain, parts.elements
+        self._poisson, self._parts, self._domain = last_steps.poisson, parts, domain
+        self._elements = parts.slopes.elements
         self._term = term = drop_overtaken(parts.assembler.term(sources), parts.heat_flow, domain.n)
         self._flow = FlowDerivative(parts.heat_flow, domain, right_hand_side(domain.n, [term])[:, 0])
         heat = self._flow.u[:, None]
@@ -102,7 +103,7 @@ class HeatDerivative:
         if by_h.any():
             # In the memory of an array that is read no more.
             by_side += np.multiply(
-                self._domain.expand_to_faces(by_h)[:, None], parts.mean_length_slopes, out=field.by_weight
+                self._domain.expand_to_faces(by_h)[:, None], parts.slopes.mean_length, out=field.by_weight
             )
         by_place = self._by_place(by_vertex, levels)
         return Change(by_side, by_place, given.by_side, float(by_t.sum()), given.by_place)
@@ -114,7 +115,7 @@ class HeatDerivative:
             raise ValueError("known distances change with the sides of the faces before any flip")
         elements = self._elements.push_forward(by_side)
         of_face = domain.components[self.triangulation.F[:, 0]]
-        of_h = np.bincount(of_face, (parts.mean_length_slopes * by_side).sum(axis=1), domain.n_components)
+        of_h = np.bincount(of_face, (parts.slopes.mean_length * by_side).sum(axis=1), domain.n_components)
         by_t = self._steps_by_h * of_h
         flow = self._flow_change(elements, change, by_t)
         initial = np.asarray(np.bincount(flow.vertex, flow.initial, domain.n), np.float64)
@@ -132,14 +133,14 @@ class HeatDerivative:
         pairs = [column for pair in zip(matrix.x, matrix.u, strict=True) for column in pair]
         of_vertex = np.stack([matrix.diagonal, by_mass, *pairs], axis=1)
         kernels.elements(
-            self.triangulation.F, e.l, e.weight, e.area, e.share, of_vertex, self._parts.flow_slopes,
+            self.triangulation.F, e.l, e.weight, e.area, e.share, of_vertex, self._parts.slopes.flow,
             self._domain.components, by_weight, by_area, by_side, by_t,
         )  # fmt: skip
 
     def _flow_change(self, elements: ElementChange, change: SideChange, by_t: FloatArray) -> FlowChange:
         """How the matrix of the heat flow and the initial heat change."""
         e, n, term, parts = self._elements, self._domain.n, self._term, self._parts
-        of_weight, of_length, of_t = parts.flow_slopes
+        of_weight, of_length, of_t = parts.slopes.flow
         entry = of_weight * elements.weight + of_length * change.by_side
         entry += of_t * self._domain.expand_to_faces(by_t)[:, None]
         F = self.triangulation.F

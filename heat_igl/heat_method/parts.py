@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.heat_method.checking import Checker
+from heat_igl.heat_method.element_slopes import ElementSlopes
 from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.solution import Diagnostics
@@ -21,7 +22,6 @@ from heat_igl.heat_method.time_step import time_step, warn_of_large_step
 from heat_igl.linear import Analysis
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
 from heat_igl.operators import (
-    Elements,
     Operators,
     operators,
     point_cloud_operators,
@@ -31,8 +31,6 @@ from heat_igl.operators import (
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
-from heat_igl.steps.fitted import fit, fit_slope
-from heat_igl.steps.normalization import lowest_full_rate
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import FrontSolver, UnfoldingSolver
 
@@ -101,52 +99,9 @@ class SolverParts:
         return HeatFlow(self.operators, self.time_steps, options.boundary, options.backend, self.analysis, self.fitted)
 
     @cached_property
-    def elements(self) -> Elements:
-        """The triangles that are solved on, to differentiate by their sides."""
-        return Elements(self.operators)
-
-    @cached_property
-    def flow_slopes(self) -> FloatArray:
-        """How the entry t L of each side changes (3, m, 3): with its weight, its length and the time step.
-
-        In a fitted L there is one entry for all sides between the same two vertices: the sum of their weights, not
-        below 0, times the factor of the shortest.
-        """
-        elements = self.elements
-        t = self.operators.expand_to_faces(self.time_steps)[:, None]
-        if not self.fitted:
-            return np.stack([t + np.zeros_like(elements.l), np.zeros_like(elements.l), elements.weight])
-        pair, first = elements.pairs
-        t_of_pair = t[first // 3, 0]
-        x = elements.l.ravel()[first] / np.sqrt(t_of_pair)
-        weight, factor = np.maximum(np.bincount(pair, elements.weight.ravel()), 0.0), fit(x)
-        by_x = weight * fit_slope(x)
-        slopes = np.zeros((3, elements.l.size))
-        slopes[0] = np.where(weight > 0, t_of_pair * factor, 0.0)[pair]
-        slopes[1, first] = by_x * np.sqrt(t_of_pair)
-        slopes[2, first] = weight * factor - by_x * x / 2
-        return slopes.reshape(3, -1, 3)
-
-    @cached_property
-    def full_rate(self) -> FloatArray:
-        """The rate (m,) of `lowest_full_rate`; 0 for a field of length 1."""
-        if self.t_damping is None:
-            return np.zeros(len(self.elements.area))
-        return lowest_full_rate(self.operators, self.t_damping, self.fitted)
-
-    @cached_property
-    def mean_length_slopes(self) -> FloatArray:
-        """The derivative (m, 3) of the mean edge length of each component by the sides."""
-        domain, elements = self.operators, self.elements
-        edges = elements.edges
-        mean = elements.l.ravel()[edges].mean()
-        if domain.n_components == 1 and not np.isclose(mean, domain.mean_edge_length, rtol=1e-12):
-            # On the mesh's own faces an edge of more than two faces counts once.
-            edges = elements.pairs[1]
-        component = domain.components[elements.i.ravel()[edges]]
-        slopes = np.zeros(elements.l.size)
-        slopes[edges] = 1 / np.bincount(component, minlength=domain.n_components)[component]
-        return slopes.reshape(-1, 3)
+    def slopes(self) -> ElementSlopes:
+        """The derivatives of what is made of the triangles."""
+        return ElementSlopes(self.operators, self.time_steps, self.t_damping, self.fitted)
 
     @property
     def given_faces(self) -> IntArray | None:

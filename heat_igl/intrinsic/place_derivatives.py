@@ -13,7 +13,7 @@ import numpy as np
 
 from heat_igl.intrinsic.history import Covered, Flipped, Merged, Refined, Turned
 from heat_igl.intrinsic.layout import apex
-from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, sides_from
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["PlaceSlopes", "carry_place", "carry_place_back"]
@@ -124,9 +124,9 @@ class _Layout:
         of_ab_p, of_pa, of_bp = _apex_slopes((self.ab, self.pa, self.bp), at_p, self.by_p * x, self.by_p * y)
         of_ab_q, of_aq, of_qb = _apex_slopes((self.ab, self.aq, self.qb), at_q, self.by_q * x, -self.by_q * y)
         of_ab = self.by_b * x + of_ab_p + of_ab_q
-        for side, slope in zip(_sides_from(self.half_edge), (of_ab, of_bp, of_pa), strict=True):
+        for side, slope in zip(sides_from(self.half_edge), (of_ab, of_bp, of_pa), strict=True):
             np.add.at(by_half_edge, side, slope)
-        for side, slope in zip(_sides_from(self.mate)[1:], (of_aq, of_qb), strict=True):
+        for side, slope in zip(sides_from(self.mate)[1:], (of_aq, of_qb), strict=True):
             np.add.at(by_half_edge, side, slope)
         of_b, of_a = x * self.ab, np.zeros(len(self.moved))
         ends = np.where(self.in_second, of_b, of_a), np.where(self.in_second, of_a, of_b)
@@ -134,8 +134,8 @@ class _Layout:
 
     def carry(self, places: FloatArray, by_half_edge: FloatArray) -> None:
         """Carry changes of places over the flip, with the changes of the sides before it."""
-        of_ab, of_bp, of_pa = (by_half_edge[side] for side in _sides_from(self.half_edge))
-        _, of_aq, of_qb = (by_half_edge[side] for side in _sides_from(self.mate))
+        of_ab, of_bp, of_pa = (by_half_edge[side] for side in sides_from(self.half_edge))
+        _, of_aq, of_qb = (by_half_edge[side] for side in sides_from(self.mate))
         of_px, of_py = _apex_change((self.ab, self.pa, self.bp), (self.px, self.py), (of_ab, of_pa, of_bp))
         of_qx, of_qy = _apex_change((self.ab, self.aq, self.qb), (self.qx, self.qy), (of_ab, of_aq, of_qb))
         of_apex, of_tail, of_head = np.take_along_axis(places[self.moved], self.before, axis=1).T
@@ -148,11 +148,6 @@ class _Layout:
         at_q = ((self.px - self.ox) * y - self.py * x) / self.determinant
         ends = np.where(self.in_q, at_q, at_p), -(at_p + at_q), np.where(self.in_q, at_p, at_q)
         places[self.moved[:, None], self.after] = np.stack(ends, axis=1)
-
-
-def _sides_from(half_edge: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """A half-edge, the next and the previous one of the same face."""
-    return half_edge, half_edge + 1 - 3 * (half_edge % 3 == 2), half_edge - 1 + 3 * (half_edge % 3 == 0)
 
 
 def _apex_slopes(

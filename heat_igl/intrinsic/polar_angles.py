@@ -14,7 +14,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic.history import Flipped
 from heat_igl.intrinsic.layout import apex, corner_angles
-from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, sides_from
 from heat_igl.kernels.polar_angles import polar_angles as kernel
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -156,16 +156,11 @@ def carried_angles(angles: PolarAngles, flipped: IntrinsicTriangulation) -> Pola
     )
 
 
-def _corner_slots(half_edge: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    following = next_half_edge(half_edge)
-    return half_edge, following, next_half_edge(following)
-
-
 def _faces_before(flipped_faces: IntArray, flips: list[Flipped]) -> IntArray:
     """The vertices (3 m,) at the corners of the faces before the flips."""
     F = flipped_faces.ravel().copy()
     for change in flips[::-1]:
-        (p, _, q_in_f), (q, _, p_in_g) = _corner_slots(change.half_edge), _corner_slots(change.mate)
+        (p, _, q_in_f), (q, _, p_in_g) = sides_from(change.half_edge), sides_from(change.mate)
         # (p, a, q), (q, b, p) back to (p, a, b), (q, b, a)
         at_a, at_b = F[next_half_edge(p)], F[next_half_edge(q)]
         F[q_in_f], F[p_in_g] = at_b, at_a
@@ -174,7 +169,7 @@ def _faces_before(flipped_faces: IntArray, flips: list[Flipped]) -> IntArray:
 
 def _replay(leaving: FloatArray, scale: FloatArray, F: IntArray, change: Flipped) -> None:
     """Carry the angles, and the faces, over edges flipped at once; names as in `Flipped`."""
-    (ab, bp, pa), (ba, aq, qb) = _corner_slots(change.half_edge), _corner_slots(change.mate)
+    (ab, bp, pa), (ba, aq, qb) = sides_from(change.half_edge), sides_from(change.mate)
     p, q = F[ab], F[ba]
     length_ab, length_pa, length_bp, length_aq, length_qb = change.lengths
     # The quadrilateral p a q b: the angles at p and q, on the sides of a and b, from the new diagonal.

@@ -16,7 +16,14 @@ import numpy as np
 from heat_igl.intrinsic.history import Covered, Flipped, Merged, Refined, Turned
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["IntrinsicTriangulation", "half_edge_head", "half_edge_tail", "next_half_edge", "previous_half_edge"]
+__all__ = [
+    "IntrinsicTriangulation",
+    "half_edge_head",
+    "half_edge_tail",
+    "next_half_edge",
+    "previous_half_edge",
+    "sides_from",
+]
 
 
 def next_half_edge(half_edge: IntArray) -> IntArray:
@@ -28,6 +35,11 @@ def next_half_edge(half_edge: IntArray) -> IntArray:
 def previous_half_edge(half_edge: IntArray) -> IntArray:
     """The half-edge before each in the same face; of corners, the previous corner."""
     return np.asarray(half_edge - 1 + 3 * (half_edge % 3 == 0))
+
+
+def sides_from(half_edge: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Each half-edge, and the next and the previous one of the same face."""
+    return half_edge, next_half_edge(half_edge), previous_half_edge(half_edge)
 
 
 def half_edge_tail(F: IntArray, half_edge: IntArray) -> IntArray:

@@ -96,7 +96,7 @@ class _Refinement:
     @cython.nogil
     @cython.exceptval(check=False)
     def judge(self, f: cython.longlong) -> cython.void:
-        """Give a triangle that has changed another place in the queue, or none."""
+        """Move a triangle that has changed to the right place in the queue, or out of it."""
         self.bad.set_key(f, self.badness(f))
 
     @cython.cfunc

@@ -16,7 +16,8 @@ from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 
 __all__ = ["Fronts", "fronts"]
 
-# Pieces of the tree that are solved side by side, about; and the entries that are worth a thread.
+# The number of pieces of the tree that are solved in parallel, roughly; and the fewest entries of a piece, so that it
+# is worth a thread.
 _PIECES = 6
 _SMALLEST_PIECE = 1_500_000
 
@@ -37,9 +38,9 @@ class Fronts(NamedTuple):
     rows : (r,) int32
         Places in the order.
     first_entry : (k,) int64
-        Start of each column in the factor, front after front, each from the diagonal on down. The
-        fronts lie there in the order back from the roots, as ascending memory is read fastest, and a single source's
-        heat skips most of the way forward.
+        Start of each column in the factor, front after front, each from the diagonal on down. Fronts are stored from
+        the roots to the leaves, the order of back substitution, since ascending memory is read fastest; forward
+        substitution for a single source skips most fronts.
     pieces : (k,) int64
         Fronts by piece of the tree, ascending within each.
     piece_end : (p + 2,) int64

@@ -69,7 +69,7 @@ def check_finite(A: sp.csc_matrix) -> None:
 def check_probe(
     factorization: Factorization, A: sp.csc_matrix, free: BoolArray | None, indefinite: bool = False
 ) -> None:
-    """Solve for ones, which a singular matrix does not survive, and for noise if A may be indefinite.
+    """Solve for a known solution, of ones, to find a singular matrix, and for noise if A may be indefinite.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Solves with a multifrontal factor: forward from the leaves of the tree of fronts to the roots, and back.
 
-The tree is cut into pieces, subtrees, and the few fronts above them. Pieces know nothing of one another: the amount
-that one subtracts from the rows above, it keeps to itself, and the sum is taken in the order of the pieces. So they run
-side by side, and the bits of a solution do not depend on the number of threads.
+The tree is cut into pieces, which are subtrees, and the few fronts above them. Pieces are independent: each stores its
+updates of the rows above in an array of its own, and these are summed in the order of the pieces. So pieces run in
+parallel, and the bits of a solution do not depend on the number of threads.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import MeshLike
 from heat_igl.reference.guarded import MEMORY, TIMEOUT
 from heat_igl.reference.measurement import measured
 from heat_igl.sources import Sources
@@ -12,7 +12,7 @@ __all__ = ["igl_heat", "potpourri3d_heat"]
 
 
 def igl_heat(
-    mesh: Mesh,
+    mesh: MeshLike,
     sources: Sources,
     *,
     t: float | None = None,
@@ -31,7 +31,7 @@ def igl_heat(
 
 
 def potpourri3d_heat(
-    mesh: Mesh,
+    mesh: MeshLike,
     sources: Sources,
     *,
     t_coef: float = 1.0,

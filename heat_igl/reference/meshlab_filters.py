@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.reference.guarded import MEMORY, TIMEOUT
 from heat_igl.reference.measurement import measured
 from heat_igl.sources import Sources
@@ -11,7 +11,7 @@ from heat_igl.typing import FloatArray
 __all__ = ["meshlab", "meshlab_border", "meshlab_heat"]
 
 
-def meshlab(mesh: Mesh, sources: Sources, *, timeout: float = TIMEOUT, memory: float = MEMORY) -> FloatArray:
+def meshlab(mesh: MeshLike, sources: Sources, *, timeout: float = TIMEOUT, memory: float = MEMORY) -> FloatArray:
     """MeshLab's geodesic distance from selected vertices: a front that unfolds one triangle per step (pymeshlab).
 
     Neither exact nor a bound; 0.05 to 1 % from exact in the mean on ordinary meshes. The time explodes on some
@@ -33,7 +33,7 @@ def meshlab_border(mesh: MeshLike, *, timeout: float = TIMEOUT, memory: float = 
 
 
 def meshlab_heat(
-    mesh: Mesh, sources: Sources, *, m: float = 1.0, timeout: float = TIMEOUT, memory: float = MEMORY
+    mesh: MeshLike, sources: Sources, *, m: float = 1.0, timeout: float = TIMEOUT, memory: float = MEMORY
 ) -> FloatArray:
     """MeshLab's heat method, through pymeshlab: single precision, extrinsic, minimum shifted to 0.
 

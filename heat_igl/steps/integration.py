@@ -15,15 +15,29 @@ __all__ = ["PoissonProblem", "integrate"]
 class PoissonProblem:
     """L phi = b, factored, with one vertex of each component grounded.
 
-    The constants on each component are the null space of L. Fixing one value in each removes exactly that and changes
-    nothing else; adding a small multiple of the identity instead would bend the solution on large domains.
+    The constants on each component are the null space of L. Fixing one value in each removes the null space and changes
+    nothing else; adding a small multiple of the identity instead would distort the solution on large domains.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
+        See `factorize`.
+    analysis : Analysis, optional
+        As `analysis` makes it for a domain with the same pattern of L, to be shared; made anew if it does not fit.
+
+    Raises
+    ------
+    FactorizationError
+        If -L without the grounded vertices is not positive definite.
     """
 
     def __init__(self, operators: Operators, backend: Backend = "auto", analysis: Analysis | None = None) -> None:
         free = operators.referenced.copy()
         # The first vertex of every component; components without faces are not free anyway.
         free[np.unique(operators.components, return_index=True)[1]] = False
-        # Here, and only here, the sign is turned: L is negative semidefinite, Cholesky wants positive.
+        # Here, and only here, the sign changes: L is negative semidefinite, factors need a positive definite matrix.
         matrix = shifted(operators.L, -1.0, np.zeros(operators.n))
         if analysis is None or not analysis.fits(matrix):
             analysis = analyse(matrix, backend)

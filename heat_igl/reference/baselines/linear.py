@@ -6,23 +6,27 @@ of the magnitude (from the time step, the mesh, the boundary and the curvature) 
 
 from __future__ import annotations
 
-import warnings
 from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method import smallest_time_step
 from heat_igl.linear import factorize
-from heat_igl.mesh import Mesh, MeshLike, as_simplices
-from heat_igl.operators import Operators, operators
-from heat_igl.runtime import LOWEST_HEAT as _LOWEST_HEAT
-from heat_igl.runtime import RANGE_LIMIT
-from heat_igl.runtime import SOURCE_HEAT as _SOURCE_HEAT
+from heat_igl.mesh import Mesh
+from heat_igl.operators import Operators
+from heat_igl.reference.baselines.decay import (
+    domain_of,
+    fallen_from_sources,
+    log_step,
+    logarithm,
+    reached_from,
+    time_step,
+)
+from heat_igl.runtime import RANGE_LIMIT, SOURCE_HEAT
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.steps import HeatFlow
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray
 
 __all__ = ["boundary_problem", "log_heat_kernel", "varadhan"]
 
@@ -141,12 +145,12 @@ def boundary_problem(mesh: Mesh | Operators, sources: Sources, *, t: float | Non
     free = reached.copy()
     free[chosen] = False
     v = np.zeros(domain.n)
-    v[chosen] = _SOURCE_HEAT
+    v[chosen] = SOURCE_HEAT
     if free.any():
         # Division by the mean mass prevents overflow in every unit of length.
         matrix = ((domain.M - step * domain.L) / domain.M.diagonal()[domain.referenced].mean()).tocsr()[free]
         v[free] = factorize(matrix[:, free].tocsc()).solve(-(matrix @ v))
-    log_v = _logarithm(v, reached)
+    log_v = logarithm(v, reached)
     return np.asarray(np.sqrt(step) * fallen_from_sources(log_v, domain, chosen))
 
 
@@ -203,13 +207,13 @@ def log_heat_kernel(mesh: Mesh | Operators, sources: Sources, t: float) -> Float
     q = float((-domain.L.diagonal() / mass).max())
     least = float(mass[chosen].min())
     u = np.zeros(domain.n)
-    u[chosen] = _SOURCE_HEAT * (least / mass[chosen])
+    u[chosen] = SOURCE_HEAT * (least / mass[chosen])
     if q * t <= _MOST_PRODUCTS:
         P = (sp.identity(domain.n) + sp.diags(1 / (q * mass)) @ domain.L).tocsr()
-        log_k = _logarithm(_poisson_mean(P, u, q * t, reached), reached)
+        log_k = logarithm(_poisson_mean(P, u, q * t, reached), reached)
     else:
         log_k = _extrapolated(domain, u, t, reached)
-    return np.asarray(log_k - np.log(_SOURCE_HEAT) - np.log(least))
+    return np.asarray(log_k - np.log(SOURCE_HEAT) - np.log(least))
 
 
 def _extrapolated(domain: Operators, u: FloatArray, t: float, reached: BoolArray) -> FloatArray:
@@ -223,7 +227,7 @@ def _extrapolated(domain: Operators, u: FloatArray, t: float, reached: BoolArray
         heat = u
         for _ in range(steps):
             heat = flow.solve(mass * heat)
-        runs.append(_logarithm(heat, reached))
+        runs.append(logarithm(heat, reached))
     coarse, middle, fine = (run[reached] for run in runs)
     log_k = np.full(domain.n, -np.inf)
     log_k[reached] = (coarse - 6 * middle + 8 * fine) / 3
@@ -247,67 +251,3 @@ def _poisson_mean(P: sp.csr_matrix, u: FloatArray, expected: float, reached: Boo
             if rest <= 1e-12 * total[reached].min():
                 break
     return total
-
-
-def domain_of(mesh: MeshLike | Operators) -> Operators:
-    """The operators of a mesh on the intrinsic Delaunay triangulation; given operators are returned unchanged."""
-    return mesh if isinstance(mesh, Operators) else operators(as_simplices(mesh))
-
-
-def time_step(t: float | None, default: float, smallest: float, name: str = "t") -> float:
-    """The time step `t` or the default, but at least `smallest`; a warning is issued if a given `t` is raised."""
-    if t is None:
-        return max(default, smallest)
-    if not (np.isfinite(t) and t > 0):
-        raise ValueError(f"{name} must be a positive number (a squared length), not {t!r}")
-    if t < smallest:
-        warnings.warn(
-            f"{name} = {t:.4g} is too small for heat to cross the mesh in double precision; using {smallest:.4g}",
-            AccuracyWarning,
-            stacklevel=3,
-        )
-    return max(float(t), smallest)
-
-
-def reached_from(domain: Operators, sources: IntArray) -> BoolArray:
-    """Mask (n,) of the referenced vertices in the components of the sources."""
-    return domain.referenced & np.isin(domain.components, domain.components[sources])
-
-
-def log_step(domain: Operators, sources: IntArray, t: float, share: FloatArray | None = None) -> FloatArray:
-    """Logarithm of u for (M - t L) u = delta, equation (4), with `share` units of heat on each source (default 1)."""
-    flow = HeatFlow(domain, t)
-    mass = domain.M.diagonal()[sources] / flow.mean_mass
-    # The largest heat that cannot overflow: the rows of L sum to zero, so u is at most the initial heat over mass.
-    unit = _SOURCE_HEAT * float(mass[mass > 0].min(initial=1.0))
-    initial = np.zeros(domain.n)
-    initial[sources] = unit if share is None else unit * share[sources]
-    u = flow.solve(initial)
-    log_u = _logarithm(u, reached_from(domain, sources))
-    return np.asarray(log_u - np.log(unit) - np.log(flow.mean_mass))
-
-
-def _logarithm(heat: FloatArray, reached: BoolArray) -> FloatArray:
-    """Logarithm of `heat`, -inf at unreachable vertices; warns if reachable vertices have no positive heat."""
-    lost = reached & ~(heat >= _LOWEST_HEAT)
-    if lost.any():
-        warnings.warn(
-            f"no positive heat arrives at {int(lost.sum())} of {int(reached.sum())} vertices, where distances are too "
-            "short: raise the time step, or, on triangles, use laplacian='intrinsic-delaunay'",
-            AccuracyWarning,
-            stacklevel=4,
-        )
-    log_heat = np.full(len(heat), -np.inf)
-    log_heat[reached] = np.log(np.where(lost, _LOWEST_HEAT, heat)[reached])
-    return log_heat
-
-
-def fallen_from_sources(log_heat: FloatArray, domain: Operators, sources: IntArray) -> FloatArray:
-    """``-log(u / u_source)`` (n,), at least 0, with u_source the largest heat at a source of the same component."""
-    warmest = np.full(int(domain.components.max()) + 1, -np.inf)
-    np.maximum.at(warmest, domain.components[sources], log_heat[sources])
-    arrived = np.isfinite(log_heat)
-    fallen = np.full(domain.n, np.inf)
-    fallen[arrived] = np.maximum(warmest[domain.components[arrived]] - log_heat[arrived], 0.0)
-    fallen[sources] = 0.0
-    return fallen

@@ -16,8 +16,8 @@ from heat_igl.heat_method import smallest_time_step
 from heat_igl.intrinsic import IntrinsicTriangulation, corner_angles
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Operators
+from heat_igl.reference.baselines.decay import domain_of, fallen_from_sources, log_step, reached_from, time_step
 from heat_igl.reference.baselines.grids import grid_sources, grid_spacing
-from heat_igl.reference.baselines.linear import domain_of, fallen_from_sources, log_step, reached_from, time_step
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
