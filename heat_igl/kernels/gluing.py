@@ -9,7 +9,7 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.libc.math import INFINITY, sqrt
 
-__all__ = ["breadth_first", "flip", "glue", "has_needles"]
+__all__ = ["breadth_first", "flip", "glue", "has_needles", "n_near"]
 
 
 @cython.cfunc
@@ -181,6 +181,16 @@ def _move(ring: cython.int[::1], old: cython.int, new: cython.int) -> cython.voi
     ring[h] = new
     ring[new] = ring[old]
     ring[old] = old
+
+
+def n_near(twin: cython.int[::1], reach: cython.int) -> int:
+    """How many half-edges (3 m,) are glued to one whose number differs from theirs by less than `reach`."""
+    h: cython.int
+    n: cython.int = 0
+    with cython.nogil:
+        for h in range(twin.shape[0]):
+            n += (twin[h] >= 0) & (-reach < twin[h] - h) & (twin[h] - h < reach)
+    return n
 
 
 def has_needles(length: cython.double[::1], margin: cython.double) -> bool:

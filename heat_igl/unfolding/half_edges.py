@@ -38,6 +38,9 @@ _ON_SIDE = 1e-13
 _MOST_FLIPS_PER_FACE = 100
 # Half-edges and vertices that indices of 32 bits tell apart, with room for two bits of the kernels' own.
 _TOO_MANY = 2**29
+# Up to so many faces, the tables stay in the caches in any order in which most neighbours are at most so far apart.
+_FEW_FACES = 30_000
+_NEAR = 768
 # Powers of two up to here, and their inverses, are normal numbers.
 _LARGEST_EXPONENT = 1000
 # Areas are made of fourth powers of lengths, which are normal numbers up to here, far below 1 too.
@@ -319,7 +322,8 @@ def glued(mesh: Mesh) -> Glued:
 def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
     """The tables of the intrinsic Delaunay triangulation of a mesh that is asked once, for distances from vertices.
 
-    Without a history of the flips; what is near vertex `start` comes first in memory.
+    Without a history of the flips. What is near vertex `start` comes first in memory, unless the mesh is small and most
+    neighbours are near each other as they are: then numbers stay.
     """
     found = glued(mesh)
     if (found.twin == -2).any():
@@ -330,8 +334,12 @@ def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
     if found.n_across:
         return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
     found.flip(mesh.F, MARGIN)
+    m, n = mesh.n_faces, mesh.n_vertices
+    if m <= _FEW_FACES and gluing.n_near(found.twin, _NEAR) > len(found.twin) // 2:
+        numbers, faces = np.arange(n, dtype=np.int32), np.arange(m, dtype=np.int32)
+        return HalfEdges(Numbered(*found[:5], numbers, faces), found.exponent)
     first_face = int(np.argmax(found.vertex == start)) // 3
-    numbered = Numbered(*gluing.breadth_first(*found[:5], mesh.n_vertices, first_face))
+    numbered = Numbered(*gluing.breadth_first(*found[:5], n, first_face))
     exponent = found.exponent
     del found  # before there are more tables
     return HalfEdges(numbered, exponent)
