@@ -16,7 +16,7 @@ from test_unfolding_sources import COORDINATES, sheared, with_point
 from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
-from heat_igl.kernels import gluing
+from heat_igl.kernels import flipping, gluing
 from heat_igl.reference.steiner import graph_distance
 from heat_igl.unfolding.distance import distance_to_targets
 from heat_igl.unfolding.exact import ExactSurface, exact_distance
@@ -416,7 +416,7 @@ def test_compiled_flips_are_those_of_the_triangulation():
     np.testing.assert_allclose(length, plain.l.ravel(), rtol=1e-15)
     assert n_across == 0
     assert aligned.all()
-    assert gluing.flip(vertex, twin, ring, length, 1e-7, 10**6) > 100
+    assert flipping.flip(vertex, twin, ring, length, 1e-7, 10**6) > 100
     flipped = intrinsic_delaunay(plain)
     np.testing.assert_allclose(np.sort(length), np.sort(flipped.l.ravel()), rtol=1e-12)
     np.testing.assert_array_equal(length[twin[twin >= 0]], length[twin >= 0])

@@ -9,7 +9,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, mollify
-from heat_igl.kernels import gluing, window_surface
+from heat_igl.kernels import flipping, gluing, window_surface
 from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
@@ -297,7 +297,9 @@ class Glued(NamedTuple):
         added = mollify(sides, F, margin)
         if added.any():
             sides += added[:, None]
-        gluing.flip(self.vertex, self.twin, self.ring, self.length, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * len(F))
+        flipping.flip(
+            self.vertex, self.twin, self.ring, self.length, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * len(F)
+        )
 
 
 def glued(mesh: Mesh) -> Glued:
