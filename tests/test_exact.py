@@ -422,6 +422,20 @@ def test_compiled_flips_are_those_of_the_triangulation():
     np.testing.assert_array_equal(length[twin[twin >= 0]], length[twin >= 0])
 
 
+def test_the_order_of_vertices_and_faces_does_not_matter():
+    """Tables of a mesh in a local order keep it; one in a random order is numbered by a front."""
+    mesh, rng = bumpy(), np.random.default_rng(4)
+    new = rng.permutation(mesh.n_vertices)
+    V = np.empty_like(mesh.V)
+    V[new] = mesh.V
+    shuffled = Mesh(V, new[mesh.F[rng.permutation(mesh.n_faces)]])
+    number = from_mesh(mesh, 7).number
+    np.testing.assert_array_equal(number, np.arange(mesh.n_vertices))
+    assert (from_mesh(shuffled, 7).number != number).any()
+    distance = exact_distance(shuffled.V, shuffled.F, int(new[7]))
+    np.testing.assert_allclose(distance[new], exact_distance(mesh.V, mesh.F, 7), rtol=1e-14)
+
+
 def test_errors():
     mesh = shapes.grid(3)
     with pytest.raises(MeshError, match="needs triangles"):
