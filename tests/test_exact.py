@@ -16,7 +16,7 @@ from test_unfolding_sources import COORDINATES, sheared, with_point
 from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
-from heat_igl.kernels import gluing
+from heat_igl.kernels import flipping, gluing
 from heat_igl.reference.steiner import graph_distance
 from heat_igl.unfolding.distance import distance_to_targets
 from heat_igl.unfolding.exact import ExactSurface, exact_distance
@@ -416,10 +416,24 @@ def test_compiled_flips_are_those_of_the_triangulation():
     np.testing.assert_allclose(length, plain.l.ravel(), rtol=1e-15)
     assert n_across == 0
     assert aligned.all()
-    assert gluing.flip(vertex, twin, ring, length, 1e-7, 10**6) > 100
+    assert flipping.flip(vertex, twin, ring, length, 1e-7, 10**6) > 100
     flipped = intrinsic_delaunay(plain)
     np.testing.assert_allclose(np.sort(length), np.sort(flipped.l.ravel()), rtol=1e-12)
     np.testing.assert_array_equal(length[twin[twin >= 0]], length[twin >= 0])
+
+
+def test_the_order_of_vertices_and_faces_does_not_matter():
+    """Tables of a mesh in a local order keep it; one in a random order is numbered by a front."""
+    mesh, rng = bumpy(), np.random.default_rng(4)
+    new = rng.permutation(mesh.n_vertices)
+    V = np.empty_like(mesh.V)
+    V[new] = mesh.V
+    shuffled = Mesh(V, new[mesh.F[rng.permutation(mesh.n_faces)]])
+    number = from_mesh(mesh, 7).number
+    np.testing.assert_array_equal(number, np.arange(mesh.n_vertices))
+    assert (from_mesh(shuffled, 7).number != number).any()
+    distance = exact_distance(shuffled.V, shuffled.F, int(new[7]))
+    np.testing.assert_allclose(distance[new], exact_distance(mesh.V, mesh.F, 7), rtol=1e-14)
 
 
 def test_errors():

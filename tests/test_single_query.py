@@ -15,7 +15,7 @@ from heat_igl.kernels import bounds
 from heat_igl.mesh import connectivity
 from heat_igl.operators import operators, unfolding_surface
 from heat_igl.unfolding.bounds import Bounds
-from heat_igl.unfolding.half_edges import glued
+from heat_igl.unfolding.glued import glued
 from heat_igl.unfolding.single_query import single_query
 
 NONE = np.zeros(0, np.int64)
@@ -123,7 +123,7 @@ def test_memory_for_each_vertex(as_arrays: bool) -> None:
 
 
 def test_too_many_faces_for_indices_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heat_igl.unfolding.half_edges._TOO_MANY", 3 * SMOOTH.n_faces + SMOOTH.n_vertices)
+    monkeypatch.setattr("heat_igl.unfolding.glued.TOO_MANY", 3 * SMOOTH.n_faces + SMOOTH.n_vertices)
     with pytest.raises(Exception, match="11520 faces are too many for 32-bit indices: split the mesh"):
         glued(SMOOTH)
 

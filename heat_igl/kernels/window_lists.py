@@ -217,13 +217,11 @@ def _free_list(s: cython.pointer(Search)) -> cython.int:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _towards_goal(
-    s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int
-) -> cython.int:
+def _towards_goal(s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int) -> cython.int:
     """Keep the windows over e through which the goal may be as near as by the path known; how many they are.
 
     No path from a point of e to the goal is shorter than the straight line from an end of e, less the way to that end.
-    With the distance of the point, this only falls from the one end to the other, so it is least at an end of the window.
+    With the distance of the point added, this falls from one end to the other, so it is least at an end of the window.
     """
     i: cython.int
     k: cython.int = 0

@@ -321,7 +321,7 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def with_rounding(distance: cython.double) -> cython.double:
-    """More than a distance, by more than rounding of it and of the lengths of needles; edges have a length of about 1."""
+    """A little more than a distance: by more than rounding, and than needles are made longer by. Edges are about 1."""
     return distance * (1.0 + 1e-9) + 1e-10
 
 
@@ -331,8 +331,8 @@ def with_rounding(distance: cython.double) -> cython.double:
 def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython.void:
     """Let the search from v be one for the distance of `goal` alone, and bound that by a path along edges.
 
-    From each vertex, the path takes the edge that makes the way to the goal shortest, were it straight from there on. Where
-    that comes no nearer to the goal, there is no bound.
+    From each vertex, the path takes the edge that makes the way to the goal shortest, were it straight from there on.
+    Where that comes no nearer to the goal, there is no bound.
     """
     k: cython.int
     h: cython.int

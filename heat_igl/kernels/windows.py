@@ -96,8 +96,8 @@ class Front:
     tolerance : float
         The fraction of a distance by which another way must be shorter before a window is cut.
     position : (3 n,), optional
-        Of the vertices in space, in the unit of the lengths, which are no shorter than in space: `search_each` then leaves
-        out what is too far from the only goal of a source along straight lines.
+        Of the vertices in space, in the unit of the lengths. With one goal for a source, `search_each` then leaves out
+        what is too far from it along straight lines.
     """
 
     def __init__(

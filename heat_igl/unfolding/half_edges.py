@@ -8,24 +8,23 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, mollify
+from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.kernels import gluing, window_surface
-from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, SurfacePoints
+from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.unfolding.glued import TOO_MANY, glued, mean_exponent
 
 __all__ = [
     "MARGIN",
     "NO_POINTS",
     "NO_SEGMENTS",
-    "Glued",
     "HalfEdges",
     "Located",
     "Numbered",
     "Tables",
     "from_mesh",
     "from_triangulation",
-    "glued",
     "rings",
 ]
 
@@ -34,14 +33,11 @@ __all__ = [
 MARGIN = 1e-12
 # A point whose barycentric coordinate is below this lies on the side of its face.
 _ON_SIDE = 1e-13
-# A last bound on the work; meshes measured so far take less than one flip per face.
-_MOST_FLIPS_PER_FACE = 100
-# Half-edges and vertices that indices of 32 bits tell apart, with room for two bits of the kernels' own.
-_TOO_MANY = 2**29
+# Up to so many faces, the tables stay in the caches in any order in which most neighbours are at most so far apart.
+_FEW_FACES = 30_000
+_NEAR = 768
 # Powers of two up to here, and their inverses, are normal numbers.
 _LARGEST_EXPONENT = 1000
-# Areas are made of fourth powers of lengths, which are normal numbers up to here, far below 1 too.
-_LARGEST_LENGTH = 1e30
 
 
 class Tables(NamedTuple):
@@ -128,7 +124,7 @@ class HalfEdges:
         vertex, twin, ring, aligned, length, self.number, self.face = numbered
         m, n = len(self.face), len(self.number)
         # By a power of two: no digit changes, and no square leaves the range of doubles.
-        shift = _exponent(length)
+        shift = mean_exponent(length)
         _times_power(length, -shift, out=length)
         self.n, self.exponent = n, exponent + shift
         self._triangulation = triangulation
@@ -252,9 +248,9 @@ def from_triangulation(triangulation: IntrinsicTriangulation) -> HalfEdges:
         If there are too many triangles for 32-bit indices.
     """
     m = len(triangulation.F)
-    if 3 * m + triangulation.n >= _TOO_MANY:
+    if 3 * m + triangulation.n >= TOO_MANY:
         raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
-    exponent = _exponent(triangulation.l)
+    exponent = mean_exponent(triangulation.l)
     numbered = gluing.breadth_first(
         triangulation.F.ravel().astype(np.int32),
         triangulation.twin.astype(np.int32),
@@ -267,59 +263,11 @@ def from_triangulation(triangulation: IntrinsicTriangulation) -> HalfEdges:
     return HalfEdges(Numbered(*numbered), exponent, triangulation)
 
 
-class Glued(NamedTuple):
-    """The triangles of a mesh by their sides, as `heat_igl.kernels.gluing.glue` returns them.
-
-    Attributes
-    ----------
-    vertex, twin, ring, aligned, length
-        As for `HalfEdges`; lengths in units of ``2 ** exponent``.
-    exponent : int
-        0, but for very large or small meshes the power of two just above the mean extent.
-    n_across : int
-        Half-edges that are not aligned.
-    """
-
-    vertex: AnyArray
-    twin: AnyArray
-    ring: AnyArray
-    aligned: AnyArray
-    length: FloatArray
-    exponent: int
-    n_across: int
-
-    def flip(self, F: IntArray, margin: float | None = None) -> None:
-        """Mollify and flip in place to the intrinsic Delaunay triangulation; F (m, 3) are the faces before."""
-        sides = self.length.reshape(-1, 3)
-        added = mollify(sides, F, margin)
-        if added.any():
-            sides += added[:, None]
-        gluing.flip(self.vertex, self.twin, self.ring, self.length, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * len(F))
-
-
-def glued(mesh: Mesh) -> Glued:
-    """The triangles of a mesh by their sides, before any flip.
-
-    Raises
-    ------
-    MeshError
-        If there are too many triangles for 32-bit indices.
-    """
-    if 3 * mesh.n_faces + mesh.n_vertices >= _TOO_MANY:
-        raise MeshError(f"{mesh.n_faces} faces are too many for 32-bit indices: split the mesh")
-    exponent = 0
-    vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, 1.0)
-    if not 1 / _LARGEST_LENGTH < length.max() < _LARGEST_LENGTH:
-        # Once more in a unit in which no square leaves the range of doubles.
-        exponent = _exponent(np.array([np.ptp(x[mesh.F[:, :2]]) for x in mesh.V.T]))
-        vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, np.ldexp(1.0, -exponent))
-    return Glued(vertex, twin, ring, aligned, length, exponent, n_across)
-
-
 def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
     """The tables of the intrinsic Delaunay triangulation of a mesh that is asked once, for distances from vertices.
 
-    Without a history of the flips; what is near vertex `start` comes first in memory.
+    Without a history of the flips. What is near vertex `start` comes first in memory, unless the mesh is small and most
+    neighbours are near each other as they are: then numbers stay.
     """
     found = glued(mesh)
     if (found.twin == -2).any():
@@ -330,8 +278,12 @@ def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
     if found.n_across:
         return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
     found.flip(mesh.F, MARGIN)
+    m, n = mesh.n_faces, mesh.n_vertices
+    if m <= _FEW_FACES and gluing.n_near(found.twin, _NEAR) > len(found.twin) // 2:
+        numbers, faces = np.arange(n, dtype=np.int32), np.arange(m, dtype=np.int32)
+        return HalfEdges(Numbered(*found[:5], numbers, faces), found.exponent)
     first_face = int(np.argmax(found.vertex == start)) // 3
-    numbered = Numbered(*gluing.breadth_first(*found[:5], mesh.n_vertices, first_face))
+    numbered = Numbered(*gluing.breadth_first(*found[:5], n, first_face))
     exponent = found.exponent
     del found  # before there are more tables
     return HalfEdges(numbered, exponent)
@@ -340,11 +292,6 @@ def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
 def _following(half_edge: IntArray) -> IntArray:
     """The next half-edge of the same face."""
     return np.asarray(half_edge + 1 - 3 * (half_edge % 3 == 2))
-
-
-def _exponent(lengths: FloatArray) -> int:
-    """The power of two just above the mean."""
-    return int(np.frexp(lengths.mean())[1])
 
 
 def _times_power(lengths: FloatArray | float, exponent: int, out: FloatArray | None = None) -> FloatArray:

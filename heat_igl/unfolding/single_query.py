@@ -20,7 +20,8 @@ from heat_igl.mesh import Mesh, connectivity
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import shorten_along
 from heat_igl.unfolding.exact import ExactSurface
-from heat_igl.unfolding.half_edges import Glued, HalfEdges, Numbered, glued
+from heat_igl.unfolding.glued import Glued, glued
+from heat_igl.unfolding.half_edges import HalfEdges, Numbered
 from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles
 from heat_igl.unfolding.solver import FEW, costs_little_to_be_exact, require_share
 
