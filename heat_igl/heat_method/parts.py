@@ -17,7 +17,7 @@ from heat_igl.heat_method.checking import Checker
 from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.solution import Diagnostics
-from heat_igl.heat_method.time_step import time_step, warn_of_large_step
+from heat_igl.heat_method.time_step import check_large_step, time_step
 from heat_igl.linear import Analysis
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
 from heat_igl.operators import (
@@ -225,7 +225,7 @@ def prepare(
     damped = options.damps(domain)
     fitted = damped and domain.lengths is not None
     step, requested = time_step(options, domain, fitted)
-    warn_of_large_step(options, domain)
+    check_large_step(options, domain)
     t_damping = step if damped else None
     front_solver = None if domain.simplices is None or not options.leaves_heat else FrontSolver(domain.simplices)
     takes_heat = options.refine != "exact" and front_solver is None
