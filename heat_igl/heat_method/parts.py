@@ -302,7 +302,9 @@ def _factored(
         flow,
         lambda: NormalizedDivergence(domain, t_damping, found.order, fitted),
     ]
-    poisson, heat_flow, divergence = in_order(lambda make: make(), makers, min(2, n_threads()))
+    # scipy's SuperLU keeps the memory of a factor that is made on one thread and dropped on another, as a solver is.
+    threads = 1 if found.backend == "scipy" else min(2, n_threads())
+    poisson, heat_flow, divergence = in_order(lambda make: make(), makers, threads)
     return heat_flow, poisson, divergence
 
 
