@@ -152,6 +152,21 @@ def test_an_output_directory_that_does_not_exist(sphere: Path) -> None:
         (["path", "--from=0", "--to=162", "--output=p.obj"], 1, ("--to 162 is no vertex", "162, counted from 0")),
         (["path", "--from=-1", "--to=0", "--output=p.obj"], 1, ("--from -1 is no vertex",)),
         (["path", "--output=p.obj"], 1, ("name two waypoints or more",)),
+        (["path", "--from=3", "--output=p.obj"], 1, ("--to is missing",)),
+        (["path", "--to=3", "--output=p.obj"], 1, ("--from is missing",)),
+        (["path", "--from=3", "--to=4", "5", "--output=p.obj"], 1, ("not both",)),
+        (
+            ["trace", "--from=162", "--direction=1,0,0", "--length=1", "--output=p.obj"],
+            1,
+            ("start[0] = 162 is no vertex",),
+        ),
+        (
+            ["trace", "--from=0", "--direction=1,0,0", "--length=1e12", "--output=p.obj"],
+            1,
+            ("length 1e+12", "unit of the mesh"),
+        ),
+        (["distance", "--at=1e300,0,0"], 1, ("positions[0]", "too far away")),
+        (["distance", "--source=0", "--t=1e300"], 1, ("t = 1e+300 is too large", "t is a squared length")),
         (["path", "3", "--output=p.obj"], 1, ("2 places or more for a path, not 1",)),
         (["path", "3", "south", "--output=p.obj"], 1, ("'south' is no place",)),
         (["path", "3", "1,2", "--output=p.obj"], 1, ("position 1,2: three numbers",)),
@@ -260,6 +275,12 @@ def test_unreachable_vertices_are_counted(two_spheres: Path, capsys: pytest.Capt
     assert "42 vertices" in next(
         line for line in capsys.readouterr().out.splitlines() if line.startswith("unreachable")
     )
+
+
+def test_vertices_beyond_the_cutoff_are_said_to_be(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["distance", str(sphere), "--source=0", "--cutoff=1"]) == 0
+    n_beyond = (heat_igl.geodesic_distance(sphere, 0) > 1).sum()
+    assert re.search(rf"unreachable +{n_beyond} vertices, or beyond the cutoff", capsys.readouterr().out)
 
 
 @pytest.mark.parametrize("method", ["unfold", "sweep", "heat"])
@@ -438,9 +459,12 @@ def test_json_of_the_other_commands(sphere: Path, capsys: pytest.CaptureFixture[
     report = shapes.icosphere(2).report()
     assert printed("info")["mean_edge"] == report.mean_edge
     lines = printed("isolines", "--source=0", "--spacing=0.5", f"--output={sphere.with_name('l.obj')}")
-    assert (lines["lines"], lines["distances"]) == (5, [0.5, 1.0, 1.5, 2.0, 2.5])
+    assert (lines["lines"], lines["distances"]) == (6, [0.5, 1.0, 1.5, 2.0, 2.5, 3.0])
+    assert lines["farthest"] == printed("distance", "--source=0")["farthest"]["distance"]
+    by_heat = printed("isolines", "--source=0", "--spacing=0.5", "--method=heat", "--output=l.obj")
+    assert by_heat["farthest"] == heat_igl.HeatMethodSolver(sphere).distance(0).max()
     path = printed("path", "--from=0", "--to=5", f"--output={sphere.with_name('p.obj')}")
-    assert path["length"] == pytest.approx(heat_igl.geodesic_distance(sphere, 0, method="exact")[5], rel=1e-3)
+    assert path["length"] == pytest.approx(heat_igl.geodesic_distance(sphere, 0, method="exact")[5], rel=1e-12)
     page = printed("view", f"--html={sphere.with_name('v.html')}")
     assert page["wrote"] == [str(sphere.with_name("v.html"))]
     validation = printed("validate", "--methods=heat")

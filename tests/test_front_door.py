@@ -342,3 +342,10 @@ def test_large_steps_are_warned_about() -> None:
     for options in ({"t": 1e4}, {"t_coef": 1e6}):
         with pytest.warns(AccuracyWarning, match=f"{next(iter(options))} = 1e.* is very large: heat spreads over"):
             HeatMethodSolver(TORUS, **options)
+
+
+@pytest.mark.parametrize("options", [{"t": 1e300}, {"t_coef": 1e20}])
+def test_steps_that_leave_heat_level_are_refused(options: dict[str, float]) -> None:
+    """M - t L is singular in double precision then."""
+    with pytest.raises(ValueError, match=f"{next(iter(options))} = 1e.* is too large: heat spreads over"):
+        HeatMethodSolver(TORUS, **options)

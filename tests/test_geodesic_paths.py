@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
@@ -424,3 +426,15 @@ def test_loops_that_begin_on_an_edge_are_straightened(axis: int) -> None:
             assert shortest.lengths(torus).sum() <= loop.lengths(torus).sum() * (1 + 1e-12)
             again = heat_igl.straighten(torus, shortest) if shortest.lengths(torus).any() else shortest
             assert again.lengths(torus).sum() == pytest.approx(shortest.lengths(torus).sum())
+
+
+def test_one_solver_serves_several_threads_and_is_pickled():
+    """The tables hold what a search leaves behind, so searches that overlap would mix."""
+    mesh = perturbed(shapes.icosphere(4))
+    solver = GeodesicPathSolver(mesh)
+    pairs = np.random.default_rng(1).integers(0, mesh.n_vertices, (60, 2)).tolist()
+    want = [float(solver.path(pair).lengths(mesh).sum()) for pair in pairs]
+    with ThreadPoolExecutor(4) as workers:
+        assert [float(curve.lengths(mesh).sum()) for curve in workers.map(solver.path, pairs)] == want
+    copy = pickle.loads(pickle.dumps(solver))
+    assert float(copy.path(pairs[0]).lengths(mesh).sum()) == want[0]

@@ -4,13 +4,14 @@ import itertools
 import pickle
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from threading import get_ident
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from heat_igl import FactorizationError, MissingExtraError, shapes
+from heat_igl import FactorizationError, HeatMethodSolver, MissingExtraError, shapes
 from heat_igl.linear import analyse, factorize
 from heat_igl.linear.dissection import dissect
 from heat_igl.operators import operators
@@ -239,3 +240,14 @@ def test_unsorted_indices(heat_matrix, backend):
     np.testing.assert_allclose(heat_matrix @ factorize(A, backend).solve(b), b, rtol=0, atol=1e-12)
     assert (indices == kept).all()
     assert np.shares_memory(A.indices, indices)
+
+
+def test_factors_of_a_small_mesh_are_made_on_the_thread_that_drops_them(monkeypatch):
+    """scipy never frees a factor that is made on one thread and dropped on another."""
+    made = []
+    whole = spl.splu
+    monkeypatch.setattr(spl, "splu", lambda *given, **options: made.append(get_ident()) or whole(*given, **options))
+    monkeypatch.setenv("HEAT_IGL_NUM_THREADS", "2")
+    assert HeatMethodSolver(shapes.icosphere(2)).diagnostics.backend == "scipy"
+    assert set(made) == {get_ident()}
+    assert len(made) == 2

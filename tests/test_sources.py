@@ -9,6 +9,7 @@ from heat_igl import (
     SourceError,
     SurfaceCurve,
     SurfacePoints,
+    isolines,
     shapes,
     shortest_paths,
 )
@@ -152,3 +153,13 @@ def test_a_curve_without_length_is_a_point(refine):
     np.testing.assert_array_equal(found.distance, solver.distance([SurfacePoints([7], inside), 5]))
     assert found.labels[5] == 1
     assert (found.labels[mesh.F[7]] == 0).all()
+
+
+def test_lists_of_curves_may_be_nested():
+    """`isolines` returns a list of curves for each level."""
+    mesh = shapes.icosphere(2)
+    lines = isolines(mesh, mesh.V[:, 2], [-0.3, 0.4])
+    flat = [curve for level in lines for curve in level]
+    solver = HeatMethodSolver(mesh, refine="sweep")
+    np.testing.assert_array_equal(solver.distance(lines), solver.distance(flat))
+    np.testing.assert_array_equal(solver.distance([lines, [3, 4]]), solver.distance([*flat, 3, 4]))

@@ -180,7 +180,7 @@ def test_bad_arguments_are_named(sphere):
         trace_geodesic(sphere, 3, [1, 0, 0, 0], 0.1)
     with pytest.raises(heat_igl.SourceError, match="start must be one vertex or point, not 2"):
         trace_geodesic(sphere, [3, 4], [1, 0], 0.1)
-    with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 99999 is no vertex"):
+    with pytest.raises(heat_igl.SourceError, match=r"start\[0\] = 99999 is no vertex"):
         trace_geodesic(sphere, 99999, [1, 0], 0.1)
     with pytest.raises(heat_igl.SourceError, match=r"faces\[0\] = 99999 is no face"):
         trace_geodesic(sphere, SurfacePoints([99999], [[1, 0, 0]]), [1, 0], 0.1)

@@ -44,7 +44,9 @@ _MOST_LINES = 10000
 
 def distance(
     mesh: MeshOrCloudArgument,
-    source: Annotated[list[int] | None, typer.Option(help="Source vertex, counted from 0; repeat for several.")] = None,
+    source: Annotated[
+        list[int] | None, typer.Option(metavar="VERTEX", help="Source vertex, counted from 0; repeat for several.")
+    ] = None,
     at: Annotated[
         list[str] | None, typer.Option(metavar="X,Y,Z", help="Source at the closest point of the surface; repeatable.")
     ] = None,
@@ -95,7 +97,7 @@ def distance(
         _warm_up(loaded, chosen, options)
         phi, about = _measured(loaded, sources, chosen, options, cutoff)
     written = _write(loaded, phi, vertices, output, picture)
-    rows = [*_summary(mesh, loaded, phi), ("method", chosen), *about, *gaps]
+    rows = [*_summary(mesh, loaded, phi, cutoff), ("method", chosen), *about, *gaps]
     print_rows([*rows, *(("wrote", str(path)) for path in written)], json_file)
 
 
@@ -149,10 +151,13 @@ def _warm_up(mesh: Mesh | PointCloud, method: DistanceMethod, options: SolverOpt
 
 def isolines(
     mesh: MeshArgument,
-    source: Annotated[list[int], typer.Option(help="Source vertex, counted from 0; repeat for several.")],
+    source: Annotated[
+        list[int], typer.Option(metavar="VERTEX", help="Source vertex, counted from 0; repeat for several.")
+    ],
     spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=positive)],
     output: Annotated[Path, typer.Option(help="OBJ, SVG or DXF file for the lines; dotted behind, in SVG.")],
-    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
+    method: Annotated[str | None, choice(DistanceMethod, "Default: unfold, near-exact.")] = None,
+    refine: Annotated[str | None, choice(Refine, "Heat: unfold triangles in its order, near-exact; or exact.")] = None,
     json_file: JsonOption = None,
 ) -> None:
     """Curves of equal distance from one or more source vertices."""
@@ -160,7 +165,8 @@ def isolines(
     sources = vertex_sources(np.array(source), loaded.n_vertices)
     check_curves(output)
     check_json(json_file)
-    phi = HeatMethodSolver(loaded, refine=cast(Refine | None, refine)).distance(sources)
+    options = SolverOptions(refine=cast(Refine | None, refine))
+    phi, _ = _measured(loaded, sources, _method(method, options, loaded), options, None)
     farthest = float(phi[np.isfinite(phi)].max())
     if farthest < spacing:
         raise ValueError(f"--spacing {spacing:g} makes no line: the farthest vertex is at {farthest:.3g}")
@@ -196,7 +202,7 @@ def _write(
     return [path for path in (output, picture) if path is not None]
 
 
-def _summary(path: Path, mesh: Mesh | PointCloud, phi: FloatArray) -> list[Row]:
+def _summary(path: Path, mesh: Mesh | PointCloud, phi: FloatArray, cutoff: float | None) -> list[Row]:
     finite = np.isfinite(phi)
     farthest = int(np.argmax(np.where(finite, phi, -1.0)))
     kind = "tetrahedra" if _is_tetrahedral(mesh) else "triangles"
@@ -208,5 +214,6 @@ def _summary(path: Path, mesh: Mesh | PointCloud, phi: FloatArray) -> list[Row]:
         ("farthest", f"{greatest:.6g} at vertex {farthest}", {"distance": greatest, "vertex": farthest}),
     ]
     if unreachable:
-        rows.append(("unreachable", f"{unreachable} vertices", unreachable))
+        beyond = "" if cutoff is None else ", or beyond the cutoff"
+        rows.append(("unreachable", f"{unreachable} vertices{beyond}", unreachable))
     return [*rows, ("mean", f"{mean:.6g}", mean)]

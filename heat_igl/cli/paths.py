@@ -11,7 +11,6 @@ import heat_igl
 from heat_igl.cli.options import JsonOption, MeshArgument, position
 from heat_igl.cli.output import Row, check_curves, check_json, print_rows
 from heat_igl.errors import SourceError
-from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.io import read_mesh
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, closest_points
 
@@ -30,8 +29,12 @@ def path(
         ),
     ] = None,
     closed: Annotated[bool, typer.Option("--closed", help="Straighten the loop through the waypoints.")] = False,
-    start: Annotated[int | None, typer.Option("--from", help="Vertex where the shortest path begins.")] = None,
-    end: Annotated[int | None, typer.Option("--to", help="Vertex where the shortest path ends.")] = None,
+    start: Annotated[
+        int | None, typer.Option("--from", metavar="VERTEX", help="Vertex where the shortest path begins.")
+    ] = None,
+    end: Annotated[
+        int | None, typer.Option("--to", metavar="VERTEX", help="Vertex where the shortest path ends.")
+    ] = None,
     json_file: JsonOption = None,
 ) -> None:
     """A geodesic through waypoints, a closed one, or the shortest path between two vertices."""
@@ -39,7 +42,12 @@ def path(
     check_curves(output)
     check_json(json_file)
     if (start is None) != (end is None) or (start is None) == (not waypoints) or (closed and not waypoints):
-        raise SourceError("name two waypoints or more, such as 12 900, or one vertex with --from and one with --to")
+        missing = "--to" if start is not None and end is None else "--from" if end is not None and start is None else ""
+        raise SourceError(
+            f"{missing} is missing: name a vertex with each of --from and --to"
+            if missing
+            else "name two waypoints or more, such as 12 900, or one vertex with --from and one with --to, not both"
+        )
     if waypoints:
         places = [_place(loaded, text) for text in waypoints]
         _write(loaded, heat_igl.geodesic_path(loaded, places, closed), output, json_file)
@@ -49,7 +57,7 @@ def path(
         if vertex is None or not 0 <= vertex < loaded.n_vertices:
             raise SourceError(f"{option} {vertex} is no vertex: the mesh has {loaded.n_vertices}, counted from 0")
         ends.append(vertex)
-    found = heat_igl.shortest_paths(loaded, HeatMethodSolver(loaded, refine="unfold"), *ends)
+    found = heat_igl.shortest_paths(loaded, None, *ends)
     _write(loaded, found[0], output, json_file)
 
 

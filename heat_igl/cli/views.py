@@ -25,7 +25,9 @@ __all__ = ["demo", "view"]
 
 def view(
     mesh: MeshArgument,
-    source: Annotated[list[int] | None, typer.Option(help="Source vertex to start with; repeat for several.")] = None,
+    source: Annotated[
+        list[int] | None, typer.Option(metavar="VERTEX", help="Source vertex to start with; repeat for several.")
+    ] = None,
     t_coef: Annotated[
         float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=positive)
     ] = None,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from threading import RLock
+
 import numpy as np
 
 from heat_igl.curves.places import Waypoints, corners, mixed_places
@@ -119,7 +121,8 @@ class GeodesicPathSolver:
 
     Notes
     -----
-    Curves are independent of one another: they may cross, touch and overlap. Threads need a solver each.
+    Curves are independent of one another: they may cross, touch and overlap. Several threads may use one solver, but
+    wait for one another: for speed, make one for each.
 
     Examples
     --------
@@ -138,6 +141,11 @@ class GeodesicPathSolver:
         self._shortener = Shortener(self._mesh)
         self._corner_at = corners(self._mesh)
         self._router: Router | None = None
+        # The tables hold what one search leaves behind.
+        self._one_at_a_time = RLock()
+
+    def __reduce__(self) -> tuple[type[GeodesicPathSolver], tuple[Mesh]]:
+        return GeodesicPathSolver, (self._mesh,)
 
     def __repr__(self) -> str:
         return f"GeodesicPathSolver({self._mesh.n_vertices} vertices)"
@@ -149,7 +157,9 @@ class GeodesicPathSolver:
         course = course_of(self._mesh, curve)
         if curve.is_closed and not curve.lengths(self._mesh).any():
             raise SourceError("curve is closed and has no length: a loop needs two different points")
-        return as_curve([self._shortener.shortest(course, is_closed=curve.is_closed)], is_closed=curve.is_closed)
+        with self._one_at_a_time:
+            found = self._shortener.shortest(course, is_closed=curve.is_closed)
+        return as_curve([found], is_closed=curve.is_closed)
 
     def path(self, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
         """The geodesic through waypoints, or the closed one of their loop; see `geodesic_path`."""
@@ -161,7 +171,8 @@ class GeodesicPathSolver:
             )
         if closed:
             around = np.append(np.arange(len(faces)), 0)
-            return self._loop(self._routes.legs(faces[around], barycentric[around]))
+            with self._one_at_a_time:
+                return self._loop(self._routes.legs(faces[around], barycentric[around]))
         return as_curve(self.geodesics(faces, barycentric), is_closed=False)
 
     def log_vectors(self, face: int, barycentric: FloatArray, faces: IntArray, ends: FloatArray) -> FloatArray:
@@ -187,8 +198,9 @@ class GeodesicPathSolver:
     def geodesics(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
         """The geodesics between checked places (k,), each from one to the next."""
         # Each of the two ways may lead past a hill on the longer side.
-        ways = (self._routes.legs(faces, barycentric, crosses=crosses) for crosses in (True, False))
-        return [self._shortener.shorter(*pair) for pair in zip(*ways, strict=True)]
+        with self._one_at_a_time:
+            ways = (self._routes.legs(faces, barycentric, crosses=crosses) for crosses in (True, False))
+            return [self._shortener.shorter(*pair) for pair in zip(*ways, strict=True)]
 
     @property
     def _routes(self) -> Router:

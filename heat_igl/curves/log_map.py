@@ -87,7 +87,7 @@ def log_map(
     _require_one(source, triangles.n_vertices)
     by_windows = method == "exact" or triangles.n_vertices <= _FEW
     if by_windows and not triangles.is_tetrahedral and not isinstance(source, SurfacePoints):
-        vectors = vectors_from(triangles, int(ordered_vertices(source, triangles.n_vertices)[0]))
+        vectors = vectors_from(triangles, int(ordered_vertices(source, triangles.n_vertices, "source")[0]))
         if vectors is not None:
             return vectors
     distance, _, angles, _ = directed_from_scratch(triangles, source, "exact" if by_windows else method, _TOLERANCE)
@@ -103,10 +103,10 @@ def _one_vertex(source: Sources, n: int) -> int:
     if isinstance(source, SurfacePoints):
         raise SourceError("the vector heat method starts at vertices: take another method for a point in a face")
     _require_one(source, n)
-    return int(ordered_vertices(source, n)[0])
+    return int(ordered_vertices(source, n, "source")[0])
 
 
 def _require_one(source: Sources, n: int) -> None:
-    k = len(source) if isinstance(source, SurfacePoints) else len(ordered_vertices(source, n))
+    k = len(source) if isinstance(source, SurfacePoints) else len(ordered_vertices(source, n, "source"))
     if k != 1:
         raise SourceError(f"source must be one vertex or point, not {k}")

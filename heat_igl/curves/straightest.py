@@ -198,7 +198,7 @@ class Tracer:
             weights = np.where(points.barycentric < ON_SIDE, 0.0, points.barycentric)
             weights /= weights.sum(axis=1, keepdims=True)
             return _Starts(points.faces, np.ascontiguousarray(weights), np.full(len(points), -1))
-        vertices = ordered_vertices(points, self._mesh.n_vertices)
+        vertices = ordered_vertices(points, self._mesh.n_vertices, name)
         corner = self._frames.angles.first[vertices]
         if (corner < 0).any():
             first = int(np.argmax(corner < 0))

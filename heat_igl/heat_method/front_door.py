@@ -93,8 +93,8 @@ def geodesic_distance(
         if method == "sweep":
             return HeatMethodSolver(triangles, refine="sweep").distance(sources, beyond)
         raise MeshError(
-            f"method={method!r} needs triangles, but the mesh holds tetrahedra: take method='sweep', the most accurate "
-            "one for tetrahedra, or method='heat'"
+            f"method={method!r} needs triangles, but the mesh holds tetrahedra: take method='sweep' or 'heat', which "
+            "follow fronts through them"
         )
     if targets is not None:
         return np.asarray(cut_off(distance_to_targets(triangles, sources, targets), beyond))

@@ -18,7 +18,7 @@ from heat_igl.heat_method.element_slopes import ElementSlopes
 from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.solution import Diagnostics
-from heat_igl.heat_method.time_step import time_step, warn_of_large_step
+from heat_igl.heat_method.time_step import check_large_step, time_step
 from heat_igl.linear import Analysis
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
 from heat_igl.operators import (
@@ -187,7 +187,7 @@ def prepare(
     damped = options.damps(domain)
     fitted = damped and domain.lengths is not None
     step, requested = time_step(options, domain, fitted)
-    warn_of_large_step(options, domain)
+    check_large_step(options, domain)
     t_damping = step if damped else None
     front_solver = None if domain.simplices is None or not options.leaves_heat else FrontSolver(domain.simplices)
     takes_heat = options.refine != "exact" and front_solver is None
@@ -264,7 +264,9 @@ def _factored(
         flow,
         lambda: NormalizedDivergence(domain, t_damping, found.order, fitted),
     ]
-    poisson, heat_flow, divergence = in_order(lambda make: make(), makers, min(2, n_threads()))
+    # scipy's SuperLU keeps the memory of a factor that is made on one thread and dropped on another, as a solver is.
+    threads = 1 if found.backend == "scipy" else min(2, n_threads())
+    poisson, heat_flow, divergence = in_order(lambda make: make(), makers, threads)
     return heat_flow, poisson, divergence
 
 

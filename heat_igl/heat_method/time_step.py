@@ -10,7 +10,7 @@ from heat_igl.operators import Operators, is_rough_or_narrow
 from heat_igl.runtime import LARGEST_EXPONENT, RANGE_LIMIT, warn_caller
 from heat_igl.typing import FloatArray
 
-__all__ = ["smallest_time_step", "time_step", "warn_of_large_step"]
+__all__ = ["smallest_time_step", "time_step", "check_large_step"]
 
 # Between two aims, see the tables of docs/heat_path.md: on scans the error falls further with t, on a regular grid of
 # squares, on which heat prefers diagonals, it grows.
@@ -20,6 +20,8 @@ _T_COEF_FITTED = 0.5
 _T_COEF_ROUGH = 0.15
 # The paper's: t = h^2.
 _T_COEF = 1.0
+# Heat that spreads over more than this many of the longest distances is level to 1e-10.
+_FARTHEST_SPREAD = 1e5
 
 
 def time_step(options: SolverOptions, domain: Operators, fitted: bool) -> tuple[float | FloatArray, float | FloatArray]:
@@ -78,8 +80,10 @@ def _smallest(longest: float, h: float, fitted: bool) -> float:
     return float(h**2 / (2 * (float(np.cosh(per_edge)) - 1))) if per_edge < LARGEST_EXPONENT else 0.0
 
 
-def warn_of_large_step(options: SolverOptions, domain: Operators) -> None:
+def check_large_step(options: SolverOptions, domain: Operators) -> None:
     """Warn if the step that was asked for is so large that heat is nearly level over the whole domain.
+
+    Raise ValueError if M - t L would be singular in double precision.
 
     Heat falls like exp(-d / sqrt(t)). With sqrt(t) above the longest distance it falls by less than a factor of e
     altogether, and distances follow the shape of the domain more than the way to the source.
@@ -87,8 +91,14 @@ def warn_of_large_step(options: SolverOptions, domain: Operators) -> None:
     step = options.t
     if step is None and options.t_coef is not None:
         step = options.t_coef * domain.mean_edge_length**2
+    name, value = ("t", options.t) if options.t is not None else ("t_coef", options.t_coef)
+    if step is not None and np.sqrt(step) > _FARTHEST_SPREAD * domain.longest_distance:
+        raise ValueError(
+            f"{name} = {value:.4g} is too large: heat spreads over sqrt(t) = {np.sqrt(step):.4g}, and the longest "
+            f"distance on the mesh is {domain.longest_distance:.4g}, so heat is level; t is a squared "
+            "length"
+        )
     if step is not None and np.sqrt(step) > domain.longest_distance:
-        name, value = ("t", options.t) if options.t is not None else ("t_coef", options.t_coef)
         warn_caller(
             f"{name} = {value:.4g} is very large: heat spreads over sqrt(t) = {np.sqrt(step):.4g}, more than the "
             f"longest distance on the mesh, {domain.longest_distance:.4g}, and distances are smoothed by as much; "

@@ -10,8 +10,8 @@ from heat_igl.typing import AnyArray, IntArray
 __all__ = ["ordered_vertices"]
 
 
-def ordered_vertices(sources: Sources, n: int) -> IntArray:
+def ordered_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
     """The vertices (k,) that `sources` names, in their order; arguments and errors as for `vertex_sources`."""
-    vertex_sources(sources, n)  # which checks them
+    vertex_sources(sources, n, name)  # which checks them
     array: AnyArray = np.atleast_1d(np.asarray(sources))
     return np.flatnonzero(array) if array.dtype.kind == "b" else array.astype(np.int64)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -162,7 +162,7 @@ def source_set(sources: Sources, n: int, F: IntArray | None) -> SourceSet:
     ----------
     sources : sources
         A vertex index, a sequence of them, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources`, or
-        a list or tuple of such.
+        a list or tuple of such, also nested, as `isolines` returns curves.
     n : int
         Number of vertices of the domain.
     F : (m, 3) int64 or None
@@ -260,6 +260,13 @@ def _checked_offsets(offsets: ArrayLike) -> FloatArray:
     return array
 
 
+def _holds_places(sources: object) -> TypeGuard[Sequence[Any]]:
+    """Whether a list, or one inside of it such as those of `isolines`, holds points or curves."""
+    if not isinstance(sources, Sequence) or isinstance(sources, (str, bytes, range)):
+        return False
+    return any(isinstance(part, _PLACES) or _holds_places(part) for part in sources)
+
+
 class _Builder:
     """Collects the parts of a set and counts the sources."""
 
@@ -291,7 +298,7 @@ class _Builder:
                 self._points.append((SurfacePoints(sources.faces[:1], sources.start[:1]), label))
             else:
                 self._curves.append((sources, int(label[0])))
-        elif isinstance(sources, Sequence) and any(isinstance(part, _PLACES) for part in sources):
+        elif _holds_places(sources):
             for i, part in enumerate(sources):
                 try:
                     self.add(part)
