@@ -144,7 +144,7 @@ def test_even_points_are_solved_on_as_their_mesh_is() -> None:
     of_cloud, of_mesh = HeatMethodSolver(PointCloud(mesh.V), magnitude="damped"), HeatMethodSolver(mesh)
     assert of_cloud.t == pytest.approx(of_mesh.t, rel=1e-6)
     np.testing.assert_allclose(of_cloud.distance(0), of_mesh.distance(0), rtol=1e-6)
-    solver = HeatMethodSolver(PointCloud(sphere(1000)))
+    solver = HeatMethodSolver(PointCloud(sphere(1000)), **HEAT)
     assert solver.t == pytest.approx(solver.operators.mean_edge_length**2, rel=1e-9)
 
 

@@ -124,10 +124,13 @@ def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysi
         follows_fronts = isinstance(mesh, Mesh) and mesh.is_tetrahedral and options.leaves_heat
         is_factored = options.refine != "exact" and not follows_fronts
         on_laplacian = analyse if known is None and is_factored and n_threads() > 1 else None
-        if isinstance(mesh, PointCloud):
+        if not isinstance(mesh, PointCloud):
+            domain = operators(mesh, options.triangulation, on_laplacian)
+        elif options.refine is None:
             domain = point_cloud_operators(mesh, options.triangulation, on_laplacian)
         else:
-            domain = operators(mesh, options.triangulation, on_laplacian)
+            # For an order, slivers at the boundary do no harm.
+            domain = operators(mesh.triangles, options.triangulation, on_laplacian)
         seconds = time.perf_counter() - start
         known = begun[0].result() if begun else known
     waited = time.perf_counter() - start - seconds
@@ -138,7 +141,9 @@ def _for_points(cloud: PointCloud, options: SolverOptions) -> SolverOptions:
     """The options with those left open chosen for a cloud: on scattered points the sweep is far nearer than heat."""
     if options.refine is None and options.leaves_heat and options.laplacian == "auto":
         options = replace(options, refine="sweep")
-    return options if options.t_coef is not None else replace(options, t_coef=_t_coef_of_points(cloud.triangles))
+    if options.refine is not None or options.t_coef is not None:
+        return options
+    return replace(options, t_coef=_t_coef_of_points(cloud.triangles))
 
 
 def _t_coef_of_points(triangles: Mesh) -> float:

@@ -133,8 +133,8 @@ def without_noise(tree: PointTree) -> PointTree:
         return tree
     most = min(_LARGEST_K, n // 4)
     sample = np.unique(np.linspace(0, n - 1, _SAMPLE).astype(np.int64))
-    few, all_k = (float(np.median(_onto_quadrics(tree, sample, size)[1])) for size in (k // 2, k))
-    if few < max(_NOISE, _NOISE_NOT_DETAIL * all_k):
+    few = float(np.median(_onto_quadrics(tree, sample, k // 2)[1]))
+    if few < _NOISE or few < _NOISE_NOT_DETAIL * float(np.median(_onto_quadrics(tree, sample, k)[1])):
         return tree
     for _ in range(_MOST_PASSES):
         _, noise, thickness = _onto_quadrics(tree, sample, k)
