@@ -161,11 +161,13 @@ class _Bends:
                 x[k] = self.positions[bend.a, k] + 0.25 * j * bend.length * bend.tangent[k]
             from_a: cython.double = self.value(bend.a, x)
             from_b: cython.double = self.value(bend.b, x)
-            if a_reaches and b_reaches:
+            a_is_seen: cython.bint = a_reaches or self.is_lit_from(bend.a, i, x, 0.25 * j)
+            b_is_seen: cython.bint = b_reaches or self.is_lit_from(bend.b, i, x, 0.25 * j)
+            if a_is_seen and b_is_seen:
                 bend.at[j] = min(from_a, from_b)
-            elif a_reaches:
+            elif a_is_seen:
                 bend.at[j] = from_a
-            elif b_reaches:
+            elif b_is_seen:
                 bend.at[j] = from_b
             else:
                 bend.at[j] = max(from_a, from_b)
@@ -175,6 +177,21 @@ class _Bends:
                 for k in range(3):
                     bend.before[k] = self.x[k]
         self.lay_flat(i)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def is_lit_from(
+        self, v: cython.int, i: cython.int, x: cython.pointer[cython.const[cython.double]], share: cython.double
+    ) -> cython.bint:
+        """Whether the source from which the way to v is straight sees a point of edge i."""
+        if self.way[v] != -1:
+            return False
+        k: cython.int
+        for k in range(3):
+            self.x[k] = x[k]
+        self.share = share
+        return self.sees(i, self.sources[self.label[v]])
 
     @cython.cfunc
     @cython.nogil
