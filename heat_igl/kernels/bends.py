@@ -108,7 +108,11 @@ def bend_around(
 @cython.final
 @cython.cclass
 class _Bends:
-    """What is read and written; `x` is the point at which the way bends that was last asked for, `share` its place."""
+    """What is read and written, and of the way that was last asked for, where it bends.
+
+    `x` (3,) is the point, `share` its place along the edge, and `beyond` by how much the way would miss the edge on a
+    line through it.
+    """
 
     ray: Ray
     bends: Bend[::1]
@@ -128,6 +132,7 @@ class _Bends:
     n_searches: cython.int
     x: cython.double[3]
     share: cython.double
+    beyond: cython.double
 
     @cython.cfunc
     @cython.nogil
@@ -264,12 +269,14 @@ class _Bends:
             along += off * bend.tangent[k]
         squared: cython.double = max(away - along * along, 0.0)
         best: cython.double = INFINITY
+        self.beyond = 0.0
         if bend.fits:
             height: cython.double = sqrt(squared)
             both: cython.double = height + bend.height
             self.share = bend.along
             if both > 0:
                 self.share = (bend.along * height + along * bend.height) / both
+            self.beyond = max(-self.share, self.share - bend.length, 0.0)
             self.share = min(max(self.share / bend.length, 0.0), 1.0)
             if 0 < self.share < 1:
                 best = bend.start + sqrt((along - bend.along) * (along - bend.along) + both * both)
@@ -311,8 +318,8 @@ class _Bends:
             old: cython.double = self.d[u]
             is_better: cython.bint = value < old * (1 - GAIN)
             if not is_better:
-                # Ways around an end are those around another edge, too.
-                if self.share == 0 or self.share == 1 or value > old + SLACK * self.reach[u]:
+                # Farther along, ways are shorter around another edge.
+                if self.beyond > self.reach[u] or value > old + SLACK * self.reach[u]:
                     continue
             if not self.is_hidden_from_before(i, u) or not self.sees(i, u):
                 continue
