@@ -122,7 +122,7 @@ def test_meshes_of_the_libraries_themselves(library: str) -> None:
 
 
 WRONG = {
-    "a number": (3, "mesh is of type int, which is not understood: pass a Mesh or PolygonMesh, a pair"),
+    "a number": (3, "mesh is of type int, which is not understood: pass a Mesh, PolygonMesh or PointCloud, a pair"),
     "nothing": (None, "mesh is of type NoneType"),
     "an object": (SimpleNamespace(vertices=V), "mesh is a types.SimpleNamespace, which is not understood"),
     "positions alone": (V, "faces F are missing"),
@@ -151,3 +151,13 @@ def test_a_path_is_taken_in_a_new_interpreter(tmp_path):
     heat_igl.write_mesh(path, heat_igl.shapes.icosphere(1))
     code = f"import heat_igl; print(heat_igl.as_mesh({str(path)!r}).n_vertices)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "42\n"
+
+
+@pytest.mark.parametrize("suffix", ["xyz", "ply", "obj", "npy"])
+def test_a_path_to_points_gives_a_cloud(tmp_path, suffix):
+    cloud = heat_igl.PointCloud(np.random.default_rng(0).normal(size=(40, 3)))
+    path = tmp_path / f"points.{suffix}"
+    heat_igl.write_point_cloud(path, cloud)
+    found = heat_igl.as_mesh(str(path))
+    assert isinstance(found, heat_igl.PointCloud)
+    np.testing.assert_allclose(found.P, cloud.P)

@@ -128,6 +128,44 @@ def test_distance_on_hexagons_of_a_sphere():
     assert errors[2] < 0.012 * np.pi / 2
 
 
+def test_points_inside_polygons():
+    """They lie on ``mesh.triangles``; the error is that from a vertex."""
+    errors, from_vertices = [], []
+    rng = np.random.default_rng(0)
+    for n in (16, 64):
+        mesh = quads(n)
+        triangles = mesh.triangles
+        solver = heat_igl.HeatMethodSolver(mesh)
+        faces, shares = rng.integers(triangles.n_faces, size=4), rng.dirichlet([1, 1, 1], 4)
+        places = np.einsum("pc,pcx->px", shares, mesh.V[triangles.F[faces]])
+        found = solver.distances([heat_igl.SurfacePoints([f], [share]) for f, share in zip(faces, shares, strict=True)])
+        exact = np.linalg.norm(mesh.V - places[:, None], axis=2)
+        errors.append(np.abs(found - exact).mean())
+        # The corners of the face know their distances exactly.
+        corners = triangles.F[faces]
+        np.testing.assert_allclose(
+            np.take_along_axis(found, corners, 1), np.take_along_axis(exact, corners, 1), rtol=1e-9
+        )
+        vertices = corners[:, 0]
+        exact = np.linalg.norm(mesh.V - mesh.V[vertices][:, None], axis=2)
+        from_vertices.append(np.abs(solver.distances([[int(v)] for v in vertices]) - exact).mean())
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[1] < 1.3 * from_vertices[1]
+
+
+def test_a_curve_across_polygons():
+    mesh = quads(32)
+    ends = np.array([[0.13, 0.21, 0], [0.77, 0.64, 0]])
+    curve = heat_igl.geodesic_path(mesh.triangles, heat_igl.closest_points(mesh.triangles, ends).points)
+    along = ends[1] - ends[0]
+    share = np.clip((mesh.V - ends[0]) @ along / (along @ along), 0, 1)
+    exact = np.linalg.norm(mesh.V - ends[0] - share[:, None] * along, axis=1)
+    found = heat_igl.HeatMethodSolver(mesh).distance(curve)
+    assert np.abs(found - exact).mean() < 0.02 * exact.mean()
+    labels = heat_igl.HeatMethodSolver(mesh).voronoi([curve, heat_igl.SurfacePoints([0], [[1 / 3] * 3])]).labels
+    assert set(labels) == {0, 1}
+
+
 def test_time_step_goes_by_what_a_polygon_couples():
     """Two unit squares: seven sides of length 1 and four diagonals."""
     V = [*SQUARE, [2, 0, 0], [2, 1, 0]]

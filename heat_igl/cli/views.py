@@ -15,7 +15,7 @@ from heat_igl.cli.output import Row, check_json, check_page, check_writable, pri
 from heat_igl.cli.regions import projected
 from heat_igl.errors import ReferenceSolverError
 from heat_igl.heat_method import Boundary, Refine, SignedHeatSolver, SolverOptions
-from heat_igl.io import read_mesh, read_point_cloud
+from heat_igl.io import read_mesh_or_cloud, read_point_cloud
 from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import FloatArray
@@ -45,7 +45,7 @@ def view(
     from heat_igl.drawing.viewer import Exploration, Window, display_problem
 
     check_json(json_file)
-    loaded = read_point_cloud(mesh) if points else read_mesh(mesh)
+    loaded = read_point_cloud(mesh) if points else read_mesh_or_cloud(mesh)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
     options = SolverOptions(t_coef, boundary=cast(Boundary, boundary), refine=cast(Refine | None, refine))
     target = html or Path(f"{mesh.stem}-view.html")

@@ -38,11 +38,17 @@ def damped_field(
 
 def imposed_faces(domain: Operators, term: SourceTerm) -> IntArray:
     """The faces (k,) near points and curves on which the field is the gradient of the known distances."""
-    if domain.surface is None or not term.seen.any():
+    if not term.seen.any():
         return np.empty(0, np.int64)
     known = np.zeros(domain.n, np.int8)
     known[term.near.vertex] = 1
     known[term.near.vertex[term.seen]] = 2
+    if domain.surface is None:
+        # Of polygons, those of which all corners are known: G has them in each triangle of the polygon.
+        of_face = abs(domain.G.tocsr())
+        unknown, seen = (of_face @ (known == kind) for kind in (0, 2))
+        unknown, seen = (rows.reshape(domain.dimension, -1).sum(axis=0) for rows in (unknown, seen))
+        return np.flatnonzero((unknown == 0) & (seen > 0))
     corners = known[domain.surface.triangulation.F]
     return np.flatnonzero((corners > 0).all(axis=1) & (corners == 2).any(axis=1))
 

@@ -106,7 +106,8 @@ class SolverParts:
     @property
     def given_faces(self) -> IntArray | None:
         """Vertices (m, 3) of the triangles that points and curves refer to."""
-        return None if self.operators.surface is None else self.operators.surface.given_faces
+        surface = self.operators.given_surface
+        return None if surface is None else surface.given_faces
 
 
 def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysis | None = None) -> SolverParts:

@@ -20,7 +20,7 @@ from heat_igl.io import freesurfer, gifti, medit, msh, obj, off, ply, stl, vtp, 
 from heat_igl.io.atomic import replacing
 from heat_igl.io.contents import Contents
 from heat_igl.io.packed import form_suffix, is_packed, pack, unpacked
-from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_simplices, read_paths_with
+from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_simplices
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = [
@@ -103,9 +103,6 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     """
     path, contents = _load(path)
     return _mesh(path, contents)
-
-
-read_paths_with(read_mesh)
 
 
 def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:

@@ -16,7 +16,7 @@ from heat_igl.io.atomic import replacing
 from heat_igl.io.files import MESH_SUFFIXES, checked_attributes, checked_path, file_bytes, read_mesh
 from heat_igl.io.packed import form_suffix, pack
 from heat_igl.io.text import Text, format_rows
-from heat_igl.mesh import Mesh, PointCloud
+from heat_igl.mesh import Mesh, PointCloud, read_paths_with
 from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["POINT_CLOUD_SUFFIXES", "read_mesh_or_cloud", "read_point_cloud", "write_point_cloud"]
@@ -82,6 +82,9 @@ def read_mesh_or_cloud(path: str | os.PathLike[str]) -> Mesh | PointCloud:
     if suffix in _FACES and not _FACES[suffix].search(file_bytes(path)):
         return read_point_cloud(path)
     return read_mesh(path)
+
+
+read_paths_with(read_mesh_or_cloud)
 
 
 def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud, /, **attributes: ArrayLike) -> None:

@@ -108,7 +108,11 @@ def bend_around(
 @cython.final
 @cython.cclass
 class _Bends:
-    """What is read and written; `x` is the point at which the way bends that was last asked for, `share` its place."""
+    """What is read and written, and of the way that was last asked for, where it bends.
+
+    `x` (3,) is the point, `share` its place along the edge, and `beyond` by how much the way would miss the edge on a
+    line through it.
+    """
 
     ray: Ray
     bends: Bend[::1]
@@ -128,6 +132,7 @@ class _Bends:
     n_searches: cython.int
     x: cython.double[3]
     share: cython.double
+    beyond: cython.double
 
     @cython.cfunc
     @cython.nogil
@@ -161,11 +166,13 @@ class _Bends:
                 x[k] = self.positions[bend.a, k] + 0.25 * j * bend.length * bend.tangent[k]
             from_a: cython.double = self.value(bend.a, x)
             from_b: cython.double = self.value(bend.b, x)
-            if a_reaches and b_reaches:
+            a_is_seen: cython.bint = a_reaches or self.is_lit_from(bend.a, i, x, 0.25 * j)
+            b_is_seen: cython.bint = b_reaches or self.is_lit_from(bend.b, i, x, 0.25 * j)
+            if a_is_seen and b_is_seen:
                 bend.at[j] = min(from_a, from_b)
-            elif a_reaches:
+            elif a_is_seen:
                 bend.at[j] = from_a
-            elif b_reaches:
+            elif b_is_seen:
                 bend.at[j] = from_b
             else:
                 bend.at[j] = max(from_a, from_b)
@@ -175,6 +182,21 @@ class _Bends:
                 for k in range(3):
                     bend.before[k] = self.x[k]
         self.lay_flat(i)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def is_lit_from(
+        self, v: cython.int, i: cython.int, x: cython.pointer[cython.const[cython.double]], share: cython.double
+    ) -> cython.bint:
+        """Whether the source from which the way to v is straight sees a point of edge i."""
+        if self.way[v] != -1:
+            return False
+        k: cython.int
+        for k in range(3):
+            self.x[k] = x[k]
+        self.share = share
+        return self.sees(i, self.sources[self.label[v]])
 
     @cython.cfunc
     @cython.nogil
@@ -247,12 +269,14 @@ class _Bends:
             along += off * bend.tangent[k]
         squared: cython.double = max(away - along * along, 0.0)
         best: cython.double = INFINITY
+        self.beyond = 0.0
         if bend.fits:
             height: cython.double = sqrt(squared)
             both: cython.double = height + bend.height
             self.share = bend.along
             if both > 0:
                 self.share = (bend.along * height + along * bend.height) / both
+            self.beyond = max(-self.share, self.share - bend.length, 0.0)
             self.share = min(max(self.share / bend.length, 0.0), 1.0)
             if 0 < self.share < 1:
                 best = bend.start + sqrt((along - bend.along) * (along - bend.along) + both * both)
@@ -294,8 +318,8 @@ class _Bends:
             old: cython.double = self.d[u]
             is_better: cython.bint = value < old * (1 - GAIN)
             if not is_better:
-                # Ways around an end are those around another edge, too.
-                if self.share == 0 or self.share == 1 or value > old + SLACK * self.reach[u]:
+                # Farther along, ways are shorter around another edge.
+                if self.beyond > self.reach[u] or value > old + SLACK * self.reach[u]:
                     continue
             if not self.is_hidden_from_before(i, u) or not self.sees(i, u):
                 continue

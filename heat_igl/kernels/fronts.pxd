@@ -10,7 +10,5 @@ cdef extern from *:
     double GAIN, STRAIGHT, FLAT
 
 cdef enum:
-    # Visits per vertex up to which the kernel goes back at once to nearer vertices that have become stale.
-    GO_BACK = 20
     # Visits per vertex after which the kernel gives up.
     MOST_VISITS = 100

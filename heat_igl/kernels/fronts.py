@@ -6,8 +6,7 @@ refracted. Seen from a vertex, the source lies behind the opposite side of a sim
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, GO_BACK, MOST_VISITS, STRAIGHT
-from cython.cimports.heat_igl.kernels.lines import STRAIGHT_LINE, straight
+from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, MOST_VISITS, STRAIGHT
 from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["advance"]
@@ -23,9 +22,6 @@ def advance(
     d: cython.double[::1],
     begin: cython.double[::1],
     label: cython.int[::1],
-    is_stale: cython.uchar[::1],
-    positions: cython.const[cython.double][:, ::1],
-    sources: cython.const[cython.int][::1],
 ):
     """Lower `d` (n,) to the best that the simplices of each vertex say, in passes over the given order.
 
@@ -47,12 +43,6 @@ def advance(
         The value at which a front that looks like the one that passes here would have left its source; at first, `d`.
     label : (n,) int32
         The source that distance comes from, -1 where there is none.
-    is_stale : (n,) uint8
-        The vertices to visit; none on return.
-    positions : (n, 3) float64
-        Of the vertices, where lengths are those of space; else no entries. No distance is then below the straight line.
-    sources : (k,) int32
-        Vertex of each source.
 
     Returns
     -------
@@ -64,10 +54,7 @@ def advance(
     one.p = corners.shape[1] - 1
     one.order, one.corners, one.lengths, one.slowness = order, corners, lengths, slowness
     one.first, one.incident, one.d, one.label = first, incident, d, label
-    one.positions, one.sources = positions, sources
-    one.begin, one.is_stale = begin, is_stale
-    # A straight front between two round ones is too early. Straight lines have been followed where positions are known.
-    one.may_mix = positions.shape[0] == 0
+    one.begin, one.is_stale = begin, np.ones(n, np.uint8)
     one.arrived = np.ones(n)
     rank = np.empty(n, np.int32)
     rank[order] = np.arange(n, dtype=np.int32)
@@ -95,13 +82,10 @@ class _Fronts:
     incident: cython.const[cython.int][::1]
     d: cython.double[::1]
     label: cython.int[::1]
-    positions: cython.const[cython.double][:, ::1]
-    sources: cython.const[cython.int][::1]
     begin: cython.double[::1]
     arrived: cython.double[::1]
     is_stale: cython.uchar[::1]
     rank: cython.const[cython.int][::1]
-    may_mix: cython.bint  # whether corners that are measured from different sources give a value together
     n_visits: cython.longlong
     # The best that was found for the vertex that is visited.
     best: cython.double
@@ -113,15 +97,10 @@ class _Fronts:
     @cython.nogil
     @cython.exceptval(check=False)
     def run(self) -> cython.void:
-        """Visit all that is stale, in order, until nothing is.
-
-        Where straight lines from a single source are known, most vertices soon have their last value, and the kernel
-        goes back at once to what depends on one. Else it goes on to the end first, since the value may change again.
-        """
+        """Visit all that is stale, in order, until nothing is; what becomes stale again waits for the next pass."""
         n: cython.Py_ssize_t = self.order.shape[0]
         i: cython.Py_ssize_t = 0
         behind: cython.Py_ssize_t = n  # lowest rank of what was passed and is stale again
-        goes_back: cython.bint = self.positions.shape[0] > 0 and self.sources.shape[0] == 1
         self.n_visits = 0
         while i < n and self.n_visits < MOST_VISITS * n:
             v: cython.int = self.order[i]
@@ -130,7 +109,7 @@ class _Fronts:
                 self.is_stale[v] = False
                 self.n_visits += 1
                 behind = min(behind, self.visit(v))
-            if behind < i and (i == n or (goes_back and self.n_visits < GO_BACK * n)):
+            if behind < i and i == n:
                 i, behind = behind, n
 
     @cython.cfunc
@@ -143,11 +122,8 @@ class _Fronts:
         u: cython.int
         k: cython.int
         old: cython.double = self.d[v]
-        floor: cython.double = self.floor(v)
         self.best, self.best_simplex = old, -1
         for k in range(self.first[v], self.first[v + 1]):
-            if self.best <= floor:
-                break
             self.through(self.incident[k] // (self.p + 1), self.incident[k] % (self.p + 1))
         if self.best_simplex < 0:
             return n
@@ -162,20 +138,10 @@ class _Fronts:
             for c in range(self.p + 1):
                 u = self.corners[s, c]
                 # Nearer vertices too: v may be the far corner of the side that their way crosses.
-                if not self.is_stale[u] and u != v and self.d[u] > self.floor(u):
+                if not self.is_stale[u] and u != v:
                     self.is_stale[u] = True
                     lowest = min(lowest, self.rank[u])
         return lowest
-
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def floor(self, v: cython.int) -> cython.double:
-        """What no distance of v is below: from a single source, the straight line."""
-        if self.positions.shape[0] == 0 or self.sources.shape[0] > 1:
-            return -INFINITY
-        return self.d[self.sources[0]] + self.line(v, 0) * (1 + STRAIGHT_LINE)
 
     @cython.cfunc
     @cython.nogil
@@ -223,28 +189,10 @@ class _Fronts:
     @cython.inline
     @cython.nogil
     @cython.exceptval(check=False)
-    def is_source(self, v: cython.int) -> cython.bint:
-        """Whether distance begins at v."""
-        return self.d[v] == self.begin[v]
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def line(self, v: cython.int, label: cython.int) -> cython.double:
-        """Length of the straight line from a source to v."""
-        source: cython.int = self.sources[label]
-        return straight(cython.address(self.positions[v, 0]), cython.address(self.positions[source, 0]))
-
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    @cython.exceptval(check=False)
     def take(
-        self, target: cython.int, value: cython.double, begin: cython.double, label: cython.int, s: cython.int
+        self, value: cython.double, begin: cython.double, label: cython.int, s: cython.int
     ) -> cython.void:
-        """Keep a value for `target` if it is the best so far, and at least the straight line from the source."""
-        if value < self.best and self.positions.shape[0] > 0:
-            value = max(value, self.d[self.sources[label]] + self.line(target, label))
+        """Keep a value if it is the best so far."""
         if value < self.best:
             self.best, self.best_begin, self.best_label, self.best_simplex = value, begin, label, s
 
@@ -257,7 +205,7 @@ class _Fronts:
         i: cython.int = self.corners[s, a]
         value: cython.double = self.d[i] + self.lengths[s, v, a]
         if value < self.best:
-            self.take(self.corners[s, v], value, self.begins(s, a), self.label[i], s)
+            self.take(value, self.begins(s, a), self.label[i], s)
 
     @cython.cfunc
     @cython.nogil
@@ -274,8 +222,6 @@ class _Fronts:
         start: cython.double = -INFINITY  # of fronts from several sources: straight
         if self.label[i] == self.label[j]:
             start = 0.5 * (self.begins(s, a) + self.begins(s, b))
-        elif not self.may_mix or self.is_source(i) or self.is_source(j):
-            return
         start = max(start, min(self.d[i], self.d[j]) - STRAIGHT * (base + to_a))
         da: cython.double = self.d[i] - start
         db: cython.double = self.d[j] - start
@@ -289,7 +235,7 @@ class _Fronts:
         crossing: cython.double = x * height + along * y  # times y + height
         if 0 <= crossing <= (y + height) * base:
             across: cython.double = sqrt((along - x) * (along - x) + (height + y) * (height + y))
-            self.take(self.corners[s, v], start + across, start, self.label[i], s)
+            self.take(start + across, start, self.label[i], s)
 
     @cython.cfunc
     @cython.nogil
@@ -306,8 +252,6 @@ class _Fronts:
         start: cython.double = -INFINITY
         if self.label[i] == self.label[j] and self.label[i] == self.label[k]:
             start = (self.begins(s, a) + self.begins(s, b) + self.begins(s, c)) / 3
-        elif not self.may_mix or self.is_source(i) or self.is_source(j) or self.is_source(k):
-            return False
         start = max(start, min(self.d[i], self.d[j], self.d[k]) - STRAIGHT * (base + self.lengths[s, v, a]))
         da: cython.double = self.d[i] - start
         db: cython.double = self.d[j] - start
@@ -339,6 +283,6 @@ class _Fronts:
         of_b: cython.double = (px - of_c * cx) / base
         if of_c >= 0 and of_b >= 0 and of_b + of_c <= height:
             across: cython.double = sqrt((vx - x) * (vx - x) + (vy - y) * (vy - y) + height * height)
-            self.take(self.corners[s, v], start + across, start, self.label[i], s)
+            self.take(start + across, start, self.label[i], s)
             return True
         return False

@@ -42,12 +42,6 @@ def look_around(
         Vertex of each source, and the value at which distance begins there.
     d, begin, label : (n,) float64, (n,) float64, (n,) int32
         Distances, the value at which the front that arrives seems to begin, and the source of each; changed.
-
-    Returns
-    -------
-    (n,) uint8
-        Whether a way that is not straight may be shorter: vertices with a neighbour that changed unless they see
-        their source, and those from which a nearer source was looked for in vain.
     """
     n = order.shape[0]
     one = _Sight()
@@ -55,9 +49,7 @@ def look_around(
     one.ray = Ray(corners, first, incident, positions)
     one.sources, one.offset, one.d, one.begin, one.label = sources, offset, d, begin, label
     is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
-    is_touched: cython.uchar[::1] = np.zeros(n, np.uint8)
-    is_hidden: cython.uchar[::1] = np.zeros(n, np.uint8)
-    one.is_waiting, one.is_touched, one.is_hidden = is_waiting, is_touched, is_hidden
+    one.is_waiting = is_waiting
     i: cython.Py_ssize_t
     _passes: cython.int
     with cython.nogil:
@@ -69,10 +61,6 @@ def look_around(
                     n_changed += one.look(order[i])
             if n_changed == 0:
                 break
-        for i in range(n):
-            if is_touched[i] and not (label[i] >= 0 and one.is_lit(i, label[i])):
-                is_hidden[i] = True
-    return np.asarray(is_hidden)
 
 
 @cython.final
@@ -90,8 +78,6 @@ class _Sight:
     begin: cython.double[::1]
     label: cython.int[::1]
     is_waiting: cython.uchar[::1]
-    is_touched: cython.uchar[::1]
-    is_hidden: cython.uchar[::1]
     ray: Ray
 
     @cython.cfunc
@@ -119,9 +105,8 @@ class _Sight:
                 for k in range(self.first[v], self.first[v + 1]):
                     for c in range(4):
                         u: cython.int = self.corners[self.incident[k] // 4, c]
-                        self.is_waiting[u] = self.is_touched[u] = True
+                        self.is_waiting[u] = True
                 return True
-            self.is_hidden[v] = True
         return False
 
     @cython.cfunc

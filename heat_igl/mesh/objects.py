@@ -18,20 +18,20 @@ from heat_igl.typing import AnyArray, ArrayLike, IntArray
 __all__ = ["MeshLike", "as_mesh", "as_simplices", "read_paths_with"]
 
 MeshLike = Any
-"""`Mesh`, `PolygonMesh`, a pair (V, F), a path, or a mesh of another library, see `as_mesh`."""
+"""`Mesh`, `PolygonMesh`, `PointCloud`, a pair (V, F), a path, or a mesh of another library, see `as_mesh`."""
 
 _UNDERSTOOD = (
-    "a Mesh or PolygonMesh, a pair (V, F), a path, or a mesh of trimesh, pyvista or vtk, open3d, meshio, pymeshlab, "
+    "a Mesh, PolygonMesh or PointCloud, a pair (V, F), a path, or a mesh of trimesh, pyvista or vtk, open3d, meshio, pymeshlab, "
     "vedo or nibabel"
 )
 # Cells by the names of meshio and by the numbers of VTK.
 _TRIANGLES, _QUADS, _POLYGONS, _TETRAHEDRA = ("triangle", 5), ("quad", 9), ("polygon", 7), ("tetra", 10)
 
 
-_readers: list[Callable[[str | os.PathLike[str]], Mesh]] = []
+_readers: list[Callable[[str | os.PathLike[str]], Mesh | PointCloud]] = []
 
 
-def read_paths_with(reader: Callable[[str | os.PathLike[str]], Mesh]) -> None:
+def read_paths_with(reader: Callable[[str | os.PathLike[str]], Mesh | PointCloud]) -> None:
     """Let `as_mesh` read paths with `reader`: files are the business of a room above this one."""
     _readers[:] = [reader]
 
@@ -43,7 +43,7 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     ----------
     mesh : mesh or array_like
         `Mesh`, `PolygonMesh` and `PointCloud` are returned as they are. Besides: a pair (V, F); a path, read by
-        `read_mesh`; meshes of trimesh, pyvista and vtk (PolyData, UnstructuredGrid), open3d, meshio, pymeshlab (also a
+        `read_mesh`, or by `read_point_cloud` if the file holds no faces; meshes of trimesh, pyvista and vtk (PolyData, UnstructuredGrid), open3d, meshio, pymeshlab (also a
         MeshSet: the current mesh), vedo, and nibabel (surfaces in GIFTI). With `F`, the positions V (n, 3).
     F : (m, 3) or (m, 4) array_like of int, optional
         Triangles or tetrahedra, when `mesh` is V.

@@ -79,6 +79,8 @@ class Operators:
         Largest ratio between faces of the length in the metric per length in space; 1 without a metric.
     metric : MetricSides or None
         The lengths of triangles in a metric, to be differentiated; None without one, and for fronts.
+    drawn_on : Surface or None
+        The triangles that points and curves refer to where `surface` is None: those of polygons.
 
     Examples
     --------
@@ -111,6 +113,7 @@ class Operators:
     simplices: MetricSimplices | None = None
     contrast: float = 1.0
     metric: MetricSides | None = None
+    drawn_on: Surface | None = None
 
     def __repr__(self) -> str:
         return f"Operators({self.n} vertices, {len(self.weights)} faces)"
@@ -124,6 +127,11 @@ class Operators:
     def n_vertices(self) -> int:
         """The same as n, as for a `Mesh`."""
         return self.n
+
+    @property
+    def given_surface(self) -> Surface | None:
+        """The triangles that points and curves refer to: `surface`, or `drawn_on`."""
+        return self.surface if self.surface is not None else self.drawn_on
 
     @property
     def n_given(self) -> int:

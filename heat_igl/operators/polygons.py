@@ -7,8 +7,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError
+from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_mesh, connectivity
 from heat_igl.operators.matrices import Operators
+from heat_igl.operators.surface import Surface
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["polygon_operators"]
@@ -35,7 +37,8 @@ def polygon_operators(mesh: MeshLike) -> Operators:
     Operators
         With n vertices, the faces those triangles, d = 3. h is the mean distance between two vertices of one polygon,
         the same pairs as in L: edges alone are too short for hexagons. No `surface`, since the vertices of those
-        triangles are not those of the mesh: nothing to refine by unfolding.
+        triangles are not those of the mesh: nothing to refine by unfolding. Points and curves as sources lie on
+        ``mesh.triangles``.
 
     Raises
     ------
@@ -78,6 +81,7 @@ def polygon_operators(mesh: MeshLike) -> Operators:
     graph = sp.csr_array((sides[first], (corners[first], following[first])), shape=(mesh.n_vertices, mesh.n_vertices))
     begin = np.cumsum(mesh.degree) - mesh.degree
     longest = connectivity.longest_paths(graph, triangles.components)
+    fans = intrinsic_triangulation(triangles)
     return Operators(
         L=L,
         M=M * unit**2,
@@ -91,6 +95,7 @@ def polygon_operators(mesh: MeshLike) -> Operators:
         longest_distance=float(longest.max()),
         longest_distances=longest,
         lengths=_chords(mesh.V, L),
+        drawn_on=Surface(fans, fans, V=mesh.V),
     )
 
 

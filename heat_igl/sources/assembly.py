@@ -150,7 +150,8 @@ class SourceAssembler:
         self._h = domain.mean_edge_lengths if np.ndim(t) else np.full(domain.n_components, domain.mean_edge_length)
         surface = domain.surface
         self.edges = None if surface is None else NearField(surface.triangulation)
-        self._faces = None if surface is None or surface.faces is None else NearField(surface.faces)
+        given = domain.given_surface
+        self._faces = None if given is None or given.faces is None else NearField(given.faces)
         self._visible = self._faces
         if surface is not None and domain.n_given < domain.n and not surface.triangulation.is_cover:
             # Added vertices see sources too.
@@ -160,7 +161,9 @@ class SourceAssembler:
         if surface is not None and surface.faces is not None and domain.n_given < domain.n:
             self._radius *= max(1.0, surface.faces.mean_edge_length / domain.mean_edge_length)
         # Triangulations on which the edges are straight lines: one, if none was flipped.
-        self._straight = [field for field in (self.edges, self._faces) if field is not None]
+        self._straight = [] if self.edges is None else [self.edges]
+        if self.edges is not None and self._faces is not None:
+            self._straight.append(self._faces)
         if surface is not None and surface.faces is surface.triangulation:
             self._straight = self._straight[:1]
         if surface is not None and surface.uncovered is not None and surface.uncovered is not surface.faces:
@@ -233,7 +236,7 @@ class SourceAssembler:
         Only if there are points or curves; for vertices alone, the ring of edges is enough, but beside an edge of
         more than two faces it is not: the tufted cover leads over it from a face to two of the others alone.
         """
-        surface = self._domain.surface
+        surface = self._domain.given_surface
         if surface is None or self._faces is None or self._visible is None:
             return _NONE, _NONE
         if sources.on_vertices_alone:
@@ -261,7 +264,7 @@ class SourceAssembler:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""
         vertices = sources.vertices[rim]
         of_vertices = vertices, np.ones(len(vertices)), sources.vertex_label[rim], sources.vertex_offset[rim]
-        surface = self._domain.surface
+        surface = self._domain.given_surface
         if sources.on_vertices_alone or surface is None or surface.given_faces is None or self._faces is None:
             return of_vertices
         h = self._h_at(surface.given_faces[sources.segments.faces, 0])

@@ -1,4 +1,4 @@
-"""Distance through tetrahedra, or triangles that do not fit together, by fronts that pass from one to the next."""
+"""Distance through tetrahedra, and through simplices that do not fit together."""
 
 from __future__ import annotations
 
@@ -19,14 +19,21 @@ from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = ["FrontSolver"]
 
+# Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
+_MOST_ROUNDS = 5
+# What the kernel of bends knows of the way to a vertex.
+_STRAIGHT, _UNKNOWN = -1, -2
+
 
 class FrontSolver(UnfoldingSolver):
     """Distance by fronts that pass through simplices, each with edge lengths of its own; no heat is read.
 
-    A vertex gets its distance from the other corners of a simplex: from each alone along an edge, and from two or three
-    by the point behind the edge or triangle between them that lies at their distances, if the straight line from it
-    crosses there. A straight way is found to rounding, in tetrahedra of any shape. Behind an edge of the body around
-    which ways bend, the point is an approximation of second order.
+    In space, distance follows straight lines from the sources, and lines that bend around edges of the body with more
+    than half a turn inside: once its ends know their distances, such an edge is a source itself.
+
+    Where each simplex has lengths of its own, a vertex gets its distance from the other corners of a simplex: from each
+    alone along an edge, and from two or three by the point behind the edge or triangle between them that lies at their
+    distances, if the straight line from it crosses there.
 
     Where a front passes into a simplex of another slowness, it is refracted: its values along the facet stay, which is
     Snell's law, and its radius is divided by the square of the ratio of speeds, as that of a paraxial ray.
@@ -34,7 +41,7 @@ class FrontSolver(UnfoldingSolver):
     Parameters
     ----------
     simplices : MetricSimplices
-        The domain. Where `V` is known, no distance is below the straight line from its source.
+        The domain. Lengths are those of space where `V` is known.
     """
 
     def __init__(self, simplices: MetricSimplices) -> None:
@@ -49,13 +56,18 @@ class FrontSolver(UnfoldingSolver):
         self._V = np.empty((0, 3)) if simplices.V is None else np.ascontiguousarray(simplices.V)
 
     @cached_property
-    def _bends(self) -> tuple[AnyArray, FloatArray, FloatArray]:
-        """Edges around which ways bend (e, 2), their directions out of the body (e, 3), longest edges at vertices (n,)."""
+    def _reflex_edges(self) -> tuple[AnyArray, FloatArray]:
+        """Edges around which ways bend (e, 2), and their directions out of the body (e, 3)."""
         edges, outward = reflex_edges(self._simplices.corners, self._V)
+        return edges.astype(np.int32), outward
+
+    @cached_property
+    def _reach(self) -> FloatArray:
+        """Longest edge at each vertex (n,)."""
         reach = np.zeros(self._simplices.n)
         pairs, lengths = self._simplices.edges
         np.maximum.at(reach, pairs.ravel(), np.repeat(lengths, 2))
-        return edges.astype(np.int32), outward, reach
+        return reach
 
     @cached_property
     def _edge_graph(self) -> sp.csr_array:
@@ -78,40 +90,48 @@ class FrontSolver(UnfoldingSolver):
         begin = distance.copy()
         label: AnyArray = np.full(n, -1, np.int32)
         label[vertices] = np.arange(len(vertices))
-        mesh, of_vertices = (self._corners, self._first, self._incident), (distance, begin, label)
-        is_stale = np.ones(n, np.uint8)
-        order = self._order(sources.vertices, straight=len(self._V) > 0 and len(vertices) == 1)
-        if len(self._V):
-            is_stale = self._follow_lines(order, vertices, offset, *of_vertices)
-        if is_stale.any():
-            order = self._order(sources.vertices)
-            advance(order, *mesh, self._lengths, self._slowness, *of_vertices, is_stale, self._V, vertices)
+        if self._simplices.V is not None:
+            self._follow_lines(vertices, offset, distance, begin, label)
+        else:
+            mesh = self._corners, self._first, self._incident
+            advance(self._order(vertices), *mesh, self._lengths, self._slowness, distance, begin, label)
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, [-1]])[label]
         return distance
 
     def _follow_lines(
-        self,
-        order: AnyArray,
-        vertices: AnyArray,
-        offset: FloatArray,
-        distance: FloatArray,
-        begin: FloatArray,
-        label: AnyArray,
-    ) -> AnyArray:
-        """Lower distance to straight lines and to ways that bend around edges; returns what was not reached (n,)."""
-        mesh, of_vertices = (self._corners, self._first, self._incident, self._V), (distance, begin, label)
-        look_around(order, *mesh, vertices, offset, *of_vertices)
-        edges, outward, reach = self._bends
-        k=0
+        self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, begin: FloatArray, label: AnyArray
+    ) -> None:
+        """Lower distance to straight lines, and to ways of straight lines that bend around edges of the body."""
+        domain = self._corners, self._first, self._incident, self._V
+        order = self._order(vertices, straight=len(vertices) == 1)
+        edges, outward = self._reflex_edges
         if len(edges):
-            rank = np.empty(self._simplices.n, np.int64)
-            rank[self._order(vertices)] = np.arange(self._simplices.n)
+            rank = np.empty(len(order), np.int64)
+            rank[self._order(vertices)] = np.arange(len(order))
             near = np.argsort(rank[edges].max(axis=1), kind="stable")
-            way = np.where(label >= 0, -1, -2).astype(np.int32)
-            k = bend_around(
-                edges[near], outward[near], *mesh, reach, vertices, offset, *of_vertices, way
-            )
-        import os
-        if os.environ.get("SAY"): print(len(edges), k, np.isinf(distance).sum())
-        return np.isinf(distance).astype(np.uint8)
+            edges, outward = edges[near], outward[near]
+        way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
+        way[vertices] = _STRAIGHT
+        for _ in range(_MOST_ROUNDS):
+            before = distance.copy()
+            look_around(order, *domain, vertices, offset, distance, begin, label)
+            way[distance < before] = _STRAIGHT
+            if len(edges):
+                bend_around(edges, outward, *domain, self._reach, vertices, offset, distance, begin, label, way)
+            # Behind a point or an edge at which tetrahedra touch, no line continues.
+            if not self._continue_along_edges(distance, begin, label):
+                break
+
+    def _continue_along_edges(self, distance: FloatArray, begin: FloatArray, label: AnyArray) -> bool:
+        """Give vertices that nothing has reached a distance along edges; returns whether there were any."""
+        pairs, lengths = self._simplices.edges
+        start, end = np.concatenate([pairs, pairs[:, ::-1]]).T
+        lengths = np.concatenate([lengths, lengths])
+        reached = len(distance) - np.count_nonzero(np.isinf(distance))
+        while len(rows := np.flatnonzero(np.isinf(distance[end]) & np.isfinite(distance[start]))):
+            # The smallest value of each vertex is written last.
+            rows = rows[np.argsort(-(distance[start[rows]] + lengths[rows]), kind="stable")]
+            distance[end[rows]] = distance[start[rows]] + lengths[rows]
+            begin[end[rows]], label[end[rows]] = distance[start[rows]], label[start[rows]]
+        return len(distance) - np.count_nonzero(np.isinf(distance)) > reached

@@ -52,7 +52,9 @@ def reflex_edges(corners: IntArray, V: FloatArray) -> tuple[IntArray, FloatArray
     sine = np.einsum("ij,ij->i", _unit(normal[wall[one]]), along_wall[other])
     outward = _unit(along_wall[one] + along_wall[other])
     outward[counts != 2] = 0
-    bends = (counts > 2) | ((counts == 2) & (sine < -_FLAT))
+    # The sides of a slit coincide, at a whole turn.
+    cosine = np.einsum("ij,ij->i", along_wall[one], along_wall[other])
+    bends = (counts > 2) | ((counts == 2) & ((sine < -_FLAT) | ((sine < _FLAT) & (cosine > 0))))
     return edges[bends], outward[bends]
 
 
