@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from heat_igl.curves.places import snapped
-from heat_igl.curves.tracing import surface
+from heat_igl.curves.tracing import Surface, surface
 from heat_igl.curves.words import crossing_letters
 from heat_igl.errors import SourceError
 from heat_igl.kernels import shortening
@@ -19,6 +19,7 @@ __all__ = ["Course", "Shortened", "Shortener", "as_curve", "course_of"]
 
 # The compiled module, whose signatures are those of Cython.
 kernel: Any = shortening
+_AHEAD = np.dtype([("along", "f8"), ("above", "f8"), ("after", "i4", 2), ("vertex", "i4")], align=True)
 # Segments are joined if their ends are no farther apart than this, in mean edge lengths.
 _GAP = 1e-6
 
@@ -116,8 +117,12 @@ class Shortener:
         sums[mesh.facets.vertices[mesh.facets.n_faces != 2]] = np.inf
         half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
         most_corners = int(np.diff(self.surface.first_corner).max())
-        apexes = _apexes(triangle["length"])
-        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, crossing_letters(mesh), apexes)
+        letters = crossing_letters(mesh)
+        if letters is None:
+            ahead, letters = np.empty(0, _AHEAD), np.empty(0, np.int32)
+        else:
+            ahead = _faces_ahead(self.surface)
+        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, ahead, letters)
 
     def shortest(self, course: Course, *, is_closed: bool = False) -> Shortened:
         """The locally shortest curve of the class of a course: between the ends, or as a loop."""
@@ -139,14 +144,18 @@ class Shortener:
         return Shortened(*found[1:])
 
 
-def _apexes(length: FloatArray) -> FloatArray:
-    """The corner (3 m, 2) opposite each half-edge: its place along the edge and its height, both in edge lengths."""
-    a, b, c = (np.roll(length, -1, axis=1)), np.roll(length, -2, axis=1), length
-    # a is opposite the corner where the edge begins, so it runs from its end to the apex.
-    along = ((b - a) * (b + a) / c + c) / (2 * c)
-    half = (a + b + c) / 2
-    height = 2 * np.sqrt(np.maximum(half * (half - a) * (half - b) * (half - c), 0)) / c**2
-    return np.stack([along.ravel(), height.ravel()], axis=1)
+def _faces_ahead(surface: Surface) -> AnyArray:
+    """The face behind each half-edge (3 m,) of an oriented manifold, for lines that enter there: `Ahead` in fans.pxd."""
+    triangle, first = surface.triangle, surface.first_side
+    opposite = np.full(3 * len(triangle), -1, np.int32)
+    inner = first[:-1][np.diff(first) == 2]
+    one, other = surface.side[inner], surface.side[inner + 1]
+    opposite[one], opposite[other] = other, one
+    ahead = np.empty((len(triangle), 3), _AHEAD)
+    ahead["along"], ahead["above"], ahead["vertex"] = triangle["along"], triangle["above"], triangle["vertex"]
+    across = opposite.reshape(-1, 3)
+    ahead["after"] = np.stack([np.roll(across, -2, axis=1), np.roll(across, -1, axis=1)], axis=2)
+    return ahead.ravel()
 
 
 def as_curve(parts: Sequence[Shortened], *, is_closed: bool) -> SurfaceCurve:

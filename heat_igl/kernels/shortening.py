@@ -31,10 +31,10 @@ class Shortener:
     length: cython.double
     end: Place  # where the curve ends in the last face; for a loop, the start there
 
-    def __init__(self, surface, half_turn, most_corners, letter, apex):
+    def __init__(self, surface, half_turn, most_corners, ahead, letter):
         self.course = Course(Surface(surface, np.empty(0)), most_corners)
         self.passing = Passing(self.course, half_turn)
-        self.fan = Fan(self.course, len(half_turn), letter, apex)
+        self.fan = Fan(self.course, len(half_turn), ahead, letter)
         self.one, self.two = Saved(), Saved()
 
     def shorten(
