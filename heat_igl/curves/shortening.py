@@ -13,6 +13,7 @@ from heat_igl.curves.words import crossing_letters
 from heat_igl.errors import SourceError
 from heat_igl.kernels import shortening
 from heat_igl.mesh import Mesh, SurfaceCurve
+from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["Course", "Shortened", "Shortener", "as_curve", "course_of"]
@@ -58,16 +59,20 @@ def course_of(mesh: Mesh, curve: SurfaceCurve) -> Course:
     Raises
     ------
     SourceError
-        If a face is not one of the mesh, or a segment does not start where the one before it ends.
+        If a face is not one of the mesh, a segment does not start where the one before it ends, or a closed curve has
+        no length.
     """
     ends = curve.positions(mesh)  # which checks the faces
     count = len(curve) if curve.is_closed else len(curve) - 1
     begins = np.einsum("kc,kcx->kx", curve.start, mesh.V[mesh.F[curve.faces]])
     following = (np.arange(count) + 1) % len(curve)
-    gap = np.linalg.norm(ends[1 : count + 1] - begins[following], axis=1)
+    if curve.is_closed and (ends[1:] == begins).all():
+        raise SourceError("curve is closed and has no length: a loop needs two different points")
+    apart = ends[1 : count + 1] - begins[following]
+    gap = np.einsum("kx,kx->k", apart, apart)
     faces, end = curve.faces, snapped(curve.end)
     joins, share = _joins(mesh, faces[:count], faces[following], end[:count])
-    wrong = np.flatnonzero((gap > _GAP * mesh.edge_lengths.mean()) | (share > _GAP))
+    wrong = np.flatnonzero((gap > (_GAP * mesh.edge_lengths.mean()) ** 2 if gap.any() else False) | (share > _GAP))
     if len(wrong):
         i = int(wrong[0])
         raise SourceError(
@@ -161,4 +166,5 @@ def _faces_ahead(surface: Surface) -> AnyArray:
 def as_curve(parts: Sequence[Shortened], *, is_closed: bool) -> SurfaceCurve:
     """One curve of parts that follow one another."""
     points = np.concatenate([part.points for part in parts])
-    return SurfaceCurve(np.concatenate([part.faces for part in parts]), points[:, 0], points[:, 1], is_closed)
+    faces = np.concatenate([part.faces for part in parts])
+    return unchecked_curve(faces, points[:, 0].copy(), points[:, 1].copy(), is_closed)

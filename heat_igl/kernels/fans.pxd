@@ -49,6 +49,8 @@ cdef class Fan:
     # The best line: what it saves, the bend that it leads to, and how many edges it crosses.
     cdef Line best
     cdef double saved
+    # Lines end at this share of the length of the path.
+    cdef double most
     cdef int goal, n_steps
 
     cdef int shorten(self, int begin, const Place* end) except -2 nogil

@@ -172,7 +172,7 @@ class Fan:
         lx: cython.double = t.length[(c + 1) % 3] * cos(at + t.angle[c])
         ly: cython.double = t.length[(c + 1) % 3] * sin(at + t.angle[c])
         h: cython.int = self.across(3 * line.face + c)
-        reach: cython.double = self.remaining[i]
+        reach: cython.double = min(self.remaining[i], self.most * self.remaining[0])
         step: cython.int = 0
         while h >= 0 and step != n_steps and (lx < reach or rx < reach):
             step += 1

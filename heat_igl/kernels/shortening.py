@@ -51,6 +51,7 @@ class Shortener:
         stuck: cython.int
         # A loop is straightened from many bases.
         self.passing.largest_loss = 0.0 if is_closed else LARGEST_LOSS
+        self.fan.most = 0.5 if is_closed else 1.0
         with cython.nogil:
             stuck = self.follow(face, join, ends, is_closed)
             if stuck < 0:
@@ -71,6 +72,7 @@ class Shortener:
         None if vertices alone hold one of them together.
         """
         self.passing.largest_loss = LARGEST_LOSS
+        self.fan.most = 1.0
         with cython.nogil:
             self.follow(face, join, ends, False)
             plain: cython.double = self.settle()
