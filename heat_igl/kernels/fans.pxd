@@ -49,7 +49,7 @@ cdef class Fan:
     # The best line: what it saves, the bend that it leads to, and how many edges it crosses.
     cdef Line best
     cdef double saved
-    # Lines end at this share of the length of the path.
+    # Lines end at this share of the length of the path; with a smaller one there are fewer.
     cdef double most
     cdef int goal, n_steps
 

@@ -32,10 +32,10 @@ class Fan:
     @cython.nogil
     @cython.exceptval(-2, check=False)
     def shorten(self, begin: cython.int, end: cython.pointer[cython.const[Place]]) -> cython.int:
-        """Lead the strip of a settled path along a line from bend `begin` or a later one; `kept` is the path before.
+        """Lead the strip of a settled path along a line from bend `begin` or a later one; keep the path before.
 
-        Returns the bend, -1 if no line promises to be shorter. The promise may be wrong. `end` is the end of the path in
-        the last face, where it stays.
+        Returns the bend, -1 if no line promises to be shorter. The promise may be wrong. `end` is the end of the path
+        in the last face, where it stays.
         """
         n: cython.int = self.layout.n_bends
         i: cython.int
@@ -107,7 +107,7 @@ class Fan:
             # That is the left corner.
             right -= self.s.triangle[f].angle[c]
         # No closer than the edges at the end of the path.
-        spacing: cython.double = max(SPACING, 1.0 / (self.strip.count - (p.last if i > 0 else 0) + 1))
+        spacing: cython.double = max(SPACING / self.most, 1.0 / (self.strip.count - (p.last if i > 0 else 0) + 1))
         self.spread(i, f, c, right, spacing)
         out: cython.int = c
         h: cython.int = self.across(3 * f + (c + 1) % 3)
@@ -162,7 +162,7 @@ class Fan:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def follow(self, i: cython.int, line: cython.pointer[cython.const[Line]], n_steps: cython.int) -> cython.int:
-        """Follow a line from bend i as far as the path is long, and aim at bends; or push its first `n_steps` crossings."""
+        """Follow a line from bend i and aim at the bends that it passes; or push its first `n_steps` crossings."""
         t = cython.address(self.s.triangle[line.face])
         c: cython.int = line.corner
         # Both ends of the next edge, in the plane in which the line is the x axis.
@@ -173,17 +173,21 @@ class Fan:
         ly: cython.double = t.length[(c + 1) % 3] * sin(at + t.angle[c])
         h: cython.int = self.across(3 * line.face + c)
         reach: cython.double = min(self.remaining[i], self.most * self.remaining[0])
+        # Each step would load the views anew.
+        table = cython.address(self.ahead[0])
+        bend_at = cython.address(self.bend_at[0])
+        ends_inside: cython.bint = self.end_vertex < 0
         step: cython.int = 0
         while h >= 0 and step != n_steps and (lx < reach or rx < reach):
             step += 1
             if n_steps >= 0:
                 self.strip.push(self.across(h), h)
-            ahead = cython.address(self.ahead[h])
+            ahead = table + h
             x: cython.double = rx + ahead.along * (lx - rx) + ahead.above * (ly - ry)
             y: cython.double = ry + ahead.along * (ly - ry) - ahead.above * (lx - rx)
-            if self.bend_at[ahead.vertex] > i:
-                self.aim(i, self.bend_at[ahead.vertex], hypot(x, y), line, step)
-            if self.end_vertex < 0 and h // 3 == self.end_face:
+            if bend_at[ahead.vertex] > i:
+                self.aim(i, bend_at[ahead.vertex], hypot(x, y), line, step)
+            if ends_inside and h // 3 == self.end_face:
                 end = cython.address(self.end)
                 along: cython.double = end.c[(h + 1) % 3] * lx + end.c[(h + 2) % 3] * rx + end.c[h % 3] * x
                 beside: cython.double = end.c[(h + 1) % 3] * ly + end.c[(h + 2) % 3] * ry + end.c[h % 3] * y
