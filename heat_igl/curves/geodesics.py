@@ -155,8 +155,6 @@ class GeodesicPathSolver:
         if not isinstance(curve, SurfaceCurve):
             raise SourceError(f"curve must be a SurfaceCurve, not {type(curve).__name__}: see edge_curve and curve_on")
         course = course_of(self._mesh, curve)
-        if curve.is_closed and not curve.lengths(self._mesh).any():
-            raise SourceError("curve is closed and has no length: a loop needs two different points")
         with self._one_at_a_time:
             found = self._shortener.shortest(course, is_closed=curve.is_closed)
         return as_curve([found], is_closed=curve.is_closed)

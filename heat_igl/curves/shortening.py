@@ -8,17 +8,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from heat_igl.curves.places import snapped
-from heat_igl.curves.tracing import surface
+from heat_igl.curves.tracing import Surface, surface
 from heat_igl.curves.words import crossing_letters
 from heat_igl.errors import SourceError
 from heat_igl.kernels import shortening
 from heat_igl.mesh import Mesh, SurfaceCurve
+from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["Course", "Shortened", "Shortener", "as_curve", "course_of"]
 
 # The compiled module, whose signatures are those of Cython.
 kernel: Any = shortening
+_AHEAD = np.dtype([("along", "f8"), ("above", "f8"), ("after", "i4", 2), ("vertex", "i4")], align=True)
 # Segments are joined if their ends are no farther apart than this, in mean edge lengths.
 _GAP = 1e-6
 
@@ -57,16 +59,20 @@ def course_of(mesh: Mesh, curve: SurfaceCurve) -> Course:
     Raises
     ------
     SourceError
-        If a face is not one of the mesh, or a segment does not start where the one before it ends.
+        If a face is not one of the mesh, a segment does not start where the one before it ends, or a closed curve has
+        no length.
     """
     ends = curve.positions(mesh)  # which checks the faces
     count = len(curve) if curve.is_closed else len(curve) - 1
     begins = np.einsum("kc,kcx->kx", curve.start, mesh.V[mesh.F[curve.faces]])
     following = (np.arange(count) + 1) % len(curve)
-    gap = np.linalg.norm(ends[1 : count + 1] - begins[following], axis=1)
+    if curve.is_closed and (ends[1:] == begins).all():
+        raise SourceError("curve is closed and has no length: a loop needs two different points")
+    apart = ends[1 : count + 1] - begins[following]
+    gap = np.einsum("kx,kx->k", apart, apart)
     faces, end = curve.faces, snapped(curve.end)
     joins, share = _joins(mesh, faces[:count], faces[following], end[:count])
-    wrong = np.flatnonzero((gap > _GAP * mesh.edge_lengths.mean()) | (share > _GAP))
+    wrong = np.flatnonzero((gap > (_GAP * mesh.edge_lengths.mean()) ** 2 if gap.any() else False) | (share > _GAP))
     if len(wrong):
         i = int(wrong[0])
         raise SourceError(
@@ -116,8 +122,12 @@ class Shortener:
         sums[mesh.facets.vertices[mesh.facets.n_faces != 2]] = np.inf
         half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
         most_corners = int(np.diff(self.surface.first_corner).max())
-        apexes = _apexes(triangle["length"])
-        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, crossing_letters(mesh), apexes)
+        letters = crossing_letters(mesh)
+        if letters is None:
+            around, ahead, letters = np.empty(0), np.empty(0, _AHEAD), np.empty(0, np.int32)
+        else:
+            around, ahead = np.where(np.isinf(sums), 0, sums), _faces_ahead(self.surface)
+        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, around, ahead, letters)
 
     def shortest(self, course: Course, *, is_closed: bool = False) -> Shortened:
         """The locally shortest curve of the class of a course: between the ends, or as a loop."""
@@ -139,17 +149,22 @@ class Shortener:
         return Shortened(*found[1:])
 
 
-def _apexes(length: FloatArray) -> FloatArray:
-    """The corner (3 m, 2) opposite each half-edge: its place along the edge and its height, both in edge lengths."""
-    a, b, c = (np.roll(length, -1, axis=1)), np.roll(length, -2, axis=1), length
-    # a is opposite the corner where the edge begins, so it runs from its end to the apex.
-    along = ((b - a) * (b + a) / c + c) / (2 * c)
-    half = (a + b + c) / 2
-    height = 2 * np.sqrt(np.maximum(half * (half - a) * (half - b) * (half - c), 0)) / c**2
-    return np.stack([along.ravel(), height.ravel()], axis=1)
+def _faces_ahead(surface: Surface) -> AnyArray:
+    """The face behind each half-edge (3 m,) of an oriented manifold, for lines that enter there; see `Ahead` in fans."""
+    triangle, first = surface.triangle, surface.first_side
+    opposite = np.full(3 * len(triangle), -1, np.int32)
+    inner = first[:-1][np.diff(first) == 2]
+    one, other = surface.side[inner], surface.side[inner + 1]
+    opposite[one], opposite[other] = other, one
+    ahead = np.empty((len(triangle), 3), _AHEAD)
+    ahead["along"], ahead["above"], ahead["vertex"] = triangle["along"], triangle["above"], triangle["vertex"]
+    across = opposite.reshape(-1, 3)
+    ahead["after"] = np.stack([np.roll(across, -2, axis=1), np.roll(across, -1, axis=1)], axis=2)
+    return ahead.ravel()
 
 
 def as_curve(parts: Sequence[Shortened], *, is_closed: bool) -> SurfaceCurve:
     """One curve of parts that follow one another."""
     points = np.concatenate([part.points for part in parts])
-    return SurfaceCurve(np.concatenate([part.faces for part in parts]), points[:, 0], points[:, 1], is_closed)
+    faces = np.concatenate([part.faces for part in parts])
+    return unchecked_curve(faces, points[:, 0].copy(), points[:, 1].copy(), is_closed)

@@ -23,7 +23,9 @@ __all__ = ["Goals", "Surface", "goals", "surface", "trace"]
 
 # Edges are at least this long, in mean edge lengths: the kernel divides by lengths.
 _SHORTEST = 1e-12
-_TRIANGLE = np.dtype([("length", "f8", 3), ("angle", "f8", 3), ("vertex", "i4", 3), ("edge", "i4", 3)])
+_TRIANGLE = np.dtype(
+    [*((name, "f8", 3) for name in ("length", "angle", "along", "above")), ("vertex", "i4", 3), ("edge", "i4", 3)]
+)
 _GOAL = np.dtype([("start", "f8", 3), ("end", "f8", 3), ("offset", "f8")])
 
 
@@ -33,7 +35,8 @@ class Surface(NamedTuple):
     Attributes
     ----------
     triangle : (m,) structures
-        Of each face its edge `length` opposite each corner, the `angle` at each, its `vertex` and `edge` numbers.
+        Of each face its edge `length` opposite each corner, the `angle` at each, its `vertex` and `edge` numbers. Corner
+        c lies `along` of the way from corner c + 2 to corner c + 1 and `above` this edge, in lengths of the edge.
     first_side, side : (k + 1,), (3 m,) int32
         Half-edges of edge e are ``side[first_side[e]:first_side[e + 1]]``.
     first_corner, corner : (n + 1,), (3 m,) int32
@@ -74,6 +77,11 @@ def surface(mesh: Mesh) -> Surface:
     lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
     triangle = np.empty(mesh.n_faces, _TRIANGLE)
     triangle["length"], triangle["angle"] = lengths, corner_angles(lengths)
+    base, left, right = lengths, np.roll(lengths, -1, axis=1), np.roll(lengths, -2, axis=1)
+    half = (base + left + right) / 2
+    # By Heron's formula. `left` is the side from corner c to corner c + 2.
+    triangle["along"] = ((left - right) * (left + right) / base + base) / (2 * base)
+    triangle["above"] = 2 * np.sqrt(np.maximum(half * (half - base) * (half - left) * (half - right), 0)) / base**2
     triangle["vertex"], triangle["edge"] = mesh.F, mesh.facets.of_face
     sides = group_by_label(mesh.facets.of_face.ravel(), len(mesh.facets.n_faces))
     corners = group_by_label(mesh.F.ravel(), mesh.n_vertices)

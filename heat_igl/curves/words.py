@@ -13,21 +13,22 @@ from heat_igl.typing import AnyArray, BoolArray, IntArray
 __all__ = ["crossing_letters"]
 
 
-def crossing_letters(mesh: Mesh) -> AnyArray:
-    """The letter (3 m,) int32 of each half-edge that a strip leaves a face through; empty on disks and spheres.
+def crossing_letters(mesh: Mesh) -> AnyArray | None:
+    """The letter (3 m,) int32 of each half-edge that a strip leaves a face through.
 
-    The word of a strip consists of the letters of its crossings. The letter of the half-edge on the other side is the
-    negative, and 0 is no letter. Two strips from one face to another are of one class if the first word, and the inverse
-    of the second, cancel. The converse is not true for all strips with vertices between them at which three chains of
-    edges meet (see Notes).
+    It is empty if all components are spheres or disks, and None if the mesh is not manifold or not oriented alike.
+
+    The letters of its crossings, without 0, are the word of a strip. On the other side of an edge the letter is the
+    negative. Strips with the same ends are of one class if the first word and the inverse of the second cancel. The
+    converse fails at a few vertices, see Notes.
 
     Notes
     -----
-    Edges that a spanning tree of the faces does not cross form a graph, to which the surface without one disk contracts
-    (Erickson and Whittlesey 2005). Without its loose ends it consists of chains of edges. A strip can be moved over
-    a vertex in the middle of a chain, so all edges of a chain have one letter; a surface of genus g without boundary
-    has at most 6 g - 3 chains and 4 g - 2 vertices at which three of them meet. All holes are joined to one vertex.
-    If the mesh is not manifold or not oriented, all edges have letters, so that only equal strips are of one class.
+    The edges that a spanning tree of the faces does not cross form a graph, to which the surface without one disk
+    contracts (Erickson and Whittlesey 2005). Without its loose ends it consists of chains of edges. Strips can be moved
+    over a vertex inside a chain, so all edges of a chain have one letter. Where chains meet, letters of strips
+    on both sides of the vertex differ, though these are of one class: at no more than 4 g - 2 vertices on a closed
+    surface of genus g. All holes are joined to one vertex.
     """
     edge = mesh.facets.of_face.ravel()
     begin, end = (mesh.F[:, [(c + turn) % 3 for c in range(3)]].ravel() for turn in (1, 2))
@@ -36,7 +37,7 @@ def crossing_letters(mesh: Mesh) -> AnyArray:
     is_inner = count == 2
     turned = np.bincount(edge, sign, len(count))
     if (turned[is_inner] != 0).any() or len(nonmanifold_vertices(mesh.F, mesh.facets, mesh.n_vertices)):
-        return (sign * (edge + 1)).astype(np.int32)
+        return None
     if _is_simply_connected(mesh):
         return np.zeros(0, np.int32)
     letter_of_edge = np.zeros(len(count), np.int32)

@@ -66,11 +66,11 @@ class Layout:
             f, entered = strip.crossing[j].enter // 3, strip.crossing[j].enter % 3
             left, right = corner_of(s, f, gate.vertex[0]), corner_of(s, f, gate.vertex[1])
             there = cython.address(s.triangle[f])
-            a, b, c = there.length[left], there.length[right], there.length[entered]
-            half = 0.5 * (a + b + c)
-            # The far corner over the crossing: a is the distance from the right end, b from the left.
-            x: cython.double = 0.5 * ((a - b) * (a + b) / c + c) / c
-            y: cython.double = 2.0 * sqrt(max(half * (half - a) * (half - b) * (half - c), 0.0)) / (c * c)
+            # The far corner over the crossing, from the right end.
+            x: cython.double = there.along[entered]
+            if right != (entered + 2) % 3:
+                x = 1.0 - x
+            y: cython.double = there.above[entered]
             ux: cython.double = gate.x[0] - gate.x[1]
             uy: cython.double = gate.y[0] - gate.y[1]
             p.x[left], p.y[left], p.x[right], p.y[right] = gate.x[0], gate.y[0], gate.x[1], gate.y[1]

@@ -31,10 +31,10 @@ class Shortener:
     length: cython.double
     end: Place  # where the curve ends in the last face; for a loop, the start there
 
-    def __init__(self, surface, half_turn, most_corners, letter, apex):
-        self.course = Course(Surface(surface, np.empty(0)), most_corners)
+    def __init__(self, surface, half_turn, most_corners, around, ahead, letter):
+        self.course = Course(Surface(surface, np.empty(0)), most_corners, around)
         self.passing = Passing(self.course, half_turn)
-        self.fan = Fan(self.course, len(half_turn), letter, apex)
+        self.fan = Fan(self.course, len(half_turn), ahead, letter)
         self.one, self.two = Saved(), Saved()
 
     def shorten(
@@ -51,6 +51,7 @@ class Shortener:
         stuck: cython.int
         # A loop is straightened from many bases.
         self.passing.largest_loss = 0.0 if is_closed else LARGEST_LOSS
+        self.fan.most = 0.5 if is_closed else 1.0
         with cython.nogil:
             stuck = self.follow(face, join, ends, is_closed)
             if stuck < 0:
@@ -71,6 +72,7 @@ class Shortener:
         None if vertices alone hold one of them together.
         """
         self.passing.largest_loss = LARGEST_LOSS
+        self.fan.most = 1.0
         with cython.nogil:
             self.follow(face, join, ends, False)
             plain: cython.double = self.settle()
@@ -152,7 +154,7 @@ class Shortener:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def pass_better(self, length: cython.double) -> cython.double:
-        """Lead a settled path of this length past vertices on the other side while that makes it shorter; the length."""
+        """Lead a settled path past vertices on the other side while that makes it shorter; returns the length."""
         i: cython.int
         self.passing.n_tried = 0
         is_better: cython.bint = True
@@ -206,7 +208,7 @@ class Shortener:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def tighten(self) -> cython.double:
-        """Lead the strip to the shortest loop of the class of one that begins and ends in the first face; returns its length."""
+        """Lead the strip of a loop from the first face to this face to the shortest of its class; returns the length."""
         shortest: cython.double = INFINITY
         n_stalled: cython.int = 0
         length: cython.double = 0.0

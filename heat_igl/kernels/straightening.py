@@ -26,8 +26,8 @@ class Course:
     It starts in `face`: at `vertex`, or at `start` if that is -1.
     """
 
-    def __init__(self, s, n_corners):
-        self.s = s
+    def __init__(self, s, n_corners, around):
+        self.s, self.around = s, around
         self.strip, self.straighter, self.detour, self.layout = Strip(), Strip(), Detour(n_corners), Layout()
         self.segment = np.empty(64, _SEGMENT)
 
@@ -86,7 +86,7 @@ class Course:
     def settle(
         self, end_vertex: cython.int, ends_on: cython.pointer[Place], end: cython.pointer[Place]
     ) -> cython.double:
-        """Lead the strip until the shortest path in it is locally shortest; returns the length, and `end` where it ends.
+        """Lead the strip until the shortest path in it is locally shortest, and set `end`; returns the length.
 
         It ends at `end_vertex`, or, if that is -1, at the nearest point of the segment between two places `ends_on` in
         the last face, which move with the end of the strip into the face before.
@@ -189,6 +189,13 @@ class Course:
             return 0  # straight through this face
         from_here = cython.address(self.layout.bend[i - 1])
         to_there = cython.address(self.layout.bend[i + 1])
+        if self.around.shape[0] > 0 and 0.0 < self.around[v] < 3.0 * M_PI:
+            # What the angle on this side, of pi at least, leaves for the other one. Most bends need no search then.
+            turn: cython.double = _angle(
+                bend.x - from_here.x, bend.y - from_here.y, to_there.x - bend.x, to_there.y - bend.y
+            )
+            if self.around[v] - (M_PI + turn) > M_PI:
+                return -1
         before: Sides
         after: Sides
         before.this = _angle(from_here.x - bend.x, from_here.y - bend.y, first.x[far] - bend.x, first.y[far] - bend.y)

@@ -7,10 +7,13 @@ cdef extern from *:
     """
     double SNAP
 
-# Edge lengths are opposite the corners; none is 0.
+# Edge lengths are opposite the corners; none is 0. Each corner c lies `along` of the way from corner c + 2 to corner
+# c + 1, and `above` that edge, in lengths of this edge.
 cdef struct Triangle:
     double length[3]
     double angle[3]
+    double along[3]
+    double above[3]
     int vertex[3]
     int edge[3]
 

@@ -143,6 +143,14 @@ class SurfaceCurve:
         return np.asarray(np.linalg.norm(np.diff(self.positions(mesh), axis=0), axis=1))
 
 
+def unchecked_curve(faces: IntArray, start: FloatArray, end: FloatArray, is_closed: bool) -> SurfaceCurve:
+    """A `SurfaceCurve` of int64 faces (s,), and float64 coordinates (s, 3) that are known to be right."""
+    curve = object.__new__(SurfaceCurve)
+    for name, value in (("faces", faces), ("start", start), ("end", end), ("is_closed", is_closed)):
+        object.__setattr__(curve, name, value)
+    return curve
+
+
 # A curve, or curves in lists of any depth.
 NestedCurves = SurfaceCurve | Sequence["NestedCurves"]
 
