@@ -12,7 +12,7 @@ from heat_igl.runtime.blocks import (
 )
 from heat_igl.runtime.heat_range import LARGEST_EXPONENT, LOWEST_HEAT, RANGE_LIMIT, SOURCE_HEAT
 from heat_igl.runtime.memory import PeakMemory, release_free_memory, resident_memory
-from heat_igl.runtime.threads import n_threads, pool, side_by_side
+from heat_igl.runtime.threads import both, n_threads, pool, side_by_side
 from heat_igl.runtime.warn import held_warnings, warn_caller
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "SOURCE_HEAT",
     "WORKING_MEMORY",
     "block_size",
+    "both",
     "float_type",
     "held_warnings",
     "in_blocks",
