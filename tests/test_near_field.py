@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import perturbed
 
-from heat_igl import HeatMethodSolver, Mesh, SurfaceCurve, SurfacePoints, curve_on, reference, shapes
+from heat_igl import HeatMethodSolver, Mesh, SurfaceCurve, SurfacePoints, curve_on, isolines, reference, shapes
 from heat_igl.intrinsic import Adjacency, intrinsic_triangulation
 from heat_igl.sources import NearField, Seeds, Sources, source_set, windows
 from heat_igl.sources.own_faces import seen_from_points
@@ -169,10 +169,10 @@ def test_dropped_lines_are_no_shortest_ones(monkeypatch):
 
 
 def test_joints_of_segments_count_once():
-    mesh = shapes.grid(6)
-    curve = curve_on(mesh, [[0.1, 0.2, 0], [0.5, 0.3, 0], [0.9, 0.8, 0]])
+    mesh = shapes.icosphere(2)
+    curve = isolines(mesh, mesh.V @ [0.2, 0.3, 0.9], 0.1)[0][0]
     ends = source_set(curve, mesh.n_vertices, mesh.F).segments.ends()
-    adjacency = Adjacency(intrinsic_triangulation(mesh))
-    corners = seen_from_points(ends, adjacency)[1][0].vertex
-    # The inner joints lie on edges: once in each of two faces, though two segments meet there.
-    assert len(corners) == 2 + 2 * (len(curve) - 1)
+    assert len(ends.faces) == 2 * len(curve)
+    corners = seen_from_points(ends, Adjacency(intrinsic_triangulation(mesh)))[1][0].vertex
+    # All joints lie on edges: once in each of two faces, though two segments meet there.
+    assert len(corners) == 2 * len(curve)
