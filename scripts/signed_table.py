@@ -1,6 +1,6 @@
 """Signed distance from broken curves, beside potpourri3d's: errors, failures, and times.
 
-    python scripts/signed_table.py MESH [MESH ...] [--cases 40] [--signs 0] [--seed 0] [--no-times] [--json FILE]
+    python scripts/signed_table.py MESH [MESH ...] [--cases 40] [--signs 0] [--steps] [--no-times] [--json FILE]
 
 Each case is a level of a random smooth function on one of the meshes, in turn, and 10, 30 or 50 % of the length of its
 curves removed, in turn, in one to six pieces. The truth is the unfolded distance from the whole curves, with the sign
@@ -8,7 +8,9 @@ of the function. Errors are means over the vertices, as a share of the square ro
 Times are medians of paired runs; those of potpourri3d's first query are part of its precomputation, since it factors
 then. With --signs, the curves around as many random regions of each mesh: across faces, through vertices, along edges
 and through midpoints of edges in turn; signs are compared with the pieces of the cut mesh, at all vertices farther than
-half a mean edge from the curves. Needs potpourri3d, but for the signs; docs/signed.md shows the tables.
+half a mean edge from the curves. With --steps, the errors of the heat for several time steps on each mesh, for whole
+levels and with 30 % of their length removed, in the mean over three of each. The errors of --cases and the times need
+potpourri3d; docs/signed.md shows the tables.
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ from scaffold import add_json, add_seed, environment, option_parser, publish, ta
 
 SHARES = (0.1, 0.3, 0.5)
 LEVELS = ("ZeroSet", "None")
+T_COEFS = (0.25, 0.5, 1.0, 2.0)
 KINDS = ("across faces", "through vertices", "along edges", "through midpoints")
 
 
@@ -198,6 +201,23 @@ def wrong_signs(mesh: Mesh, count: int, rng: np.random.Generator) -> dict[str, i
     return found
 
 
+def errors_by_step(mesh: Mesh, rng: np.random.Generator) -> dict[str, Any]:
+    """Mean error for each time step: of whole levels, and with 30 % of their length removed."""
+    solvers = {t_coef: SignedHeatSolver(mesh, t_coef=t_coef) for t_coef in T_COEFS}
+    errors = np.zeros((2, len(T_COEFS)))
+    for _ in range(3):
+        values = smooth_function(mesh, rng)
+        level = float(np.quantile(values, rng.uniform(0.3, 0.7)))
+        whole = isolines(mesh, values, level)[0]
+        truth = np.where(values < level, -1, 1) * unfolded_distance(mesh, whole)
+        size = float(np.sqrt(sublevel_areas(mesh, values, level)[0]))
+        pieces = [piece for curve in whole for piece in broken(mesh, curve, 0.3, 3, rng)]
+        for row, curves in zip(errors, (whole, pieces), strict=True):
+            row += [100 * np.abs(solver.distance(curves) - truth).mean() / size / 3 for solver in solvers.values()]
+    names = [f"{what}, t = {t_coef:g} h^2" for what in ("whole", "30 % removed") for t_coef in T_COEFS]
+    return {"vertices": mesh.n_vertices} | dict(zip(names, errors.ravel().tolist(), strict=True))
+
+
 def summary(rows: list[dict[str, Any]]) -> str:
     names = [name for name in rows[0] if name not in ("mesh", "removed")]
     lines = []
@@ -248,6 +268,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("meshes", nargs="+", type=Path)
     parser.add_argument("--cases", type=int, default=40, help="number of cases (default 40)")
     parser.add_argument("--signs", type=int, default=0, help="number of regions on each mesh for the signs (default 0)")
+    parser.add_argument("--steps", action="store_true", help="errors of the heat for several time steps")
     parser.add_argument("--no-times", action="store_true", help="errors and signs only")
     add_seed(parser)
     add_json(parser)
@@ -260,8 +281,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         parts.append(summary(rows))
     signs = {name: wrong_signs(mesh, arguments.signs, rng) for name, mesh in meshes.items() if arguments.signs}
     times = {name: measure_times(mesh, 5) for name, mesh in meshes.items() if not arguments.no_times}
-    parts += [one_row_each(found) for found in (signs, times) if found]
-    result = {"environment": environment(), "rows": rows, "signs": signs, "times": times}
+    steps = {name: errors_by_step(mesh, rng) for name, mesh in meshes.items() if arguments.steps}
+    parts += [one_row_each(found) for found in (signs, times, steps) if found]
+    result = {"environment": environment(), "rows": rows, "signs": signs, "times": times, "steps": steps}
     publish(result, "\n\n".join(parts), json_file=arguments.json)
     return 0
 

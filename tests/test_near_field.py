@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from conftest import perturbed
 
-from heat_igl import Mesh, SurfaceCurve, SurfacePoints, curve_on, reference, shapes
-from heat_igl.intrinsic import intrinsic_triangulation
-from heat_igl.sources import NearField, Seeds, Sources, source_set
+from heat_igl import HeatMethodSolver, Mesh, SurfaceCurve, SurfacePoints, curve_on, isolines, reference, shapes
+from heat_igl.intrinsic import Adjacency, intrinsic_triangulation
+from heat_igl.sources import NearField, Seeds, Sources, source_set, windows
+from heat_igl.sources.own_faces import seen_from_points
 
 
 def seeds(mesh: Mesh, sources: Sources, radius: float) -> Seeds:
@@ -149,3 +150,29 @@ def test_curves_refuse_nothing_at_the_boundary():
     found = seeds(mesh, point, 3.0)
     assert len(found.vertex) == mesh.n_vertices
     np.testing.assert_allclose(found.value, np.linalg.norm(mesh.V - point.positions(mesh), axis=1), rtol=1e-12)
+
+
+def test_dropped_lines_are_no_shortest_ones(monkeypatch):
+    mesh = perturbed(shapes.icosphere(3), 0.4, 1)
+    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    wave = np.stack([np.cos(angle), np.sin(angle), 0.4 * np.sin(3 * angle)], axis=1)
+    curve = curve_on(mesh, wave / np.linalg.norm(wave, axis=1)[:, None], closed=True)
+    found = seeds(mesh, curve, 1.0)
+    monkeypatch.setattr(windows, "_DETOUR", 1e9)
+    every = seeds(mesh, curve, 1.0)
+    exact = HeatMethodSolver(mesh, refine="exact").distance(curve)
+    shortest = every.at(every.value < exact[every.vertex] * (1 + 1e-9))
+    assert len(shortest.vertex) > 400
+    value = np.full(mesh.n_vertices, np.nan)
+    value[found.vertex] = found.value
+    np.testing.assert_allclose(value[shortest.vertex], shortest.value, rtol=1e-12)
+
+
+def test_joints_of_segments_count_once():
+    mesh = shapes.icosphere(2)
+    curve = isolines(mesh, mesh.V @ [0.2, 0.3, 0.9], 0.1)[0][0]
+    ends = source_set(curve, mesh.n_vertices, mesh.F).segments.ends()
+    assert len(ends.faces) == 2 * len(curve)
+    corners = seen_from_points(ends, Adjacency(intrinsic_triangulation(mesh)))[1][0].vertex
+    # All joints lie on edges: once in each of two faces, though two segments meet there.
+    assert len(corners) == 2 * len(curve)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from conftest import flat_perturbed
+from scipy.sparse.linalg import spsolve
 from test_unfolding import moebius_strip
 
 from heat_igl import (
@@ -25,6 +27,8 @@ from heat_igl import (
     shapes,
     unfolded_distance,
 )
+from heat_igl.heat_method import curve_levels
+from heat_igl.sources import oriented_set
 
 
 def ring(mesh: Mesh, radius: float = 0.3, start: float = 0.0, end: float = 2 * np.pi) -> SurfaceCurve:
@@ -232,6 +236,30 @@ def test_curves_with_bends_are_near_zero(mesh):
         near = on_curves(mesh, curves, solver.distance(curves))
         assert near < 0.03
         assert near < on_curves(mesh, curves, solver.distance(curves, level="none")) / 10
+
+
+def test_the_smooth_part_of_the_level_is_the_least_one(monkeypatch):
+    """Conjugate gradients against the normal equations, on two components of different size."""
+    small, large = shapes.icosphere(2), shapes.torus(16, 10)
+    V = np.concatenate([0.3 * small.V, np.add(large.V, [5, 0, 0])])
+    mesh = Mesh(V, np.concatenate([small.F, large.F + small.n_vertices]))
+    curves = isolines(mesh, V @ [0.2, 0.4, 0.9], 0.1)[0]
+    solver = SignedHeatSolver(mesh)
+    domain, pieces = solver.operators, solver._pieces(oriented_set(curves, mesh))
+    on_curves = curve_levels._OnCurves(domain, mesh.F, pieces)
+    values = np.sin(5 * pieces.barycentric[:, 0] + pieces.faces)
+    h = domain.mean_edge_lengths[on_curves.component]
+    rows = np.repeat(np.arange(len(values)), 3)
+    B = sp.csr_array((pieces.barycentric.ravel(), (rows, mesh.F[pieces.faces].ravel())), shape=(len(values), len(V)))
+    weighted = B.T @ sp.diags_array(pieces.weight / h)
+    truth = spsolve(sp.csc_array(-domain.L + weighted @ B), weighted @ values)
+    off = []
+    for steps in (3, 200):
+        monkeypatch.setattr(curve_levels, "_SMOOTH_STEPS", steps)
+        found = solver._levels._smooth(values, on_curves)
+        off.append(np.abs(found - truth).max() / np.abs(truth).max())
+    assert off[1] < 1e-9
+    assert off[0] < 0.2
 
 
 def test_vertices_on_curves_that_were_cut_are_exactly_zero():

@@ -51,6 +51,17 @@ class Pieces(NamedTuple):
     label: IntArray
     is_point: BoolArray
 
+    def at(self, chosen: BoolArray) -> Pieces:
+        """Some of the pieces, by a mask (q,)."""
+        return Pieces(
+            self.faces[chosen],
+            self.barycentric[chosen],
+            self.normal[chosen],
+            self.weight[chosen],
+            self.label[chosen],
+            self.is_point[chosen],
+        )
+
 
 class CurveLevels:
     """Extends values on curves to all vertices of one domain.
@@ -84,8 +95,14 @@ class CurveLevels:
             _, group = np.unique(np.stack([pieces.label, on_curves.component]), axis=1, return_inverse=True)
             group = group.ravel()
             rest -= (np.bincount(group, pieces.weight * rest) / np.bincount(group, pieces.weight))[group]
-        smooth = _SMOOTH_SHARE * self._smooth(rest, on_curves)
-        return np.asarray(at_vertices + smooth + self._extended(rest - on_curves.values(smooth), on_curves))
+        lines = ~pieces.is_point
+        if lines.any():
+            # Of points only the mean of many counts.
+            segments = _OnCurves(self._domain, self._faces, pieces.at(lines))
+            smooth = _SMOOTH_SHARE * self._smooth(rest[lines], segments)
+            at_vertices = at_vertices + smooth
+            rest = rest - on_curves.values(smooth)
+        return np.asarray(at_vertices + self._extended(rest, on_curves))
 
     def _smooth(self, values: FloatArray, on_curves: _OnCurves) -> FloatArray:
         """The function g (n,) with the least sum of |grad g|^2 over the surface and (g - values)^2 / h over the curves.

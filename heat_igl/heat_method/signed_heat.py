@@ -18,7 +18,7 @@ from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_gradient, lay_o
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.operators import Operators, divergence_matrix, edge_rotations, face_rotations, operators
-from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT
+from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, both
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set
 from heat_igl.steps import PoissonProblem, VectorHeatFlow
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
@@ -183,13 +183,17 @@ class SignedHeatSolver:
 
     def _refined(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Near-exact distance (n,), and which vertices (n,) are on the left."""
-        size = self._unsigned.distance(chosen.unoriented())
+        sources = chosen.unoriented()
         if not has_gaps(self._mesh, chosen):
-            left, is_known = left_of_closed(self._mesh, self._faces, chosen)
+            size, (left, is_known) = both(
+                lambda: self._unsigned.distance(sources), lambda: left_of_closed(self._mesh, self._faces, chosen)
+            )
             if (is_known | (size == 0) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
             return size, np.where(is_known, left, self._integrated(self._pieces(chosen), level) < 0)
-        phi = self._integrated(self._pieces(chosen), level)
+        size, phi = both(
+            lambda: self._unsigned.distance(sources), lambda: self._integrated(self._pieces(chosen), level)
+        )
         left = left_of_nearest(self._faces, chosen, size, phi < 0)
         closing = zero_curve_in_gaps(self._mesh, phi, size, self._domain.mean_edge_length)
         return size if closing is None else np.minimum(size, self._unsigned.distance(closing)), left

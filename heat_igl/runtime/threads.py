@@ -8,9 +8,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
-__all__ = ["n_threads", "pool", "side_by_side"]
+__all__ = ["both", "n_threads", "pool", "side_by_side"]
 
 Item = TypeVar("Item")
+First = TypeVar("First")
+Second = TypeVar("Second")
 
 # Per thread: the number of threads, this one included, among which the processors are divided.
 _divided = threading.local()
@@ -55,3 +57,12 @@ def side_by_side(work: Callable[[Item], Any], items: Sequence[Item]) -> None:
         work(items[0])
         for other in others:
             other.result()
+
+
+def both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
+    """The results of two calls, the second of them on another thread if there is one."""
+    if n_threads() == 1:
+        return first(), second()
+    with pool(2) as workers:
+        other = workers.submit(second)
+        return first(), other.result()

@@ -13,6 +13,7 @@ import numpy as np
 from heat_igl.errors import is_number, shown
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.operators import Surface, unfolding_surface
+from heat_igl.runtime import both, n_threads
 from heat_igl.sources import NEAR_RADIUS, NearField, SourcePoints, SourceSegments, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
@@ -249,8 +250,15 @@ class UnfoldingSolver:
             labels=labels, angles=angles, tolerance=self._tolerance if tolerance is None else tolerance
         )
         by_windows = by_windows or self._is_straight(asked)
-        near = None if takes_curves else self._near(relative, by_windows)
-        distance = self._unfolded(u, asked, near, _groups(relative, points), by_windows)
+        groups = _groups(relative, points)
+        if len(relative.segments.faces) and not (by_windows or self._sweeps) and n_threads() > 1:
+            # Walks along curves do not need the distance near them.
+            near, distance = both(
+                lambda: self._near(relative, by_windows), lambda: self._unfolded(u, asked, None, groups, by_windows)
+            )
+        else:
+            near = None if takes_curves else self._near(relative, by_windows)
+            distance = self._unfolded(u, asked, near, groups, by_windows)
         start = self._domain.expand_to_vertices(earliest)
         if sources.offsets.any():
             distance += start
