@@ -169,7 +169,7 @@ def n_near(twin: cython.int[::1], reach: cython.int) -> int:
     return n
 
 
-def has_needles(length: cython.double[::1], margin: cython.double) -> bool:
+def has_needles(length: cython.const[cython.double][::1], margin: cython.double) -> bool:
     """Whether in some face two sides (3 m,) exceed the third by less than `margin` times the longest side of all."""
     h: cython.Py_ssize_t
     total: cython.double
