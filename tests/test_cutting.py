@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from conftest import flat_perturbed
+from conftest import flat_perturbed, load_script
 
 import heat_igl
 from heat_igl import Mesh, MeshError, SourceError, SurfaceCurve, curve_on, cut, edge_curve, isolines, shapes
@@ -104,6 +106,24 @@ def test_many_random_curves():
         found = cut(mesh, wild_segments(mesh, 25, seed))
         assert_same_surface(mesh, found)
         assert is_along_edges(found)
+
+
+def test_the_script_of_random_cuts(monkeypatch):
+    """Every kind of its curves, and a cut that is wrong is found."""
+    script = load_script("random_cuts")
+    found = script.campaign(12, 0)
+    assert found["failed"] == []
+    assert all(counts["meshes"] == 2 for counts in found["counts"].values())
+
+    def moved(mesh, curves):
+        right = cut(mesh, curves)
+        V = right.mesh.V.copy()
+        V[0] += 1e-6
+        return replace(right, mesh=Mesh(V, right.mesh.F))
+
+    monkeypatch.setattr(script, "cut", moved)
+    assert all("area" in each["wrong"] for each in script.campaign(12, 0)["failed"])
+    assert len(script.campaign(12, 0)["failed"]) == 12
 
 
 def test_pieces_lie_on_either_side():
