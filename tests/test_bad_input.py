@@ -93,8 +93,8 @@ def array_cases() -> Iterator[Case]:
     for shape in ((0, 3), (0, 4), (0,), (3, 0)):
         yield mesh_case(f"F empty, {shape}", V4, np.zeros(shape, int), "F is empty")
     yield mesh_case("V empty", V4[:0], TRIANGLES, "V is empty")
-    yield mesh_case("V ragged", [[0, 0, 0], [1, 0]], TRIANGLES, "V must be an array")
-    yield mesh_case("F ragged", V4, [[0, 1, 2], [1, 3]], "F must be an array")
+    yield mesh_case("V ragged", [[0, 0, 0], [1, 0]], TRIANGLES, "V must be an array .* rows differ in length$")
+    yield mesh_case("F ragged", V4, [[0, 1, 2], [1, 3]], "F must be .* rows differ in length: PolygonMesh")
     yield mesh_case("V None", None, TRIANGLES, "V must hold real numbers")
     yield mesh_case("F None", V4, None, "F must hold integers")
     yield mesh_case("V a string", "bunny", TRIANGLES, "V must hold real numbers")

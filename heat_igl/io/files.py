@@ -302,8 +302,8 @@ def checked_attributes(attributes: Mapping[str, ArrayLike], n: int) -> dict[str,
             raise MeshError(f"{name!r} cannot name an attribute: use letters, digits and _, and not x, y or z")
         try:
             array = np.asarray(values)
-        except ValueError as error:
-            raise MeshError(f"{name} must be an array of shape ({n},) or ({n}, k): {error}") from None
+        except ValueError:
+            raise MeshError(f"{name} must be an array of shape ({n},) or ({n}, k), but rows differ in length") from None
         if array.dtype.kind not in "biuf" or array.dtype.itemsize > 8:
             raise MeshError(f"{name} must hold real numbers that fit double precision, not {array.dtype}")
         if array.ndim not in (1, 2) or len(array) != n or not array.size:

@@ -48,8 +48,8 @@ def checked_positions(V: ArrayLike) -> FloatArray:
     """
     try:
         array = np.asarray(V)
-    except ValueError as error:
-        raise MeshError(f"V must be an array of shape (n, 3): {error}") from None
+    except ValueError:
+        raise MeshError("V must be an array of shape (n, 3), but rows differ in length") from None
     if array.dtype.kind not in "iuf":
         raise MeshError(f"V must hold real numbers, not {array.dtype}: pass an (n, 3) array of positions")
     if array.ndim != 2 or array.shape[1] not in (2, 3):
@@ -81,8 +81,10 @@ def checked_faces(F: ArrayLike, n: int | None, *, may_repeat: bool = False) -> I
     """
     try:
         array = np.asarray(F)
-    except ValueError as error:
-        raise MeshError(f"F must be an array of shape (m, 3) or (m, 4): {error}") from None
+    except ValueError:
+        raise MeshError(
+            "F must be an array of shape (m, 3) or (m, 4), but rows differ in length: PolygonMesh takes polygons"
+        ) from None
     if array.size == 0:
         raise MeshError("F is empty: a mesh needs triangles (m, 3) or tetrahedra (m, 4)")
     if array.dtype.kind not in "iu":

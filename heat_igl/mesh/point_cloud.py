@@ -199,8 +199,8 @@ def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:
     """The normals as a new array of unit vectors."""
     try:
         array = np.asarray(normals)
-    except ValueError as error:
-        raise MeshError(f"normals must be an array of shape ({n}, 3): {error}") from None
+    except ValueError:
+        raise MeshError(f"normals must be an array of shape ({n}, 3), but rows differ in length") from None
     if array.dtype.kind not in "iuf":
         raise MeshError(f"normals must hold real numbers, not {array.dtype}")
     if array.shape != (n, 3):
