@@ -1,12 +1,14 @@
 """Distance on point clouds: error and time, beside potpourri3d's solver on the same points.
 
     python scripts/clouds_table.py [--sizes 5000 50000] [--noise 0 0.01] [--sources 6] [--seed 0] [--json FILE]
+    python scripts/clouds_table.py --meshes bunny.obj ... [--sources 6] [--seed 0] [--json FILE]
 
 Random points on a sphere of radius 1, a torus of radii 1 and 0.4 (at most 144 000), a cylinder of radius 1 and height
 3, and a square with sides of length 1. Prints, as a Markdown table, the mean of |d - exact| / exact over points and
 sources in percent, seconds to make the solver, and seconds for one query. Seconds are those of all processors together,
 which other programs disturb least; potpourri3d uses one, this package all that there are. Noise is Gaussian in all
-coordinates, of the given standard deviation. Needs the extra ``bench``; docs/clouds.md shows the table.
+coordinates, of the given standard deviation. With --meshes, points are the vertices of meshes, and exact is what
+unfolding finds on the mesh. Needs the extra ``bench``; docs/clouds.md shows the tables.
 """
 
 from __future__ import annotations
@@ -14,10 +16,14 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from heat_igl import HeatMethodSolver, PointCloud, shapes
+from heat_igl import HeatMethodSolver, PointCloud, read_mesh, shapes
 from heat_igl.typing import FloatArray
 
 from scaffold import add_json, add_seed, environment, option_parser, publish, table
@@ -54,6 +60,11 @@ def torus(n: int, rng: np.random.Generator) -> tuple[FloatArray, Truth]:
     return mesh.V[chosen], lambda i: solver.distance(int(chosen[i]))[chosen]
 
 
+def vertices(file: str, _: np.random.Generator) -> tuple[FloatArray, Truth]:
+    mesh = read_mesh(file)
+    return mesh.V, HeatMethodSolver(mesh, refine="unfold").distance
+
+
 SHAPES = {"sphere": sphere, "torus": torus, "cylinder": cylinder, "square": square}
 
 
@@ -71,18 +82,15 @@ def timed(
     errors = []
     for i, distance in zip(sources, found, strict=True):
         exact = truth(i)
-        away = (exact > 0) & np.isfinite(distance)
+        away = (exact > 0) & np.isfinite(exact) & np.isfinite(distance)
         errors.append(np.mean(np.abs(distance - exact)[away] / exact[away]))
     return 100 * float(np.mean(errors)), made, asked
 
 
-def measure(shape: str, n: int, noise: float, k: int, seed: int) -> dict[str, tuple[float, float, float]]:
+def measure(P: FloatArray, truth: Truth, k: int, rng: np.random.Generator) -> dict[str, tuple[float, float, float]]:
     import potpourri3d
 
-    rng = np.random.default_rng(seed)
-    P, truth = SHAPES[shape](n, rng)
-    P = P + noise * rng.standard_normal(P.shape)
-    sources = rng.choice(n, k, replace=False).tolist()
+    sources = rng.choice(len(P), k, replace=False).tolist()
     return {
         "heat": timed(lambda: HeatMethodSolver(PointCloud(P), magnitude="damped").distance, sources, truth),
         "default": timed(lambda: HeatMethodSolver(PointCloud(P)).distance, sources, truth),
@@ -94,19 +102,29 @@ def measure(shape: str, n: int, noise: float, k: int, seed: int) -> dict[str, tu
 def main(argv: Sequence[str] | None = None) -> int:
     parser = option_parser(__doc__)
     parser.add_argument("--shapes", nargs="+", choices=SHAPES, default=[*SHAPES], help="surfaces")
+    parser.add_argument("--meshes", nargs="+", default=[], metavar="FILE", help="points are the vertices of these")
     parser.add_argument("--sizes", nargs="+", type=int, default=[5000, 50000], help="numbers of points")
     parser.add_argument("--noise", nargs="+", type=float, default=[0.0, 0.01], help="standard deviations")
     parser.add_argument("--sources", type=int, default=6, help="per cloud (default 6)")
     add_seed(parser)
     add_json(parser)
     arguments = parser.parse_args(argv)
-    rows = []
-    for shape in arguments.shapes:
-        for n in arguments.sizes:
-            for noise in arguments.noise:
-                found = measure(shape, n, noise, arguments.sources, arguments.seed)
-                rows.append({"shape": shape, "points": n, "noise": noise, **found})
-                print(rows[-1], file=sys.stderr, flush=True)
+    rows: list[dict[str, Any]] = []
+
+    def add(shape: str, noise: float, points: Callable[[np.random.Generator], tuple[FloatArray, Truth]]) -> None:
+        rng = np.random.default_rng(arguments.seed)
+        P, truth = points(rng)
+        if noise:
+            P = P + noise * rng.standard_normal(P.shape)
+        found = measure(P, truth, arguments.sources, rng)
+        rows.append({"shape": shape, "points": len(P), "noise": noise, **found})
+        print(rows[-1], file=sys.stderr, flush=True)
+
+    for file in arguments.meshes:
+        add(Path(file).stem, 0.0, partial(vertices, file))
+    if not arguments.meshes:
+        for shape, n, noise in product(arguments.shapes, arguments.sizes, arguments.noise):
+            add(shape, noise, partial(SHAPES[shape], n))
     methods = ("heat", "default", "unfold", "potpourri3d")
     head = ["points on", "number", "noise", *(f"{m}, %" for m in methods), *(f"{m}, s + s" for m in methods)]
     cells = [

@@ -541,7 +541,14 @@ def test_points_of_a_regular_torus_make_a_closed_surface(around_tube: int, aroun
     report = cloud.report()
     assert (report.euler_characteristic, report.n_boundary_loops, cloud.n_faces) == (0, 0, mesh.n_faces)
     assert is_a_surface(cloud.F, mesh.n_vertices)
-    heat_igl.tangent_frames(cloud.triangles)
+    upper = mesh.V[:, 2] > 0.15
+    side = heat_igl.SignedHeatSolver(cloud).distance(upper)
+    assert (side[mesh.V[:, 2] > 0.3] < 0).all()
+    assert (side[mesh.V[:, 2] < -0.1] > 0).all()
+    found = HeatMethodSolver(cloud, refine="unfold").directions(0)
+    on_mesh = HeatMethodSolver(mesh, refine="unfold").directions(0)
+    np.testing.assert_allclose(found.distance, on_mesh.distance, atol=0.03 * on_mesh.distance.max())
+    np.testing.assert_allclose(np.linalg.norm(found.gradient[1:], axis=1), 1, atol=1e-6)
 
 
 def test_of_several_fans_at_a_vertex_the_largest_stays() -> None:

@@ -284,9 +284,9 @@ class HeatMethodSolver(PreparedSolver):
 
     @cached_property
     def _frames(self) -> TangentFrames:
-        if not isinstance(self._mesh, Mesh):
+        if self._mesh is None:
             raise ValueError("directions need the positions of a mesh, which this solver does not have")
-        return tangent_frames(self._mesh)
+        return tangent_frames(self._mesh if isinstance(self._mesh, Mesh) else self._mesh.triangles)
 
     def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
         """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
