@@ -492,3 +492,8 @@ def test_vectors_on_a_cloud():
     P = heat_igl.shapes.icosphere(3).V
     vectors = heat_igl.VectorHeatSolver(heat_igl.PointCloud(P), refine="exact").log_map(0)
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), np.arccos(np.clip(P @ P[0], -1, 1)), atol=0.01)
+
+
+def test_operators_of_points_want_points():
+    with pytest.raises(heat_igl.MeshError, match="point_cloud_operators needs a PointCloud, not Mesh"):
+        heat_igl.point_cloud_operators(heat_igl.shapes.grid(2))

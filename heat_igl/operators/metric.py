@@ -287,6 +287,8 @@ def _checked(metric: ArrayLike, mesh: Mesh) -> FloatArray:
 
 def checked_numbers(name: str, values: ArrayLike) -> FloatArray:
     """`values` as float64; a ValueError that calls them `name` if they are no real numbers."""
+    if np.iscomplexobj(values):
+        raise ValueError(f"{name} must be real numbers, not complex")
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from heat_igl.errors import MeshError
 from heat_igl.mesh import PointCloud
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators
 from heat_igl.operators.triangles import operators, tufted_operators
@@ -29,7 +30,7 @@ def point_cloud_operators(
     Raises
     ------
     MeshError
-        If no three points are near enough to one another to make a triangle.
+        If `cloud` is none, or no three points are near enough to one another to make a triangle.
     ValueError
         If `laplacian` is neither.
 
@@ -43,6 +44,8 @@ def point_cloud_operators(
     >>> bool(np.allclose(domain.L @ np.ones(domain.n), 0))
     True
     """
+    if not isinstance(cloud, PointCloud):
+        raise MeshError(f"point_cloud_operators needs a PointCloud, not {cloud!r:.60}: see operators")
     mesh = cloud.triangles
     # The triangles of scattered points are even enough.
     laplacian = "intrinsic-delaunay" if laplacian == "auto" else laplacian
