@@ -217,7 +217,11 @@ def test_targets_alone() -> None:
         ({"cutoff": -1}, ValueError, "cutoff must be a positive number, not -1"),
         ({"cutoff": "1"}, ValueError, "cutoff must be a positive number, not '1'"),
         ({"sources": 10**6}, SourceError, r"sources\[0\] = 1000000 is no vertex"),
-        ({"mesh": 3}, MeshError, "mesh is of type int, which is not understood: pass a Mesh, PolygonMesh or PointCloud, a pair"),
+        (
+            {"mesh": 3},
+            MeshError,
+            "mesh is of type int, which is not understood: pass a Mesh, PolygonMesh or PointCloud, a pair",
+        ),
         ({"mesh": TORUS.V}, MeshError, r"faces F are missing: .* or a pair \(V, F\)"),
     ],
 )

@@ -98,7 +98,9 @@ def crosses_octant(p: FloatArray, q: FloatArray) -> BoolArray:
 def around_the_corner(V: FloatArray, source: int) -> FloatArray:
     """In a cube without the octant x, y, z > 1/2, the shortest way through points on the three edges around it."""
     steps = np.linspace(0.5, 1, 201)
-    edges = np.concatenate([np.roll(np.stack([steps, *(2 * [np.full(201, 0.5)])], axis=1), i, axis=1) for i in range(3)])
+    edges = np.concatenate(
+        [np.roll(np.stack([steps, *(2 * [np.full(201, 0.5)])], axis=1), i, axis=1) for i in range(3)]
+    )
 
     def straight(p: FloatArray) -> FloatArray:
         lengths = np.linalg.norm(p[:, None] - edges, axis=2)

@@ -55,12 +55,8 @@ def bend_around(
         Edges of the body around which ways bend, roughly from near to far.
     outward : (e, 3) float64
         Direction out of the body at each, halfway between the two walls; zero where more than two meet.
-    corners : (m, 4) int32
-        Tetrahedra.
-    first, incident : (n + 1,) int32, (4 m,) int32
-        Corners ``4 * tetrahedron + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
-    positions : (n, 3) float64
-        Of the vertices.
+    corners, first, incident, positions
+        The body, as for `heat_igl.kernels.sight.look_around`.
     reach : (n,) float64
         Longest edge at each vertex.
     sources, offset : (k,) int32, (k,) float64
@@ -90,7 +86,7 @@ def bend_around(
     one.corners, one.first, one.incident, one.positions = corners, first, incident, positions
     one.reach, one.sources, one.offset = reach, sources, offset
     one.d, one.begin, one.label, one.way = d, begin, label, way
-    one.seen, one.stack = np.full(n, -1, np.int32), np.empty(n, np.int32)
+    one.seen, one.lit, one.queue = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
     i: cython.int
     _rounds: cython.int
     with cython.nogil:
@@ -98,6 +94,7 @@ def bend_around(
             before: cython.int = one.n_searches
             for i in range(one.bends.shape[0]):
                 if one.is_stale(i):
+                    one.n_searches += 1
                     one.fit(i)
                     one.search(i)
             if one.n_searches == before:
@@ -127,8 +124,9 @@ class _Bends:
     begin: cython.double[::1]
     label: cython.int[::1]
     way: cython.int[::1]
-    seen: cython.int[::1]
-    stack: cython.int[::1]
+    seen: cython.int[::1]  # the last search that came to a vertex, and the last in which it saw the edge
+    lit: cython.int[::1]
+    queue: cython.int[::1]
     n_searches: cython.int
     x: cython.double[3]
     share: cython.double
@@ -240,7 +238,7 @@ class _Bends:
     @cython.nogil
     @cython.exceptval(check=False)
     def value(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """Distance at a point near vertex v if the way to it is that to v, and in `self.x` where that way bends last."""
+        """Distance at a point near vertex v, by the way to v; `x` becomes the point at which this way bends last."""
         if self.way[v] >= 0:
             return self.around(self.way[v], x)
         source: cython.int = v
@@ -258,7 +256,7 @@ class _Bends:
     @cython.nogil
     @cython.exceptval(check=False)
     def around(self, i: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """Length of the way to a point that bends around an edge last, and in `self.x` where; `share` along the edge."""
+        """Length of the way to a point that bends around an edge last; sets `x`, `share` and `beyond`."""
         bend = cython.address(self.bends[i])
         k: cython.int
         away: cython.double = 0.0
@@ -299,30 +297,23 @@ class _Bends:
     def search(self, i: cython.int) -> cython.void:
         """Give the vertices around an edge their ways around it, as far as they see it and may need it."""
         bend = cython.address(self.bends[i])
-        self.n_searches += 1
         stamp: cython.int = self.n_searches
-        size: cython.int = 0
-        k: cython.int
-        c: cython.int
-        u: cython.int
-        ends: cython.int
-        for ends in range(2):
-            u = bend.b if ends else bend.a
-            if self.seen[u] != stamp:
-                self.seen[u] = stamp
-            size = self.push_around(u, size, stamp)
-        while size > 0:
-            size -= 1
-            u = self.stack[size]
+        self.seen[bend.a] = self.seen[bend.b] = self.lit[bend.a] = self.lit[bend.b] = stamp
+        size: cython.int = self.push_around(bend.a, 0, stamp)
+        size = self.push_around(bend.b, size, stamp)
+        next_one: cython.int = 0
+        while next_one < size:
+            u: cython.int = self.queue[next_one]
+            next_one += 1
             value: cython.double = self.around(i, cython.address(self.positions[u, 0]))
             old: cython.double = self.d[u]
             is_better: cython.bint = value < old * (1 - GAIN)
-            if not is_better:
-                # Farther along, ways are shorter around another edge.
-                if self.beyond > self.reach[u] or value > old + SLACK * self.reach[u]:
-                    continue
+            # Farther along, ways are shorter around another edge.
+            if not is_better and (self.beyond > self.reach[u] or value > old + SLACK * self.reach[u]):
+                continue
             if not self.is_hidden_from_before(i, u) or not self.sees(i, u):
                 continue
+            self.lit[u] = stamp
             if is_better:
                 self.d[u], self.way[u] = value, i
                 self.begin[u] = value - self.away(u)
@@ -333,7 +324,7 @@ class _Bends:
     @cython.nogil
     @cython.exceptval(check=False)
     def push_around(self, v: cython.int, size: cython.int, stamp: cython.int) -> cython.int:
-        """Put the neighbours of v that were not searched on the stack; returns its size."""
+        """Put the neighbours of v that the search has not come to at the end of the queue; returns its size."""
         k: cython.int
         c: cython.int
         for k in range(self.first[v], self.first[v + 1]):
@@ -341,7 +332,7 @@ class _Bends:
                 u: cython.int = self.corners[self.incident[k] // 4, c]
                 if self.seen[u] != stamp:
                     self.seen[u] = stamp
-                    self.stack[size] = u
+                    self.queue[size] = u
                     size += 1
         return size
 
@@ -411,7 +402,10 @@ class _Bends:
     @cython.nogil
     @cython.exceptval(check=False)
     def sees(self, i: cython.int, v: cython.int) -> cython.bint:
-        """Whether the line from v to `x` on edge i stays in the tetrahedra."""
+        """Whether the line from v to `x` on edge i stays in the tetrahedra.
+
+        It does once it passes between three vertices that see the edge.
+        """
         k: cython.int
         _steps: cython.int
         for k in range(self.first[v], self.first[v + 1]):
@@ -420,14 +414,25 @@ class _Bends:
         for k in range(self.first[v], self.first[v + 1]):
             if self.ray.begins(self.incident[k], self.x):
                 self.ray.aim(v, self.incident[k] // 4, self.x, -1, NUDGE)
-                if not self.ray.enters(self.incident[k] // 4):
-                    continue
-                for _steps in range(MOST_STEPS):
-                    o: cython.int = self.ray.cross()
-                    if o < 0:
-                        break
-                    if self.has_end(self.ray.t, i):
-                        return True
-                    if not self.ray.turn(o):
-                        break
+                if self.ray.enters(self.incident[k] // 4) and self.arrives(i):
+                    return True
+        return False
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def arrives(self, i: cython.int) -> cython.bint:
+        """Whether the ray gets to edge i before it leaves the body."""
+        stamp: cython.int = self.n_searches
+        _steps: cython.int
+        for _steps in range(MOST_STEPS):
+            if self.lit[self.ray.a] == stamp and self.lit[self.ray.b] == stamp and self.lit[self.ray.c] == stamp:
+                return True
+            o: cython.int = self.ray.cross()
+            if o < 0:
+                return False
+            if self.has_end(self.ray.t, i):
+                return True
+            if not self.ray.turn(o):
+                return False
         return False

@@ -189,9 +189,7 @@ class _Fronts:
     @cython.inline
     @cython.nogil
     @cython.exceptval(check=False)
-    def take(
-        self, value: cython.double, begin: cython.double, label: cython.int, s: cython.int
-    ) -> cython.void:
+    def take(self, value: cython.double, begin: cython.double, label: cython.int, s: cython.int) -> cython.void:
         """Keep a value if it is the best so far."""
         if value < self.best:
             self.best, self.best_begin, self.best_label, self.best_simplex = value, begin, label, s

@@ -23,7 +23,7 @@ class Ray:
     @cython.nogil
     @cython.exceptval(check=False)
     def begins(self, k: cython.int, goal: cython.pointer[cython.const[cython.double]]) -> cython.bint:
-        """Whether the line from a vertex to a point leaves the tetrahedron of its corner k through the opposite side."""
+        """Whether the line from corner k to a point leaves the tetrahedron of k through the opposite side."""
         t: cython.int = k // 4
         o: cython.int = k % 4
         v: cython.int = self.corners[t, o]

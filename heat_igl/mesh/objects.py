@@ -21,8 +21,8 @@ MeshLike = Any
 """`Mesh`, `PolygonMesh`, `PointCloud`, a pair (V, F), a path, or a mesh of another library, see `as_mesh`."""
 
 _UNDERSTOOD = (
-    "a Mesh, PolygonMesh or PointCloud, a pair (V, F), a path, or a mesh of trimesh, pyvista or vtk, open3d, meshio, pymeshlab, "
-    "vedo or nibabel"
+    "a Mesh, PolygonMesh or PointCloud, a pair (V, F), a path, or a mesh of trimesh, pyvista or vtk, open3d, meshio, "
+    "pymeshlab, vedo or nibabel"
 )
 # Cells by the names of meshio and by the numbers of VTK.
 _TRIANGLES, _QUADS, _POLYGONS, _TETRAHEDRA = ("triangle", 5), ("quad", 9), ("polygon", 7), ("tetra", 10)
@@ -43,8 +43,9 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     ----------
     mesh : mesh or array_like
         `Mesh`, `PolygonMesh` and `PointCloud` are returned as they are. Besides: a pair (V, F); a path, read by
-        `read_mesh`, or by `read_point_cloud` if the file holds no faces; meshes of trimesh, pyvista and vtk (PolyData, UnstructuredGrid), open3d, meshio, pymeshlab (also a
-        MeshSet: the current mesh), vedo, and nibabel (surfaces in GIFTI). With `F`, the positions V (n, 3).
+        `read_mesh`, or by `read_point_cloud` if the file holds no faces; meshes of trimesh, pyvista and vtk (PolyData,
+        UnstructuredGrid), open3d, meshio, pymeshlab (also a MeshSet: the current mesh), vedo, and nibabel (surfaces in
+        GIFTI). With `F`, the positions V (n, 3).
     F : (m, 3) or (m, 4) array_like of int, optional
         Triangles or tetrahedra, when `mesh` is V.
 

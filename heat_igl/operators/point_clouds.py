@@ -30,7 +30,7 @@ def point_cloud_operators(
     Raises
     ------
     MeshError
-        If no three points are near enough to one another to make a triangle.
+        If `cloud` is none, or no three points are near enough to one another to make a triangle.
     ValueError
         If `laplacian` is neither.
 

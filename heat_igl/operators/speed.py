@@ -8,7 +8,7 @@ import numpy as np
 
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.operators.matrices import Operators
-from heat_igl.operators.metric import operators_in_metric
+from heat_igl.operators.metric import checked_numbers, operators_in_metric
 from heat_igl.operators.metric_derivatives import MetricSides
 from heat_igl.typing import ArrayLike, FloatArray
 
@@ -66,11 +66,12 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     return replace(domain, metric=MetricSides.of(mesh, np.eye(3) / s[:, None, None] ** 2))
 
 
+# Lengths in the metric are squared, and their fourth powers give areas.
+_LARGEST = 1e100
+
+
 def _checked(speed: ArrayLike, m: int) -> FloatArray:
-    try:
-        s = np.array(speed, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(f"speed must be real numbers of shape ({m},), one per face") from None
+    s = checked_numbers("speed", speed)
     if s.shape != (m,):
         raise ValueError(f"speed must have shape ({m},), one per face, not {s.shape}")
     bad = ~((s > 0) & np.isfinite(s))
@@ -79,5 +80,13 @@ def _checked(speed: ArrayLike, m: int) -> FloatArray:
         raise ValueError(
             f"speed[{first}] = {s[first]} must be positive and finite ({int(bad.sum())} of {m} are not): remove faces "
             "that cannot be crossed"
+        )
+    outside = (s < 1 / _LARGEST) | (s > _LARGEST)
+    if outside.any():
+        first = int(np.argmax(outside))
+        raise ValueError(
+            f"speed[{first}] = {s[first]} is not between {1 / _LARGEST:g} and {_LARGEST:g} ({int(outside.sum())} of "
+            f"{m} are not): squares leave the range of doubles; take another unit, or remove faces that cannot be "
+            "crossed"
         )
     return s

@@ -73,7 +73,7 @@ class FrontSolver(UnfoldingSolver):
     def _edge_graph(self) -> sp.csr_array:
         return connectivity.shortest_edge_graph(*self._simplices.edges, self._simplices.n)
 
-    def _order(self, vertices: IntArray, straight: bool = False) -> AnyArray:
+    def _order(self, vertices: AnyArray, straight: bool = False) -> AnyArray:
         """All vertices, from near to far: by the straight line from the only source, or by edges."""
         if straight:
             far = np.linalg.norm(self._V - self._V[vertices[0]], axis=1)
@@ -134,4 +134,4 @@ class FrontSolver(UnfoldingSolver):
             rows = rows[np.argsort(-(distance[start[rows]] + lengths[rows]), kind="stable")]
             distance[end[rows]] = distance[start[rows]] + lengths[rows]
             begin[end[rows]], label[end[rows]] = distance[start[rows]], label[start[rows]]
-        return len(distance) - np.count_nonzero(np.isinf(distance)) > reached
+        return bool(len(distance) - np.count_nonzero(np.isinf(distance)) > reached)
