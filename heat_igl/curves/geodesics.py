@@ -47,7 +47,8 @@ def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
     The curve gives a strip of faces, in which a funnel finds the shortest path (Lee and Preparata 1984). Where it bends
     at a vertex with an angle below pi on the other side, the strip is led there (Xin and Wang 2007). A loop is
     straightened from one of its points to itself, then from another one, until its length stays the same. On a surface
-    with hills one class can have several locally shortest curves.
+    with hills one class can have several locally shortest curves. Straight lines that leave the curve at small angles
+    are followed; one that meets the curve again after a shorter way, in the same class, replaces the part in between.
 
     Examples
     --------

@@ -124,10 +124,10 @@ class Shortener:
         most_corners = int(np.diff(self.surface.first_corner).max())
         letters = crossing_letters(mesh)
         if letters is None:
-            around, ahead, letters = np.empty(0), np.empty(0, _AHEAD), np.empty(0, np.int32)
+            ahead, letters = np.empty(0, _AHEAD), np.empty(0, np.int32)
         else:
-            around, ahead = np.where(np.isinf(sums), 0, sums), _faces_ahead(self.surface)
-        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, around, ahead, letters)
+            ahead = _faces_ahead(self.surface)
+        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, ahead, letters)
 
     def shortest(self, course: Course, *, is_closed: bool = False) -> Shortened:
         """The locally shortest curve of the class of a course: between the ends, or as a loop."""
@@ -150,7 +150,7 @@ class Shortener:
 
 
 def _faces_ahead(surface: Surface) -> AnyArray:
-    """The face behind each half-edge (3 m,) of an oriented manifold, for lines that enter there; see `Ahead` in fans."""
+    """The face behind each half-edge (3 m,) of an oriented manifold, for lines that enter there: `Ahead` in fans."""
     triangle, first = surface.triangle, surface.first_side
     opposite = np.full(3 * len(triangle), -1, np.int32)
     inner = first[:-1][np.diff(first) == 2]

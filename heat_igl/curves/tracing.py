@@ -35,8 +35,8 @@ class Surface(NamedTuple):
     Attributes
     ----------
     triangle : (m,) structures
-        Of each face its edge `length` opposite each corner, the `angle` at each, its `vertex` and `edge` numbers. Corner
-        c lies `along` of the way from corner c + 2 to corner c + 1 and `above` this edge, in lengths of the edge.
+        Of each face its edge `length` opposite each corner, the `angle` at each, its `vertex` and `edge` numbers.
+        Corner c lies `along` of the way from corner c + 2 to c + 1, and `above` this edge, in lengths of the edge.
     first_side, side : (k + 1,), (3 m,) int32
         Half-edges of edge e are ``side[first_side[e]:first_side[e + 1]]``.
     first_corner, corner : (n + 1,), (3 m,) int32

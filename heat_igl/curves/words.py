@@ -82,7 +82,7 @@ def _forest(one: IntArray, other: IntArray, n: int) -> IntArray:
     is_first[1:] = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
     single = order[is_first & (low[order] != high[order])]
     graph = sp.coo_array((np.arange(1.0, len(single) + 1), (low[single], high[single])), shape=(n, n))
-    return single[csgraph.minimum_spanning_tree(graph.tocsr()).data.astype(int) - 1]
+    return np.asarray(single[csgraph.minimum_spanning_tree(graph.tocsr()).data.astype(int) - 1])
 
 
 def _without_loose_ends(ends: IntArray, is_branch: BoolArray, n: int) -> IntArray:

@@ -31,8 +31,8 @@ class Shortener:
     length: cython.double
     end: Place  # where the curve ends in the last face; for a loop, the start there
 
-    def __init__(self, surface, half_turn, most_corners, around, ahead, letter):
-        self.course = Course(Surface(surface, np.empty(0)), most_corners, around)
+    def __init__(self, surface, half_turn, most_corners, ahead, letter):
+        self.course = Course(Surface(surface, np.empty(0)), most_corners)
         self.passing = Passing(self.course, half_turn)
         self.fan = Fan(self.course, len(half_turn), ahead, letter)
         self.one, self.two = Saved(), Saved()
@@ -208,7 +208,7 @@ class Shortener:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def tighten(self) -> cython.double:
-        """Lead the strip of a loop from the first face to this face to the shortest of its class; returns the length."""
+        """Lead the strip of a loop to the shortest loop of its class; returns the length."""
         shortest: cython.double = INFINITY
         n_stalled: cython.int = 0
         length: cython.double = 0.0

@@ -22,8 +22,6 @@ cdef struct Segment:
 
 cdef class Course:
     cdef Surface s
-    # The sum of the angles at each vertex, 0 where it is not that of one closed fan; may be empty.
-    cdef const double[::1] around
     cdef Strip strip, straighter
     cdef Detour detour
     cdef Layout layout

@@ -26,8 +26,8 @@ class Course:
     It starts in `face`: at `vertex`, or at `start` if that is -1.
     """
 
-    def __init__(self, s, n_corners, around):
-        self.s, self.around = s, around
+    def __init__(self, s, n_corners):
+        self.s = s
         self.strip, self.straighter, self.detour, self.layout = Strip(), Strip(), Detour(n_corners), Layout()
         self.segment = np.empty(64, _SEGMENT)
 
@@ -189,13 +189,6 @@ class Course:
             return 0  # straight through this face
         from_here = cython.address(self.layout.bend[i - 1])
         to_there = cython.address(self.layout.bend[i + 1])
-        if self.around.shape[0] > 0 and 0.0 < self.around[v] < 3.0 * M_PI:
-            # What the angle on this side, of pi at least, leaves for the other one. Most bends need no search then.
-            turn: cython.double = _angle(
-                bend.x - from_here.x, bend.y - from_here.y, to_there.x - bend.x, to_there.y - bend.y
-            )
-            if self.around[v] - (M_PI + turn) > M_PI:
-                return -1
         before: Sides
         after: Sides
         before.this = _angle(from_here.x - bend.x, from_here.y - bend.y, first.x[far] - bend.x, first.y[far] - bend.y)

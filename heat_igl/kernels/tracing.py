@@ -35,7 +35,7 @@ def trace(
     tracer.s = Surface(surface, d)
     tracer.is_source = goals.is_source.view(np.uint8)
     tracer.goals, tracer.escape = Goals(goals.first_inside, goals.inside), goals.escape
-    tracer.course = Course(tracer.s, int(np.diff(surface.first_corner).max()), np.empty(0))
+    tracer.course = Course(tracer.s, int(np.diff(surface.first_corner).max()))
     tracer.max_steps = max_steps
     array = np.zeros(face.shape[0] + 1, np.int64)
     first: cython.longlong[::1] = array

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from heat_igl.errors import real_numbers
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.operators.matrices import Operators
-from heat_igl.operators.metric import checked_numbers, operators_in_metric
+from heat_igl.operators.metric import operators_in_metric
 from heat_igl.operators.metric_derivatives import MetricSides
 from heat_igl.typing import ArrayLike, FloatArray
 
@@ -71,7 +72,7 @@ _LARGEST = 1e100
 
 
 def _checked(speed: ArrayLike, m: int) -> FloatArray:
-    s = checked_numbers("speed", speed)
+    s = real_numbers("speed", speed)
     if s.shape != (m,):
         raise ValueError(f"speed must have shape ({m},), one per face, not {s.shape}")
     bad = ~((s > 0) & np.isfinite(s))
