@@ -197,6 +197,8 @@ def require_choice(name: str, value: object, choices: Iterable[str | None]) -> N
 
 def real_numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """`values` as a new float64 array; a ValueError that calls them `name` if they are no real numbers."""
+    if np.iscomplexobj(values):
+        raise ValueError(f"{name} must be real numbers, not complex")
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
