@@ -195,10 +195,18 @@ def require_choice(name: str, value: object, choices: Iterable[str | None]) -> N
         raise ValueError(f"{name} must be one of {', '.join(map(repr, known))}, not {shown(value)}")
 
 
+def refuse_masked(name: str, values: object, error: type[ValueError] = ValueError) -> None:
+    """Raise an `error` if entries of a masked array are masked: numpy would take the numbers under the mask."""
+    mask = getattr(values, "mask", None) if isinstance(values, np.ndarray) else None
+    if mask is not None and np.any(mask):
+        raise error(f"{name} has {int(np.sum(mask))} masked entries: fill or remove them")
+
+
 def real_numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """`values` as a new float64 array; a ValueError that calls them `name` if they are no real numbers."""
     if np.iscomplexobj(values):
         raise ValueError(f"{name} must be real numbers, not complex")
+    refuse_masked(name, values)
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):

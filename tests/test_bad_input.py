@@ -95,6 +95,9 @@ def array_cases() -> Iterator[Case]:
     yield mesh_case("V empty", V4[:0], TRIANGLES, "V is empty")
     yield mesh_case("V ragged", [[0, 0, 0], [1, 0]], TRIANGLES, "V must be an array .* rows differ in length$")
     yield mesh_case("F ragged", V4, [[0, 1, 2], [1, 3]], "F must be .* rows differ in length: PolygonMesh")
+    masked = np.ma.masked_array(V4, mask=V4 > 0.5)
+    yield mesh_case("V masked", masked, TRIANGLES, "V has 3 masked entries: fill or remove them")
+    yield mesh_case("V masked nowhere, neighbour", np.ma.masked_array(V4), TRIANGLES)
     yield mesh_case("V None", None, TRIANGLES, "V must hold real numbers")
     yield mesh_case("F None", V4, None, "F must hold integers")
     yield mesh_case("V a string", "bunny", TRIANGLES, "V must hold real numbers")
@@ -213,6 +216,13 @@ def argument_cases() -> Iterator[Case]:
     }.items():
         argument = name.partition(" ")[0]
         yield argument_case(f"{name}, ragged", ask, f"^{argument} must be real numbers.*, not ")
+    yield argument_case(
+        "g, masked",
+        lambda mesh: heat_igl.HeatMethodSolver(mesh, refine="unfold").distance_vjp(0)[1](
+            np.ma.masked_less(mesh.V[:, 0], 0)
+        ),
+        r"g has \d+ masked entries: fill or remove them",
+    )
     for name, ask in {
         "distance": lambda mesh: heat_igl.shortest_paths(mesh, ragged, [3], 0),
         "vectors": lambda mesh: heat_igl.tangent_frames(mesh).from_world(ragged),

@@ -14,7 +14,7 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, refuse_masked
 from heat_igl.kernels import mesh_arrays
 from heat_igl.mesh import connectivity
 from heat_igl.mesh.quadrilaterals import first_quadrilateral
@@ -46,6 +46,7 @@ def checked_positions(V: ArrayLike) -> FloatArray:
     MeshError
         As for `Mesh`; the message names the first bad position.
     """
+    refuse_masked("V", V, MeshError)
     try:
         array = np.asarray(V)
     except ValueError:
