@@ -193,6 +193,15 @@ def test_copies_of_a_point_are_at_distance_0_of_each_other() -> None:
     assert np.isfinite(HeatMethodSolver(PointCloud(P)).distance(3)).all()
 
 
+def test_many_copies_of_points_are_reached() -> None:
+    P = np.append(plane(300), plane(300)[np.random.default_rng(2).integers(0, 300, 400)], axis=0)
+    cloud = PointCloud(P)
+    assert cloud.has_copies
+    assert not PointCloud(P[:300]).has_copies
+    distance = HeatMethodSolver(cloud).distance(0)
+    np.testing.assert_allclose(distance, np.linalg.norm(P - P[0], axis=1), atol=0.1)
+
+
 def two_sheets(n: int, gap: float) -> tuple[np.ndarray, np.ndarray]:
     lower, upper = plane(n, 0), plane(n, 1) + np.array([0, 0, gap])
     return np.concatenate([lower, upper]), np.repeat([[0, 0, -1.0], [0, 0, 1.0]], n, axis=0)

@@ -139,8 +139,12 @@ def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysi
 
 
 def _for_points(cloud: PointCloud, options: SolverOptions) -> SolverOptions:
-    """The options with those left open chosen for a cloud: on scattered points the sweep is far nearer than heat."""
-    if options.refine is None and options.leaves_heat and options.laplacian == "auto":
+    """The options with those left open chosen for a cloud: on scattered points the sweep is far nearer than heat.
+
+    Heat crosses the triangles of length 0 between many copies of points, in which unfolding gets lost.
+    """
+    leaves_heat = options.refine is None and options.leaves_heat and options.laplacian == "auto"
+    if leaves_heat and not cloud.has_copies:
         options = replace(options, refine="sweep")
     if options.refine is not None or options.t_coef is not None:
         return options

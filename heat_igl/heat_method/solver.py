@@ -41,7 +41,8 @@ class HeatMethodSolver(PreparedSolver):
         Whatever `as_mesh` takes, or the positions V of a mesh whose faces are `F`. Polygons are solved on with
         `polygon_operators`, and with `refine` on their triangles. Tetrahedra take fronts instead of heat
         (`FrontSolver`), unless `magnitude`, a time step, a `boundary` or ``laplacian="cotan"`` is named. Points without
-        faces take ``refine="sweep"``, unless one of these or any `laplacian` is named: ``magnitude="damped"`` is heat.
+        faces take ``refine="sweep"``, unless points are equal, or one of these or any `laplacian` is named:
+        ``magnitude="damped"`` is heat.
     F : (m, 3) or (m, 4) array_like, optional
         Faces, when `mesh` is V.
     t_coef : float, optional

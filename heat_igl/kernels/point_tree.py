@@ -133,7 +133,8 @@ def nearest(
         Squares of the distances.
     """
     b: cython.Py_ssize_t = chosen.shape[0]
-    found, squares = np.empty((b, k), np.int32), np.full((b, k), np.inf)
+    # Zeros: squares of the distances of points may underflow, and then none is below the limit.
+    found, squares = np.zeros((b, k), np.int32), np.full((b, k), np.inf)
     index: cython.int[:, ::1] = found
     square: cython.double[:, ::1] = squares
     # For each node that waits: the first and the last point, and the distance.

@@ -107,6 +107,11 @@ class PointCloud:
         """The faces (m, 3) of `triangles`."""
         return self.triangles.F
 
+    @property
+    def has_copies(self) -> bool:
+        """Whether two of the points are equal."""
+        return len(_distinct(self.P)[0]) < len(self.P)
+
     @cached_property
     def triangles(self) -> Mesh:
         """The surface on which distance is measured: a mesh whose vertices are the points, with a boundary or without.
