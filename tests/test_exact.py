@@ -459,3 +459,17 @@ def test_targets_where_faces_are_there_twice():
     assert distance_to_targets(twice, 0, [20])[0] == pytest.approx(np.linalg.norm(square.V[20] - square.V[0]))
     with pytest.raises(MeshError, match=r"face 800 is there twice \(400 are\)"):
         distance_to_targets(twice, 0, SurfacePoints([0], [[0.2, 0.3, 0.5]]))
+
+
+def test_straight_past_a_flat_vertex_next_to_the_source():
+    """The way over that vertex is as long, to the last digit, as the straight line past it."""
+    rng = np.random.default_rng(0)
+    faces = [[1, 2, 3], [1, 3, 4], [1, 4, 5], [0, 2, 1], [0, 1, 5], [0, 5, 6], [0, 6, 7], [0, 7, 8], [0, 8, 2]]
+    for _ in range(300):
+        gap, turn = 10 ** rng.uniform(-12, -6), rng.uniform(0, 2 * np.pi)
+        source = rng.uniform(0.3, 0.7, 2)
+        angle = turn + np.array([0, -1.3, -0.5, 0.4, 1.2, 2.3, 3.3, 4.2])
+        apart = np.concatenate([[gap], rng.uniform(0.3, 0.5, 7)])
+        V = np.concatenate([[source], source + apart[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])])
+        expected = np.linalg.norm(V - source, axis=1)
+        np.testing.assert_allclose(exact_distance(V, faces, 0), expected, rtol=0, atol=1e-12)

@@ -294,8 +294,9 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     length: cython.double = s.length[h]
     from_tail: cython.double = s.distance[s.vertex[next_half_edge(h)]]
     from_head: cython.double = s.distance[s.vertex[previous_half_edge(h)]]
-    from_tail += s.tolerance * from_tail
-    from_head += s.tolerance * from_head
+    # Of the length too: straight past a vertex near the root, both ways round to the same number.
+    from_tail += s.tolerance * (from_tail + length)
+    from_head += s.tolerance * (from_head + length)
     from_head += length
     for i in range(n):
         w = windows + i
