@@ -124,7 +124,7 @@ def test_ways_around_edges_that_are_not_parallel(n):
 
 
 def test_beyond_an_edge_at_which_two_bodies_touch():
-    """No line of sight and no bend leads there; edges do."""
+    """Four walls meet there, so paths may bend either way around it."""
     mesh = without(4, lambda centre: (centre[:, 0] > 0.5) != (centre[:, 1] > 0.5), 0.0)
     source = int(np.argmin(np.linalg.norm(mesh.V, axis=1)))
     exact = np.linalg.norm(mesh.V - mesh.V[source], axis=1)
