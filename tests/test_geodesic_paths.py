@@ -439,6 +439,8 @@ def test_one_solver_serves_several_threads_and_is_pickled():
         assert [float(curve.lengths(mesh).sum()) for curve in workers.map(solver.path, pairs)] == want
     copy = pickle.loads(pickle.dumps(solver))
     assert float(copy.path(pairs[0]).lengths(mesh).sum()) == want[0]
+
+
 def test_straight_lines_lead_past_hills_of_many_vertices():
     grid = flat_perturbed(shapes.grid(30))
     x, y = grid.V[:, 0], grid.V[:, 1]

@@ -619,6 +619,8 @@ def test_quadrics_and_principal_axes() -> None:
     )
     np.testing.assert_allclose(variances[0], expected, rtol=1e-9)
     np.testing.assert_allclose(np.abs(axes[0][::-1] @ vectors), np.eye(3), atol=1e-9)
+
+
 def test_operators_of_points_want_points():
     with pytest.raises(heat_igl.MeshError, match="cloud must be a PointCloud, not Mesh"):
         heat_igl.point_cloud_operators(heat_igl.shapes.grid(2))
