@@ -73,6 +73,7 @@ cdef struct Search:
     int* corner          # NULL unless asked for, as the next
     double* leaving      # two for each vertex
     double* emitted
+    double* upper        # the least distance known: `distance` itself, unless another search goes on beside this one
     int* touched
     int n_touched
     # Sources inside faces.
@@ -102,6 +103,7 @@ cdef struct Search:
     int* slot
     List* lists
     int n_lists, n_all_lists, n_made_lists
+    long long n_waiting  # windows in lists
     int free_list
     int* next_free
     Entry* heap
@@ -118,6 +120,18 @@ cdef struct Search:
     int n_nearest, n_next
     double* ranked
     int n_all_ranked
+    # Of two searches that share a surface, what each tells the other after a round: see `window_sharing`.
+    Search* other        # NULL if there is none
+    bint is_first
+    double round_length
+    int parity           # rounds write the two places of these by turns
+    Entry* news[2]       # distances, and the vertices that they were found for
+    int n_news[2]
+    int n_all_news[2]
+    double first_key[2]  # of what waits
+    long long load[2]    # how much waits
+    bint has_failed[2]
+    void* arrived[3]     # locks: the news of a round are there, or windows were handed over
 
 cdef enum Kind:
     UNKNOWN = 0
@@ -198,6 +212,13 @@ cdef extern from *:
     #define OVERLAP 0.2
     // A search goes on beyond its cutoff by this fraction, more than rounding of a key.
     #define MARGIN 1e-12
+    // Looks at the lock of another thread before it is waited for.
+    #define TRIES 2000
+    // What a list costs beside its windows, in windows.
+    #define PER_LIST 4
+    // With more than this on the front there is work for two threads, until less than that is left.
+    #define PLENTY 1000
+    #define FEW 300
     """
     double SHADOW_MARGIN
     double NARROW
@@ -205,3 +226,7 @@ cdef extern from *:
     double SAME
     double OVERLAP
     double MARGIN
+    int TRIES
+    int PER_LIST
+    int PLENTY
+    int FEW

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from heat_igl.kernels import windows
 from heat_igl.mesh import SurfacePoints
+from heat_igl.runtime import side_by_side
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, Located
@@ -17,6 +20,11 @@ __all__ = ["TOLERANCE", "Found", "Leaving", "Searched", "Starts", "search", "sta
 #: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds
 #: up to. A larger number keeps a few windows more and changes no result.
 TOLERANCE = 1e-11
+# On fewer vertices a search takes less than a few milliseconds, and a thread costs a tenth of one.
+_FEWEST_SHARED = 4000
+# Two threads meet after so many mean edge lengths. Shorter rounds cost time, longer ones more windows that cross the
+# line between the two parts.
+_ROUND = 3.0
 _NO_VERTICES = np.empty(0, np.int64)
 
 
@@ -61,6 +69,12 @@ class Found(NamedTuple):
         """Nothing found yet, at k places."""
         nothing = np.full((2, k), -1, np.int32)
         return cls(np.full(k, np.inf), nothing[0], np.full(n_labels, -1, np.int32), nothing[1], np.zeros(k))
+
+    def take_nearer(self, other: Found) -> None:
+        """Take over what was found nearer by another search."""
+        is_nearer = np.flatnonzero(other.distance < self.distance)
+        for mine, theirs in zip(self, other, strict=True):
+            mine[is_nearer] = theirs[is_nearer]
 
 
 class Leaving(NamedTuple):
@@ -126,27 +140,19 @@ def search(
     targets: SurfacePoints | None = None,
     goals: IntArray | None = None,
     directed: bool = False,
+    threads: int = 1,
 ) -> Searched:
     """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`."""
     place = edges.located(targets)
     n, t = edges.n, len(place.faces)
-    found, at_targets = Found.of(n, n + len(starts.points.faces) + len(starts.segments.faces)), Found.of(t, 0)
-    statistics = np.zeros(3, np.int64)
+    n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
+    found, at_targets = Found.of(n, n_labels), Found.of(t, 0)
     leaving = Leaving.of(n) if directed else None
-    front = windows.Front(
-        *edges.tables,
-        found.distance,
-        np.full(n, np.inf),
-        found.root,
-        found.label,
-        found.entered,
-        found.crossing,
-        np.empty(n, np.int32),
-        np.full(len(edges.tables.vertex), -1, np.int32),
-        TOLERANCE,
-        *(() if leaving is None else (leaving.corner, leaving.direction.ravel())),
-    )
-    done = windows.search(
+    front = _front(edges, found, leaving)
+    longest = float(edges.scaled(cutoff))
+    statistics = np.zeros((2, 3), np.int64)
+    begin = partial(
+        windows.search,
         front,
         starts.vertices,
         starts.offset,
@@ -166,12 +172,57 @@ def search(
         at_targets.crossing,
         edges.largest_circle(place),
         goals is not None,
-        float(edges.scaled(cutoff)),
-        statistics,
+        longest,
+        statistics[0],
     )
+    if threads == 1 or n < _FEWEST_SHARED or t > 0 or goals is not None or directed:
+        done = begin()
+    else:
+        also = Found.of(n, n_labels)
+        done = _beside(edges, front, begin, _front(edges, also), longest, statistics[1])
+        found.take_nearer(also)
     if not done:
         raise MemoryError("the windows of the exact distance do not fit into memory")
-    return Searched(starts, found, place, at_targets, int(statistics[1]), int(statistics[2]), leaving)
+    _, n_windows, n_crossings = statistics.sum(axis=0).tolist()
+    return Searched(starts, found, place, at_targets, n_windows, n_crossings, leaving)
+
+
+def _front(edges: HalfEdges, found: Found, leaving: Leaving | None = None) -> windows.Front:
+    """What the kernel writes in one search."""
+    return windows.Front(
+        *edges.tables,
+        found.distance,
+        np.full(edges.n, np.inf),
+        found.root,
+        found.label,
+        found.entered,
+        found.crossing,
+        np.empty(edges.n, np.int32),
+        np.full(len(edges.tables.vertex), -1, np.int32),
+        TOLERANCE,
+        *(() if leaving is None else (leaving.corner, leaving.direction.ravel())),
+    )
+
+
+def _beside(
+    edges: HalfEdges,
+    front: windows.Front,
+    begin: Callable[[], bool],
+    second: windows.Front,
+    cutoff: float,
+    statistics: IntArray,
+) -> bool:
+    """Begin a search, with a second thread that takes its part; false where memory runs out."""
+    done = []
+    round_length = _ROUND * float(edges.tables.length.mean())
+    windows.pair(front, second, np.full(edges.n, np.inf), np.full(edges.n, np.inf), round_length)
+    try:
+        side_by_side(
+            lambda work: done.append(work()), [begin, lambda: windows.assist(second, cutoff, statistics)]
+        )
+    finally:
+        windows.part(front, second)
+    return all(done)
 
 
 def starts_at(
