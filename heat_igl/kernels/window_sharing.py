@@ -5,6 +5,10 @@ After a round each tells the other which distances it has found, and windows tha
 one thread has found both. So only windows next to the line between the two parts go further than those of one thread,
 by the length of a round. Where much less waits in one part, a piece of the other is handed over. What is done depends
 on nothing but the two queues, never on which thread is faster.
+
+A distance is rounded along the faces that its path crosses, whoever carries the window. The exception are halves of a
+window that are joined behind a flat vertex, since both must wait in one list: `run_beside` ends when it meets some, and
+one thread does all. On surfaces with flat parts there are few windows anyway.
 """
 
 import cython
@@ -18,7 +22,7 @@ from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_lists import append, pop, push
 from cython.cimports.heat_igl.kernels.window_search import carry
-from cython.cimports.heat_igl.kernels.window_structures import FEW, MARGIN, PASSED, PER_LIST, PLENTY, TRIES, Entry, List, Search
+from cython.cimports.heat_igl.kernels.window_structures import MARGIN, PASSED, PER_LIST, TRIES, Entry, List, Search
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdlib import free, malloc
 
@@ -30,7 +34,7 @@ def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
     """Carry what has a key below `until`; if that is infinite, until there is work for two."""
     entry: Entry
     while s.n_heap > 0 and s.heap[0].key < until and s.heap[0].key <= s.last_key and not s.failed:
-        if until == INFINITY and _load(s) > PLENTY:
+        if until == INFINITY and _load(s) > s.plenty and not s.is_joined:
             return
         entry = pop(s)
         if s.n_heap > 0:
@@ -85,11 +89,13 @@ def run_beside(s: cython.pointer(Search)) -> cython.void:
         p = s.parity
         s.first_key[p] = s.heap[0].key if s.n_heap > 0 else INFINITY
         s.load[p] = _load(s)
-        s.has_failed[p] = s.failed
+        s.has_failed[p], s.has_joined[p] = s.failed, s.is_joined
         _meet(s, p)
         _hear(s, o.news[p], o.n_news[p])
         key = min(s.first_key[p], o.first_key[p])
         if s.has_failed[p] or o.has_failed[p] or key == INFINITY or key > s.last_key:
+            break
+        if s.is_shared and (s.has_joined[p] or o.has_joined[p]):
             break
         is_alone = _balance(s)
         s.parity = 1 - p
@@ -106,16 +112,19 @@ def _balance(s: cython.pointer(Search)) -> cython.bint:
     mine: cython.longlong = s.load[s.parity]
     theirs: cython.longlong = o.load[s.parity]
     least: cython.longlong = (mine + theirs) // 8
-    is_small: cython.bint = mine + theirs < FEW
-    if (mine == 0 or theirs == 0) and mine + theirs < PLENTY:
+    is_small: cython.bint = mine + theirs < s.few
+    if (mine == 0 or theirs == 0) and (mine + theirs < s.plenty):
         return True
+    if not is_small and mine - theirs <= least and theirs - mine <= least:
+        return False
+    s.is_shared = True
+    _meet(s, 2)
     if is_small and not s.is_first:
         _hand_over(s, o, mine)
         s.n_heap = 0
-    elif not is_small and mine - theirs > least:
+    elif not is_small and mine > theirs:
         _hand_over(s, o, (mine - theirs) // 2)
-    if is_small or mine - theirs > least or theirs - mine > least:
-        _meet(s, 2)
+    _meet(s, 3)
     return is_small
 
 
@@ -172,6 +181,7 @@ def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython
         o.touched[o.n_touched] = v
         o.n_touched += 1
     s.emitted[v] = s.distance[v]
+    o.emitted[v] = INFINITY  # it may have come from there
     o.distance[v] = o.upper[v] = s.distance[v]
     o.root[v] = s.root[v]
     o.label[v] = s.label[v]
@@ -190,7 +200,7 @@ def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython
 @cython.exceptval(check=False)
 def _hand_over(s: cython.pointer(Search), o: cython.pointer(Search), amount: cython.longlong) -> cython.void:
     """Give a connected piece of the front to the other search, which waits meanwhile."""
-    queue: cython.p_int = cython.cast(cython.p_int, malloc(s.n_lists * cython.sizeof(cython.int)))
+    queue: cython.p_int = cython.cast(cython.p_int, malloc((s.n_lists + 1) * cython.sizeof(cython.int)))
     n: cython.int = 0
     i: cython.int = 0
     c: cython.int

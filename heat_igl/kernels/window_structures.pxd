@@ -124,6 +124,7 @@ cdef struct Search:
     Search* other        # NULL if there is none
     bint is_first
     double round_length
+    long long plenty, few  # with more than one on the front there is work for two threads, until it is less than the other
     int parity           # rounds write the two places of these by turns
     Entry* news[2]       # distances, and the vertices that they were found for
     int n_news[2]
@@ -131,7 +132,10 @@ cdef struct Search:
     double first_key[2]  # of what waits
     long long load[2]    # how much waits
     bint has_failed[2]
-    void* arrived[3]     # locks: the news of a round are there, or windows were handed over
+    bint has_joined[2]
+    bint is_joined       # whether halves of a window were joined behind a flat vertex
+    bint is_shared       # whether windows were handed over
+    void* arrived[4]     # locks: the news of a round are there, windows can be handed over, or were
 
 cdef enum Kind:
     UNKNOWN = 0
@@ -216,9 +220,6 @@ cdef extern from *:
     #define TRIES 2000
     // What a list costs beside its windows, in windows.
     #define PER_LIST 4
-    // With more than this on the front there is work for two threads, until less than that is left.
-    #define PLENTY 1000
-    #define FEW 300
     """
     double SHADOW_MARGIN
     double NARROW
@@ -228,5 +229,3 @@ cdef extern from *:
     double MARGIN
     int TRIES
     int PER_LIST
-    int PLENTY
-    int FEW

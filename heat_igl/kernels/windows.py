@@ -185,7 +185,12 @@ class Front:
 
 
 def pair(
-    first: Front, second: Front, upper: cython.double[::1], other_upper: cython.double[::1], round_length: cython.double
+    first: Front,
+    second: Front,
+    upper: cython.double[::1],
+    other_upper: cython.double[::1],
+    round_length: cython.double,
+    plenty: cython.longlong,
 ) -> None:
     """Let two searches on one surface go on side by side: `search` on the first, `assist` on the second.
 
@@ -198,31 +203,35 @@ def pair(
         Must come full of infinity.
     round_length : float
         How far the distance goes between two meetings.
+    plenty : int
+        About so many windows on the front are work for two threads. When less than a third is left, one goes on alone.
     """
-    _join(first, upper, second, round_length)
-    _join(second, other_upper, first, round_length)
+    _join(first, upper, second)
+    _join(second, other_upper, first)
+    first.state.round_length = second.state.round_length = round_length
+    first.state.plenty = second.state.plenty = plenty
+    first.state.few = second.state.few = plenty // 3
     first.state.is_first, second.state.is_first = True, False
 
 
 @cython.cfunc
-def _join(one: Front, upper: cython.double[::1], other: Front, round_length: cython.double) -> None:
+def _join(one: Front, upper: cython.double[::1], other: Front) -> None:
     s: cython.pointer(Search) = cython.address(one.state)
     i: cython.int
     one.arrays += (upper.base,)
     s.other = cython.address(other.state)
     s.upper = cython.address(upper[0])
-    s.round_length = round_length
     s.parity = 0
     for i in range(2):
         s.news[i] = cython.NULL
         s.n_news[i] = s.n_all_news[i] = 0
-    for i in range(3):
+    for i in range(4):
         s.arrived[i] = PyThread_allocate_lock()
         PyThread_acquire_lock(s.arrived[i], WAIT_LOCK)
 
 
-def part(first: Front, second: Front) -> None:
-    """Return what `pair` took."""
+def part(first: Front, second: Front) -> bool:
+    """Return what `pair` took; whether the distances are those of one thread to the bit, otherwise it must search."""
     one: Front
     s: cython.pointer(Search)
     i: cython.int
@@ -231,8 +240,9 @@ def part(first: Front, second: Front) -> None:
         s.other = cython.NULL
         for i in range(2):
             free(s.news[i])
-        for i in range(3):
+        for i in range(4):
             PyThread_free_lock(s.arrived[i])
+    return not (first.state.is_shared and (first.state.is_joined or second.state.is_joined))
 
 
 def assist(front: Front, cutoff: cython.double, statistics: cython.longlong[::1]) -> bool:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +24,8 @@ _FEWEST_SHARED = 4000
 # Two threads meet after so many mean edge lengths. Shorter rounds cost time, longer ones more windows that cross the
 # line between the two parts.
 _ROUND = 3.0
+# With about so many windows on the front there is work for two threads between two meetings: a tenth of a millisecond.
+_PLENTY = 1000
 _NO_VERTICES = np.empty(0, np.int64)
 
 
@@ -148,12 +149,7 @@ def search(
     n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
     found, at_targets = Found.of(n, n_labels), Found.of(t, 0)
     leaving = Leaving.of(n) if directed else None
-    front = _front(edges, found, leaving)
-    longest = float(edges.scaled(cutoff))
-    statistics = np.zeros((2, 3), np.int64)
-    begin = partial(
-        windows.search,
-        front,
+    arguments = (
         starts.vertices,
         starts.offset,
         starts.points.faces,
@@ -172,19 +168,22 @@ def search(
         at_targets.crossing,
         edges.largest_circle(place),
         goals is not None,
-        longest,
-        statistics[0],
+        float(edges.scaled(cutoff)),
     )
-    if threads == 1 or n < _FEWEST_SHARED or t > 0 or goals is not None or directed:
-        done = begin()
-    else:
-        also = Found.of(n, n_labels)
-        done = _beside(edges, front, begin, _front(edges, also), longest, statistics[1])
-        found.take_nearer(also)
-    if not done:
+    statistics = None
+    if threads > 1 and n >= _FEWEST_SHARED and t == 0 and goals is None and not directed:
+        statistics = _beside(edges, found, arguments)
+        if statistics is None:
+            found = Found.of(n, n_labels)
+    if statistics is None:
+        statistics = np.zeros(3, np.int64)
+        _require(windows.search(_front(edges, found, leaving), *arguments, statistics))
+    return Searched(starts, found, place, at_targets, int(statistics[1]), int(statistics[2]), leaving)
+
+
+def _require(is_done: bool) -> None:
+    if not is_done:
         raise MemoryError("the windows of the exact distance do not fit into memory")
-    _, n_windows, n_crossings = statistics.sum(axis=0).tolist()
-    return Searched(starts, found, place, at_targets, n_windows, n_crossings, leaving)
 
 
 def _front(edges: HalfEdges, found: Found, leaving: Leaving | None = None) -> windows.Front:
@@ -204,25 +203,23 @@ def _front(edges: HalfEdges, found: Found, leaving: Leaving | None = None) -> wi
     )
 
 
-def _beside(
-    edges: HalfEdges,
-    front: windows.Front,
-    begin: Callable[[], bool],
-    second: windows.Front,
-    cutoff: float,
-    statistics: IntArray,
-) -> bool:
-    """Begin a search, with a second thread that takes its part; false where memory runs out."""
-    done = []
-    round_length = _ROUND * float(edges.tables.length.mean())
-    windows.pair(front, second, np.full(edges.n, np.inf), np.full(edges.n, np.inf), round_length)
+def _beside(edges: HalfEdges, found: Found, arguments: tuple[Any, ...]) -> IntArray | None:
+    """Search on two threads; the statistics of both, or None if one thread has to search instead."""
+    also, statistics, done = Found.of(edges.n, len(found.label)), np.zeros((2, 3), np.int64), []
+    first, second = _front(edges, found), _front(edges, also)
+    bounds = np.full((2, edges.n), np.inf)
+    windows.pair(first, second, *bounds, _ROUND * float(edges.tables.length.mean()), _PLENTY)
+    calls = [
+        partial(windows.search, first, *arguments, statistics[0]),
+        partial(windows.assist, second, arguments[-1], statistics[1]),
+    ]
     try:
-        side_by_side(
-            lambda work: done.append(work()), [begin, lambda: windows.assist(second, cutoff, statistics)]
-        )
+        side_by_side(lambda call: done.append(call()), calls)
     finally:
-        windows.part(front, second)
-    return all(done)
+        is_same = windows.part(first, second)
+    _require(all(done))
+    found.take_nearer(also)
+    return np.asarray(statistics.sum(axis=0)) if is_same else None
 
 
 def starts_at(
