@@ -19,9 +19,9 @@ from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 def pinched() -> Mesh:
     """Two bumpy grids with one vertex in common, and a third without."""
     one = perturbed(shapes.grid(14), 0.4, 3)
-    V = np.concatenate([one.V, 2 * one.V[-1] - one.V[:-1], one.V + [0, 0, 9]])
+    V = np.concatenate([one.V, 2 * one.V[-1] - one.V[:-1], one.V + np.array([0, 0, 9])])
     second = one.F + one.n_vertices
-    second[one.F == one.n_vertices - 1] = one.n_vertices - 1
+    second[one.n_vertices - 1 == one.F] = one.n_vertices - 1
     return Mesh(V, np.concatenate([one.F, second, one.F + 2 * one.n_vertices - 1]))
 
 

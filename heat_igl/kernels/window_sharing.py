@@ -56,9 +56,9 @@ def _load(s: cython.pointer(Search)) -> cython.longlong:
 @cython.exceptval(check=False)
 def _meet(s: cython.pointer(Search), which: cython.int) -> cython.void:
     """Wait for the other thread: first without sleep, since rounds are short."""
-    i: cython.int
+    _: cython.int
     PyThread_release_lock(s.arrived[which])
-    for i in range(TRIES):
+    for _ in range(TRIES):
         if PyThread_acquire_lock(s.other.arrived[which], NOWAIT_LOCK):
             return
     PyThread_acquire_lock(s.other.arrived[which], WAIT_LOCK)

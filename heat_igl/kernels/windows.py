@@ -11,7 +11,12 @@ This module has what Python calls: `search` for one question about all vertices,
 """
 
 import cython
-from cython.cimports.cpython.pythread import WAIT_LOCK, PyThread_acquire_lock, PyThread_allocate_lock, PyThread_free_lock
+from cython.cimports.cpython.pythread import (
+    WAIT_LOCK,
+    PyThread_acquire_lock,
+    PyThread_allocate_lock,
+    PyThread_free_lock,
+)
 from cython.cimports.heat_igl.kernels.window_lists import allocate, empty_front, free_front, push
 from cython.cimports.heat_igl.kernels.window_search import forget, narrow, run
 from cython.cimports.heat_igl.kernels.window_sharing import run_beside
@@ -246,7 +251,7 @@ def part(first: Front, second: Front) -> bool:
 
 
 def assist(front: Front, cutoff: cython.double, statistics: cython.longlong[::1]) -> bool:
-    """Take a part of the search that the other front of a `pair` begins; parameters and result are those of `search`."""
+    """Take a part of the search that the other front of a `pair` begins; parameters and result as for `search`."""
     s: cython.pointer(Search) = cython.address(front.state)
     s.stops_early = False
     s.slack = 0.0
