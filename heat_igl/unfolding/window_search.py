@@ -19,8 +19,8 @@ __all__ = ["TOLERANCE", "Found", "Leaving", "Searched", "Starts", "search", "sta
 #: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds
 #: up to. A larger number keeps a few windows more and changes no result.
 TOLERANCE = 1e-11
-# On fewer vertices a search takes less than a few milliseconds, and a thread costs a tenth of one.
-_FEWEST_SHARED = 4000
+# On fewer vertices a search takes a few milliseconds, and a thread with its arrays a part of one.
+_FEWEST_SHARED = 10_000
 # Two threads meet after so many mean edge lengths. Shorter rounds cost time, longer ones more windows that cross the
 # line between the two parts.
 _ROUND = 3.0
