@@ -3,7 +3,7 @@
     python scripts/exact_shapes.py --vtp PROGRAM                        # generated shapes of 5000 to 130 000 vertices
     python scripts/exact_shapes.py --vtp PROGRAM bunny.obj face.obj     # and meshes
     python scripts/exact_shapes.py --vtp PROGRAM --memory               # and memory; pygeodesic takes minutes
-    python scripts/exact_shapes.py --vtp PROGRAM --walls                # and the gain of two threads, on an idle machine
+    python scripts/exact_shapes.py --vtp PROGRAM --walls                # and the gain of two threads, on idle machines
     python scripts/exact_shapes.py --vtp PROGRAM --output DIRECTORY     # where exact_shapes.json and exact_shapes.md go
 
 Times are those of the processor on one thread, validation of the arrays included; those of VTP are for its propagation
