@@ -232,6 +232,8 @@ def _join(one: Front, upper: cython.double[::1], other: Front) -> None:
         s.n_news[i] = s.n_all_news[i] = 0
     for i in range(4):
         s.arrived[i] = PyThread_allocate_lock()
+        if s.arrived[i] == cython.NULL:
+            raise MemoryError("there is no room for a lock")
         PyThread_acquire_lock(s.arrived[i], WAIT_LOCK)
 
 
