@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -208,10 +208,10 @@ def _beside(edges: HalfEdges, found: Found, arguments: tuple[Any, ...]) -> IntAr
     also, statistics, done = Found.of(edges.n, len(found.label)), np.zeros((2, 3), np.int64), []
     first, second = _front(edges, found), _front(edges, also)
     bounds = np.full((2, edges.n), np.inf)
-    windows.pair(first, second, *bounds, _ROUND * float(edges.tables.length.mean()), _PLENTY)
-    calls = [
-        partial(windows.search, first, *arguments, statistics[0]),
-        partial(windows.assist, second, arguments[-1], statistics[1]),
+    windows.pair(first, second, bounds[0], bounds[1], _ROUND * float(edges.tables.length.mean()), _PLENTY)
+    calls: list[Callable[[], bool]] = [
+        lambda: windows.search(first, *arguments, statistics[0]),
+        lambda: windows.assist(second, arguments[-1], statistics[1]),
     ]
     try:
         side_by_side(lambda call: done.append(call()), calls)
