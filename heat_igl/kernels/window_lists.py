@@ -275,7 +275,7 @@ def allocate(s: cython.pointer(Search)) -> cython.void:
     s.n_lists = s.n_made_lists = s.n_heap = s.n_touched = s.n_found = 0
     s.n_all_lists, s.n_all_heap, s.n_out = 256, 1024, 256
     s.free_list = -1
-    s.failed = s.is_joined = s.is_shared = False
+    s.failed = s.meets_flat = s.is_shared = False
     s.n_windows = s.n_lists_done = s.n_waiting = 0
     s.n_nearest = s.n_all_ranked = 0
     s.ranked = cython.NULL

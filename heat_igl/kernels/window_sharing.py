@@ -7,7 +7,7 @@ by the length of a round. Where much less waits in one part, a piece of the othe
 on nothing but the two queues, never on which thread is faster.
 
 A distance is rounded along the faces that its path crosses, whoever carries the window. The exception are halves of a
-window that are joined behind a flat vertex, since both must wait in one list: `run_beside` ends when it meets some, and
+window that are joined behind a flat vertex, since both must wait in one list: `run_beside` ends when it meets one, and
 one thread does all. On surfaces with flat parts there are few windows anyway.
 """
 
@@ -22,7 +22,16 @@ from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_lists import append, pop, push
 from cython.cimports.heat_igl.kernels.window_search import carry
-from cython.cimports.heat_igl.kernels.window_structures import MARGIN, PASSED, PER_LIST, TRIES, Entry, List, Search
+from cython.cimports.heat_igl.kernels.window_structures import (
+    FLAT,
+    MARGIN,
+    PASSED,
+    PER_LIST,
+    TRIES,
+    Entry,
+    List,
+    Search,
+)
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdlib import free, malloc
 
@@ -34,7 +43,7 @@ def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
     """Carry what has a key below `until`; if that is infinite, until there is work for two."""
     entry: Entry
     while s.n_heap > 0 and s.heap[0].key < until and s.heap[0].key <= s.last_key and not s.failed:
-        if until == INFINITY and _load(s) > s.plenty and not s.is_joined:
+        if until == INFINITY and _load(s) > s.plenty and not s.meets_flat:
             return
         entry = pop(s)
         if s.n_heap > 0:
@@ -89,13 +98,13 @@ def run_beside(s: cython.pointer(Search)) -> cython.void:
         p = s.parity
         s.first_key[p] = s.heap[0].key if s.n_heap > 0 else INFINITY
         s.load[p] = _load(s)
-        s.has_failed[p], s.has_joined[p] = s.failed, s.is_joined
+        s.has_failed[p], s.met_flat[p] = s.failed, s.meets_flat
         _meet(s, p)
         _hear(s, o.news[p], o.n_news[p])
         key = min(s.first_key[p], o.first_key[p])
         if s.has_failed[p] or o.has_failed[p] or key == INFINITY or key > s.last_key:
             break
-        if s.is_shared and (s.has_joined[p] or o.has_joined[p]):
+        if s.is_shared and (s.met_flat[p] or o.met_flat[p]):
             break
         is_alone = _balance(s)
         s.parity = 1 - p
@@ -175,7 +184,13 @@ def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.i
 @cython.exceptval(check=False)
 def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython.int) -> cython.longlong:
     """Hand over a vertex that is to shed windows; how much that is."""
-    if s.kind[v] == PASSED or s.emitted[v] <= s.distance[v] or s.distance[v] > s.upper[v] or s.distance[v] == INFINITY:
+    if (
+        s.kind[v] == PASSED
+        or s.kind[v] == FLAT
+        or s.emitted[v] <= s.distance[v]
+        or s.distance[v] > s.upper[v]
+        or s.distance[v] == INFINITY
+    ):
         return 0
     if o.distance[v] == INFINITY:
         o.touched[o.n_touched] = v

@@ -9,6 +9,7 @@ from cython.cimports.heat_igl.kernels.triangles import foot, next_half_edge, pre
 from cython.cimports.heat_igl.kernels.window_lists import add, push, tell
 from cython.cimports.heat_igl.kernels.window_structures import (
     BENDS,
+    FLAT,
     JOINS,
     PASSED,
     SHADOW_MARGIN,
@@ -60,7 +61,9 @@ def relax(
         return
     if s.kind[v] == UNKNOWN:
         s.kind[v] = classify(s, v)
-    if s.kind[v] != PASSED:
+    if s.kind[v] == FLAT:
+        s.meets_flat = True
+    elif s.kind[v] != PASSED:
         push(s, distance, s.n_half_edges + v)
 
 

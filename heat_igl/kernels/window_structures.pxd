@@ -132,8 +132,8 @@ cdef struct Search:
     double first_key[2]  # of what waits
     long long load[2]    # how much waits
     bint has_failed[2]
-    bint has_joined[2]
-    bint is_joined       # whether halves of a window were joined behind a flat vertex
+    bint met_flat[2]
+    bint meets_flat       # whether a flat vertex was reached
     bint is_shared       # whether windows were handed over
     void* arrived[4]     # locks: the news of a round are there, windows can be handed over, or were
 
@@ -143,6 +143,7 @@ cdef enum Kind:
     BENDS = 2            # total angle above 2 pi: paths bend here
     ENDS = 3             # on the boundary
     JOINS = 4            # several fans, or an edge of more than two faces: paths leave into all faces
+    FLAT = 5             # passed, and the angles sum to 2 pi to rounding: windows that it splits are joined behind it
 
 cdef enum Order:
     UNDECIDED = 0        # which of two windows is nearer
@@ -216,6 +217,8 @@ cdef extern from *:
     #define OVERLAP 0.2
     // A search goes on beyond its cutoff by this fraction, more than rounding of a key.
     #define MARGIN 1e-12
+    // A vertex is flat if its angles sum to 2 pi up to this: ten times what still lets halves of a window be joined.
+    #define FLATNESS 1e-12
     // Looks at the lock of another thread before it is waited for.
     #define TRIES 2000
     // What a list costs beside its windows, in windows.
@@ -227,5 +230,6 @@ cdef extern from *:
     double SAME
     double OVERLAP
     double MARGIN
+    double FLATNESS
     int TRIES
     int PER_LIST

@@ -5,13 +5,15 @@ Half-edge ``3 f + c`` is the side of face f opposite its corner c; the corner ca
 
 import cython
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.window_structures import BENDS, ENDS, JOINS, PASSED, Ray, Search
-from cython.cimports.libc.math import sqrt
+from cython.cimports.heat_igl.kernels.window_structures import BENDS, ENDS, FLAT, FLATNESS, JOINS, PASSED, Ray, Search
+from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["SEVERAL_FANS", "shapes"]
+__all__ = ["FLAT_VERTEX", "SEVERAL_FANS", "shapes"]
 
 #: The kind of a vertex whose faces are several fans, or at an edge of more than two faces.
 SEVERAL_FANS = cython.cast(cython.int, JOINS)
+#: The kind of an inner vertex whose angles sum to 2 pi.
+FLAT_VERTEX = cython.cast(cython.int, FLAT)
 
 
 def shapes(
@@ -156,7 +158,7 @@ def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
                 return JOINS
             # Less than 1e-8 above 2 pi is flat: what a path loses there is the square of it.
             if n_half_turns < 2 or (n_half_turns == 2 and ray.cosine > 0.0 and ray.sine < 1e-8):
-                return PASSED
+                return FLAT if ray.cosine > 0.0 and fabs(ray.sine) < FLATNESS else PASSED
             return BENDS
     # An open fan: from the start to its other end.
     k = start

@@ -242,11 +242,7 @@ def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cytho
 @cython.nogil
 @cython.exceptval(check=False)
 def _insert(
-    s: cython.pointer(Search),
-    windows: cython.pointer(Window),
-    k: cython.int,
-    w: cython.pointer(Window),
-    length: cython.double,
+    windows: cython.pointer(Window), k: cython.int, w: cython.pointer(Window), length: cython.double
 ) -> cython.int:
     """Add a window to k that lie side by side, after cutting all where another is nearer; how many there are then.
 
@@ -279,7 +275,6 @@ def _insert(
         windows[j] = moved
         return k + 1
     if j > 0 and _goes_on(cython.address(windows[j - 1]), w, length):
-        s.is_joined = True
         if w.stop > windows[j - 1].stop:
             windows[j - 1].stop = w.stop
         return k
@@ -307,5 +302,5 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
         if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset):
             continue
         if w.stop - w.start > NARROW * length:
-            k = _insert(s, windows, k, w, length)
+            k = _insert(windows, k, w, length)
     return k

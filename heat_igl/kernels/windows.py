@@ -249,7 +249,7 @@ def part(first: Front, second: Front) -> bool:
             free(s.news[i])
         for i in range(4):
             PyThread_free_lock(s.arrived[i])
-    return not (first.state.is_shared and (first.state.is_joined or second.state.is_joined))
+    return not (first.state.is_shared and (first.state.meets_flat or second.state.meets_flat))
 
 
 def assist(front: Front, cutoff: cython.double, statistics: cython.longlong[::1]) -> bool:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from heat_igl.kernels import windows
+from heat_igl.kernels.window_surface import FLAT_VERTEX
 from heat_igl.mesh import SurfacePoints
 from heat_igl.runtime import side_by_side
 from heat_igl.sources import SourceSegments
@@ -149,7 +150,7 @@ def search(
     n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
     found, at_targets = Found.of(n, n_labels), Found.of(t, 0)
     leaving = Leaving.of(n) if directed else None
-    arguments = (
+    arguments: tuple[Any, ...] = (
         starts.vertices,
         starts.offset,
         starts.points.faces,
@@ -171,7 +172,9 @@ def search(
         float(edges.scaled(cutoff)),
     )
     statistics = None
-    if threads > 1 and n >= _FEWEST_SHARED and t == 0 and goals is None and not directed:
+    # Vertices are found flat by the first search.
+    asks_for_all = t == 0 and goals is None and not directed
+    if threads > 1 and n >= _FEWEST_SHARED and asks_for_all and not (edges.tables.kind == FLAT_VERTEX).any():
         statistics = _beside(edges, found, arguments)
         if statistics is None:
             found = Found.of(n, n_labels)
@@ -210,7 +213,7 @@ def _beside(edges: HalfEdges, found: Found, arguments: tuple[Any, ...]) -> IntAr
     bounds = np.full((2, edges.n), np.inf)
     windows.pair(first, second, bounds[0], bounds[1], _ROUND * float(edges.tables.length.mean()), _PLENTY)
     calls: list[Callable[[], bool]] = [
-        lambda: windows.search(first, *arguments, statistics[0]),
+        lambda: windows.search(first, *arguments, statistics[0]),  # type: ignore[call-arg]
         lambda: windows.assist(second, arguments[-1], statistics[1]),
     ]
     try:
