@@ -180,7 +180,7 @@ def search(
             found = Found.of(n, n_labels)
     if statistics is None:
         statistics = np.zeros(3, np.int64)
-        _require(windows.search(_front(edges, found, leaving), *arguments, statistics))
+        _require(windows.search(*(_front(edges, found, leaving), *arguments, statistics)))
     return Searched(starts, found, place, at_targets, int(statistics[1]), int(statistics[2]), leaving)
 
 
@@ -213,7 +213,7 @@ def _beside(edges: HalfEdges, found: Found, arguments: tuple[Any, ...]) -> IntAr
     bounds = np.full((2, edges.n), np.inf)
     windows.pair(first, second, bounds[0], bounds[1], _ROUND * float(edges.tables.length.mean()), _PLENTY)
     calls: list[Callable[[], bool]] = [
-        lambda: windows.search(first, *arguments, statistics[0]),  # type: ignore[call-arg]
+        lambda: windows.search(*(first, *arguments, statistics[0])),
         lambda: windows.assist(second, arguments[-1], statistics[1]),
     ]
     try:
