@@ -13,8 +13,10 @@ far, and rough, where there are few windows and preparation counts most.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
+import time
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -120,8 +122,10 @@ def measured(mesh: Mesh, n_sources: int, repeats: int, vtp: Path, has_memory: bo
             n_lost += int((other >= _LOST).sum())
             differences.append(_difference(found.distance, other))
             if differences[-1] > _AGREE:
-                third = reference.measured("pygeodesic", mesh, source).distance
-                arbitrated.append((_difference(found.distance, third), _difference(other, third)))
+                # On the largest shapes it runs out of time or memory.
+                with contextlib.suppress(ReferenceSolverError):
+                    third = reference.measured("pygeodesic", mesh, source).distance
+                    arbitrated.append((_difference(found.distance, third), _difference(other, third)))
     row: dict[str, Any] = {
         "n": mesh.n_vertices,
         "windows per edge": float(np.mean(windows)),
