@@ -17,7 +17,6 @@ import contextlib
 import os
 import sys
 import time
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
