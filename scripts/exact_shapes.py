@@ -6,9 +6,9 @@
     python scripts/exact_shapes.py --vtp PROGRAM --walls                # and the gain of two threads, on idle machines
     python scripts/exact_shapes.py --vtp PROGRAM --output DIRECTORY     # where exact_shapes.json and exact_shapes.md go
 
-Times are those of the processor, for one thread with HEAT_IGL_NUM_THREADS=1, validation of the arrays included; those of VTP are for its propagation
-alone, as it prints them. The calls take turns, and shares are medians. The shapes are smooth, where a window is carried
-far, and rough, where there are few windows and preparation counts most.
+Times are those of the processor, for one thread with HEAT_IGL_NUM_THREADS=1, validation of the arrays included; those
+of VTP are for its propagation alone, as it prints them. The calls take turns, and shares are medians. The shapes are
+smooth, where a window is carried far, and rough, where there are few windows and preparation counts most.
 """
 
 from __future__ import annotations
