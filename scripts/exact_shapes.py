@@ -3,17 +3,20 @@
     python scripts/exact_shapes.py --vtp PROGRAM                        # generated shapes of 5000 to 130 000 vertices
     python scripts/exact_shapes.py --vtp PROGRAM bunny.obj face.obj     # and meshes
     python scripts/exact_shapes.py --vtp PROGRAM --memory               # and memory; pygeodesic takes minutes
+    python scripts/exact_shapes.py --vtp PROGRAM --walls                # and the gain of two threads, on idle machines
     python scripts/exact_shapes.py --vtp PROGRAM --output DIRECTORY     # where exact_shapes.json and exact_shapes.md go
 
-Times are those of the processor on one thread, validation of the arrays included; those of VTP are for its propagation
-alone, as it prints them. The calls take turns, and shares are medians. The shapes are smooth, where a window is carried
-far, and rough, where there are few windows and preparation counts most.
+Times are those of the processor, for one thread with HEAT_IGL_NUM_THREADS=1, validation of the arrays included; those
+of VTP are for its propagation alone, as it prints them. The calls take turns, and shares are medians. The shapes are
+smooth, where a window is carried far, and rough, where there are few windows and preparation counts most.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -82,7 +85,28 @@ SHAPES: dict[str, Callable[[], Mesh]] = {
 }
 
 
-def measured(mesh: Mesh, n_sources: int, repeats: int, vtp: Path, has_memory: bool) -> dict[str, Any]:
+def speedup(mesh: Mesh, source: int, repeats: int) -> float:
+    """By how much two threads are faster than one, from arrays, by the clock: the median of calls that take turns."""
+    ratios = []
+    before = os.environ.get("HEAT_IGL_NUM_THREADS")
+    try:
+        for _ in range(repeats):
+            walls = []
+            for threads in ("1", "2"):
+                os.environ["HEAT_IGL_NUM_THREADS"] = threads
+                begin = time.perf_counter()
+                exact_distance(mesh.V, mesh.F, source)
+                walls.append(time.perf_counter() - begin)
+            ratios.append(walls[0] / walls[1])
+    finally:
+        if before is None:
+            del os.environ["HEAT_IGL_NUM_THREADS"]
+        else:
+            os.environ["HEAT_IGL_NUM_THREADS"] = before
+    return float(np.median(ratios))
+
+
+def measured(mesh: Mesh, n_sources: int, repeats: int, vtp: Path, has_memory: bool, has_walls: bool) -> dict[str, Any]:
     """Windows per edge, seconds, shares and differences, over the sources; memory from the first."""
     windows, seconds, ratios, differences, n_lost = [], [], [], [], 0
     arbitrated: list[tuple[float, float]] = []
@@ -113,6 +137,8 @@ def measured(mesh: Mesh, n_sources: int, repeats: int, vtp: Path, has_memory: bo
         row["difference"] = max(differences)
     if arbitrated:
         row["to pygeodesic"], row["VTP to pygeodesic"] = np.max(arbitrated, axis=0).tolist()
+    if has_walls:
+        row["speedup"] = speedup(mesh, drawn_sources(mesh, range(1))[0], 5 * repeats)
     return row | (memory(mesh) if has_memory else {})
 
 
@@ -145,6 +171,7 @@ def markdown(found: dict[str, Any]) -> str:
             cells += [f"{row['peak'] / 2**20:.1f}", f"{row['peak'] / row['their peak']:.2f}"]
         else:
             cells += ["-", "-"]
+        cells.append(f"{row['speedup']:.2f}" if "speedup" in row else "-")
         rows.append(cells)
     head = ("shape", "vertices", "windows per edge", "VTP, s", "from arrays / VTP", "largest", "difference")
     lost = sum(row["lost"] for row in found.values())
@@ -156,7 +183,7 @@ def markdown(found: dict[str, Any]) -> str:
     ]
     return "\n".join(
         [
-            *table((*head, "peak, MiB", "peak / pygeodesic's"), rows),
+            *table((*head, "peak, MiB", "peak / pygeodesic's", "two threads"), rows),
             "",
             f"VTP left {lost} vertices without a distance; they are not compared.",
             *wrong,
@@ -173,6 +200,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--sources", type=int, default=2, help="sources on each mesh (default 2)")
     parser.add_argument("--repeats", type=int, default=3, help="calls that take turns, for each source (default 3)")
     parser.add_argument("--memory", action="store_true", help="measure memory, and that of pygeodesic")
+    parser.add_argument("--walls", action="store_true", help="measure by how much two threads are faster")
     add_output(parser, "exact_shapes")
     arguments = parser.parse_args(argv)
     chosen: dict[str, Callable[[], Mesh]] = {
@@ -182,7 +210,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     found = {}
     for name, make in chosen.items():
         vtp = arguments.vtp.resolve()
-        found[name] = measured(make(), arguments.sources, arguments.repeats, vtp, arguments.memory)
+        options = (arguments.sources, arguments.repeats, vtp, arguments.memory, arguments.walls)
+        found[name] = measured(make(), *options)
         print(f"{name}: {found[name]['share']:.2f}", file=sys.stderr, flush=True)
     publish(
         {"environment": environment(), "meshes": found}, markdown(found), folder=arguments.output, name="exact_shapes"

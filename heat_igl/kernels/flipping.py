@@ -5,21 +5,10 @@ Half-edge ``3 f + c`` is the side of face f opposite its corner c, and that corn
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge, twice_area
 from cython.cimports.libc.math import sqrt
 
 __all__ = ["flip"]
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _double_area(a: cython.double, b: cython.double, c: cython.double) -> cython.double:
-    """Twice the area by the sides: Heron's formula as a product of differences, which needles need."""
-    s: cython.double = 0.5 * (a + b + c)
-    product: cython.double = s * (s - a) * (s - b) * (s - c)
-    return 2.0 * sqrt(product) if product > 0.0 else 0.0
 
 
 @cython.cfunc
@@ -60,7 +49,7 @@ def flip(
     beyond: cython.int
     with cython.nogil:
         for f in range(twin.shape[0] // 3):
-            flips.area[f] = _double_area(length[3 * f], length[3 * f + 1], length[3 * f + 2])
+            flips.area[f] = twice_area(length[3 * f], length[3 * f + 1], length[3 * f + 2])
             flips.compare(3 * f)
         for first in range(twin.shape[0]):
             # Without a branch for each test: which half-edge of an edge comes first is as good as random.
@@ -151,8 +140,8 @@ class _Flips:
         x = 0.5 * ((pa - bp) * (pa + bp) - (aq - qb) * (aq + qb)) / ab
         y = (self.area[f] + self.area[g]) / ab
         self.diagonal = sqrt(x * x + y * y)
-        self.area_of_f = _double_area(pa, aq, self.diagonal)
-        self.area_of_g = _double_area(qb, bp, self.diagonal)
+        self.area_of_f = twice_area(pa, aq, self.diagonal)
+        self.area_of_g = twice_area(qb, bp, self.diagonal)
         return self.area_of_f > 0.0 and self.area_of_g > 0.0
 
     @cython.cfunc

@@ -209,6 +209,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     _fetch(s, s.twin[next_half_edge(h)])
     s.slot[h] = -1
     s.n_lists_done += 1
+    s.n_waiting -= n
     n = trim(s, windows, n, h)
     if n > s.n_out:
         more_room(s, n)

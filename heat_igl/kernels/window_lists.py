@@ -76,6 +76,27 @@ def pop(s: cython.pointer(Search)) -> Entry:
 
 
 @cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> cython.void:
+    """Note a distance of vertex v for the other of two searches."""
+    n: cython.int = s.n_news[s.parity]
+    room: cython.int = s.n_all_news[s.parity]
+    more: cython.pointer(Entry)
+    if n == room:
+        room = 2 * room + 64
+        more = cython.cast(cython.pointer(Entry), realloc(s.news[s.parity], room * cython.sizeof(Entry)))
+        if more == cython.NULL:
+            s.failed = True
+            return
+        s.news[s.parity] = more
+        s.n_all_news[s.parity] = room
+    s.news[s.parity][n].key = distance
+    s.news[s.parity][n].what = v
+    s.n_news[s.parity] = n + 1
+
+
+@cython.cfunc
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
@@ -120,7 +141,7 @@ def _is_late(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _append(
+def append(
     s: cython.pointer(Search),
     t: cython.int,
     run: cython.pointer(Window),
@@ -166,6 +187,7 @@ def _append(
         to = one.windows + one.count
     one.count += n
     s.n_windows += n
+    s.n_waiting += n
     if mirrored:
         for i in range(n):
             to[i] = run[n - 1 - i]
@@ -254,11 +276,11 @@ def add(
         if n == 0:
             return
     if t >= 0:
-        _append(s, t, run, n, in_front, not s.aligned[e])
+        append(s, t, run, n, in_front, not s.aligned[e])
     elif t == -2:
         t = s.ring[e]
         while t != e:
-            _append(s, t, run, n, in_front, s.vertex[next_half_edge(t)] == s.vertex[next_half_edge(e)])
+            append(s, t, run, n, in_front, s.vertex[next_half_edge(t)] == s.vertex[next_half_edge(e)])
             t = s.ring[t]
 
 
@@ -284,8 +306,8 @@ def allocate(s: cython.pointer(Search)) -> cython.void:
     s.n_lists = s.n_made_lists = s.n_heap = s.n_touched = s.n_found = 0
     s.n_all_lists, s.n_all_heap, s.n_out = 256, 1024, 256
     s.free_list = -1
-    s.failed = False
-    s.n_windows = s.n_lists_done = 0
+    s.failed = s.meets_flat = s.is_shared = False
+    s.n_windows = s.n_lists_done = s.n_waiting = 0
     s.n_nearest = s.n_all_ranked = 0
     s.ranked = cython.NULL
     s.lists = cython.cast(cython.pointer(List), malloc(s.n_all_lists * cython.sizeof(List)))
@@ -321,4 +343,5 @@ def empty_front(s: cython.pointer(Search)) -> cython.void:
         if s.lists[i].half_edge >= 0:
             s.slot[s.lists[i].half_edge] = -1
     s.n_lists = s.n_heap = 0
+    s.n_waiting = 0
     s.free_list = -1

@@ -32,14 +32,34 @@ def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
+    """Let a list cross its face, or a vertex, point or segment shed its windows, unless the entry is out of date."""
+    v: cython.int
+    place: cython.int
+    if entry.what < s.n_half_edges:
+        place = s.slot[entry.what]
+        if place >= 0 and s.lists[place].key == entry.key:
+            cross(s, entry.what)
+        return
+    v = entry.what - s.n_half_edges
+    if v >= s.n + s.n_points:
+        emit_segment(s, v - s.n - s.n_points)
+    elif v >= s.n:
+        emit_point(s, v - s.n)
+    elif entry.key == s.upper[v] and s.emitted[v] > entry.key:
+        shed(s, v)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def run(s: cython.pointer(Search)) -> cython.void:
     """Carry lists, and let vertices and points shed windows, in ascending order of their keys."""
     entry: Entry
-    v: cython.int
     j: cython.int
-    place: cython.int
     s.last_key = s.cutoff * (1.0 + MARGIN) + s.slack
     while s.n_heap > 0 and not s.failed:
         if s.n_nearest > 0 and s.n_touched >= s.n_next:
@@ -55,18 +75,7 @@ def run(s: cython.pointer(Search)) -> cython.void:
                 break
             if s.n_targets == 0 and s.n_found + 1 == s.n_goals:
                 s.last_key = min(s.last_key, s.distance[s.goal[s.n_found]] * (1.0 + MARGIN))
-        if entry.what < s.n_half_edges:
-            place = s.slot[entry.what]
-            if place >= 0 and s.lists[place].key == entry.key:
-                cross(s, entry.what)
-            continue
-        v = entry.what - s.n_half_edges
-        if v >= s.n + s.n_points:
-            emit_segment(s, v - s.n - s.n_points)
-        elif v >= s.n:
-            emit_point(s, v - s.n)
-        elif entry.key == s.distance[v] and s.emitted[v] > entry.key:
-            shed(s, v)
+        carry(s, entry)
     for j in range(s.n_targets):
         over_corners(s, j)
 

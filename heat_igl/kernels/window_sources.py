@@ -6,9 +6,10 @@ the boundary; and where faces are not one fan, into all faces.
 
 import cython
 from cython.cimports.heat_igl.kernels.triangles import foot, next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.window_lists import add, push
+from cython.cimports.heat_igl.kernels.window_lists import add, push, tell
 from cython.cimports.heat_igl.kernels.window_structures import (
     BENDS,
+    FLAT,
     JOINS,
     PASSED,
     SHADOW_MARGIN,
@@ -41,12 +42,12 @@ def relax(
     The straight last part of the path leaves the root out of a corner, in the direction (x, y). The frame of a corner
     begins with the side to the next corner of the face. In the face f of a source point it is that of corner 3 f.
     """
-    if distance >= s.distance[v]:
+    if distance >= s.upper[v]:
         return
     if s.distance[v] == INFINITY:
         s.touched[s.n_touched] = v
         s.n_touched += 1
-    s.distance[v] = distance
+    s.distance[v] = s.upper[v] = distance
     s.root[v] = root
     s.label[v] = s.label[root]
     s.entered[v] = entered
@@ -55,6 +56,8 @@ def relax(
         s.corner[v] = corner
         s.leaving[2 * v] = x
         s.leaving[2 * v + 1] = y
+    if s.other != cython.NULL:
+        tell(s, v, distance)
     if distance > s.last_key:
         return
     if s.aim >= 0:
@@ -64,7 +67,9 @@ def relax(
             return
     if s.kind[v] == UNKNOWN:
         s.kind[v] = classify(s, v)
-    if s.kind[v] != PASSED:
+    if s.kind[v] == FLAT:
+        s.meets_flat = True
+    elif s.kind[v] != PASSED:
         push(s, distance, s.n_half_edges + v)
 
 
@@ -375,8 +380,10 @@ def start_at(s: cython.pointer(Search), v: cython.int, offset: cython.double, la
     if s.distance[v] == INFINITY:
         s.touched[s.n_touched] = v
         s.n_touched += 1
-    s.distance[v] = offset
+    s.distance[v] = s.upper[v] = offset
     s.root[v] = v
     s.label[v] = label
     s.entered[v] = -1
+    if s.other != cython.NULL:
+        tell(s, v, offset)
     push(s, offset, s.n_half_edges + v)

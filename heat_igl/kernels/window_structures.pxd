@@ -73,6 +73,7 @@ cdef struct Search:
     int* corner          # NULL unless asked for, as the next
     double* leaving      # two for each vertex
     double* emitted
+    double* upper        # the least distance known: `distance` itself, unless another search goes on beside this one
     int* touched
     int n_touched
     # Sources inside faces.
@@ -107,6 +108,7 @@ cdef struct Search:
     int* slot
     List* lists
     int n_lists, n_all_lists, n_made_lists
+    long long n_waiting  # windows in lists
     int free_list
     int* next_free
     Entry* heap
@@ -123,6 +125,22 @@ cdef struct Search:
     int n_nearest, n_next
     double* ranked
     int n_all_ranked
+    # Of two searches that share a surface, what each tells the other after a round: see `window_sharing`.
+    Search* other        # NULL if there is none
+    bint is_first
+    double round_length
+    long long plenty, few  # with more than one on the front there is work for two threads, until it is less than the other
+    int parity           # rounds write the two places of these by turns
+    Entry* news[2]       # distances, and the vertices that they were found for
+    int n_news[2]
+    int n_all_news[2]
+    double first_key[2]  # of what waits
+    long long load[2]    # how much waits
+    bint has_failed[2]
+    bint met_flat[2]
+    bint meets_flat       # whether a flat vertex was reached
+    bint is_shared       # whether windows were handed over
+    void* arrived[4]     # locks: the news of a round are there, windows can be handed over, or were
 
 cdef enum Kind:
     UNKNOWN = 0
@@ -130,6 +148,7 @@ cdef enum Kind:
     BENDS = 2            # total angle above 2 pi: paths bend here
     ENDS = 3             # on the boundary
     JOINS = 4            # several fans, or an edge of more than two faces: paths leave into all faces
+    FLAT = 5             # passed, and the angles sum to 2 pi to rounding: windows that it splits are joined behind it
 
 cdef enum Order:
     UNDECIDED = 0        # which of two windows is nearer
@@ -211,6 +230,12 @@ cdef extern from *:
     #define OVERLAP 0.2
     // A search goes on beyond its cutoff by this fraction, more than rounding of a key.
     #define MARGIN 1e-12
+    // A vertex is flat if its angles sum to 2 pi up to this: ten times what still lets halves of a window be joined.
+    #define FLATNESS 1e-12
+    // Looks at the lock of another thread before it is waited for.
+    #define TRIES 2000
+    // What a list costs beside its windows, in windows.
+    #define PER_LIST 4
     """
     double SHADOW_MARGIN
     double NARROW
@@ -218,3 +243,6 @@ cdef extern from *:
     double SAME
     double OVERLAP
     double MARGIN
+    double FLATNESS
+    int TRIES
+    int PER_LIST

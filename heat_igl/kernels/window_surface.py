@@ -4,14 +4,16 @@ Half-edge ``3 f + c`` is the side of face f opposite its corner c; the corner ca
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.window_structures import BENDS, ENDS, JOINS, PASSED, Ray, Search
-from cython.cimports.libc.math import sqrt
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge, twice_area
+from cython.cimports.heat_igl.kernels.window_structures import BENDS, ENDS, FLAT, FLATNESS, JOINS, PASSED, Ray, Search
+from cython.cimports.libc.math import fabs
 
-__all__ = ["SEVERAL_FANS", "shapes"]
+__all__ = ["FLAT_VERTEX", "SEVERAL_FANS", "shapes"]
 
 #: The kind of a vertex whose faces are several fans, or at an edge of more than two faces.
 SEVERAL_FANS = cython.cast(cython.int, JOINS)
+#: The kind of an inner vertex whose angles sum to 2 pi.
+FLAT_VERTEX = cython.cast(cython.int, FLAT)
 
 
 def shapes(
@@ -59,7 +61,7 @@ def shapes(
             h = 3 * f
             a, b, d = length[h], length[h + 1], length[h + 2]
             # A needle without height would have no circle.
-            area = _double_area(a, b, d) + 1e-20 * a * a
+            area = twice_area(a, b, d) + 1e-20 * a * a
             double_area[f] = area
             bulge[h] = a * (b * b + d * d - a * a) / (2.0 * area)
             bulge[h + 1] = b * (a * a + d * d - b * b) / (2.0 * area)
@@ -76,17 +78,6 @@ def shapes(
                 kind[vertex[next_half_edge(h)]] = kind[vertex[previous_half_edge(h)]] = JOINS
                 is_delaunay = False
     return is_delaunay
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _double_area(a: cython.double, b: cython.double, c: cython.double) -> cython.double:
-    """Twice the area of a triangle by its sides: Heron's formula as a product of differences, which needles need."""
-    s: cython.double = 0.5 * (a + b + c)
-    product: cython.double = s * (s - a) * (s - b) * (s - c)
-    return 2.0 * sqrt(product) if product > 0.0 else 0.0
 
 
 @cython.cfunc
@@ -162,7 +153,7 @@ def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
                 return JOINS
             # Less than 1e-8 above 2 pi is flat: what a path loses there is the square of it.
             if n_half_turns < 2 or (n_half_turns == 2 and ray.cosine > 0.0 and ray.sine < 1e-8):
-                return PASSED
+                return FLAT if ray.cosine > 0.0 and fabs(ray.sine) < FLATNESS else PASSED
             return BENDS
     # An open fan: from the start to its other end.
     k = start

@@ -292,8 +292,8 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     k: cython.int = 0
     w: cython.pointer(Window)
     length: cython.double = s.length[h]
-    from_tail: cython.double = s.distance[s.vertex[next_half_edge(h)]]
-    from_head: cython.double = s.distance[s.vertex[previous_half_edge(h)]]
+    from_tail: cython.double = s.upper[s.vertex[next_half_edge(h)]]
+    from_head: cython.double = s.upper[s.vertex[previous_half_edge(h)]]
     # Of the length too: straight past a vertex near the root, both ways round to the same number.
     from_tail += s.tolerance * (from_tail + length)
     from_head += s.tolerance * (from_head + length)

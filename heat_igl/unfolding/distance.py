@@ -14,6 +14,7 @@ from heat_igl.errors import MeshError, positive
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices, connectivity
 from heat_igl.operators import Surface, unfolding_surface
+from heat_igl.runtime import n_threads
 from heat_igl.sources import (
     NearField,
     SourcePoints,
@@ -201,7 +202,7 @@ def _from_vertices(mesh: Mesh, sources: SourceSet, cutoff: float) -> FloatArray:
     faces = _within_reach(mesh, sources, cutoff)
     if faces.mean() > _MOST_OF_IT:
         surface = ExactSurface(from_mesh(mesh, int(sources.vertices[0])))
-        return surface.distance(sources.vertices, sources.vertex_offset, cutoff)
+        return surface.distance(sources.vertices, sources.vertex_offset, cutoff, n_threads())
     distance = np.full(mesh.n_vertices, np.inf)
     distance[sources.vertices] = np.where(sources.vertex_offset <= cutoff, sources.vertex_offset, np.inf)
     used, numbers = np.unique(mesh.F[faces], return_inverse=True)

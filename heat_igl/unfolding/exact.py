@@ -10,6 +10,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.runtime import n_threads
 from heat_igl.sources import Sources, SourceSegments, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh, from_triangulation
@@ -111,6 +112,7 @@ class ExactSurface:
         targets: SurfacePoints | None = None,
         goals: IntArray | None = None,
         directed: bool = False,
+        threads: int = 1,
     ) -> ExactSolution:
         """Distances from vertices and points.
 
@@ -136,6 +138,9 @@ class ExactSurface:
             vertices may then be too large or ``inf``.
         directed : bool
             Whether `ExactSolution.leaving` is asked for, on faces that are oriented alike.
+        threads : int
+            With more than one, two threads share the search for distances of all vertices, on large surfaces. The
+            distances are the same; of paths that are equally long, another may be found.
 
         Returns
         -------
@@ -150,7 +155,15 @@ class ExactSurface:
             If there are segments or points, and the surface does not know the faces that they refer to.
         """
         starts = starts_at(self._half_edges, sources, offsets, points, point_offsets, segments)
-        done = search(self._half_edges, starts, cutoff=cutoff, targets=targets, goals=goals, directed=directed)
+        done = search(
+            self._half_edges,
+            starts,
+            cutoff=cutoff,
+            targets=targets,
+            goals=goals,
+            directed=directed,
+            threads=threads,
+        )
         which = done.nearest_copy(0 if targets is None else len(targets))
         return ExactSolution(
             *self._result(done.found, done, self._half_edges.number, cutoff),
@@ -160,10 +173,12 @@ class ExactSurface:
             self._leaving(done),
         )
 
-    def distance(self, sources: IntArray, offsets: FloatArray | None = None, cutoff: float = np.inf) -> FloatArray:
+    def distance(
+        self, sources: IntArray, offsets: FloatArray | None = None, cutoff: float = np.inf, threads: int = 1
+    ) -> FloatArray:
         """Distance (n,) from vertices alone, as `solve` finds it, without the origins of the paths."""
         edges = self._half_edges
-        done = search(edges, starts_at(edges, sources, offsets, None, None, None), cutoff=cutoff)
+        done = search(edges, starts_at(edges, sources, offsets, None, None, None), cutoff=cutoff, threads=threads)
         distance = edges.unscaled(done.found.distance[edges.number])
         if cutoff < np.inf:
             distance[distance > cutoff] = np.inf
@@ -234,4 +249,4 @@ def exact_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, cutoff: floa
     if mesh.is_tetrahedral:
         raise MeshError("exact distance needs triangles, but F has 4 columns")
     chosen = vertex_sources(sources, mesh.n_vertices)
-    return ExactSurface(from_mesh(mesh, int(chosen[0]))).distance(chosen, cutoff=cutoff)
+    return ExactSurface(from_mesh(mesh, int(chosen[0]))).distance(chosen, cutoff=cutoff, threads=n_threads())

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from heat_igl.kernels import windows
+from heat_igl.kernels.window_surface import FLAT_VERTEX
 from heat_igl.mesh import SurfacePoints
+from heat_igl.runtime import side_by_side
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import NO_POINTS, NO_SEGMENTS, HalfEdges, Located
@@ -17,6 +20,13 @@ __all__ = ["TOLERANCE", "Found", "Leaving", "Searched", "Starts", "search", "sta
 #: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds
 #: up to. A larger number keeps a few windows more and changes no result.
 TOLERANCE = 1e-11
+# On fewer vertices a search takes a few milliseconds, and a thread with its arrays a part of one.
+_FEWEST_SHARED = 10_000
+# Two threads meet after so many mean edge lengths. Shorter rounds cost time, longer ones more windows that cross the
+# line between the two parts.
+_ROUND = 3.0
+# With about so many windows on the front there is work for two threads between two meetings: a tenth of a millisecond.
+_PLENTY = 1000
 _NO_VERTICES = np.empty(0, np.int64)
 
 
@@ -61,6 +71,12 @@ class Found(NamedTuple):
         """Nothing found yet, at k places."""
         nothing = np.full((2, k), -1, np.int32)
         return cls(np.full(k, np.inf), nothing[0], np.full(n_labels, -1, np.int32), nothing[1], np.zeros(k))
+
+    def take_nearer(self, other: Found) -> None:
+        """Take over what was found nearer by another search."""
+        is_nearer = np.flatnonzero(other.distance < self.distance)
+        for mine, theirs in zip(self, other, strict=True):
+            mine[is_nearer] = theirs[is_nearer]
 
 
 class Leaving(NamedTuple):
@@ -126,28 +142,15 @@ def search(
     targets: SurfacePoints | None = None,
     goals: IntArray | None = None,
     directed: bool = False,
+    threads: int = 1,
 ) -> Searched:
     """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`."""
     place = edges.located(targets)
     n, t = edges.n, len(place.faces)
-    found, at_targets = Found.of(n, n + len(starts.points.faces) + len(starts.segments.faces)), Found.of(t, 0)
-    statistics = np.zeros(3, np.int64)
+    n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
+    found, at_targets = Found.of(n, n_labels), Found.of(t, 0)
     leaving = Leaving.of(n) if directed else None
-    front = windows.Front(
-        *edges.tables,
-        found.distance,
-        np.full(n, np.inf),
-        found.root,
-        found.label,
-        found.entered,
-        found.crossing,
-        np.empty(n, np.int32),
-        np.full(len(edges.tables.vertex), -1, np.int32),
-        TOLERANCE,
-        *(() if leaving is None else (leaving.corner, leaving.direction.ravel())),
-    )
-    done = windows.search(
-        front,
+    arguments: tuple[Any, ...] = (
         starts.vertices,
         starts.offset,
         starts.points.faces,
@@ -167,11 +170,59 @@ def search(
         edges.largest_circle(place),
         goals is not None,
         float(edges.scaled(cutoff)),
-        statistics,
     )
-    if not done:
-        raise MemoryError("the windows of the exact distance do not fit into memory")
+    statistics = None
+    # Vertices are found flat by the first search.
+    asks_for_all = t == 0 and goals is None and not directed
+    if threads > 1 and n >= _FEWEST_SHARED and asks_for_all and not (edges.tables.kind == FLAT_VERTEX).any():
+        statistics = _beside(edges, found, arguments)
+        if statistics is None:
+            found = Found.of(n, n_labels)
+    if statistics is None:
+        statistics = np.zeros(3, np.int64)
+        _require(windows.search(*(_front(edges, found, leaving), *arguments, statistics)))
     return Searched(starts, found, place, at_targets, int(statistics[1]), int(statistics[2]), leaving)
+
+
+def _require(is_done: bool) -> None:
+    if not is_done:
+        raise MemoryError("the windows of the exact distance do not fit into memory")
+
+
+def _front(edges: HalfEdges, found: Found, leaving: Leaving | None = None) -> windows.Front:
+    """What the kernel writes in one search."""
+    return windows.Front(
+        *edges.tables,
+        found.distance,
+        np.full(edges.n, np.inf),
+        found.root,
+        found.label,
+        found.entered,
+        found.crossing,
+        np.empty(edges.n, np.int32),
+        np.full(len(edges.tables.vertex), -1, np.int32),
+        TOLERANCE,
+        *(() if leaving is None else (leaving.corner, leaving.direction.ravel())),
+    )
+
+
+def _beside(edges: HalfEdges, found: Found, arguments: tuple[Any, ...]) -> IntArray | None:
+    """Search on two threads; the statistics of both, or None if one thread has to search instead."""
+    also, statistics, done = Found.of(edges.n, len(found.label)), np.zeros((2, 3), np.int64), []
+    first, second = _front(edges, found), _front(edges, also)
+    bounds = np.full((2, edges.n), np.inf)
+    windows.pair(first, second, bounds[0], bounds[1], _ROUND * float(edges.tables.length.mean()), _PLENTY)
+    calls: list[Callable[[], bool]] = [
+        lambda: windows.search(*(first, *arguments, statistics[0])),
+        lambda: windows.assist(second, arguments[-1], statistics[1]),
+    ]
+    try:
+        side_by_side(lambda call: done.append(call()), calls)
+    finally:
+        is_same = windows.part(first, second)
+    _require(all(done))
+    found.take_nearer(also)
+    return np.asarray(statistics.sum(axis=0)) if is_same else None
 
 
 def starts_at(

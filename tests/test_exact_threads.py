@@ -1,0 +1,74 @@
+"""One exact search on two threads: the same bits, whatever the surface and the sources."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import perturbed
+from test_exact import two_arms
+from test_local_queries import book
+from test_unfolding import moebius_strip
+
+from heat_igl import Mesh, SurfacePoints, isolines, shapes
+from heat_igl.intrinsic import intrinsic_triangulation
+from heat_igl.sources import source_set
+from heat_igl.unfolding import window_search
+from heat_igl.unfolding.exact import ExactSolution, ExactSurface
+
+
+def pinched() -> Mesh:
+    """Two bumpy grids with one vertex in common, and a third without."""
+    one = perturbed(shapes.grid(14), 0.4, 3)
+    V = np.concatenate([one.V, 2 * one.V[-1] - one.V[:-1], one.V + np.array([0, 0, 9])])
+    second = one.F + one.n_vertices
+    second[one.n_vertices - 1 == one.F] = one.n_vertices - 1
+    return Mesh(V, np.concatenate([one.F, second, one.F + 2 * one.n_vertices - 1]))
+
+
+ZOO = {
+    "sphere": lambda: shapes.icosphere(3),
+    "rough sphere": lambda: perturbed(shapes.icosphere(3), 0.5, 1),
+    "torus": lambda: shapes.torus(40, 20),
+    "boundary": lambda: perturbed(shapes.grid(24), 0.6, 2),
+    "bends at a corner": lambda: two_arms(10),
+    "plane": lambda: shapes.grid(20),
+    "edges of three faces": book,
+    "cannot be oriented": lambda: moebius_strip(80, 8),
+    "pinched, and components": pinched,
+    "strip": lambda: shapes.strip(200, 2),
+    "needles": lambda: Mesh(shapes.icosphere(3).V * [1, 30, 1], shapes.icosphere(3).F),
+}
+
+
+@pytest.fixture(autouse=True)
+def shared_from_the_start(monkeypatch):
+    monkeypatch.setattr(window_search, "_FEWEST_SHARED", 0)
+    monkeypatch.setattr(window_search, "_PLENTY", 30)
+    monkeypatch.setattr(window_search, "_ROUND", 0.3)
+
+
+def require_same(one: ExactSolution, two: ExactSolution) -> None:
+    np.testing.assert_array_equal(two.distance, one.distance)
+
+
+@pytest.mark.parametrize("name", ZOO)
+def test_two_threads_find_what_one_finds(name):
+    mesh = ZOO[name]()
+    surface, rng = ExactSurface(intrinsic_triangulation(mesh)), np.random.default_rng(0)
+    for source in rng.choice(np.unique(mesh.F), 5):
+        sources = np.array([source])
+        require_same(surface.solve(sources), surface.solve(sources, threads=2))
+    several, offsets = rng.choice(np.unique(mesh.F), 7, replace=False), rng.random(7) * mesh.edge_lengths.mean()
+    require_same(surface.solve(several, offsets), surface.solve(several, offsets, threads=2))
+    cutoff = float(np.median(surface.solve(several[:1]).distance))
+    require_same(surface.solve(several, cutoff=cutoff), surface.solve(several, cutoff=cutoff, threads=2))
+    points = SurfacePoints(rng.integers(mesh.n_faces, size=3), rng.dirichlet(np.ones(3), 3))
+    require_same(surface.solve(points=points), surface.solve(points=points, threads=2))
+
+
+def test_curves():
+    for mesh in (shapes.grid(16), perturbed(shapes.icosphere(3), 0.3, 1)):
+        curve = isolines(mesh, mesh.V[:, 0] + 0.3 * mesh.V[:, 1], 0.4)[0][0]
+        segments = source_set(curve, mesh.n_vertices, mesh.F).segments
+        surface = ExactSurface(intrinsic_triangulation(mesh))
+        require_same(surface.solve(segments=segments), surface.solve(segments=segments, threads=2))
