@@ -204,13 +204,13 @@ def refuse_masked(name: str, values: object, error: type[ValueError] = ValueErro
 
 def real_numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """`values` as a new float64 array; a ValueError that calls them `name` if they are no real numbers."""
-    if np.iscomplexobj(values):
-        raise ValueError(f"{name} must be real numbers, not complex")
     refuse_masked(name, values)
     try:
-        return np.array(values, dtype=np.float64)
+        if not np.iscomplexobj(values):
+            return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} must be real numbers in an array, not {shown(values)}") from None
+    raise ValueError(f"{name} must be real numbers, not complex")
 
 
 def as_array(name: str, values: npt.ArrayLike | None, error: type[ValueError] = ValueError) -> npt.NDArray[Any]:

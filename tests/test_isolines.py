@@ -321,7 +321,7 @@ def test_the_command_line_writes_the_same_lines(tmp_path):
     run = {"cwd": tmp_path, "env": environment, "capture_output": True, "text": True, "check": False}
     done = subprocess.run([*command, "0.5", "--output", "lines.obj"], **run)
     assert (done.returncode, done.stderr) == (0, "")
-    phi = HeatMethodSolver(mesh).distance(5)
+    phi = heat_igl.geodesic_distance(mesh, 5)
     levels = np.arange(0.5, phi.max(), 0.5)
     assert re.search(rf"lines +{len(levels)} at {len(levels)} distances", done.stdout)
     curves = dict(zip([f"{level:g}" for level in levels], isolines(mesh, phi, levels), strict=True))

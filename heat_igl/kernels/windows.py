@@ -7,74 +7,18 @@ out in the plane before the half-edge gives the distance of every point of the w
 another path reaches sooner (`window_trimming`), and what would cross a shorter way to the corner ahead
 (`window_crossing`). A vertex gets windows of its own where shortest paths can bend (`window_sources`).
 
-This module has what Python calls: `search` for one question about all vertices, `search_each` for many local ones.
+`search` is for one question about all vertices; `window_pairs` lets two threads share it, and `local_windows` has a
+search for many local ones.
 """
 
 import cython
-from cython.cimports.cpython.pythread import (
-    WAIT_LOCK,
-    PyThread_acquire_lock,
-    PyThread_allocate_lock,
-    PyThread_free_lock,
-)
 from cython.cimports.heat_igl.kernels.window_lists import allocate, empty_front, free_front, push
-from cython.cimports.heat_igl.kernels.window_search import forget, narrow, run
+from cython.cimports.heat_igl.kernels.window_search import run
 from cython.cimports.heat_igl.kernels.window_sharing import run_beside
-from cython.cimports.heat_igl.kernels.window_sources import aim_at, start_at
+from cython.cimports.heat_igl.kernels.window_sources import start_at
 from cython.cimports.heat_igl.kernels.window_structures import Search
-from cython.cimports.libc.stdlib import free
 
-__all__ = ["Front", "assist", "pair", "part", "search", "search_each"]
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _write_within(
-    s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
-) -> cython.int:
-    """All vertices within the cutoff and their distances; how many they are."""
-    i: cython.int
-    v: cython.int
-    n: cython.int = 0
-    for i in range(s.n_touched):
-        v = s.touched[i]
-        if s.distance[v] <= s.cutoff:
-            to[n] = name[v]
-            value[n] = s.distance[v]
-            n += 1
-    return n
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _write_nearest(
-    s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
-) -> cython.int:
-    """The nearest vertices, of equally near ones those with the lowest names, in order; how many they are."""
-    i: cython.int
-    j: cython.int
-    v: cython.int
-    n: cython.int = 0
-    d: cython.double
-    for i in range(s.n_touched):
-        v = s.touched[i]
-        d = s.distance[v]
-        if d > s.cutoff:
-            continue
-        if n < s.n_nearest:
-            n += 1
-        elif d > value[n - 1] or (d == value[n - 1] and name[v] > to[n - 1]):
-            continue
-        j = n - 1
-        while j > 0 and (d < value[j - 1] or (d == value[j - 1] and name[v] < to[j - 1])):
-            value[j] = value[j - 1]
-            to[j] = to[j - 1]
-            j -= 1
-        value[j] = d
-        to[j] = name[v]
-    return n
+__all__ = ["Front", "search"]
 
 
 class Front:
@@ -196,168 +140,6 @@ class Front:
         s.tolerance = tolerance
         s.n_points = s.n_segments = s.n_targets = s.n_goals = 0
         s.first_target = cython.NULL
-
-
-def pair(
-    first: Front,
-    second: Front,
-    upper: cython.double[::1],
-    other_upper: cython.double[::1],
-    round_length: cython.double,
-    plenty: cython.longlong,
-) -> None:
-    """Let two searches on one surface go on side by side: `search` on the first, `assist` on the second.
-
-    Parameters
-    ----------
-    first, second : Front
-        For one search, with arrays of their own for what they write, but for `kind`. Each vertex has the smaller of
-        the two distances that they find.
-    upper, other_upper : (n,)
-        Must come full of infinity.
-    round_length : float
-        How far the distance goes between two meetings.
-    plenty : int
-        About so many windows on the front are work for two threads. When less than a third is left, one goes on alone.
-    """
-    _join(first, upper, second)
-    _join(second, other_upper, first)
-    first.state.round_length = second.state.round_length = round_length
-    first.state.plenty = second.state.plenty = plenty
-    first.state.few = second.state.few = plenty // 3
-    first.state.is_first, second.state.is_first = True, False
-
-
-@cython.cfunc
-def _join(one: Front, upper: cython.double[::1], other: Front) -> None:
-    s: cython.pointer(Search) = cython.address(one.state)
-    i: cython.int
-    one.arrays += (upper.base,)
-    s.other = cython.address(other.state)
-    s.upper = cython.address(upper[0])
-    s.parity = 0
-    for i in range(2):
-        s.news[i] = cython.NULL
-        s.n_news[i] = s.n_all_news[i] = 0
-    for i in range(4):
-        s.arrived[i] = PyThread_allocate_lock()
-        if s.arrived[i] == cython.NULL:
-            raise MemoryError("there is no room for a lock")
-        PyThread_acquire_lock(s.arrived[i], WAIT_LOCK)
-
-
-def part(first: Front, second: Front) -> bool:
-    """Return what `pair` took; whether the distances are those of one thread to the bit, otherwise it must search."""
-    one: Front
-    s: cython.pointer(Search)
-    i: cython.int
-    for one in (first, second):
-        s = cython.address(one.state)
-        s.other = cython.NULL
-        for i in range(2):
-            free(s.news[i])
-        for i in range(4):
-            PyThread_free_lock(s.arrived[i])
-    return not (first.state.is_shared and (first.state.meets_flat or second.state.meets_flat))
-
-
-def assist(front: Front, cutoff: cython.double, statistics: cython.longlong[::1]) -> bool:
-    """Take a part of the search that the other front of a `pair` begins; parameters and result as for `search`."""
-    s: cython.pointer(Search) = cython.address(front.state)
-    s.stops_early = False
-    s.slack = 0.0
-    s.cutoff = cutoff
-    with cython.nogil:
-        allocate(s)
-        run_beside(s)
-        empty_front(s)
-        free_front(s)
-    statistics[0] = s.n_touched
-    statistics[1] = s.n_windows
-    statistics[2] = s.n_lists_done
-    return not s.failed
-
-
-def search_each(
-    front: Front,
-    source: cython.int[::1],
-    goal: cython.int[::1],
-    first_goal: cython.longlong[::1],
-    cutoff: cython.double,
-    n_nearest: cython.int,
-    name: cython.longlong[::1],
-    found: cython.int[::1],
-    value: cython.double[::1],
-    end: cython.longlong[::1],
-) -> int:
-    """Distances from one vertex after the other, each search ended early; how many sources were done, -1 for no memory.
-
-    What a search touched is cleared after it, so that its cost depends on what is near alone.
-
-    Parameters
-    ----------
-    front : Front
-        In its first state, and in it again afterwards.
-    source : (k,)
-        Vertices that distance starts from, each alone.
-    goal, first_goal : (g,), (k + 1,)
-        The distances that are asked for, ``goal[first_goal[i]:first_goal[i + 1]]`` of source i, if there are any.
-    cutoff : float
-        Otherwise all vertices up to here are asked for,
-    n_nearest : int
-        and so many at most, the nearest; 0 for all.
-    name : (n,)
-        What vertices are called in `found`.
-    found, value : (r,)
-        Take vertices and their distances, source after source. The last source done is the last whose results had room.
-    end : (k,)
-        Takes where the results of each source end. Results for goals are one value each, and `found` is not used.
-    """
-    s: cython.pointer(Search) = cython.address(front.state)
-    i: cython.int
-    j: cython.longlong
-    n_done: cython.int = 0
-    at: cython.longlong = 0
-    room: cython.longlong = value.shape[0]
-    names: cython.p_longlong = cython.address(name[0])
-    s.stops_early = goal.shape[0] > 0
-    s.slack = 0.0
-    with cython.nogil:
-        allocate(s)
-        for i in range(source.shape[0]):
-            s.cutoff = cutoff
-            s.n_nearest = s.n_next = n_nearest
-            if s.stops_early:
-                s.n_goals = cython.cast(cython.int, first_goal[i + 1] - first_goal[i])
-                s.goal = cython.address(goal[0]) + first_goal[i]
-            s.aim = -1
-            if s.stops_early and s.n_goals == 1 and s.position != cython.NULL:
-                aim_at(s, source[i], s.goal[0])
-                s.cutoff = s.within
-            start_at(s, source[i], 0.0, 0)
-            if not s.failed:
-                run(s)
-            if s.failed:
-                break
-            if s.stops_early:
-                for j in range(first_goal[i], first_goal[i + 1]):
-                    value[j] = s.distance[goal[j]]
-                at = first_goal[i + 1]
-            else:
-                if at + (n_nearest if n_nearest > 0 else s.n_touched) > room:
-                    break
-                if n_nearest > 0:
-                    if s.n_touched >= n_nearest:
-                        narrow(s)
-                    at += _write_nearest(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
-                else:
-                    at += _write_within(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
-            end[i] = at
-            n_done += 1
-            forget(s)
-        forget(s)
-        free_front(s)
-    return -1 if s.failed else n_done
 
 
 def search(

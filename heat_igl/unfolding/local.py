@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, SourceError, positive
-from heat_igl.kernels import windows
+from heat_igl.kernels import local_windows, windows
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, named_vertices
@@ -264,7 +264,7 @@ class _Workspace:
     ) -> IntArray:
         """Search from each of `sources`; the end of the results of each, for as many as had room."""
         ends = np.zeros(len(sources), np.int64)
-        n_done = windows.search_each(
+        n_done = local_windows.search_each(
             self._front,
             sources,
             goals,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import igl
 import numpy as np
@@ -14,8 +14,9 @@ from heat_igl.errors import is_number, shown
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.operators import Surface, unfolding_surface
 from heat_igl.runtime import both, n_threads
-from heat_igl.sources import NEAR_RADIUS, NearField, SourcePoints, SourceSegments, SourceSet
+from heat_igl.sources import NEAR_RADIUS, NearField, SourcePoints, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.asked import Asked, asked_of, groups_of, labels_of
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
@@ -81,22 +82,6 @@ def require_share(tolerance: float | None) -> None:
     """Refuse a tolerance that is not a number from 0 to 1."""
     if tolerance is not None and not (is_number(tolerance) and 0 <= tolerance <= 1):
         raise ValueError(f"tolerance must lie between 0 and 1, not {shown(tolerance)}")
-
-
-class _Asked(NamedTuple):
-    """What distance starts from, and when; `labels` and `angles` are filled if given.
-
-    Without `segments`, points stand for curves.
-    """
-
-    vertices: IntArray
-    offsets: FloatArray | None
-    points: SurfacePoints | None
-    point_offsets: FloatArray | None
-    segments: SourceSegments | None
-    labels: IntArray | None
-    angles: FloatArray | None
-    tolerance: float | None
 
 
 def _as_thin_as_given(surface: Surface) -> Surface:
@@ -246,11 +231,11 @@ class UnfoldingSolver:
         by_windows = self._takes_windows(sources)
         takes_curves = by_windows and angles is None
         points = relative.points if takes_curves else self._points(relative)
-        asked = _asked(relative, points, takes_curves)._replace(
+        asked = asked_of(relative, points, takes_curves)._replace(
             labels=labels, angles=angles, tolerance=self._tolerance if tolerance is None else tolerance
         )
         by_windows = by_windows or self._is_straight(asked)
-        groups = _groups(relative, points)
+        groups = groups_of(relative, points)
         if len(relative.segments.faces) and not (by_windows or self._sweeps) and n_threads() > 1:
             # Walks along curves do not need the distance near them.
             near, distance = both(
@@ -265,12 +250,12 @@ class UnfoldingSolver:
         if origin is not None and labels is not None:
             origin[:] = labels
         if labels is not None:
-            labels[:] = _labels(sources, points)[labels]
+            labels[:] = labels_of(sources, points)[labels]
         if near is not None:
             at = np.flatnonzero(np.isfinite(near.distance))
             distance[at] = start[at] + near.distance[at]
             if labels is not None:
-                labels[at] = _labels(sources, sources.points)[near.origin.label[at]]
+                labels[at] = labels_of(sources, sources.points)[near.origin.label[at]]
         if not by_windows:
             self._bounds.shorten(distance, labels)
             if self._sweeps:
@@ -304,7 +289,7 @@ class UnfoldingSolver:
             return None
         edges = _KNOWN_RADIUS if sources.on_vertices_alone else NEAR_RADIUS
         cutoff = edges * self._domain.mean_edge_length + float(sources.offsets.max())
-        surface, asked = self._exact_on_given_faces if has_curves else self._exact, _asked(sources, sources.points)
+        surface, asked = self._exact_on_given_faces if has_curves else self._exact, asked_of(sources, sources.points)
         return surface.solve(
             asked.vertices, asked.offsets, asked.points, asked.point_offsets, asked.segments, cutoff=cutoff
         )
@@ -324,7 +309,7 @@ class UnfoldingSolver:
     def _unfolded(
         self,
         u: FloatArray,
-        asked: _Asked,
+        asked: Asked,
         near: ExactSolution | None,
         groups: IntArray | None,
         by_windows: bool,
@@ -364,13 +349,13 @@ class UnfoldingSolver:
             labels=asked.labels,
         )
 
-    def _is_straight(self, asked: _Asked) -> bool:
+    def _is_straight(self, asked: Asked) -> bool:
         """Whether directions are found by windows, as walks of a small tolerance would take as long."""
         if asked.angles is None or asked.tolerance is None or asked.tolerance >= TOLERANCE:
             return False
         return asked.tolerance == 0 or self._domain.components.size <= _FEW_FOR_DIRECTIONS
 
-    def _directed_walks(self, refinement: Refinement, u: FloatArray, asked: _Asked) -> FloatArray:
+    def _directed_walks(self, refinement: Refinement, u: FloatArray, asked: Asked) -> FloatArray:
         starts = refinement.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
         walk = refinement.walks(-u, starts, TOLERANCE if asked.tolerance is None else asked.tolerance)
         row = refinement.number
@@ -393,40 +378,7 @@ class UnfoldingSolver:
         return points.joined(self._faces.samples(segments, self._spacing)[0]).joined(segments.ends())
 
 
-def _labels(sources: SourceSet, points: SourcePoints) -> IntArray:
-    """The sources, as the user counts them, of vertices, `points` and segments, one after another; -1 for nothing."""
-    return np.concatenate([sources.vertex_label, points.label, sources.segments.label, [-1]])
-
-
-def _asked(sources: SourceSet, points: SourcePoints, takes_curves: bool = True) -> _Asked:
-    """Distance from the vertices of a set, from `points`, and from the curves of the set if windows take them."""
-    of_vertices, of_points = sources.vertex_offset, points.offset
-    differ = bool(of_vertices.any() or of_points.any())
-    places = SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None
-    return _Asked(
-        sources.vertices,
-        of_vertices if differ else None,
-        places,
-        of_points if differ and places else None,
-        sources.segments if takes_curves and len(sources.segments.faces) else None,
-        None,
-        None,
-        None,
-    )
-
-
-def _groups(sources: SourceSet, points: SourcePoints) -> IntArray | None:
-    """For each source, which curve it is a point of, or itself; None if there are no curves."""
-    if not len(sources.segments.faces):
-        return None
-    k = len(sources.vertices)
-    groups = np.arange(k + len(points.label))
-    of_curve = np.isin(points.label, sources.segments.label)
-    groups[k:][of_curve] = len(groups) + points.label[of_curve]
-    return groups
-
-
-def _known(asked: _Asked, near: ExactSolution | None) -> Known | None:
+def _known(asked: Asked, near: ExactSolution | None) -> Known | None:
     """Vertices that a sweep begins with."""
     if near is None:
         return None

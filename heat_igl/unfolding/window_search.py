@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels import windows
+from heat_igl.kernels import window_pairs, windows
 from heat_igl.kernels.window_surface import FLAT_VERTEX
 from heat_igl.mesh import SurfacePoints
 from heat_igl.runtime import side_by_side
@@ -211,15 +211,15 @@ def _beside(edges: HalfEdges, found: Found, arguments: tuple[Any, ...]) -> IntAr
     also, statistics, done = Found.of(edges.n, len(found.label)), np.zeros((2, 3), np.int64), []
     first, second = _front(edges, found), _front(edges, also)
     bounds = np.full((2, edges.n), np.inf)
-    windows.pair(first, second, bounds[0], bounds[1], _ROUND * float(edges.tables.length.mean()), _PLENTY)
+    window_pairs.pair(first, second, bounds[0], bounds[1], _ROUND * float(edges.tables.length.mean()), _PLENTY)
     calls: list[Callable[[], bool]] = [
         lambda: windows.search(*(first, *arguments, statistics[0])),
-        lambda: windows.assist(second, arguments[-1], statistics[1]),
+        lambda: window_pairs.assist(second, arguments[-1], statistics[1]),
     ]
     try:
         side_by_side(lambda call: done.append(call()), calls)
     finally:
-        is_same = windows.part(first, second)
+        is_same = window_pairs.part(first, second)
     _require(all(done))
     found.take_nearer(also)
     return np.asarray(statistics.sum(axis=0)) if is_same else None

@@ -1,0 +1,142 @@
+"""Many local searches by windows on one surface, each of which costs what it touches."""
+
+import cython
+from cython.cimports.heat_igl.kernels.window_lists import allocate, free_front
+from cython.cimports.heat_igl.kernels.window_search import forget, narrow, run
+from cython.cimports.heat_igl.kernels.window_sources import aim_at, start_at
+from cython.cimports.heat_igl.kernels.window_structures import Search
+from cython.cimports.heat_igl.kernels.windows import Front
+
+__all__ = ["search_each"]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _write_within(
+    s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
+) -> cython.int:
+    """All vertices within the cutoff and their distances; how many they are."""
+    i: cython.int
+    v: cython.int
+    n: cython.int = 0
+    for i in range(s.n_touched):
+        v = s.touched[i]
+        if s.distance[v] <= s.cutoff:
+            to[n] = name[v]
+            value[n] = s.distance[v]
+            n += 1
+    return n
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _write_nearest(
+    s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
+) -> cython.int:
+    """The nearest vertices, of equally near ones those with the lowest names, in order; how many they are."""
+    i: cython.int
+    j: cython.int
+    v: cython.int
+    n: cython.int = 0
+    d: cython.double
+    for i in range(s.n_touched):
+        v = s.touched[i]
+        d = s.distance[v]
+        if d > s.cutoff:
+            continue
+        if n < s.n_nearest:
+            n += 1
+        elif d > value[n - 1] or (d == value[n - 1] and name[v] > to[n - 1]):
+            continue
+        j = n - 1
+        while j > 0 and (d < value[j - 1] or (d == value[j - 1] and name[v] < to[j - 1])):
+            value[j] = value[j - 1]
+            to[j] = to[j - 1]
+            j -= 1
+        value[j] = d
+        to[j] = name[v]
+    return n
+
+
+def search_each(
+    front: Front,
+    source: cython.int[::1],
+    goal: cython.int[::1],
+    first_goal: cython.longlong[::1],
+    cutoff: cython.double,
+    n_nearest: cython.int,
+    name: cython.longlong[::1],
+    found: cython.int[::1],
+    value: cython.double[::1],
+    end: cython.longlong[::1],
+) -> int:
+    """Distances from one vertex after the other, each search ended early; how many sources were done, -1 for no memory.
+
+    What a search touched is cleared after it, so that its cost depends on what is near alone.
+
+    Parameters
+    ----------
+    front : Front
+        In its first state, and in it again afterwards.
+    source : (k,)
+        Vertices that distance starts from, each alone.
+    goal, first_goal : (g,), (k + 1,)
+        The distances that are asked for, ``goal[first_goal[i]:first_goal[i + 1]]`` of source i, if there are any.
+    cutoff : float
+        Otherwise all vertices up to here are asked for,
+    n_nearest : int
+        and so many at most, the nearest; 0 for all.
+    name : (n,)
+        What vertices are called in `found`.
+    found, value : (r,)
+        Take vertices and their distances, source after source. The last source done is the last whose results had room.
+    end : (k,)
+        Takes where the results of each source end. Results for goals are one value each, and `found` is not used.
+    """
+    s: cython.pointer(Search) = cython.address(front.state)
+    i: cython.int
+    j: cython.longlong
+    n_done: cython.int = 0
+    at: cython.longlong = 0
+    room: cython.longlong = value.shape[0]
+    names: cython.p_longlong = cython.address(name[0])
+    s.stops_early = goal.shape[0] > 0
+    s.slack = 0.0
+    with cython.nogil:
+        allocate(s)
+        for i in range(source.shape[0]):
+            s.cutoff = cutoff
+            s.n_nearest = s.n_next = n_nearest
+            if s.stops_early:
+                s.n_goals = cython.cast(cython.int, first_goal[i + 1] - first_goal[i])
+                s.goal = cython.address(goal[0]) + first_goal[i]
+            s.aim = -1
+            if s.stops_early and s.n_goals == 1 and s.position != cython.NULL:
+                aim_at(s, source[i], s.goal[0])
+                s.cutoff = s.within
+            start_at(s, source[i], 0.0, 0)
+            if not s.failed:
+                run(s)
+            if s.failed:
+                break
+            if s.stops_early:
+                for j in range(first_goal[i], first_goal[i + 1]):
+                    value[j] = s.distance[goal[j]]
+                at = first_goal[i + 1]
+            else:
+                if at + (n_nearest if n_nearest > 0 else s.n_touched) > room:
+                    break
+                if n_nearest > 0:
+                    if s.n_touched >= n_nearest:
+                        narrow(s)
+                    at += _write_nearest(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
+                else:
+                    at += _write_within(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
+            end[i] = at
+            n_done += 1
+            forget(s)
+        forget(s)
+        free_front(s)
+    return -1 if s.failed else n_done

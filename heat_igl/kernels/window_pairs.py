@@ -1,0 +1,96 @@
+"""Two fronts that share one exact search, a thread for each; `window_sharing` has what they do."""
+
+import cython
+from cython.cimports.cpython.pythread import (
+    WAIT_LOCK,
+    PyThread_acquire_lock,
+    PyThread_allocate_lock,
+    PyThread_free_lock,
+)
+from cython.cimports.heat_igl.kernels.window_lists import allocate, empty_front, free_front
+from cython.cimports.heat_igl.kernels.window_sharing import run_beside
+from cython.cimports.heat_igl.kernels.window_structures import Search
+from cython.cimports.heat_igl.kernels.windows import Front
+from cython.cimports.libc.stdlib import free
+
+__all__ = ["assist", "pair", "part"]
+
+
+def pair(
+    first: Front,
+    second: Front,
+    upper: cython.double[::1],
+    other_upper: cython.double[::1],
+    round_length: cython.double,
+    plenty: cython.longlong,
+) -> None:
+    """Let two searches on one surface go on side by side: `search` on the first, `assist` on the second.
+
+    Parameters
+    ----------
+    first, second : Front
+        For one search, with arrays of their own for what they write, but for `kind`. Each vertex has the smaller of
+        the two distances that they find.
+    upper, other_upper : (n,)
+        Must come full of infinity.
+    round_length : float
+        How far the distance goes between two meetings.
+    plenty : int
+        About so many windows on the front are work for two threads. When less than a third is left, one goes on alone.
+    """
+    _join(first, upper, second)
+    _join(second, other_upper, first)
+    first.state.round_length = second.state.round_length = round_length
+    first.state.plenty = second.state.plenty = plenty
+    first.state.few = second.state.few = plenty // 3
+    first.state.is_first, second.state.is_first = True, False
+
+
+@cython.cfunc
+def _join(one: Front, upper: cython.double[::1], other: Front) -> None:
+    s: cython.pointer(Search) = cython.address(one.state)
+    i: cython.int
+    one.arrays += (upper.base,)
+    s.other = cython.address(other.state)
+    s.upper = cython.address(upper[0])
+    s.parity = 0
+    for i in range(2):
+        s.news[i] = cython.NULL
+        s.n_news[i] = s.n_all_news[i] = 0
+    for i in range(4):
+        s.arrived[i] = PyThread_allocate_lock()
+        if s.arrived[i] == cython.NULL:
+            raise MemoryError("there is no room for a lock")
+        PyThread_acquire_lock(s.arrived[i], WAIT_LOCK)
+
+
+def part(first: Front, second: Front) -> bool:
+    """Return what `pair` took; whether the distances are those of one thread to the bit, otherwise it must search."""
+    one: Front
+    s: cython.pointer(Search)
+    i: cython.int
+    for one in (first, second):
+        s = cython.address(one.state)
+        s.other = cython.NULL
+        for i in range(2):
+            free(s.news[i])
+        for i in range(4):
+            PyThread_free_lock(s.arrived[i])
+    return not (first.state.is_shared and (first.state.meets_flat or second.state.meets_flat))
+
+
+def assist(front: Front, cutoff: cython.double, statistics: cython.longlong[::1]) -> bool:
+    """Take a part of the search that the other front of a `pair` begins; parameters and result as for `search`."""
+    s: cython.pointer(Search) = cython.address(front.state)
+    s.stops_early = False
+    s.slack = 0.0
+    s.cutoff = cutoff
+    with cython.nogil:
+        allocate(s)
+        run_beside(s)
+        empty_front(s)
+        free_front(s)
+    statistics[0] = s.n_touched
+    statistics[1] = s.n_windows
+    statistics[2] = s.n_lists_done
+    return not s.failed
