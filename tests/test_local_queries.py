@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from itertools import pairwise
 
 import numpy as np
@@ -235,3 +236,22 @@ def test_errors():
         nearest_vertices(mesh, 2, [99])
     with pytest.raises(MeshError, match="exact distances need triangles"):
         distances_within(shapes.box(2), 1.0)
+
+
+def test_an_interrupt_ends_all_threads(monkeypatch):
+    """What waits is not begun any more, neither by the thread that was interrupted nor by others."""
+    mesh, within, begun = shapes.icosphere(2), local._within, []
+
+    def interrupted_once(work, part, radius):
+        begun.append(part.start)
+        if len(begun) == 1:
+            raise KeyboardInterrupt
+        time.sleep(0.01)
+        return within(work, part, radius)
+
+    monkeypatch.setattr(local, "_within", interrupted_once)
+    monkeypatch.setattr(local, "_CHUNK", 1)
+    monkeypatch.setattr(local, "n_threads", lambda: 2)
+    with pytest.raises(KeyboardInterrupt):
+        distances_within(mesh, 0.5)
+    assert len(begun) < 10

@@ -329,7 +329,11 @@ def _in_chunks(
             except IndexError:  # another thread took the last one
                 return
             stop = min(start + _CHUNK, len(sources))
-            parts[i] = search(workspace, _Chunk(start, stop, sources[start:stop]))
+            try:
+                parts[i] = search(workspace, _Chunk(start, stop, sources[start:stop]))
+            except BaseException:
+                waiting.clear()  # for a Ctrl-C, other threads end with the chunk at hand
+                raise
 
     side_by_side(run, [_Workspace(edges, position) for _ in range(min(n_threads(), len(starts)))])
     return parts
