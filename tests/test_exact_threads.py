@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from conftest import perturbed
@@ -11,9 +13,10 @@ from test_unfolding import moebius_strip
 
 from heat_igl import Mesh, SurfacePoints, isolines, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
+from heat_igl.kernels import window_pairs
 from heat_igl.sources import source_set
 from heat_igl.unfolding import window_search
-from heat_igl.unfolding.exact import ExactSolution, ExactSurface
+from heat_igl.unfolding.exact import ExactSurface
 
 
 def pinched() -> Mesh:
@@ -47,8 +50,9 @@ def shared_from_the_start(monkeypatch):
     monkeypatch.setattr(window_search, "_ROUND", 0.3)
 
 
-def require_same(one: ExactSolution, two: ExactSolution) -> None:
-    np.testing.assert_array_equal(two.distance, one.distance)
+def both_ways(surface: ExactSurface, *sources: np.ndarray, **keywords: object) -> tuple[np.ndarray, np.ndarray]:
+    """Distances by one thread and by two."""
+    return surface.solve(*sources, **keywords).distance, surface.solve(*sources, threads=2, **keywords).distance
 
 
 @pytest.mark.parametrize("name", ZOO)
@@ -56,14 +60,13 @@ def test_two_threads_find_what_one_finds(name):
     mesh = ZOO[name]()
     surface, rng = ExactSurface(intrinsic_triangulation(mesh)), np.random.default_rng(0)
     for source in rng.choice(np.unique(mesh.F), 5):
-        sources = np.array([source])
-        require_same(surface.solve(sources), surface.solve(sources, threads=2))
+        np.testing.assert_array_equal(*both_ways(surface, np.array([source])))
     several, offsets = rng.choice(np.unique(mesh.F), 7, replace=False), rng.random(7) * mesh.edge_lengths.mean()
-    require_same(surface.solve(several, offsets), surface.solve(several, offsets, threads=2))
+    np.testing.assert_array_equal(*both_ways(surface, several, offsets))
     cutoff = float(np.median(surface.solve(several[:1]).distance))
-    require_same(surface.solve(several, cutoff=cutoff), surface.solve(several, cutoff=cutoff, threads=2))
+    np.testing.assert_array_equal(*both_ways(surface, several, cutoff=cutoff))
     points = SurfacePoints(rng.integers(mesh.n_faces, size=3), rng.dirichlet(np.ones(3), 3))
-    require_same(surface.solve(points=points), surface.solve(points=points, threads=2))
+    np.testing.assert_array_equal(*both_ways(surface, points=points))
 
 
 def test_curves():
@@ -71,4 +74,21 @@ def test_curves():
         curve = isolines(mesh, mesh.V[:, 0] + 0.3 * mesh.V[:, 1], 0.4)[0][0]
         segments = source_set(curve, mesh.n_vertices, mesh.F).segments
         surface = ExactSurface(intrinsic_triangulation(mesh))
-        require_same(surface.solve(segments=segments), surface.solve(segments=segments, threads=2))
+        np.testing.assert_array_equal(*both_ways(surface, segments=segments))
+
+
+def test_the_second_thread_has_a_share(monkeypatch):
+    """Without this, equal distances could be those of one thread that did all."""
+    shares = []
+
+    def assist(front, cutoff, statistics):
+        done = window_pairs.assist(front, cutoff, statistics)
+        shares.append(int(statistics[1]))
+        return done
+
+    spied = SimpleNamespace(pair=window_pairs.pair, part=window_pairs.part, assist=assist)
+    monkeypatch.setattr(window_search, "window_pairs", spied)
+    surface = ExactSurface(intrinsic_triangulation(ZOO["rough sphere"]()))
+    found = surface.solve(np.array([0]), threads=2)
+    assert len(shares) == 1
+    assert 0.1 * found.n_windows < shares[0] < 0.9 * found.n_windows
