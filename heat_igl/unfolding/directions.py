@@ -21,6 +21,8 @@ __all__ = ["PathAngles", "PathDirections", "in_circle"]
 _WHOLE = 2 * np.pi
 # How far a second point in a face is from the first, in lengths of the shortest side.
 _ASIDE = 1e-3
+# In so many directions.
+_ROUND = 8
 
 
 def in_circle(angles: FloatArray) -> FloatArray:
@@ -103,7 +105,7 @@ class PathDirections:
         back[row] = _polar(self._begin[row], walk["angle"][row], scale[row], on_boundary[row])
         if points is not None:
             inside = row[root[row] >= n]
-            departure[inside] += self._turns(points)[root[inside] - n]
+            departure[inside] += self._turns(points)[0][root[inside] - n]
         found = _handed_on(row, root, departure, back, np.where(on_boundary, scale, 1.0))
         return PathAngles(*found[:, self._number])
 
@@ -146,8 +148,8 @@ class PathDirections:
 
         A point on a side is also in the triangle beyond.
         """
-        home, inside = self._triangulation.locate(points.faces, points.barycentric)
-        turn = self._turns(points)[point]
+        turns, home, inside = self._turns(points)
+        turn = turns[point]
         beyond = np.flatnonzero(home[point] != faces)
         sides = 3 * home[point[beyond], None] + np.arange(3)
         leads_there = self._triangulation.twin[sides] // 3 == faces[beyond, None]
@@ -161,27 +163,30 @@ class PathDirections:
         angle, first = self.angles.corners.ravel(), half_edge - half_edge % 3
         return np.choose(half_edge % 3, [np.pi - angle[first + 1], angle[first] - np.pi, np.zeros(len(half_edge))])
 
-    def _turns(self, points: SurfacePoints) -> FloatArray:
-        """The angle (p,) of corners 0 and 1 of the triangles that hold points, in the given faces.
+    def _turns(self, points: SurfacePoints) -> tuple[FloatArray, IntArray, FloatArray]:
+        """The angle (p,) of corners 0 and 1 of the triangles that hold points, in the given faces; and the places.
 
         Flips have turned the triangles. A second point nearby, in the given face and in the triangle, shows how far.
+        The places are the triangles (p,) and the barycentric coordinates (p, 3).
         """
-        given, triangulation = self._faces, self._triangulation
-        place, l = lay_out(given.l[points.faces]), given.l[points.faces]  # noqa: E741
-        home, inside = triangulation.locate(points.faces, points.barycentric)
-        at = np.einsum("pc,pcx->px", inside, lay_out(triangulation.l[home]))
-        best, turn = np.full(len(points), -np.inf), np.zeros(len(points))
-        for angle in np.arange(8) * (_WHOLE / 8) + 0.1:
-            step = _ASIDE * l.min(axis=1)[:, None] * [np.cos(angle), np.sin(angle)]
-            weights = points.barycentric + _barycentric_step(place, step)
-            faces, there = triangulation.locate(points.faces, np.maximum(weights, 0.0))
-            # By how much both points are inside.
-            margin = np.where(faces == home, np.minimum(weights.min(axis=1), there.min(axis=1)), -np.inf)
-            dx, dy = (np.einsum("pc,pcx->px", there, lay_out(triangulation.l[home])) - at).T
-            better = margin > best
-            best[better] = margin[better]
-            turn[better] = (angle - np.arctan2(dy, dx))[better]
-        return turn
+        given, triangulation, p = self._faces, self._triangulation, len(points)
+        angle = np.arange(_ROUND) * (_WHOLE / _ROUND) + 0.1
+        length = _ASIDE * given.l[points.faces].min(axis=1)
+        step = length[:, None] * np.cos(angle), length[:, None] * np.sin(angle)
+        # All in one go, as flips are followed one round after another.
+        beside = points.barycentric[:, None] + _barycentric_steps(lay_out(given.l[points.faces]), *step)
+        faces, barycentric = triangulation.locate(
+            np.append(points.faces, np.repeat(points.faces, _ROUND)),
+            np.concatenate([points.barycentric, np.maximum(beside, 0.0).reshape(-1, 3)]),
+        )
+        home, inside = faces[:p], barycentric[:p]
+        there = barycentric[p:].reshape(p, _ROUND, 3)
+        # By how much both points are inside.
+        margin = np.minimum(beside.min(axis=2), there.min(axis=2))
+        best = np.where(faces[p:].reshape(p, _ROUND) == home[:, None], margin, -np.inf).argmax(axis=1)
+        ahead = there[np.arange(p), best] - inside
+        dx, dy = np.einsum("pc,pcx->xp", ahead, lay_out(triangulation.l[home]))
+        return angle[best] - np.arctan2(dy, dx), home, inside
 
 
 def _polar(begin: FloatArray, angles: FloatArray, scale: FloatArray, on_boundary: BoolArray) -> FloatArray:
@@ -225,10 +230,9 @@ def _handed_on(row: IntArray, root: IntArray, departure: FloatArray, back: Float
     return found
 
 
-def _barycentric_step(corners: FloatArray, step: FloatArray) -> FloatArray:
-    """How barycentric coordinates (k, 3) change over a step (k, 2) in triangles (k, 3, 2)."""
-    ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    b = (step[:, 0] * ac[:, 1] - step[:, 1] * ac[:, 0]) / area
-    c = (ab[:, 0] * step[:, 1] - ab[:, 1] * step[:, 0]) / area
-    return np.stack([-b - c, b, c], axis=1)
+def _barycentric_steps(corners: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """How barycentric coordinates (k, s, 3) change over steps (x, y), (k, s) each, in triangles (k, 3, 2)."""
+    (ab_x, ab_y), (ac_x, ac_y) = ((corners[:, c] - corners[:, 0]).T[:, :, None] for c in (1, 2))
+    area = ab_x * ac_y - ab_y * ac_x
+    b, c = (x * ac_y - y * ac_x) / area, (ab_x * y - ab_y * x) / area
+    return np.stack([-b - c, b, c], axis=2)
