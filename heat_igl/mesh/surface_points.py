@@ -151,6 +151,14 @@ def unchecked_curve(faces: IntArray, start: FloatArray, end: FloatArray, is_clos
     return curve
 
 
+def unchecked_points(faces: IntArray, barycentric: FloatArray) -> SurfacePoints:
+    """`SurfacePoints` of int64 faces (k,), and float64 coordinates (k, 3) that are known to be right."""
+    points = object.__new__(SurfacePoints)
+    object.__setattr__(points, "faces", faces)
+    object.__setattr__(points, "barycentric", barycentric)
+    return points
+
+
 # A curve, or curves in lists of any depth.
 NestedCurves = SurfaceCurve | Sequence["NestedCurves"]
 

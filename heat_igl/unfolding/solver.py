@@ -12,6 +12,7 @@ import numpy as np
 
 from heat_igl.errors import is_number, shown
 from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Surface, unfolding_surface
 from heat_igl.runtime import both, n_threads
 from heat_igl.sources import NEAR_RADIUS, NearField, SourcePoints, SourceSet
@@ -205,14 +206,19 @@ class UnfoldingSolver:
 
     def _places(self, sources: SourceSet, origin: IntArray) -> SurfacePoints:
         """Sources (n,), counted vertices first; a corner of face 0 where there is none."""
-        F, points, vertices = self._given_faces, self._points(sources), sources.vertices
-        corner_at = np.zeros(self._domain.components.size, np.int64)
-        corner_at[F.ravel()[::-1]] = np.arange(F.size)[::-1]
-        corner = np.append(corner_at[vertices], 0)
+        points = self._points(sources)
+        corner = np.append(self._corner_at[sources.vertices], 0)
         # After the vertices, points and nothing: the last one is nothing for an origin of -1.
         faces = np.concatenate([corner[:-1] // 3, points.faces, corner[-1:] // 3])
         barycentric = np.concatenate([np.eye(3)[corner[:-1] % 3], points.barycentric, np.eye(3)[:1]])
-        return SurfacePoints(faces[origin], barycentric[origin])
+        return unchecked_points(faces[origin], barycentric[origin])
+
+    @cached_property
+    def _corner_at(self) -> IntArray:
+        """The first corner (n,) of the given faces at each vertex."""
+        F, corner_at = self._given_faces, np.zeros(self._domain.components.size, np.int64)
+        corner_at[F.ravel()[::-1]] = np.arange(F.size)[::-1]
+        return corner_at
 
     def _distance(self, sources: SourceSet, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
         return self._measured(sources, u, labels)
