@@ -1,6 +1,7 @@
 """Errors and warnings, one class per remedy.
 
-`positive`, `require_choice`, `real_numbers` and `as_array` check single arguments for all rooms, in the same words.
+`positive`, `truth`, `require_choice`, `real_numbers` and `as_array` check single arguments for all rooms, in the same
+words.
 """
 
 from __future__ import annotations
@@ -187,6 +188,13 @@ def positive(name: str, value: object, *, infinite: bool = False) -> float:
     return number
 
 
+def truth(name: str, value: object) -> bool:
+    """`value` as a bool; a ValueError that calls it `name` if it is neither a truth value nor 0 or 1."""
+    if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
+        return bool(value)
+    raise ValueError(f"{name} must be True or False, not {shown(value)}")
+
+
 def require_choice(name: str, value: object, choices: Iterable[str | None]) -> None:
     """Raise a ValueError that calls `value` `name` and lists the `choices` if it is none of them."""
     known = list(choices)
@@ -206,15 +214,20 @@ def real_numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """`values` as a new float64 array; a ValueError that calls them `name` if they are no real numbers."""
     refuse_masked(name, values)
     try:
-        if not np.iscomplexobj(values):
+        # numpy would take dates as numbers of days, and read texts.
+        if np.asarray(values).dtype.kind not in "cmMSU":
             return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} must be real numbers in an array, not {shown(values)}") from None
-    raise ValueError(f"{name} must be real numbers, not complex")
+    raise ValueError(f"{name} must be real numbers, not {shown(np.asarray(values))}")
 
 
 def as_array(name: str, values: npt.ArrayLike | None, error: type[ValueError] = ValueError) -> npt.NDArray[Any]:
-    """`values` as an array of any type; an `error` that calls them `name` if the rows differ in length."""
+    """`values` as an array of any type.
+
+    An `error` that calls them `name` if the rows differ in length, or if entries are masked.
+    """
+    refuse_masked(name, values, error)
     try:
         return np.asarray(values)
     except ValueError:

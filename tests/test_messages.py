@@ -52,6 +52,44 @@ def test_errors_name_the_argument_of_the_offender(ask, message):
         ask()
 
 
+HIDDEN = np.ma.masked_array([1, 2], mask=[True, False])
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda: heat_igl.geodesic_path(MESH, [0, 1], closed="no"), "closed must be True or False, not 'no'"),
+        (lambda: heat_igl.edge_curve(MESH, [0, 42], closed=np.ones(2)), "closed must be True or False, not an array"),
+        (lambda: heat_igl.curve_on(MESH, MESH.V[:2], closed=None), "closed must be True or False, not None"),
+        (lambda: SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]], 2), "is_closed must be True or False, not 2"),
+        (lambda: SOLVER.distances([0], progress="bar"), "progress must be True or False, not 'bar'"),
+        (lambda: geodesic_distance(MESH, HIDDEN), "sources has 1 masked entries: fill or remove them"),
+        (lambda: SurfacePoints(HIDDEN, np.eye(3)[:2]), "faces has 1 masked entries"),
+        (lambda: SurfacePoints([0], np.ma.masked_less([[1.0, 0, 0]], 1)), "barycentric has 2 masked entries"),
+        (lambda: SOLVER.distance(heat_igl.OffsetSources([1, 2], HIDDEN)), "offsets has 1 masked entries"),
+        (lambda: heat_igl.exp_map(MESH, 0, np.empty((0, 2))), r"vectors must be one vector or more.* \(0, 2\)"),
+        (lambda: heat_igl.TangentFrames.from_angles("1"), "angles must be real numbers, not '?"),
+        (lambda: heat_igl.TangentFrames.from_angles([1, 2], [1, 2, 3]), r"lengths must be one number or \(2,\)"),
+        (lambda: heat_igl.TangentFrames.from_angles(np.datetime64("2020")), "angles must be real numbers"),
+    ],
+)
+def test_arguments_that_numpy_would_take_for_something_else_are_refused(ask, message):
+    with pytest.raises(ValueError, match=f"^{message}"):
+        ask()
+
+
+def test_truth_values_may_be_those_of_numpy_and_integers():
+    for closed in (np.True_, 1):
+        assert heat_igl.curve_on(MESH, MESH.V[:3], closed=closed, tolerance=1.0).is_closed is True
+
+
+def test_a_number_of_neighbours_that_no_memory_holds_is_named():
+    for k in (10**12, 2**70):
+        with pytest.raises(MemoryError, match=f"^k = {k} for each of 1 vertices does not fit into memory"):
+            heat_igl.nearest_vertices(MESH, k, sources=0)
+    assert heat_igl.nearest_vertices(MESH, 1000, sources=0)[0].shape == (1, 1000)
+
+
 @pytest.mark.parametrize("positions", [[0.0, 0.0, 1.0], [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]])
 def test_positions_as_sources_are_told_of_closest_points(positions):
     for ask in (SOLVER.distance, lambda sources: geodesic_distance(MESH, sources)):

@@ -213,7 +213,7 @@ def test_bad_arguments_are_named():
         solver.transport([0, 1], np.ones((3, 2)))
     with pytest.raises(ValueError, match=r"values\[1\] = \[nan\] is not finite"):
         solver.extend([0, 1], [1.0, np.nan])
-    with pytest.raises(ValueError, match=r"values must have shape \(1, 1\)"):
+    with pytest.raises(ValueError, match="values must be one number for each of the 1 sources"):
         solver.extend(0, [1.0, 2.0])
     with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 99 is no vertex"):
         solver.transport(99, [1, 0])

@@ -9,7 +9,7 @@ import numpy as np
 from heat_igl.curves.places import Waypoints, corners, mixed_places
 from heat_igl.curves.routes import Router
 from heat_igl.curves.shortening import Course, Shortened, Shortener, as_curve, course_of
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import MeshError, SourceError, truth
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.typing import FloatArray, IntArray
 
@@ -163,7 +163,7 @@ class GeodesicPathSolver:
     def path(self, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
         """The geodesic through waypoints, or the closed one of their loop; see `geodesic_path`."""
         faces, barycentric = mixed_places("waypoints", self._mesh, waypoints, self._corner_at)
-        needed = 3 if closed else 2
+        needed = 3 if truth("closed", closed) else 2
         if len(faces) < needed:
             raise SourceError(
                 f"waypoints must be {needed} places or more for a {'loop' if closed else 'path'}, not {len(faces)}"

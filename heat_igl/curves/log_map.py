@@ -32,14 +32,14 @@ def log_map(
     ----------
     mesh : mesh, HeatMethodSolver or VectorHeatSolver
         Whatever `as_mesh` takes, with triangles that are a manifold and oriented alike; or a solver on such a mesh.
-        From the second source on, one with ``refine="unfold"`` is quicker on more than 10 000 vertices.
+        A solver keeps the tables that a mesh needs for each source.
     source : int or SurfacePoints
         A vertex, or one point in a face.
     method : {"unfold", "exact", "vector-heat"}
         "unfold" takes exact windows on up to 200 000 vertices, and follows paths through strips of triangles beyond,
         which is faster there. "exact" takes windows on all meshes. "vector-heat" is `VectorHeatSolver.log_map`, from
         vertices only. A solver has a method of its own, and this is not read: `HeatMethodSolver` that of its `refine`.
-        With "unfold" it takes windows on up to 10 000 vertices.
+        With "unfold" it takes windows on up to 50 000 vertices.
 
     Returns
     -------

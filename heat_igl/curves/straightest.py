@@ -171,6 +171,8 @@ class Tracer:
         begin = self.starts("source", source)
         array = real_numbers("vectors", vectors)
         k = len(array) if array.ndim == 2 else 1
+        if not k:
+            raise ValueError(f"vectors must be one vector or more, but it has shape {array.shape}")
         if len(begin.faces) == 1:
             begin = begin.repeated(k)
         elif len(begin.faces) != k:

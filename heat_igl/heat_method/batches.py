@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence, Sized
 import numpy as np
 import numpy.typing as npt
 
-from heat_igl.errors import AccuracyWarning, SourceError, positive, shown
+from heat_igl.errors import AccuracyWarning, SourceError, positive, shown, truth
 from heat_igl.runtime import (
     block_size,
     float_type,
@@ -117,7 +117,7 @@ class BatchedSolver(ABC):
         elif isinstance(out, np.ndarray) and not out.flags.writeable:
             raise ValueError("out is read-only: open a memmap with mode='r+'")
         write = row_writer(out)
-        with progress_bar("distances", len(chosen), progress) as advance:
+        with progress_bar("distances", len(chosen), truth("progress", progress)) as advance:
             for rows in self._blocks(chosen, len(chosen)):
                 write(cut_off(rows, beyond).astype(out.dtype, copy=False))
                 advance(len(rows))

@@ -252,7 +252,7 @@ class HeatMethodSolver(PreparedSolver):
         tolerance : float, optional
             For ``refine="unfold"``, see `Refinement.unfold`. With the default, departures are wrong by 0.1 to 0.2
             degrees in the mean, and by less than 0.02 degrees in the median; with 1e-6 by half of that, and hardly at
-            all away from the cut locus. With 0, and with less than the default on up to 10 000 vertices, windows find
+            all away from the cut locus. With 0, and with less than the default on up to 50 000 vertices, windows find
             the paths, which are exact.
 
         Returns

@@ -189,8 +189,12 @@ class VectorHeatSolver:
         The ratio u / phi of two heat flows, that of the values and that of ones (equation 5 of the paper).
         """
         vertices = self._vertices(sources)
-        given = checked_vectors("values", real_numbers("values", values).reshape(-1, 1), len(vertices), 1)[:, 0]
-        return self._transport.extend(vertices, given)
+        given = np.atleast_1d(real_numbers("values", values))
+        if given.shape != (len(vertices),):
+            raise ValueError(
+                f"values must be one number for each of the {len(vertices)} sources, but the shape is {given.shape}"
+            )
+        return self._transport.extend(vertices, checked_vectors("values", given[:, None], len(vertices), 1)[:, 0])
 
     def transport(self, sources: Sources, vectors: ArrayLike) -> FloatArray:
         """Tangent vectors at vertices, transported to all along shortest geodesics.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import igl
 import numpy as np
 
-from heat_igl.errors import MeshError, as_array
+from heat_igl.errors import MeshError, as_array, real_numbers
 from heat_igl.intrinsic.gluing import intrinsic_triangulation
 from heat_igl.intrinsic.polar_angles import PolarAngles, polar_angles
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
@@ -135,7 +135,9 @@ class TangentFrames:
     @staticmethod
     def from_angles(angles: ArrayLike, lengths: ArrayLike = 1.0) -> FloatArray:
         """Tangent vectors (k, 2) of the given angles (k,) and lengths."""
-        angle, length = np.broadcast_arrays(np.asarray(angles, np.float64), np.asarray(lengths, np.float64))
+        angle, length = real_numbers("angles", angles), real_numbers("lengths", lengths)
+        if length.shape not in ((), angle.shape) and angle.shape:
+            raise ValueError(f"lengths must be one number or {angle.shape} as angles, not of shape {length.shape}")
         return np.stack([length * np.cos(angle), length * np.sin(angle)], axis=-1)
 
     def corner_towards(self, vertices: IntArray, angles: FloatArray) -> tuple[IntArray, FloatArray]:

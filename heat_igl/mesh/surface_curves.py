@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import SourceError, as_array, positive
+from heat_igl.errors import SourceError, as_array, positive, truth
 from heat_igl.mesh.grouping import Groups, enumerate_runs, group_by_label
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
@@ -65,7 +65,7 @@ def curve_on(
         If the polyline is farther from the surface than `tolerance`, or the closest points jump from one part of it to
         another; if there are fewer than two different corners, or a position is not finite.
     ValueError
-        If `tolerance` is not a positive number.
+        If `tolerance` is not a positive number, or `closed` is no truth value.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def curve_on(
     >>> round(float(curve.lengths(mesh).sum()), 6)
     0.5
     """
-    mesh = as_simplices(mesh)
+    mesh, closed = as_simplices(mesh), truth("closed", closed)
     corners = checked_points(positions)
     if len(corners) < 2:
         raise SourceError(f"positions must be two corners of a curve or more, not {len(corners)}")
@@ -122,7 +122,7 @@ def edge_curve(mesh: MeshLike, vertices: ArrayLike, *, closed: bool = False) -> 
     >>> heat_igl.geodesic_distance(mesh, row)[6:].round(6).tolist()
     [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
     """
-    mesh = as_simplices(mesh)
+    mesh, closed = as_simplices(mesh), truth("closed", closed)
     require_triangles(mesh)
     path = np.atleast_1d(as_array("vertices", vertices, SourceError))
     if path.ndim != 1 or path.dtype.kind not in "iu" or len(path) < 2:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import SourceError, as_array
+from heat_igl.errors import SourceError, as_array, refuse_masked, truth
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -126,6 +126,7 @@ class SurfaceCurve:
         object.__setattr__(self, "faces", faces)
         object.__setattr__(self, "start", _coordinates("start", self.start, len(faces)))
         object.__setattr__(self, "end", _coordinates("end", self.end, len(faces)))
+        object.__setattr__(self, "is_closed", truth("is_closed", self.is_closed))
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -198,6 +199,7 @@ def _face_indices(name: str, faces: ArrayLike) -> IntArray:
 
 
 def _coordinates(name: str, barycentric: ArrayLike, k: int) -> FloatArray:
+    refuse_masked(name, barycentric, SourceError)
     try:
         array = np.atleast_2d(np.array(barycentric, dtype=np.float64))
     except (TypeError, ValueError):

@@ -11,7 +11,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, refuse_masked
 from heat_igl.mesh import SurfaceCurve, SurfacePoints
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
@@ -208,6 +208,7 @@ def named_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
     """The vertices that `sources` names, in the order in which they are named; arguments as for `vertex_sources`."""
     if isinstance(sources, _PLACES):
         raise SourceError(f"{name} must be {_ACCEPTED} here, not {type(sources).__name__}")
+    refuse_masked(name, sources, SourceError)
     try:
         array = np.atleast_1d(np.asarray(sources))
     except ValueError:
@@ -246,6 +247,7 @@ def _first_of_wrong_type(array: AnyArray) -> str:
 
 
 def _checked_offsets(offsets: ArrayLike) -> FloatArray:
+    refuse_masked("offsets", offsets, SourceError)
     try:
         array = np.array(offsets, dtype=np.float64)
     except (TypeError, ValueError):

@@ -24,6 +24,8 @@ __all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distan
 _CHUNK = 64
 # Distances that a thread makes room for at first.
 _ROOM = 2**16
+# Where more are asked for than the mesh has vertices, the most entries of the result.
+_MOST_PADDED = 2**28
 _NO_VERTICES = np.empty(0, np.int32)
 
 
@@ -136,6 +138,8 @@ def nearest_vertices(mesh: MeshLike, k: int, sources: Sources | None = None) -> 
     ------
     ValueError
         If `k` is not a positive integer.
+    MemoryError
+        If s rows of k do not fit into memory.
     MeshError
         If the mesh cannot be used, or is tetrahedral.
     SourceError
@@ -155,15 +159,28 @@ def nearest_vertices(mesh: MeshLike, k: int, sources: Sources | None = None) -> 
     edges = from_mesh(triangles, int(chosen[0]))
     # More than all vertices cannot be found.
     wanted = min(int(k), triangles.n_vertices)
+    indices, distances = _unfilled(len(chosen), int(k), triangles.n_vertices)
     number = edges.number[chosen]
     order = np.argsort(number, kind="stable")
     parts = _in_chunks(edges, number[order], lambda work, part: _nearest(work, part, wanted))
-    indices = np.full((len(chosen), int(k)), -1, np.int64)
-    distances = np.full((len(chosen), int(k)), np.inf)
     i, j = np.nonzero(np.arange(int(k)) < np.concatenate([part.counts for part in parts])[:, None])
     indices[order[i], j] = np.concatenate([part.vertex for part in parts])
     distances[order[i], j] = edges.unscaled(np.concatenate([part.distance for part in parts]))
     return indices, distances
+
+
+def _unfilled(s: int, k: int, n: int) -> tuple[IntArray, FloatArray]:
+    """Indices and distances (s, k) of nothing."""
+    # Before the arrays are filled, a system may give away more memory than it has.
+    if k <= n or s * k <= _MOST_PADDED:
+        try:
+            return np.full((s, k), -1, np.int64), np.full((s, k), np.inf)
+        except (MemoryError, ValueError):
+            pass
+    raise MemoryError(
+        f"k = {k} for each of {s} vertices does not fit into memory: take a smaller k (the mesh has {n} vertices) or "
+        "fewer sources"
+    )
 
 
 def pair_distances(mesh: MeshLike, pairs: ArrayLike) -> FloatArray:

@@ -38,8 +38,8 @@ FEW = 1000
 # 0.46 % on a coarse cow with 0.14, which is too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
 _ROUGH = {"sweep": 0.25, "unfold": 0.1}
 # Up to so many vertices directions are found by windows, if the tolerance is smaller than the default. Walks of the
-# tolerance 1e-6 take 0.8 times as long there, and at some vertices depart to the other side of a hill.
-_FEW_FOR_DIRECTIONS = 10_000
+# tolerance 1e-6 take 0.7 to 0.9 times as long there, and at some vertices depart to the other side of a hill.
+_FEW_FOR_DIRECTIONS = 50_000
 # With this share of flat vertices, and holes that keep walks from proving flatness, windows are as fast as walks.
 _FLAT = 0.5
 # Sweeps from several sources start with the exact distance up to so many mean edge lengths: next to a border of cells
