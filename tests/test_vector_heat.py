@@ -244,8 +244,9 @@ def test_a_large_sphere_is_finite_and_right():
     assert np.isfinite(found).all()
     near = mesh.V @ p > -0.9
     error = angle_between(found, frames.from_world(sphere_transport(p, mesh.V, w)))[near]
-    assert error.mean() < np.radians(0.1)
-    assert error.max() < np.radians(1)
+    # For time steps of h^2 the error grows slowly with the number of vertices (docs/directions.md).
+    assert error.mean() < np.radians(0.13)
+    assert error.max() < np.radians(1.3)
 
 
 @pytest.mark.parametrize("refine", ["unfold", "exact"])
