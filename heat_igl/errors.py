@@ -51,7 +51,7 @@ class SourceError(ValueError):
     ... except heat_igl.SourceError as error:
     ...     print(error)
     ...
-    sources[0] = 9 is no vertex (1 of 1 are not): the mesh has 9 vertices, so indices run from 0 to 8
+    sources[0] = 9 is no vertex: the mesh has 9 vertices, so indices run from 0 to 8
     """
 
 

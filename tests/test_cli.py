@@ -118,7 +118,11 @@ def test_paths_and_traces_are_those_of_the_library(
     }
     for (name, *arguments), curve in expected.items():
         assert cli.run([name, str(sphere), *arguments, "--output=curve.obj"]) == 0
-        assert f"{curve.lengths(mesh).sum():.6g}" in capsys.readouterr().out
+        printed = capsys.readouterr().out
+        assert f"{curve.lengths(mesh).sum():.6g}" in printed
+        # The position is told how far it is from the surface.
+        gap = heat_igl.closest_points(mesh, [0.3, 2, 0.1]).gap[0]
+        assert (f"off the surface  {gap:.6g}" in printed) == ("0.3,2,0.1" in arguments)
         written = [line.split()[1:] for line in Path("curve.obj").read_text().splitlines() if line.startswith("v ")]
         np.testing.assert_allclose(np.array(written, float), curve.positions(mesh), atol=1e-6)
 
@@ -163,7 +167,7 @@ def test_an_output_directory_that_does_not_exist(sphere: Path) -> None:
         (
             ["trace", "--from=0", "--direction=1,0,0", "--length=1e12", "--output=p.obj"],
             1,
-            ("length 1e+12", "unit of the mesh"),
+            ("length is too long: 1e+12", "unit of the mesh"),
         ),
         (["distance", "--at=1e300,0,0"], 1, ("positions[0]", "too far away")),
         (["distance", "--source=0", "--t=1e300"], 1, ("t = 1e+300 is too large", "t is a squared length")),

@@ -79,12 +79,16 @@ def test_files_without_curves(tmp_path: Path, text: str, match: str) -> None:
     [
         (["signed", "sphere.ply", "--curves=none.obj"], "none.obj"),
         (["signed", "sphere.ply", "--curves=sphere.ply"], "holds no curve"),
+        (["signed", "sphere.ply", "--curves=far.obj"], "far.obj, polyline 1: the polyline leaves the surface by"),
         (["cut", "sphere.ply", "--curves=circle.obj", "--output=cut.png"], "--output cut.png: meshes go to"),
     ],
 )
 def test_failures_are_one_line(
     folder: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
 ) -> None:
+    circle = (folder / "circle.obj").read_text()
+    n = circle.count("v ")
+    (folder / "far.obj").write_text(f"{circle}v 9 0 0\nv 9 1 0\nl {n + 1} {n + 2}\n")
     before = sorted(folder.iterdir())
     assert cli.run(arguments) == 1
     message = capsys.readouterr().err

@@ -38,7 +38,7 @@ def test_accepted_forms(sources, expected):
 @pytest.mark.parametrize(
     ("sources", "message"),
     [
-        (5, r"sources\[0\] = 5 is no vertex \(1 of 1 are not\).* from 0 to 4"),
+        (5, r"sources\[0\] = 5 is no vertex: the mesh has 5 vertices.* from 0 to 4"),
         ([0, -1, 9], r"sources\[1\] = -1 is no vertex \(2 of 3"),
         ([], "sources is empty"),
         (np.zeros(5, bool), "selects no vertex"),

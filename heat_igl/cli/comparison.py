@@ -18,7 +18,7 @@ from heat_igl.cli.output import check_json, check_outputs, print_json, print_row
 from heat_igl.drawing.output import Picture
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.reference.guarded import TIMEOUT
-from heat_igl.validation import METHODS, draw_sources
+from heat_igl.validation import METHODS, ValidationRow, draw_sources
 
 __all__ = ["info", "validate"]
 
@@ -72,6 +72,15 @@ def validate(
         print_report(report)
     exceeding = report.exceeding(fail_above) if fail_above is not None else ()
     if exceeding:
-        names = ", ".join(row.method for row in exceeding)
-        say(f"no mean error of at most {fail_above:g} % for {names}")
+        found = ", ".join(f"{row.method} {_verdict(row)}" for row in exceeding)
+        say(f"the mean error is not at most {fail_above:g} %: {found}")
         raise typer.Exit(1)
+
+
+def _verdict(row: ValidationRow) -> str:
+    """Why a method does not have the error that is asked for."""
+    if row.errors is None:
+        return "failed" if row.failure else "has no reference"
+    if row.errors.n_wrong_reach:
+        return f"reaches {row.errors.n_wrong_reach} other vertices than the reference"
+    return f"{100 * row.errors.mean:.3g} %"

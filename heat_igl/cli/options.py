@@ -27,7 +27,7 @@ MeshOrCloudArgument = Annotated[
 ]
 JsonOption = Annotated[
     Path | None,
-    typer.Option("--json", metavar="FILE", help="JSON file for what is printed; - prints JSON in place of it."),
+    typer.Option("--json", metavar="FILE", help="JSON file for the results; with - they are printed as JSON."),
 ]
 
 

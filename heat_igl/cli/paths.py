@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -49,8 +50,8 @@ def path(
             else "name two waypoints or more, such as 12 900, or one vertex with --from and one with --to, not both"
         )
     if waypoints:
-        places = [_place(loaded, text) for text in waypoints]
-        _write(loaded, heat_igl.geodesic_path(loaded, places, closed), output, json_file)
+        places, gaps = zip(*(_place(loaded, text) for text in waypoints), strict=True)
+        _write(loaded, heat_igl.geodesic_path(loaded, list(places), closed), output, json_file, gaps)
         return
     ends = []
     for option, vertex in (("--from", start), ("--to", end)):
@@ -58,7 +59,7 @@ def path(
             raise SourceError(f"{option} {vertex} is no vertex: the mesh has {loaded.n_vertices}, counted from 0")
         ends.append(vertex)
     found = heat_igl.shortest_paths(loaded, None, *ends)
-    _write(loaded, found[0], output, json_file)
+    _write(loaded, found[0], output, json_file, ())
 
 
 def trace(
@@ -73,23 +74,30 @@ def trace(
     loaded = read_mesh(mesh)
     check_curves(output)
     check_json(json_file)
-    place = _place(loaded, start)
+    place, gap = _place(loaded, start)
     towards = position(direction, "--direction")
-    _write(loaded, heat_igl.trace_geodesic(loaded, place, towards, length), output, json_file)
+    _write(loaded, heat_igl.trace_geodesic(loaded, place, towards, length), output, json_file, [gap])
 
 
-def _place(mesh: Mesh, text: str) -> int | SurfacePoints:
-    """The vertex of this number, or the closest point of the surface to this position."""
+def _place(mesh: Mesh, text: str) -> tuple[int | SurfacePoints, float | None]:
+    """The vertex of this number, or the closest point of the surface to this position and the distance between them."""
     if "," in text:
-        return closest_points(mesh, [position(text, "position")]).points
+        found = closest_points(mesh, [position(text, "position")])
+        return found.points, float(found.gap[0])
     try:
-        return int(text)
+        return int(text), None
     except ValueError:
         raise SourceError(f"{text!r} is no place: a vertex such as 12, or a position such as 0.5,0,1.25") from None
 
 
-def _write(mesh: Mesh, curve: SurfaceCurve, output: Path, json_file: Path | None) -> None:
+def _write(
+    mesh: Mesh, curve: SurfaceCurve, output: Path, json_file: Path | None, gaps: Sequence[float | None]
+) -> None:
+    """Write a curve, and print the length, and how far positions were off the surface."""
     heat_igl.write_curves(output, mesh, [curve])
     length, segments = float(curve.lengths(mesh).sum()), len(curve)
     rows: list[Row] = [("length", f"{length:.6g}", length), ("segments", str(segments), segments)]
+    given = [gap for gap in gaps if gap is not None]
+    if given:
+        rows.append(("off the surface", ", ".join(f"{gap:.6g}" for gap in given), given))
     print_rows([*rows, ("wrote", str(output))], json_file)

@@ -11,7 +11,7 @@ import typer
 import heat_igl
 from heat_igl.cli.options import JsonOption, MeshArgument, choice, positive
 from heat_igl.cli.output import Row, check_json, check_outputs, check_writable, print_rows, write_distance
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat_method import Level, Refine, SignedHeatSolver
 from heat_igl.io import MESH_SUFFIXES, read_mesh, read_polylines, write_mesh
 from heat_igl.mesh import Mesh, SurfaceCurve, curve_on
@@ -96,4 +96,10 @@ def cut(
 
 def projected(mesh: Mesh, path: Path) -> list[SurfaceCurve]:
     """The polylines of a file as curves on the mesh."""
-    return [curve_on(mesh, line.positions, closed=line.is_closed) for line in read_polylines(path)]
+    curves = []
+    for i, line in enumerate(read_polylines(path)):
+        try:
+            curves.append(curve_on(mesh, line.positions, closed=line.is_closed))
+        except SourceError as error:
+            raise SourceError(f"{path}, polyline {i}: {error}") from None
+    return curves

@@ -188,7 +188,7 @@ class Tracer:
         if (edges > _MOST_EDGES).any():
             first = int(np.argmax(edges > _MOST_EDGES))
             raise ValueError(
-                f"{name if len(edges) == 1 else f'{name}[{first}]'} has the length {lengths[first]:.4g}, which is "
+                f"{name if len(edges) == 1 else f'{name}[{first}]'} is too long: {lengths[first]:.4g} is "
                 f"{edges[first]:.2g} mean edge lengths, and a line may have {_MOST_EDGES:.0e}: give it in the unit of "
                 "the mesh"
             )

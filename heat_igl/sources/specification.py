@@ -233,9 +233,10 @@ def named_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
     outside = (array < 0) | (array >= n)
     if outside.any():
         first = int(np.flatnonzero(outside)[0])
+        count = f" ({int(outside.sum())} of {len(array)} are not)" if len(array) > 1 else ""
         raise SourceError(
-            f"{name}[{first}] = {array[first]} is no vertex ({int(outside.sum())} of {len(array)} are not): the mesh "
-            f"has {n} vertices, so indices run from 0 to {n - 1}"
+            f"{name}[{first}] = {array[first]} is no vertex{count}: the mesh has {n} vertices, so indices run from 0 "
+            f"to {n - 1}"
         )
     return np.asarray(array, dtype=np.int64)
 
