@@ -90,9 +90,7 @@ def _place(mesh: Mesh, text: str) -> tuple[int | SurfacePoints, float | None]:
         raise SourceError(f"{text!r} is no place: a vertex such as 12, or a position such as 0.5,0,1.25") from None
 
 
-def _write(
-    mesh: Mesh, curve: SurfaceCurve, output: Path, json_file: Path | None, gaps: Sequence[float | None]
-) -> None:
+def _write(mesh: Mesh, curve: SurfaceCurve, output: Path, json_file: Path | None, gaps: Sequence[float | None]) -> None:
     """Write a curve, and print the length, and how far positions were off the surface."""
     heat_igl.write_curves(output, mesh, [curve])
     length, segments = float(curve.lengths(mesh).sum()), len(curve)
