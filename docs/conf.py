@@ -81,13 +81,6 @@ def _generate_pages(app) -> None:
     generate_autosummary_docs([str(names)], output_dir=str(HERE / "api"), app=app, overwrite=True)
 
 
-def _drop_missing_pages(app, docname: str, source: list[str]) -> None:
-    """In lists of pages, ``name?`` is a page that may be missing."""
-    source[0] = re.sub(
-        r"^(\w+)\?\n", lambda page: f"{page[1]}\n" if (HERE / f"{page[1]}.md").exists() else "", source[0], flags=re.M
-    )
-
-
 def _escape_bars(app, what, name, obj, options, lines) -> None:
     """In docstrings |x| is a length, not a substitution."""
     for i, line in enumerate(lines):
@@ -130,6 +123,5 @@ def setup(app) -> None:
     app.connect("missing-reference", _resolve_names)
     app.connect("config-inited", _write_parts)
     app.connect("builder-inited", _generate_pages)
-    app.connect("source-read", _drop_missing_pages)
     app.connect("autodoc-skip-member", _skip_members)
     app.connect("autodoc-process-docstring", _escape_bars, priority=900)  # after numpydoc
