@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from heat_igl.kernels.local_planes import onto_quadrics, principal_axes, tangent_planes
 from heat_igl.kernels.point_tree import arrange, nearest
-from heat_igl.runtime import in_order, n_threads
+from heat_igl.runtime import over_rows
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["Neighbourhoods", "PointTree", "neighbourhoods", "point_tree", "without_noise"]
@@ -107,7 +106,7 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: 
     found = Neighbourhoods(np.empty((len(P), k + 1), np.int32), np.empty(len(P)), np.empty((len(P), 3, 3)))
 
     def fill(rows: slice) -> None:
-        index, square = tree.nearest(np.arange(rows.start, min(rows.stop, len(P))), k + 1)
+        index, square = tree.nearest(np.arange(rows.start, rows.stop), k + 1)
         found.radius[rows] = np.sqrt(square[:, -1])
         if normals is not None:
             found.axes[rows] = _completed(normals[rows])
@@ -117,7 +116,7 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: 
             found.axes[rows] = principal_axes(P, index, square)[0]
         found.index[rows] = index
 
-    _in_blocks(fill, len(P))
+    over_rows(fill, len(P), _BLOCK)
     return found
 
 
@@ -160,14 +159,8 @@ def _onto_quadrics(tree: PointTree, chosen: IntArray, k: int) -> tuple[FloatArra
         moved[rows], noise[rows] = onto_quadrics(tree.P, index, square, axes)
         thickness[rows] = variances[:, 0] / np.maximum(variances[:, 1], np.finfo(float).tiny)
 
-    _in_blocks(fill, len(chosen))
+    over_rows(fill, len(chosen), _BLOCK)
     return moved, noise * np.sqrt(k / np.pi), thickness
-
-
-def _in_blocks(fill: Callable[[slice], None], n: int) -> None:
-    """Call `fill` for slices that make up n rows, on all processors."""
-    for _ in in_order(fill, [slice(begin, begin + _BLOCK) for begin in range(0, n, _BLOCK)], n_threads()):
-        pass
 
 
 def _completed(normals: FloatArray) -> FloatArray:
