@@ -22,7 +22,7 @@ __all__ = ["Dissection", "dissect"]
 
 # Pieces with more vertices than this, and than this share of all, are cut one at a time and their parts side by side;
 # others are done in one go.
-_LARGE = 10000
+_LARGE = 3000
 _SHARE = 1 / 64
 # Small components are dissected together, so many vertices at a time.
 _TOGETHER = 256
