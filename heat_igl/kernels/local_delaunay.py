@@ -49,9 +49,7 @@ def delaunay_stars(
     with cython.nogil:
         for i in range(begin, end):
             before: cython.Py_ssize_t = m
-            count: cython.Py_ssize_t = _neighbours_around(
-                i, P, axes, neighbours, least_cosine, star, members, stack
-            )
+            count: cython.Py_ssize_t = _neighbours_around(i, P, axes, neighbours, least_cosine, star, members, stack)
             if count >= 2:
                 top: cython.Py_ssize_t = _visible_hull(count, star, stack)
                 m = _triangles(i, top, star, members, stack, largest[i], found, radius, m)
