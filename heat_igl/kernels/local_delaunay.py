@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.libc.math import atan2, fabs, sqrt
+from cython.cimports.libc.math import INFINITY, atan2, fabs, sqrt
 
 __all__ = ["delaunay_stars", "fitting_triangles"]
 
@@ -41,7 +41,7 @@ def delaunay_stars(
     is_closed: cython.uchar[::1] = closed
     found: cython.int[:, ::1] = corners
     radius: cython.double[::1] = radii
-    star: cython.double[:, ::1] = np.empty((k + 1, 3))
+    star: cython.double[:, ::1] = np.empty((k + 1, 5))
     members: cython.int[::1] = np.empty(k + 1, np.int32)
     stack: cython.int[::1] = np.empty(k + 2, np.int32)
     m: cython.Py_ssize_t = 0
@@ -49,7 +49,7 @@ def delaunay_stars(
     with cython.nogil:
         for i in range(begin, end):
             before: cython.Py_ssize_t = m
-            count: cython.Py_ssize_t = _neighbours_around(i, P, axes, neighbours, least_cosine, star, members)
+            count: cython.Py_ssize_t = _neighbours_around(i, P, axes, neighbours, least_cosine, star, members, stack)
             if count >= 2:
                 top: cython.Py_ssize_t = _visible_hull(count, star, stack)
                 m = _triangles(i, top, star, members, stack, largest[i], found, radius, m)
@@ -69,15 +69,19 @@ def _neighbours_around(
     least_cosine: cython.double,
     star: cython.double[:, ::1],
     members: cython.int[::1],
+    stack: cython.int[::1],
 ) -> cython.Py_ssize_t:
     """Put the neighbours of point i into `star` and `members`, sorted by angle and inverted; return how many there are.
 
     The inversion p / |p|^2 takes circles through the point to straight lines: the star of the point is the part of the
-    convex hull of the inverted neighbours that it sees, found by Graham's scan.
+    convex hull of the inverted neighbours that it sees, found by Graham's scan. Neighbours inside the hull of the
+    nearest ones are left out.
     """
     a: cython.Py_ssize_t
     b: cython.Py_ssize_t
     size: cython.Py_ssize_t = 0
+    n_sides: cython.Py_ssize_t = 0
+    reach: cython.double = INFINITY  # squared: twice the largest radius of the circles of the star
     for a in range(neighbours.shape[1]):
         j: cython.Py_ssize_t = neighbours[i, a]
         if j < 0 or j == i:
@@ -94,6 +98,11 @@ def _neighbours_around(
         square: cython.double = x * x + y * y
         # A point above the centre has no direction in the plane.
         if square <= 1e-12 * (dx * dx + dy * dy + dz * dz) or square <= 0.0:
+            continue
+        if size == FEW and n_sides == 0:
+            n_sides = _sides(_visible_hull(size, star, stack), star, stack)
+            reach = _reach(n_sides, star)
+        if square > reach or _is_inside(n_sides, star, x / square, y / square):
             continue
         # Grows with the angle, and needs no arctangent.
         angle: cython.double = y / (fabs(x) + fabs(y))
@@ -145,6 +154,50 @@ def _visible_hull(size: cython.Py_ssize_t, star: cython.double[:, ::1], stack: c
         top += 1
         stack[top] = cython.cast(cython.int, following)
     return top
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _sides(top: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.Py_ssize_t:
+    """Fill the columns of the sides in `star`; return how many there are, -1 if the hull is not around the point."""
+    a: cython.Py_ssize_t
+    for a in range(top):
+        p: cython.Py_ssize_t = stack[a]
+        q: cython.Py_ssize_t = stack[a + 1]
+        turn: cython.double = star[p, X] * star[q, Y] - star[p, Y] * star[q, X]
+        if turn <= 0.0:
+            return -1
+        star[a, ACROSS_X] = (star[p, Y] - star[q, Y]) / turn
+        star[a, ACROSS_Y] = (star[q, X] - star[p, X]) / turn
+    return top
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _reach(n_sides: cython.Py_ssize_t, star: cython.double[:, ::1]) -> cython.double:
+    """Squared distance beyond which neighbours, inverted, are inside all sides; infinite if there are none."""
+    a: cython.Py_ssize_t
+    largest: cython.double = 0.0
+    for a in range(n_sides):
+        largest = max(largest, star[a, ACROSS_X] * star[a, ACROSS_X] + star[a, ACROSS_Y] * star[a, ACROSS_Y])
+    return largest / (INSIDE * INSIDE) if n_sides > 0 else INFINITY
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _is_inside(
+    n_sides: cython.Py_ssize_t, star: cython.double[:, ::1], x: cython.double, y: cython.double
+) -> cython.bint:
+    """Whether a point is inside all sides of a hull, of which there are some."""
+    a: cython.Py_ssize_t
+    for a in range(n_sides):
+        if star[a, ACROSS_X] * x + star[a, ACROSS_Y] * y < -INSIDE:
+            return False
+    return n_sides > 0
 
 
 @cython.cfunc
