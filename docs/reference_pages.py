@@ -24,7 +24,8 @@ GROUPS = {
         karcher_mean centroidal_voronoi CentroidalSites diameter sampling""",
     "Operators of a domain": """Operators polygon_operators point_cloud_operators speed_operators metric_operators
         fibre_metric""",
-    "Validation": "validate ValidationReport ValidationRow reference closed_forms metrics shapes baselines",
+    "Validation": """validate ValidationReport ValidationRow validate_domains DomainReport DomainRow reference
+        closed_forms metrics shapes baselines""",
     "Pictures": "plots",
     "Many meshes": "cluster",
     "Errors and warnings": """MeshError SourceError FactorizationError MissingExtraError ReferenceSolverError BatchError

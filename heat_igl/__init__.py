@@ -108,6 +108,7 @@ if TYPE_CHECKING:
         write_distances_within,
     )
     from heat_igl.validation import ValidationReport, ValidationRow, closed_forms, metrics, shapes, validate
+    from heat_igl.validation.domains import DomainReport, DomainRow, validate_domains
     from heat_igl.validation.samples import sample_mesh
 
 __all__ = [
@@ -118,6 +119,8 @@ __all__ = [
     "CutMesh",
     "Diagnostics",
     "Directions",
+    "DomainReport",
+    "DomainRow",
     "FactorizationError",
     "GeodesicPathSolver",
     "HeatMethodSolver",
@@ -201,6 +204,7 @@ __all__ = [
     "trace_geodesic",
     "unfolded_distance",
     "validate",
+    "validate_domains",
     "volume_signed_distance",
     "voronoi_cells",
     "write_curves",
@@ -220,6 +224,8 @@ _LAZY = {
     "CutMesh": "curves",
     "Diagnostics": "heat_method",
     "Directions": "heat_method",
+    "DomainReport": "validation.domains",
+    "DomainRow": "validation.domains",
     "FactorizationError": "errors",
     "GeodesicPathSolver": "curves",
     "HeatMethodSolver": "heat_method",
@@ -318,6 +324,7 @@ _LAZY = {
     "unfolded_distance": "unfolding",
     "unfolding": "unfolding",
     "validate": "validation",
+    "validate_domains": "validation.domains",
     "volume_signed_distance": "heat_method",
     "voronoi_cells": "sampling",
     "write_curves": "io",

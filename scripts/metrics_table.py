@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.spatial import Delaunay
 
 from heat_igl import (
     AccuracyWarning,
@@ -30,6 +29,8 @@ from heat_igl import (
 )
 from heat_igl.operators import Operators
 from heat_igl.typing import BoolArray, FloatArray
+from heat_igl.validation.domains.body_cases import around_the_edge, delaunay, without
+from heat_igl.validation.domains.surface_cases import by_fermat, moved_inside, straight
 
 from scaffold import add_json, add_seed, environment, option_parser, publish, table
 
@@ -45,12 +46,7 @@ METHODS: dict[str, dict[str, Any]] = {
 def plane(rows: int, rng: np.random.Generator, border: float | None = None) -> Mesh:
     """The unit square, with vertices inside moved by a quarter of an edge; those at x = `border` stay there."""
     mesh = shapes.grid(rows)
-    V = mesh.V.copy()
-    inner = ~mesh.boundary
-    if border is not None:
-        inner &= V[:, 0] != border
-    V[inner, :2] += rng.uniform(-0.25, 0.25, (int(inner.sum()), 2)) / rows
-    return Mesh(V, mesh.F)
+    return moved_inside(mesh, rng, 0.25 / rows, None if border is None else mesh.V[:, 0] == border)
 
 
 def linear_maps(rows: int, rng: np.random.Generator) -> Iterator[tuple[str, Operators, Truth]]:
@@ -63,17 +59,15 @@ def linear_maps(rows: int, rng: np.random.Generator) -> Iterator[tuple[str, Oper
         yield (
             f"one tensor, 1 : {ratio:g}",
             metric_operators(mesh, metric),
-            lambda i, mapped=mapped: np.linalg.norm(mapped - mapped[i], axis=1),
+            lambda i, mapped=mapped: straight(mapped, i),
         )
 
 
 def exponential_speeds(rows: int, rng: np.random.Generator) -> Iterator[tuple[str, Operators, Truth]]:
     for contrast in (1e1, 1e3, 1e6):
         strip = shapes.strip(8 * rows // 2, rows // 2)
-        V = strip.V.copy()
-        inner = ~strip.boundary
-        V[inner, :2] += rng.uniform(-0.25, 0.25, (int(inner.sum()), 2))
-        mesh = Mesh(V, strip.F)
+        mesh = moved_inside(strip, rng, 0.25)
+        V = mesh.V
         k = np.log(contrast) / np.ptp(V[:, 0])
         unrolled = np.exp(-k * (V[:, 0] + 1j * (V[:, 1] - V[:, 1].mean()))) / k
         speed = np.exp(k * V[mesh.F][:, :, 0].mean(axis=1))
@@ -95,24 +89,6 @@ def two_speeds(rows: int, rng: np.random.Generator) -> Iterator[tuple[str, Opera
         )
 
 
-def by_fermat(V: FloatArray, i: int, left: float, right: float) -> FloatArray:
-    """Least time over where the way crosses x = 1/2, or along the faster side of it."""
-    source, x, y = V[i], V[:, 0] - 0.5, V[:, 1]
-    here, there = (left, right) if source[0] < 0.5 else (right, left)
-    beyond = x * (source[0] - 0.5) < 0
-    depth = abs(source[0] - 0.5)
-    crossing = np.linspace(-0.5, 1.5, 8001)
-    to_crossing = np.hypot(depth, source[1] - crossing) / here
-    refracted = np.array([(to_crossing + np.hypot(a, b - crossing) / there).min() for a, b in zip(x, y, strict=True)])
-    straight = np.linalg.norm(V - source, axis=1) / here
-    if there > here:
-        critical = np.arcsin(here / there)
-        both, along = depth + np.abs(x), np.abs(y - source[1])
-        head = both * np.cos(critical) / here + along / there
-        straight = np.where(along >= both * np.tan(critical), np.minimum(straight, head), straight)
-    return np.where(beyond, refracted, straight)
-
-
 def bodies(points: int, rng: np.random.Generator) -> Iterator[tuple[str, Mesh, Truth]]:
     """Boxes of even tetrahedra, Delaunay tetrahedra of random points, a cube without a quarter, and a hand."""
     rows = round(points ** (1 / 3)) - 1
@@ -124,20 +100,13 @@ def bodies(points: int, rng: np.random.Generator) -> Iterator[tuple[str, Mesh, T
         ("cube, Delaunay tetrahedra", delaunay(scattered)),
         ("ball, Delaunay tetrahedra", delaunay(ball)),
     ):
-        yield name, mesh, lambda i, V=mesh.V: np.linalg.norm(V - V[i], axis=1)
+        yield name, mesh, lambda i, V=mesh.V: straight(V, i)
     # A cube without the quarter x, y > 1/2, as many vertices.
     quarter = without(2 * round((points / 6) ** (1 / 3)), lambda centre: (centre[:, :2] > 0.5).all(axis=1))
     yield "three quarters of a cube", quarter, lambda i: around_the_edge(quarter.V, i)
     cells = 9 * round((5 * points) ** (1 / 3) / 9)
     hand = without(cells, lambda centre: ~in_hand(centre) | (np.abs(centre[:, 2] - 0.5) > 1 / 6))
     yield "palm and five fingers", hand, lambda i: across_hand(hand.V, i, cells)
-
-
-def without(n: int, cut: Callable[[FloatArray], BoolArray]) -> Mesh:
-    """A cube of n^3 cells without those whose centres are `cut`."""
-    cube = shapes.box(n)
-    used, F = np.unique(cube.F[~cut(cube.V[cube.F].mean(axis=1))], return_inverse=True)
-    return Mesh(cube.V[used], F.reshape(-1, 4))
 
 
 def in_hand(centre: FloatArray) -> BoolArray:
@@ -153,20 +122,6 @@ def across_hand(V: FloatArray, i: int, cells: int) -> FloatArray:
     on_plan = np.array([number[x, y] for x, y in np.rint(cells * V[:, :2]).astype(int).tolist()])
     flat = geodesic_distance(plan, int(on_plan[i]), method="exact")[on_plan]
     return np.asarray(np.hypot(flat, V[:, 2] - V[i, 2]))
-
-
-def delaunay(V: FloatArray) -> Mesh:
-    F = Delaunay(V).simplices
-    volumes = np.abs(np.linalg.det(V[F[:, 1:]] - V[F[:, :1]]))
-    return Mesh(V, F[volumes > 1e-12])
-
-
-def around_the_edge(V: FloatArray, i: int) -> FloatArray:
-    """Distance in the cube without the quarter x, y > 1/2, whose inner edge turns the part beyond into line."""
-    x, y, z = (V - [0.5, 0.5, V[i, 2]]).T
-    angle = np.mod(np.arctan2(y, x) - np.pi / 2, 2 * np.pi)
-    bent = np.hypot(np.hypot(x, y) + np.hypot(x[i], y[i]), z)
-    return np.where(np.abs(angle - angle[i]) > np.pi, bent, np.linalg.norm(V - V[i], axis=1))
 
 
 def mean_error(found: FloatArray, exact: FloatArray) -> float:

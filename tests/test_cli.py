@@ -419,7 +419,7 @@ def test_a_fault_of_the_package_is_not_hidden(sphere: Path, monkeypatch: pytest.
 
 
 def commands() -> list[str]:
-    return [each.callback.__name__ for each in application().registered_commands]
+    return [each.name for each in application().registered_commands]
 
 
 @pytest.mark.parametrize("name", commands())
@@ -465,7 +465,9 @@ def test_json_of_the_other_commands(sphere: Path, capsys: pytest.CaptureFixture[
     lines = printed("isolines", "--source=0", "--spacing=0.5", f"--output={sphere.with_name('l.obj')}")
     assert (lines["lines"], lines["distances"]) == (6, [0.5, 1.0, 1.5, 2.0, 2.5, 3.0])
     assert lines["farthest"] == printed("distance", "--source=0")["farthest"]["distance"]
-    by_heat = printed("isolines", "--source=0", "--spacing=0.5", "--method=heat", "--output=l.obj")
+    by_heat = printed(
+        "isolines", "--source=0", "--spacing=0.5", "--method=heat", f"--output={sphere.with_name('l.obj')}"
+    )
     assert by_heat["farthest"] == heat_igl.HeatMethodSolver(sphere).distance(0).max()
     path = printed("path", "--from=0", "--to=5", f"--output={sphere.with_name('p.obj')}")
     assert path["length"] == pytest.approx(heat_igl.geodesic_distance(sphere, 0, method="exact")[5], rel=1e-12)

@@ -29,6 +29,7 @@ geodesic_bezier geodesic_path handle_loops karcher_mean straighten
 Directions log_map
 unfolded_distance validate voronoi_cells write_curves write_distances_within write_mesh write_point_cloud
 fibre_metric metric_operators
+DomainReport DomainRow validate_domains
 CutMesh OrientedPoints SignedHeatSolver VoxelBox cut region_boundary volume_signed_distance
 """.split()
 
@@ -112,6 +113,7 @@ read_distances_within(path, rows=None)
 validate(mesh, sources, methods=('heat', 'sweep', 'unfold', 'meshlab', 'igl'), reference='exact', *, name='mesh',\
  progress=None)
 validation.draw_sources(mesh, count, seed=0)
+validate_domains(domains=None, *, seed=0, progress=None)
 closed_forms.sphere(mesh, sources, *, center=(0.0, 0.0, 0.0))
 metrics.relative_error(distance, truth)
 cluster.distances(meshes, sources, store, *, client=None, refine=None, dtype='float32', progress=False)

@@ -288,6 +288,18 @@ def test_rows_of_other_domains() -> None:
     assert inside.mean < 1e-6
 
 
+def test_methods_take_polygons() -> None:
+    """Methods of this package take the polygons, not their triangles."""
+    V = shapes.grid(6).V
+    first = (np.arange(6)[:, None] * 7 + np.arange(6)).ravel()
+    quads = heat_igl.PolygonMesh(V, np.stack([first, first + 1, first + 8, first + 7], axis=1))
+    report = validate(quads, 0, ["heat", "unfold"], closed_forms.plane)
+    np.testing.assert_array_equal(report.distances["heat"][0], HeatMethodSolver(quads).distance(0))
+    assert (report.distances["heat"][0] != HeatMethodSolver(quads.triangles).distance(0)).any()
+    assert report.rows[1].errors is not None
+    assert report.rows[1].errors.maximum < 1e-9
+
+
 def test_what_counts_as_one_set_of_sources() -> None:
     mesh = shapes.grid(5)
     mask = np.zeros(mesh.n_vertices, bool)

@@ -35,6 +35,7 @@ _COMPLETION = "_HEAT_IGL_COMPLETE"
 _MODULES = {
     "info": "comparison",
     "validate": "comparison",
+    "validate-domains": "domain_checks",
     "distance": "distances",
     "isolines": "distances",
     "path": "paths",
@@ -54,7 +55,7 @@ def application(asked: str | None = None) -> typer.Typer:
     )
     app.callback(invoke_without_command=True)(_version)
     for name in [asked] if asked in _MODULES else _MODULES:
-        command = getattr(import_module(f"heat_igl.cli.{_MODULES[name]}"), name)
+        command = getattr(import_module(f"heat_igl.cli.{_MODULES[name]}"), name.replace("-", "_"))
         app.command(name, epilog=epilog(name))(command)
     return app
 

@@ -15,6 +15,9 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["polygon_operators"]
 
+# Share of the weights of L that may be negative while the heat flow is still fitted to lengths, which leaves these out.
+_NEGATIVE = 0.03
+
 
 def polygon_operators(mesh: MeshLike) -> Operators:
     """The operators of a polygon mesh, for `HeatMethodSolver.from_operators`.
@@ -38,7 +41,8 @@ def polygon_operators(mesh: MeshLike) -> Operators:
         With n vertices, the faces those triangles, d = 3. h is the mean distance between two vertices of one polygon,
         the same pairs as in L: edges alone are too short for hexagons. No `surface`, since the vertices of those
         triangles are not those of the mesh: nothing to refine by unfolding. Points and curves as sources lie on
-        ``mesh.triangles``.
+        ``mesh.triangles``. No `lengths` if more than 3 % of the weights of L are negative, as with concave
+        polygons: `fitted_laplacian` leaves these out, and heat would be too fast.
 
     Raises
     ------
@@ -94,9 +98,15 @@ def polygon_operators(mesh: MeshLike) -> Operators:
         referenced=triangles.referenced,
         longest_distance=float(longest.max()),
         longest_distances=longest,
-        lengths=_chords(mesh.V, L),
+        lengths=None if _negative_share(L) > _NEGATIVE else _chords(mesh.V, L),
         drawn_on=Surface(fans, fans, V=mesh.V),
     )
+
+
+def _negative_share(L: sp.csc_matrix) -> float:
+    """Sum of the negative entries of L off the diagonal over that of the positive ones."""
+    weights = L.data[L.indices != np.repeat(np.arange(L.shape[1]), np.diff(L.indptr))]
+    return float(-weights[weights < 0].sum() / weights[weights > 0].sum())
 
 
 def _chords(V: FloatArray, L: sp.csc_matrix) -> sp.csc_matrix:

@@ -15,7 +15,7 @@ from heat_igl.errors import (
     real_numbers,
     shown,
 )
-from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_mesh, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, as_mesh, as_simplices
 from heat_igl.reference import MEMORY, TIMEOUT, edge_paths, straight_lines
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -44,7 +44,8 @@ def validate(
     ----------
     mesh : mesh
         Triangles; for tetrahedra, give a `reference` of your own, such as `heat_igl.closed_forms.convex_solid`. Of a
-        `PointCloud`, own methods take the points, and native ones and the reference the triangles.
+        `PointCloud` or `PolygonMesh`, own methods take the points or polygons, and native ones and the reference the
+        triangles.
     sources : sources, or sequence of sources
         One set of sources (an index, a sequence of indices, a mask), or a sequence of sets, with one distance for each:
         ``[3, 7]`` is one set of two vertices, ``[[3], [7]]`` are two sets of one vertex.
@@ -89,7 +90,7 @@ def validate(
     """
     given = as_mesh(mesh)
     mesh = as_simplices(given)
-    domain = given if isinstance(given, PointCloud) else mesh
+    domain = mesh if isinstance(given, Mesh) else given
     sets = _source_sets(sources, mesh.n_vertices)
     if not isinstance(methods, Iterable) or isinstance(methods, str) or getattr(methods, "ndim", 1) == 0:
         raise ValueError(f"methods must be a sequence of methods, not {shown(methods)}")

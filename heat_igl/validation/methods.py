@@ -14,7 +14,7 @@ import numpy as np
 from heat_igl import reference
 from heat_igl.errors import AccuracyWarning, ReferenceSolverError, shown
 from heat_igl.heat_method import HeatMethodSolver
-from heat_igl.mesh import Mesh, PointCloud, as_simplices
+from heat_igl.mesh import Mesh, PointCloud, PolygonMesh, as_simplices
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
 
@@ -117,7 +117,7 @@ def resolved(method: Method) -> tuple[str, Prepare | None]:
     return method, None
 
 
-def _heat_solver(mesh: Mesh | PointCloud, options: Mapping[str, Any]) -> Solver:
+def _heat_solver(mesh: Mesh | PolygonMesh | PointCloud, options: Mapping[str, Any]) -> Solver:
     if isinstance(mesh, Mesh) and mesh.is_tetrahedral and "refine" in options:
         raise ReferenceSolverError(f"refine={options['refine']!r} unfolds triangles, and the mesh holds tetrahedra")
     if isinstance(mesh, PointCloud) and not options:
@@ -127,7 +127,7 @@ def _heat_solver(mesh: Mesh | PointCloud, options: Mapping[str, Any]) -> Solver:
 
 
 def run(
-    mesh: Mesh | PointCloud,
+    mesh: Mesh | PolygonMesh | PointCloud,
     sets: list[IntArray],
     label: str,
     prepare: Prepare | None,

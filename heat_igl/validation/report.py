@@ -15,7 +15,7 @@ from heat_igl.validation.plots import error_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["ValidationReport", "ValidationRow"]
+__all__ = ["ValidationReport", "ValidationRow", "plain"]
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class ValidationRow:
 
     def to_dict(self) -> dict[str, Any]:
         """The row as values that JSON can carry; an infinite error becomes the string ``"inf"``."""
-        return {name: _plain(value) for name, value in asdict(self).items()}
+        return {name: plain(value) for name, value in asdict(self).items()}
 
 
 _COLUMNS = (
@@ -233,12 +233,12 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3g}"
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """A value that JSON can carry. It has no infinity and no NaN, which become text."""
     if isinstance(value, Mapping):
-        return {str(name): _plain(entry) for name, entry in value.items()}
+        return {str(name): plain(entry) for name, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(entry) for entry in value]
+        return [plain(entry) for entry in value]
     if isinstance(value, float) and not math.isfinite(value):
         return str(float(value))
     if value is None or isinstance(value, (bool, int, float, str)):
