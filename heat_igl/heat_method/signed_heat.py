@@ -172,7 +172,8 @@ class SignedHeatSolver:
         sign of the integrated value instead, unless there is `refine`. The diffused normals of all curves are added: if
         curves contradict each other, the longer pieces decide.
         """
-        require_choice("level", level, (None, *get_args(Level)))
+        if level is not None:
+            require_choice("level", level, get_args(Level))
         chosen = oriented_set(curves, self._mesh)
         # Points are samples with noise, over which heat takes the mean.
         by_fronts = self._fronts is not None and level is None and not len(chosen.point_faces)
