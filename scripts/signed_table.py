@@ -75,7 +75,7 @@ class Peer:
         return edge, [float(at[held[1 if tail == corners[0] else 0]])]
 
     def distance(self, nodes: Any, level: str) -> FloatArray:
-        """The answer; a RuntimeError where it fails."""
+        """The answer; a RuntimeError or a ValueError where it fails."""
         return np.asarray(self._solver.compute_distance(nodes, level_set_constraint=level))
 
 
@@ -115,7 +115,7 @@ def measure_case(mesh: Mesh, solvers: dict[str, Any], share: float, rng: np.rand
             for constraint in LEVELS:
                 try:
                     answers[f"{name} {constraint}"] = solver.distance(solver.nodes(pieces), constraint)
-                except RuntimeError:
+                except (RuntimeError, ValueError):  # a factorization that failed
                     answers[f"{name} {constraint}"] = None
         else:
             answers[name] = solver.distance(pieces)

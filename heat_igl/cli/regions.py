@@ -29,7 +29,9 @@ def signed(
     output: Annotated[Path | None, typer.Option(help="PLY or VTU file for mesh and distance.")] = None,
     picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for a picture.")] = None,
     refine: Annotated[str | None, choice(Refine, "Size of the distance by unfolding, near-exact; or exact.")] = None,
-    level: Annotated[str, choice(Level, "What is 0: each curve, or the mean over all.")] = "zero",
+    level: Annotated[
+        str | None, choice(Level, "The integrated distance: what is 0 of it, each curve, or the mean over all.")
+    ] = None,
     t_coef: Annotated[
         float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=positive)
     ] = None,
@@ -41,7 +43,7 @@ def signed(
     check_outputs(loaded, output, picture)
     check_json(json_file)
     solver = SignedHeatSolver(loaded, refine=cast(Refine | None, refine), t_coef=t_coef)
-    phi = solver.distance(drawn_on, level=cast(Level, level))
+    phi = solver.distance(drawn_on, level=cast(Level | None, level))
     drawn = None
     if picture is not None:
         from heat_igl.drawing import plots

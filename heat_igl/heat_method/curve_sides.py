@@ -21,6 +21,8 @@ _SAME_PLACE = 1e-6
 # The zero curve of an integrated distance runs within a quarter of an edge of the curves. It counts as the closing of a
 # gap where it is farther than this from all of them, in mean edge lengths.
 _IN_GAP = 1.0
+# Farther than any distance, and not infinite, so that none of it is 0.
+_FAR = 1e300
 # If a vertex sees the nearest place of a segment almost along the segment, rounding decides the side.
 _LEAST_SINE = 1e-6
 # Straight lines in one face are as long as the distance, but for rounding.
@@ -72,7 +74,8 @@ def zero_curve_in_gaps(mesh: Mesh, phi: FloatArray, distance: FloatArray, h: flo
         The segments, in the order of faces; None if there is none.
     """
     faces, start, end, _ = level_segments(mesh, phi, 0.0)
-    middle = np.einsum("sc,sc->s", (start + end) / 2, distance[mesh.F[faces]])
+    # Where no distance is known, it is large.
+    middle = np.einsum("sc,sc->s", (start + end) / 2, np.minimum(distance, _FAR)[mesh.F[faces]])
     kept = (middle > _IN_GAP * h) & (start != end).any(axis=1)
     return SurfaceCurve(faces[kept], start[kept], end[kept]) if kept.any() else None
 

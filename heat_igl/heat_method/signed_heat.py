@@ -16,13 +16,13 @@ from heat_igl.heat_method.parts import prepare
 from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_gradient, lay_out, oriented
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
 from heat_igl.operators import Operators, divergence_matrix, edge_rotations, face_rotations, operators
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, both
-from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set
+from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, source_set
 from heat_igl.steps import PoissonProblem, VectorHeatFlow
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
-from heat_igl.unfolding import Refine
+from heat_igl.unfolding import CurvedFronts, Front, Refine
 
 __all__ = ["Level", "SignedHeatSolver"]
 
@@ -36,18 +36,23 @@ _CANCELLED = 1e-9
 class SignedHeatSolver:
     """The signed heat method (Feng and Crane 2024): factor once, ask many times.
 
+    Heat finds the sides of the curves and closes their gaps. From the closed curves distance is measured by fronts, or
+    as `refine` says; from points with normals, and if a time step is given, it is the integrated one of the paper.
+
     Parameters
     ----------
     mesh : mesh
         Triangles, manifold and oriented alike; whatever `as_mesh` takes.
     refine : {"unfold", "exact"}, optional
         Take the size from `HeatMethodSolver` with the same `refine`, measured from the curves, and in gaps between them
-        from the zero curve of the integrated distance.
+        from the zero curve of the integrated distance. By default fronts give it, see `CurvedFronts`.
     t_coef : float, optional
         t = t_coef h^2, with h the mean edge length of the intrinsic Delaunay triangulation; 0.25 by default. Larger
-        values close wide gaps with rounder curves, and smooth noisy ones.
+        values close wide gaps with rounder curves, and smooth noisy ones. If it is given, and no `refine`, the distance
+        is the integrated one.
     t : float, optional
-        Time step as a squared length; overrides `t_coef`. It is raised if heat would not cross the mesh.
+        Time step as a squared length; overrides `t_coef`, and counts like it. It is raised if heat would not cross the
+        mesh.
     backend : {"auto", "scipy", "multifrontal"}
         Linear solver, see `factorize`.
 
@@ -83,7 +88,8 @@ class SignedHeatSolver:
         t: float | None = None,
         backend: Backend = "auto",
     ) -> None:
-        options = SolverOptions(_T_COEF if t_coef is None and t is None else t_coef, t, refine=refine, backend=backend)
+        is_default = t_coef is None and t is None
+        options = SolverOptions(_T_COEF if is_default else t_coef, t, refine=refine, backend=backend)
         self._mesh = as_simplices(mesh)
         self._refines = refine is not None
         domain, self._faces, self._triangulation = _oriented_domain(self._mesh)
@@ -103,6 +109,9 @@ class SignedHeatSolver:
         self._D = divergence_matrix(gradient, self._triangulation.areas)
         self._levels = CurveLevels(domain, self._mesh.F, self._heat_flow, self._poisson)
         self._unsigned = HeatMethodSolver._of(parts)
+        self._fronts: CurvedFronts | None = None
+        if refine is None and is_default:
+            self._fronts = CurvedFronts(self._faces, self._triangulation, domain.mean_edge_length)
 
     def __repr__(self) -> str:
         return repr(self._unsigned).replace("HeatMethodSolver", "SignedHeatSolver", 1)
@@ -122,7 +131,7 @@ class SignedHeatSolver:
         """Length of a distance array."""
         return self._mesh.n_vertices
 
-    def distance(self, curves: Oriented, *, unsigned: Sources | None = None, level: Level = "zero") -> FloatArray:
+    def distance(self, curves: Oriented, *, unsigned: Sources | None = None, level: Level | None = None) -> FloatArray:
         """Distance from the nearest curve, negative on the left of the curves.
 
         Seen from outside, a counter-clockwise loop is negative inside.
@@ -136,12 +145,13 @@ class SignedHeatSolver:
         unsigned : sources, optional
             More sources, as for `HeatMethodSolver.distance`, without a sign: near them the size of the distance is
             that from them, and the sign is the one that the curves give.
-        level : {"zero", "constant", "none"}
-            Without `refine`: "zero" subtracts from each vertex the integrated value at the place on the curves that
-            its heat comes from, so that all curves are near 0: within 0.03 mean edge lengths (root mean square) on
-            coarse meshes, see docs/signed.md. "constant" makes the value nearly constant along each curve, with a
-            different level for each, and 0 in the mean over all. "none" only makes the mean 0. `refine` measures from
-            the curves in any case, and takes the sign from this if curves have gaps.
+        level : {"zero", "constant", "none"}, optional
+            Asks for the integrated distance without `refine`, with this level. "zero" subtracts from each vertex the
+            value at the place on the curves that its heat comes from, so that all curves are near 0: within 0.03 mean
+            edge lengths (root mean square) on coarse meshes, see docs/signed.md. "constant" makes the value nearly
+            constant along each curve, with a different level for each, and 0 in the mean over all. "none" only makes
+            the mean 0. `refine` measures from the curves in any case, and takes the sign from this if curves have
+            gaps. Where the integrated distance is meant and no level is given, it is "zero".
 
         Returns
         -------
@@ -162,9 +172,12 @@ class SignedHeatSolver:
         sign of the integrated value instead, unless there is `refine`. The diffused normals of all curves are added: if
         curves contradict each other, the longer pieces decide.
         """
-        require_choice("level", level, get_args(Level))
+        if level is not None:
+            require_choice("level", level, get_args(Level))
         chosen = oriented_set(curves, self._mesh)
-        size, left = self._refined(chosen, level) if self._refines else self._from_heat(chosen, level)
+        # Points are samples with noise, over which heat takes the mean.
+        by_fronts = self._fronts is not None and level is None and not len(chosen.point_faces)
+        size, left = (self._measured if self._refines or by_fronts else self._from_heat)(chosen, level or "zero")
         reached = np.isfinite(size)
         if not reached.any():
             raise SourceError("curves reach no vertex: the components that they lie on have no area")
@@ -181,22 +194,31 @@ class SignedHeatSolver:
             return np.abs(phi), np.where(is_known, left, phi < 0)
         return np.abs(phi), phi < 0
 
-    def _refined(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
-        """Near-exact distance (n,), and which vertices (n,) are on the left."""
+    def _measured(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
+        """Distance (n,) from the curves, with their gaps closed, and which vertices (n,) are on the left."""
         sources = chosen.unoriented()
         if not has_gaps(self._mesh, chosen):
             size, (left, is_known) = both(
-                lambda: self._unsigned.distance(sources), lambda: left_of_closed(self._mesh, self._faces, chosen)
+                lambda: self._continued(self._near(sources)),
+                lambda: left_of_closed(self._mesh, self._faces, chosen),
             )
             if (is_known | (size == 0) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
             return size, np.where(is_known, left, self._integrated(self._pieces(chosen), level) < 0)
-        size, phi = both(
-            lambda: self._unsigned.distance(sources), lambda: self._integrated(self._pieces(chosen), level)
-        )
-        left = left_of_nearest(self._faces, chosen, size, phi < 0)
-        closing = zero_curve_in_gaps(self._mesh, phi, size, self._domain.mean_edge_length)
-        return size if closing is None else np.minimum(size, self._unsigned.distance(closing)), left
+        near, phi = both(lambda: self._near(sources), lambda: self._integrated(self._pieces(chosen), level))
+        left = left_of_nearest(self._faces, chosen, near.distance, phi < 0)
+        closing = zero_curve_in_gaps(self._mesh, phi, near.distance, self._domain.mean_edge_length)
+        return self._continued(near if closing is None else near.before(self._near([closing]))), left
+
+    def _near(self, sources: list[SurfaceCurve | SurfacePoints]) -> Front:
+        """Distance from curves and points: near them, or with `refine` at all vertices."""
+        if self._fronts is None:
+            return Front(self._unsigned.distance(sources), np.full(self.n_vertices, np.nan))
+        return self._fronts.near(source_set(sources, self.n_vertices, self._mesh.F))
+
+    def _continued(self, front: Front) -> FloatArray:
+        """Distance (n,) at all vertices, from that near the curves."""
+        return front.distance if self._fronts is None else self._fronts.continued(front)
 
     def _pieces(self, chosen: OrientedSet) -> Pieces:
         """Segments and points with their normals in the planes of their faces."""

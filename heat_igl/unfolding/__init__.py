@@ -1,5 +1,6 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
+from heat_igl.unfolding.curved_fronts import CurvedFronts, Front
 from heat_igl.unfolding.directions import PathAngles, in_circle
 from heat_igl.unfolding.distance import (
     directed_from_scratch,
@@ -19,10 +20,12 @@ from heat_igl.unfolding.solver import UnfoldingSolver
 from heat_igl.unfolding.within_store import read_distances_within, write_distances_within
 
 __all__ = [
+    "CurvedFronts",
     "ExactPaths",
     "Change",
     "ExactSolution",
     "ExactSurface",
+    "Front",
     "FrontSolver",
     "Known",
     "Origin",
