@@ -185,9 +185,8 @@ class SignedHeatSolver:
         """Near-exact distance (n,), and which vertices (n,) are on the left."""
         sources = chosen.unoriented()
         if not has_gaps(self._mesh, chosen):
-            size, (left, is_known) = both(
-                lambda: self._unsigned.distance(sources), lambda: left_of_closed(self._mesh, self._faces, chosen)
-            )
+            size = self._unsigned.distance(sources)
+            left, is_known = left_of_closed(self._mesh, self._faces, chosen)
             if (is_known | (size == 0) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
             return size, np.where(is_known, left, self._integrated(self._pieces(chosen), level) < 0)
