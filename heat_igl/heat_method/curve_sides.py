@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 
 from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
-from heat_igl.mesh import Mesh, SurfaceCurve, level_segments
+from heat_igl.mesh import Mesh, SurfaceCurve, connectivity, level_segments
 from heat_igl.mesh.grouping import next_in_run
 from heat_igl.sources import OrientedSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
@@ -112,8 +110,8 @@ def left_of_closed(
         is_met[mesh.facets.of_face[sources.faces[on_edge], barycentric[on_edge].argmin(axis=1)]] = True
     tail, head = mesh.edges.T
     joins = ~(is_met | on_curve[tail] | on_curve[head])
-    graph = sp.coo_array((np.ones(int(joins.sum()), np.int8), (tail[joins], head[joins])), shape=(n, n))
-    n_regions, region = csgraph.connected_components(graph, directed=False)
+    region = connectivity.connected_components(mesh.edges[joins], n)
+    n_regions = int(region.max()) + 1
     seen = _seen(triangulation, sources)
     # Of the segments in a face, each corner sees the nearest, and of equally near ones that under the largest angle.
     angle = np.abs(seen.sine)

@@ -11,7 +11,7 @@ from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.searching import search
 from cython.cimports.heat_igl.kernels.unfolding import MAX_WAITING
 from cython.cimports.heat_igl.kernels.walking import cross_crowded, look_around, walk_through
-from cython.cimports.heat_igl.kernels.walks import NO_FAN, NOT_VISITED, REAL_BEND, SAYS_LEFT, SAYS_RIGHT, Query, Walk
+from cython.cimports.heat_igl.kernels.walks import BETWEEN, NO_FAN, NOT_VISITED, REAL_BEND, SAYS_LEFT, SAYS_RIGHT, Query, Walk
 from cython.cimports.libc.math import INFINITY, atan2, cos, sin, sqrt
 
 __all__ = ["unfold", "views"]
@@ -31,6 +31,8 @@ def unfold(
     entered,
     share,
     reach,
+    barrier,
+    roughness,
 ):
     """Pass over the vertices `order` (n,) until nothing is stale; see `heat_igl.unfolding.walks.unfold`.
 
@@ -38,7 +40,7 @@ def unfold(
     """
     ways = _Ways()
     ways.entered, ways.share, ways.reach = entered, share, reach
-    q = Query(tables, walk, first_inside, inside, tolerance, shortfall, max_steps)
+    q = Query(tables, walk, first_inside, inside, tolerance, shortfall, max_steps, barrier, roughness)
     q.has_holes = has_holes
     v: cython.int
     n: cython.int = q.t.first.shape[0] - 1
@@ -221,7 +223,10 @@ def _settle(q: Query, v: cython.int) -> cython.void:
     offset: cython.double = end.distance
     departure: cython.double = found.there
     root: cython.int = found.end
-    if found.saving != REAL_BEND and end.reach > 0.0:
+    if found.saving == BETWEEN:
+        reach += found.there
+        offset = max(found.distance - reach, 0.0)
+    elif found.saving != REAL_BEND and end.reach > 0.0:
         # On to the last bend of that path, in the direction in which it is seen from the end.
         c: cython.double = cos(found.saving)
         s: cython.double = sin(found.saving)

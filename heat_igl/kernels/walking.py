@@ -7,7 +7,8 @@ docs/refinement.md.
 
 import cython
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
-from cython.cimports.heat_igl.kernels.walking import SHARE, Limit
+from cython.cimports.heat_igl.kernels.between import take_between
+from cython.cimports.heat_igl.kernels.walking import SHARE
 from cython.cimports.heat_igl.kernels.walks import (
     BENDS,
     NOT_VISITED,
@@ -15,6 +16,7 @@ from cython.cimports.heat_igl.kernels.walks import (
     SAYS_LEFT,
     SAYS_RIGHT,
     STRAIGHT,
+    Limit,
     Query,
     Savings,
     View,
@@ -78,11 +80,16 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
     first_y: cython.double = view.ay
     if _take_common_source(q, cython.address(right), cython.address(left), k):
         return -1
+    if q.roughness > 0.0 and take_between(q, cython.address(right), cython.address(left), k):
+        return -1
+    has_barrier: cython.bint = q.barrier.shape[0] > 0
     has_points: cython.bint = q.first_inside.shape[0] > 0
     far: cython.double = 4.0 * q.found.distance * q.found.distance
     wait_for: cython.int = -1
     turned: Savings
     while view.h >= 0:
+        if has_barrier and q.barrier[view.h // 3]:
+            break
         step = cython.address(q.t.step[view.h])
         # Where the walk goes next is known late, but both ways are known now.
         prefetch(cython.address(q.t.step[max(step.to_right, 0)]))
@@ -124,6 +131,8 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
             else:
                 left.x, left.y, left.length, left.saving, left.vertex = wx, wy, length, most, step.vertex
                 view.lx, view.ly, view.bx, view.by, view.h = wx, wy, wx, wy, step.to_right
+            if q.roughness > 0.0 and take_between(q, cython.address(right), cython.address(left), k):
+                return -1
             # What is left to gain by going on, to second order in the bend: little on the whole path, and also on the
             # way to w, so that many short ways do not add up.
             gain: cython.double = 0.5 * most * most * length * reach

@@ -8,8 +8,10 @@ cdef extern from *:
     #define STRAIGHT 1e-9
     // In place of an angle, for a path that cannot be pulled tight.
     #define REAL_BEND 100.0
+    // For a path through a place between two vertices, whose lengths and directions give the one there.
+    #define BETWEEN 200.0
     """
-    double STRAIGHT, REAL_BEND
+    double STRAIGHT, REAL_BEND, BETWEEN
 
 cdef enum:
     # A vertex without a fan has no direction: sources, and vertices not yet visited.
@@ -61,6 +63,12 @@ cdef struct Cone:
     double forecast
     int a, b
 
+# An end of the cone of a walk: where it lies, how far away, and by how much its path misses being straight; -1 if it
+# is not passed on the side of the cone. `there` is the direction back at a neighbour; at others it is not needed.
+cdef struct Limit:
+    double x, y, length, saving, there
+    int vertex
+
 # By how much less than pi a path turns on the right and on the left side of a vertex.
 cdef struct Savings:
     double right, left
@@ -71,7 +79,8 @@ cdef class Query:
     cdef Walk[::1] walk
     cdef const int[::1] first_inside
     cdef const Inside[::1] inside
-    cdef double tolerance, shortfall
+    cdef const unsigned char[::1] barrier
+    cdef double tolerance, shortfall, roughness
     cdef int max_steps
     cdef bint has_holes
     cdef Way found

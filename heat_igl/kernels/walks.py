@@ -32,10 +32,11 @@ class Query:
         As `heat_igl.unfolding.walks.unfold` has them.
     """
 
-    def __init__(self, tables, walk, first_inside, inside, tolerance, shortfall, max_steps):
+    def __init__(self, tables, walk, first_inside, inside, tolerance, shortfall, max_steps, barrier, roughness):
         self.t = HalfEdges(tables)
         self.walk, self.first_inside, self.inside = walk, first_inside, inside
         self.tolerance, self.shortfall, self.max_steps = tolerance, shortfall, max_steps
+        self.barrier, self.roughness = barrier, roughness
         self.advice = np.zeros(np.diff(tables.first).max(), _ADVICE)
         self.cone = np.zeros(_MAX_CONES, _CONE)
 

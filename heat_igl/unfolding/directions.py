@@ -72,10 +72,12 @@ class PathDirections:
         if surface.faces is None:
             raise MeshError("directions need the faces of the mesh, which this domain does not know")
         #: Around the vertices of the triangulation.
-        self.angles: PolarAngles = carried_angles(polar_angles(surface.faces), surface.unfolding)
+        given = polar_angles(surface.faces)
+        self._leaving = given.leaving
+        self.angles: PolarAngles = carried_angles(given, surface.unfolding)
         self._faces, self._triangulation = surface.faces, surface.unfolding
         if refinement is not None:
-            self._number = refinement.number
+            self._number, self._tables = refinement.number, refinement.tables
             self._begin, self._scale, self._on_boundary = self._fans(refinement)
 
     def _fans(self, refinement: Refinement) -> tuple[FloatArray, FloatArray, BoolArray]:
@@ -91,6 +93,18 @@ class PathDirections:
         scale[refinement.number] = self.angles.scale
         on_boundary[refinement.number] = self.angles.on_boundary
         return begin, scale, on_boundary
+
+    def in_fans(self, row: AnyArray, corner: IntArray, seen: FloatArray) -> tuple[FloatArray, AnyArray, FloatArray]:
+        """Directions at rows (k,) of the tables: angles in their fans, the fans, and the sums of angles in these.
+
+        They are turned by `seen` (k,) from the side to the next corner, of corners (k,) of the given faces.
+        """
+        t = self._tables
+        fan = t.turn["fan_here"][t.first[row]]
+        total = t.total[fan]
+        angle = (self._leaving[previous_half_edge(corner)] - self._begin[row]) / self._scale[row] + seen
+        whole = np.where(total > 0, total, np.inf)
+        return angle - np.where(total > 0, total, 0.0) * np.floor(angle / whole), fan, total
 
     def of_walks(self, walk: AnyArray, points: SurfacePoints | None = None) -> PathAngles:
         """The angles of walks (n + p,), with p sources at `points` in faces."""

@@ -192,6 +192,17 @@ class ExactSurface:
         place = self._half_edges.located(points)
         return self._half_edges.face[place.faces].astype(np.int64), place.barycentric, place.point
 
+    def located_segments(self, segments: SourceSegments) -> tuple[IntArray, FloatArray]:
+        """Triangles (q,) that hold segments, and coordinates (q, 2, 3) of both ends; one on a side is there twice.
+
+        Raises
+        ------
+        ValueError
+            If the triangles are not those that the segments were given in.
+        """
+        place = self._half_edges.located_segments(segments)
+        return self._half_edges.face[place.faces].astype(np.int64), place.barycentric
+
     def _leaving(self, done: Searched) -> Leaving | None:
         """How paths leave the roots, in the caller's numbers."""
         if done.leaving is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -68,7 +68,7 @@ class NumberedTriangles:
         self.n, self._n_sheets = len(number) // n_sheets, n_sheets
 
     @property
-    def _faces(self) -> AnyArray:
+    def faces(self) -> AnyArray:
         """Vertices (m, 3) of the triangles, by the numbers of the tables."""
         return np.ascontiguousarray(self.tables.step["vertex"].reshape(-1, 3))
 
@@ -81,7 +81,7 @@ class NumberedTriangles:
     @cached_property
     def has_holes(self) -> bool:
         """Whether some component is neither a disk nor a sphere, so that a closed curve may enclose no surface."""
-        return _has_holes(self._faces, self._twin, len(self.number))
+        return _has_holes(self.faces, self._twin, len(self.number))
 
     @cached_property
     def flatness(self) -> float:
@@ -109,10 +109,15 @@ class NumberedTriangles:
         walk["distance"] = walk["offset"] = begin[walk["label"]]
         return WalkStarts.ascending(row, walk, begin)
 
-    def walks(self, key: FloatArray, starts: WalkStarts, tolerance: float = TOLERANCE, **ways: AnyArray) -> AnyArray:
-        """What is known of the path of each row after `Refinement.unfold`; how each begins is filled into `ways`."""
+    def walks(
+        self, order: AnyArray, starts: WalkStarts, tolerance: float = TOLERANCE, **options: Any
+    ) -> AnyArray:
+        """What is known of the path of each row after `Refinement.unfold`, of the rows in `order`.
+
+        More arguments are those of `heat_igl.unfolding.walks.unfold`.
+        """
         # The walks are large: what is needed for a moment comes before.
-        order, has_holes = self._order(key), self.has_holes
+        has_holes = self.has_holes
         walk = unknown(len(self.number) + starts.n_points)
         walk[starts.row] = starts.walk
         unfold(
@@ -126,11 +131,11 @@ class NumberedTriangles:
             max_steps=_MAX_SEARCH,
             max_passes=_MAX_PASSES,
             has_holes=has_holes,
-            **ways,
+            **options,
         )
         return walk
 
-    def _order(self, key: FloatArray) -> AnyArray:
+    def order(self, key: FloatArray) -> AnyArray:
         """Vertices of all sheets in ascending order, by the numbers of the tables."""
         if np.shape(key) != (self.n,):
             raise ValueError(f"key must have a number for each of {self.n} vertices, but its shape is {np.shape(key)}")

@@ -152,7 +152,7 @@ class Refinement(NumberedTriangles):
             if label is not None:
                 label[row] = np.tile(known.source, self._n_sheets)
         group = np.arange(len(starts.offset)) if groups is None else np.ascontiguousarray(groups, np.int64)
-        sweep(self._order(key), self._swept, distance[:n], label, starts.offset, group, is_stale)
+        sweep(self.order(key), self._swept, distance[:n], label, starts.offset, group, is_stale)
         return _on_base(self.number, self._n_sheets, distance, label, labels)
 
     def unfold(
@@ -191,7 +191,7 @@ class Refinement(NumberedTriangles):
         """
         if not 0 <= tolerance <= 1:
             raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance!r}")
-        walk = self.walks(key, self.starts(sources, offsets, points, point_offsets), tolerance)
+        walk = self.walks(self.order(key), self.starts(sources, offsets, points, point_offsets), tolerance)
         return _on_base(self.number, self._n_sheets, walk["distance"], walk["label"], labels)
 
     def paths(self, key: FloatArray, sources: Starts, tolerance: float = TOLERANCE) -> Paths:
@@ -203,7 +203,7 @@ class Refinement(NumberedTriangles):
         starts = self.starts(vertices, offsets if offsets.any() else None, points, point_offsets)
         n = len(self.number)
         entered, share, reach = np.full(n, -1, np.int32), np.zeros(n), np.zeros(n)
-        walk = self.walks(key, starts, tolerance, entered=entered, share=share, reach=reach)
+        walk = self.walks(self.order(key), starts, tolerance, entered=entered, share=share, reach=reach)
         found = Ways(walk["distance"][:n].copy(), entered.astype(np.int64), share, reach)
         places = Places.none()
         if points is not None:
@@ -217,7 +217,7 @@ class Refinement(NumberedTriangles):
 
     @cached_property
     def _triangles(self) -> Triangles:
-        F, twin = self._faces.astype(np.int64), self._twin.astype(np.int64).ravel()
+        F, twin = self.faces.astype(np.int64), self._twin.astype(np.int64).ravel()
         lengths, is_aligned = self.on_tables(self.triangulation.l), np.ones(F.size, bool)
         return half_edge_arrays(IntrinsicTriangulation(F, lengths, twin, is_aligned, len(self.number)))
 
@@ -260,7 +260,7 @@ class Refinement(NumberedTriangles):
         n, k = len(self.number), len(sources)
         row, walk, begin = at_vertices.row, at_vertices.walk, at_vertices.offset
         faces, barycentric, point, turn = self._faces_of(points)
-        vertex, seen = views(faces, barycentric, self._faces, self.tables)
+        vertex, seen = views(faces, barycentric, self.faces, self.tables)
         place = unknown(len(points))
         walk["distance"] = place["distance"] = 0.0
         seen["label"], place["label"] = k + np.repeat(point, 3), k + np.arange(len(points))

@@ -10,7 +10,7 @@ from typing import Protocol
 import igl
 import numpy as np
 
-from heat_igl.errors import is_number, shown
+from heat_igl.errors import MeshError, is_number, shown
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Surface, unfolding_surface
@@ -19,6 +19,7 @@ from heat_igl.sources import NEAR_RADIUS, NearField, SourcePoints, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.asked import Asked, asked_of, groups_of, labels_of
 from heat_igl.unfolding.bounds import Bounds
+from heat_igl.unfolding.curve_walks import KNOWN_EDGES, CurveWalks
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN
@@ -235,6 +236,8 @@ class UnfoldingSolver:
         # Tolerances are relative to the distance: the common part is added afterwards.
         earliest, relative = self._from_earliest(sources)
         by_windows = self._takes_windows(sources)
+        if not by_windows and angles is None and self._is_on_curves_alone(relative):
+            return self._from_curves(relative, u, labels, earliest)
         takes_curves = by_windows and angles is None
         points = relative.points if takes_curves else self._points(relative)
         asked = asked_of(relative, points, takes_curves)._replace(
@@ -266,6 +269,37 @@ class UnfoldingSolver:
             self._bounds.shorten(distance, labels)
             if self._sweeps:
                 self._bounds.lengthen(distance, sources, points)
+        return distance
+
+    def _is_on_curves_alone(self, sources: SourceSet) -> bool:
+        """Whether walks begin at exact distances near the sources."""
+        has_others = len(sources.vertices) or len(sources.points.faces) or not len(sources.segments.faces)
+        return not (has_others or self._sweeps or self._tolerance is not None) and self._curve_walks is not None
+
+    @cached_property
+    def _curve_walks(self) -> CurveWalks | None:
+        """None unless the surface is an oriented manifold."""
+        faces, refinement = self._surface.faces, self._refinement
+        if faces is None or refinement is None:
+            return None
+        try:
+            directions = self.path_directions
+        except MeshError:
+            return None
+        return CurveWalks(faces, refinement, directions, self._exact_on_given_faces)
+
+    def _from_curves(
+        self, sources: SourceSet, u: FloatArray, labels: IntArray | None, earliest: FloatArray
+    ) -> FloatArray:
+        """Distance (n,) from segments, whose offsets are those from when distance begins on the component."""
+        segments = sources.segments
+        cutoff = KNOWN_EDGES * self._domain.mean_edge_length + float(segments.offset.max())
+        near = self._exact_on_given_faces.solve(segments=segments, cutoff=cutoff)
+        distance = self._curve_walks.distance(-u, segments, near, labels)
+        distance += self._domain.expand_to_vertices(earliest)
+        if labels is not None:
+            labels[:] = np.append(segments.label, -1)[labels]
+        self._bounds.shorten(distance, labels)
         return distance
 
     def _from_earliest(self, sources: SourceSet) -> tuple[FloatArray, SourceSet]:
@@ -363,7 +397,7 @@ class UnfoldingSolver:
 
     def _directed_walks(self, refinement: Refinement, u: FloatArray, asked: Asked) -> FloatArray:
         starts = refinement.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
-        walk = refinement.walks(-u, starts, TOLERANCE if asked.tolerance is None else asked.tolerance)
+        walk = refinement.walks(refinement.order(-u), starts, TOLERANCE if asked.tolerance is None else asked.tolerance)
         row = refinement.number
         if asked.labels is not None:
             asked.labels[:] = walk["label"][row]

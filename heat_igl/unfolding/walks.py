@@ -26,6 +26,7 @@ WALK = np.dtype(
 # that of the first face.
 INSIDE = np.dtype([("barycentric", "f8", 3), ("turn", "f8"), ("following", "i4"), ("row", "i4")])
 
+_NO_BARRIER = np.empty(0, np.uint8)
 _NOT_ASKED = np.empty(0, np.int32), np.empty(0)
 
 
@@ -97,6 +98,8 @@ def unfold(
     entered: AnyArray = _NOT_ASKED[0],
     share: FloatArray = _NOT_ASKED[1],
     reach: FloatArray = _NOT_ASKED[1],
+    barrier: AnyArray = _NO_BARRIER,
+    roughness: float = 0.0,
 ) -> None:
     """Distance by straight paths through strips of triangles, to be read from `walk`.
 
@@ -126,7 +129,8 @@ def unfold(
     """
     first, inside = (np.empty(0, np.int32), np.empty(0, INSIDE)) if points is None else points
     unfolding.unfold(
-        order, t, walk, first, inside, tolerance, shortfall, max_steps, max_passes, has_holes, entered, share, reach
+        order, t, walk, first, inside, tolerance, shortfall, max_steps, max_passes, has_holes, entered, share, reach,
+        barrier, roughness
     )
 
 
