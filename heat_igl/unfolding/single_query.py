@@ -18,12 +18,13 @@ from heat_igl.intrinsic.triangulation import half_edge_head, half_edge_tail
 from heat_igl.kernels import bounds, numbering
 from heat_igl.mesh import Mesh, connectivity
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.asked import require_share
 from heat_igl.unfolding.bounds import shorten_along
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.glued import Glued, glued
 from heat_igl.unfolding.half_edges import HalfEdges, Numbered
 from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles
-from heat_igl.unfolding.solver import FEW, costs_little_to_be_exact, require_share
+from heat_igl.unfolding.when_exact import FEW, costs_little_to_be_exact
 
 __all__ = ["SingleQuery", "single_query"]
 
