@@ -17,11 +17,11 @@ def n_near(twin: cython.int[::1], reach: cython.int) -> int:
 
 
 def breadth_first(
-    vertex: cython.int[::1],
-    twin: cython.int[::1],
-    ring: cython.int[::1],
-    aligned: cython.uchar[::1],
-    length: cython.double[::1],
+    vertex: cython.const[cython.int][::1],
+    twin: cython.const[cython.int][::1],
+    ring,
+    aligned,
+    length: cython.const[cython.double][::1],
     n: cython.int,
     start: cython.int,
 ):
@@ -33,7 +33,7 @@ def breadth_first(
     Parameters
     ----------
     vertex, twin, ring, aligned, length : (3 m,)
-        As `gluing.glue` returns them.
+        As `gluing.glue` returns them; None for `ring` and `aligned` if they are not needed.
     n : int
         Number of vertices; those of no face come last.
     start : int
@@ -50,14 +50,18 @@ def breadth_first(
     """
     m: cython.int = twin.shape[0] // 3
     # Each on its own, so that what is not needed any more can be let go of.
-    vertices, twins, rings = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)
-    alignment, lengths = np.empty(3 * m, np.uint8), np.empty(3 * m)
+    vertices, twins, lengths = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m)
+    rings = None if ring is None else np.empty(3 * m, np.int32)
+    alignment = None if aligned is None else np.empty(3 * m, np.uint8)
     numbers, faces = np.full(n, -1, np.int32), np.empty(m, np.int32)
     search: _Search = _Search()
     search.vertex, search.twin, search.aligned, search.length = vertex, twin, aligned, length
     search.new_vertex, search.new_twin, search.new_aligned, search.new_length = vertices, twins, alignment, lengths
+    search.has_aligned = aligned is not None
     search.number, search.face, search.place = numbers, faces, np.full(m, -1, np.int32)
+    old_ring: cython.const[cython.int][::1] = ring
     new_ring: cython.int[::1] = rings
+    n_rings: cython.int = 0 if ring is None else 3 * m
     first: cython.int
     h: cython.int
     t: cython.int
@@ -70,10 +74,10 @@ def breadth_first(
             if search.number[v] < 0:
                 search.number[v] = search.n_numbered
                 search.n_numbered += 1
-        for h in range(3 * m):
+        for h in range(n_rings):
             new_ring[h] = h
             if search.has_many:
-                t = ring[3 * search.face[h // 3] + h % 3]
+                t = old_ring[3 * search.face[h // 3] + h % 3]
                 new_ring[h] = 3 * search.place[t // 3] + t % 3
     return vertices, twins, rings, alignment, lengths, numbers, faces
 
@@ -83,10 +87,10 @@ def breadth_first(
 class _Search:
     """What a breadth-first search over the faces reads, and writes by the new numbers."""
 
-    vertex: cython.int[::1]
-    twin: cython.int[::1]
-    aligned: cython.uchar[::1]
-    length: cython.double[::1]
+    vertex: cython.const[cython.int][::1]
+    twin: cython.const[cython.int][::1]
+    aligned: cython.const[cython.uchar][::1]
+    length: cython.const[cython.double][::1]
     new_vertex: cython.int[::1]
     new_twin: cython.int[::1]
     new_aligned: cython.uchar[::1]
@@ -97,6 +101,7 @@ class _Search:
     n_met: cython.int
     n_done: cython.int
     n_numbered: cython.int
+    has_aligned: cython.bint
     has_many: cython.bint  # whether more than two faces meet at an edge
 
     @cython.cfunc
@@ -120,7 +125,8 @@ class _Search:
                     self.n_numbered += 1
                 self.new_vertex[g + c] = self.number[v]
                 self.new_length[g + c] = self.length[h + c]
-                self.new_aligned[g + c] = self.aligned[h + c]
+                if self.has_aligned:
+                    self.new_aligned[g + c] = self.aligned[h + c]
                 t = self.twin[h + c]
                 if t >= 0:
                     self.meet(t // 3)

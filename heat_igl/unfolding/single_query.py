@@ -44,7 +44,9 @@ def single_query(mesh: Mesh, sources: IntArray) -> SingleQuery | None:
     found.flip(mesh.F)
     flipped = _flipped_sides(mesh, found)
     first_face = int(np.argmax(found.vertex == sources[0])) // 3
-    vertex, twin, _, _, length, number, _ = numbering.breadth_first(*found[:5], mesh.n_vertices, first_face)
+    vertex, twin, _, _, length, number, _ = numbering.breadth_first(
+        found.vertex, found.twin, None, None, found.length, mesh.n_vertices, first_face
+    )
     return SingleQuery(Sides(vertex, twin, length), found.exponent, number, sources, key, flipped)
 
 
