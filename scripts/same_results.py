@@ -34,7 +34,6 @@ from scaffold import add_output, add_seed, environment, environment_line, option
 
 WHEEL = ("airplane.obj", "bone.ply", "bunny.obj", "bunny10k_textured.obj", "cow.obj", "cube.obj")
 SUFFIXES = (".off", ".obj", ".ply", ".mesh")
-Results = dict[str, list[np.ndarray]]
 
 
 # What is compared. Only names that users have: these stay where they are.

@@ -423,7 +423,7 @@ def test_compiled_flips_are_those_of_the_triangulation():
 
 
 def test_the_order_of_vertices_and_faces_does_not_matter():
-    """Tables of a mesh in a local order keep it; one in a random order is numbered by a front."""
+    """Tables of a mesh in a local order keep it; one in a random order is numbered breadth-first."""
     mesh, rng = bumpy(), np.random.default_rng(4)
     new = rng.permutation(mesh.n_vertices)
     V = np.empty_like(mesh.V)

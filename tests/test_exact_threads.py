@@ -13,7 +13,7 @@ from test_unfolding import moebius_strip
 
 from heat_igl import Mesh, SurfacePoints, isolines, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
-from heat_igl.kernels import window_pairs
+from heat_igl.kernels import windows
 from heat_igl.sources import source_set
 from heat_igl.unfolding import window_search
 from heat_igl.unfolding.exact import ExactSurface
@@ -81,14 +81,14 @@ def test_the_second_thread_has_a_share(monkeypatch):
     """Without this, equal distances could be those of one thread that did all."""
     shares = []
 
-    def assist(front, cutoff, statistics):
-        done = window_pairs.assist(front, cutoff, statistics)
-        shares.append(int(statistics[1]))
+    def search(*arguments):
+        done = windows.search(*arguments)
+        shares.append(int(arguments[-1][1]))
         return done
 
-    spied = SimpleNamespace(pair=window_pairs.pair, part=window_pairs.part, assist=assist)
-    monkeypatch.setattr(window_search, "window_pairs", spied)
+    monkeypatch.setattr(window_search, "windows", SimpleNamespace(Front=windows.Front, search=search))
     surface = ExactSurface(intrinsic_triangulation(ZOO["rough sphere"]()))
     found = surface.solve(np.array([0]), threads=2)
-    assert len(shares) == 1
-    assert 0.1 * found.n_windows < shares[0] < 0.9 * found.n_windows
+    assert len(shares) == 2
+    assert sum(shares) == found.n_windows
+    assert min(shares) > 0.1 * found.n_windows

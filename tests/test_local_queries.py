@@ -16,6 +16,7 @@ from heat_igl.typing import FloatArray
 from heat_igl.unfolding import blocks_within, local, read_distances_within, within_store, write_distances_within
 from heat_igl.unfolding.exact import ExactSurface, exact_distance
 from heat_igl.unfolding.half_edges import from_mesh
+from heat_igl.unfolding.window_search import Found
 
 
 def book() -> Mesh:
@@ -176,24 +177,28 @@ def test_what_is_not_reached_is_padded():
     assert pair_distances(mesh, np.empty((0, 2), int)).shape == (0,)
 
 
-def test_a_search_costs_what_it_touches(monkeypatch):
-    # What the kernel is handed must come back clean, or the next search would pay for it and go wrong.
+def test_a_search_clears_what_it_wrote(monkeypatch):
+    """Otherwise the next search on the same arrays would go wrong, or cost more than what it touches."""
     mesh, kept = bumpy(), []
     original = local._Workspace
 
     class Kept(original):  # type: ignore[misc, valid-type]
         def __init__(self, *arguments):
             super().__init__(*arguments)
-            kept.append([array.copy() for array in self._state])
-            kept.append(self._state)
+            kept.append(self)
 
     monkeypatch.setattr(local, "_Workspace", Kept)
     distances_within(mesh, 0.5)
     nearest_vertices(mesh, 7)
     pair_distances(mesh, [[0, 300], [5, 9]])
-    for before, after in zip(kept[::2], kept[1::2], strict=True):
-        for i in (0, 1, 2, 3, 4, 7):
-            np.testing.assert_array_equal(before[i], after[i])
+    blank = Found.of(mesh.n_vertices, mesh.n_vertices)
+    for work in kept:
+        for name in ("distance", "root", "label", "entered"):
+            np.testing.assert_array_equal(getattr(work._found, name), getattr(blank, name))
+    work, (found, value) = kept[0], np.empty((2, 2, mesh.n_vertices))
+    for row in range(2):
+        work.search(np.array([3], np.int32), found[row].view(np.int32)[: mesh.n_vertices], value[row], n_nearest=99)
+    np.testing.assert_array_equal(value[0, :99], value[1, :99])
 
 
 def test_a_cutoff_ends_the_search():

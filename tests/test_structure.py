@@ -97,14 +97,14 @@ LINES = [f"line_{k} = {k}" for k in range(8)]
 @pytest.mark.parametrize(("shared", "found"), [(5, []), (6, [6]), (8, [8])])
 def test_repeated_passages_are_as_long_as_they_can_be(shared: int, found: list[int]) -> None:
     first = "\n".join(["a = 0", *LINES[:shared], "b = 0"])
-    # Comments, blank lines, white space, brackets and imports make no difference.
+    # Comments, blank lines, white space, brackets, imports and decorators of kernels make no difference.
     noise = ["    " + line + "  # why" for line in LINES[:shared]]
-    noise[2:2] = ["", "# a comment", ")", "from x import (", "    y,", ")"]
+    noise[2:2] = ["", "# a comment", ")", "from x import (", "    y,", ")", "@cython.nogil"]
     second = "\n".join(["c = 0", *noise, "d = 0"])
     passages = structure.repeated({"first": first, "second": second})
     assert [each.lines for each in passages] == found
     if found:
-        assert (passages[0].first, passages[0].second) == (f"first:2-{shared + 1}", f"second:2-{shared + 7}")
+        assert (passages[0].first, passages[0].second) == (f"first:2-{shared + 1}", f"second:2-{shared + 8}")
 
 
 def test_a_file_repeats_itself_but_not_the_lines_of_a_run() -> None:

@@ -8,7 +8,6 @@ from heat_igl.heat_method.signed_heat import Level, SignedHeatSolver
 from heat_igl.heat_method.signed_volumes import VoxelBox, volume_signed_distance
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.heat_method.solver import HeatMethodSolver, heat_method_distance
-from heat_igl.heat_method.time_step import smallest_time_step
 from heat_igl.heat_method.vector_heat import VectorHeatSolver
 
 __all__ = [
@@ -31,6 +30,5 @@ __all__ = [
     "VectorHeatSolver",
     "VoxelBox",
     "heat_method_distance",
-    "smallest_time_step",
     "volume_signed_distance",
 ]

@@ -9,11 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError, SourceError, is_number, positive, real_numbers, shown
-from heat_igl.heat_method.time_step import smallest_time_step
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_mesh, as_simplices
 from heat_igl.operators import Operators, operators
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT
-from heat_igl.steps import HeatFlow, PoissonProblem
+from heat_igl.steps import HeatFlow, PoissonProblem, smallest_time_step
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["VoxelBox", "volume_signed_distance"]

@@ -21,12 +21,12 @@ def delaunay_refinement(
     triangulation: IntrinsicTriangulation,
     most_vertices: int,
     *,
-    least_angle: float = _LEAST_ANGLE,
     largest_radius: float = np.inf,
     unit: FloatArray | None = None,
 ) -> IntrinsicTriangulation:
-    """Add circumcenters as vertices until all angles are large enough (Sharp, Soliman, Crane 2019, section 4.2).
+    """Add circumcenters as vertices until no angle is below 25 degrees (Sharp, Soliman, Crane 2019, section 4.2).
 
+    Angles at a vertex of the mesh around which they sum to less than 60 degrees are left as they are.
     The triangle with the largest circumcircle among the bad ones is first. Edges are flipped after each new vertex, so
     that the triangulation stays intrinsic Delaunay. The surface stays the same, and so do the given vertices, which
     come before the new ones.
@@ -37,9 +37,6 @@ def delaunay_refinement(
         Intrinsic Delaunay, closed and oriented: every half-edge has an aligned twin.
     most_vertices : int
         No vertex is added when there are so many.
-    least_angle : float
-        Smallest angle in degrees, at most 30. If the angles around a vertex of the mesh sum to less than 60 degrees,
-        the angles at the vertex are left as they are.
     largest_radius : float
         Largest circumradius, in the `unit` of the face.
     unit : (m,) float64, optional
@@ -63,7 +60,7 @@ def delaunay_refinement(
         triangulation.twin,
         triangulation.n,
         np.ones(len(triangulation.F)) if unit is None else unit,
-        np.radians(least_angle),
+        np.radians(_LEAST_ANGLE),
         largest_radius,
         most_vertices,
     )

@@ -1,8 +1,8 @@
-"""Triangles by their edge lengths, made from positions: gluing, and numbering by a front.
+"""Triangles by their edge lengths, made from positions: gluing along the edges that faces share.
 
 Half-edge ``3 f + c`` is the side of face f opposite its corner c, and that corner has the same number. This is for a
-mesh that is asked once, as are the flips of `flipping`; `heat_igl.intrinsic` glues with numpy, and keeps the history of
-its flips.
+mesh that is asked once, as are the flips of `flipping` and the numbers of `numbering`; `heat_igl.intrinsic` glues with
+numpy, and keeps the history of its flips.
 """
 
 import cython
@@ -10,7 +10,7 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge
 from cython.cimports.libc.math import INFINITY, sqrt
 
-__all__ = ["breadth_first", "glue", "has_needles", "n_near"]
+__all__ = ["glue", "has_needles"]
 
 
 def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double][:, ::1], scale: cython.double):
@@ -159,16 +159,6 @@ def _glue_sides(
             ring[p] = h
 
 
-def n_near(twin: cython.int[::1], reach: cython.int) -> int:
-    """How many half-edges (3 m,) are glued to one whose number differs from theirs by less than `reach`."""
-    h: cython.int
-    n: cython.int = 0
-    with cython.nogil:
-        for h in range(twin.shape[0]):
-            n += (twin[h] >= 0) & (-reach < twin[h] - h) & (twin[h] - h < reach)
-    return n
-
-
 def has_needles(length: cython.const[cython.double][::1], margin: cython.double) -> bool:
     """Whether in some face two sides (3 m,) exceed the third by less than `margin` times the longest side of all."""
     h: cython.Py_ssize_t
@@ -183,89 +173,3 @@ def has_needles(length: cython.const[cython.double][::1], margin: cython.double)
             longest_of_all = max(longest_of_all, longest)
             least = min(least, total - 2.0 * longest)
     return least < margin * longest_of_all
-
-
-def breadth_first(
-    vertex: cython.int[::1],
-    twin: cython.int[::1],
-    ring: cython.int[::1],
-    aligned: cython.uchar[::1],
-    length: cython.double[::1],
-    n: cython.int,
-    start: cython.int,
-):
-    """Number vertices and faces in the order in which a front over the faces meets them, from face `start` on.
-
-    What a front touches together then lies together in memory.
-
-    Returns
-    -------
-    vertex, twin, ring, aligned, length
-        By the new numbers.
-    number : (n,) int32
-        New number of each vertex.
-    face : (m,) int32
-        Old number of each face; corners stay in place.
-    """
-    m: cython.int = twin.shape[0] // 3
-    # Each on its own, so that what is not needed any more can be let go of.
-    vertices, twins, rings = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)
-    alignment, lengths = np.empty(3 * m, np.uint8), np.empty(3 * m)
-    numbers, faces = np.full(n, -1, np.int32), np.empty(m, np.int32)
-    new_vertex: cython.int[::1] = vertices
-    new_twin: cython.int[::1] = twins
-    new_ring: cython.int[::1] = rings
-    new_aligned: cython.uchar[::1] = alignment
-    new_length: cython.double[::1] = lengths
-    number: cython.int[::1] = numbers
-    face: cython.int[::1] = faces
-    place: cython.int[::1] = np.full(m, -1, np.int32)
-    n_met: cython.int = 0
-    n_done: cython.int = 0
-    n_numbered: cython.int = 0
-    has_many: cython.bint = False
-    first: cython.int
-    c: cython.int
-    f: cython.int
-    h: cython.int
-    t: cython.int
-    v: cython.int
-    with cython.nogil:
-        for first in range(-1, m):
-            f = start if first < 0 else first
-            if place[f] >= 0:
-                continue
-            place[f] = n_met
-            face[n_met] = f
-            n_met += 1
-            while n_done < n_met:
-                h = 3 * face[n_done]
-                for c in range(3):
-                    v = vertex[h + c]
-                    if number[v] < 0:
-                        number[v] = n_numbered
-                        n_numbered += 1
-                    new_vertex[3 * n_done + c] = number[v]
-                    new_length[3 * n_done + c] = length[h + c]
-                    new_aligned[3 * n_done + c] = aligned[h + c]
-                    t = twin[h + c]
-                    if t >= 0:
-                        f = t // 3
-                        if place[f] < 0:
-                            place[f] = n_met
-                            face[n_met] = f
-                            n_met += 1
-                        t = 3 * place[f] + t % 3
-                    has_many |= t == -2
-                    new_twin[3 * n_done + c] = t
-                    new_ring[3 * n_done + c] = 3 * n_done + c
-                n_done += 1
-        for v in range(n):
-            if number[v] < 0:
-                number[v] = n_numbered
-                n_numbered += 1
-        if has_many:
-            for h in range(3 * m):
-                t = ring[3 * face[h // 3] + h % 3]
-                new_ring[h] = 3 * place[t // 3] + t % 3
-    return vertices, twins, rings, alignment, lengths, numbers, faces

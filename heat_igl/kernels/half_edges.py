@@ -5,7 +5,7 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.half_edges import Spoke, Step, Turn, following, preceding
 from cython.cimports.libc.math import M_PI, NAN, atan2, fabs, sqrt
 
-__all__ = ["HalfEdges", "breadth_first", "fill", "first_spokes"]
+__all__ = ["HalfEdges", "fill", "first_spokes"]
 
 
 @cython.final
@@ -203,97 +203,3 @@ def _fill_spokes(
             # Seen from beyond, the side runs the other way.
             s.beyond_along, s.beyond_depth = (1.0 - step[t].x) * base, step[t].y * base
             s.beyond = step[t].vertex
-
-
-def breadth_first(
-    F: cython.const[cython.longlong][:, ::1],
-    l: cython.const[cython.double][:, ::1],  # noqa: E741
-    twin: cython.const[cython.longlong][::1],
-    n: cython.int,
-):
-    """Vertices and faces numbered in the order in which a front over glued faces meets them.
-
-    Returns the new number of each vertex (n,) and of each face (m,), and F, l and twin by the new numbers, all integers
-    int32. Neighbours on the surface become neighbours in memory: nothing on most meshes, a fifth of the time where
-    vertices come in an arbitrary order.
-    """
-    m: cython.int = F.shape[0]
-    numbers, faces = np.full(n, -1, np.int32), np.full(m, -1, np.int32)
-    new_F, new_l, new_twin = np.empty((m, 3), np.int32), np.empty((m, 3)), np.empty(3 * m, np.int32)
-    number: cython.int[::1] = numbers
-    face: cython.int[::1] = faces
-    queue: cython.int[::1] = np.empty(m, np.int32)
-    F_by_number: cython.int[:, ::1] = new_F
-    l_by_number: cython.double[:, ::1] = new_l
-    twin_by_number: cython.int[::1] = new_twin
-    with cython.nogil:
-        _meet(F, twin, number, face, queue)
-        _renumber(F, l, twin, number, face, queue, F_by_number, l_by_number, twin_by_number)
-    return numbers, faces, new_F, new_l, new_twin
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _meet(
-    F: cython.const[cython.longlong][:, ::1],
-    twin: cython.const[cython.longlong][::1],
-    number: cython.int[::1],
-    face: cython.int[::1],
-    queue: cython.int[::1],
-) -> cython.void:
-    """Number vertices and faces; `queue` (m,) gets the faces in their new order."""
-    c: cython.int
-    f: cython.int
-    v: cython.int
-    start: cython.int
-    n_met: cython.int = 0
-    n_numbered: cython.int = 0
-    n_done: cython.int = 0
-    for start in range(F.shape[0]):
-        if face[start] < 0:
-            face[start] = n_met
-            queue[n_met] = start
-            n_met += 1
-        while n_done < n_met:
-            f = queue[n_done]
-            n_done += 1
-            for c in range(3):
-                v = F[f, c]
-                if number[v] < 0:
-                    number[v] = n_numbered
-                    n_numbered += 1
-                t: cython.longlong = twin[3 * cython.cast(cython.Py_ssize_t, f) + c]
-                if t >= 0 and face[t // 3] < 0:
-                    face[t // 3] = n_met
-                    queue[n_met] = t // 3
-                    n_met += 1
-    for v in range(number.shape[0]):  # those of no face
-        if number[v] < 0:
-            number[v] = n_numbered
-            n_numbered += 1
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _renumber(
-    F: cython.const[cython.longlong][:, ::1],
-    l: cython.const[cython.double][:, ::1],  # noqa: E741
-    twin: cython.const[cython.longlong][::1],
-    number: cython.int[::1],
-    face: cython.int[::1],
-    queue: cython.int[::1],
-    new_F: cython.int[:, ::1],
-    new_l: cython.double[:, ::1],
-    new_twin: cython.int[::1],
-) -> cython.void:
-    i: cython.Py_ssize_t
-    f: cython.Py_ssize_t
-    c: cython.int
-    for i in range(F.shape[0]):
-        f = queue[i]
-        for c in range(3):
-            t: cython.longlong = twin[3 * f + c]
-            new_F[i, c], new_l[i, c] = number[F[f, c]], l[f, c]
-            new_twin[3 * i + c] = 3 * face[t // 3] + t % 3 if t >= 0 else t

@@ -1,9 +1,10 @@
 """Many local searches by windows on one surface, each of which costs what it touches."""
 
 import cython
-from cython.cimports.heat_igl.kernels.window_lists import allocate, free_front
+from cython.cimports.heat_igl.kernels.window_goal import aim_at
+from cython.cimports.heat_igl.kernels.window_memory import allocate, free_front
 from cython.cimports.heat_igl.kernels.window_search import forget, narrow, run
-from cython.cimports.heat_igl.kernels.window_sources import aim_at, start_at
+from cython.cimports.heat_igl.kernels.window_sources import start_at
 from cython.cimports.heat_igl.kernels.window_structures import Search
 from cython.cimports.heat_igl.kernels.windows import Front
 

@@ -3,8 +3,9 @@
 import cython
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.window_lists import add, more_room
-from cython.cimports.heat_igl.kernels.window_sources import apart, relax, take
+from cython.cimports.heat_igl.kernels.window_distances import relax, take
+from cython.cimports.heat_igl.kernels.window_lists import add
+from cython.cimports.heat_igl.kernels.window_memory import more_room
 from cython.cimports.heat_igl.kernels.window_structures import (
     AROUND_APEX,
     LEFT_OF_APEX,
@@ -15,6 +16,8 @@ from cython.cimports.heat_igl.kernels.window_structures import (
     List,
     Search,
     Window,
+    apart,
+    at_corner,
     backward,
     lateral,
     reach,
@@ -298,11 +301,9 @@ def over_corners(s: cython.pointer(Search), j: cython.int) -> cython.void:
     """Distance of target j over the corners of its face."""
     f: cython.int = s.target_face[j]
     c: cython.int
-    k: cython.int
     v: cython.int
     corner: cython.double[3]
     for c in range(3):
-        for k in range(3):
-            corner[k] = 1.0 if k == c else 0.0
+        at_corner(c, corner)
         v = s.vertex[3 * f + c]
-        take(s, j, s.distance[v] + apart(s, f, corner, s.target + 3 * j), v)
+        take(s, j, s.distance[v] + apart(s.length + 3 * f, corner, s.target + 3 * j), v)

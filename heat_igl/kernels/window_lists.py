@@ -1,4 +1,4 @@
-"""Windows that wait: lists at half-edges, each with a key, and the queue of the keys.
+"""Windows that wait: lists at half-edges, each with a key.
 
 The square of the key of a list is the power of the root with respect to the circle around the face that is entered
 next. On a Delaunay triangulation that power grows along every straight line from the root, it is no larger than the
@@ -8,92 +8,13 @@ triangulations the key is the distance of the nearest point of the windows.
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.window_structures import Entry, List, Search, Window, reach, straight
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge
+from cython.cimports.heat_igl.kernels.window_goal import towards_goal
+from cython.cimports.heat_igl.kernels.window_queue import push
+from cython.cimports.heat_igl.kernels.window_structures import List, Search, Window
 from cython.cimports.libc.math import INFINITY, sqrt
-from cython.cimports.libc.stdlib import free, malloc, realloc
+from cython.cimports.libc.stdlib import realloc
 from cython.cimports.libc.string import memcpy, memmove
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cython.void:
-    """Add to the queue, a binary heap."""
-    i: cython.int
-    above: cython.int
-    if s.n_heap == s.n_all_heap:
-        more: cython.pointer(Entry) = cython.cast(
-            cython.pointer(Entry), realloc(s.heap, 2 * s.n_all_heap * cython.sizeof(Entry))
-        )
-        if more == cython.NULL:
-            s.failed = True
-            return
-        s.heap = more
-        s.n_all_heap *= 2
-    i = s.n_heap
-    s.n_heap += 1
-    while i > 0:
-        above = (i - 1) // 2
-        if s.heap[above].key <= key:
-            break
-        s.heap[i] = s.heap[above]
-        i = above
-    s.heap[i].key = key
-    s.heap[i].what = what
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def pop(s: cython.pointer(Search)) -> Entry:
-    """Take the entry with the smallest key."""
-    heap: cython.pointer(Entry) = s.heap
-    top: Entry = heap[0]
-    last: Entry
-    i: cython.int = 0
-    above: cython.int
-    below: cython.int = 1
-    s.n_heap -= 1
-    last = heap[s.n_heap]
-    # From below: the gap goes down to a leaf, without a branch that depends on keys, and the last entry seldom rises.
-    while below + 1 < s.n_heap:
-        below += heap[below + 1].key < heap[below].key
-        heap[i] = heap[below]
-        i = below
-        below = 2 * i + 1
-    if below < s.n_heap:
-        heap[i] = heap[below]
-        i = below
-    while i > 0:
-        above = (i - 1) // 2
-        if heap[above].key <= last.key:
-            break
-        heap[i] = heap[above]
-        i = above
-    heap[i] = last
-    return top
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> cython.void:
-    """Note a distance of vertex v for the other of two searches."""
-    n: cython.int = s.n_news[s.parity]
-    room: cython.int = s.n_all_news[s.parity]
-    more: cython.pointer(Entry)
-    if n == room:
-        room = 2 * room + 64
-        more = cython.cast(cython.pointer(Entry), realloc(s.news[s.parity], room * cython.sizeof(Entry)))
-        if more == cython.NULL:
-            s.failed = True
-            return
-        s.news[s.parity] = more
-        s.n_all_news[s.parity] = room
-    s.news[s.parity][n].key = distance
-    s.news[s.parity][n].what = v
-    s.n_news[s.parity] = n + 1
 
 
 @cython.cfunc
@@ -139,6 +60,41 @@ def _is_late(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _has_room(one: cython.pointer(List), n: cython.int) -> cython.bint:
+    """Make room for n more windows of a list; false without memory."""
+    capacity: cython.int
+    more: cython.pointer(Window)
+    if one.count + n > one.capacity:
+        capacity = 2 * (one.count + n) + 4
+        more = cython.cast(cython.pointer(Window), realloc(one.windows, capacity * cython.sizeof(Window)))
+        if more == cython.NULL:
+            return False
+        one.windows = more
+        one.capacity = capacity
+    return True
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _mirrored(w: Window, length: cython.double) -> Window:
+    """A window in the frame that begins at the other end of its half-edge."""
+    start: cython.double = w.start
+    if w.is_plane:
+        w.offset += w.x * length
+        w.x = -w.x
+    else:
+        w.x = length - w.x
+    w.start = length - w.stop
+    w.stop = length - start
+    return w
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def append(
@@ -152,14 +108,12 @@ def append(
     """Add windows to those that wait at half-edge t."""
     i: cython.int
     place: cython.int = s.slot[t]
-    capacity: cython.int
     one: cython.pointer(List)
     to: cython.pointer(Window)
     length: cython.double = s.length[t]
     bulge: cython.double = s.bulge[t]
     key: cython.double
     lowest: cython.double = INFINITY
-    x: cython.double
     if place < 0:
         if s.last_key < INFINITY and _is_late(s, run, n, length, bulge):
             return
@@ -171,14 +125,9 @@ def append(
         s.lists[place].count = 0
         s.lists[place].key = INFINITY
     one = cython.address(s.lists[place])
-    if one.count + n > one.capacity:
-        capacity = 2 * (one.count + n) + 4
-        to = cython.cast(cython.pointer(Window), realloc(one.windows, capacity * cython.sizeof(Window)))
-        if to == cython.NULL:
-            s.failed = True
-            return
-        one.windows = to
-        one.capacity = capacity
+    if not _has_room(one, n):
+        s.failed = True
+        return
     if in_front != mirrored:
         if one.count > 0:
             memmove(one.windows + n, one.windows, one.count * cython.sizeof(Window))
@@ -190,15 +139,7 @@ def append(
     s.n_waiting += n
     if mirrored:
         for i in range(n):
-            to[i] = run[n - 1 - i]
-            if to[i].is_plane:
-                to[i].offset += to[i].x * length
-                to[i].x = -to[i].x
-            else:
-                to[i].x = length - to[i].x
-            x = to[i].start
-            to[i].start = length - to[i].stop
-            to[i].stop = length - x
+            to[i] = _mirrored(run[n - 1 - i], length)
     else:
         memcpy(to, run, n * cython.sizeof(Window))
     for i in range(n):
@@ -239,40 +180,13 @@ def _free_list(s: cython.pointer(Search)) -> cython.int:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _towards_goal(s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int) -> cython.int:
-    """Keep the windows over e through which the goal may be as near as by the path known; how many they are.
-
-    No path from a point of e to the goal is shorter than the straight line from an end of e, less the way to that end.
-    With the distance of the point added, this falls from one end to the other, so it is least at an end of the window.
-    """
-    i: cython.int
-    k: cython.int = 0
-    w: cython.pointer(Window)
-    # As seen by the windows, whose frame begins at the head of e.
-    from_tail: cython.double = straight(s, s.vertex[previous_half_edge(e)])
-    from_head: cython.double = straight(s, s.vertex[next_half_edge(e)]) - s.length[e]
-    for i in range(n):
-        w = run + i
-        if w.offset + reach(w, w.stop) + (from_tail - w.stop) > s.within:
-            continue
-        if w.offset + reach(w, w.start) + (from_head + w.start) > s.within:
-            continue
-        if k < i:
-            run[k] = run[i]
-        k += 1
-    return k
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def add(
     s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int, in_front: cython.bint
 ) -> cython.void:
     """Windows over half-edge e, out of its face; their frame runs from the head of e to its tail."""
     t: cython.int = s.twin[e]
     if s.aim >= 0:
-        n = _towards_goal(s, e, run, n)
+        n = towards_goal(s, e, run, n)
         if n == 0:
             return
     if t >= 0:
@@ -282,66 +196,3 @@ def add(
         while t != e:
             append(s, t, run, n, in_front, s.vertex[next_half_edge(t)] == s.vertex[next_half_edge(e)])
             t = s.ring[t]
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def more_room(s: cython.pointer(Search), n: cython.int) -> cython.void:
-    """Room for n windows on each side of an apex."""
-    s.n_out = 2 * n
-    free(s.to_left)
-    free(s.to_right)
-    s.to_left = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
-    s.to_right = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
-    if s.to_left == cython.NULL or s.to_right == cython.NULL:
-        s.failed = True
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def allocate(s: cython.pointer(Search)) -> cython.void:
-    """Room for a front."""
-    s.n_lists = s.n_made_lists = s.n_heap = s.n_touched = s.n_found = 0
-    s.n_all_lists, s.n_all_heap, s.n_out = 256, 1024, 256
-    s.free_list = -1
-    s.failed = s.meets_flat = s.is_shared = False
-    s.n_windows = s.n_lists_done = s.n_waiting = 0
-    s.n_nearest = s.n_all_ranked = 0
-    s.ranked = cython.NULL
-    s.lists = cython.cast(cython.pointer(List), malloc(s.n_all_lists * cython.sizeof(List)))
-    s.heap = cython.cast(cython.pointer(Entry), malloc(s.n_all_heap * cython.sizeof(Entry)))
-    s.to_left = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
-    s.to_right = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
-    if s.lists == cython.NULL or s.heap == cython.NULL or s.to_left == cython.NULL or s.to_right == cython.NULL:
-        s.failed = True
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def free_front(s: cython.pointer(Search)) -> cython.void:
-    """Return the memory of a front."""
-    i: cython.int
-    for i in range(s.n_made_lists):
-        free(s.lists[i].windows)
-    free(s.lists)
-    free(s.heap)
-    free(s.to_left)
-    free(s.to_right)
-    free(s.ranked)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def empty_front(s: cython.pointer(Search)) -> cython.void:
-    """Drop all that waits; lists and queue keep their room."""
-    i: cython.int
-    for i in range(s.n_lists):
-        if s.lists[i].half_edge >= 0:
-            s.slot[s.lists[i].half_edge] = -1
-    s.n_lists = s.n_heap = 0
-    s.n_waiting = 0
-    s.free_list = -1

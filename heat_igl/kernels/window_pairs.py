@@ -7,13 +7,11 @@ from cython.cimports.cpython.pythread import (
     PyThread_allocate_lock,
     PyThread_free_lock,
 )
-from cython.cimports.heat_igl.kernels.window_lists import allocate, empty_front, free_front
-from cython.cimports.heat_igl.kernels.window_sharing import run_beside
 from cython.cimports.heat_igl.kernels.window_structures import Search
 from cython.cimports.heat_igl.kernels.windows import Front
 from cython.cimports.libc.stdlib import free
 
-__all__ = ["assist", "pair", "part"]
+__all__ = ["pair", "part"]
 
 
 def pair(
@@ -24,7 +22,7 @@ def pair(
     round_length: cython.double,
     plenty: cython.longlong,
 ) -> None:
-    """Let two searches on one surface go on side by side: `search` on the first, `assist` on the second.
+    """Let two searches on one surface go on side by side: `search` from the sources on one, from none on the other.
 
     Parameters
     ----------
@@ -77,20 +75,3 @@ def part(first: Front, second: Front) -> bool:
         for i in range(4):
             PyThread_free_lock(s.arrived[i])
     return not (first.state.is_shared and (first.state.meets_flat or second.state.meets_flat))
-
-
-def assist(front: Front, cutoff: cython.double, statistics: cython.longlong[::1]) -> bool:
-    """Take a part of the search that the other front of a `pair` begins; parameters and result as for `search`."""
-    s: cython.pointer(Search) = cython.address(front.state)
-    s.stops_early = False
-    s.slack = 0.0
-    s.cutoff = cutoff
-    with cython.nogil:
-        allocate(s)
-        run_beside(s)
-        empty_front(s)
-        free_front(s)
-    statistics[0] = s.n_touched
-    statistics[1] = s.n_windows
-    statistics[2] = s.n_lists_done
-    return not s.failed

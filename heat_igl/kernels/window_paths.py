@@ -8,8 +8,10 @@ given up once the distance of a vertex shows that it is too far from the source.
 """
 
 import cython
+from cython.cimports.heat_igl.kernels.inner_sources import InnerSources
+from cython.cimports.heat_igl.kernels.path_segments import PathSegments
 from cython.cimports.heat_igl.kernels.triangles import foot, next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.window_structures import nearest_on
+from cython.cimports.heat_igl.kernels.window_structures import apart, at_corner
 from cython.cimports.libc.math import fabs, sqrt
 
 __all__ = ["trace_back"]
@@ -17,17 +19,9 @@ __all__ = ["trace_back"]
 
 def trace_back(
     tables,
-    distance: cython.const[cython.double][::1],
-    root: cython.const[cython.int][::1],
-    entered: cython.const[cython.int][::1],
-    crossing: cython.const[cython.double][::1],
-    point_face: cython.const[cython.int][::1],
-    point: cython.const[cython.double][:, ::1],
-    point_offset: cython.const[cython.double][::1],
-    segment_face: cython.const[cython.int][::1],
-    segment: cython.const[cython.double][:, :, ::1],
-    segment_offset: cython.const[cython.double][::1],
-    start,
+    found,
+    sources,
+    begin,
     face: cython.int[::1],
     place: cython.double[:, :, ::1],
     end: cython.longlong[::1],
@@ -37,80 +31,57 @@ def trace_back(
     Parameters
     ----------
     tables : Tables
-        As for `search`, of triangles that were not flipped: no face has a vertex twice.
-    distance, root, entered, crossing : (n,)
-        What `search` found for the vertices.
-    point_face, point, point_offset : (p,), (p, 3), (p,)
-        Its source points inside faces.
-    segment_face, segment, segment_offset : (q,), (q, 2, 3), (q,)
-        Its source segments inside faces.
-    start : Starts
-        Where the k paths begin; see `heat_igl.unfolding.exact_paths.Starts`.
+        As for `windows.Front`, of triangles that were not flipped: no face has a vertex twice.
+    found : Found
+        What `windows.search` found for the vertices.
+    sources : Starts
+        Its sources.
+    begin : PathStarts
+        Where the k paths begin; see `heat_igl.unfolding.exact_paths.PathStarts`.
     face, place : (r,), (r, 2, 3)
         Take the segments, path after path: face, and barycentric coordinates of both ends.
     end : (k,)
         Takes where the segments of each path end; nothing is added for a path that was lost.
     """
-    back: _Back = _Back()
-    back.vertex, back.length, back.twin = tables.vertex, tables.length, tables.twin
-    back.aligned, back.ring, back.double_area = tables.aligned, tables.ring, tables.double_area
-    back.distance, back.root, back.entered, back.crossing = distance, root, entered, crossing
-    back.point_face, back.point, back.point_offset = point_face, point, point_offset
-    back.segment_face, back.segment, back.segment_offset = segment_face, segment, segment_offset
-    back.face, back.place = face, place
-    vertex: cython.const[cython.int][::1] = start.vertex
-    from_face: cython.const[cython.int][::1] = start.face
-    from_place: cython.const[cython.double][:, ::1] = start.barycentric
-    from_distance: cython.const[cython.double][::1] = start.distance
-    from_root: cython.const[cython.int][::1] = start.root
-    from_entered: cython.const[cython.int][::1] = start.entered
-    from_crossing: cython.const[cython.double][::1] = start.crossing
+    segments: PathSegments = PathSegments(face, place)
+    tracer: _PathTracer = _PathTracer(tables, found, InnerSources(len(found.distance), sources), segments)
+    vertex: cython.const[cython.int][::1] = begin.vertex
+    from_face: cython.const[cython.int][::1] = begin.face
+    from_place: cython.const[cython.double][:, ::1] = begin.barycentric
+    from_distance: cython.const[cython.double][::1] = begin.distance
+    from_root: cython.const[cython.int][::1] = begin.root
+    from_entered: cython.const[cython.int][::1] = begin.entered
+    from_crossing: cython.const[cython.double][::1] = begin.crossing
     i: cython.Py_ssize_t
     v: cython.int
-    begin: Bend
+    bend: Bend
     n_done: cython.int = 0
     with cython.nogil:
         for i in range(end.shape[0]):
-            back.n_steps = 0
-            first: cython.longlong = back.n_segments
+            tracer.n_steps = 0
+            first: cython.longlong = segments.n
             v = vertex[i]
-            begin.x, begin.y, begin.z = from_place[i, 0], from_place[i, 1], from_place[i, 2]
-            begin.face, begin.distance, begin.root = from_face[i], from_distance[i], from_root[i]
-            begin.entered, begin.crossing = from_entered[i], from_crossing[i]
+            bend.x, bend.y, bend.z = from_place[i, 0], from_place[i, 1], from_place[i, 2]
+            bend.face, bend.distance, bend.root = from_face[i], from_distance[i], from_root[i]
+            bend.entered, bend.crossing = from_entered[i], from_crossing[i]
             if v < 0:
-                v = back.along_bends(back.straight(cython.address(begin)))
-            elif root[v] == v:
-                v = back.stay(cython.address(begin))
+                v = tracer.along_bends(tracer.straight(cython.address(bend)))
+            elif tracer.root[v] == v:
+                v = tracer.stay(cython.address(bend))
             else:
-                v = back.along_bends(v)
+                v = tracer.along_bends(v)
             if v == NO_ROOM:
                 break
             if v == LOST:
-                back.n_segments = first
-            end[i] = back.n_segments
+                segments.n = first
+            end[i] = segments.n
             n_done += 1
     return n_done
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _apart(
-    length: cython.pointer[cython.const[cython.double]], a: cython.p_double, b: cython.p_double
-) -> cython.double:
-    """Distance between two points of a face with these edge lengths."""
-    u: cython.double = a[0] - b[0]
-    v: cython.double = a[1] - b[1]
-    w: cython.double = a[2] - b[2]
-    p: cython.double = length[0]
-    q: cython.double = length[1]
-    r: cython.double = length[2]
-    return sqrt(max(-(p * p * v * w + q * q * w * u + r * r * u * v), 0.0))
-
-
 @cython.final
 @cython.cclass
-class _Back:
+class _PathTracer:
     """A surface, what a search found on it, and the segments so far."""
 
     vertex: cython.const[cython.int][::1]
@@ -123,19 +94,19 @@ class _Back:
     root: cython.const[cython.int][::1]
     entered: cython.const[cython.int][::1]
     crossing: cython.const[cython.double][::1]
-    point_face: cython.const[cython.int][::1]
-    point: cython.const[cython.double][:, ::1]
-    point_offset: cython.const[cython.double][::1]
-    segment_face: cython.const[cython.int][::1]
-    segment: cython.const[cython.double][:, :, ::1]
-    segment_offset: cython.const[cython.double][::1]
-    face: cython.int[::1]
-    place: cython.double[:, :, ::1]
-    n_segments: cython.longlong
+    sources: InnerSources
+    segments: PathSegments
     n_steps: cython.longlong
     # Lines to be tried, the next one last.
     line: Line[MOST_LINES]
     n_lines: cython.int
+
+    def __init__(self, tables, found, sources: InnerSources, segments: PathSegments):
+        self.vertex, self.length, self.twin = tables.vertex, tables.length, tables.twin
+        self.aligned, self.ring, self.double_area = tables.aligned, tables.ring, tables.double_area
+        self.distance, self.root = found.distance, found.root
+        self.entered, self.crossing = found.entered, found.crossing
+        self.sources, self.segments = sources, segments
 
     @cython.cfunc
     @cython.nogil
@@ -158,7 +129,7 @@ class _Back:
             )
             if h < 0:
                 # A source inside a face with this vertex.
-                h = 3 * self.face_of_source(begin.root)
+                h = 3 * self.sources.face(begin.root)
                 while self.vertex[h] != v:
                     h += 1
             begin.face = h // 3
@@ -173,7 +144,7 @@ class _Back:
         """A segment without length, at a source; AT_SOURCE or NO_ROOM."""
         here: cython.double[3]
         here[0], here[1], here[2] = begin.x, begin.y, begin.z
-        return AT_SOURCE if self.append(begin.face, here, here) else NO_ROOM
+        return AT_SOURCE if self.segments.append(begin.face, here, here) else NO_ROOM
 
     @cython.cfunc
     @cython.nogil
@@ -183,14 +154,17 @@ class _Back:
         h: cython.int = begin.entered
         f: cython.int = begin.face
         here: cython.double[3]
+        corner: cython.double[3]
         line: Line
         v: cython.int
         c: cython.int
         here[0], here[1], here[2] = begin.x, begin.y, begin.z
         for c in range(3):
             v = self.vertex[3 * f + c]
-            if here[c] != 1.0 and ((h < 0 and v == begin.root) or self.leads(begin, v, self.to_corner(f, here, c))):
-                return self.add_to_corner(f, here, c, v)
+            at_corner(c, corner)
+            left: cython.double = apart(cython.address(self.length[3 * f]), here, corner)
+            if here[c] != 1.0 and ((h < 0 and v == begin.root) or self.leads(begin, v, left)):
+                return v if self.segments.append(f, here, corner) else NO_ROOM
         if h < 0:
             return self.add_to_source(f, here, begin.root)
         length: cython.double = self.length[h]
@@ -236,12 +210,13 @@ class _Back:
         apex_x: cython.double = foot(length, self.length[left], self.length[right])
         apex_y: cython.double = self.double_area[g] / length
         here: cython.double[3]
+        corner: cython.double[3]
         side: cython.int
         ux: cython.double
         uy: cython.double
         across: cython.double
         out: Line
-        self.n_segments = line.n_segments
+        self.segments.n = line.n_segments
         self.n_steps += 1
         if self.n_steps > MOST_STEPS:
             return LOST
@@ -250,7 +225,8 @@ class _Back:
         if self.is_at_source(begin, g, here, line.walked):
             return self.add_to_source(g, here, begin.root)
         if self.leads(begin, self.vertex[t], line.walked + sqrt(x * x + apex_y * apex_y)):
-            return self.add_to_corner(g, here, t % 3, self.vertex[t])
+            at_corner(t % 3, corner)
+            return self.vertex[t] if self.segments.append(g, here, corner) else NO_ROOM
         # Out over the side between the tail of t and the apex, or over the one between the apex and the head.
         if x * line.dy - apex_y * line.dx > 0.0:
             side = left
@@ -305,48 +281,11 @@ class _Back:
     def note(self, t: cython.int, line: Line, mirrored: cython.bint) -> cython.void:
         if self.n_lines == MOST_LINES:
             return
-        line.half_edge, line.n_segments = t, self.n_segments
+        line.half_edge, line.n_segments = t, self.segments.n
         if mirrored:
             line.x, line.dx = self.length[t] - line.x, -line.dx
         self.line[self.n_lines] = line
         self.n_lines += 1
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def to_corner(self, f: cython.int, here: cython.p_double, c: cython.int) -> cython.double:
-        """How far a point of face f is from its corner c."""
-        there: cython.double[3]
-        k: cython.int
-        for k in range(3):
-            there[k] = k == c
-        return _apart(cython.address(self.length[3 * f]), here, there)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def face_of_source(self, root: cython.int) -> cython.int:
-        """The face that holds a source point or segment."""
-        i: cython.Py_ssize_t = root - self.distance.shape[0]
-        n_points: cython.Py_ssize_t = self.point_face.shape[0]
-        return self.point_face[i] if i < n_points else self.segment_face[i - n_points]
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def nearest_of_source(self, root: cython.int, here: cython.p_double, there: cython.p_double) -> cython.double:
-        """The point of a source inside a face that is nearest to a point of the face; the offset of the source."""
-        k: cython.int
-        i: cython.Py_ssize_t = root - self.distance.shape[0]
-        if i < self.point_face.shape[0]:
-            for k in range(3):
-                there[k] = self.point[i, k]
-            return self.point_offset[i]
-        i -= self.point_face.shape[0]
-        nearest_on(
-            cython.address(self.length[3 * self.segment_face[i]]), cython.address(self.segment[i, 0, 0]), here, there
-        )
-        return self.segment_offset[i]
 
     @cython.cfunc
     @cython.nogil
@@ -356,14 +295,11 @@ class _Back:
     ) -> cython.bint:
         """Whether the source inside a face that the path comes from lies ahead in face f."""
         there: cython.double[3]
-        offset: cython.double
-        if begin.root < self.distance.shape[0] or self.face_of_source(begin.root) != f:
+        side: cython.pointer[cython.const[cython.double]] = cython.address(self.length[3 * f])
+        if self.sources.face(begin.root) != f:
             return False
-        offset = self.nearest_of_source(begin.root, here, there)
-        return (
-            fabs(offset + walked + _apart(cython.address(self.length[3 * f]), here, there) - begin.distance)
-            <= AT_ROOT * begin.distance
-        )
+        walked += self.sources.nearest(side, begin.root, here, there)
+        return fabs(walked + apart(side, here, there) - begin.distance) <= AT_ROOT * begin.distance
 
     @cython.cfunc
     @cython.nogil
@@ -373,18 +309,7 @@ class _Back:
         there: cython.double[3]
         share: cython.double = x / self.length[h]
         there[h % 3], there[previous_half_edge(h) % 3], there[next_half_edge(h) % 3] = 0.0, 1.0 - share, share
-        return self.append(f, here, there)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def add_to_corner(self, f: cython.int, here: cython.p_double, c: cython.int, v: cython.int) -> cython.int:
-        """A segment to corner c; its vertex v."""
-        there: cython.double[3]
-        k: cython.int
-        for k in range(3):
-            there[k] = k == c
-        return v if self.append(f, here, there) else NO_ROOM
+        return self.segments.append(f, here, there)
 
     @cython.cfunc
     @cython.nogil
@@ -392,21 +317,7 @@ class _Back:
     def add_to_source(self, f: cython.int, here: cython.p_double, root: cython.int) -> cython.int:
         """A segment to a source inside face f."""
         there: cython.double[3]
-        if root < self.distance.shape[0] or self.face_of_source(root) != f:
+        if self.sources.face(root) != f:
             return LOST
-        self.nearest_of_source(root, here, there)
-        return AT_SOURCE if self.append(f, here, there) else NO_ROOM
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def append(self, f: cython.int, here: cython.p_double, there: cython.p_double) -> cython.bint:
-        k: cython.int
-        if self.n_segments == self.face.shape[0]:
-            return False
-        self.face[self.n_segments] = f
-        for k in range(3):
-            self.place[self.n_segments, 0, k] = here[k]
-            self.place[self.n_segments, 1, k] = there[k]
-        self.n_segments += 1
-        return True
+        self.sources.nearest(cython.address(self.length[3 * f]), root, here, there)
+        return AT_SOURCE if self.segments.append(f, here, there) else NO_ROOM

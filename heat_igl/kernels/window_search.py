@@ -2,10 +2,12 @@
 
 import cython
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
+from cython.cimports.heat_igl.kernels.window_bends import emit_vertex
 from cython.cimports.heat_igl.kernels.window_crossing import cross, over_corners
-from cython.cimports.heat_igl.kernels.window_lists import empty_front, pop
+from cython.cimports.heat_igl.kernels.window_memory import empty_front
+from cython.cimports.heat_igl.kernels.window_queue import pop
 from cython.cimports.heat_igl.kernels.window_segments import emit_segment
-from cython.cimports.heat_igl.kernels.window_sources import emit_point, shed
+from cython.cimports.heat_igl.kernels.window_sources import emit_point
 from cython.cimports.heat_igl.kernels.window_structures import MARGIN, Entry, Search
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdlib import free, malloc
@@ -36,7 +38,7 @@ def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
 @cython.nogil
 @cython.exceptval(check=False)
 def carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
-    """Let a list cross its face, or a vertex, point or segment shed its windows, unless the entry is out of date."""
+    """Let a list cross its face, or windows leave a vertex, point or segment, unless the entry is out of date."""
     v: cython.int
     place: cython.int
     if entry.what < s.n_half_edges:
@@ -50,14 +52,14 @@ def carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
     elif v >= s.n:
         emit_point(s, v - s.n)
     elif entry.key == s.upper[v] and s.emitted[v] > entry.key:
-        shed(s, v)
+        emit_vertex(s, v)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def run(s: cython.pointer(Search)) -> cython.void:
-    """Carry lists, and let vertices and points shed windows, in ascending order of their keys."""
+    """Carry lists, and let windows leave vertices, points and segments, in ascending order of their keys."""
     entry: Entry
     j: cython.int
     s.last_key = s.cutoff * (1.0 + MARGIN) + s.slack

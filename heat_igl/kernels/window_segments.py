@@ -6,9 +6,9 @@ all directions: the ends are source points as well.
 
 import cython
 from cython.cimports.heat_igl.kernels.triangles import foot, next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.window_distances import relax, take
 from cython.cimports.heat_igl.kernels.window_lists import add
-from cython.cimports.heat_igl.kernels.window_sources import apart, relax, take
-from cython.cimports.heat_igl.kernels.window_structures import NARROW, Search, Window, nearest_on
+from cython.cimports.heat_igl.kernels.window_structures import NARROW, Search, Window, apart, at_corner, nearest_on
 from cython.cimports.libc.math import fabs, sqrt
 
 
@@ -22,11 +22,9 @@ def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
     ends: cython.p_double = s.segment + 6 * i
     corner: cython.double[3]
     c: cython.int
-    k: cython.int
     j: cython.int
     for c in range(3):
-        for k in range(3):
-            corner[k] = 1.0 if k == c else 0.0
+        at_corner(c, corner)
         relax(s, s.vertex[3 * f + c], _distance(s, i, corner), root, -1, 0.0, -1, 0.0, 0.0)
         # On the side itself, the segment belongs to the face beyond it too.
         if ends[c] > 0.0 or ends[3 + c] > 0.0:
@@ -44,7 +42,7 @@ def _distance(s: cython.pointer(Search), i: cython.int, point: cython.p_double) 
     """Of a point in the face of segment i."""
     found: cython.double[3]
     nearest_on(s.length + 3 * s.segment_face[i], s.segment + 6 * i, point, found)
-    return s.segment_offset[i] + apart(s, s.segment_face[i], point, found)
+    return s.segment_offset[i] + apart(s.length + 3 * s.segment_face[i], point, found)
 
 
 @cython.cfunc

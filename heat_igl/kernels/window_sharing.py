@@ -20,7 +20,8 @@ from cython.cimports.cpython.pythread import (
 )
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.window_lists import append, pop, push
+from cython.cimports.heat_igl.kernels.window_lists import append
+from cython.cimports.heat_igl.kernels.window_queue import pop, push
 from cython.cimports.heat_igl.kernels.window_search import carry
 from cython.cimports.heat_igl.kernels.window_structures import (
     FLAT,

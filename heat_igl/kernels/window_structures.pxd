@@ -172,6 +172,23 @@ cdef inline double product(const double* side, const double* u, const double* v)
     )
 
 
+# Barycentric coordinates of a corner.
+cdef inline void at_corner(int c, double* found) noexcept nogil:
+    found[0] = found[1] = found[2] = 0.0
+    found[c] = 1.0
+
+
+# Distance between two points of a face.
+cdef inline double apart(const double* side, const double* a, const double* b) noexcept nogil:
+    cdef double u = a[0] - b[0]
+    cdef double v = a[1] - b[1]
+    cdef double w = a[2] - b[2]
+    cdef double square = -(
+        side[0] * side[0] * v * w + side[1] * side[1] * w * u + side[2] * side[2] * u * v
+    )
+    return sqrt(square) if square > 0.0 else 0.0
+
+
 # The point of a segment, given by the coordinates of its two ends, that is nearest to a point.
 cdef inline void nearest_on(const double* side, const double* ends, const double* point, double* found) noexcept nogil:
     cdef double along[3]

@@ -18,20 +18,25 @@ __all__ = ["graph_distance", "steiner_distance"]
 
 # Arcs of a graph, 24 bytes each and a few times that while they are put together.
 LARGEST_GRAPH = 4e7
+# Points on each edge at first.
+_POINTS = 4
+# Graphs are made denser until distances change by less than this part of themselves.
+_TOLERANCE = 2e-3
 
 
-def steiner_distance(mesh: MeshLike, sources: ArrayLike, tolerance: float = 2e-3, points: int = 4) -> FloatArray:
+def steiner_distance(mesh: MeshLike, sources: ArrayLike) -> FloatArray:
     """Distance (k, n) from each of k sources, by shortest paths in denser and denser graphs.
 
-    The number of points on every edge is doubled until distances change by less than `tolerance` of themselves, on
-    average over the vertices; the remaining error is less than the last change. As many points on a short edge as on a
+    The number of points on every edge is doubled until distances change by less than 0.2 % on average over the
+    vertices; the remaining error is less than the last change. As many points on a short edge as on a
     long one measured better than even spacing: on the cow, 16 points per edge leave 0.08 % on average and 0.5 % at the
     worst vertex, and as many in even spacing 0.09 % and 1.3 %.
     """
     mesh = as_simplices(mesh)
+    points = _POINTS
     distance = graph_distance(mesh, sources, points)
     change = float("inf")
-    while change > tolerance:
+    while change > _TOLERANCE:
         points *= 2
         before, distance = distance, graph_distance(mesh, sources, points)
         reached = np.isfinite(distance) & (distance > 0)

@@ -11,6 +11,7 @@ from heat_igl.steps.flow_derivative import FlowDerivative, MatrixSlopes
 from heat_igl.steps.integration import PoissonProblem, integrate
 from heat_igl.steps.normalization import NormalizedDivergence, damping, normalize
 from heat_igl.steps.pattern import analysis
+from heat_igl.steps.smallest_time_step import smallest_time_step, smallest_time_steps
 from heat_igl.steps.vector_diffusion import VectorHeatFlow
 
 __all__ = [
@@ -29,4 +30,6 @@ __all__ = [
     "integrate",
     "mass_unit",
     "normalize",
+    "smallest_time_step",
+    "smallest_time_steps",
 ]

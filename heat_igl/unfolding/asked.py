@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from heat_igl.errors import is_number, shown
 from heat_igl.mesh import SurfacePoints
-from heat_igl.sources import SourcePoints, SourceSegments, SourceSet
+from heat_igl.sources import NearField, SourcePoints, SourceSegments, SourceSet
 from heat_igl.typing import FloatArray, IntArray
+from heat_igl.unfolding.exact import ExactSolution
+from heat_igl.unfolding.refinement import Known
 
-__all__ = ["Asked", "asked_of", "groups_of", "labels_of"]
+__all__ = [
+    "Asked",
+    "asked_of",
+    "from_earliest",
+    "groups_of",
+    "known_of",
+    "labels_of",
+    "require_share",
+    "with_samples",
+]
 
 
 class Asked(NamedTuple):
@@ -27,6 +40,19 @@ class Asked(NamedTuple):
     labels: IntArray | None
     angles: FloatArray | None
     tolerance: float | None
+
+    @property
+    def starts(
+        self,
+    ) -> tuple[IntArray, FloatArray | None, SurfacePoints | None, FloatArray | None, SourceSegments | None]:
+        """What distance starts from, as `ExactSurface.solve` takes it."""
+        return self.vertices, self.offsets, self.points, self.point_offsets, self.segments
+
+
+def require_share(tolerance: float | None) -> None:
+    """Refuse a tolerance that is not a number from 0 to 1."""
+    if tolerance is not None and not (is_number(tolerance) and 0 <= tolerance <= 1):
+        raise ValueError(f"tolerance must lie between 0 and 1, not {shown(tolerance)}")
 
 
 def labels_of(sources: SourceSet, points: SourcePoints) -> IntArray:
@@ -60,3 +86,35 @@ def groups_of(sources: SourceSet, points: SourcePoints) -> IntArray | None:
     of_curve = np.isin(points.label, sources.segments.label)
     groups[k:][of_curve] = len(groups) + points.label[of_curve]
     return groups
+
+
+def with_samples(sources: SourceSet, near_field: NearField, spacing: float) -> SourcePoints:
+    """The points of a set, and points on its curves that are at most `spacing` apart."""
+    samples, _ = near_field.samples(sources.segments, spacing)
+    return sources.points.joined(samples).joined(sources.segments.ends())
+
+
+def from_earliest(sources: SourceSet, components: IntArray, F: IntArray) -> tuple[FloatArray, SourceSet]:
+    """When distance begins on each component (n_components,), and the sources with their offsets from there."""
+    points, segments = sources.points, sources.segments
+    places = [components[at] for at in (sources.vertices, F[points.faces, 0], F[segments.faces, 0])]
+    offsets = [sources.vertex_offset, points.offset, segments.offset]
+    earliest = np.full(int(components.max()) + 1, np.inf)
+    np.minimum.at(earliest, np.concatenate(places), np.concatenate(offsets))
+    late = [offset - earliest[place] for offset, place in zip(offsets, places, strict=True)]
+    return earliest, replace(
+        sources,
+        vertex_offset=late[0],
+        points=replace(points, offset=late[1]),
+        segments=replace(segments, offset=late[2]),
+    )
+
+
+def known_of(asked: Asked, near: ExactSolution | None) -> Known | None:
+    """Vertices that a sweep begins with."""
+    if near is None:
+        return None
+    is_found = np.isfinite(near.distance)
+    is_found[asked.vertices] = False
+    vertex = np.flatnonzero(is_found)
+    return Known(vertex, near.distance[vertex], near.origin.label[vertex])

@@ -24,13 +24,14 @@ from heat_igl.sources import (
     source_set,
 )
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.unfolding.asked import require_share, with_samples
 from heat_igl.unfolding.directions import PathAngles
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN, from_mesh
 from heat_igl.unfolding.numbered import TOLERANCE
 from heat_igl.unfolding.refinement import Refine
 from heat_igl.unfolding.single_query import single_query
-from heat_igl.unfolding.solver import UnfoldingSolver, require_share
+from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = ["directed_from_scratch", "distance_from_scratch", "distance_to_targets", "unfolded_distance"]
 
@@ -244,10 +245,6 @@ class _Domain:
         return self.mesh.components
 
     @cached_property
-    def n_components(self) -> int:
-        return int(self.components.max()) + 1
-
-    @cached_property
     def mean_edge_length(self) -> float:
         return float(self.mesh.edge_lengths.mean())
 
@@ -270,8 +267,7 @@ def _along_edges(domain: _Domain, sources: SourceSet) -> FloatArray:
     np.minimum.at(begin, sources.vertices, sources.vertex_offset)
     points = sources.points
     if len(sources.segments.faces):
-        samples, _ = domain.near_field.samples(sources.segments, _SPACING * domain.mean_edge_length)
-        points = points.joined(samples).joined(sources.segments.ends())
+        points = with_samples(sources, domain.near_field, _SPACING * domain.mean_edge_length)
     np.minimum.at(begin, mesh.F[points.faces], _to_corners(mesh, points))
     # Dijkstra's algorithm starts at one more vertex, which is as far from the others as distance begins there.
     start = np.flatnonzero(np.isfinite(begin))

@@ -14,7 +14,8 @@ from heat_igl.runtime import n_threads
 from heat_igl.sources import Sources, SourceSegments, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh, from_triangulation
-from heat_igl.unfolding.window_search import Found, Leaving, Searched, search, starts_at
+from heat_igl.unfolding.window_search import Found, Leaving, Searched, search
+from heat_igl.unfolding.window_starts import starts_at
 
 __all__ = ["ExactSolution", "ExactSurface", "Origin", "exact_distance"]
 
@@ -167,7 +168,7 @@ class ExactSurface:
         which = done.nearest_copy(0 if targets is None else len(targets))
         return ExactSolution(
             *self._result(done.found, done, self._half_edges.number, cutoff),
-            *self._result(done.at_targets, done, which, cutoff),
+            *self._result(done.targets.found, done, which, cutoff),
             done.n_windows,
             done.n_crossings,
             self._leaving(done),

@@ -13,15 +13,16 @@ from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import MARGIN, HalfEdges, from_triangulation
-from heat_igl.unfolding.window_search import Searched, search, starts_at
+from heat_igl.unfolding.window_search import Searched, search
+from heat_igl.unfolding.window_starts import starts_at
 
-__all__ = ["ExactPaths", "Starts", "exact_paths"]
+__all__ = ["ExactPaths", "PathStarts", "exact_paths"]
 
 # Segments that there is room for at first.
 _ROOM = 2**14
 
 
-class Starts(NamedTuple):
+class PathStarts(NamedTuple):
     """Where k paths begin, by the numbers of the tables: at a vertex, or where that is -1, at a target of the search.
 
     Attributes
@@ -110,14 +111,14 @@ def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: Fl
     )
 
 
-def _starts(edges: HalfEdges, done: Searched, vertex: IntArray) -> Starts:
+def _starts(edges: HalfEdges, done: Searched, vertex: IntArray) -> PathStarts:
     """Where paths begin: at vertices by the caller's number, or where that is -1, at one target after the other."""
-    at, place = done.at_targets, done.place
+    at, place = done.targets.found, done.targets.place
     k, of_target = len(vertex), np.flatnonzero(vertex < 0)
     which = done.nearest_copy(len(of_target))
     number = edges.number[vertex]
     corner = edges.tables.corner_of_vertex[number]
-    starts = Starts(
+    starts = PathStarts(
         np.where(vertex < 0, -1, number).astype(np.int32),
         (corner // 3).astype(np.int32),
         np.eye(3)[corner % 3],
@@ -132,28 +133,12 @@ def _starts(edges: HalfEdges, done: Searched, vertex: IntArray) -> Starts:
     return starts
 
 
-def _traced(edges: HalfEdges, done: Searched, starts: Starts) -> tuple[AnyArray, FloatArray, IntArray]:
+def _traced(edges: HalfEdges, done: Searched, starts: PathStarts) -> tuple[AnyArray, FloatArray, IntArray]:
     """Faces and ends of all segments, and where the segments of each path end; room is doubled until they fit."""
-    room, found, sources = _ROOM, done.found, done.starts
+    room = _ROOM
     while True:
         face, place, ends = np.empty(room, np.int32), np.empty((room, 2, 3)), np.zeros(len(starts.vertex), np.int64)
-        n_done = window_paths.trace_back(
-            edges.tables,
-            found.distance,
-            found.root,
-            found.entered,
-            found.crossing,
-            sources.points.faces,
-            np.ascontiguousarray(sources.points.barycentric),
-            sources.point_offset,
-            sources.segments.faces,
-            np.ascontiguousarray(sources.segments.barycentric),
-            sources.segment_offset,
-            starts,
-            face,
-            place,
-            ends,
-        )
+        n_done = window_paths.trace_back(edges.tables, done.found, done.starts, starts, face, place, ends)
         if n_done == len(starts.vertex):
             n = ends[-1] if n_done else 0
             return face[:n], place[:n], ends

@@ -13,7 +13,8 @@ from heat_igl.kernels.window_surface import SEVERAL_FANS
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
-from heat_igl.unfolding.window_search import Leaving, Searched, search, starts_at
+from heat_igl.unfolding.window_search import Leaving, Searched, search
+from heat_igl.unfolding.window_starts import starts_at
 
 __all__ = ["vectors_from"]
 

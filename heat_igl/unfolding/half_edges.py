@@ -9,7 +9,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation
-from heat_igl.kernels import gluing, window_surface
+from heat_igl.kernels import numbering, window_surface
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
@@ -58,7 +58,7 @@ class Tables(NamedTuple):
 
 
 class Located(NamedTuple):
-    """Points in the triangles, by their new numbers; one on a side, once for every triangle there.
+    """Points in the triangles, by their new numbers; one on a side, once for every triangle there; contiguous.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ NO_SEGMENTS = Located(np.empty(0, np.int32), np.empty((0, 2, 3)), np.empty(0, np
 
 
 class Numbered(NamedTuple):
-    """Triangles by their sides, numbered in the order of a front: what `gluing.breadth_first` returns.
+    """Triangles by their sides, numbered in the order of a front: what `numbering.breadth_first` returns.
 
     Attributes
     ----------
@@ -216,7 +216,7 @@ class HalfEdges:
             other[k, :, (here + 2) % 3] = np.where(same_way, head, tail)
             rows.append((here // 3, other, point[i]))
         faces, barycentric, point = (np.concatenate(column) for column in zip(*rows, strict=True))
-        return Located(faces.astype(np.int32), barycentric, point)
+        return Located(faces.astype(np.int32), np.ascontiguousarray(barycentric), point)
 
     def by_face(self, located: Located) -> tuple[AnyArray, AnyArray]:
         """The first point of each triangle, and the next point of the same triangle; -1 for none."""
@@ -251,7 +251,7 @@ def from_triangulation(triangulation: IntrinsicTriangulation) -> HalfEdges:
     if 3 * m + triangulation.n >= TOO_MANY:
         raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
     exponent = mean_exponent(triangulation.l)
-    numbered = gluing.breadth_first(
+    numbered = numbering.breadth_first(
         triangulation.F.ravel().astype(np.int32),
         triangulation.twin.astype(np.int32),
         rings(triangulation),
@@ -279,11 +279,11 @@ def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
         return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
     found.flip(mesh.F, MARGIN)
     m, n = mesh.n_faces, mesh.n_vertices
-    if m <= _FEW_FACES and gluing.n_near(found.twin, _NEAR) > len(found.twin) // 2:
+    if m <= _FEW_FACES and numbering.n_near(found.twin, _NEAR) > len(found.twin) // 2:
         numbers, faces = np.arange(n, dtype=np.int32), np.arange(m, dtype=np.int32)
         return HalfEdges(Numbered(*found[:5], numbers, faces), found.exponent)
     first_face = int(np.argmax(found.vertex == start)) // 3
-    numbered = Numbered(*gluing.breadth_first(*found[:5], n, first_face))
+    numbered = Numbered(*numbering.breadth_first(*found[:5], n, first_face))
     exponent = found.exponent
     del found  # before there are more tables
     return HalfEdges(numbered, exponent)

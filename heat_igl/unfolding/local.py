@@ -16,7 +16,7 @@ from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
-from heat_igl.unfolding.window_search import TOLERANCE
+from heat_igl.unfolding.window_search import TOLERANCE, Found
 
 __all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distances"]
 
@@ -254,19 +254,9 @@ class _Workspace:
     """What searches of one thread write, in the state in which each must find it."""
 
     def __init__(self, edges: HalfEdges, position: FloatArray | None) -> None:
-        n = edges.n
         self._names = edges.old_vertex
-        self._state = (
-            np.full(n, np.inf),
-            np.full(n, np.inf),
-            np.full(n, -1, np.int32),
-            np.full(n, -1, np.int32),
-            np.full(n, -1, np.int32),
-            np.zeros(n),
-            np.empty(n, np.int32),
-            np.full(len(edges.tables.vertex), -1, np.int32),
-        )
-        self._front = windows.Front(*edges.tables, *self._state, TOLERANCE, position=position)
+        self._found = Found.of(edges.n, edges.n)
+        self._front = windows.Front(edges.tables, self._found, TOLERANCE, position=position)
 
     def search(
         self,

@@ -15,15 +15,16 @@ import scipy.sparse as sp
 
 from heat_igl.intrinsic.fans import tables
 from heat_igl.intrinsic.triangulation import half_edge_head, half_edge_tail
-from heat_igl.kernels import bounds, gluing
+from heat_igl.kernels import bounds, numbering
 from heat_igl.mesh import Mesh, connectivity
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.asked import require_share
 from heat_igl.unfolding.bounds import shorten_along
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.glued import Glued, glued
 from heat_igl.unfolding.half_edges import HalfEdges, Numbered
 from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles
-from heat_igl.unfolding.solver import FEW, costs_little_to_be_exact, require_share
+from heat_igl.unfolding.when_exact import FEW, costs_little_to_be_exact
 
 __all__ = ["SingleQuery", "single_query"]
 
@@ -43,7 +44,9 @@ def single_query(mesh: Mesh, sources: IntArray) -> SingleQuery | None:
     found.flip(mesh.F)
     flipped = _flipped_sides(mesh, found)
     first_face = int(np.argmax(found.vertex == sources[0])) // 3
-    vertex, twin, _, _, length, number, _ = gluing.breadth_first(*found[:5], mesh.n_vertices, first_face)
+    vertex, twin, _, _, length, number, _ = numbering.breadth_first(
+        found.vertex, found.twin, None, None, found.length, mesh.n_vertices, first_face
+    )
     return SingleQuery(Sides(vertex, twin, length), found.exponent, number, sources, key, flipped)
 
 

@@ -3,46 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property, partial
 from typing import Protocol
 
 import igl
 import numpy as np
 
-from heat_igl.errors import MeshError, is_number, shown
+from heat_igl.errors import MeshError
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Surface, unfolding_surface
 from heat_igl.runtime import both, n_threads
 from heat_igl.sources import NEAR_RADIUS, NearField, SourcePoints, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.unfolding.asked import Asked, asked_of, groups_of, labels_of
+from heat_igl.unfolding.asked import (
+    Asked,
+    asked_of,
+    from_earliest,
+    groups_of,
+    known_of,
+    labels_of,
+    require_share,
+    with_samples,
+)
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.curve_walks import KNOWN_EDGES, CurveWalks
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN
-from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles
+from heat_igl.unfolding.numbered import TOLERANCE
 from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
-from heat_igl.unfolding.refinement import Known, Refine, Refinement
+from heat_igl.unfolding.refinement import Refine, Refinement
+from heat_igl.unfolding.when_exact import FEW, costs_little_to_be_exact, directions_by_windows
 
-__all__ = ["FEW", "UnfoldingDomain", "UnfoldingSolver", "costs_little_to_be_exact", "require_share"]
+__all__ = ["UnfoldingDomain", "UnfoldingSolver"]
 
 # Curves are unfolded from as points, at most so many mean edge lengths s apart. At a distance d that is wrong by the
 # fraction (s / d)^2 / 8 at most: by 0.005 % beyond the 6 edges within which windows take the curve itself.
 _SPACING = 0.125
-# In components of up to so many vertices distance is found by exact windows, whatever was asked for.
-FEW = 1000
-# So it is with so much curvature at each vertex (radians, in the mean). There walks pass vertices on the wrong side:
-# 0.7 to 3.4 % of the largest distance on plates, beams, voxels and terrain, most with 0.5 to 3 radians, and up to
-# 0.46 % on a coarse cow with 0.14, which is too much for them but not for a sweep. Scanned surfaces have 0.005 to 0.05.
-_ROUGH = {"sweep": 0.25, "unfold": 0.1}
-# Up to so many vertices directions are found by windows, if the tolerance is smaller than the default. Walks of the
-# tolerance 1e-6 take 0.7 to 0.9 times as long there, and at some vertices depart to the other side of a hill.
-_FEW_FOR_DIRECTIONS = 50_000
-# With this share of flat vertices, and holes that keep walks from proving flatness, windows are as fast as walks.
-_FLAT = 0.5
 # Sweeps from several sources start with the exact distance up to so many mean edge lengths: next to a border of cells
 # they know no source from both ends of a side.
 _KNOWN_RADIUS = 4.0
@@ -60,30 +58,11 @@ class UnfoldingDomain(Protocol):
         """Component label (n,) of each vertex."""
 
     @property
-    def n_components(self) -> int:
-        """Number of components."""
-
-    @property
     def mean_edge_length(self) -> float:
-        """H."""
+        """Mean length of the edges."""
 
     def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
         """The value (n,) of each vertex's component."""
-
-
-def costs_little_to_be_exact(triangles: NumberedTriangles, refine: Refine) -> bool:
-    """Whether the mesh is small or rough, or flat with holes."""
-    return (
-        triangles.n <= FEW
-        or triangles.curvature > _ROUGH[refine]
-        or (triangles.flatness > _FLAT and triangles.has_holes)
-    )
-
-
-def require_share(tolerance: float | None) -> None:
-    """Refuse a tolerance that is not a number from 0 to 1."""
-    if tolerance is not None and not (is_number(tolerance) and 0 <= tolerance <= 1):
-        raise ValueError(f"tolerance must lie between 0 and 1, not {shown(tolerance)}")
 
 
 def _as_thin_as_given(surface: Surface) -> Surface:
@@ -139,8 +118,8 @@ class UnfoldingSolver:
             self._refinement.keep_for_sweeps()
         self._surface = surface
         self._domain = domain
-        self._given_faces = np.empty((0, 3), np.int64) if surface.given_faces is None else surface.given_faces
         self._spacing = _SPACING * domain.mean_edge_length
+        self._given_faces = np.empty((0, 3), np.int64) if surface.given_faces is None else surface.given_faces
 
     @cached_property
     def _exact(self) -> ExactSurface:
@@ -234,7 +213,7 @@ class UnfoldingSolver:
         origin: IntArray | None = None,
     ) -> FloatArray:
         # Tolerances are relative to the distance: the common part is added afterwards.
-        earliest, relative = self._from_earliest(sources)
+        earliest, relative = from_earliest(sources, self._domain.components, self._given_faces)
         by_windows = self._takes_windows(sources)
         if not by_windows and angles is None and self._is_on_curves_alone(relative):
             return self._from_curves(relative, u, labels, earliest)
@@ -243,7 +222,7 @@ class UnfoldingSolver:
         asked = asked_of(relative, points, takes_curves)._replace(
             labels=labels, angles=angles, tolerance=self._tolerance if tolerance is None else tolerance
         )
-        by_windows = by_windows or self._is_straight(asked)
+        by_windows = by_windows or (angles is not None and directions_by_windows(len(u), asked.tolerance))
         groups = groups_of(relative, points)
         if len(relative.segments.faces) and not (by_windows or self._sweeps) and n_threads() > 1:
             # Walks along curves do not need the distance near them.
@@ -302,22 +281,6 @@ class UnfoldingSolver:
         self._bounds.shorten(distance, labels)
         return distance
 
-    def _from_earliest(self, sources: SourceSet) -> tuple[FloatArray, SourceSet]:
-        """When distance begins on each component (n_components,), and the sources with their offsets from there."""
-        components, F = self._domain.components, self._given_faces
-        points, segments = sources.points, sources.segments
-        places = [components[at] for at in (sources.vertices, F[points.faces, 0], F[segments.faces, 0])]
-        offsets = [sources.vertex_offset, points.offset, segments.offset]
-        earliest = np.full(self._domain.n_components, np.inf)
-        np.minimum.at(earliest, np.concatenate(places), np.concatenate(offsets))
-        late = [offset - earliest[place] for offset, place in zip(offsets, places, strict=True)]
-        return earliest, replace(
-            sources,
-            vertex_offset=late[0],
-            points=replace(points, offset=late[1]),
-            segments=replace(segments, offset=late[2]),
-        )
-
     def _near(self, sources: SourceSet, by_windows: bool) -> ExactSolution | None:
         """Exact distance around points and curves; None if windows find it anyway, or if there are none.
 
@@ -330,9 +293,7 @@ class UnfoldingSolver:
         edges = _KNOWN_RADIUS if sources.on_vertices_alone else NEAR_RADIUS
         cutoff = edges * self._domain.mean_edge_length + float(sources.offsets.max())
         surface, asked = self._exact_on_given_faces if has_curves else self._exact, asked_of(sources, sources.points)
-        return surface.solve(
-            asked.vertices, asked.offsets, asked.points, asked.point_offsets, asked.segments, cutoff=cutoff
-        )
+        return surface.solve(*asked.starts, cutoff=cutoff)
 
     def _takes_windows(self, sources: SourceSet) -> bool:
         """Whether distance from these sources is found by exact windows."""
@@ -357,15 +318,7 @@ class UnfoldingSolver:
         """Distances (n,) from vertices and points, each component's from where it begins."""
         if self._refinement is None or by_windows:
             surface = self._exact if asked.segments is None else self._exact_on_given_faces
-            found = surface.solve(
-                asked.vertices,
-                asked.offsets,
-                asked.points,
-                asked.point_offsets,
-                asked.segments,
-                cutoff=self._cutoff,
-                directed=asked.angles is not None,
-            )
+            found = surface.solve(*asked.starts, cutoff=self._cutoff, directed=asked.angles is not None)
             if asked.labels is not None:
                 asked.labels[:] = found.origin.label
             if asked.angles is not None:
@@ -376,7 +329,7 @@ class UnfoldingSolver:
         unfolded = self._refinement.unfold
         if self._sweeps:
             # Which point of a curve is nearest is not known.
-            known = None if groups is not None else _known(asked, near)
+            known = None if groups is not None else known_of(asked, near)
             unfolded = partial(self._refinement.sweep, known=known, groups=groups)
         elif asked.tolerance is not None:
             unfolded = partial(unfolded, tolerance=asked.tolerance)
@@ -388,12 +341,6 @@ class UnfoldingSolver:
             point_offsets=asked.point_offsets,
             labels=asked.labels,
         )
-
-    def _is_straight(self, asked: Asked) -> bool:
-        """Whether directions are found by windows, as walks of a small tolerance would take as long."""
-        if asked.angles is None or asked.tolerance is None or asked.tolerance >= TOLERANCE:
-            return False
-        return asked.tolerance == 0 or self._domain.components.size <= _FEW_FOR_DIRECTIONS
 
     def _directed_walks(self, refinement: Refinement, u: FloatArray, asked: Asked) -> FloatArray:
         starts = refinement.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
@@ -412,17 +359,6 @@ class UnfoldingSolver:
 
     def _points(self, sources: SourceSet) -> SourcePoints:
         """The points of a set, and those that stand for its curves."""
-        points, segments = sources.points, sources.segments
-        if not len(segments.faces) or self._faces is None:
-            return points
-        return points.joined(self._faces.samples(segments, self._spacing)[0]).joined(segments.ends())
-
-
-def _known(asked: Asked, near: ExactSolution | None) -> Known | None:
-    """Vertices that a sweep begins with."""
-    if near is None:
-        return None
-    is_found = np.isfinite(near.distance)
-    is_found[asked.vertices] = False
-    vertex = np.flatnonzero(is_found)
-    return Known(vertex, near.distance[vertex], near.origin.label[vertex])
+        if not len(sources.segments.faces) or self._faces is None:
+            return sources.points
+        return with_samples(sources, self._faces, self._spacing)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from heat_igl.kernels import window_pairs, windows
 from heat_igl.kernels.window_surface import FLAT_VERTEX
 from heat_igl.mesh import SurfacePoints
 from heat_igl.runtime import side_by_side
-from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.unfolding.half_edges import NO_POINTS, NO_SEGMENTS, HalfEdges, Located
+from heat_igl.unfolding.half_edges import HalfEdges, Located
+from heat_igl.unfolding.window_starts import NO_STARTS, Starts
 
-__all__ = ["TOLERANCE", "Found", "Leaving", "Searched", "Starts", "search", "starts_at"]
+__all__ = ["TOLERANCE", "Found", "Leaving", "Searched", "Targets", "search"]
 
 #: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds
 #: up to. A larger number keeps a few windows more and changes no result.
@@ -29,32 +29,8 @@ _ROUND = 3.0
 _PLENTY = 1000
 _NO_VERTICES = np.empty(0, np.int64)
 
-
-class Starts(NamedTuple):
-    """Sources by the numbers of the tables.
-
-    Attributes
-    ----------
-    vertices, offset : (k,)
-        Vertices, and when each starts.
-    points, point_offset : (p,)
-        Points inside faces; ends of segments are among them.
-    segments, segment_offset : (q,)
-        Segments inside faces.
-    place : (p + q + 1,) int64
-        The number of each point and segment, counted as the caller does: points, then segments; then -1 for nothing.
-    label : (k + p + q + 1,) int64
-        The same after those of the vertices.
-    """
-
-    vertices: AnyArray
-    offset: FloatArray
-    points: Located
-    point_offset: FloatArray
-    segments: Located
-    segment_offset: FloatArray
-    place: IntArray
-    label: IntArray
+# A search of the kernel on a front, from some sources; it fills statistics, and returns whether memory sufficed.
+_Run = Callable[[windows.Front, Starts, IntArray], bool]
 
 
 class Found(NamedTuple):
@@ -77,6 +53,28 @@ class Found(NamedTuple):
         is_nearer = np.flatnonzero(other.distance < self.distance)
         for mine, theirs in zip(self, other, strict=True):
             mine[is_nearer] = theirs[is_nearer]
+
+
+class Targets(NamedTuple):
+    """Points whose distance is asked for.
+
+    Attributes
+    ----------
+    place : Located
+        t places in the triangles, in contiguous arrays.
+    first, following : (m,), (t,) int32
+        The first place in each triangle, and the next place in the same triangle; -1 for none.
+    largest_circle : float
+        Diameter of the largest circle around a triangle with a place.
+    found : Found
+        At each place.
+    """
+
+    place: Located
+    first: AnyArray
+    following: AnyArray
+    largest_circle: float
+    found: Found
 
 
 class Leaving(NamedTuple):
@@ -108,10 +106,8 @@ class Searched(NamedTuple):
         The sources.
     found : Found
         At the vertices.
-    place : Located
-        The targets.
-    at_targets : Found
-        At each of `place`.
+    targets : Targets
+        The points that were asked for, and what was found there.
     n_windows, n_crossings : int
         As in `ExactSolution`.
     leaving : Leaving or None
@@ -120,17 +116,16 @@ class Searched(NamedTuple):
 
     starts: Starts
     found: Found
-    place: Located
-    at_targets: Found
+    targets: Targets
     n_windows: int
     n_crossings: int
     leaving: Leaving | None
 
     def nearest_copy(self, n_targets: int) -> IntArray:
         """Of the copies of each target, the one with the smallest distance."""
-        order = np.lexsort((-self.at_targets.distance, self.place.point))
+        order = np.lexsort((-self.targets.found.distance, self.targets.place.point))
         which = np.empty(n_targets, np.int64)
-        which[self.place.point[order]] = order
+        which[self.targets.place.point[order]] = order
         return which
 
 
@@ -145,43 +140,25 @@ def search(
     threads: int = 1,
 ) -> Searched:
     """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`."""
-    place = edges.located(targets)
-    n, t = edges.n, len(place.faces)
+    n, wanted = edges.n, _targets_at(edges, targets)
     n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
-    found, at_targets = Found.of(n, n_labels), Found.of(t, 0)
-    leaving = Leaving.of(n) if directed else None
-    arguments: tuple[Any, ...] = (
-        starts.vertices,
-        starts.offset,
-        starts.points.faces,
-        np.ascontiguousarray(starts.points.barycentric).ravel(),
-        starts.point_offset,
-        starts.segments.faces,
-        np.ascontiguousarray(starts.segments.barycentric).ravel(),
-        starts.segment_offset,
-        edges.number[_NO_VERTICES if goals is None else goals],
-        *edges.by_face(place),
-        place.faces,
-        np.ascontiguousarray(place.barycentric).ravel(),
-        at_targets.distance,
-        at_targets.root,
-        at_targets.entered,
-        at_targets.crossing,
-        edges.largest_circle(place),
-        goals is not None,
-        float(edges.scaled(cutoff)),
-    )
+    found, leaving = Found.of(n, n_labels), Leaving.of(n) if directed else None
+    goal, limit = edges.number[_NO_VERTICES if goals is None else goals], float(edges.scaled(cutoff))
+
+    def run(front: windows.Front, starts: Starts, statistics: IntArray) -> bool:
+        return windows.search(front, starts, goal, wanted, goals is not None, limit, statistics)
+
     statistics = None
     # Vertices are found flat by the first search.
-    asks_for_all = t == 0 and goals is None and not directed
+    asks_for_all = not len(wanted.place.faces) and goals is None and not directed
     if threads > 1 and n >= _FEWEST_SHARED and asks_for_all and not (edges.tables.kind == FLAT_VERTEX).any():
-        statistics = _beside(edges, found, arguments)
+        statistics = _beside(edges, starts, found, run)
         if statistics is None:
             found = Found.of(n, n_labels)
     if statistics is None:
         statistics = np.zeros(3, np.int64)
-        _require(windows.search(*(_front(edges, found, leaving), *arguments, statistics)))
-    return Searched(starts, found, place, at_targets, int(statistics[1]), int(statistics[2]), leaving)
+        _require(run(_front(edges, found, leaving), starts, statistics))
+    return Searched(starts, found, wanted, int(statistics[1]), int(statistics[2]), leaving)
 
 
 def _require(is_done: bool) -> None:
@@ -191,30 +168,18 @@ def _require(is_done: bool) -> None:
 
 def _front(edges: HalfEdges, found: Found, leaving: Leaving | None = None) -> windows.Front:
     """What the kernel writes in one search."""
-    return windows.Front(
-        *edges.tables,
-        found.distance,
-        np.full(edges.n, np.inf),
-        found.root,
-        found.label,
-        found.entered,
-        found.crossing,
-        np.empty(edges.n, np.int32),
-        np.full(len(edges.tables.vertex), -1, np.int32),
-        TOLERANCE,
-        *(() if leaving is None else (leaving.corner, leaving.direction.ravel())),
-    )
+    return windows.Front(edges.tables, found, TOLERANCE, leaving)
 
 
-def _beside(edges: HalfEdges, found: Found, arguments: tuple[Any, ...]) -> IntArray | None:
+def _beside(edges: HalfEdges, starts: Starts, found: Found, run: _Run) -> IntArray | None:
     """Search on two threads; the statistics of both, or None if one thread has to search instead."""
     also, statistics, done = Found.of(edges.n, len(found.label)), np.zeros((2, 3), np.int64), []
     first, second = _front(edges, found), _front(edges, also)
     bounds = np.full((2, edges.n), np.inf)
     window_pairs.pair(first, second, bounds[0], bounds[1], _ROUND * float(edges.tables.length.mean()), _PLENTY)
     calls: list[Callable[[], bool]] = [
-        lambda: windows.search(*(first, *arguments, statistics[0])),
-        lambda: window_pairs.assist(second, arguments[-1], statistics[1]),
+        lambda: run(first, starts, statistics[0]),
+        lambda: run(second, NO_STARTS, statistics[1]),
     ]
     try:
         side_by_side(lambda call: done.append(call()), calls)
@@ -225,40 +190,7 @@ def _beside(edges: HalfEdges, found: Found, arguments: tuple[Any, ...]) -> IntAr
     return np.asarray(statistics.sum(axis=0)) if is_same else None
 
 
-def starts_at(
-    edges: HalfEdges,
-    sources: IntArray,
-    offsets: FloatArray | None,
-    points: SurfacePoints | None,
-    point_offsets: FloatArray | None,
-    segments: SourceSegments | None,
-) -> Starts:
-    """Sources for the kernel, as `ExactSurface.solve` takes them; points at corners become vertices."""
-    k, p = len(sources), 0 if points is None else len(points)
-    begin = np.zeros(k) if offsets is None else edges.scaled(np.asarray(offsets, np.float64))
-    if points is None and segments is None:
-        nothing, label = np.zeros(0), np.append(np.arange(k), -1)
-        return Starts(edges.number[sources], begin, NO_POINTS, nothing, NO_SEGMENTS, nothing, label[k:], label)
-    late = np.zeros(p) if point_offsets is None else edges.scaled(np.asarray(point_offsets, np.float64))
-    counted = np.arange(p)
-    if segments is not None:
-        ends, number = segments.ends(), p + np.arange(len(segments.faces))
-        all_faces = np.concatenate([np.empty(0, np.int64) if points is None else points.faces, ends.faces])
-        all_places = np.concatenate([np.empty((0, 3)) if points is None else points.barycentric, ends.barycentric])
-        points = SurfacePoints(all_faces, all_places)
-        late, counted = np.concatenate([late, edges.scaled(ends.offset)]), np.concatenate([counted, number, number])
-    place, lines = edges.located(points), edges.located_segments(segments)
-    late, counted = late[place.point], counted[place.point]
-    is_corner = (place.barycentric == 0).sum(axis=1) == 2
-    corner = 3 * place.faces[is_corner] + place.barycentric[is_corner].argmax(axis=1)
-    numbers = np.concatenate([counted[~is_corner], p + lines.point, [-1]])
-    return Starts(
-        np.concatenate([edges.number[sources], edges.tables.vertex[corner]]),
-        np.concatenate([begin, late[is_corner]]),
-        Located(*(column[~is_corner] for column in place)),
-        late[~is_corner],
-        lines,
-        np.zeros(0) if segments is None else edges.scaled(segments.offset)[lines.point],
-        numbers,
-        np.concatenate([np.arange(k), k + counted[is_corner], np.where(numbers < 0, -1, k + numbers)]),
-    )
+def _targets_at(edges: HalfEdges, points: SurfacePoints | None) -> Targets:
+    """Points for the kernel, before anything is found."""
+    place = edges.located(points)
+    return Targets(place, *edges.by_face(place), edges.largest_circle(place), Found.of(len(place.faces), 0))

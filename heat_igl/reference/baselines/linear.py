@@ -11,7 +11,6 @@ from typing import Literal
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.heat_method import smallest_time_step
 from heat_igl.linear import factorize
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Operators
@@ -25,7 +24,7 @@ from heat_igl.reference.baselines.decay import (
 )
 from heat_igl.runtime import RANGE_LIMIT, SOURCE_HEAT
 from heat_igl.sources import Sources, vertex_sources
-from heat_igl.steps import HeatFlow
+from heat_igl.steps import HeatFlow, smallest_time_step
 from heat_igl.typing import BoolArray, FloatArray
 
 __all__ = ["boundary_problem", "log_heat_kernel", "varadhan"]

@@ -12,13 +12,12 @@ from typing import Literal
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.heat_method import smallest_time_step
-from heat_igl.intrinsic import IntrinsicTriangulation, corner_angles
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Operators
 from heat_igl.reference.baselines.decay import domain_of, fallen_from_sources, log_step, reached_from, time_step
 from heat_igl.reference.baselines.grids import grid_sources, grid_spacing
 from heat_igl.sources import Sources, vertex_sources
+from heat_igl.steps import smallest_time_step
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["schrodinger", "schrodinger_grid"]
@@ -87,21 +86,13 @@ def schrodinger(
     if domain.surface is None:
         raise MeshError("green='bessel' is for triangles, and the domain has none: pass green='exponential'")
     share = np.zeros(domain.n)
-    share[chosen] = _total_angles(domain.surface.triangulation)[chosen] / (2 * np.pi)
+    share[chosen] = domain.surface.triangulation.total_angles[chosen] / (2 * np.pi)
     log_phi = log_step(domain, chosen, t, share)
     distance = np.full(domain.n, np.inf)
     reached = reached_from(domain, chosen)
     distance[reached] = length * _inverse_log_bessel(log_phi[reached] + np.log(2 * np.pi * t))
     distance[chosen] = 0.0
     return distance
-
-
-def _total_angles(triangulation: IntrinsicTriangulation) -> FloatArray:
-    """The sum (n,) of the angles around each vertex: 2 pi inside a plane, pi on a straight boundary."""
-    angle = corner_angles(triangulation.l)
-    return np.asarray(
-        np.bincount(triangulation.F.ravel(), weights=angle.ravel(), minlength=triangulation.n), np.float64
-    )
 
 
 def _inverse_log_bessel(y: FloatArray) -> FloatArray:

@@ -1,0 +1,146 @@
+"""Vertices and faces numbered breadth-first, so that neighbours lie near each other in memory."""
+
+import cython
+import numpy as np
+
+__all__ = ["breadth_first", "n_near"]
+
+
+def n_near(twin: cython.int[::1], reach: cython.int) -> int:
+    """How many half-edges (3 m,) are glued to one whose number differs from theirs by less than `reach`."""
+    h: cython.int
+    n: cython.int = 0
+    with cython.nogil:
+        for h in range(twin.shape[0]):
+            n += (twin[h] >= 0) & (-reach < twin[h] - h) & (twin[h] - h < reach)
+    return n
+
+
+def breadth_first(
+    vertex: cython.const[cython.int][::1],
+    twin: cython.const[cython.int][::1],
+    ring,
+    aligned,
+    length: cython.const[cython.double][::1],
+    n: cython.int,
+    start: cython.int,
+):
+    """Number vertices and faces in the order in which a breadth-first search over the faces meets them.
+
+    What a front touches together then lies together in memory. The search begins at face `start`, and goes on in the
+    first face that it has not met.
+
+    Parameters
+    ----------
+    vertex, twin, ring, aligned, length : (3 m,)
+        As `gluing.glue` returns them; None for `ring` and `aligned` if they are not needed.
+    n : int
+        Number of vertices; those of no face come last.
+    start : int
+        Face.
+
+    Returns
+    -------
+    vertex, twin, ring, aligned, length
+        By the new numbers.
+    number : (n,) int32
+        New number of each vertex.
+    face : (m,) int32
+        Old number of each face; corners stay in place.
+    """
+    m: cython.int = twin.shape[0] // 3
+    # Each on its own, so that what is not needed any more can be let go of.
+    vertices, twins, lengths = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m)
+    rings = None if ring is None else np.empty(3 * m, np.int32)
+    alignment = None if aligned is None else np.empty(3 * m, np.uint8)
+    numbers, faces = np.full(n, -1, np.int32), np.empty(m, np.int32)
+    search: _Search = _Search()
+    search.vertex, search.twin, search.aligned, search.length = vertex, twin, aligned, length
+    search.new_vertex, search.new_twin, search.new_aligned, search.new_length = vertices, twins, alignment, lengths
+    search.has_aligned = aligned is not None
+    search.number, search.face, search.place = numbers, faces, np.full(m, -1, np.int32)
+    old_ring: cython.const[cython.int][::1] = ring
+    new_ring: cython.int[::1] = rings
+    n_rings: cython.int = 0 if ring is None else 3 * m
+    first: cython.int
+    h: cython.int
+    t: cython.int
+    v: cython.int
+    with cython.nogil:
+        search.go_on_from(start)
+        for first in range(m):
+            search.go_on_from(first)
+        for v in range(n):
+            if search.number[v] < 0:
+                search.number[v] = search.n_numbered
+                search.n_numbered += 1
+        for h in range(n_rings):
+            new_ring[h] = h
+            if search.has_many:
+                t = old_ring[3 * search.face[h // 3] + h % 3]
+                new_ring[h] = 3 * search.place[t // 3] + t % 3
+    return vertices, twins, rings, alignment, lengths, numbers, faces
+
+
+@cython.final
+@cython.cclass
+class _Search:
+    """What a breadth-first search over the faces reads, and writes by the new numbers."""
+
+    vertex: cython.const[cython.int][::1]
+    twin: cython.const[cython.int][::1]
+    aligned: cython.const[cython.uchar][::1]
+    length: cython.const[cython.double][::1]
+    new_vertex: cython.int[::1]
+    new_twin: cython.int[::1]
+    new_aligned: cython.uchar[::1]
+    new_length: cython.double[::1]
+    number: cython.int[::1]
+    face: cython.int[::1]
+    place: cython.int[::1]  # new number of each face
+    n_met: cython.int
+    n_done: cython.int
+    n_numbered: cython.int
+    has_aligned: cython.bint
+    has_many: cython.bint  # whether more than two faces meet at an edge
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def go_on_from(self, first: cython.int) -> cython.void:
+        """Number all faces that hang together with this one, unless it has a number."""
+        c: cython.int
+        g: cython.int
+        h: cython.int
+        t: cython.int
+        v: cython.int
+        self.meet(first)
+        while self.n_done < self.n_met:
+            h = 3 * self.face[self.n_done]
+            g = 3 * self.n_done
+            for c in range(3):
+                v = self.vertex[h + c]
+                if self.number[v] < 0:
+                    self.number[v] = self.n_numbered
+                    self.n_numbered += 1
+                self.new_vertex[g + c] = self.number[v]
+                self.new_length[g + c] = self.length[h + c]
+                if self.has_aligned:
+                    self.new_aligned[g + c] = self.aligned[h + c]
+                t = self.twin[h + c]
+                if t >= 0:
+                    self.meet(t // 3)
+                    t = 3 * self.place[t // 3] + t % 3
+                self.has_many |= t == -2
+                self.new_twin[g + c] = t
+            self.n_done += 1
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def meet(self, f: cython.int) -> cython.void:
+        if self.place[f] < 0:
+            self.place[f] = self.n_met
+            self.face[self.n_met] = f
+            self.n_met += 1
