@@ -12,7 +12,7 @@ from heat_igl.sources import NEAR_RADIUS, SourceSet
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding.asked import asked_of
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
-from heat_igl.unfolding.solver import FEW
+from heat_igl.unfolding.when_exact import FEW
 
 __all__ = ["CurvedFronts", "Front"]
 
