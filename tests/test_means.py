@@ -139,13 +139,13 @@ def test_bezier_curves_in_the_plane_are_polynomials():
 
 
 def test_bad_arguments_of_means_are_told_apart(sphere):
-    with pytest.raises(ValueError, match="weights must be 2 numbers, one for each point"):
+    with pytest.raises(ValueError, match=r"weights must be 2 numbers, one for each point, but the shape is \(3,\)"):
         karcher_mean(sphere, [1, 2], [1, 2, 3])
-    with pytest.raises(ValueError, match="not negative"):
+    with pytest.raises(ValueError, match=r"weights\[1\] = -1.0 must be finite and not negative"):
         karcher_mean(sphere, [1, 2], [1, -1])
-    with pytest.raises(ValueError, match="not all 0"):
+    with pytest.raises(ValueError, match="weights are all 0"):
         karcher_mean(sphere, [1, 2], [0, 0])
-    with pytest.raises(ValueError, match="weights must be 2 real numbers"):
+    with pytest.raises(ValueError, match="weights must be real numbers"):
         karcher_mean(sphere, [1, 2], ["a", "b"])
     for p in (0.5, np.inf, np.nan, "2", True):
         with pytest.raises(ValueError, match="p must be a number from 1 to 64"):

@@ -9,7 +9,7 @@ import numpy as np
 from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.curves.places import Waypoints, mixed_places
 from heat_igl.curves.straightest import Tracer
-from heat_igl.errors import AccuracyWarning, SourceError, is_number, shown
+from heat_igl.errors import AccuracyWarning, SourceError, is_number, real_numbers, shown
 from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices
 from heat_igl.runtime import warn_caller
@@ -189,12 +189,15 @@ class _Search:
 def _checked_weights(weights: ArrayLike | None, k: int) -> FloatArray:
     if weights is None:
         return np.ones(k)
-    try:
-        array = np.asarray(weights, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(f"weights must be {k} real numbers, one for each point") from None
-    if array.shape != (k,) or not (np.isfinite(array) & (array >= 0)).all() or not array.any():
-        raise ValueError(f"weights must be {k} numbers, one for each point: finite, not negative, and not all 0")
+    array = real_numbers("weights", weights)
+    if array.shape != (k,):
+        raise ValueError(f"weights must be {k} numbers, one for each point, but the shape is {array.shape}")
+    bad = ~(np.isfinite(array) & (array >= 0))
+    if bad.any():
+        first = int(np.argmax(bad))
+        raise ValueError(f"weights[{first}] = {array[first]} must be finite and not negative")
+    if not array.any():
+        raise ValueError("weights are all 0: one point at least needs a positive weight")
     return array
 
 
