@@ -13,6 +13,7 @@ from heat_igl import (
     SurfacePoints,
     centroidal_voronoi,
     geodesic_bezier,
+    geodesic_distance,
     karcher_mean,
     pair_distances,
     shapes,
@@ -104,6 +105,16 @@ def test_two_points_divide_their_geodesic(cow):
     found = karcher_mean(mesh, ends, [3, 1])
     refined = np.array([_length(mesh, found, end) for end in ends])
     np.testing.assert_allclose(refined, length * np.array([0.25, 0.75]), rtol=1e-2)
+
+
+def test_means_of_two_points_on_rough_ground_are_in_the_middle():
+    flat = shapes.grid(14)
+    for seed in (0, 5, 9, 33):
+        rng = np.random.default_rng(seed)
+        mesh = Mesh(flat.V + 0.3 * flat.edge_lengths.mean() * rng.standard_normal(flat.V.shape), flat.F)
+        ends = rng.choice(mesh.n_vertices, 2, replace=False)
+        halves = geodesic_distance(mesh, karcher_mean(mesh, ends), method="exact")[ends]
+        np.testing.assert_allclose(halves, pair_distances(mesh, [ends])[0] / 2, rtol=1e-5)
 
 
 def _length(mesh: Mesh, place: SurfacePoints, vertex: int) -> float:
