@@ -252,7 +252,7 @@ def test_connection_laplacian_is_positive(intrinsic: bool) -> None:
 def test_scalars_are_extended(sphere: Mesh) -> None:
     found = pp3d.MeshVectorHeatSolver(sphere.V, sphere.F).extend_scalar([1, 22], [0.0, 6.0])
     assert (found.min(), found.max()) >= (0.0, 5.9)
-    with pytest.raises(ValueError, match="values must have shape"):
+    with pytest.raises(ValueError, match="values must be one number for each of the 2 sources"):
         pp3d.MeshVectorHeatSolver(sphere.V, sphere.F).extend_scalar([1, 22], [0.0])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import flat_perturbed, perturbed
+from conftest import flat_perturbed, load_script, perturbed
 
 import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, exp_map, log_map, shapes, tangent_frames
@@ -164,6 +164,19 @@ def test_departures_are_those_of_straightened_paths(bunny):
     same = np.abs(np.hypot(*log[targets].T) - length) < 1e-9 * length
     assert same.sum() > 40
     assert np.abs(np.angle(found[same] / (log[targets] @ [1, 1j])[same])).max() < 1e-6
+
+
+@pytest.mark.parametrize("mesh", [perturbed(shapes.icosphere(2), 0.1), flat_perturbed(shapes.grid(9))])
+def test_the_script_of_directions_measures_against_paths(mesh):
+    script = load_script("directions_table")
+    truth, is_straight = script.exact_log(mesh, 7)
+    away = script.away_from_jumps(mesh, truth)
+    assert 0.1 < is_straight.mean() <= 1
+    assert 0.5 < away.mean() <= 1
+    found = log_map(mesh, 7)
+    assert script.errors(found, truth, away)["error"] < 1e-7
+    turned = found @ np.array([[np.cos(0.1), np.sin(0.1)], [-np.sin(0.1), np.cos(0.1)]])
+    assert script.errors(turned, truth, away)["median angle"] == pytest.approx(np.degrees(0.1))
 
 
 @pytest.mark.parametrize("source", [5, SurfacePoints([40], [[0.3, 0.3, 0.4]])])

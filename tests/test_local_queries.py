@@ -220,6 +220,18 @@ def test_nonmanifold_mesh_from_a_file():
         np.testing.assert_allclose(exact[indices[i][indices[i] >= 0]], distances[i][indices[i] >= 0], rtol=1e-13)
 
 
+def test_distances_that_will_not_fit_into_memory_are_refused_early(monkeypatch):
+    mesh = shapes.torus(12, 24)
+    whole = mesh.n_vertices**2 * local._BYTES
+    monkeypatch.setattr(local, "available_memory", lambda: 1.01 * whole)
+    assert distances_within(mesh, np.inf).nnz == mesh.n_vertices**2
+    monkeypatch.setattr(local, "available_memory", lambda: 0.5 * whole)
+    with pytest.raises(MemoryError, match=r"about 8\.3e\+04 distances lie within the radius, 288 from each"):
+        distances_within(mesh, 1e12)
+    # Rows that are written some at a time need less.
+    assert sum(block.nnz for block in blocks_within(mesh, np.inf, most_entries=1)) == mesh.n_vertices**2
+
+
 def test_errors():
     mesh = shapes.grid(3)
     for radius in (0, -1.0, np.nan, "far", True, None):

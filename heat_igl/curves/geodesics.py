@@ -152,7 +152,7 @@ class GeodesicPathSolver:
         return f"GeodesicPathSolver({self._mesh.n_vertices} vertices)"
 
     def straighten(self, curve: SurfaceCurve) -> SurfaceCurve:
-        """The locally shortest curve of the class of a curve; see `heat_igl.straighten`."""
+        """The locally shortest curve of the class of a curve; argument, result and errors of `heat_igl.straighten`."""
         if not isinstance(curve, SurfaceCurve):
             raise SourceError(f"curve must be a SurfaceCurve, not {type(curve).__name__}: see edge_curve and curve_on")
         course = course_of(self._mesh, curve)
@@ -161,7 +161,10 @@ class GeodesicPathSolver:
         return as_curve([found], is_closed=curve.is_closed)
 
     def path(self, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
-        """The geodesic through waypoints, or the closed one of their loop; see `geodesic_path`."""
+        """The geodesic through waypoints, or the closed one of their loop.
+
+        Arguments, result and errors are those of `geodesic_path`.
+        """
         faces, barycentric = mixed_places("waypoints", self._mesh, waypoints, self._corner_at)
         needed = 3 if truth("closed", closed) else 2
         if len(faces) < needed:

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
-from heat_igl.errors import MeshError, positive, shown
+from heat_igl.errors import MeshError, positive, refuse_masked, shown
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices, crossings, joined_segments, level_segments
 from heat_igl.sources import Sources
@@ -187,11 +187,12 @@ def _checked(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> tuple[FloatArr
         raise ValueError(f"values[{first}] is {array[first]} ({int(bad.sum())} of {len(array)} are NaN or -inf)")
     wanted = np.atleast_1d(_real("levels", levels))
     if wanted.ndim != 1 or not np.isfinite(wanted).all():
-        raise ValueError(f"levels must be finite numbers in one dimension, not {levels!r}")
+        raise ValueError(f"levels must be finite numbers in one dimension, not {shown(levels)}")
     return array, wanted
 
 
 def _real(name: str, array: ArrayLike) -> FloatArray:
+    refuse_masked(name, array)
     found: AnyArray | None = None
     with suppress(ValueError):  # of ragged lists
         found = np.asarray(array)

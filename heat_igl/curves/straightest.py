@@ -166,6 +166,13 @@ class Tracer:
             triangulation.l, triangulation.areas, polar.corners, triangulation.twin, np.ascontiguousarray(half)
         )
 
+    @property
+    def curvature(self) -> float:
+        """Mean over the vertices inside of how far the angles around them are from 2 pi, in radians."""
+        polar = self._frames.angles
+        inside = self._mesh.referenced & ~polar.on_boundary
+        return float(np.abs(2 * np.pi - polar.sums[inside]).mean()) if inside.any() else 0.0
+
     def exp(self, source: Sources, vectors: ArrayLike) -> SurfacePoints:
         """The exponential map; see `exp_map`."""
         begin = self.starts("source", source)

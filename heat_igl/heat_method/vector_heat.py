@@ -158,7 +158,10 @@ class VectorHeatSolver:
         return self._distance_solver.t
 
     def reaches(self, sources: Sources) -> BoolArray:
-        """Mask (n,) of the vertices on the components of the sources: all others get 0."""
+        """Mask (n,) of the vertices on the components of the sources: all others get 0.
+
+        `sources` and errors are those of `transport`.
+        """
         components = self.operators.components
         return np.isin(components, components[self._vertices(sources)])
 

@@ -68,22 +68,51 @@ class TangentFrames:
         return f"TangentFrames({len(self.x)} vertices)"
 
     def from_world(self, vectors: ArrayLike, vertices: ArrayLike | None = None) -> FloatArray:
-        """Components (k, 2) along x and y of vectors (k, 3) in space: their normal parts are left out.
+        """Components of vectors in space.
 
-        `vertices` (k,) are those at which the vectors are; all n in order if not given.
+        Parameters
+        ----------
+        vectors : (k, 3) array_like
+            Normal parts are left out.
+        vertices : (k,) array_like of int, optional
+            The vertices at which the vectors are; all n in order if not given.
+
+        Returns
+        -------
+        (k, 2) float64
+            Along x and y.
+
+        Raises
+        ------
+        MeshError
+            If an entry of `vertices` is no vertex.
+        ValueError
+            If `vectors` has another shape, or is not finite.
         """
         at = self._vertices(vertices)
         found = checked_vectors("vectors", vectors, len(at), 3)
         return np.stack([np.einsum("kx,kx->k", found, axis[at]) for axis in (self.x, self.y)], axis=1)
 
     def to_world(self, vectors: ArrayLike, vertices: ArrayLike | None = None) -> FloatArray:
-        """Vectors (k, 3) in space from components (k, 2) along x and y; `vertices` as for `from_world`."""
+        """Vectors in space from their components.
+
+        Parameters
+        ----------
+        vectors : (k, 2) array_like
+            Components along x and y.
+        vertices : (k,) array_like of int, optional
+            As for `from_world`, with its errors.
+
+        Returns
+        -------
+        (k, 3) float64
+        """
         at = self._vertices(vertices)
         found = checked_vectors("vectors", vectors, len(at), 2)
         return np.asarray(found[:, :1] * self.x[at] + found[:, 1:] * self.y[at])
 
     def from_faces(self, faces: ArrayLike, corners: ArrayLike, vectors: ArrayLike) -> FloatArray:
-        """Components (k, 2) at a corner of vectors (k, 3) that lie in the plane of a face.
+        """Components at a corner of vectors in the plane of a face.
 
         The angle from the side that leaves from the corner is scaled as the angles of the faces are, so that a vector
         along either side of the corner gets the angle of this edge. The length stays.
@@ -94,6 +123,18 @@ class TangentFrames:
             A face, and one of the corners 0 to 2.
         vectors : (k, 3) array_like
             Parts along the normal of the face are left out.
+
+        Returns
+        -------
+        (k, 2) float64
+            In the frames of the vertices at these corners.
+
+        Raises
+        ------
+        MeshError
+            If there is no such face or corner.
+        ValueError
+            If `vectors` has another shape, or is not finite.
         """
         corner = self._corners(faces, corners)
         found = checked_vectors("vectors", vectors, len(corner), 3)
@@ -111,10 +152,27 @@ class TangentFrames:
         )
 
     def to_faces(self, vertices: ArrayLike, vectors: ArrayLike) -> tuple[IntArray, IntArray, FloatArray]:
-        """The face into which each tangent vector (k, 2) at a vertex points, the corner, and the vector (k, 3) in it.
+        """The faces into which tangent vectors point: the inverse of `from_faces`.
 
-        The inverse of `from_faces`. On the boundary, vectors that point off the surface get the face next to them, and
-        lie in the plane of the face beyond the boundary.
+        Parameters
+        ----------
+        vertices : (k,) array_like of int
+            The vertices at which the vectors are.
+        vectors : (k, 2) array_like
+            Components in the frames of these.
+
+        Returns
+        -------
+        faces, corners : (k,) int64
+            A face at the vertex, and the corner 0 to 2 that is the vertex. On the boundary, vectors that point off the
+            surface get the face next to them.
+        vectors : (k, 3) float64
+            In the planes of the faces, also beyond the boundary.
+
+        Raises
+        ------
+        MeshError, ValueError
+            As for `from_world`.
         """
         at = self._vertices(vertices)
         found = checked_vectors("vectors", vectors, len(at), 2)
@@ -127,14 +185,20 @@ class TangentFrames:
 
     @staticmethod
     def to_angles(vectors: ArrayLike) -> FloatArray:
-        """Angle (k,) of tangent vectors (k, 2), counterclockwise from x, in [0, 2 pi)."""
+        """Angles (k,) in [0, 2 pi) of tangent vectors (k, 2), counterclockwise from x.
+
+        A ValueError if `vectors` has another shape, or is not finite.
+        """
         found = checked_vectors("vectors", vectors, None, 2)
         angle = np.arctan2(found[:, 1], found[:, 0])
         return np.asarray(np.where(angle < 0, np.maximum(angle + 2 * np.pi, 0.0) % (2 * np.pi), angle))
 
     @staticmethod
     def from_angles(angles: ArrayLike, lengths: ArrayLike = 1.0) -> FloatArray:
-        """Tangent vectors (k, 2) of the given angles (k,) and lengths."""
+        """Tangent vectors (k, 2) of the given angles (k,), in radians, and lengths: one, or (k,).
+
+        A ValueError if the shapes do not fit, or entries are no real numbers.
+        """
         angle, length = real_numbers("angles", angles), real_numbers("lengths", lengths)
         if length.shape not in ((), angle.shape) and angle.shape:
             raise ValueError(f"lengths must be one number or {angle.shape} as angles, not of shape {length.shape}")

@@ -1,13 +1,13 @@
-"""The memory that factors will take, by an estimate made before, and the memory that is available."""
+"""The memory that factors will take, by an estimate made before."""
 
 from __future__ import annotations
-
-import os
 
 import numpy as np
 import scipy.sparse as sp
 
-__all__ = ["available_memory", "factor_bytes", "factors_fit"]
+from heat_igl.runtime import available_memory
+
+__all__ = ["factor_bytes", "factors_fit"]
 
 # Bytes per row of each of two factors while they are made, on log2 n and on n^(1/3): the multifrontal ones of spheres
 # and tori of 150k vertices took 25 to 37, those of a box of 30k vertices 35. Rather too much than too little.
@@ -29,18 +29,3 @@ def factor_bytes(n: int, n_entries: int) -> float:
     """
     is_volume = n_entries > 10 * n
     return float(n * (_BYTES_VOLUME * n ** (1 / 3) if is_volume else _BYTES_SURFACE * np.log2(max(n, 2))))
-
-
-def available_memory() -> float:
-    """Bytes that can be allocated without swapping, as far as the system tells; infinite if it does not."""
-    try:
-        with open("/proc/meminfo") as lines:
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return 1024.0 * int(line.split()[1])
-    except OSError:
-        pass
-    try:
-        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return float("inf")

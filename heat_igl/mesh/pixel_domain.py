@@ -57,6 +57,11 @@ class ImageDomain:
         pixels : array_like of bool
             Of the shape of `index`. Pixels outside the domain are ignored.
 
+        Returns
+        -------
+        (k,) int64
+            A vertex for each pixel that is set, in the order of the image.
+
         Raises
         ------
         SourceError

@@ -107,6 +107,11 @@ def edge_curve(mesh: MeshLike, vertices: ArrayLike, *, closed: bool = False) -> 
     closed : bool
         Whether an edge leads from the last back to the first.
 
+    Returns
+    -------
+    SurfaceCurve
+        With a segment for each edge.
+
     Raises
     ------
     SourceError

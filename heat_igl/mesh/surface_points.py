@@ -135,12 +135,15 @@ class SurfaceCurve:
         return f"SurfaceCurve({len(self)} segments, {'closed' if self.is_closed else 'open'})"
 
     def positions(self, mesh: MeshLike) -> FloatArray:
-        """Positions (s + 1, 3) of the polyline's corners; on a closed curve the last is the first again."""
+        """Positions (s + 1, 3) of the corners of the polyline on `mesh`; on a closed curve the last is the first again.
+
+        Errors are those of `SurfacePoints.positions`.
+        """
         first = _in_space(mesh, self.faces[:1], self.start[:1])
         return np.concatenate([first, _in_space(mesh, self.faces, self.end)])
 
     def lengths(self, mesh: MeshLike) -> FloatArray:
-        """Length of each segment, (s,)."""
+        """Length (s,) of each segment on `mesh`, in the unit of the mesh; errors as for `positions`."""
         return np.asarray(np.linalg.norm(np.diff(self.positions(mesh), axis=0), axis=1))
 
 

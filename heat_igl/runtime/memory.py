@@ -1,17 +1,18 @@
-"""Peak and current memory of this process."""
+"""Peak and current memory of this process, and the memory that is available."""
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
 import importlib
+import os
 import re
 import threading
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-__all__ = ["PeakMemory", "release_free_memory", "resident_memory"]
+__all__ = ["PeakMemory", "available_memory", "release_free_memory", "resident_memory"]
 
 _SAMPLE_SECONDS = 0.005
 
@@ -39,6 +40,21 @@ def resident_memory() -> int | None:
     if known is None and (process := _psutil_process()) is not None:
         known = int(process.memory_info().rss)
     return known
+
+
+def available_memory() -> float:
+    """Bytes that can be allocated without swapping, as far as the system tells; infinite if it does not."""
+    try:
+        with open("/proc/meminfo") as lines:
+            for line in lines:
+                if line.startswith("MemAvailable:"):
+                    return 1024.0 * int(line.split()[1])
+    except OSError:
+        pass
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return float("inf")
 
 
 class PeakMemory:

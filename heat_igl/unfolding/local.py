@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from heat_igl.errors import MeshError, SourceError, positive
 from heat_igl.kernels import local_windows, windows
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
-from heat_igl.runtime import n_threads, side_by_side
+from heat_igl.runtime import available_memory, n_threads, side_by_side
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
@@ -24,6 +24,8 @@ __all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distan
 _CHUNK = 64
 # Distances that a thread makes room for at first.
 _ROOM = 2**16
+# Bytes that each distance of a sparse array takes while the array is put together.
+_BYTES = 48
 # Where more are asked for than the mesh has vertices, the most entries of the result.
 _MOST_PADDED = 2**28
 _NO_VERTICES = np.empty(0, np.int32)
@@ -51,6 +53,8 @@ def distances_within(mesh: MeshLike, radius: float, sources: Sources | None = No
     ------
     ValueError
         If `radius` is not a positive number.
+    MemoryError
+        If the distances up to this radius will not fit into memory, as soon as the first searches tell.
     MeshError
         If the mesh cannot be used, or is tetrahedral.
     SourceError
@@ -102,7 +106,8 @@ def blocks_within(
 def _rows_within(edges: HalfEdges, chosen: IntArray, limit: float) -> sp.csr_array:
     number = edges.number[chosen]
     order = np.argsort(number, kind="stable")
-    parts = _in_chunks(edges, number[order], lambda work, part: _within(work, part, edges.scaled(limit)))
+    count = _Count(len(chosen), available_memory() / _BYTES)
+    parts = _in_chunks(edges, number[order], lambda work, part: count(_within(work, part, edges.scaled(limit))))
     counts = np.concatenate([part.counts for part in parts])
     ends = np.concatenate([[0], np.cumsum(counts)])
     columns = np.concatenate([part.vertex for part in parts])
@@ -286,6 +291,27 @@ class _Workspace:
         if n_done < 0:
             raise MemoryError("the windows of the exact distance do not fit into memory")
         return ends[:n_done]
+
+
+class _Count:
+    """Counts the distances from some of k sources, and ends the search if those from all will be too many."""
+
+    def __init__(self, k: int, most: float) -> None:
+        self._k, self._most = k, most
+        self._sources = self._found = 0
+
+    def __call__(self, near: _Near) -> _Near:
+        # Threads may miss what others add: an estimate suffices.
+        self._sources += len(near.counts)
+        self._found += len(near.vertex)
+        expected = self._found / self._sources * self._k
+        if expected > self._most:
+            raise MemoryError(
+                f"about {expected:.2g} distances lie within the radius, {expected / self._k:.3g} from each vertex, and "
+                "do not fit into memory: take a smaller radius (in the unit of the mesh) or fewer sources, or write "
+                "rows to a file with write_distances_within"
+            )
+        return near
 
 
 def _within(work: _Workspace, part: _Chunk, radius: AnyArray) -> _Near:

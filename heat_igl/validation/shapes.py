@@ -18,6 +18,7 @@ from itertools import permutations
 import igl
 import numpy as np
 
+from heat_igl.errors import is_number, shown
 from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
@@ -39,9 +40,13 @@ __all__ = [
 ]
 
 
+# An icosphere of more subdivisions has more half-edges than indices of 32 bits can count.
+_MOST_SUBDIVISIONS = 12
+
+
 def _at_least(name: str, value: int, least: int) -> int:
-    if value != int(value) or value < least:
-        raise ValueError(f"{name} must be an integer of at least {least}, not {value!r}")
+    if not is_number(value) or not np.isfinite(value) or value != int(value) or value < least:
+        raise ValueError(f"{name} must be an integer of at least {least}, not {shown(value)}")
     return int(value)
 
 
@@ -113,7 +118,11 @@ def icosphere(subdivisions: int) -> Mesh:
     by the order of h^2. For every vertex, the antipode is a vertex too.
     """
     V, F = igl.icosahedron()
-    for _ in range(_at_least("subdivisions", subdivisions, 0)):
+    if _at_least("subdivisions", subdivisions, 0) > _MOST_SUBDIVISIONS:
+        raise ValueError(
+            f"subdivisions must be at most {_MOST_SUBDIVISIONS}, not {subdivisions}: each quadruples faces"
+        )
+    for _ in range(int(subdivisions)):
         V, F = igl.upsample(V, F)
         V /= np.linalg.norm(V, axis=1, keepdims=True)
     return Mesh(V / np.linalg.norm(V, axis=1, keepdims=True), F)
