@@ -53,16 +53,17 @@ def take_between(
     cube: cython.double = first + last - 2.0 * rise
     if fabs(cube) > most:
         return False
-    # The shortest way over the line: the slope of the whole is negative at the right end and positive at the left.
+    # The shortest way over the line meets it at an angle with the cosine p. The mean slope gives a first place, which
+    # is the right one on a straight front: directions that are wrong by little add up over many vertices.
     along: cython.double = right.x * ex + right.y * ey
-    begin: cython.double = c * along / right.length + first
-    end: cython.double = c * (along + c) / left.length + last
-    s: cython.double = begin / (begin - end)
+    p: cython.double = min(max(-rise / c, -0.999), 0.999)
+    s: cython.double = (p * fabs(right.x * ey - right.y * ex) / sqrt(1.0 - p * p) - along) / c
+    s = min(max(s, 0.0), 1.0)
     for _ in range(2):
         x: cython.double = right.x + s * c * ex
         y: cython.double = right.y + s * c * ey
         length: cython.double = sqrt(x * x + y * y)
-        p: cython.double = (along + s * c) / length
+        p = (along + s * c) / length
         bend: cython.double = c * c * (1.0 - p * p) / length + 2.0 * square + 6.0 * cube * s
         if not bend > 0.0:
             return False
