@@ -21,8 +21,8 @@ def test_distance_from_a_straight_line_in_a_plane_is_exact(shear):
     flat = flat_perturbed(shapes.grid(40), 0.2)
     mesh = sheared(flat, shear)
     (line,) = isolines(mesh, mesh.V[:, 1], 0.43)[0]
-    # Where the perpendicular meets the line.
-    beside = np.abs(mesh.V[:, 0] - shear * 0.43 - 0.5) < 0.49
+    # Where the perpendicular meets the line, and not near an end, around which the front is round.
+    beside = np.abs(mesh.V[:, 0] - shear * 0.43 - 0.5) < 0.4
     found = solvers(mesh)[0].distance(line)
     np.testing.assert_allclose(found[beside], np.abs(mesh.V[:, 1] - 0.43)[beside], rtol=1e-9, atol=1e-12)
 
