@@ -1,7 +1,12 @@
-"""Kernel of the unfolding: the path through a place between two vertices whose distances and directions are known."""
+"""Kernel of the unfolding: the path through a place between two vertices whose distances and directions are known.
+
+Distance on the line between two vertices is taken as the cubic polynomial with their distances and slopes, which are
+the cosines of their paths' directions. It is right on smooth fronts to fourth order in the length of the line. Where
+the paths of both ends pass different sides of vertices with curvature it has a large cubic part, by which it is judged.
+"""
 
 import cython
-from cython.cimports.heat_igl.kernels.between import LEAST_COSINE
+from cython.cimports.heat_igl.kernels.between import LEAST_COSINE, TURN, WIDEST
 from cython.cimports.heat_igl.kernels.walks import BETWEEN, Limit, Query, take
 from cython.cimports.libc.math import cos, fabs, sin, sqrt
 
@@ -10,12 +15,17 @@ from cython.cimports.libc.math import cos, fabs, sin, sqrt
 @cython.nogil
 @cython.exceptval(check=False)
 def take_between(
-    q: Query, right: cython.pointer[cython.const[Limit]], left: cython.pointer[cython.const[Limit]], k: cython.int
+    q: Query,
+    right: cython.pointer[cython.const[Limit]],
+    left: cython.pointer[cython.const[Limit]],
+    k: cython.int,
+    roughness: cython.double,
 ) -> cython.bint:
-    """Note the path between the limits of the cone at spoke k, if the distances on the line between them are smooth."""
-    if right.saving <= 0.0 or left.saving <= 0.0:
-        return False
-    if right.saving + left.saving > 1.5:
+    """Note the path between the limits of the cone at spoke k, if the distance on the line between them is smooth.
+
+    Smooth if the cubic part is at most `roughness` times the way to the nearer of both; 0 takes none.
+    """
+    if not (roughness > 0.0 and right.saving > 0.0 and left.saving > 0.0 and right.saving + left.saving < WIDEST):
         return False
     ex: cython.double = left.x - right.x
     ey: cython.double = left.y - right.y
@@ -23,55 +33,46 @@ def take_between(
     if not c > 0.0:
         return False
     ex, ey = ex / c, ey / c
-    # The directions in which the paths of both go on, away from v: turned towards the inside of the cone.
-    co: cython.double = cos(right.saving) / right.length
-    si: cython.double = sin(right.saving) / right.length
-    rx: cython.double = right.x * co - right.y * si
-    ry: cython.double = right.x * si + right.y * co
-    co = cos(left.saving) / left.length
-    si = -sin(left.saving) / left.length
-    lx: cython.double = left.x * co - left.y * si
-    ly: cython.double = left.x * si + left.y * co
-    differ: cython.double = rx * ly - ry * lx
-    cosine: cython.double = rx * lx + ry * ly
-    length: cython.double = min(right.length, left.length)
-    if cosine < LEAST_COSINE or c * fabs(differ) > 100.0 * q.roughness * length:
+    # The directions in which the paths of both go on: turned towards the inside of the cone.
+    cosine: cython.double = cos(right.saving) / right.length
+    sine: cython.double = sin(right.saving) / right.length
+    rx: cython.double = right.x * cosine - right.y * sine
+    ry: cython.double = right.x * sine + right.y * cosine
+    cosine, sine = cos(left.saving) / left.length, -sin(left.saving) / left.length
+    lx: cython.double = left.x * cosine - left.y * sine
+    ly: cython.double = left.x * sine + left.y * cosine
+    most: cython.double = roughness * min(right.length, left.length)
+    if rx * lx + ry * ly < LEAST_COSINE or c * fabs(rx * ly - ry * lx) > TURN * most:
         return False
-    # Distance along the line falls in those directions.
-    at_right: cython.double = -(rx * ex + ry * ey) * c
-    at_left: cython.double = -(lx * ex + ly * ey) * c
+    # Distance is one + s (first + s (square + s cube)) at a share s of the line; it falls in those directions.
     one: cython.double = q.walk[right.vertex].distance
+    first: cython.double = -(rx * ex + ry * ey) * c
+    last: cython.double = -(lx * ex + ly * ey) * c
     rise: cython.double = q.walk[left.vertex].distance - one
-    # Distance is one + s (at_right + s (a + s b)) at a share s of the line.
-    a: cython.double = 3.0 * rise - 2.0 * at_right - at_left
-    b: cython.double = at_right + at_left - 2.0 * rise
-    if fabs(b) > q.roughness * length:
+    square: cython.double = 3.0 * rise - 2.0 * first - last
+    cube: cython.double = first + last - 2.0 * rise
+    if fabs(cube) > most:
         return False
+    # The shortest way over the line meets it at an angle with the cosine p. The mean slope gives a first place, which
+    # is the right one on a straight front: directions that are wrong by little add up over many vertices.
     along: cython.double = right.x * ex + right.y * ey
-    # The derivative of the length is negative at the right end, positive at the left.
-    first: cython.double = c * along / right.length + at_right
-    last: cython.double = c * (along + c) / left.length + at_left
-    if first >= 0.0 or last <= 0.0:
-        return False
-    s: cython.double = first / (first - last)
-    x: cython.double = 0.0
-    y: cython.double = 0.0
-    r: cython.double = 0.0
-    for _ in range(3):
-        x, y = right.x + s * c * ex, right.y + s * c * ey
-        r = sqrt(x * x + y * y)
-        p: cython.double = (along + s * c) / r
-        slope: cython.double = c * p + at_right + s * (2.0 * a + 3.0 * b * s)
-        bend: cython.double = c * c * (1.0 - p * p) / r + 2.0 * a + 6.0 * b * s
+    p: cython.double = min(max(-rise / c, -0.999), 0.999)
+    s: cython.double = (p * fabs(right.x * ey - right.y * ex) / sqrt(1.0 - p * p) - along) / c
+    s = min(max(s, 0.0), 1.0)
+    for _ in range(2):
+        x: cython.double = right.x + s * c * ex
+        y: cython.double = right.y + s * c * ey
+        length: cython.double = sqrt(x * x + y * y)
+        p = (along + s * c) / length
+        bend: cython.double = c * c * (1.0 - p * p) / length + 2.0 * square + 6.0 * cube * s
         if not bend > 0.0:
             return False
-        s -= slope / bend
+        s -= (c * p + first + s * (2.0 * square + 3.0 * cube * s)) / bend
         s = min(max(s, 0.0), 1.0)
     x, y = right.x + s * c * ex, right.y + s * c * ey
-    r = sqrt(x * x + y * y)
-    distance: cython.double = r + one + s * (at_right + s * (a + s * b))
     reach: cython.double = (1.0 - s) * q.walk[right.vertex].reach + s * q.walk[left.vertex].reach
+    distance: cython.double = sqrt(x * x + y * y) + one + s * (first + s * (square + s * cube))
     spoke = cython.address(q.t.spoke[k])
-    end: cython.int = right.vertex if s < 0.5 else left.vertex
-    take(q, distance, end, x, y, BETWEEN, k, -spoke.along, -spoke.height, reach)
+    nearer: cython.int = right.vertex if s < 0.5 else left.vertex
+    take(q, distance, nearer, x, y, BETWEEN, k, -spoke.along, -spoke.height, reach)
     return True

@@ -136,7 +136,6 @@ def components_without(F: cython.const[cython.int][:, ::1], skip: cython.const[c
     return labels
 
 
-
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)

@@ -11,7 +11,16 @@ from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.searching import search
 from cython.cimports.heat_igl.kernels.unfolding import MAX_WAITING
 from cython.cimports.heat_igl.kernels.walking import cross_crowded, look_around, walk_through
-from cython.cimports.heat_igl.kernels.walks import BETWEEN, NO_FAN, NOT_VISITED, REAL_BEND, SAYS_LEFT, SAYS_RIGHT, Query, Walk
+from cython.cimports.heat_igl.kernels.walks import (
+    BETWEEN,
+    NO_FAN,
+    NOT_VISITED,
+    REAL_BEND,
+    SAYS_LEFT,
+    SAYS_RIGHT,
+    Query,
+    Walk,
+)
 from cython.cimports.libc.math import INFINITY, atan2, cos, sin, sqrt
 
 __all__ = ["unfold", "views"]

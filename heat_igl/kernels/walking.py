@@ -6,8 +6,8 @@ docs/refinement.md.
 """
 
 import cython
+from cython.cimports.heat_igl.kernels.between import ROUGHEST, take_between
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
-from cython.cimports.heat_igl.kernels.between import take_between
 from cython.cimports.heat_igl.kernels.walking import SHARE
 from cython.cimports.heat_igl.kernels.walks import (
     BENDS,
@@ -78,17 +78,14 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
     view = _cone_over(q, v, k, cython.address(right), cython.address(left))
     first_x: cython.double = view.ax
     first_y: cython.double = view.ay
-    if _take_common_source(q, cython.address(right), cython.address(left), k):
+    if _take_at_once(q, cython.address(right), cython.address(left), k):
         return -1
-    if q.roughness > 0.0 and take_between(q, cython.address(right), cython.address(left), k):
-        return -1
-    has_barrier: cython.bint = q.barrier.shape[0] > 0
     has_points: cython.bint = q.first_inside.shape[0] > 0
     far: cython.double = 4.0 * q.found.distance * q.found.distance
     wait_for: cython.int = -1
     turned: Savings
     while view.h >= 0:
-        if has_barrier and q.barrier[view.h // 3]:
+        if _ends_at_barrier(q, view.h, cython.address(right), cython.address(left), k):
             break
         step = cython.address(q.t.step[view.h])
         # Where the walk goes next is known late, but both ways are known now.
@@ -131,13 +128,9 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
             else:
                 left.x, left.y, left.length, left.saving, left.vertex = wx, wy, length, most, step.vertex
                 view.lx, view.ly, view.bx, view.by, view.h = wx, wy, wx, wy, step.to_right
-            if q.roughness > 0.0 and take_between(q, cython.address(right), cython.address(left), k):
+            if take_between(q, cython.address(right), cython.address(left), k, q.roughness):
                 return -1
-            # What is left to gain by going on, to second order in the bend: little on the whole path, and also on the
-            # way to w, so that many short ways do not add up.
-            gain: cython.double = 0.5 * most * most * length * reach
-            enough: cython.double = q.tolerance * min(length + w.distance, SHARE * length) * (length + reach)
-            if gain < enough and right.saving > 0.0 and left.saving > 0.0:
+            if right.saving > 0.0 and left.saving > 0.0 and _is_little(q, length, w.distance, reach, most):
                 _take_common_source(q, cython.address(right), cython.address(left), k)
                 break
         if view.ax * view.ax + view.ay * view.ay > far and view.bx * view.bx + view.by * view.by > far:
@@ -145,6 +138,35 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
     _take_limit(q, cython.address(right), 1.0, k)
     _take_limit(q, cython.address(left), -1.0, k)
     return wait_for
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _ends_at_barrier(
+    q: Query, h: cython.int, right: cython.pointer[Limit], left: cython.pointer[Limit], k: cython.int
+) -> cython.bint:
+    """Whether a curve that is a source runs behind half-edge h; if so, note the path between the limits of the cone."""
+    if q.barrier.shape[0] == 0 or not q.barrier[h // 3]:
+        return False
+    take_between(q, right, left, k, ROUGHEST)
+    return True
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _is_little(
+    q: Query, length: cython.double, distance: cython.double, reach: cython.double, bend: cython.double
+) -> cython.bint:
+    """Whether going on gains little, to second order in the bend at a vertex `length` away.
+
+    Little of the whole path, and also of the way to that vertex, so that many short ways do not add up.
+    """
+    gain: cython.double = 0.5 * bend * bend * length * reach
+    return gain < q.tolerance * min(length + distance, SHARE * length) * (length + reach)
 
 
 @cython.cfunc
@@ -200,6 +222,15 @@ def _take_common_source(
     spoke = cython.address(q.t.spoke[k])
     take(q, distance, right.vertex, right.x, right.y, right.saving, k, -spoke.along, -spoke.height, 0.0)
     return True
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _take_at_once(q: Query, right: cython.pointer[Limit], left: cython.pointer[Limit], k: cython.int) -> cython.bint:
+    """Note the path between the limits of the cone at spoke k, if what they know gives it; whether it does."""
+    return _take_common_source(q, right, left, k) or take_between(q, right, left, k, q.roughness)
 
 
 @cython.cfunc

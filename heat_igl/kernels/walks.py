@@ -28,7 +28,7 @@ class Query:
         What is known of n vertices and p sources inside faces; changed in place.
     first_inside, inside
         Those of `heat_igl.unfolding.walks.Points`; of length 0 if there are none.
-    tolerance, shortfall, max_steps
+    tolerance, shortfall, max_steps, barrier, roughness
         As `heat_igl.unfolding.walks.unfold` has them.
     """
 

@@ -109,9 +109,7 @@ class NumberedTriangles:
         walk["distance"] = walk["offset"] = begin[walk["label"]]
         return WalkStarts.ascending(row, walk, begin)
 
-    def walks(
-        self, order: AnyArray, starts: WalkStarts, tolerance: float = TOLERANCE, **options: Any
-    ) -> AnyArray:
+    def walks(self, order: AnyArray, starts: WalkStarts, tolerance: float = TOLERANCE, **options: Any) -> AnyArray:
         """What is known of the path of each row after `Refinement.unfold`, of the rows in `order`.
 
         More arguments are those of `heat_igl.unfolding.walks.unfold`.

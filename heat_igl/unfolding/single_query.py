@@ -103,9 +103,9 @@ class SingleQuery:
         del sides
         starts = triangles.starts_at(self.sources)
         distance = np.array(
-            triangles.walks(
-                triangles.order(self.key), starts, TOLERANCE if tolerance is None else tolerance
-            )["distance"]
+            triangles.walks(triangles.order(self.key), starts, TOLERANCE if tolerance is None else tolerance)[
+                "distance"
+            ]
         )
         edges = bounds.spoke_edges(triangles.tables.first, triangles.tables.spoke)
         del triangles

@@ -27,7 +27,7 @@ from heat_igl.unfolding.asked import (
     with_samples,
 )
 from heat_igl.unfolding.bounds import Bounds
-from heat_igl.unfolding.curve_walks import KNOWN_EDGES, CurveWalks
+from heat_igl.unfolding.curve_walks import CurveWalks
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN
@@ -215,8 +215,9 @@ class UnfoldingSolver:
         # Tolerances are relative to the distance: the common part is added afterwards.
         earliest, relative = from_earliest(sources, self._domain.components, self._given_faces)
         by_windows = self._takes_windows(sources)
-        if not by_windows and angles is None and self._is_on_curves_alone(relative):
-            return self._from_curves(relative, u, labels, earliest)
+        walks = None if by_windows or angles is not None else self._walks_of(relative)
+        if walks is not None:
+            return self._from_curves(walks, relative, u, labels, self._domain.expand_to_vertices(earliest))
         takes_curves = by_windows and angles is None
         points = relative.points if takes_curves else self._points(relative)
         asked = asked_of(relative, points, takes_curves)._replace(
@@ -250,10 +251,10 @@ class UnfoldingSolver:
                 self._bounds.lengthen(distance, sources, points)
         return distance
 
-    def _is_on_curves_alone(self, sources: SourceSet) -> bool:
-        """Whether walks begin at exact distances near the sources."""
+    def _walks_of(self, sources: SourceSet) -> CurveWalks | None:
+        """The walks that begin at exact distances near curves; None for other sources, or another tolerance."""
         has_others = len(sources.vertices) or len(sources.points.faces) or not len(sources.segments.faces)
-        return not (has_others or self._sweeps or self._tolerance is not None) and self._curve_walks is not None
+        return None if has_others or self._sweeps or self._tolerance is not None else self._curve_walks
 
     @cached_property
     def _curve_walks(self) -> CurveWalks | None:
@@ -268,16 +269,15 @@ class UnfoldingSolver:
         return CurveWalks(faces, refinement, directions, self._exact_on_given_faces)
 
     def _from_curves(
-        self, sources: SourceSet, u: FloatArray, labels: IntArray | None, earliest: FloatArray
+        self, walks: CurveWalks, sources: SourceSet, u: FloatArray, labels: IntArray | None, start: FloatArray
     ) -> FloatArray:
-        """Distance (n,) from segments, whose offsets are those from when distance begins on the component."""
-        segments = sources.segments
-        cutoff = KNOWN_EDGES * self._domain.mean_edge_length + float(segments.offset.max())
-        near = self._exact_on_given_faces.solve(segments=segments, cutoff=cutoff)
-        distance = self._curve_walks.distance(-u, segments, near, labels)
-        distance += self._domain.expand_to_vertices(earliest)
+        """Distance (n,) from segments, whose offsets count from `start` (n,) on."""
+        near = self._near(sources, by_windows=False)
+        if near is None:
+            raise ValueError("walks from curves need curves")
+        distance = walks.distance(-u, sources.segments, near, labels) + start
         if labels is not None:
-            labels[:] = np.append(segments.label, -1)[labels]
+            labels[:] = labels_of(sources, sources.points)[labels]
         self._bounds.shorten(distance, labels)
         return distance
 

@@ -95,11 +95,11 @@ def unfold(
     max_steps: int,
     max_passes: int,
     has_holes: bool = False,
+    barrier: AnyArray = _NO_BARRIER,
+    roughness: float = 0.0,
     entered: AnyArray = _NOT_ASKED[0],
     share: FloatArray = _NOT_ASKED[1],
     reach: FloatArray = _NOT_ASKED[1],
-    barrier: AnyArray = _NO_BARRIER,
-    roughness: float = 0.0,
 ) -> None:
     """Distance by straight paths through strips of triangles, to be read from `walk`.
 
@@ -124,13 +124,32 @@ def unfold(
         Passes over vertices that a later one may have improved.
     has_holes : bool
         Whether a closed curve on some component encloses no piece of surface.
+    barrier : (m,) uint8
+        Triangles that no walk passes, since they hold sources that walks do not end at; empty for none.
+    roughness : float
+        A path through a place between two vertices is taken if the cubic part of the distance there is at most so large
+        as a share of the way to them, see `heat_igl.kernels.between`; it may then be shorter than any on the surface.
+        0 takes none.
     entered, share, reach : (n,) int32, (n,) float64, (n,) float64, optional
         Filled with how each path begins, see `heat_igl.unfolding.path_derivatives.Ways`.
     """
     first, inside = (np.empty(0, np.int32), np.empty(0, INSIDE)) if points is None else points
     unfolding.unfold(
-        order, t, walk, first, inside, tolerance, shortfall, max_steps, max_passes, has_holes, entered, share, reach,
-        barrier, roughness
+        order,
+        t,
+        walk,
+        first,
+        inside,
+        tolerance,
+        shortfall,
+        max_steps,
+        max_passes,
+        has_holes,
+        entered,
+        share,
+        reach,
+        barrier,
+        roughness,
     )
 
 
