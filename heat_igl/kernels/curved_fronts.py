@@ -196,9 +196,9 @@ def _shortest(
 
     On the side, distance is slope s + bend s (s - base) / 2. The first guess is that of a straight front.
     """
-    k: cython.int
+    _: cython.int
     s: cython.double = min(max(along - height * slope / sqrt(1.0 - slope * slope), 0.0), base)
-    for k in range(_STEPS):
+    for _ in range(_STEPS):
         x: cython.double = s - along
         r: cython.double = sqrt(x * x + height * height)
         curve: cython.double = height * height / (r * r * r)
