@@ -100,6 +100,15 @@ def smooth_function(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
     return np.asarray(np.sin(mesh.V @ waves + rng.uniform(0, 2 * np.pi, 4)) @ rng.normal(size=4))
 
 
+def our_solvers(mesh: Mesh) -> dict[str, Any]:
+    """By default, with the integrated distance, and refined."""
+    return {
+        "default": SignedHeatSolver(mesh),
+        "heat": SignedHeatSolver(mesh, t_coef=T_COEFS[0]),
+        "unfold": SignedHeatSolver(mesh, refine="unfold"),
+    }
+
+
 def measure_case(mesh: Mesh, solvers: dict[str, Any], share: float, rng: np.random.Generator) -> dict[str, float]:
     """The errors of all solvers in one case; NaN where one fails."""
     values = smooth_function(mesh, rng)
@@ -126,9 +135,11 @@ def measure_case(mesh: Mesh, solvers: dict[str, Any], share: float, rng: np.rand
 
 
 def measure_times(mesh: Mesh, rounds: int) -> dict[str, float]:
-    """Seconds, and their ratios: a curve through the middle of the mesh; the refined query beside the same one."""
+    """Seconds, and their ratios: a curve through the middle of the mesh, whole for the peer and in every ratio."""
     height = mesh.V @ [0.3, 0.5, 0.81]
     curves = isolines(mesh, height, float(np.median(height)))[0]
+    rng = np.random.default_rng(0)
+    pieces = [piece for curve in curves for piece in broken(mesh, curve, 0.3, 3, rng)]
     found: dict[str, list[float]] = {}
 
     def ours() -> SignedHeatSolver:
@@ -144,21 +155,18 @@ def measure_times(mesh: Mesh, rounds: int) -> dict[str, float]:
         solver.compute_distance(nodes, level_set_constraint="None")
 
     solver, refined = ours(), SignedHeatSolver(mesh, refine="unfold")
-    solver.distance(curves)
-    refined.distance(curves)
-    peer.distance(nodes, "None")
+    queries = {
+        "query": lambda: solver.distance(curves),
+        "broken query": lambda: solver.distance(pieces),
+        "heat query": lambda: solver.distance(curves, level="zero"),
+        "refined query": lambda: refined.distance(curves),
+    }
+    for ask in (*queries.values(), lambda: peer.distance(nodes, "None")):
+        ask()
     for _ in range(rounds):
-        times = {
-            "precomputation": (seconds_of(ours), seconds_of(theirs)),
-            "query": (
-                seconds_of(lambda: solver.distance(curves)),
-                seconds_of(lambda: peer.distance(nodes, "None")),
-            ),
-            "refined query": (
-                seconds_of(lambda: refined.distance(curves)),
-                seconds_of(lambda: peer.distance(nodes, "None")),
-            ),
-        }
+        times = {"precomputation": (seconds_of(ours), seconds_of(theirs))}
+        for name, ask in queries.items():
+            times[name] = seconds_of(ask), seconds_of(lambda: peer.distance(nodes, "None"))
         for name, (one, other) in times.items():
             for key, value in ((f"{name}, s", one), (f"{name}, peer, s", other), (f"{name}, ratio", one / other)):
                 found.setdefault(key, []).append(value)
@@ -178,7 +186,7 @@ def drawn(kind: str, mesh: Mesh, values: FloatArray, level: float) -> list[Surfa
 
 def wrong_signs(mesh: Mesh, count: int, rng: np.random.Generator) -> dict[str, int]:
     """Cases with a wrong sign, and vertices compared; the truth is a flood fill of the cut mesh."""
-    solvers = {"heat": SignedHeatSolver(mesh), "unfold": SignedHeatSolver(mesh, refine="unfold")}
+    solvers = our_solvers(mesh)
     found = {"cases": 0, "curves": 0, "vertices compared": 0}
     found |= {f"{name}, cases with a wrong sign": 0 for name in solvers}
     for case in range(count):
@@ -232,19 +240,15 @@ def summary(rows: list[dict[str, Any]]) -> str:
     best = np.array([np.nanmin([row[name] for name in names if name.startswith("potpourri3d")]) for row in rows])
     better = [f"{int((np.array([row[name] for row in rows]) <= best).sum())} of {len(rows)}" for name in names]
     lines.append(("no worse than the better of potpourri3d's", str(len(rows)), *better))
+    shares = [np.array([row[name] for row in rows]) / best for name in names]
+    lines.append(("of its error, at most", "", *(f"{np.nanmax(share):.3g}" for share in shares)))
+    lines.append(("in the geometric mean", "", *(f"{np.exp(np.nanmean(np.log(share))):.3g}" for share in shares)))
     return "\n".join(table(["removed", "cases", *names], lines))
 
 
 def measure_errors(meshes: dict[str, Mesh], count: int, rng: np.random.Generator) -> list[dict[str, Any]]:
     """A row for each case: mesh, share removed, and the errors of all solvers."""
-    solvers = {
-        name: {
-            "heat": SignedHeatSolver(mesh),
-            "unfold": SignedHeatSolver(mesh, refine="unfold"),
-            "potpourri3d": Peer(mesh),
-        }
-        for name, mesh in meshes.items()
-    }
+    solvers = {name: our_solvers(mesh) | {"potpourri3d": Peer(mesh)} for name, mesh in meshes.items()}
     rows: list[dict[str, Any]] = []
     for case in range(count):
         name, share = list(meshes)[case % len(meshes)], SHARES[case // len(meshes) % len(SHARES)]

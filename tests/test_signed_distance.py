@@ -39,6 +39,13 @@ def ring(mesh: Mesh, radius: float = 0.3, start: float = 0.0, end: float = 2 * n
     return curve_on(mesh, positions, closed=closed)
 
 
+def bent_level(mesh: Mesh, seed: int) -> list[SurfaceCurve]:
+    """The level of a random smooth function, with many bends."""
+    rng = np.random.default_rng(seed)
+    values = np.sin(mesh.V @ rng.normal(size=(3, 5)) * 2 + rng.uniform(0, 6, 5)).sum(axis=1)
+    return isolines(mesh, values, float(np.quantile(values, 0.4)))[0]
+
+
 def reversed_curve(curve: SurfaceCurve) -> SurfaceCurve:
     return SurfaceCurve(curve.faces[::-1], curve.end[::-1], curve.start[::-1], curve.is_closed)
 
@@ -71,7 +78,7 @@ def mean_error(distance: np.ndarray, truth: np.ndarray) -> float:
 
 @pytest.mark.parametrize("surface", [plane, sphere, cylinder])
 def test_circles_converge_and_are_near_exact_when_refined(surface):
-    errors, of_mesh = [], []
+    errors, of_mesh, of_fronts = [], [], []
     for n in (20, 40, 80):
         mesh, circle, truth = surface(n)
         # The time step in proportion to h: in proportion to h^2, the directions of a grid stay in the normals.
@@ -80,9 +87,13 @@ def test_circles_converge_and_are_near_exact_when_refined(surface):
         polyhedral = np.copysign(geodesic_distance(mesh, circle, method="exact"), truth)
         assert mean_error(refined, polyhedral) < 2e-4
         of_mesh.append(mean_error(polyhedral, truth))
+        of_fronts.append(mean_error(SignedHeatSolver(mesh).distance(circle), polyhedral))
     # First order; on the cylinder the field is exact at once.
     assert errors[2] < 0.002
     assert errors[2] < 0.6 * errors[1] < 0.36 * errors[0] or errors[0] < 1e-9
+    # Exact on up to 1000 vertices, then far below the error of straight fronts, which is 0.3 % on the plane.
+    assert of_fronts[0] < 1e-12
+    assert of_fronts[2] < of_fronts[1] < 2e-4 or of_fronts[1] < 1e-12
     # Second order, or the surface is flat and only the circle is a polygon.
     assert of_mesh[2] < 0.3 * of_mesh[1] < 0.09 * of_mesh[0] or max(of_mesh) < 2e-5
     assert mean_error(refined, truth) < 2e-4
@@ -199,7 +210,7 @@ def test_unsigned_sources_among_the_curves():
     np.testing.assert_array_equal(distance[far] < 0, truth[far] < 0)
 
 
-@pytest.mark.parametrize("level", ["zero", "none"])
+@pytest.mark.parametrize("level", [None, "zero", "none"])
 def test_an_unsigned_curve_among_signed_ones(level):
     mesh, circle, _ = plane(34)
     # Through both sides of the circle.
@@ -219,10 +230,52 @@ def on_curves(mesh: Mesh, curves: list[SurfaceCurve], values: np.ndarray) -> flo
     return float(np.sqrt(np.average(middle**2, weights=length)) / mesh.edge_lengths.mean())
 
 
+@pytest.mark.parametrize(
+    "mesh", [shapes.icosphere(4), shapes.torus(60, 30), shapes.blob(4)], ids=["sphere", "torus", "blob"]
+)
+def test_the_default_is_near_the_exact_distance_of_curves_with_bends(mesh):
+    """Beyond three edges fronts go on, across ridges, behind corners of the curves and over uneven triangles."""
+    solver = SignedHeatSolver(mesh)
+    for seed in range(3):
+        curves = bent_level(mesh, seed)
+        exact = geodesic_distance(mesh, curves, method="exact")
+        off = np.abs(np.abs(solver.distance(curves)) - exact)
+        assert off.mean() < 1e-3 * exact.mean()
+        assert off.max() < 0.04 * exact.max()
+        near = exact < 3 * solver.operators.mean_edge_length
+        np.testing.assert_allclose(off[near], 0, atol=1e-12)
+        # Integrated, it is at least ten times as far off.
+        heat = np.abs(np.abs(solver.distance(curves, level="zero")) - exact)
+        assert heat.mean() > 10 * off.mean()
+
+
+def test_a_time_step_or_a_level_asks_for_the_integrated_distance():
+    mesh, circle, _ = plane(34)
+    solver = SignedHeatSolver(mesh)
+    integrated = SignedHeatSolver(mesh, t=solver.t).distance(circle)
+    np.testing.assert_array_equal(integrated, solver.distance(circle, level="zero"))
+    np.testing.assert_array_equal(integrated, SignedHeatSolver(mesh, t_coef=0.25).distance(circle))
+    assert np.abs(integrated - solver.distance(circle)).max() > 1e-4
+    with_points = [circle, OrientedPoints(closest_points(mesh, [[0.82, 0.5, 0]]).points, [[1, 0, 0]])]
+    np.testing.assert_array_equal(solver.distance(with_points), solver.distance(with_points, level="zero"))
+
+
+def test_fronts_begin_on_triangles_much_larger_than_the_mean():
+    """Three mean edge lengths from the curve there is no corner of the triangle that it runs in."""
+    fine, coarse = shapes.grid(40), shapes.grid(3)
+    V = np.concatenate([0.01 * fine.V, np.add(coarse.V, [1, 0, 0])])
+    mesh = Mesh(V, np.concatenate([fine.F, coarse.F + fine.n_vertices]))
+    line = isolines(mesh, V[:, 0], 1.5)[0]
+    distance = SignedHeatSolver(mesh).distance(line)
+    np.testing.assert_allclose(np.abs(distance[fine.n_vertices :]), np.abs(coarse.V[:, 0] - 0.5), atol=1e-12)
+    assert np.isinf(distance[: fine.n_vertices]).all()
+
+
 def test_a_circle_is_nearer_to_zero_than_the_true_distance():
     # The true distance is not linear in the faces, and so not 0 on the segments of the circle.
     mesh, circle, truth = plane(40)
-    assert on_curves(mesh, [circle], SignedHeatSolver(mesh).distance(circle)) < on_curves(mesh, [circle], truth)
+    near = SignedHeatSolver(mesh).distance(circle, level="zero")
+    assert on_curves(mesh, [circle], near) < on_curves(mesh, [circle], truth)
 
 
 @pytest.mark.parametrize(
@@ -233,7 +286,7 @@ def test_curves_with_bends_are_near_zero(mesh):
     for _ in range(3):
         values = np.sin(mesh.V @ rng.normal(size=(3, 5)) * 2 + rng.uniform(0, 6, 5)).sum(axis=1)
         curves = isolines(mesh, values, float(np.quantile(values, 0.4)))[0]
-        near = on_curves(mesh, curves, solver.distance(curves))
+        near = on_curves(mesh, curves, solver.distance(curves, level="zero"))
         assert near < 0.03
         assert near < on_curves(mesh, curves, solver.distance(curves, level="none")) / 10
 

@@ -6,6 +6,7 @@ distance is a parabola: the directions at the ends give the slopes, so the front
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.curved_fronts import Triangle
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.libc.math import INFINITY, M_PI, atan2, cos, fabs, sqrt
 
@@ -13,8 +14,8 @@ __all__ = ["advance"]
 
 # A vertex that was passed is visited again if a later front is earlier there by this part of an edge.
 _GAIN = cython.declare(cython.double, 1e-4)
-# Steps of Newton's method to the shortest way from a side; the error is below 1e-8 edges after the second.
-_STEPS = cython.declare(cython.int, 3)
+# Steps of Newton's method to the shortest way from a side. The length is off by the square of the error of its place.
+_STEPS = cython.declare(cython.int, 2)
 # A front that converges on the far corner has no shortest way from the side. It counts as less curved, by this factor.
 _CONVERGING = cython.declare(cython.double, 0.8)
 # Visits per vertex after which the kernel gives up.
@@ -24,9 +25,7 @@ _LEAST = cython.declare(cython.double, 1e-300)
 
 
 def advance(
-    F: cython.const[cython.int][:, ::1],
-    lengths: cython.const[cython.double][:, ::1],
-    leaving: cython.const[cython.double][:, ::1],
+    triangle: cython.const[Triangle][::1],
     total: cython.const[cython.double][::1],
     first: cython.const[cython.int][::1],
     incident: cython.const[cython.int][::1],
@@ -37,10 +36,9 @@ def advance(
 
     Parameters
     ----------
-    F, lengths : (m, 3) int32, (m, 3) float64
-        Triangles, oriented alike, and the side opposite each corner.
-    leaving : (m, 3) float64
-        At each corner, the direction of the side to the next corner: an angle around the vertex, counterclockwise.
+    triangle : (m,) structures
+        The `vertex` at each of three corners, counterclockwise; the `side` opposite; and the direction of the side to
+        the next corner, `leaving`: an angle around the vertex, counterclockwise.
     total : (n,) float64
         Sum of the angles around each vertex; ``inf`` on the boundary.
     first, incident : (n + 1,) int32, (3 m,) int32
@@ -56,8 +54,8 @@ def advance(
         Number of visits.
     """
     one = _CurvedFronts()
-    one.F, one.lengths, one.leaving, one.total = F, lengths, leaving, total
-    one.first, one.incident, one.d, one.back = first, incident, d, back
+    one.triangle, one.total, one.first, one.incident = triangle, total, first, incident
+    one.d, one.back = d, back
     is_known = np.isfinite(d)
     one.is_known, one.is_passed = is_known.view(np.uint8), is_known.astype(np.uint8)
     one.queue = PriorityQueue(d.shape[0])
@@ -71,9 +69,7 @@ def advance(
 class _CurvedFronts:
     """What is read and written, by triangle and by vertex. The vertices in the queue come in ascending order of `d`."""
 
-    F: cython.const[cython.int][:, ::1]
-    lengths: cython.const[cython.double][:, ::1]
-    leaving: cython.const[cython.double][:, ::1]
+    triangle: cython.const[Triangle][::1]
     total: cython.const[cython.double][::1]
     first: cython.const[cython.int][::1]
     incident: cython.const[cython.int][::1]
@@ -99,7 +95,8 @@ class _CurvedFronts:
                 continue
             for k in range(self.first[v], self.first[v + 1]):
                 f, c = self.incident[k] // 3, self.incident[k] % 3
-                if not (self.is_known[self.F[f, (c + 1) % 3]] and self.is_known[self.F[f, (c + 2) % 3]]):
+                t = cython.address(self.triangle[f])
+                if not (self.is_known[t.vertex[(c + 1) % 3]] and self.is_known[t.vertex[(c + 2) % 3]]):
                     self.queue.set_key(v, 1.0 / max(self.d[v], _LEAST))
                     break
         self.n_visits = 0
@@ -110,29 +107,32 @@ class _CurvedFronts:
             self.n_visits += 1
             for k in range(self.first[v], self.first[v + 1]):
                 f, c = self.incident[k] // 3, self.incident[k] % 3
-                self.arrive(f, (c + 1) % 3)
-                self.arrive(f, (c + 2) % 3)
+                self.arrive(cython.address(self.triangle[f]), (c + 1) % 3)
+                self.arrive(cython.address(self.triangle[f]), (c + 2) % 3)
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def arrive(self, f: cython.int, c: cython.int) -> cython.void:
-        """Let corner c of triangle f have the front that has passed the other two, if it is the first."""
-        v: cython.int = self.F[f, c]
+    def arrive(self, t: cython.pointer[cython.const[Triangle]], c: cython.int) -> cython.void:
+        """Let corner c of triangle t have the front that has passed the other two, if it is the first."""
+        v: cython.int = t.vertex[c]
         if self.is_known[v]:
             return
         i: cython.int = (c + 1) % 3
         j: cython.int = (c + 2) % 3
-        a: cython.int = self.F[f, i]
-        b: cython.int = self.F[f, j]
+        a: cython.int = t.vertex[i]
+        b: cython.int = t.vertex[j]
         da: cython.double = self.d[a] if self.is_passed[a] else INFINITY
         db: cython.double = self.d[b] if self.is_passed[b] else INFINITY
         best: cython.double = self.d[v]
         if not min(da, db) < best:
             return
-        base: cython.double = self.lengths[f, c]
-        to_a: cython.double = self.lengths[f, j]
-        to_b: cython.double = self.lengths[f, i]
+        base: cython.double = t.side[c]
+        to_a: cython.double = t.side[j]
+        to_b: cython.double = t.side[i]
+        if self.is_passed[v] and best <= max(da, db) and to_a * to_a + to_b * to_b > base * base:
+            # Into an acute corner, a front comes after it has passed both other corners.
+            return
         # In the plane: a in the origin, b on the first axis, v above it.
         along: cython.double = 0.5 * ((to_a - to_b) * (to_a + to_b) / base + base)
         height: cython.double = sqrt(max(to_a * to_a - along * along, 0.0))
@@ -143,7 +143,7 @@ class _CurvedFronts:
             best, foot = db + to_b, base
         if fabs(db - da) < base:
             slope: cython.double = (db - da) / base
-            bend: cython.double = self.bend(f, i, j, atan2(height, base - along))
+            bend: cython.double = self.bend(t, c, atan2(height, base - along))
             s: cython.double = _shortest(slope, bend, base, along, height)
             value: cython.double = da + s * slope + 0.5 * bend * s * (s - base)
             value += sqrt((s - along) * (s - along) + height * height)
@@ -153,20 +153,22 @@ class _CurvedFronts:
             return
         self.is_passed[v] = False
         self.d[v] = best
-        self.back[v] = self.leaving[f, c] + atan2(height * foot, along * (along - foot) + height * height)
+        self.back[v] = t.leaving[c] + atan2(height * foot, to_a * to_a - along * foot)
         self.queue.set_key(v, 1.0 / max(best, _LEAST))
 
     @cython.cfunc
     @cython.inline
     @cython.nogil
     @cython.exceptval(check=False)
-    def bend(self, f: cython.int, i: cython.int, j: cython.int, angle: cython.double) -> cython.double:
-        """Second derivative of distance along the side from corner i to j, with `angle` at j; 0 if it is not known."""
-        a: cython.int = self.F[f, i]
-        b: cython.int = self.F[f, j]
+    def bend(self, t: cython.pointer[cython.const[Triangle]], c: cython.int, angle: cython.double) -> cython.double:
+        """Second derivative of distance along the side opposite corner c, with `angle` at its end; 0 if not known."""
+        i: cython.int = (c + 1) % 3
+        j: cython.int = (c + 2) % 3
+        a: cython.int = t.vertex[i]
+        b: cython.int = t.vertex[j]
         if self.back[a] != self.back[a] or self.back[b] != self.back[b]:
             return 0.0
-        return -(self.slope(b, self.leaving[f, j] + angle) + self.slope(a, self.leaving[f, i])) / self.lengths[f, 3 - i - j]
+        return -(self.slope(b, t.leaving[j] + angle) + self.slope(a, t.leaving[i])) / t.side[c]
 
     @cython.cfunc
     @cython.inline
@@ -194,9 +196,9 @@ def _shortest(
 
     On the side, distance is slope s + bend s (s - base) / 2. The first guess is that of a straight front.
     """
-    k: cython.int
+    _: cython.int
     s: cython.double = min(max(along - height * slope / sqrt(1.0 - slope * slope), 0.0), base)
-    for k in range(_STEPS):
+    for _ in range(_STEPS):
         x: cython.double = s - along
         r: cython.double = sqrt(x * x + height * height)
         curve: cython.double = height * height / (r * r * r)
