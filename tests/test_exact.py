@@ -97,7 +97,7 @@ def test_rolled_out_pyramid():
         np.testing.assert_allclose(exact_distance(mesh.V, mesh.F, source), truth, rtol=1e-12, atol=1e-14)
 
 
-def test_cube():
+def test_corners_of_a_cube_are_as_far_as_over_unfolded_faces():
     mesh = cube()
     straight = np.linalg.norm(mesh.V, axis=1)
     truth = np.where(np.isclose(straight, np.sqrt(3)), np.sqrt(5), straight)
@@ -214,7 +214,7 @@ def test_distance_is_symmetric(name):
     np.testing.assert_allclose(between, between.T, rtol=1e-12, atol=1e-14)
 
 
-def test_scales():
+def test_distances_scale_with_the_mesh():
     mesh = bumpy()
     d = exact_distance(mesh.V, mesh.F, 0)
     np.testing.assert_array_equal(exact_distance(mesh.V * 2.0**90, mesh.F, 0), d * 2.0**90)
@@ -436,7 +436,7 @@ def test_the_order_of_vertices_and_faces_does_not_matter():
     np.testing.assert_allclose(distance[new], exact_distance(mesh.V, mesh.F, 7), rtol=1e-14)
 
 
-def test_errors():
+def test_what_has_no_exact_distance_is_refused():
     mesh = shapes.grid(3)
     with pytest.raises(MeshError, match="needs triangles"):
         exact_distance(shapes.box(1).V, shapes.box(1).F, 0)

@@ -69,7 +69,7 @@ def test_two_threads_find_what_one_finds(name):
     np.testing.assert_array_equal(*both_ways(surface, points=points))
 
 
-def test_curves():
+def test_two_threads_find_what_one_finds_from_curves():
     for mesh in (shapes.grid(16), perturbed(shapes.icosphere(3), 0.3, 1)):
         curve = isolines(mesh, mesh.V[:, 0] + 0.3 * mesh.V[:, 1], 0.4)[0][0]
         segments = source_set(curve, mesh.n_vertices, mesh.F).segments

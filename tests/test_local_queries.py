@@ -220,7 +220,7 @@ def test_nonmanifold_mesh_from_a_file():
         np.testing.assert_allclose(exact[indices[i][indices[i] >= 0]], distances[i][indices[i] >= 0], rtol=1e-13)
 
 
-def test_errors():
+def test_radii_counts_and_pairs_that_make_no_sense_are_refused():
     mesh = shapes.grid(3)
     for radius in (0, -1.0, np.nan, "far", True, None):
         with pytest.raises(ValueError, match="radius must be a positive number, not"):

@@ -249,7 +249,7 @@ class _Sweep:
     @cython.nogil
     @cython.exceptval(check=False)
     def mark(self, v: cython.int, old: cython.double, begin: cython.double) -> cython.Py_ssize_t:
-        """Mark the vertices that v's new distance, if it is enough below `old`, can improve; returns their lowest rank, or n.
+        """Mark the vertices that a decrease of v's distance from `old` can improve; returns their lowest rank, or n.
 
         `begin` is the distance at which v's source begins.
         """
