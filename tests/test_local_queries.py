@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import perturbed, shared_path
-from test_exact import bumpy, two_arms
+from surfaces import bent_pages, bumpy, two_arms
 
 from heat_igl import Mesh, MeshError, SourceError, distances_within, nearest_vertices, pair_distances, read_mesh, shapes
 from heat_igl.typing import FloatArray
@@ -18,22 +18,10 @@ from heat_igl.unfolding.exact import ExactSurface, exact_distance
 from heat_igl.unfolding.half_edges import from_mesh
 from heat_igl.unfolding.window_search import Found
 
-
-def book() -> Mesh:
-    """Three pages at one edge, each of them bent."""
-    page = shapes.grid(6)
-    x, y, _ = (page.V - page.V.min(axis=0)).T
-    V = [np.column_stack([x * np.cos(a), x * np.sin(a), y]) for a in (0.0, 2.0, 4.0)]
-    stacked = np.concatenate(V)
-    F = np.concatenate([page.F + k * page.n_vertices for k in range(3)])
-    _, first, inverse = np.unique(np.round(stacked, 9), axis=0, return_index=True, return_inverse=True)
-    return Mesh(stacked[first], inverse.ravel()[F])
-
-
 MESHES = {
     "bumpy": bumpy,
     "bends at a corner": lambda: two_arms(8),
-    "edges of three faces": book,
+    "edges of three faces": bent_pages,
     "rough": lambda: perturbed(shapes.grid(12), 0.8, 2),
 }
 
