@@ -398,6 +398,7 @@ def test_demo_goes_on_without_pymeshlab_and_without_references(
     assert "error of heat" in out
     assert files(tmp_path) == {"sphere.ply", "sphere.png"}
     monkeypatch.setattr(reference, "exact", missing)
+    monkeypatch.setattr(demo, "_drawn", lambda *_: ("picture", "drawn before"))
     assert cli.run(["demo", "--out", str(tmp_path)]) == 0
     assert "error of heat" not in capsys.readouterr().out
 

@@ -13,7 +13,13 @@ from surfaces import bent_pages, bumpy, two_arms
 
 from heat_igl import Mesh, MeshError, SourceError, distances_within, nearest_vertices, pair_distances, read_mesh, shapes
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import blocks_within, local, read_distances_within, within_store, write_distances_within
+from heat_igl.unfolding import (
+    blocks_within,
+    local_searches,
+    read_distances_within,
+    within_store,
+    write_distances_within,
+)
 from heat_igl.unfolding.exact import ExactSurface, exact_distance
 from heat_igl.unfolding.half_edges import from_mesh
 from heat_igl.unfolding.window_search import Found
@@ -130,9 +136,9 @@ def test_threads_and_room_change_nothing(monkeypatch):
     mesh = bumpy()
     monkeypatch.setenv("HEAT_IGL_NUM_THREADS", "1")
     alone = distances_within(mesh, 0.7), *nearest_vertices(mesh, 20)
-    monkeypatch.setattr(local, "n_threads", lambda: 4)
-    monkeypatch.setattr(local, "_CHUNK", 5)
-    monkeypatch.setattr(local, "_ROOM", 3)  # less than one source needs
+    monkeypatch.setattr(local_searches, "n_threads", lambda: 4)
+    monkeypatch.setattr(local_searches, "CHUNK", 5)
+    monkeypatch.setattr(local_searches, "_ROOM", 3)  # less than one source needs
     together = distances_within(mesh, 0.7), *nearest_vertices(mesh, 20)
     np.testing.assert_array_equal(alone[0].toarray(), together[0].toarray())
     for one, other in zip(alone[1:], together[1:], strict=True):
@@ -168,14 +174,14 @@ def test_what_is_not_reached_is_padded():
 def test_a_search_clears_what_it_wrote(monkeypatch):
     """Otherwise the next search on the same arrays would go wrong, or cost more than what it touches."""
     mesh, kept = bumpy(), []
-    original = local._Workspace
+    original = local_searches.Workspace
 
     class Kept(original):  # type: ignore[misc, valid-type]
         def __init__(self, *arguments):
             super().__init__(*arguments)
             kept.append(self)
 
-    monkeypatch.setattr(local, "_Workspace", Kept)
+    monkeypatch.setattr(local_searches, "Workspace", Kept)
     distances_within(mesh, 0.5)
     nearest_vertices(mesh, 7)
     pair_distances(mesh, [[0, 300], [5, 9]])
@@ -233,7 +239,7 @@ def test_radii_counts_and_pairs_that_make_no_sense_are_refused():
 
 def test_an_interrupt_ends_all_threads(monkeypatch):
     """What waits is not begun any more, neither by the thread that was interrupted nor by others."""
-    mesh, within, begun = shapes.icosphere(2), local._within, []
+    mesh, within, begun = shapes.icosphere(2), local_searches.within, []
 
     def interrupted_once(work, part, radius):
         begun.append(part.start)
@@ -242,9 +248,9 @@ def test_an_interrupt_ends_all_threads(monkeypatch):
         time.sleep(0.01)
         return within(work, part, radius)
 
-    monkeypatch.setattr(local, "_within", interrupted_once)
-    monkeypatch.setattr(local, "_CHUNK", 1)
-    monkeypatch.setattr(local, "n_threads", lambda: 2)
+    monkeypatch.setattr(local_searches, "within", interrupted_once)
+    monkeypatch.setattr(local_searches, "CHUNK", 1)
+    monkeypatch.setattr(local_searches, "n_threads", lambda: 2)
     with pytest.raises(KeyboardInterrupt):
         distances_within(mesh, 0.5)
     assert len(begun) < 10
