@@ -7,7 +7,7 @@
 Truth is pygeodesic's exact polyhedral distance (extra ``validate``). Paths are traced down the refined distance, and
 down that of the heat alone. With ``--pairs``, `GeodesicPathSolver` is compared with potpourri3d's
 `EdgeFlipGeodesicSolver` (extra ``bench``) on so many pairs of vertices, and on a tenth as many loops through four
-vertices along edges, which both straighten.
+vertices along edges, which both straighten. A mesh of 3000 vertices takes about a second.
 """
 
 from __future__ import annotations

@@ -16,6 +16,8 @@ cut mesh it is checked
 - that every edge has as many faces as before at most, every vertex one fan, the surface the same Euler characteristic,
   number of boundary loops and orientation,
 - that the curves are edges, with the same length.
+
+Ten thousand curves take about three minutes.
 """
 
 from __future__ import annotations

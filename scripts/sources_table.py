@@ -5,7 +5,8 @@
 For each mesh, points are drawn in faces, by area; the truth is the exact distance on the mesh with the point inserted
 as a vertex, and compared with it the same for a corner of the same face. Prints the mean of |d - exact| / exact over
 vertices and sources in percent as a Markdown table, and the largest error of the corners of the point's face as a share
-of their distance. Needs the extras ``validate`` and ``fast``; docs/sources.md shows the table.
+of their distance. Needs the extras ``validate`` and ``fast``; docs/sources.md shows the table. A mesh of 5000 vertices
+takes about a second.
 """
 
 from __future__ import annotations

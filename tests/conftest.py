@@ -56,6 +56,22 @@ def flat_perturbed(mesh: heat_igl.Mesh, amount: float = 0.3, seed: int = 0) -> h
     return heat_igl.Mesh(perturbed(mesh, amount, seed).V * [1, 1, 0], mesh.F)
 
 
+def relative_error(d: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """|d - truth| / truth at the vertices with a positive finite truth."""
+    there = (truth > 0) & np.isfinite(truth)
+    return np.abs(d[there] - truth[there]) / truth[there]
+
+
+def pygeodesic_distance(mesh: heat_igl.Mesh, source: int) -> np.ndarray:
+    """Exact distance (n,) by pygeodesic; ``inf`` at unused vertices, which it does not take."""
+    geodesic = pytest.importorskip("pygeodesic.geodesic")
+    used, F = np.unique(mesh.F, return_inverse=True)
+    algorithm = geodesic.PyGeodesicAlgorithmExact(mesh.V[used], F.reshape(-1, 3))
+    d = np.full(mesh.n_vertices, np.inf)
+    d[used] = algorithm.geodesicDistances(np.searchsorted(used, [source]))[0]
+    return d
+
+
 @pytest.fixture(scope="session")
 def cow() -> heat_igl.Mesh:
     return heat_igl.read_mesh(wheel_path("cow.obj"))

@@ -107,7 +107,7 @@ def test_unit_of_length_does_not_matter(name, scale):
 
 
 @pytest.mark.parametrize("name", MESH_METHODS)
-def test_bad_sources(name):
+def test_sources_that_are_no_vertices_are_refused(name):
     if name == "fast marching":
         needs("mesh")
     with pytest.raises(SourceError, match="is no vertex"):
@@ -470,7 +470,7 @@ def test_fast_sweeping_solves_the_upwind_equations():
 
 
 @pytest.mark.parametrize("name", ["fast marching", "fast sweeping"])
-def test_walls(name):
+def test_paths_lead_around_walls_and_not_into_a_closed_room(name):
     """A wall with one gap, and a closed room: the path goes through the gap, and into the room none does."""
     if name == "fast marching":
         needs("grid")
@@ -520,7 +520,7 @@ def test_neighbouring_sources_in_fast_marching():
 
 
 @pytest.mark.parametrize("name", GRID_METHODS)
-def test_bad_grids(name):
+def test_sources_and_spacings_that_fit_no_grid_are_refused(name):
     method = GRID_METHODS[name]
     mask = np.zeros((3, 4), bool)
     with pytest.raises(SourceError, match="sources marks no point"):

@@ -222,7 +222,7 @@ def test_without_typer_one_line_names_the_extra(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
-def test_interrupt(tmp_path: Path) -> None:
+def test_an_interrupt_ends_the_command_without_a_traceback(tmp_path: Path) -> None:
     code = (
         # A process started in the background inherits that interrupts are ignored; a user's is not.
         "import signal, sys, time; from heat_igl import cli; from heat_igl.cli import comparison\n"
@@ -381,7 +381,7 @@ def test_no_arguments_print_the_help(capsys: pytest.CaptureFixture[str]) -> None
     assert all(name in out for name in ("info", "distance", "demo"))
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+def test_version_prints_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["--version"]) == 0
     assert capsys.readouterr().out == f"{heat_igl.__version__}\n"
 
@@ -402,6 +402,7 @@ def test_demo_goes_on_without_pymeshlab_and_without_references(
     assert "error of heat" in out
     assert files(tmp_path) == {"sphere.ply", "sphere.png"}
     monkeypatch.setattr(reference, "exact", missing)
+    monkeypatch.setattr(demo, "_drawn", lambda *_: ("picture", "drawn before"))
     assert cli.run(["demo", "--out", str(tmp_path)]) == 0
     assert "error of heat" not in capsys.readouterr().out
 

@@ -437,7 +437,7 @@ def test_wrong_curves_name_the_node(sphere: Mesh) -> None:
         pp3d.MeshFastMarchingDistanceSolver(sphere.V, sphere.F).compute_distance([[(3, [])]], [[1.0]], sign=True)
 
 
-def test_polygons() -> None:
+def test_the_polygon_solver_measures_a_plane_and_carries_vectors_unturned() -> None:
     V, F = igl.quad_grid(6, 6)[:2]
     V = np.hstack([V, np.zeros((len(V), 3 - V.shape[1]))])
     solver = pp3d.PolygonMeshHeatSolver(V, F)
@@ -450,7 +450,7 @@ def test_polygons() -> None:
     assert np.array_equal(solver.extend_scalar([0, 20], [3.0, 3.0]), np.full(len(V), 3.0))
 
 
-def test_point_clouds(sphere: Mesh) -> None:
+def test_the_cloud_solver_measures_a_sphere(sphere: Mesh) -> None:
     solver = pp3d.PointCloudHeatSolver(sphere.V)
     exact = np.arccos(np.clip(sphere.V @ sphere.V[7], -1, 1))
     assert np.abs(solver.compute_distance(7) - exact).mean() < 0.05
@@ -497,7 +497,7 @@ def test_texture_coordinates_are_written(tmp_path: Path, kind: str, rows: int) -
         pp3d.write_mesh(V, F, tmp_path / "a.ply", coordinates, kind)
 
 
-def test_files(tmp_path: Path, torus: Mesh) -> None:
+def test_files_are_read_back_as_written(tmp_path: Path, torus: Mesh) -> None:
     pp3d.write_mesh(torus.V, torus.F, str(tmp_path / "a.obj"))
     V, F = pp3d.read_mesh(str(tmp_path / "a.obj"))
     assert np.array_equal(V, torus.V)

@@ -180,7 +180,7 @@ def test_faces_without_a_curve_stay():
     assert whole.sum() > mesh.n_faces - 10
 
 
-def test_bad_input():
+def test_what_is_no_curve_on_the_mesh_is_refused():
     mesh = square()
     curve = random_loop(mesh, 1)
     with pytest.raises(SourceError, match="curves is empty"):

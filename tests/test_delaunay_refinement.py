@@ -55,7 +55,7 @@ def test_the_surface_stays_the_same(coarse: IntrinsicTriangulation, fine: Intrin
     assert fine.n - len(fine.edges) + len(fine.F) == 2
 
 
-def test_gluing(fine: IntrinsicTriangulation) -> None:
+def test_glued_half_edges_share_ends_and_length(fine: IntrinsicTriangulation) -> None:
     half_edge = np.arange(fine.F.size)
     assert (fine.twin[fine.twin] == half_edge).all()
     assert (fine.tail(half_edge) == fine.head(fine.twin)).all()

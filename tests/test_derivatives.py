@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import perturbed
+from surfaces import moebius_strip
 
 import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, MeshError, OffsetSources, SurfacePoints, shapes
@@ -20,22 +21,6 @@ HEAT = [
 ]
 
 
-def moebius_strip(around: int = 40, across: int = 5) -> Mesh:
-    """A strip that cannot be oriented."""
-    angle = np.repeat(np.linspace(0, 2 * np.pi, around, endpoint=False), across)
-    off = np.tile(np.linspace(-0.4, 0.4, across), around)
-    radius = 1 + off / 2 * np.cos(angle / 2)
-    V = np.stack([radius * np.cos(angle), radius * np.sin(angle), off / 2 * np.sin(angle / 2)], axis=1)
-    F = []
-    for i in range(around):
-        for j in range(across - 1):
-            a, b, c, d = i * across + j, i * across + j + 1, (i + 1) * across + j, (i + 1) * across + j + 1
-            if i == around - 1:
-                c, d = across - 1 - j, across - 2 - j
-            F += [[a, c, b], [b, c, d]]
-    return Mesh(V, F)
-
-
 def moved(mesh: Mesh, amount: float = 0.15) -> Mesh:
     """All vertices moved at random, the outer ones too: no two paths are equally long, and no edges are cocircular."""
     h = mesh.edge_lengths.mean()
@@ -46,7 +31,7 @@ MESHES = {
     "sphere": lambda: moved(shapes.icosphere(3)),
     "grid": lambda: moved(shapes.grid(16)),
     "torus": lambda: moved(shapes.torus(40, 20)),
-    "moebius": lambda: moved(moebius_strip()),
+    "moebius": lambda: moved(moebius_strip(40, 4, 0.2)),
     "book": lambda: moved(shapes.book(3, 8), 0.1),
     "fine sphere": lambda: moved(shapes.icosphere(4), 0.05),
 }

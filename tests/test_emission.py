@@ -285,7 +285,7 @@ def test_labels_of_several_kinds(refine):
     assert (np.isinf(found.distance) == (found.labels == -1)).all()
 
 
-def test_cutoff(refine):
+def test_beyond_the_cutoff_distances_are_infinite_and_within_unchanged(refine):
     mesh = plane(12)
     solver = HeatMethodSolver(mesh, refine=refine)
     whole = solver.distance(5)

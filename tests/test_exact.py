@@ -7,11 +7,27 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-import scipy.spatial
-from conftest import flat_perturbed, load_script, perturbed, shared_path, wheel_path
-from test_unfolding import exact as pygeodesic
-from test_unfolding import moebius_strip, random_disk, relative_error
-from test_unfolding_sources import COORDINATES, sheared, with_point
+from conftest import (
+    flat_perturbed,
+    load_script,
+    perturbed,
+    pygeodesic_distance,
+    relative_error,
+    shared_path,
+    wheel_path,
+)
+from surfaces import (
+    bumpy,
+    cube,
+    moebius_strip,
+    random_disk,
+    rough_field,
+    rough_star,
+    sheared,
+    two_arms,
+    with_point,
+)
+from test_unfolding_sources import COORDINATES
 
 from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
 from heat_igl.errors import MeshError, SourceError
@@ -32,23 +48,6 @@ def as_given(mesh: Mesh) -> ExactSurface:
 
 
 SURFACES = {"given": as_given, "delaunay": delaunay, "from scratch": lambda mesh: ExactSurface(from_mesh(mesh, 0))}
-
-
-def bumpy() -> Mesh:
-    return perturbed(shapes.icosphere(3), 0.3, 1)
-
-
-def cube() -> Mesh:
-    V = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
-    return Mesh(V, scipy.spatial.ConvexHull(V).simplices)
-
-
-def two_arms(n: int) -> Mesh:
-    """A flat square without one quadrant: paths from its one arm into the other bend at the inner corner, (0, 0)."""
-    mesh = shapes.grid(2 * n)
-    V = mesh.V - 0.5 * mesh.V.max(axis=0)
-    x, y, _ = V[mesh.F].mean(axis=1).T
-    return Mesh(V, mesh.F[(x < 0) | (y < 0)])
 
 
 FLAT = {
@@ -97,7 +96,7 @@ def test_rolled_out_pyramid():
         np.testing.assert_allclose(exact_distance(mesh.V, mesh.F, source), truth, rtol=1e-12, atol=1e-14)
 
 
-def test_cube():
+def test_corners_of_a_cube_are_as_far_as_over_unfolded_faces():
     mesh = cube()
     straight = np.linalg.norm(mesh.V, axis=1)
     truth = np.where(np.isclose(straight, np.sqrt(3)), np.sqrt(5), straight)
@@ -171,20 +170,7 @@ def test_shared_meshes_against_pygeodesic(name):
 def assert_agrees(mesh: Mesh, n_sources: int) -> None:
     for source in np.random.default_rng(5).choice(np.unique(mesh.F), n_sources, replace=False):
         d = exact_distance(mesh.V, mesh.F, int(source))
-        assert relative_error(d, pygeodesic(mesh, int(source))).max() < 1e-10
-
-
-def rough_star(seed: int) -> Mesh:
-    rng = np.random.default_rng(seed)
-    P = rng.normal(size=(rng.integers(8, 50), 3))
-    P /= np.linalg.norm(P, axis=1)[:, None]
-    return Mesh(P * np.exp(rng.normal(size=(len(P), 1)) * 0.4), scipy.spatial.ConvexHull(P).simplices)
-
-
-def rough_field(seed: int) -> Mesh:
-    rng = np.random.default_rng(seed)
-    P = rng.random((rng.integers(8, 60), 2))
-    return Mesh(np.column_stack([P, rng.normal(size=len(P)) * 0.3]), scipy.spatial.Delaunay(P).simplices)
+        assert relative_error(d, pygeodesic_distance(mesh, int(source))).max() < 1e-10
 
 
 @pytest.mark.parametrize("make", [rough_star, rough_field])
@@ -195,14 +181,14 @@ def test_coarse_rough_meshes_against_pygeodesic(make, surface):
         if mesh.report().smallest_angle < 0.1:
             continue  # pygeodesic loses digits at needles
         d = SURFACES[surface](mesh).solve(np.array([3])).distance
-        assert relative_error(d, pygeodesic(mesh, 3)).max() < 1e-10, seed
+        assert relative_error(d, pygeodesic_distance(mesh, 3)).max() < 1e-10, seed
 
 
 def test_moebius_strip_against_pygeodesic():
     mesh = moebius_strip(30, 4)
     d = [SURFACES[name](mesh).solve(np.array([7])).distance for name in SURFACES]
     for one in d:
-        assert relative_error(one, pygeodesic(mesh, 7)).max() < 1e-12
+        assert relative_error(one, pygeodesic_distance(mesh, 7)).max() < 1e-12
 
 
 @pytest.mark.parametrize("name", ["bumpy", "moebius", "book"])
@@ -214,7 +200,7 @@ def test_distance_is_symmetric(name):
     np.testing.assert_allclose(between, between.T, rtol=1e-12, atol=1e-14)
 
 
-def test_scales():
+def test_distances_scale_with_the_mesh():
     mesh = bumpy()
     d = exact_distance(mesh.V, mesh.F, 0)
     np.testing.assert_array_equal(exact_distance(mesh.V * 2.0**90, mesh.F, 0), d * 2.0**90)
@@ -436,7 +422,7 @@ def test_the_order_of_vertices_and_faces_does_not_matter():
     np.testing.assert_allclose(distance[new], exact_distance(mesh.V, mesh.F, 7), rtol=1e-14)
 
 
-def test_errors():
+def test_what_has_no_exact_distance_is_refused():
     mesh = shapes.grid(3)
     with pytest.raises(MeshError, match="needs triangles"):
         exact_distance(shapes.box(1).V, shapes.box(1).F, 0)

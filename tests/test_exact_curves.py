@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from conftest import flat_perturbed
-from test_exact import cube, delaunay
+from surfaces import cube
+from test_exact import delaunay
 from test_exact_paths import MESHES
 from test_paths import assert_on_surface, lengths
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import flat_perturbed, perturbed, shared_path
-from test_exact import rough_field, rough_star, two_arms
+from surfaces import moebius_strip, rough_field, rough_star, two_arms
 from test_paths import assert_on_surface, ends, lengths, turns
-from test_unfolding import moebius_strip
 
 from heat_igl import (
     HeatMethodSolver,

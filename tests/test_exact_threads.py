@@ -7,9 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from conftest import perturbed
-from test_exact import two_arms
-from test_local_queries import book
-from test_unfolding import moebius_strip
+from surfaces import bent_pages, moebius_strip, two_arms
 
 from heat_igl import Mesh, SurfacePoints, isolines, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
@@ -35,7 +33,7 @@ ZOO = {
     "boundary": lambda: perturbed(shapes.grid(24), 0.6, 2),
     "bends at a corner": lambda: two_arms(10),
     "plane": lambda: shapes.grid(20),
-    "edges of three faces": book,
+    "edges of three faces": bent_pages,
     "cannot be oriented": lambda: moebius_strip(80, 8),
     "pinched, and components": pinched,
     "strip": lambda: shapes.strip(200, 2),
@@ -69,7 +67,7 @@ def test_two_threads_find_what_one_finds(name):
     np.testing.assert_array_equal(*both_ways(surface, points=points))
 
 
-def test_curves():
+def test_two_threads_find_what_one_finds_from_curves():
     for mesh in (shapes.grid(16), perturbed(shapes.icosphere(3), 0.3, 1)):
         curve = isolines(mesh, mesh.V[:, 0] + 0.3 * mesh.V[:, 1], 0.4)[0][0]
         segments = source_set(curve, mesh.n_vertices, mesh.F).segments

@@ -142,7 +142,7 @@ def test_heat_of_a_region_starts_at_its_rim():
 
 
 @pytest.mark.parametrize("k", [1, 8, 19])
-def test_batches(sphere, solver, k):
+def test_a_batch_has_the_distances_of_each_source_set(sphere, solver, k):
     sets = [int(i) for i in np.random.default_rng(0).choice(sphere.n_vertices, k, replace=False)]
     batch = solver.distances(sets)
     assert batch.shape == (k, sphere.n_vertices)
@@ -169,7 +169,7 @@ def test_bad_source_set_is_named_before_anything_is_solved(solver):
         solver.distances(5)
 
 
-def test_time_step(sphere):
+def test_time_step_is_a_multiple_of_the_squared_mean_edge_length(sphere):
     h = HeatMethodSolver(sphere).diagnostics.mean_edge_length
     assert HeatMethodSolver(sphere).t == pytest.approx(h**2 / 2, rel=1e-14)
     assert HeatMethodSolver(sphere, magnitude="unit").t == pytest.approx(h**2, rel=1e-14)
@@ -237,7 +237,7 @@ def test_a_warning_points_at_the_line_that_calls_the_package(call, message):
     assert lines == {(__file__, call.__code__.co_firstlineno)}
 
 
-def test_magnitude():
+def test_the_field_is_damped_by_default_and_of_unit_length_on_demand():
     """By default the field is damped on surfaces; the paper's plain method is there for the asking."""
     mesh = perturbed(shapes.disk(8))
     assert HeatMethodSolver(mesh).solve(20).magnitude.min() < 1
@@ -264,7 +264,7 @@ def test_dirichlet_and_average_boundaries():
     assert 1.5 < distance[np.argmin(mesh.V[:, 0])] < 2.5
 
 
-def test_tetrahedra():
+def test_distance_in_a_box_of_tetrahedra_is_near_euclidean():
     mesh = shapes.box(8)
     solver = HeatMethodSolver(mesh)
     distance = solver.distance(0)

@@ -39,7 +39,7 @@ def assert_same(found: np.ndarray, kind: str, scale: float = 1.0) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 @settings(deadline=None, max_examples=15, derandomize=True)
 @given(seed=seeds)
-def test_relabelling(kind, seed):
+def test_distance_does_not_depend_on_the_order_of_vertices_and_faces(kind, seed):
     mesh = MESHES[kind]
     rng = np.random.default_rng(seed)
     order = rng.permutation(mesh.n_vertices)
@@ -55,7 +55,7 @@ def test_relabelling(kind, seed):
 @pytest.mark.parametrize("kind", KINDS)
 @settings(deadline=None, max_examples=10, derandomize=True)
 @given(seed=seeds)
-def test_rotation(kind, seed):
+def test_distance_does_not_change_by_rotation(kind, seed):
     mesh = MESHES[kind]
     turned = Mesh(mesh.V @ Rotation.random(rng=np.random.default_rng(seed)).as_matrix().T, mesh.F)
     assert_same(HeatMethodSolver(turned).distance(3), kind)
@@ -73,7 +73,7 @@ def test_translation_by_a_million(kind, seed):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("scale", [1e-8, 1e-3, 1e8, 1e-30, 1e30])
-def test_scale(kind, scale):
+def test_distance_scales_with_the_mesh(kind, scale):
     mesh = MESHES[kind]
     assert_same(HeatMethodSolver(Mesh(mesh.V * scale, mesh.F)).distance(3), kind, scale)
 

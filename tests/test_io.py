@@ -156,7 +156,7 @@ FACES = "3 0 1 2\n3 0 1 3\n"
         "OFF\n4 2 0\n" + VERTICES.replace("1", "+1.0E+00") + FACES,
     ],
 )
-def test_off_variants(tmp_path: Path, content: str) -> None:
+def test_variants_of_off_are_read_alike(tmp_path: Path, content: str) -> None:
     assert same(read_mesh(save(tmp_path / "a.off", content)), V4, F4)
 
 
@@ -211,7 +211,7 @@ OBJ_VERTICES = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
         ("  " + OBJ_VERTICES + "\tf 1 2 3\nf 1 2 4\n").replace("\n", " \r\n"),
     ],
 )
-def test_obj_variants(tmp_path: Path, content: str) -> None:
+def test_variants_of_obj_are_read_alike(tmp_path: Path, content: str) -> None:
     assert same(read_mesh(save(tmp_path / "a.obj", content)), V4, F4)
 
 
@@ -310,7 +310,7 @@ CORNERS = V4[[[0, 1, 2], [0, 1, 3]]]
         binary_stl(np.concatenate([CORNERS[:1], V4[[[3, 3, 1]]], np.where(CORNERS[1:] == 0, -0.0, CORNERS[1:])])),
     ],
 )
-def test_stl_variants(tmp_path: Path, content: str | bytes) -> None:
+def test_variants_of_stl_are_read_alike(tmp_path: Path, content: str | bytes) -> None:
     mesh = read_mesh(save(tmp_path / "a.stl", content))
     assert np.array_equal(mesh.V, V4)
     assert np.array_equal(mesh.F, F4)
@@ -540,7 +540,7 @@ def real(name: str) -> Path:
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_real_meshes(tmp_path: Path, name: str) -> None:
+def test_real_meshes_are_read_whole_and_written_back(tmp_path: Path, name: str) -> None:
     mesh = read_mesh(real(name))
     assert (mesh.n_vertices, mesh.n_faces) == REAL[name]
     for extension in (".off", ".obj", ".ply"):

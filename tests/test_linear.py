@@ -29,7 +29,7 @@ def heat_matrix() -> sp.csc_matrix:
     return (domain.M - domain.mean_edge_length**2 * domain.L).tocsc()
 
 
-def test_solves(heat_matrix, backend):
+def test_the_solution_of_one_and_of_many_right_hand_sides(heat_matrix, backend):
     factor = factorize(heat_matrix, backend)
     assert factor.backend == backend
     x = np.random.default_rng(0).standard_normal((heat_matrix.shape[0], 37))
@@ -59,7 +59,7 @@ def test_pickled_copy_gives_the_same_bits(heat_matrix, backend):
 
 
 @pytest.mark.parametrize("kind", ["singular", "indefinite", "not finite"])
-def test_bad_matrix(backend, kind):
+def test_matrices_that_are_not_positive_definite_are_refused(backend, kind):
     matrix = {
         "singular": -operators(shapes.icosphere(1)).L,
         "indefinite": sp.csc_matrix(np.array([[1.0, 2.0], [2.0, 1.0]])),
@@ -137,7 +137,7 @@ def graph(name: str) -> sp.csc_matrix:
 @pytest.mark.parametrize(
     "name", ["one vertex", "no edges", "complete", "one large front", "star", "path", "many pieces", "random"]
 )
-def test_any_graph(name):
+def test_a_system_on_any_graph_is_solved(name):
     """Of every graph the Laplacian plus the identity is solved, whatever its separators look like."""
     weights = abs(graph(name))
     weights = weights + weights.T

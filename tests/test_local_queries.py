@@ -9,31 +9,26 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import perturbed, shared_path
-from test_exact import bumpy, two_arms
+from surfaces import bent_pages, bumpy, two_arms
 
 from heat_igl import Mesh, MeshError, SourceError, distances_within, nearest_vertices, pair_distances, read_mesh, shapes
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import blocks_within, local, read_distances_within, within_store, write_distances_within
+from heat_igl.unfolding import (
+    blocks_within,
+    local,
+    local_searches,
+    read_distances_within,
+    within_store,
+    write_distances_within,
+)
 from heat_igl.unfolding.exact import ExactSurface, exact_distance
 from heat_igl.unfolding.half_edges import from_mesh
 from heat_igl.unfolding.window_search import Found
 
-
-def book() -> Mesh:
-    """Three pages at one edge, each of them bent."""
-    page = shapes.grid(6)
-    x, y, _ = (page.V - page.V.min(axis=0)).T
-    V = [np.column_stack([x * np.cos(a), x * np.sin(a), y]) for a in (0.0, 2.0, 4.0)]
-    stacked = np.concatenate(V)
-    F = np.concatenate([page.F + k * page.n_vertices for k in range(3)])
-    _, first, inverse = np.unique(np.round(stacked, 9), axis=0, return_index=True, return_inverse=True)
-    return Mesh(stacked[first], inverse.ravel()[F])
-
-
 MESHES = {
     "bumpy": bumpy,
     "bends at a corner": lambda: two_arms(8),
-    "edges of three faces": book,
+    "edges of three faces": bent_pages,
     "rough": lambda: perturbed(shapes.grid(12), 0.8, 2),
 }
 
@@ -142,9 +137,9 @@ def test_threads_and_room_change_nothing(monkeypatch):
     mesh = bumpy()
     monkeypatch.setenv("HEAT_IGL_NUM_THREADS", "1")
     alone = distances_within(mesh, 0.7), *nearest_vertices(mesh, 20)
-    monkeypatch.setattr(local, "n_threads", lambda: 4)
-    monkeypatch.setattr(local, "_CHUNK", 5)
-    monkeypatch.setattr(local, "_ROOM", 3)  # less than one source needs
+    monkeypatch.setattr(local_searches, "n_threads", lambda: 4)
+    monkeypatch.setattr(local_searches, "CHUNK", 5)
+    monkeypatch.setattr(local_searches, "_ROOM", 3)  # less than one source needs
     together = distances_within(mesh, 0.7), *nearest_vertices(mesh, 20)
     np.testing.assert_array_equal(alone[0].toarray(), together[0].toarray())
     for one, other in zip(alone[1:], together[1:], strict=True):
@@ -180,14 +175,14 @@ def test_what_is_not_reached_is_padded():
 def test_a_search_clears_what_it_wrote(monkeypatch):
     """Otherwise the next search on the same arrays would go wrong, or cost more than what it touches."""
     mesh, kept = bumpy(), []
-    original = local._Workspace
+    original = local_searches.Workspace
 
     class Kept(original):  # type: ignore[misc, valid-type]
         def __init__(self, *arguments):
             super().__init__(*arguments)
             kept.append(self)
 
-    monkeypatch.setattr(local, "_Workspace", Kept)
+    monkeypatch.setattr(local_searches, "Workspace", Kept)
     distances_within(mesh, 0.5)
     nearest_vertices(mesh, 7)
     pair_distances(mesh, [[0, 300], [5, 9]])
@@ -232,7 +227,7 @@ def test_distances_that_will_not_fit_into_memory_are_refused_early(monkeypatch):
     assert sum(block.nnz for block in blocks_within(mesh, np.inf, most_entries=1)) == mesh.n_vertices**2
 
 
-def test_errors():
+def test_radii_counts_and_pairs_that_make_no_sense_are_refused():
     mesh = shapes.grid(3)
     for radius in (0, -1.0, np.nan, "far", True, None):
         with pytest.raises(ValueError, match="radius must be a positive number, not"):
@@ -257,7 +252,7 @@ def test_errors():
 
 def test_an_interrupt_ends_all_threads(monkeypatch):
     """What waits is not begun any more, neither by the thread that was interrupted nor by others."""
-    mesh, within, begun = shapes.icosphere(2), local._within, []
+    mesh, within, begun = shapes.icosphere(2), local_searches.within, []
 
     def interrupted_once(work, part, radius):
         begun.append(part.start)
@@ -266,9 +261,9 @@ def test_an_interrupt_ends_all_threads(monkeypatch):
         time.sleep(0.01)
         return within(work, part, radius)
 
-    monkeypatch.setattr(local, "_within", interrupted_once)
-    monkeypatch.setattr(local, "_CHUNK", 1)
-    monkeypatch.setattr(local, "n_threads", lambda: 2)
+    monkeypatch.setattr(local_searches, "within", interrupted_once)
+    monkeypatch.setattr(local_searches, "CHUNK", 1)
+    monkeypatch.setattr(local_searches, "n_threads", lambda: 2)
     with pytest.raises(KeyboardInterrupt):
         distances_within(mesh, 0.5)
     assert len(begun) < 10

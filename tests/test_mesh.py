@@ -87,7 +87,7 @@ def test_error_counts_the_offenders() -> None:
 
 
 @pytest.mark.parametrize("mesh", [sheet(2, 3), two_tetrahedra()], ids=["surface", "solid"])
-def test_pickle(mesh: Mesh) -> None:
+def test_a_pickled_mesh_comes_back_with_the_same_bits(mesh: Mesh) -> None:
     _ = mesh.edges
     back = pickle.loads(pickle.dumps(mesh))
     assert back.V.tobytes() == mesh.V.tobytes()
@@ -160,7 +160,7 @@ def test_longest_distance() -> None:
     ],
     ids=["sphere", "disk", "cylinder", "moebius", "torus", "tetrahedron", "two tetrahedra"],
 )
-def test_topology(mesh: Mesh, euler: int, loops: int) -> None:
+def test_report_counts_boundary_loops_and_the_euler_characteristic(mesh: Mesh, euler: int, loops: int) -> None:
     report = mesh.report()
     assert (report.euler_characteristic, report.n_boundary_loops, report.n_components) == (euler, loops, 1)
     assert (report.n_vertices, report.n_faces, report.n_edges) == (mesh.n_vertices, mesh.n_faces, len(mesh.edges))
@@ -294,7 +294,7 @@ def test_nonmanifold_vertices_against_links(given_faces: tuple[int, list[list[in
 @pytest.mark.parametrize("n", [4, 10**6])
 @pytest.mark.parametrize("columns", [1, 2, 3])
 @pytest.mark.parametrize("count", [0, 1, 200])
-def test_unique_rows(n: int, columns: int, count: int) -> None:
+def test_unique_rows_are_those_of_numpy(n: int, columns: int, count: int) -> None:
     rows = np.random.default_rng(31).integers(0, 4, (count, columns)) * (n // 4)
     first, inverse, counts = connectivity.unique_rows(rows, n)
     expected, expected_first, expected_counts = np.unique(rows, axis=0, return_index=True, return_counts=True)
@@ -357,7 +357,7 @@ def test_groups_hold_what_has_their_label(count: int) -> None:
     assert np.array_equal(renamed.members, 100 + groups.members)
 
 
-def test_runs() -> None:
+def test_places_within_runs_and_the_next_in_each_run() -> None:
     counts = np.array([2, 0, 3, 1])
     run, within = grouping.enumerate_runs(counts)
     assert list(zip(run.tolist(), within.tolist(), strict=True)) == [(0, 0), (0, 1), (2, 0), (2, 1), (2, 2), (3, 0)]

@@ -168,7 +168,7 @@ def test_points_left_out_are_predicted_by_fits_without_them() -> None:
         assert row["in_sample"] == pytest.approx(np.sqrt(np.mean((fit(i) - seconds) ** 2)) / seconds.mean(), rel=1e-8)
 
 
-def test_power_law() -> None:
+def test_a_power_law_is_recovered_and_noise_is_measured() -> None:
     i = np.arange(10.0, 310, 10)
     law = paper_figures.power_law(i, 3e-6 * i**2.3)
     assert law["exponent"] == pytest.approx(2.3, rel=1e-8)

@@ -87,7 +87,7 @@ def test_a_polyline_over_a_real_mesh(bunny):
     assert straight * 0.7 < curve.lengths(bunny).sum() < straight * 1.5
 
 
-def test_edges():
+def test_a_curve_along_edges_passes_their_vertices_in_order():
     mesh = shapes.grid(4)
     path = [0, 1, 6, 11]
     curve = edge_curve(mesh, path)

@@ -22,7 +22,7 @@ CORNERS = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)], float)
 
 @pytest.mark.parametrize("bend", [0, 0.1, 0.5, 2])
 @pytest.mark.parametrize("n", [2, 6, 40])
-def test_sheets(bend: float, n: int) -> None:
+def test_a_sheet_of_quadrilaterals_is_not_taken_for_tetrahedra(bend: float, n: int) -> None:
     V, F = quads(bend, n)
     with pytest.raises(MeshError, match=r"F has 4 columns, which stands for tetrahedra, but F\[\d+\] = .* is a quadri"):
         Mesh(V, F)
@@ -32,7 +32,7 @@ def test_sheets(bend: float, n: int) -> None:
 @pytest.mark.parametrize(
     "F", [CUBE, CUBE[:2], CUBE[:1], CUBE[:3], [*CUBE, CUBE[0]]], ids=["closed", "apart", "single", "open", "twice"]
 )
-def test_cubes(F: list[list[int]]) -> None:
+def test_a_cube_of_quadrilaterals_is_not_taken_for_tetrahedra(F: list[list[int]]) -> None:
     with pytest.raises(MeshError, match=r"F\[0\] = \[0, 2, 3, 1\] is a quadrilateral: pass PolygonMesh\(V, F\)"):
         Mesh(CORNERS, F)
 
@@ -61,7 +61,7 @@ def test_scattered_tetrahedra(seed: int) -> None:
 
 
 @pytest.mark.parametrize("n", [1, 2, 9])
-def test_boxes(n: int) -> None:
+def test_boxes_of_tetrahedra_are_not_taken_for_quadrilaterals(n: int) -> None:
     assert shapes.box(n).n_faces == 6 * n**3
     assert shapes.box(n, (1, 1, 1e-3)).n_faces == 6 * n**3
 
@@ -89,7 +89,7 @@ def test_tetrahedra_of_which_one_hangs_on_an_edge() -> None:
         assert Mesh(np.array(V) * [1, 1, thickness], F).n_faces == 3
 
 
-def test_large_arrays() -> None:
+def test_half_a_million_quadrilaterals_are_told_from_tetrahedra() -> None:
     """Half a million quadrilaterals and nearly as many tetrahedra: a quadratic check would not end."""
     V, F = quads(0.2, 700)
     with pytest.raises(MeshError, match="is a quadrilateral"):

@@ -52,7 +52,7 @@ def test_accepted_forms(sources, expected):
         ({0}, "sources must be a vertex index"),
     ],
 )
-def test_refused(sources, message):
+def test_sources_that_name_no_vertices_are_refused(sources, message):
     with pytest.raises(SourceError, match=message):
         vertex_sources(sources, 5)
     with pytest.raises(SourceError, match=message):
@@ -87,7 +87,7 @@ def test_a_point_in_a_vertex_is_that_vertex():
     assert found.n_labels == 2
 
 
-def test_offsets():
+def test_offsets_add_up_through_nested_sources():
     assert source_set(OffsetSources([3, 1], [0.5, 0.25]), 5, F).vertex_offset.tolist() == [0.25, 0.5]
     assert source_set(OffsetSources([3, 1], 2), 5, F).vertex_offset.tolist() == [2, 2]
     nested = [OffsetSources([OffsetSources(0, 1), CURVE, SurfacePoints([1], CENTRE)], [10, 20, 30]), 2]

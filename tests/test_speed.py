@@ -28,7 +28,7 @@ def solver(mesh: Mesh, speed: FloatArray, **options: Any) -> heat_igl.HeatMethod
 
 
 @pytest.mark.parametrize("mesh", [perturbed(shapes.torus(12, 30)), perturbed(shapes.box(4))], ids=["torus", "box"])
-def test_identities(mesh):
+def test_operators_with_a_speed_satisfy_the_identities_of_the_laplacian(mesh):
     p = mesh.F.shape[1] - 1
     speed = np.random.default_rng(0).choice([0.5, 1, 3], mesh.n_faces)
     # On the mesh's own faces: those of one speed are flipped otherwise.

@@ -119,7 +119,7 @@ def test_cover_is_closed_and_oriented(mesh):
     assert flipped.areas.sum() == pytest.approx(2 * mesh.measures.sum(), rel=1e-12)
 
 
-def test_identities(mesh):
+def test_tufted_operators_satisfy_the_identities_of_the_laplacian(mesh):
     domain = tufted_operators(mesh)
     scale = abs(domain.L).max()
     assert abs(domain.D @ domain.G - domain.L).max() <= 1e-12 * scale
@@ -350,7 +350,7 @@ def test_every_face_twice(cow):
     assert heat_error(plain, sources, truth, magnitude="unit") > 0.1
 
 
-def test_suzanne():
+def test_errors_on_the_uneven_suzanne_are_within_three_percent():
     """507 vertices of very uneven spacing."""
     suzanne = heat_igl.read_mesh(shared_path("suzanne.obj"))
     sources = sample_sources(suzanne, 10)
@@ -362,7 +362,7 @@ def test_suzanne():
 
 # The operators that the cover is compared with are as far off as the warning says.
 @pytest.mark.filterwarnings("ignore:.*heat gave distances:heat_igl.AccuracyWarning")
-def test_truck():
+def test_the_cover_reduces_the_error_beside_edges_of_three_faces():
     """54 edges of three faces and slivers of 179.7 degrees at them."""
     truck = heat_igl.read_mesh(shared_path("truck.obj"))
     sources = sample_sources(truck, 5)

@@ -7,7 +7,8 @@ import warnings
 
 import numpy as np
 import pytest
-from conftest import perturbed, wheel_path
+from conftest import perturbed, pygeodesic_distance, relative_error, wheel_path
+from surfaces import moebius_strip, random_disk
 
 import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, Refinement, shapes, unfolded_distance
@@ -16,47 +17,6 @@ from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.reference.baselines import graph_distance
 
 METHODS = ("sweep", "unfold")
-
-
-def random_disk(n: int, seed: int) -> Mesh:
-    """A Delaunay triangulation of random points in the unit disk, boundary points on the circle."""
-    spatial = pytest.importorskip("scipy.spatial")
-    rng = np.random.default_rng(seed)
-    radius, angle = 0.97 * np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
-    rim = 2 * np.pi * np.arange(int(4 * np.sqrt(n))) / int(4 * np.sqrt(n))
-    points = np.concatenate(
-        [np.stack([radius * np.cos(angle), radius * np.sin(angle)], 1), np.stack([np.cos(rim), np.sin(rim)], 1)]
-    )
-    faces = spatial.Delaunay(points).simplices
-    return Mesh(np.column_stack([points, np.zeros(len(points))]), faces)
-
-
-def exact(mesh: Mesh, source: int) -> np.ndarray:
-    geodesic = pytest.importorskip("pygeodesic.geodesic")
-    used, F = np.unique(mesh.F, return_inverse=True)  # it takes no unused vertices
-    algorithm = geodesic.PyGeodesicAlgorithmExact(mesh.V[used], F.reshape(-1, 3))
-    d = np.full(mesh.n_vertices, np.inf)
-    d[used] = algorithm.geodesicDistances(np.searchsorted(used, [source]))[0]
-    return d
-
-
-def relative_error(d: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    there = (truth > 0) & np.isfinite(truth)
-    return np.abs(d[there] - truth[there]) / truth[there]
-
-
-def moebius_strip(around: int, across: int) -> Mesh:
-    t = np.linspace(0, 2 * np.pi, around, endpoint=False)
-    s = np.linspace(-0.4, 0.4, across + 1)
-    T, S = np.meshgrid(t, s, indexing="ij")
-    V = np.stack([(1 + S * np.cos(T / 2)) * np.cos(T), (1 + S * np.cos(T / 2)) * np.sin(T), S * np.sin(T / 2)], axis=-1)
-    faces = []
-    for i in range(around):
-        for j in range(across):
-            a, b = i * (across + 1) + j, i * (across + 1) + j + 1
-            c, d = (a + across + 1, b + across + 1) if i < around - 1 else (across - j, across - j - 1)
-            faces += [[a, c, b], [b, c, d]]
-    return Mesh(V.reshape(-1, 3), faces)
 
 
 FLAT = {
@@ -108,7 +68,7 @@ def bumpy() -> Mesh:
 
 @pytest.mark.parametrize("source", [0, 100, 1000])
 def test_against_exact_distance_on_a_generated_surface(bumpy, source):
-    truth = exact(bumpy, source)
+    truth = pygeodesic_distance(bumpy, source)
     unfolded = relative_error(HeatMethodSolver(bumpy, refine="unfold").distance(source), truth)
     swept = relative_error(HeatMethodSolver(bumpy, refine="sweep").distance(source), truth)
     assert unfolded.mean() < 1e-4
@@ -132,7 +92,7 @@ def test_sweep_on_the_sphere_converges():
 def test_against_exact_distance_on_a_sample_mesh(name):
     mesh = heat_igl.read_mesh(wheel_path(name))
     source = int(mesh.F[0, 0])
-    truth = exact(mesh, source)
+    truth = pygeodesic_distance(mesh, source)
     error = relative_error(HeatMethodSolver(mesh, refine="unfold").distance(source), truth)
     assert error.mean() < 3e-4
     assert np.percentile(error, 99) < 2e-3
@@ -140,7 +100,7 @@ def test_against_exact_distance_on_a_sample_mesh(name):
 
 def test_unfolding_is_never_shorter_than_the_exact_distance(bumpy):
     """Every value is the length of a path. The sweep makes no such claim, and would fail this."""
-    truth = exact(bumpy, 7)
+    truth = pygeodesic_distance(bumpy, 7)
     d = HeatMethodSolver(bumpy, refine="unfold").distance(7)
     assert (d - truth).min() > -1e-8 * truth.max()
     assert (HeatMethodSolver(bumpy, refine="sweep").distance(7) - truth).min() < -1e-5 * truth.max()
@@ -156,7 +116,7 @@ def test_unfolding_is_never_longer_than_along_edges(bumpy):
 
 
 def test_smaller_tolerance_is_more_accurate(bumpy):
-    truth = exact(bumpy, 3)
+    truth = pygeodesic_distance(bumpy, 3)
     error = [relative_error(unfolded_distance(bumpy.V, bumpy.F, 3, tolerance=t), truth).mean() for t in (1e-3, 1e-5, 0)]
     assert error[0] > 2 * error[1] > 2 * error[2]
     # Followed to their ends, most paths are the shortest ones.
@@ -207,7 +167,7 @@ def test_path_bends_at_the_corner_of_a_boundary():
 def test_surface_that_cannot_be_oriented(source):
     """The seam must not be felt: without the double cover, paths would run along it."""
     mesh = moebius_strip(60, 6)
-    truth = exact(mesh, source)
+    truth = pygeodesic_distance(mesh, source)
     assert relative_error(unfolded_distance(mesh.V, mesh.F, source), truth).max() < 1e-3
     assert relative_error(HeatMethodSolver(mesh, refine="sweep").distance(source), truth).mean() < 2e-2
 
@@ -254,7 +214,7 @@ def test_straight_over_an_edge_of_more_than_two_faces(method, k):
 
 
 def test_slivers_do_little_harm(bumpy):
-    truth = exact(bumpy, 5)
+    truth = pygeodesic_distance(bumpy, 5)
     bad = shapes.with_slivers(bumpy, 0)
     assert bad.n_vertices > bumpy.n_vertices + 200
     error = {}
@@ -274,14 +234,17 @@ def test_slivers_do_little_harm_on_the_cow(cow, seed):
     for mesh in (cow, shapes.with_slivers(cow, seed)):
         walks = Refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)))  # a solver takes windows on the cow
         found = [walks.unfold(graph_distance(mesh, source), np.array([source])) for source in sources]
-        each = [relative_error(d[: cow.n_vertices], exact(cow, s)) for d, s in zip(found, sources, strict=True)]
+        each = [
+            relative_error(d[: cow.n_vertices], pygeodesic_distance(cow, s))
+            for d, s in zip(found, sources, strict=True)
+        ]
         error.append(np.mean(each))
     assert 1e-6 < error[1] < 1.5 * error[0]
 
 
 def test_any_order_will_do(bumpy):
     """The order costs time, not accuracy: even a random one is repaired."""
-    truth = exact(bumpy, 9)
+    truth = pygeodesic_distance(bumpy, 9)
     refinement = Refinement(intrinsic_delaunay(intrinsic_triangulation(bumpy)))
     key = np.random.default_rng(0).random(bumpy.n_vertices)
     assert relative_error(refinement.unfold(key, np.array([9])), truth).mean() < 2e-3

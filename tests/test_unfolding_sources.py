@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import perturbed
-from test_unfolding import METHODS, exact, moebius_strip, random_disk, relative_error
+from conftest import perturbed, pygeodesic_distance, relative_error
+from surfaces import moebius_strip, random_disk, sheared, with_point
+from test_unfolding import METHODS
 
 from heat_igl import Mesh, Refinement, SurfacePoints, shapes
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
@@ -15,22 +16,6 @@ NONE = np.zeros(0, np.int64)
 
 def refinement(mesh: Mesh) -> Refinement:
     return Refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-
-
-def sheared(mesh: Mesh, shear: float) -> Mesh:
-    """Still flat and convex, but most faces are not those of its Delaunay triangulation."""
-    V = mesh.V.copy()
-    V[:, 0] += shear * V[:, 1]
-    return Mesh(V, mesh.F)
-
-
-def with_point(mesh: Mesh, face: int, barycentric: np.ndarray) -> Mesh:
-    """The same surface with a vertex, the last one, inside a face."""
-    corners, n = mesh.F[face], mesh.n_vertices
-    fan = [[corners[c], corners[(c + 1) % 3], n] for c in range(3)]
-    return Mesh(
-        np.concatenate([mesh.V, [barycentric @ mesh.V[corners]]]), np.concatenate([np.delete(mesh.F, face, 0), fan])
-    )
 
 
 FLAT = {
@@ -68,7 +53,7 @@ def test_point_as_a_vertex_in_its_place(method):
         for face in (3, 77, 300):
             barycentric = np.array([0.2, 0.5, 0.3])
             refined = with_point(mesh, face, barycentric)
-            truth = exact(refined, mesh.n_vertices)
+            truth = pygeodesic_distance(refined, mesh.n_vertices)
             d = getattr(refinement(mesh), method)(truth[:-1], NONE, points=SurfacePoints([face], [barycentric]))
             error = relative_error(d, truth[:-1])
             inserted = getattr(refinement(refined), method)(truth, np.array([mesh.n_vertices]))

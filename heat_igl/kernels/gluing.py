@@ -69,7 +69,7 @@ def _by_lower_end(
     sides: cython.int[:, ::1],
     begin: cython.int[::1],
 ) -> cython.void:
-    """Copy the faces, and put their half-edges, each with the upper end, in the order of the lower end.
+    """Copy the faces, and sort their half-edges by the lower end; `sides` takes each with the upper end.
 
     `begin` (n + 1,), which must come full of 0, takes where the half-edges with lower end v end, at ``begin[v]``.
     """

@@ -108,7 +108,7 @@ class _Search:
     @cython.nogil
     @cython.exceptval(check=False)
     def go_on_from(self, first: cython.int) -> cython.void:
-        """Number all faces that hang together with this one, unless it has a number."""
+        """Number the faces of the component of this one, unless it has a number."""
         c: cython.int
         g: cython.int
         h: cython.int

@@ -1,4 +1,4 @@
-"""Kernel of the search: all cones from a vertex, best first, if no walk found the promised distance."""
+"""Search through all cones from a vertex, best first, for vertices at which no walk found the promised distance."""
 
 import cython
 from cython.cimports.heat_igl.kernels.walks import (
@@ -22,8 +22,8 @@ from cython.cimports.libc.math import INFINITY, atan2, sqrt
 def search(q: Query, v: cython.int) -> cython.void:
     """Look for a shorter path from v among all cones whose forecast is better than the known distance, best first.
 
-    The cone splits at every vertex in it, so that both sides are tried; the circles about the ends of an edge tell
-    the faces behind it.
+    A cone is split at every vertex in it, so that both sides are tried. `_forecast` places the source behind an edge by
+    the distances at both ends.
     """
     top: cython.int = _first_cones(q, v)
     steps: cython.int = 0

@@ -249,7 +249,7 @@ class _Sweep:
     @cython.nogil
     @cython.exceptval(check=False)
     def mark(self, v: cython.int, old: cython.double, begin: cython.double) -> cython.Py_ssize_t:
-        """Mark whom v's new distance can improve, if it is less than `old` by enough; returns their lowest rank, or n.
+        """Mark the vertices that a decrease of v's distance from `old` can improve; returns their lowest rank, or n.
 
         `begin` is the distance at which v's source begins.
         """
@@ -324,5 +324,5 @@ class _Sweep:
     @cython.nogil
     @cython.exceptval(check=False)
     def kept(self, v: cython.int) -> cython.double:
-        """The part of v's distance above which a smaller one is no news."""
+        """The part of v's distance that a shorter one must fall below to count."""
         return 1 - SWEEP_ROUNDING if self.is_flat[v] else 1 - NEGLIGIBLE

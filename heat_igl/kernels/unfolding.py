@@ -1,7 +1,7 @@
-"""Kernel of the unfolding: the straightest path of every vertex from the paths of its neighbours.
+"""Unfolding: the shortest path to every vertex that is found from the paths of the neighbours.
 
-`walking` follows a path through a strip of triangles, `searching` tries all; here vertices are visited in order and
-take the best that these find. The record of a path at a vertex is a `Walk`.
+Vertices are visited in order, and take the shortest path of those that `walking` finds by following one strip of
+triangles and `searching` by trying all. The record of a path at a vertex is a `Walk`.
 """
 
 import cython

@@ -1,8 +1,8 @@
-"""Kernel of the unfolding, the walk: straight on through a strip of triangles, left or right of each vertex as it says.
+"""Walks: the path from a vertex is followed straight through a strip of triangles, past vertices left or right.
 
-A walk stands at a vertex v in the origin and looks into the cone between its right limit R and its left limit L, two
-vertices. Half-edges that it crosses run from right (a) to left (b). Why it decides as it does is derived in
-docs/refinement.md.
+Vertex v is the origin, and the walk goes on inside the cone between two vertices, the right limit R and the left limit
+L. Half-edges that it crosses run from right (a) to left (b). At a vertex inside the cone, the known path from there
+tells on which side to pass; docs/refinement.md derives the rule.
 """
 
 import cython
@@ -33,7 +33,10 @@ from cython.cimports.libc.math import INFINITY, atan2, cos, fabs, sin, sqrt
 @cython.nogil
 @cython.exceptval(check=False)
 def look_around(q: Query, v: cython.int) -> cython.double:
-    """Judge v's neighbours: the best path along an edge, and in ``q.advice`` what each says; the smallest promise."""
+    """Find the best path along an edge at v, and in ``q.advice`` the better side of each neighbour.
+
+    Returns the smallest length that a neighbour promises: that of the path over it, once the bend there is removed.
+    """
     smallest: cython.double = INFINITY
     first: cython.int = q.t.first[v]
     k: cython.int
@@ -68,7 +71,7 @@ def look_around(q: Query, v: cython.int) -> cython.double:
 @cython.nogil
 @cython.exceptval(check=False)
 def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
-    """Walk from v through the corner left of its spoke k, between the vertices that say left and those that say right.
+    """Walk from v through the corner left of spoke k, past each vertex on the better side.
 
     Returns the vertex to visit first if the walk meets one that is not visited yet, -1 otherwise.
     """

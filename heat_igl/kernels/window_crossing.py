@@ -61,7 +61,7 @@ def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
 def _arrive(
     s: cython.pointer(Search), h: cython.int, w: cython.pointer(Window), distance: cython.double, at: cython.double
 ) -> cython.void:
-    """A line of a window, through a point of h, reaches the corner opposite."""
+    """Take the distance of the corner opposite h by the line of a window through a point of h."""
     x: cython.double = at - w.x
     leaving_x: cython.double = x * w.turn_x - w.depth * w.turn_y
     leaving_y: cython.double = x * w.turn_y + w.depth * w.turn_x

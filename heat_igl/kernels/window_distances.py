@@ -23,7 +23,7 @@ def relax(
     x: cython.double,
     y: cython.double,
 ) -> cython.void:
-    """Take a distance of v if it is shorter than the one known.
+    """Lower the distance of v to `distance` if that is shorter, and note the path: root, half-edge, and crossing.
 
     The straight last part of the path leaves the root out of a corner, in the direction (x, y). The frame of a corner
     begins with the side to the next corner of the face. In the face f of a source point it is that of corner 3 f.
@@ -63,7 +63,7 @@ def relax(
 @cython.nogil
 @cython.exceptval(check=False)
 def take(s: cython.pointer(Search), j: cython.int, distance: cython.double, root: cython.int) -> cython.void:
-    """Take a distance of target j inside its face if it is shorter than the one known."""
+    """Lower the distance of target j to one along a straight line inside the face, if that is shorter."""
     if distance < s.target_distance[j]:
         s.target_distance[j] = distance
         s.target_root[j] = root

@@ -1,4 +1,4 @@
-"""A search by windows for the distance of one goal: what cannot be part of a shortest path to it is left out."""
+"""Searches by windows for the distance of one goal: windows that cannot lead to it on a shortest path are left out."""
 
 import cython
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
@@ -52,7 +52,7 @@ def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython
 @cython.nogil
 @cython.exceptval(check=False)
 def towards_goal(s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int) -> cython.int:
-    """Keep the windows over e through which the goal may be as near as by the path known; how many they are.
+    """Keep the windows over e through which a path to the goal may be as short as the one known; how many they are.
 
     No path from a point of e to the goal is shorter than the straight line from an end of e, less the way to that end.
     With the distance of the point added, this falls from one end to the other, so it is least at an end of the window.

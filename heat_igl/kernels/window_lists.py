@@ -24,7 +24,7 @@ from cython.cimports.libc.string import memcpy, memmove
 def _key(
     s: cython.pointer(Search), w: cython.pointer(Window), length: cython.double, bulge: cython.double
 ) -> cython.double:
-    """When a window has its turn. A plane is a root at infinity: the power becomes the distance of the centre."""
+    """The key of a window. Of parallel lines, the power of the root becomes the distance of the circle's centre."""
     key: cython.double
     x: cython.double = 0.0
     if w.is_plane:
@@ -51,7 +51,7 @@ def _is_late(
     length: cython.double,
     bulge: cython.double,
 ) -> cython.bint:
-    """Whether all windows of a run have their turn after the search has ended; keys do not depend on their frame."""
+    """Whether the keys of all windows of a run, the same in both frames, lie beyond the end of the search."""
     i: cython.int
     for i in range(n):
         if _key(s, run + i, length, bulge) <= s.last_key:

@@ -1,10 +1,10 @@
 """Shortest paths back from where windows arrived: straight through the faces from bend to bend.
 
-The straight last part of a path begins at a root, and is known at its other end: by the point at which it enters the
-last face. Laid out in the plane, the line from there on leads back to the root. Every vertex on the line whose distance
-accounts for the rest of the path is taken as a bend, so that a line through a vertex need not be told on which side it
-passes. At an edge of more than two faces the path may have come from each of them: one after the other is tried, and
-given up once the distance of a vertex shows that it is too far from the source.
+Of the straight last part of a path, the search knows the root and the point at which it enters the last face. The line
+from the end of the path through this point, continued over faces laid out in the plane, leads back to the root. A
+vertex on the line counts as a bend if the distance there accounts for the rest of the path, so no side has to be
+chosen. At an edge of more than two faces the path may come from any of them: they are tried one after the other, and a
+line is given up once the distances of the vertices beside it show that it leads away from the source.
 """
 
 import cython
@@ -150,7 +150,7 @@ class _PathTracer:
     @cython.nogil
     @cython.exceptval(check=False)
     def straight(self, begin: cython.pointer[cython.const[Bend]]) -> cython.int:
-        """The straight part of a path that ends at `begin`, back to where it starts: a vertex, or as `along_bends`."""
+        """The vertex at which the straight part of a path that ends at `begin` starts, or as `along_bends`."""
         h: cython.int = begin.entered
         f: cython.int = begin.face
         here: cython.double[3]
@@ -255,7 +255,7 @@ class _PathTracer:
     @cython.nogil
     @cython.exceptval(check=False)
     def is_too_far(self, begin: cython.pointer[cython.const[Bend]], h: cython.int, line: Line) -> cython.bint:
-        """Whether the ends of a half-edge are too far for what should be left of the path; so the line is no path."""
+        """Whether the ends of a half-edge are farther from the source than the rest of the path allows."""
         left: cython.double = begin.distance - line.walked + ASTRAY * begin.distance
         at_head: cython.double = self.distance[self.vertex[previous_half_edge(h)]]
         at_tail: cython.double = self.distance[self.vertex[next_half_edge(h)]]

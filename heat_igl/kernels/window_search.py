@@ -131,7 +131,7 @@ def narrow(s: cython.pointer(Search)) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def forget(s: cython.pointer(Search)) -> cython.void:
-    """Make all that a search wrote what it was before."""
+    """Clear all that a search wrote, for the next one on the same front."""
     i: cython.int
     v: cython.int
     empty_front(s)

@@ -1,4 +1,4 @@
-"""Where windows of parallel lines begin: at segments inside faces, every point of which is a source.
+"""Windows of parallel lines from segments inside faces, every point of which is a source.
 
 Lines at a right angle to the segment leave it on both sides (Bommes and Kobbelt 2007). Around its ends lines leave in
 all directions: the ends are source points as well.
@@ -39,7 +39,7 @@ def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def _distance(s: cython.pointer(Search), i: cython.int, point: cython.p_double) -> cython.double:
-    """Of a point in the face of segment i."""
+    """Distance of a point in the face of segment i from the segment."""
     found: cython.double[3]
     nearest_on(s.length + 3 * s.segment_face[i], s.segment + 6 * i, point, found)
     return s.segment_offset[i] + apart(s.length + 3 * s.segment_face[i], point, found)

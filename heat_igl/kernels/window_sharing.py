@@ -41,7 +41,7 @@ from cython.cimports.libc.stdlib import free, malloc
 @cython.nogil
 @cython.exceptval(check=False)
 def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
-    """Carry what has a key below `until`; if that is infinite, until there is work for two."""
+    """Carry lists with keys below `until`; if that is infinite, until there is work for two threads."""
     entry: Entry
     while s.n_heap > 0 and s.heap[0].key < until and s.heap[0].key <= s.last_key and not s.failed:
         if until == INFINITY and _load(s) > s.plenty and not s.meets_flat:
@@ -57,7 +57,7 @@ def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def _load(s: cython.pointer(Search)) -> cython.longlong:
-    """About how much waits, in windows; 0 where nothing does."""
+    """About how much work waits, counted in windows; 0 if there is none."""
     return s.n_waiting + PER_LIST * s.n_heap
 
 
@@ -89,7 +89,7 @@ def _hear(s: cython.pointer(Search), news: cython.pointer(Entry), n: cython.int)
 @cython.nogil
 @cython.exceptval(check=False)
 def run_beside(s: cython.pointer(Search)) -> cython.void:
-    """`run`, for one of two searches of which each has a thread: both end together."""
+    """As `run`, for one of two searches that have a thread each; both end together."""
     o: cython.pointer(Search) = s.other
     p: cython.int
     key: cython.double
@@ -117,7 +117,7 @@ def run_beside(s: cython.pointer(Search)) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def _balance(s: cython.pointer(Search)) -> cython.bint:
-    """Hand windows over where one thread has more to do; whether one has everything, as there is too little for two."""
+    """Hand windows over if one thread has more to do; whether one has everything, as there is too little for two."""
     o: cython.pointer(Search) = s.other
     mine: cython.longlong = s.load[s.parity]
     theirs: cython.longlong = o.load[s.parity]
@@ -184,7 +184,7 @@ def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.i
 @cython.nogil
 @cython.exceptval(check=False)
 def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython.int) -> cython.longlong:
-    """Hand over a vertex that is to shed windows; how much that is."""
+    """Hand over a vertex from which windows are to start; how much that is."""
     if (
         s.kind[v] == PASSED
         or s.kind[v] == FLAT

@@ -27,7 +27,7 @@ def shapes(
     corner_of_vertex: cython.int[::1],
     next_corner: cython.int[::1],
 ) -> bool:
-    """Fill what `search` reads of a surface, and say whether it is intrinsic Delaunay.
+    """Fill the tables that `windows.Front` takes of a surface; returns whether it is intrinsic Delaunay.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython
 @cython.nogil
 @cython.exceptval(check=False)
 def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
-    """Walk around v: whether its faces are one fan, and whether the angles exceed 2 pi."""
+    """The kind of vertex v, by a walk around it: whether the faces are one fan, and whether the angles exceed 2 pi."""
     start: cython.int = s.corner_of_vertex[v]
     k: cython.int = start
     side: cython.int = previous_half_edge(start)

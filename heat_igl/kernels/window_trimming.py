@@ -27,7 +27,7 @@ from cython.cimports.libc.string import memmove
 @cython.nogil
 @cython.exceptval(check=False)
 def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
-    """How fast what a window adds to its offset, `reached` there, grows along the half-edge."""
+    """Derivative, along the half-edge, of the length `reached` that a window adds to its offset."""
     return w.x if w.is_plane else (at - w.x) / reached
 
 
@@ -37,7 +37,7 @@ def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double)
 def _excess(
     u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, slope: cython.p_double
 ) -> cython.double:
-    """By how much u is farther than w; `slope` takes a number of the sign of its derivative."""
+    """Distance by u less that by w; `slope` takes a number with the sign of the derivative of this difference."""
     a: cython.double = reach(u, at)
     b: cython.double = reach(w, at)
     if u.is_plane or w.is_plane:
@@ -58,7 +58,7 @@ def _meeting(
     at_low: cython.double,
     at_high: cython.double,
 ) -> cython.double:
-    """Where two windows are equally far: a few steps of Newton's method inside a bracket."""
+    """The point that is equally far by two windows: a few steps of Newton's method inside a bracket."""
     x: cython.double = low + (high - low) * at_low / (at_low - at_high)
     y: cython.double
     a: cython.double
@@ -92,7 +92,7 @@ def _compare(
     high: cython.double,
     meeting: cython.p_double,
 ) -> cython.int:
-    """Which of two windows is nearer between two points; `meeting` takes where they are equally far."""
+    """Which of two windows is nearer between two points; `meeting` takes the point at which they are equally far."""
     a: cython.double
     b: cython.double
     at_low: cython.double

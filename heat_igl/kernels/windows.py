@@ -25,7 +25,7 @@ __all__ = ["Front", "search"]
 
 
 class Front:
-    """A surface, and what searches on it write; `search` and `search_each` say in which state.
+    """A surface, and the arrays that searches on it write, for `search` or `search_each`.
 
     Parameters
     ----------

@@ -2,33 +2,25 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterator
 
 import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, SourceError, positive
-from heat_igl.kernels import local_windows, windows
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
-from heat_igl.runtime import available_memory, n_threads, side_by_side
+from heat_igl.runtime import available_memory, n_threads
 from heat_igl.sources import Sources, named_vertices
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
+from heat_igl.unfolding import local_searches
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
-from heat_igl.unfolding.window_search import TOLERANCE, Found
 
 __all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distances"]
 
-# Sources that a thread takes at a time: few enough that all threads end together.
-_CHUNK = 64
-# Distances that a thread makes room for at first.
-_ROOM = 2**16
 # Bytes that each distance of a sparse array takes while the array is put together.
 _BYTES = 48
 # Where more are asked for than the mesh has vertices, the most entries of the result.
 _MOST_PADDED = 2**28
-_NO_VERTICES = np.empty(0, np.int32)
 
 
 def distances_within(mesh: MeshLike, radius: float, sources: Sources | None = None) -> sp.csr_array:
@@ -94,7 +86,7 @@ def blocks_within(
     triangles = _triangles(mesh)
     chosen = _chosen(sources, triangles)
     edges = from_mesh(triangles, int(chosen[0]))
-    least = _CHUNK * n_threads()
+    least = local_searches.CHUNK * n_threads()
     start, rows = 0, least
     while start < len(chosen):
         block = _rows_within(edges, chosen[start : start + rows], limit)
@@ -107,7 +99,11 @@ def _rows_within(edges: HalfEdges, chosen: IntArray, limit: float) -> sp.csr_arr
     number = edges.number[chosen]
     order = np.argsort(number, kind="stable")
     count = _Count(len(chosen), available_memory() / _BYTES)
-    parts = _in_chunks(edges, number[order], lambda work, part: count(_within(work, part, edges.scaled(limit))))
+    parts = local_searches.in_chunks(
+        edges,
+        number[order],
+        lambda work, part: count(local_searches.within(work, part, float(edges.scaled(limit)))),
+    )
     counts = np.concatenate([part.counts for part in parts])
     ends = np.concatenate([[0], np.cumsum(counts)])
     columns = np.concatenate([part.vertex for part in parts])
@@ -167,7 +163,9 @@ def nearest_vertices(mesh: MeshLike, k: int, sources: Sources | None = None) -> 
     indices, distances = _unfilled(len(chosen), int(k), triangles.n_vertices)
     number = edges.number[chosen]
     order = np.argsort(number, kind="stable")
-    parts = _in_chunks(edges, number[order], lambda work, part: _nearest(work, part, wanted))
+    parts = local_searches.in_chunks(
+        edges, number[order], lambda work, part: local_searches.nearest(work, part, wanted)
+    )
     i, j = np.nonzero(np.arange(int(k)) < np.concatenate([part.counts for part in parts])[:, None])
     indices[order[i], j] = np.concatenate([part.vertex for part in parts])
     distances[order[i], j] = edges.unscaled(np.concatenate([part.distance for part in parts]))
@@ -229,68 +227,14 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike) -> FloatArray:
     sources, begin = np.unique(edges.number[first[joined]], return_index=True)
     ends = np.append(begin, len(joined))
     goals = edges.number[second[joined]]
-    parts = _in_chunks(
+    parts = local_searches.in_chunks(
         edges,
         sources,
-        lambda work, part: _to_goals(work, part, goals[ends[part.start] : ends[part.stop]], ends),
+        lambda work, part: local_searches.to_goals(work, part, goals[ends[part.start] : ends[part.stop]], ends),
         edges.scaled(triangles.V[edges.old_vertex]).ravel(),
     )
     distance[joined] = edges.unscaled(np.concatenate([part.distance for part in parts]))
     return distance
-
-
-class _Chunk(NamedTuple):
-    """Some of the sources: their positions, and their numbers in the tables."""
-
-    start: int
-    stop: int
-    vertices: AnyArray
-
-
-class _Near(NamedTuple):
-    """How many vertices were found from each source, which, and how far, source after source."""
-
-    counts: IntArray
-    vertex: AnyArray
-    distance: FloatArray
-
-
-class _Workspace:
-    """What searches of one thread write, in the state in which each must find it."""
-
-    def __init__(self, edges: HalfEdges, position: FloatArray | None) -> None:
-        self._names = edges.old_vertex
-        self._found = Found.of(edges.n, edges.n)
-        self._front = windows.Front(edges.tables, self._found, TOLERANCE, position=position)
-
-    def search(
-        self,
-        sources: AnyArray,
-        found: AnyArray,
-        value: FloatArray,
-        *,
-        goals: AnyArray = _NO_VERTICES,
-        first_goal: AnyArray | None = None,
-        cutoff: float = np.inf,
-        n_nearest: int = 0,
-    ) -> IntArray:
-        """Search from each of `sources`; the end of the results of each, for as many as had room."""
-        ends = np.zeros(len(sources), np.int64)
-        n_done = local_windows.search_each(
-            self._front,
-            sources,
-            goals,
-            np.zeros(len(sources) + 1, np.int64) if first_goal is None else first_goal,
-            cutoff,
-            n_nearest,
-            self._names,
-            found,
-            value,
-            ends,
-        )
-        if n_done < 0:
-            raise MemoryError("the windows of the exact distance do not fit into memory")
-        return ends[:n_done]
 
 
 class _Count:
@@ -300,7 +244,7 @@ class _Count:
         self._k, self._most = k, most
         self._sources = self._found = 0
 
-    def __call__(self, near: _Near) -> _Near:
+    def __call__(self, near: local_searches.Near) -> local_searches.Near:
         # Threads may miss what others add: an estimate suffices.
         self._sources += len(near.counts)
         self._found += len(near.vertex)
@@ -312,64 +256,6 @@ class _Count:
                 "rows to a file with write_distances_within"
             )
         return near
-
-
-def _within(work: _Workspace, part: _Chunk, radius: AnyArray) -> _Near:
-    """All vertices up to a radius; room is doubled until the results of the next source fit."""
-    rows, done, room = [], 0, _ROOM
-    while done < len(part.vertices):
-        found, value = np.empty(room, np.int32), np.empty(room)
-        ends = work.search(part.vertices[done:], found, value, cutoff=float(radius))
-        if not len(ends):
-            room *= 2
-            continue
-        done += len(ends)
-        rows.append(_Near(np.diff(ends, prepend=0), found[: ends[-1]].copy(), value[: ends[-1]].copy()))
-    return _Near(*(np.concatenate(column) for column in zip(*rows, strict=True)))
-
-
-def _nearest(work: _Workspace, part: _Chunk, k: int) -> _Near:
-    found, value = np.empty(k * len(part.vertices), np.int32), np.empty(k * len(part.vertices))
-    ends = work.search(part.vertices, found, value, n_nearest=k)
-    return _Near(np.diff(ends, prepend=0), found[: ends[-1]], value[: ends[-1]])
-
-
-def _to_goals(work: _Workspace, part: _Chunk, goals: AnyArray, ends: IntArray) -> _Near:
-    first = ends[part.start : part.stop + 1] - ends[part.start]
-    value = np.empty(len(goals))
-    work.search(part.vertices, np.empty(1, np.int32), value, goals=goals, first_goal=first)
-    return _Near(np.diff(first), _NO_VERTICES, value)
-
-
-def _in_chunks(
-    edges: HalfEdges,
-    sources: AnyArray,
-    search: Callable[[_Workspace, _Chunk], _Near],
-    position: FloatArray | None = None,
-) -> list[_Near]:
-    """What `search` finds from consecutive sources, on all processors; in the order of the sources.
-
-    Sources are numbers in the tables: in ascending order, what searches read often is in the caches from the last one.
-    """
-    starts = range(0, len(sources), _CHUNK)
-    waiting = deque(enumerate(starts))
-    parts: list[Any] = [None] * len(starts)
-
-    def run(workspace: _Workspace) -> None:
-        while waiting:
-            try:
-                i, start = waiting.popleft()
-            except IndexError:  # another thread took the last one
-                return
-            stop = min(start + _CHUNK, len(sources))
-            try:
-                parts[i] = search(workspace, _Chunk(start, stop, sources[start:stop]))
-            except BaseException:
-                waiting.clear()  # for a Ctrl-C, other threads end with the chunk at hand
-                raise
-
-    side_by_side(run, [_Workspace(edges, position) for _ in range(min(n_threads(), len(starts)))])
-    return parts
 
 
 def _triangles(mesh: MeshLike) -> Mesh:

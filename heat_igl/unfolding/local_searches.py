@@ -1,0 +1,137 @@
+"""Searches by windows from one vertex after the other, on all processors; each ends at what it is asked for."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from heat_igl.kernels import local_windows, windows
+from heat_igl.runtime import n_threads, side_by_side
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.half_edges import HalfEdges
+from heat_igl.unfolding.window_search import TOLERANCE, Found
+
+__all__ = ["CHUNK", "Chunk", "Near", "Workspace", "in_chunks", "nearest", "to_goals", "within"]
+
+#: Sources that a thread takes at a time: few enough that all threads end together.
+CHUNK = 64
+# Distances that a thread makes room for at first.
+_ROOM = 2**16
+_NO_VERTICES = np.empty(0, np.int32)
+
+
+class Chunk(NamedTuple):
+    """Some of the sources: their positions, and their numbers in the tables."""
+
+    start: int
+    stop: int
+    vertices: AnyArray
+
+
+class Near(NamedTuple):
+    """How many vertices were found from each source, which, and how far, source after source."""
+
+    counts: IntArray
+    vertex: AnyArray
+    distance: FloatArray
+
+
+class Workspace:
+    """What searches of one thread write, in the state in which each must find it."""
+
+    def __init__(self, edges: HalfEdges, position: FloatArray | None) -> None:
+        self._names = edges.old_vertex
+        self._found = Found.of(edges.n, edges.n)
+        self._front = windows.Front(edges.tables, self._found, TOLERANCE, position=position)
+
+    def search(
+        self,
+        sources: AnyArray,
+        found: AnyArray,
+        value: FloatArray,
+        *,
+        goals: AnyArray = _NO_VERTICES,
+        first_goal: AnyArray | None = None,
+        cutoff: float = np.inf,
+        n_nearest: int = 0,
+    ) -> IntArray:
+        """Search from each of `sources`; the end of the results of each, for as many as had room."""
+        ends = np.zeros(len(sources), np.int64)
+        n_done = local_windows.search_each(
+            self._front,
+            sources,
+            goals,
+            np.zeros(len(sources) + 1, np.int64) if first_goal is None else first_goal,
+            cutoff,
+            n_nearest,
+            self._names,
+            found,
+            value,
+            ends,
+        )
+        if n_done < 0:
+            raise MemoryError("the windows of the exact distance do not fit into memory")
+        return ends[:n_done]
+
+
+def within(work: Workspace, part: Chunk, radius: float) -> Near:
+    """All vertices up to a radius; room is doubled until the results of the next source fit."""
+    rows, done, room = [], 0, _ROOM
+    while done < len(part.vertices):
+        found, value = np.empty(room, np.int32), np.empty(room)
+        ends = work.search(part.vertices[done:], found, value, cutoff=radius)
+        if not len(ends):
+            room *= 2
+            continue
+        done += len(ends)
+        rows.append(Near(np.diff(ends, prepend=0), found[: ends[-1]].copy(), value[: ends[-1]].copy()))
+    return Near(*(np.concatenate(column) for column in zip(*rows, strict=True)))
+
+
+def nearest(work: Workspace, part: Chunk, k: int) -> Near:
+    """The k nearest vertices of each source."""
+    found, value = np.empty(k * len(part.vertices), np.int32), np.empty(k * len(part.vertices))
+    ends = work.search(part.vertices, found, value, n_nearest=k)
+    return Near(np.diff(ends, prepend=0), found[: ends[-1]], value[: ends[-1]])
+
+
+def to_goals(work: Workspace, part: Chunk, goals: AnyArray, ends: IntArray) -> Near:
+    """Distances of the goals of a part: those of source i are numbers ``ends[i]`` to ``ends[i + 1]`` of all goals."""
+    first = ends[part.start : part.stop + 1] - ends[part.start]
+    value = np.empty(len(goals))
+    work.search(part.vertices, np.empty(1, np.int32), value, goals=goals, first_goal=first)
+    return Near(np.diff(first), _NO_VERTICES, value)
+
+
+def in_chunks(
+    edges: HalfEdges,
+    sources: AnyArray,
+    search: Callable[[Workspace, Chunk], Near],
+    position: FloatArray | None = None,
+) -> list[Near]:
+    """What `search` finds from consecutive sources, on all processors; in the order of the sources.
+
+    Sources are numbers in the tables: in ascending order, what searches read often is in the caches from the last one.
+    """
+    starts = range(0, len(sources), CHUNK)
+    waiting = deque(enumerate(starts))
+    parts: list[Any] = [None] * len(starts)
+
+    def run(workspace: Workspace) -> None:
+        while waiting:
+            try:
+                i, start = waiting.popleft()
+            except IndexError:  # another thread took the last one
+                return
+            stop = min(start + CHUNK, len(sources))
+            try:
+                parts[i] = search(workspace, Chunk(start, stop, sources[start:stop]))
+            except BaseException:
+                waiting.clear()  # for a Ctrl-C, other threads end with the chunk at hand
+                raise
+
+    side_by_side(run, [Workspace(edges, position) for _ in range(min(n_threads(), len(starts)))])
+    return parts

@@ -1,0 +1,96 @@
+"""Meshes that several tests measure on, besides those of `heat_igl.shapes`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.spatial
+from conftest import perturbed
+
+from heat_igl import Mesh, shapes
+
+
+def bumpy() -> Mesh:
+    """A sphere of 642 vertices with curvature of both signs, and no symmetry."""
+    return perturbed(shapes.icosphere(3), 0.3, 1)
+
+
+def cube() -> Mesh:
+    V = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    return Mesh(V, scipy.spatial.ConvexHull(V).simplices)
+
+
+def two_arms(n: int) -> Mesh:
+    """A flat square without one quadrant: paths from its one arm into the other bend at the inner corner, (0, 0)."""
+    mesh = shapes.grid(2 * n)
+    V = mesh.V - 0.5 * mesh.V.max(axis=0)
+    x, y, _ = V[mesh.F].mean(axis=1).T
+    return Mesh(V, mesh.F[(x < 0) | (y < 0)])
+
+
+def rough_field(seed: int) -> Mesh:
+    rng = np.random.default_rng(seed)
+    P = rng.random((rng.integers(8, 60), 2))
+    return Mesh(np.column_stack([P, rng.normal(size=len(P)) * 0.3]), scipy.spatial.Delaunay(P).simplices)
+
+
+def rough_star(seed: int) -> Mesh:
+    rng = np.random.default_rng(seed)
+    P = rng.normal(size=(rng.integers(8, 50), 3))
+    P /= np.linalg.norm(P, axis=1)[:, None]
+    return Mesh(P * np.exp(rng.normal(size=(len(P), 1)) * 0.4), scipy.spatial.ConvexHull(P).simplices)
+
+
+def random_disk(n: int, seed: int) -> Mesh:
+    """A Delaunay triangulation of random points in the unit disk, boundary points on the circle."""
+    spatial = pytest.importorskip("scipy.spatial")
+    rng = np.random.default_rng(seed)
+    radius, angle = 0.97 * np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
+    rim = 2 * np.pi * np.arange(int(4 * np.sqrt(n))) / int(4 * np.sqrt(n))
+    points = np.concatenate(
+        [np.stack([radius * np.cos(angle), radius * np.sin(angle)], 1), np.stack([np.cos(rim), np.sin(rim)], 1)]
+    )
+    faces = spatial.Delaunay(points).simplices
+    return Mesh(np.column_stack([points, np.zeros(len(points))]), faces)
+
+
+def sheared(mesh: Mesh, shear: float) -> Mesh:
+    """Still flat and convex, but most faces are not those of its Delaunay triangulation."""
+    V = mesh.V.copy()
+    V[:, 0] += shear * V[:, 1]
+    return Mesh(V, mesh.F)
+
+
+def with_point(mesh: Mesh, face: int, barycentric: np.ndarray) -> Mesh:
+    """The same surface with a vertex, the last one, inside a face."""
+    corners, n = mesh.F[face], mesh.n_vertices
+    fan = [[corners[c], corners[(c + 1) % 3], n] for c in range(3)]
+    return Mesh(
+        np.concatenate([mesh.V, [barycentric @ mesh.V[corners]]]), np.concatenate([np.delete(mesh.F, face, 0), fan])
+    )
+
+
+def moebius_strip(around: int, across: int, half_width: float = 0.4) -> Mesh:
+    """A strip that cannot be oriented, of `around` by `across` cells."""
+    t = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    s = np.linspace(-half_width, half_width, across + 1)
+    T, S = np.meshgrid(t, s, indexing="ij")
+    V = np.stack([(1 + S * np.cos(T / 2)) * np.cos(T), (1 + S * np.cos(T / 2)) * np.sin(T), S * np.sin(T / 2)], axis=-1)
+    faces = []
+    for i in range(around):
+        for j in range(across):
+            a, b = i * (across + 1) + j, i * (across + 1) + j + 1
+            c, d = (a + across + 1, b + across + 1) if i < around - 1 else (across - j, across - j - 1)
+            faces += [[a, c, b], [b, c, d]]
+    return Mesh(V.reshape(-1, 3), faces)
+
+
+def bent_pages() -> Mesh:
+    """Three pages at one edge, each of them bent."""
+    page = shapes.grid(6)
+    x, y, _ = (page.V - page.V.min(axis=0)).T
+    V = [np.column_stack([x * np.cos(a), x * np.sin(a), y]) for a in (0.0, 2.0, 4.0)]
+    stacked = np.concatenate(V)
+    F = np.concatenate([page.F + k * page.n_vertices for k in range(3)])
+    _, first, inverse = np.unique(np.round(stacked, 9), axis=0, return_index=True, return_inverse=True)
+    return Mesh(stacked[first], inverse.ravel()[F])
