@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from conftest import shared_path
 from scipy.spatial import Delaunay, cKDTree
 
 import heat_igl
@@ -168,6 +169,14 @@ def test_many_sources_around_an_edge(k):
     assert (found >= exact * (1 - 1e-9)).all()
     assert np.abs(found - exact).mean() < 2e-5 * exact.mean()
     assert (found <= 1.01 * exact).all()
+
+
+def test_a_source_that_no_vertex_around_sees():
+    """The line is found once a path that bends has told the vertex of the source."""
+    octopus = heat_igl.read_mesh(shared_path("octopus_tets.mesh"))
+    found = HeatMethodSolver(octopus).distance(18)
+    assert found[284] == pytest.approx(np.linalg.norm(octopus.V[284] - octopus.V[18]), rel=1e-9)
+    assert (found >= np.linalg.norm(octopus.V - octopus.V[18], axis=1) * (1 - 1e-9)).all()
 
 
 def test_a_line_is_not_followed_across_a_gap():

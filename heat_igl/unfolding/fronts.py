@@ -113,14 +113,20 @@ class FrontSolver(UnfoldingSolver):
             edges, outward = edges[near], outward[near]
         way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
         way[vertices] = _STRAIGHT
-        for _ in range(_MOST_ROUNDS):
+        is_continued = False
+        for round_ in range(_MOST_ROUNDS):
             before = distance.copy()
             look_around(order, *domain, vertices, offset, distance, begin, label)
-            way[distance < before] = _STRAIGHT
+            is_seen = distance < before
+            way[is_seen] = _STRAIGHT
+            if round_ and not is_seen.any() and not is_continued:
+                break
             if len(edges):
+                # After it, a vertex may know a source that it sees, and that none of the vertices around it sees.
                 bend_around(edges, outward, *domain, self._reach, vertices, offset, distance, begin, label, way)
             # Behind a point or an edge at which tetrahedra touch, no line continues.
-            if not self._continue_along_edges(distance, begin, label):
+            is_continued = self._continue_along_edges(distance, begin, label)
+            if not len(edges) and not is_continued:
                 break
 
     def _continue_along_edges(self, distance: FloatArray, begin: FloatArray, label: AnyArray) -> bool:
