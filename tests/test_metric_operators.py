@@ -191,6 +191,7 @@ def test_points_are_sources_in_a_metric():
 def test_a_ratio_of_lengths_is_drawn_along_fibres():
     metric = fibre_metric([[2, 0, 0], [0, 0, -1]], [1.0, 2.0], 10.0)
     np.testing.assert_allclose(metric, [np.diag([1, 100, 100]), np.diag([100, 100, 4])])
+    np.testing.assert_array_equal(fibre_metric([[2, 1]], 1.0, 3.0), fibre_metric([[2, 1, 0]], 1.0, 3.0))
 
 
 GOOD = np.tile(np.eye(3), (18, 1, 1))

@@ -419,7 +419,7 @@ def test_bad_files(tmp_path, name: str, text: str, message: str) -> None:
 
 def test_npy_of_another_shape(tmp_path) -> None:
     np.save(tmp_path / "a.npy", np.zeros((5, 4)))
-    with pytest.raises(MeshError, match=r"must have shape \(n, 3\), or \(n, 6\) with normals"):
+    with pytest.raises(MeshError, match=r"must have shape \(n, 3\), \(n, 6\) with normals, or \(n, 2\)"):
         read_point_cloud(tmp_path / "a.npy")
 
 

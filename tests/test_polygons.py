@@ -118,8 +118,22 @@ def test_distance_in_the_plane_converges():
     assert errors[2] < 0.65 * errors[1]
 
 
+def test_distance_around_a_vertex_is_that_along_edges():
+    """Of the polygons and of their triangles; heat alone is a tenth too short there."""
+    mesh = dual_of_sphere(3)
+    spokes = [mesh.triangles.edges[(mesh.triangles.edges == 40).any(axis=1)].sum(axis=1) - 40]
+    around = np.unique(spokes)
+    exact = np.linalg.norm(mesh.V[around] - mesh.V[40], axis=1)
+    np.testing.assert_allclose(heat_igl.HeatMethodSolver(mesh).distance(40)[around], exact, rtol=1e-12)
+    by_heat = heat_igl.HeatMethodSolver(mesh, magnitude="unit").distance(40)
+    assert np.abs(by_heat[around] / exact - 1).mean() > 0.05
+    found = heat_igl.HeatMethodSolver(mesh).distance([40, 200])
+    exact = np.arccos(np.clip(mesh.V @ mesh.V[[40, 200]].T, -1, 1)).min(axis=1)
+    assert np.nanmean(relative_error(found, exact)) < 0.02
+
+
 def test_distance_on_hexagons_of_a_sphere():
-    """Regular meshes keep an error of direction, as triangles do: it falls to one percent, and there it stays."""
+    """Regular meshes keep an error of direction, as triangles do: it falls to some tenths of a percent."""
     errors = []
     for subdivisions in (2, 3, 4):
         mesh = dual_of_sphere(subdivisions)
@@ -127,7 +141,7 @@ def test_distance_on_hexagons_of_a_sphere():
         exact = np.arccos(np.clip(mesh.V @ mesh.V[0], -1, 1))
         errors.append(np.abs(solver.distance(0) - exact).mean())
     assert errors[2] < errors[1] < 0.6 * errors[0]
-    assert errors[2] < 0.012 * np.pi / 2
+    assert errors[2] < 0.008 * np.pi / 2
 
 
 def test_points_inside_polygons():

@@ -5,7 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heat_igl import HeatMethodSolver, Mesh, MeshError, PointCloud, PolygonMesh, image_domain, speed_operators
+import heat_igl
+from heat_igl import (
+    HeatMethodSolver,
+    Mesh,
+    MeshError,
+    PointCloud,
+    PolygonMesh,
+    image_domain,
+    metric_operators,
+    read_point_cloud,
+    shapes,
+    speed_operators,
+)
+from heat_igl.compat import igl as igl_names
+from heat_igl.compat import potpourri3d as potpourri3d_names
 
 
 def test_tetrahedra_fit_together_and_fill_the_voxels():
@@ -77,3 +91,40 @@ def test_planar_positions():
     np.testing.assert_array_equal(mesh.with_vertices(2 * V).V, 2 * mesh.V)
     assert PolygonMesh(V, [[0, 1, 2, 3]]).V.shape == (4, 3)
     assert PointCloud(V).P.shape == (4, 3)
+
+
+def test_planar_points_of_files(tmp_path):
+    P = np.random.default_rng(0).random((30, 2))
+    np.save(tmp_path / "a.npy", P)
+    np.savetxt(tmp_path / "a.xyz", P, fmt="%.17g")
+    for name in ("a.npy", "a.xyz"):
+        np.testing.assert_array_equal(read_point_cloud(tmp_path / name).P, PointCloud(P).P)
+    np.save(tmp_path / "b.npy", np.ones((30, 4)))
+    with pytest.raises(MeshError, match=r"or \(n, 2\) in the plane, but its shape is \(30, 4\)"):
+        read_point_cloud(tmp_path / "b.npy")
+
+
+# What each function that takes positions makes of two columns is what it makes of three with z = 0.
+FLAT = shapes.disk(6)
+TAKE_POSITIONS = {
+    "HeatMethodSolver": lambda V: HeatMethodSolver(V, FLAT.F).distance(3),
+    "heat_method_distance": lambda V: heat_igl.heat_method_distance(V, FLAT.F, 3),
+    "unfolded_distance": lambda V: heat_igl.unfolded_distance(V, FLAT.F, 3),
+    "geodesic_distance": lambda V: heat_igl.geodesic_distance((V, FLAT.F), 3),
+    "closest_points": lambda V: heat_igl.closest_points(FLAT, V[:5] / 2).points.barycentric,
+    "curve_on": lambda V: heat_igl.curve_on(FLAT, V[[0, 4, 9]]).start,
+    "PointCloud": lambda V: HeatMethodSolver(PointCloud(V)).distance(3),
+    "polygon_operators": lambda V: heat_igl.polygon_operators(PolygonMesh(V, FLAT.F)).L.toarray(),
+    "tangent_frames": lambda V: heat_igl.tangent_frames((V, FLAT.F)).x,
+    "closed_forms.plane": lambda V: heat_igl.closed_forms.plane((V, FLAT.F), 3),
+    "with_vertices": lambda V: HeatMethodSolver(FLAT).with_vertices(2 * V).distance(3),
+    "metric_operators": lambda V: metric_operators((V, FLAT.F), np.tile(np.eye(3), (FLAT.n_faces, 1, 1))).L.toarray(),
+    "libigl": lambda V: igl_names.heat_geodesic(V, FLAT.F, 0.01, np.array([3])),
+    "potpourri3d": lambda V: potpourri3d_names.PointCloudHeatSolver(V).compute_distance(3),
+}
+
+
+@pytest.mark.parametrize("name", TAKE_POSITIONS)
+def test_two_columns_are_a_plane(name):
+    call = TAKE_POSITIONS[name]
+    np.testing.assert_array_equal(call(FLAT.V[:, :2]), call(FLAT.V))

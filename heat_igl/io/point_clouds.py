@@ -32,9 +32,9 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
     path : path-like
         The extension, in upper or lower case, selects the format. .ply: the vertices, and their properties nx, ny, nz
         as normals. .obj: the lines v, and the lines vn as normals if there are as many. .xyz: a point in each line,
-        three coordinates or three and a normal; separated by white space or commas, "#" starts a comment. .npy: an
-        array (n, 3), or (n, 6) with normals. .pcd: the fields x, y, z and normal_x, normal_y, normal_z, text or binary.
-        A further .gz stands for a file packed by gzip.
+        three coordinates, or three and a normal, or two in the plane z = 0; separated by white space or commas, "#"
+        starts a comment. .npy: an array (n, 3), (n, 6) with normals, or (n, 2). .pcd: the fields x, y, z and normal_x,
+        normal_y, normal_z, text or binary. A further .gz stands for a file packed by gzip.
 
     Returns
     -------
@@ -158,11 +158,13 @@ def _from_obj(path: Path, data: bytes) -> _Points:
 def _from_xyz(path: Path, data: bytes) -> _Points:
     text = Text(path, data.replace(b",", b" "), comment="#")
     width = int(text.count[0])
-    wrong = text.count != (width if width in (3, 6) else 3)
+    wrong = text.count != (width if width in (2, 3, 6) else 3)
     if wrong.any():
         line = int(np.argmax(wrong))
         raise text.error(
-            line, f"a point has 3 numbers, or 6 with a normal, and all points as many ({int(wrong.sum())} lines differ)"
+            line,
+            "a point has 3 numbers, or 6 with a normal, or 2 in the plane, and all points as many "
+            f"({int(wrong.sum())} lines differ)",
         )
     values = text.all_numbers().reshape(-1, width)
     return values[:, :3], values[:, 3:] if width == 6 else None
@@ -173,9 +175,12 @@ def _from_npy(path: Path, data: bytes) -> _Points:
         array = np.load(io.BytesIO(data), allow_pickle=False)
     except (ValueError, EOFError, OSError) as error:
         raise MeshError(f"{path}: not an array in the format of numpy.save: {error}") from None
-    if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] not in (3, 6):
+    if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] not in (2, 3, 6):
         shape = getattr(array, "shape", "none")
-        raise MeshError(f"{path}: the array must have shape (n, 3), or (n, 6) with normals, but its shape is {shape}")
+        raise MeshError(
+            f"{path}: the array must have shape (n, 3), (n, 6) with normals, or (n, 2) in the plane, but its shape is "
+            f"{shape}"
+        )
     return array[:, :3], array[:, 3:] if array.shape[1] == 6 else None
 
 

@@ -102,7 +102,8 @@ def fibre_metric(directions: ArrayLike, along: ArrayLike, across: ArrayLike) -> 
     Parameters
     ----------
     directions : (m, 3) array_like
-        Of the fibres, or a principal direction, on each face; of any length but 0, and either sign.
+        Of the fibres, or a principal direction, on each face; of any length but 0, and either sign. (m, 2) in the plane
+        z = 0.
     along, across : float or (m,) array_like
         Positive factors; for a speed, one over it.
 
@@ -124,8 +125,9 @@ def fibre_metric(directions: ArrayLike, along: ArrayLike, across: ArrayLike) -> 
     [[0.25, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]]
     """
     w = real_numbers("directions", directions)
-    if w.ndim != 2 or w.shape[1] != 3:
-        raise ValueError(f"directions must have shape (m, 3), one per face, not {w.shape}")
+    if w.ndim != 2 or w.shape[1] not in (2, 3):
+        raise ValueError(f"directions must have shape (m, 3), one per face, or (m, 2) in the plane, not {w.shape}")
+    w = np.pad(w, ((0, 0), (0, 3 - w.shape[1])))
     with np.errstate(over="ignore"):
         length = np.linalg.norm(w, axis=1)
     _raise_at_first(~((length > 0) & np.isfinite(length)), "directions", w, "is no direction")

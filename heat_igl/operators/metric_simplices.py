@@ -48,3 +48,24 @@ class MetricSimplices:
         """Edges (e, 2) of each simplex one after the other, and their lengths (e,) there."""
         i, j = np.triu_indices(self.corners.shape[1], 1)
         return self.corners[:, np.stack([i, j], axis=1)].reshape(-1, 2), self.lengths[:, i, j].ravel()
+
+    def halved(self) -> MetricSimplices:
+        """Tetrahedra in space, each cut into eight at the middles of the edges; the vertices keep their numbers.
+
+        Raises
+        ------
+        ValueError
+            If these are triangles, or their positions are not known.
+        """
+        if self.V is None or self.corners.shape[1] != 4:
+            raise ValueError("only tetrahedra in space can be halved: give their positions V")
+        pairs, _ = self.edges
+        ends, middle = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+        ab, ac, ad, bc, bd, cd = self.n + middle.reshape(-1, 6).T
+        a, b, c, d = self.corners.T
+        # Four at the corners, and the octahedron between them around its diagonal from ac to bd.
+        around = [(ab, ad), (ad, cd), (cd, bc), (bc, ab)]
+        parts = [(a, ab, ac, ad), (ab, b, bc, bd), (ac, bc, c, cd), (ad, bd, cd, d)]
+        parts += [(ac, bd, one, other) for one, other in around]
+        corners = np.concatenate([np.stack(part, axis=1) for part in parts])
+        return MetricSimplices.in_space(Mesh(np.concatenate([self.V, self.V[ends].mean(axis=1)]), corners))

@@ -160,10 +160,8 @@ class SourceAssembler:
         self._radius = NEAR_RADIUS
         if surface is not None and surface.faces is not None and domain.n_given < domain.n:
             self._radius *= max(1.0, surface.faces.mean_edge_length / domain.mean_edge_length)
-        # Triangulations on which the edges are straight lines: one, if none was flipped.
-        self._straight = [] if self.edges is None else [self.edges]
-        if self.edges is not None and self._faces is not None:
-            self._straight.append(self._faces)
+        # Triangulations on which the edges are straight lines: one, if none was flipped; on polygons, their triangles.
+        self._straight = [field for field in (self.edges, self._faces) if field is not None]
         if surface is not None and surface.faces is surface.triangulation:
             self._straight = self._straight[:1]
         if surface is not None and surface.uncovered is not None and surface.uncovered is not surface.faces:

@@ -21,6 +21,10 @@ __all__ = ["FrontSolver"]
 
 # Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
 _MOST_ROUNDS = 5
+# Up to so many vertices, a body is measured on halved tetrahedra as well: of a long edge, a part may see the source
+# although neither end does, and then such an edge is too coarse a source itself.
+_FEW = 1000
+_ROUNDING = 1e-9
 # What the kernel of bends knows of the way to a vertex.
 _STRAIGHT, _UNKNOWN = -1, -2
 
@@ -42,9 +46,11 @@ class FrontSolver(UnfoldingSolver):
     ----------
     simplices : MetricSimplices
         The domain. Lengths are those of space where `V` is known.
+    is_halved : bool
+        Whether tetrahedra are not to be halved again.
     """
 
-    def __init__(self, simplices: MetricSimplices) -> None:
+    def __init__(self, simplices: MetricSimplices, is_halved: bool = False) -> None:
         self.is_exact = True
         self._simplices = simplices
         self._corners = np.ascontiguousarray(simplices.corners, np.int32)
@@ -54,6 +60,8 @@ class FrontSolver(UnfoldingSolver):
         self._lengths = np.ascontiguousarray(simplices.lengths)
         self._slowness = np.ascontiguousarray(simplices.slowness)
         self._V = np.empty((0, 3)) if simplices.V is None else np.ascontiguousarray(simplices.V)
+        is_small = simplices.V is not None and simplices.n <= _FEW and not is_halved
+        self._finer = FrontSolver(simplices.halved(), True) if is_small and len(self._reflex_edges[0]) else None
 
     @cached_property
     def _reflex_edges(self) -> tuple[AnyArray, FloatArray]:
@@ -97,7 +105,21 @@ class FrontSolver(UnfoldingSolver):
             advance(self._order(vertices), *mesh, self._lengths, self._slowness, distance, begin, label)
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, [-1]])[label]
+        if self._finer is not None:
+            self._take_shorter(self._finer, sources, distance, labels)
         return distance
+
+    @staticmethod
+    def _take_shorter(finer: FrontSolver, sources: SourceSet, distance: FloatArray, labels: IntArray | None) -> None:
+        """Lower distance to that on halved tetrahedra."""
+        n = len(distance)
+        other = np.full(finer._simplices.n, -1)
+        found = finer._distance(sources, distance, other)[:n]
+        # Longer by rounding alone, a distance stays as it is.
+        shorter = found < distance * (1 - _ROUNDING)
+        distance[shorter] = found[shorter]
+        if labels is not None:
+            labels[shorter] = other[:n][shorter]
 
     def _follow_lines(
         self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, begin: FloatArray, label: AnyArray
@@ -113,14 +135,20 @@ class FrontSolver(UnfoldingSolver):
             edges, outward = edges[near], outward[near]
         way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
         way[vertices] = _STRAIGHT
-        for _ in range(_MOST_ROUNDS):
+        is_continued = False
+        for round_ in range(_MOST_ROUNDS):
             before = distance.copy()
             look_around(order, *domain, vertices, offset, distance, begin, label)
-            way[distance < before] = _STRAIGHT
+            is_seen = distance < before
+            way[is_seen] = _STRAIGHT
+            if round_ and not is_seen.any() and not is_continued:
+                break
             if len(edges):
+                # After it, a vertex may know a source that it sees, and that none of the vertices around it sees.
                 bend_around(edges, outward, *domain, self._reach, vertices, offset, distance, begin, label, way)
             # Behind a point or an edge at which tetrahedra touch, no line continues.
-            if not self._continue_along_edges(distance, begin, label):
+            is_continued = self._continue_along_edges(distance, begin, label)
+            if not len(edges) and not is_continued:
                 break
 
     def _continue_along_edges(self, distance: FloatArray, begin: FloatArray, label: AnyArray) -> bool:
