@@ -193,13 +193,48 @@ def test_copies_of_a_point_are_at_distance_0_of_each_other() -> None:
     assert np.isfinite(HeatMethodSolver(PointCloud(P)).distance(3)).all()
 
 
-def test_many_copies_of_points_are_reached() -> None:
-    P = np.append(plane(300), plane(300)[np.random.default_rng(2).integers(0, 300, 400)], axis=0)
-    cloud = PointCloud(P)
-    assert cloud.has_copies
-    assert not PointCloud(P[:300]).has_copies
-    distance = HeatMethodSolver(cloud).distance(0)
-    np.testing.assert_allclose(distance, np.linalg.norm(P - P[0], axis=1), atol=0.1)
+@pytest.mark.parametrize("copies", ["at random", "six of each", "a thousand of one"])
+def test_copies_have_the_distance_of_the_point(copies: str) -> None:
+    """Distance by the sweep, walks and windows, from the front door, and cells: as on the distinct points."""
+    distinct = sphere(1200)
+    rng = np.random.default_rng(2)
+    of = {
+        "at random": np.append(np.arange(1200), rng.integers(0, 1200, 2000)),
+        "six of each": np.tile(np.arange(1200), 6),
+        "a thousand of one": np.append(np.arange(1200), np.full(1000, 7)),
+    }[copies]
+    cloud, alone = PointCloud(distinct[of]), PointCloud(distinct)
+    np.testing.assert_array_equal(cloud.originals, of)
+    source = len(of) - 1
+    for refine in ("sweep", "unfold", "exact"):
+        solver, other = HeatMethodSolver(cloud, refine=refine), HeatMethodSolver(alone, refine=refine)
+        found, expected = solver.distance(source), other.distance(int(of[source]))
+        np.testing.assert_array_equal(found, found[of])
+        assert found[source] == 0
+        assert mean_error(found, expected[of]) < (0.002 if refine == "sweep" else 1e-5)
+        cells = solver.voronoi([0, 1])
+        np.testing.assert_array_equal(cells.labels, cells.labels[of])
+    np.testing.assert_array_equal(
+        HeatMethodSolver(cloud).distance(0), HeatMethodSolver(cloud, refine="sweep").distance(0)
+    )
+    front_door = heat_igl.geodesic_distance(cloud, source)
+    np.testing.assert_allclose(front_door, heat_igl.geodesic_distance(alone, int(of[source]))[of], atol=1e-5)
+
+
+def test_copies_of_an_outlier_are_outliers() -> None:
+    cloud = PointCloud(np.append(sphere(500), [[0, 0, 5.0]] * 3, axis=0))
+    assert np.isinf(HeatMethodSolver(cloud).distance(0)[500:]).all()
+    assert cloud.report().unreferenced_vertices.tolist() == [500, 501, 502]
+
+
+@pytest.mark.parametrize("domain", ["points", "copies"])
+def test_heat_by_name_is_the_heat_method(domain: str) -> None:
+    """A solver on points sweeps unless heat is named, and `method` names it."""
+    P = sphere(1100)
+    cloud = PointCloud(P if domain == "points" else np.append(P, P[:40], axis=0))
+    by_heat = HeatMethodSolver(cloud, magnitude="damped").distance(3)
+    np.testing.assert_array_equal(heat_igl.geodesic_distance(cloud, 3, method="heat"), by_heat)
+    assert not np.array_equal(by_heat, HeatMethodSolver(cloud).distance(3))
 
 
 def two_sheets(n: int, gap: float) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.local_delaunay import STEEP, InPlane
 from cython.cimports.libc.math import atan2, fabs, sqrt
 
 __all__ = ["delaunay_stars", "fitting_triangles"]
@@ -91,7 +92,12 @@ def _neighbours_around(
         dz: cython.double = P[j, 2] - P[i, 2]
         x: cython.double = dx * axes[i, 0, 0] + dy * axes[i, 0, 1] + dz * axes[i, 0, 2]
         y: cython.double = dx * axes[i, 1, 0] + dy * axes[i, 1, 1] + dz * axes[i, 1, 2]
+        height: cython.double = dx * axes[i, 2, 0] + dy * axes[i, 2, 1] + dz * axes[i, 2, 2]
         square: cython.double = x * x + y * y
+        if height * height > STEEP * square and square > 1e-12 * height * height:
+            flat: InPlane = _unrolled(axes, i, j, x, y, height)
+            x, y = flat.x, flat.y
+            square = x * x + y * y
         # A point above the centre has no direction in the plane.
         if square <= 1e-12 * (dx * dx + dy * dy + dz * dz) or square <= 0.0:
             continue
@@ -281,7 +287,45 @@ def _direction(
     dz: cython.double = P[j, 2] - P[i, 2]
     x: cython.double = dx * axes[i, 0, 0] + dy * axes[i, 0, 1] + dz * axes[i, 0, 2]
     y: cython.double = dx * axes[i, 1, 0] + dy * axes[i, 1, 1] + dz * axes[i, 1, 2]
+    height: cython.double = dx * axes[i, 2, 0] + dy * axes[i, 2, 1] + dz * axes[i, 2, 2]
+    if height * height > STEEP * (x * x + y * y) and (x * x + y * y) > 1e-12 * height * height:
+        flat: InPlane = _unrolled(axes, i, j, x, y, height)
+        return atan2(flat.y, flat.x)
     return atan2(y, x)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _unrolled(
+    axes: cython.const[cython.double][:, :, ::1],
+    i: cython.Py_ssize_t,
+    j: cython.Py_ssize_t,
+    x: cython.double,
+    y: cython.double,
+    height: cython.double,
+) -> InPlane:
+    """Place of point j in the tangent plane of i, at its distance: turned about the line in which the planes meet."""
+    # The normal of j, in the tangent plane of i.
+    nx: cython.double = axes[j, 2, 0] * axes[i, 0, 0] + axes[j, 2, 1] * axes[i, 0, 1] + axes[j, 2, 2] * axes[i, 0, 2]
+    ny: cython.double = axes[j, 2, 0] * axes[i, 1, 0] + axes[j, 2, 1] * axes[i, 1, 1] + axes[j, 2, 2] * axes[i, 1, 2]
+    size: cython.double = sqrt(nx * nx + ny * ny)
+    found: InPlane
+    scale: cython.double
+    if size < 0.2:
+        scale = sqrt(1.0 + height * height / (x * x + y * y))
+        found.x, found.y = scale * x, scale * y
+        return found
+    nx, ny = nx / size, ny / size
+    across: cython.double = nx * x + ny * y
+    along: cython.double = nx * y - ny * x
+    longer: cython.double = sqrt(across * across + height * height)
+    if across < 0.0:
+        longer = -longer
+    found.x = longer * nx - along * ny
+    found.y = longer * ny + along * nx
+    return found
 
 
 @cython.cfunc
