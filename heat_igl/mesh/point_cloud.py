@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.kernels.agreeing import orient
 from heat_igl.mesh.cloud_copies import distinct_points, with_copies
+from heat_igl.mesh.cloud_orientation import oriented
 from heat_igl.mesh.cloud_triangles import cloud_triangles
 from heat_igl.mesh.connectivity import connected_components
 from heat_igl.mesh.mesh import Mesh, checked_positions
@@ -161,8 +161,7 @@ class PointCloud:
             raise MeshError(
                 "no three points of P are neighbours on a surface: the points are too few or too unevenly spaced"
             )
-        _orient(tree.P, triangles, normals)
-        F, V = number[triangles], np.empty_like(self.P)
+        F, V = number[oriented(tree.P, triangles, normals)], np.empty_like(self.P)
         V[number] = tree.P
         return Mesh(V[distinct[original]], F)
 
@@ -250,13 +249,3 @@ def _triangles(tree: PointTree, normals: FloatArray | None) -> IntArray:
 def _n_parts(F: IntArray, n: int) -> int:
     """How many parts the triangles F (m, 3) make, without points in no triangle."""
     return len(np.unique(connected_components(F, n)[F])) if len(F) else 0
-
-
-def _orient(P: FloatArray, F: IntArray, normals: FloatArray | None) -> None:
-    """Turn triangles of F (m, 3) until neighbours are oriented alike, and each part like most of the normals."""
-    part = orient(F, len(P))
-    if normals is not None:
-        area = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
-        along = np.bincount(part, np.einsum("fx,fx->f", area, normals[F].sum(axis=1)))
-        turned = along[part] < 0
-        F[turned] = F[turned, ::-1]

@@ -368,13 +368,14 @@ class UnfoldingSolver:
         return asked.tolerance == 0 or self._domain.components.size <= _FEW_FOR_DIRECTIONS
 
     def _directed_walks(self, refinement: Refinement, u: FloatArray, asked: Asked) -> FloatArray:
+        directions = self.path_directions  # refuses surfaces without tangent planes, before there are walks
         starts = refinement.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
         walk = refinement.walks(-u, starts, TOLERANCE if asked.tolerance is None else asked.tolerance)
         row = refinement.number
         if asked.labels is not None:
             asked.labels[:] = walk["label"][row]
         if asked.angles is not None:
-            asked.angles[:] = self.path_directions.of_walks(walk, asked.points)
+            asked.angles[:] = directions.of_walks(walk, asked.points)
         return np.asarray(walk["distance"][row])
 
     @cached_property
