@@ -12,8 +12,9 @@ import heat_igl
 from heat_igl import HeatMethodSolver, MeshError, PointCloud, cli, farthest_points, read_point_cloud, shapes
 from heat_igl.drawing.discs import discs
 from heat_igl.io import ply
-from heat_igl.kernels.local_planes import onto_quadrics, principal_axes
+from heat_igl.kernels.local_planes import farthest_last, onto_quadrics, principal_axes
 from heat_igl.mesh.cloud_gaps import pinched_vertices, with_one_fan
+from heat_igl.mesh.cloud_orientation import oriented
 from heat_igl.mesh.cloud_triangles import cloud_triangles
 from heat_igl.mesh.neighbourhoods import neighbourhoods, point_tree, without_noise
 
@@ -169,6 +170,19 @@ def test_noise_is_taken_away_and_clean_points_stay() -> None:
     waves = np.stack([x, y, 0.02 * np.abs((40 * x + 3 * y) % 2 - 1)], axis=1)
     detailed = point_tree(waves)
     assert without_noise(detailed) is detailed
+
+
+def test_more_neighbours_are_not_taken_where_the_surface_bends() -> None:
+    """On a torus of radii 1 and 0.4 that 1500 points sample: 120 of them go half around the tube."""
+    P = shapes.torus(240, 600).V
+    P = P[np.random.default_rng(0).choice(len(P), 1500, replace=False)]
+    noisy = P + 0.01 * np.random.default_rng(1).standard_normal(P.shape)
+
+    def off(P: np.ndarray) -> float:
+        return float((np.hypot(np.hypot(P[:, 0], P[:, 1]) - 1, P[:, 2]) - 0.4).std())
+
+    assert off(P) < 1e-3
+    assert off(without_noise(point_tree(noisy)).P) < 0.8 * off(noisy)
 
 
 # What scans bring along.
@@ -622,19 +636,32 @@ def test_fans_stay_that_are_the_only_connection() -> None:
 # Neighbours.
 
 
-@pytest.mark.parametrize("n", [4, 33, 3000])
-def test_nearest_points_are_those_of_scipy(n: int) -> None:
-    from scipy.spatial import KDTree
-
-    P = np.random.default_rng(n).standard_normal((n, 3)) * [1, 10, 0.01]
+def test_points_come_before_their_nearest() -> None:
+    """Even if squares of distances underflow, so that scipy's tree takes others for the point itself."""
+    P = np.random.default_rng(0).standard_normal((300, 3))
+    P[1:40] = P[0] * (1 + 1e-15 * np.arange(1, 40)[:, None])
+    P[40:80] = 1e-170 * np.random.default_rng(1).standard_normal((40, 3))
     tree = point_tree(P)
     np.testing.assert_array_equal(tree.P, P[tree.order])
-    k = min(n, 20)
-    chosen = np.random.default_rng(0).permutation(n)[: n // 2]
-    index, square = tree.nearest(chosen, k)
-    distance, expected = KDTree(tree.P).query(tree.P[chosen], k)
-    np.testing.assert_array_equal(index, expected)
-    np.testing.assert_allclose(square, distance**2, rtol=1e-12)
+    index, square = tree.nearest(np.arange(300), 20)
+    np.testing.assert_array_equal(index[:, 0], np.arange(300))
+    assert (np.diff(square, axis=1) >= 0).all()
+    far = np.square(tree.P[:, None] - tree.P).sum(axis=2)
+    np.testing.assert_allclose(square, np.sort(far, axis=1)[:, :20], rtol=1e-12)
+    np.testing.assert_allclose(np.take_along_axis(far, index, axis=1), square, rtol=1e-12)
+
+
+def test_the_farthest_neighbour_goes_to_the_end() -> None:
+    P = np.random.default_rng(0).standard_normal((50, 3))
+    index = np.random.default_rng(1).permuted(np.tile(np.arange(50, dtype=np.int32), (7, 1)), axis=1)[:, :12].copy()
+    index[0] = index[0][np.argsort(np.linalg.norm(P[index[0]] - P[index[0, 0]], axis=1))]
+    given = index.copy()
+    square = farthest_last(P, index)
+    np.testing.assert_array_equal(index[:, 0], given[:, 0])
+    np.testing.assert_array_equal(index[0], given[0])
+    np.testing.assert_array_equal(np.sort(index, axis=1), np.sort(given, axis=1))
+    np.testing.assert_allclose(square, np.square(P[index] - P[index[:, :1]]).sum(axis=2), rtol=1e-12)
+    np.testing.assert_array_equal(square.argmax(axis=1), 11)
 
 
 def test_quadrics_and_principal_axes() -> None:
@@ -659,3 +686,68 @@ def test_quadrics_and_principal_axes() -> None:
 def test_operators_of_points_want_points():
     with pytest.raises(heat_igl.MeshError, match="cloud must be a PointCloud, not Mesh"):
         heat_igl.point_cloud_operators(heat_igl.shapes.grid(2))
+
+
+# Sheets, and the orientation of the triangles.
+
+
+@pytest.mark.parametrize("gap", [1.0, 2.0, 4.0])
+def test_sheets_without_normals_stay_apart(gap: float) -> None:
+    """In spacings; in the neighbourhoods of 30 points there are points of both sheets."""
+    n = 1500
+    P, _ = two_sheets(n, gap / np.sqrt(n))
+    inner = (np.abs(P[:, :2] - 0.5) < 0.35).all(axis=1)
+    upper = P[:, 2] > 0
+    F = PointCloud(P).F
+    F = F[inner[F].all(axis=1)]
+    joins = upper[F].any(axis=1) != upper[F].all(axis=1)
+    assert len(F) > 2000
+    assert joins.sum() <= (0 if gap > 1 else 2)
+
+
+def test_the_two_sides_of_a_thin_disc() -> None:
+    """Its rim joins them: the distance to the point opposite the centre is that over the rim."""
+    rng, n, thickness = np.random.default_rng(3), 3000, 0.03
+    radius, angle = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
+    radius[:2] = 0
+    flat = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    side = np.where(np.arange(n) % 2 == 0, 1, -1) * thickness / 2
+    # A round rim, so that there is one surface.
+    turn = np.pi * (rng.random(800) - 0.5)
+    around = 2 * np.pi * rng.random(800)
+    out = 1 + thickness / 2 * np.cos(turn)
+    rim = np.stack([out * np.cos(around), out * np.sin(around), thickness / 2 * np.sin(turn)], axis=1)
+    P = np.concatenate([np.append(flat, side[:, None], axis=1), rim])
+    distance = HeatMethodSolver(PointCloud(P), refine="exact").distance(0)
+    assert distance[1] == pytest.approx(2 + np.pi * thickness / 2, rel=0.03)
+
+
+def moebius_strip(m: int) -> tuple[np.ndarray, np.ndarray]:
+    """2 m triangles around a circle."""
+    turn = 2 * np.pi * np.arange(m) / m
+    ends = []
+    for side in (0.1, -0.1):
+        out = 1 + side * np.cos(turn / 2)
+        ends.append(np.stack([out * np.cos(turn), out * np.sin(turn), side * np.sin(turn / 2)], axis=1))
+    a, b = np.arange(m), np.arange(m) + m
+    # After a turn, the sides have changed places.
+    c, d = np.append(a[1:], m), np.append(b[1:], 0)
+    return np.concatenate(ends), np.concatenate([np.stack([a, c, b], 1), np.stack([c, d, b], 1)]).astype(np.int32)
+
+
+def test_triangles_that_contradict_are_left_out_if_they_are_few() -> None:
+    P, F = moebius_strip(1000)
+    found = oriented(P, F, None)
+    assert len(F) - 4 <= len(found) < len(F)
+    sides = np.concatenate([found[:, [0, 1]], found[:, [1, 2]], found[:, [2, 0]]])
+    assert len(np.unique(sides, axis=0)) == len(sides)
+    assert len(np.unique(found)) == len(P)
+    small = moebius_strip(50)
+    np.testing.assert_array_equal(np.sort(oriented(*small, None), axis=1), np.sort(small[1], axis=1))
+
+
+def test_directions_on_a_surface_that_cannot_be_oriented_are_an_error() -> None:
+    P, F = moebius_strip(1500)
+    solver = HeatMethodSolver(heat_igl.Mesh(P, F), refine="unfold")
+    with pytest.raises(MeshError, match="oriented"):
+        solver.directions(0)

@@ -138,9 +138,7 @@ def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysi
             domain = operators(mesh.distinct_triangles, options.triangulation, on_laplacian)
             originals = mesh.originals if mesh.has_copies else None
         seconds = time.perf_counter() - start
-        known = begun[0].result() if begun else known
-    waited = time.perf_counter() - start - seconds
-    return prepare(domain, options, known, seconds, waited, mesh.V, originals)
+        return prepare(domain, options, begun[0].result if begun else lambda: known, seconds, mesh.V, originals)
 
 
 def _for_points(cloud: PointCloud, options: SolverOptions) -> SolverOptions:
@@ -173,9 +171,8 @@ def prepare_polygons(mesh: PolygonMesh, options: SolverOptions) -> SolverParts:
 def prepare(
     domain: Operators,
     options: SolverOptions,
-    known: Analysis | None = None,
+    known: Callable[[], Analysis | None] = lambda: None,
     seconds_operators: float = 0.0,
-    seconds_analysis: float = 0.0,
     V: FloatArray | None = None,
     originals: IntArray | None = None,
 ) -> SolverParts:
@@ -187,16 +184,15 @@ def prepare(
         The domain.
     options : SolverOptions
         The options.
-    known : Analysis, optional
-        An order of elimination, taken if it fits.
-    seconds_operators, seconds_analysis : float
+    known : callable
+        An order of elimination, taken if it fits; called when it is needed.
+    seconds_operators : float
         Time spent before, for the diagnostics.
     V : (n, 3) float64, optional
         Positions, to check answers against straight lines.
     originals : (n,) int64, optional
         With `refine`, the vertex whose distance each takes: see `PointCloud.originals`.
     """
-    start = time.perf_counter()
     domain, options = _resolved(domain, options)
     damped = options.damps(domain)
     fitted = damped and domain.lengths is not None
@@ -205,13 +201,13 @@ def prepare(
     t_damping = step if damped else None
     front_solver = None if domain.simplices is None or not options.leaves_heat else FrontSolver(domain.simplices)
     takes_heat = options.refine != "exact" and front_solver is None
-    found = analysis(domain.L, options.backend, known, options.n_factors) if takes_heat else None
-    analysed = time.perf_counter()
     unfolding: UnfoldingSolver | None = front_solver
     if unfolding is None and options.refine is not None:
         # Before there are factors: most memory is needed while the tables are made.
         unfolding = UnfoldingSolver(domain, options.refine, originals=originals)
     unfolded = time.perf_counter()
+    found = analysis(domain.L, options.backend, known(), options.n_factors) if takes_heat else None
+    analysed = time.perf_counter()
     heat_flow, poisson, divergence = (
         (None, None, None) if found is None else _factored(domain, options, step, found, t_damping, fitted)
     )
@@ -237,8 +233,8 @@ def prepare(
         seconds_operators=seconds_operators,
         factor_nonzeros=sum(factor.nonzeros for factor in factors),
         factor_bytes=sum(factor.n_bytes for factor in factors),
-        seconds_analysis=seconds_analysis + analysed - start,
-        seconds_factorization=factored - unfolded,
+        seconds_analysis=analysed - unfolded,
+        seconds_factorization=factored - analysed,
     )
     return SolverParts(
         options=options,

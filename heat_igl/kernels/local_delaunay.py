@@ -2,8 +2,8 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.local_delaunay import STEEP, InPlane
-from cython.cimports.libc.math import atan2, fabs, sqrt
+from cython.cimports.heat_igl.kernels.local_delaunay import ALIKE, STEEP, InPlane
+from cython.cimports.libc.math import INFINITY, atan2, fabs, sqrt
 
 __all__ = ["delaunay_stars", "fitting_triangles"]
 
@@ -42,7 +42,7 @@ def delaunay_stars(
     is_closed: cython.uchar[::1] = closed
     found: cython.int[:, ::1] = corners
     radius: cython.double[::1] = radii
-    star: cython.double[:, ::1] = np.empty((k + 1, 3))
+    star: cython.double[:, ::1] = np.empty((k + 1, 5))
     members: cython.int[::1] = np.empty(k + 1, np.int32)
     stack: cython.int[::1] = np.empty(k + 2, np.int32)
     m: cython.Py_ssize_t = 0
@@ -50,7 +50,7 @@ def delaunay_stars(
     with cython.nogil:
         for i in range(begin, end):
             before: cython.Py_ssize_t = m
-            count: cython.Py_ssize_t = _neighbours_around(i, P, axes, neighbours, least_cosine, star, members)
+            count: cython.Py_ssize_t = _neighbours_around(i, P, axes, neighbours, least_cosine, star, members, stack)
             if count >= 2:
                 top: cython.Py_ssize_t = _visible_hull(count, star, stack)
                 m = _triangles(i, top, star, members, stack, largest[i], found, radius, m)
@@ -70,15 +70,19 @@ def _neighbours_around(
     least_cosine: cython.double,
     star: cython.double[:, ::1],
     members: cython.int[::1],
+    stack: cython.int[::1],
 ) -> cython.Py_ssize_t:
     """Put the neighbours of point i into `star` and `members`, sorted by angle and inverted; return how many there are.
 
     The inversion p / |p|^2 takes circles through the point to straight lines: the star of the point is the part of the
-    convex hull of the inverted neighbours that it sees, found by Graham's scan.
+    convex hull of the inverted neighbours that it sees, found by Graham's scan. Neighbours inside the hull of the
+    nearest ones are left out.
     """
     a: cython.Py_ssize_t
     b: cython.Py_ssize_t
     size: cython.Py_ssize_t = 0
+    n_sides: cython.Py_ssize_t = 0
+    reach: cython.double = INFINITY  # squared: twice the largest radius of the circles of the star
     for a in range(neighbours.shape[1]):
         j: cython.Py_ssize_t = neighbours[i, a]
         if j < 0 or j == i:
@@ -87,19 +91,16 @@ def _neighbours_around(
             axes[i, 2, 0] * axes[j, 2, 0] + axes[i, 2, 1] * axes[j, 2, 1] + axes[i, 2, 2] * axes[j, 2, 2] < least_cosine
         ):
             continue
-        dx: cython.double = P[j, 0] - P[i, 0]
-        dy: cython.double = P[j, 1] - P[i, 1]
-        dz: cython.double = P[j, 2] - P[i, 2]
-        x: cython.double = dx * axes[i, 0, 0] + dy * axes[i, 0, 1] + dz * axes[i, 0, 2]
-        y: cython.double = dx * axes[i, 1, 0] + dy * axes[i, 1, 1] + dz * axes[i, 1, 2]
-        height: cython.double = dx * axes[i, 2, 0] + dy * axes[i, 2, 1] + dz * axes[i, 2, 2]
+        flat: InPlane = _in_plane(P, axes, i, j)
+        x, y = flat.x, flat.y
         square: cython.double = x * x + y * y
-        if height * height > STEEP * square and square > 1e-12 * height * height:
-            flat: InPlane = _unrolled(axes, i, j, x, y, height)
-            x, y = flat.x, flat.y
-            square = x * x + y * y
         # A point above the centre has no direction in the plane.
-        if square <= 1e-12 * (dx * dx + dy * dy + dz * dz) or square <= 0.0:
+        if square <= 0.0:
+            continue
+        if size == FEW and n_sides == 0:
+            n_sides = _sides(_visible_hull(size, star, stack), star, stack)
+            reach = _reach(n_sides, star)
+        if square > reach or _is_inside(n_sides, star, x / square, y / square):
             continue
         # Grows with the angle, and needs no arctangent.
         angle: cython.double = y / (fabs(x) + fabs(y))
@@ -151,6 +152,50 @@ def _visible_hull(size: cython.Py_ssize_t, star: cython.double[:, ::1], stack: c
         top += 1
         stack[top] = cython.cast(cython.int, following)
     return top
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _sides(top: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.Py_ssize_t:
+    """Fill the columns of the sides in `star`; return how many there are, -1 if the hull is not around the point."""
+    a: cython.Py_ssize_t
+    for a in range(top):
+        p: cython.Py_ssize_t = stack[a]
+        q: cython.Py_ssize_t = stack[a + 1]
+        turn: cython.double = star[p, X] * star[q, Y] - star[p, Y] * star[q, X]
+        if turn <= 0.0:
+            return -1
+        star[a, ACROSS_X] = (star[p, Y] - star[q, Y]) / turn
+        star[a, ACROSS_Y] = (star[q, X] - star[p, X]) / turn
+    return top
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _reach(n_sides: cython.Py_ssize_t, star: cython.double[:, ::1]) -> cython.double:
+    """Squared distance beyond which neighbours, inverted, are inside all sides; infinite if there are none."""
+    a: cython.Py_ssize_t
+    largest: cython.double = 0.0
+    for a in range(n_sides):
+        largest = max(largest, star[a, ACROSS_X] * star[a, ACROSS_X] + star[a, ACROSS_Y] * star[a, ACROSS_Y])
+    return largest / (INSIDE * INSIDE) if n_sides > 0 else INFINITY
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _is_inside(
+    n_sides: cython.Py_ssize_t, star: cython.double[:, ::1], x: cython.double, y: cython.double
+) -> cython.bint:
+    """Whether a point is inside all sides of a hull, of which there are some."""
+    a: cython.Py_ssize_t
+    for a in range(n_sides):
+        if star[a, ACROSS_X] * x + star[a, ACROSS_Y] * y < -INSIDE:
+            return False
+    return n_sides > 0
 
 
 @cython.cfunc
@@ -282,20 +327,38 @@ def _direction(
     j: cython.Py_ssize_t,
 ) -> cython.double:
     """Angle of point j around point i in the tangent plane of i."""
-    dx: cython.double = P[j, 0] - P[i, 0]
-    dy: cython.double = P[j, 1] - P[i, 1]
-    dz: cython.double = P[j, 2] - P[i, 2]
-    x: cython.double = dx * axes[i, 0, 0] + dy * axes[i, 0, 1] + dz * axes[i, 0, 2]
-    y: cython.double = dx * axes[i, 1, 0] + dy * axes[i, 1, 1] + dz * axes[i, 1, 2]
-    height: cython.double = dx * axes[i, 2, 0] + dy * axes[i, 2, 1] + dz * axes[i, 2, 2]
-    if height * height > STEEP * (x * x + y * y) and (x * x + y * y) > 1e-12 * height * height:
-        flat: InPlane = _unrolled(axes, i, j, x, y, height)
-        return atan2(flat.y, flat.x)
-    return atan2(y, x)
+    flat: InPlane = _in_plane(P, axes, i, j)
+    return atan2(flat.y, flat.x)
 
 
 @cython.cfunc
 @cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _in_plane(
+    P: cython.const[cython.double][:, ::1],
+    axes: cython.const[cython.double][:, :, ::1],
+    i: cython.Py_ssize_t,
+    j: cython.Py_ssize_t,
+) -> InPlane:
+    """Point j in the tangent plane of i, projected, or unrolled if it is steeply above or below; 0 right above it."""
+    dx: cython.double = P[j, 0] - P[i, 0]
+    dy: cython.double = P[j, 1] - P[i, 1]
+    dz: cython.double = P[j, 2] - P[i, 2]
+    found: InPlane
+    found.x = dx * axes[i, 0, 0] + dy * axes[i, 0, 1] + dz * axes[i, 0, 2]
+    found.y = dx * axes[i, 1, 0] + dy * axes[i, 1, 1] + dz * axes[i, 1, 2]
+    height: cython.double = dx * axes[i, 2, 0] + dy * axes[i, 2, 1] + dz * axes[i, 2, 2]
+    square: cython.double = found.x * found.x + found.y * found.y
+    if height * height > STEEP * square:
+        if square <= 1e-12 * height * height:
+            found.x = found.y = 0.0
+        else:
+            found = _unrolled(axes, i, j, found.x, found.y, height)
+    return found
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _unrolled(
@@ -306,14 +369,17 @@ def _unrolled(
     y: cython.double,
     height: cython.double,
 ) -> InPlane:
-    """Place of point j in the tangent plane of i, at its distance: turned about the line in which the planes meet."""
+    """Point j in the tangent plane of i at its distance, turned about the line in which their planes meet.
+
+    Around a sharp edge projection makes the far side too short.
+    """
     # The normal of j, in the tangent plane of i.
     nx: cython.double = axes[j, 2, 0] * axes[i, 0, 0] + axes[j, 2, 1] * axes[i, 0, 1] + axes[j, 2, 2] * axes[i, 0, 2]
     ny: cython.double = axes[j, 2, 0] * axes[i, 1, 0] + axes[j, 2, 1] * axes[i, 1, 1] + axes[j, 2, 2] * axes[i, 1, 2]
     size: cython.double = sqrt(nx * nx + ny * ny)
     found: InPlane
     scale: cython.double
-    if size < 0.2:
+    if size < ALIKE:
         scale = sqrt(1.0 + height * height / (x * x + y * y))
         found.x, found.y = scale * x, scale * y
         return found

@@ -5,7 +5,7 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.local_planes import BENT, DIAGONAL, FLATTER, LEAST_WEIGHT, TINY
 from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["onto_quadrics", "principal_axes", "tangent_planes"]
+__all__ = ["farthest_last", "onto_quadrics", "principal_axes", "tangent_planes"]
 
 
 def principal_axes(
@@ -93,6 +93,34 @@ def tangent_planes(
             for j in range(size, k):
                 index[row, j] = -1
     return found, radii, bends
+
+
+def farthest_last(P: cython.const[cython.double][:, ::1], index: cython.int[:, ::1]):
+    """Bring the neighbour of points that is farthest to the end of each row of `index` (b, k), k at least 2.
+
+    The others keep their places, but for the one that was last; the point itself comes first. Returns the squared
+    distances (b, k) of the neighbours from it.
+    """
+    k: cython.Py_ssize_t = index.shape[1]
+    squares = np.empty((index.shape[0], k))
+    square: cython.double[:, ::1] = squares
+    row: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    with cython.nogil:
+        for row in range(index.shape[0]):
+            i: cython.Py_ssize_t = index[row, 0]
+            farthest: cython.Py_ssize_t = k - 1
+            for j in range(k):
+                dx: cython.double = P[index[row, j], 0] - P[i, 0]
+                dy: cython.double = P[index[row, j], 1] - P[i, 1]
+                dz: cython.double = P[index[row, j], 2] - P[i, 2]
+                square[row, j] = dx * dx + dy * dy + dz * dz
+            for j in range(1, k - 1):
+                if square[row, j] > square[row, farthest]:
+                    farthest = j
+            index[row, farthest], index[row, k - 1] = index[row, k - 1], index[row, farthest]
+            square[row, farthest], square[row, k - 1] = square[row, k - 1], square[row, farthest]
+    return squares
 
 
 @cython.cfunc

@@ -16,7 +16,7 @@ from heat_igl.mesh.cloud_gaps import pinched_vertices, with_gaps_closed, with_on
 from heat_igl.mesh.connectivity import ascending_rows
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.neighbourhoods import Neighbourhoods
-from heat_igl.runtime import in_order, n_threads
+from heat_igl.runtime import over_rows
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["cloud_triangles", "with_points"]
@@ -66,21 +66,21 @@ def _triangles_of_stars(
     """
     largest = _LARGEST_RADIUS * near.radius
 
-    def stars_of(begin: int) -> tuple[IntArray, FloatArray, IntArray, IntArray]:
-        end = min(begin + _BLOCK, len(P))
-        corners, radii, sizes, is_closed = delaunay_stars(P, near.axes, near.index, largest, least_cosine, begin, end)
+    def stars_of(rows: slice) -> tuple[IntArray, FloatArray, IntArray, IntArray]:
+        corners, radii, sizes, is_closed = delaunay_stars(
+            P, near.axes, near.index, largest, least_cosine, rows.start, rows.stop
+        )
         return corners, radii, sizes, is_closed
 
-    blocks = range(0, len(P), _BLOCK)
-    corners, radii, sizes, is_closed = map(np.concatenate, zip(*in_order(stars_of, blocks, n_threads()), strict=True))
+    corners, radii, sizes, is_closed = map(np.concatenate, zip(*over_rows(stars_of, len(P), _BLOCK), strict=True))
     first = np.zeros(len(P) + 1, np.int64)
     np.cumsum(sizes, out=first[1:])
 
-    def agreement_of(begin: int) -> tuple[IntArray, FloatArray, IntArray]:
-        count, radius, is_settled = agreement(first, corners, radii, is_closed, begin, min(begin + _BLOCK, len(P)))
+    def agreement_of(rows: slice) -> tuple[IntArray, FloatArray, IntArray]:
+        count, radius, is_settled = agreement(first, corners, radii, is_closed, rows.start, rows.stop)
         return count, radius, is_settled
 
-    count, radius, is_settled = map(np.concatenate, zip(*in_order(agreement_of, blocks, n_threads()), strict=True))
+    count, radius, is_settled = map(np.concatenate, zip(*over_rows(agreement_of, len(P), _BLOCK), strict=True))
     others = np.flatnonzero((count == 1) | (count == 2))
     rows = ascending_rows(corners[others])
     # Those in more stars first, then the smaller ones.

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heat_igl.kernels.local_planes import onto_quadrics, principal_axes, tangent_planes
-from heat_igl.kernels.point_tree import arrange, nearest
+from heat_igl.kernels.local_planes import farthest_last, onto_quadrics, principal_axes, tangent_planes
 from heat_igl.mesh.sheets import axes_along, one_sheet
-from heat_igl.runtime import in_order, n_threads
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.runtime import over_rows
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 __all__ = ["Neighbourhoods", "PointTree", "neighbourhoods", "point_tree", "without_noise"]
 
@@ -19,8 +22,8 @@ __all__ = ["Neighbourhoods", "PointTree", "neighbourhoods", "point_tree", "witho
 _K = 30
 # Points at a time: bounds the memory for their neighbours.
 _BLOCK = 1 << 12
-# Points in a leaf of the tree, about.
-_LEAF = 16
+# Points in a leaf of the tree.
+_LEAF = 32
 # Ratio of the two smaller variances above which neighbours may be on several sheets.
 _SEVERAL_SHEETS = 0.04
 
@@ -31,8 +34,10 @@ _NOISE = 0.05
 _THICKNESS = 0.05
 _LARGEST_K = 120
 _MOST_PASSES = 8
+# A pass that leaves more than this share of the noise is the last.
+_HARDLY_CHANGED = 0.9
 # Noise is looked for at this many points.
-_SAMPLE = 1000
+_SAMPLE = 500
 # Deviations from a quadric of half as many neighbours, in shares of those from the quadric of all: noise deviates from
 # both alike, 0.68 to 1 in measurements, detail from the smaller one by less, 0.14 to 0.58.
 _NOISE_NOT_DETAIL = 0.63
@@ -40,7 +45,7 @@ _NOISE_NOT_DETAIL = 0.63
 
 @dataclass(frozen=True, eq=False)
 class PointTree:
-    """Points sorted into a k-d tree, so that those near to each other are near in memory, too.
+    """Points and their k-d tree, in the order of its leaves: those near to each other are near in memory, too.
 
     Attributes
     ----------
@@ -48,23 +53,24 @@ class PointTree:
         The points, leaf by leaf.
     order : (n,) int64
         Which of the given points each is.
-    box : (2 b - 1, 6) float64
-        Least and greatest coordinates in each node of the tree, whose b leaves are last.
+    tree : scipy.spatial.KDTree
+        Of `P`.
     """
 
     P: FloatArray
     order: IntArray
-    box: FloatArray
+    tree: KDTree
 
-    def nearest(self, chosen: IntArray, k: int) -> tuple[IntArray, FloatArray]:
+    def nearest(self, chosen: IntArray, k: int) -> tuple[AnyArray, FloatArray]:
         """The k nearest points (b, k) int32 of some of `P`, themselves first, and the squared distances (b, k)."""
-        index, square = nearest(self.P, self.box, np.asarray(chosen, np.int32), k)
-        return index, square
+        distance, index = self.tree.query(self.P[chosen], k)
+        # Squares of distances may underflow, and then others are as near as the point itself.
+        index[:, 0] = chosen
+        return index.astype(np.int32), np.square(distance)
 
     def moved(self, P: FloatArray) -> PointTree:
-        """The tree of other positions (n, 3) of the same points, in the order of this tree."""
-        tree = point_tree(P)
-        return replace(tree, order=self.order[tree.order])
+        """The same points, in the same order, at other positions (n, 3)."""
+        return replace(self, P=P, tree=_tree(P))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,10 +98,16 @@ class Neighbourhoods:
 
 
 def point_tree(P: FloatArray) -> PointTree:
-    """The k-d tree of the points P (n, 3)."""
-    levels = max(int(len(P) / _LEAF).bit_length(), 1)
-    order, positions, box = arrange(P, levels)
-    return PointTree(positions, order.astype(np.int64), box)
+    """The points P (n, 3), sorted, and their k-d tree."""
+    order = np.asarray(_tree(P).indices, np.int64)
+    positions = P[order]
+    return PointTree(positions, order, _tree(positions))
+
+
+def _tree(P: FloatArray) -> KDTree:
+    from scipy.spatial import KDTree  # takes as long to import as the rest of the package
+
+    return KDTree(P, _LEAF)
 
 
 def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: bool = True) -> Neighbourhoods:
@@ -112,7 +124,7 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: 
     bend = np.zeros(len(P))
 
     def fill(rows: slice) -> None:
-        index, square = tree.nearest(np.arange(rows.start, min(rows.stop, len(P))), k + 1)
+        index, square = tree.nearest(np.arange(rows.start, rows.stop), k + 1)
         found.radius[rows] = np.sqrt(square[:, -1])
         if normals is not None:
             found.axes[rows] = axes_along(normals[rows])
@@ -123,7 +135,7 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: 
             bend[rows] = variances[:, 0] / np.maximum(variances[:, 1], np.finfo(float).tiny)
         found.index[rows] = index
 
-    _in_blocks(fill, len(P))
+    over_rows(fill, len(P), _BLOCK)
     bent = np.flatnonzero(bend > _SEVERAL_SHEETS)
     if len(bent):
         index, square = tree.nearest(bent, k + 1)
@@ -136,45 +148,65 @@ def without_noise(tree: PointTree) -> PointTree:
 
     Points are noisy if neighbours deviate from the quadric by more than 1 / 20 of their spacing at half of the points,
     and this is not detail, from which a quadric of half as many neighbours would deviate by less. Then all points are
-    moved along their normals, until the deviation is smaller.
+    moved along their normals, until the deviation is smaller or hardly changes; the neighbours stay the same.
     """
-    k, n = _K, len(tree.P)
-    if n <= 4 * k:
+    n = len(tree.P)
+    if n <= 4 * _K:
         return tree
-    most = min(_LARGEST_K, n // 4)
     sample = np.unique(np.linspace(0, n - 1, _SAMPLE).astype(np.int64))
-    few = float(np.median(_onto_quadrics(tree, sample, k // 2)[1]))
-    if few < _NOISE or few < _NOISE_NOT_DETAIL * float(np.median(_onto_quadrics(tree, sample, k)[1])):
+
+    def of_sample(k: int) -> tuple[float, float]:
+        """Medians of the noise and of the thickness."""
+        _, noise, thickness = _onto_quadrics(tree.P, _nearest(tree, sample, k))
+        return float(np.median(noise)), float(np.median(thickness))
+
+    few, _ = of_sample(_K // 2)
+    if few < _NOISE:
         return tree
+    noise, thickness = of_sample(_K)
+    if few < _NOISE_NOT_DETAIL * noise:
+        return tree
+    index = _nearest(tree, np.arange(n), _number_of_neighbours(of_sample, thickness, n))
+    P, before = tree.P, np.inf
     for _ in range(_MOST_PASSES):
-        _, noise, thickness = _onto_quadrics(tree, sample, k)
-        while np.median(thickness) > _THICKNESS and k < most:
-            k = min(2 * k, most)
-            _, noise, thickness = _onto_quadrics(tree, sample, k)
-        if np.median(noise) <= _NOISE:
+        P = _onto_quadrics(P, index)[0]
+        noise = float(np.median(_onto_quadrics(P, index[sample])[1]))
+        if noise <= _NOISE or noise > _HARDLY_CHANGED * before:
             break
-        tree = tree.moved(_onto_quadrics(tree, np.arange(n), k)[0])
-    return tree
+        before = noise
+    return tree.moved(P)
 
 
-def _onto_quadrics(tree: PointTree, chosen: IntArray, k: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Some points (b, 3) of the tree, moved onto quadrics that are fitted to k neighbours.
+def _number_of_neighbours(of_sample: Callable[[int], tuple[float, float]], thickness: float, n: int) -> int:
+    """How many of n points show the surface: more than `_K` if noise thickens these, not if the surface bends."""
+    k, most = _K, min(_LARGEST_K, n // 4)
+    found = {k: thickness}
+    while thickness > _THICKNESS and k < most:
+        k = min(2 * k, most)
+        _, thickness = of_sample(k)
+        found[k] = thickness
+    return min(found, key=found.__getitem__)
 
+
+def _nearest(tree: PointTree, chosen: IntArray, k: int) -> AnyArray:
+    """The indices (b, k + 1) int32 of some points of the tree and of their k neighbours."""
+    return np.concatenate(over_rows(lambda rows: tree.nearest(chosen[rows], k + 1)[0], len(chosen), _BLOCK))
+
+
+def _onto_quadrics(P: FloatArray, index: AnyArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Points (b, 3), moved onto quadrics that are fitted to their neighbours.
+
+    In each row of `index` (b, k + 1), the point comes first; the farthest of its neighbours is brought to the end.
     Also returns the noise (b,) in shares of the spacing, and the ratio (b,) of the two smaller variances.
     """
-    moved, noise, thickness = np.empty((len(chosen), 3)), np.empty(len(chosen)), np.empty(len(chosen))
+    b, k = len(index), index.shape[1] - 1
+    moved, noise, thickness = np.empty((b, 3)), np.empty(b), np.empty(b)
 
     def fill(rows: slice) -> None:
-        index, square = tree.nearest(chosen[rows], k + 1)
-        axes, variances = principal_axes(tree.P, index, square)
-        moved[rows], noise[rows] = onto_quadrics(tree.P, index, square, axes)
+        square = farthest_last(P, index[rows])
+        axes, variances = principal_axes(P, index[rows], square)
+        moved[rows], noise[rows] = onto_quadrics(P, index[rows], square, axes)
         thickness[rows] = variances[:, 0] / np.maximum(variances[:, 1], np.finfo(float).tiny)
 
-    _in_blocks(fill, len(chosen))
+    over_rows(fill, b, _BLOCK)
     return moved, noise * np.sqrt(k / np.pi), thickness
-
-
-def _in_blocks(fill: Callable[[slice], None], n: int) -> None:
-    """Call `fill` for slices that make up n rows, on all processors."""
-    for _ in in_order(fill, [slice(begin, begin + _BLOCK) for begin in range(0, n, _BLOCK)], n_threads()):
-        pass

@@ -21,6 +21,8 @@ __all__ = ["PointCloud"]
 
 # Points lie on a line if their second variance is at most this share of the first.
 _ON_A_LINE = 1e-20
+# Above this share they do not, whatever the rounding: singular values, which take longer, need not tell.
+_BESIDE_A_LINE = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -199,6 +201,8 @@ def _check_extent(P: FloatArray) -> None:
     centred = (P - P[0]) / extent
     centred -= centred.mean(axis=0)
     variances = np.linalg.eigvalsh(centred.T @ centred)
+    if variances[1] > _BESIDE_A_LINE * variances[2]:
+        return
     if variances[1] <= _ON_A_LINE * variances[2] or np.linalg.matrix_rank(centred, tol=1e-9) < 2:
         raise MeshError(f"all {len(P)} points in P lie on a line: a surface needs points beside it")
 
@@ -238,8 +242,8 @@ def _triangles(tree: PointTree, normals: FloatArray | None) -> IntArray:
     """The triangles (m, 3) int32 of points: of as few parts as those of neighbourhoods that are not made smaller."""
     near = neighbourhoods(tree, normals)
     F = cloud_triangles(tree.P, near, oriented=normals is not None)
-    parts = _n_parts(F, len(tree.P))
-    if near.has_shrunk and parts != 1:
+    parts = _n_parts(F, len(tree.P)) if near.has_shrunk else 1
+    if parts != 1:
         joined = cloud_triangles(tree.P, neighbourhoods(tree, shrinks=False), oriented=False)
         if _n_parts(joined, len(tree.P)) < parts or not parts:
             return joined

@@ -6,7 +6,7 @@ import numpy as np
 
 from heat_igl.kernels.empty_balls import on_one_side, roomiest_normals
 from heat_igl.kernels.local_planes import principal_axes, tangent_planes
-from heat_igl.runtime import in_order, n_threads
+from heat_igl.runtime import over_rows
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["axes_along", "one_sheet"]
@@ -51,19 +51,18 @@ def one_sheet(
     directions = np.ascontiguousarray(_directions(_DIRECTIONS).T)
     number = np.full(len(P), -1, np.int32)
     number[index[:, 0]] = np.arange(len(index))
-    blocks = [slice(begin, begin + _BLOCK) for begin in range(0, len(index), _BLOCK)]
 
     def balls(rows: slice) -> tuple[FloatArray, FloatArray, FloatArray]:
         normals, radii, room = roomiest_normals(P, index[rows], square[rows], directions)
         return normals, radii, room
 
-    normals, radii, room = map(np.concatenate, zip(*in_order(balls, blocks, n_threads()), strict=True))
+    normals, radii, room = map(np.concatenate, zip(*over_rows(balls, len(index), _BLOCK), strict=True))
 
     def seen(rows: slice) -> BoolArray:
         kept: BoolArray = on_one_side(P, index[rows], number, normals, radii)
         return kept
 
-    keeps = np.concatenate(list(in_order(seen, blocks, n_threads())))
+    keeps = np.concatenate(over_rows(seen, len(index), _BLOCK))
     found, radius, axes = _planes(P, index, square, keeps, shrinks)
     is_thin = room[:, 1] < _THIN * room[:, 0]
     axes[is_thin] = axes_along(_blend(axes[is_thin, 2], normals[is_thin]))

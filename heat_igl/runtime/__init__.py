@@ -5,7 +5,7 @@ from heat_igl.runtime.heat_range import LARGEST_EXPONENT, LOWEST_HEAT, RANGE_LIM
 from heat_igl.runtime.memory import PeakMemory, release_free_memory, resident_memory
 from heat_igl.runtime.progress import progress_bar, rich_progress
 from heat_igl.runtime.rows import float_type, row_writer
-from heat_igl.runtime.threads import both, n_threads, pool, side_by_side
+from heat_igl.runtime.threads import both, n_threads, over_rows, pool, side_by_side
 from heat_igl.runtime.warn import held_warnings, warn_caller
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "in_blocks",
     "in_order",
     "n_threads",
+    "over_rows",
     "pool",
     "progress_bar",
     "release_free_memory",

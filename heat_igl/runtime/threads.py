@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import os
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
-__all__ = ["both", "n_threads", "pool", "side_by_side"]
+__all__ = ["both", "n_threads", "over_rows", "pool", "side_by_side"]
 
 Item = TypeVar("Item")
 First = TypeVar("First")
 Second = TypeVar("Second")
+Result = TypeVar("Result")
 
 # Per thread: the number of threads, this one included, among which the processors are divided.
 _divided = threading.local()
+# Blocks of rows for each thread, so that the last one ends soon after the others.
+_BLOCKS_PER_THREAD = 4
 
 
 def n_threads() -> int:
@@ -57,6 +61,26 @@ def side_by_side(work: Callable[[Item], Any], items: Sequence[Item]) -> None:
         work(items[0])
         for other in others:
             other.result()
+
+
+def over_rows(work: Callable[[slice], Result], n: int, most: int) -> list[Result]:
+    """The results of `work` on slices of at most `most` rows that make up n rows, in order, on all processors."""
+    threads = n_threads()
+    size = max(min(most, -(-n // (_BLOCKS_PER_THREAD * threads))), 1)
+    slices = [slice(begin, min(begin + size, n)) for begin in range(0, n, size)]
+    waiting = deque(range(len(slices)))
+    results: dict[int, Result] = {}
+
+    def work_off(_: int) -> None:
+        while True:
+            try:
+                at = waiting.popleft()
+            except IndexError:
+                return
+            results[at] = work(slices[at])
+
+    side_by_side(work_off, range(max(min(threads, len(slices)), 1)))
+    return [results[at] for at in range(len(slices))]
 
 
 def both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
