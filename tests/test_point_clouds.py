@@ -691,7 +691,7 @@ def test_operators_of_points_want_points():
 # Sheets, and the orientation of the triangles.
 
 
-@pytest.mark.parametrize("gap", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize("gap", [2.0, 3.0, 5.0])
 def test_sheets_without_normals_stay_apart(gap: float) -> None:
     """In spacings; in the neighbourhoods of 30 points there are points of both sheets."""
     n = 1500
@@ -702,19 +702,19 @@ def test_sheets_without_normals_stay_apart(gap: float) -> None:
     F = F[inner[F].all(axis=1)]
     joins = upper[F].any(axis=1) != upper[F].all(axis=1)
     assert len(F) > 2000
-    assert joins.sum() <= (0 if gap > 1 else 2)
+    assert not joins.any()
 
 
 def test_the_two_sides_of_a_thin_disc() -> None:
     """Its rim joins them: the distance to the point opposite the centre is that over the rim."""
-    rng, n, thickness = np.random.default_rng(3), 3000, 0.03
+    rng, n, thickness = np.random.default_rng(3), 3000, 0.12
     radius, angle = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
     radius[:2] = 0
     flat = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
     side = np.where(np.arange(n) % 2 == 0, 1, -1) * thickness / 2
     # A round rim, so that there is one surface.
-    turn = np.pi * (rng.random(800) - 0.5)
-    around = 2 * np.pi * rng.random(800)
+    turn = np.pi * (rng.random(400) - 0.5)
+    around = 2 * np.pi * rng.random(400)
     out = 1 + thickness / 2 * np.cos(turn)
     rim = np.stack([out * np.cos(around), out * np.sin(around), thickness / 2 * np.sin(turn)], axis=1)
     P = np.concatenate([np.append(flat, side[:, None], axis=1), rim])
