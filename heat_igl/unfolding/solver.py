@@ -93,6 +93,8 @@ class UnfoldingSolver:
         As for `Refinement.unfold`, with the same default.
     cutoff : float
         With "exact", what is farther is ``inf``, and the search ends there.
+    originals : (n,) int64, optional
+        The vertex whose values each takes: itself, or that of which it is a copy, see `PointCloud.originals`.
 
     Raises
     ------
@@ -101,7 +103,12 @@ class UnfoldingSolver:
     """
 
     def __init__(
-        self, domain: UnfoldingDomain, refine: Refine, tolerance: float | None = None, cutoff: float = np.inf
+        self,
+        domain: UnfoldingDomain,
+        refine: Refine,
+        tolerance: float | None = None,
+        cutoff: float = np.inf,
+        originals: IntArray | None = None,
     ) -> None:
         surface = domain.surface
         if surface is None:
@@ -118,6 +125,7 @@ class UnfoldingSolver:
             self._refinement.keep_for_sweeps()
         self._surface = surface
         self._domain = domain
+        self._originals = originals
         self._spacing = _SPACING * domain.mean_edge_length
         self._given_faces = np.empty((0, 3), np.int64) if surface.given_faces is None else surface.given_faces
 
@@ -217,7 +225,8 @@ class UnfoldingSolver:
         by_windows = self._takes_windows(sources)
         walks = None if by_windows or angles is not None else self._walks_of(relative)
         if walks is not None:
-            return self._from_curves(walks, relative, u, labels, self._domain.expand_to_vertices(earliest))
+            distance = self._from_curves(walks, relative, u, labels, self._domain.expand_to_vertices(earliest))
+            return self._with_copies(distance, labels)
         takes_curves = by_windows and angles is None
         points = relative.points if takes_curves else self._points(relative)
         asked = asked_of(relative, points, takes_curves)._replace(
@@ -249,6 +258,14 @@ class UnfoldingSolver:
             self._bounds.shorten(distance, labels)
             if self._sweeps:
                 self._bounds.lengthen(distance, sources, points)
+        return self._with_copies(distance, labels, angles, origin)
+
+    def _with_copies(self, distance: FloatArray, *others: AnyArray | None) -> FloatArray:
+        """The same array; there and in others, copies of points take the values of their originals."""
+        if self._originals is not None:
+            for values in (distance, *others):
+                if values is not None:
+                    values[...] = values[..., self._originals]
         return distance
 
     def _walks_of(self, sources: SourceSet) -> CurveWalks | None:
@@ -343,13 +360,14 @@ class UnfoldingSolver:
         )
 
     def _directed_walks(self, refinement: Refinement, u: FloatArray, asked: Asked) -> FloatArray:
+        directions = self.path_directions  # refuses surfaces without tangent planes, before there are walks
         starts = refinement.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
         walk = refinement.walks(refinement.order(-u), starts, TOLERANCE if asked.tolerance is None else asked.tolerance)
         row = refinement.number
         if asked.labels is not None:
             asked.labels[:] = walk["label"][row]
         if asked.angles is not None:
-            asked.angles[:] = self.path_directions.of_walks(walk, asked.points)
+            asked.angles[:] = directions.of_walks(walk, asked.points)
         return np.asarray(walk["distance"][row])
 
     @cached_property
