@@ -45,7 +45,7 @@ class SignedHeatSolver:
         Triangles, manifold and oriented alike; whatever `as_mesh` takes.
     refine : {"unfold", "exact"}, optional
         Take the size from `HeatMethodSolver` with the same `refine`, measured from the curves, and in gaps between them
-        from the zero curve of the integrated distance. By default fronts give it, see `CurvedFronts`.
+        from the zero curve of the integrated distance. By default fronts give it, see docs/signed.md.
     t_coef : float, optional
         t = t_coef h^2, with h the mean edge length of the intrinsic Delaunay triangulation; 0.25 by default. Larger
         values close wide gaps with rounder curves, and smooth noisy ones. If it is given, and no `refine`, the distance

@@ -49,7 +49,7 @@ class CurvedFronts:
     """Distance from curves on an oriented manifold, for any number of queries.
 
     Near the curves it is exact. Beyond, fronts pass from triangle to triangle, as in fast marching (Kimmel and Sethian
-    1998), with the direction at each vertex beside the distance, as in jet marching (Potter and Cameron 2021). Along a
+    1998), with the direction at each vertex beside the distance, as in jet marching (Potter and Cameron 2020). Along a
     side, distance is a parabola with the slopes that the directions at its ends have, so that errors are of second
     order in the edge length; straight fronts are of first order.
 
