@@ -108,7 +108,7 @@ class UnfoldingSolver:
         two take it as well if the mesh is rough or flat with holes, and in small components. It is exact from vertices,
         points and curves. For the other two, a curve stands for points at most an eighth of a mean edge length apart;
         up to 6 edges from points and curves windows give the exact distance, and beyond, distance from a curve is too
-        long by 0.005 % at most.
+        long by 0.005 % at most. With "unfold", walks from curves alone begin at that distance, see `CurveWalks`.
     tolerance : float, optional
         As for `Refinement.unfold`, with the same default.
     cutoff : float
