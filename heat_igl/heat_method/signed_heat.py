@@ -145,9 +145,10 @@ class SignedHeatSolver:
         level : {"zero", "constant", "none"}
             Without `refine`: "zero" subtracts from each vertex the integrated value at the place on the curves that
             its heat comes from, so that all curves are near 0: within 0.03 mean edge lengths (root mean square) on
-            coarse meshes, and exactly at vertices on them, see docs/signed.md. "constant" makes the value nearly constant along each curve, with a
-            different level for each, and 0 in the mean over all. "none" only makes the mean 0. `refine` measures from
-            the curves in any case, and takes the sign from this if curves have gaps.
+            coarse meshes, and exactly at vertices on them, see docs/signed.md. "constant" makes the value nearly
+            constant along each curve, with a different level for each, and 0 in the mean over all. "none" only makes
+            the mean 0. `refine` measures from the curves in any case, and takes the sign from this if curves have
+            gaps.
 
         Returns
         -------
