@@ -7,7 +7,7 @@ import pytest
 from test_signed_distance import flat_perturbed
 from test_unfolding_sources import sheared
 
-from heat_igl import HeatMethodSolver, Mesh, isolines, shapes
+from heat_igl import HeatMethodSolver, Mesh, SurfaceCurve, isolines, shapes
 from heat_igl.unfolding import curve_walks
 
 
@@ -16,15 +16,28 @@ def solvers(mesh: Mesh) -> tuple[HeatMethodSolver, HeatMethodSolver]:
 
 
 @pytest.mark.parametrize("shear", [0.0, 2.3])
-def test_distance_from_a_straight_line_in_a_plane_is_exact(shear):
+def test_distance_from_straight_lines_in_a_plane_is_exact(shear):
     # With a shear nearly all faces are flipped, and angles in the fans of the faces are not those in the triangles'.
-    flat = flat_perturbed(shapes.grid(40), 0.2)
-    mesh = sheared(flat, shear)
+    mesh = sheared(flat_perturbed(shapes.grid(40), 0.2), shear)
     (line,) = isolines(mesh, mesh.V[:, 1], 0.43)[0]
+    # There and back: a closed curve.
+    closed = SurfaceCurve(*(np.concatenate(pair) for pair in zip(forth(line), back(line), strict=True)))
     # Where the perpendicular meets the line, and not near an end, around which the front is round.
     beside = np.abs(mesh.V[:, 0] - shear * 0.43 - 0.5) < 0.4
-    found = solvers(mesh)[0].distance(line)
+    solver = solvers(mesh)[0]
+    walks = solver._parts.last_steps._walks_of
+    assert walks(solver._source_set(line)) is None
+    assert walks(solver._source_set(closed)) is not None
+    found = solver.distance(closed)
     np.testing.assert_allclose(found[beside], np.abs(mesh.V[:, 1] - 0.43)[beside], rtol=1e-9, atol=1e-12)
+
+
+def forth(curve: SurfaceCurve) -> tuple[np.ndarray, ...]:
+    return curve.faces, curve.start, curve.end
+
+
+def back(curve: SurfaceCurve) -> tuple[np.ndarray, ...]:
+    return curve.faces[::-1], curve.end[::-1], curve.start[::-1]
 
 
 def test_distance_from_several_curves_is_near_exact_with_the_nearest_one():

@@ -291,6 +291,21 @@ def test_curves_with_bends_are_near_zero(mesh):
         assert near < on_curves(mesh, curves, solver.distance(curves, level="none")) / 10
 
 
+@pytest.mark.parametrize("kind", ["faces", "half of a boundary"])
+def test_vertices_on_curves_are_zero(kind):
+    mesh = shapes.blob(3)
+    (boundary,) = region_boundary(mesh, faces=mesh.V[mesh.F].mean(axis=1) @ [0.3, 0.5, 0.8] < 0.1)
+    half = SurfaceCurve(*(column[: len(boundary) // 2] for column in (boundary.faces, boundary.start, boundary.end)))
+    curve = boundary if kind == "faces" else half
+    is_corner = (np.concatenate([curve.start, curve.end]) == 1).any(axis=1)
+    assert is_corner.all()
+    faces, places = np.tile(curve.faces, 2), np.concatenate([curve.start, curve.end])
+    on_curve = np.unique(mesh.F[faces, places.argmax(axis=1)])
+    solver = SignedHeatSolver(mesh)
+    np.testing.assert_array_equal(solver.distance(curve, level="zero")[on_curve], 0)
+    assert (solver.distance(curve, level="none")[on_curve] != 0).any()
+
+
 def test_the_smooth_part_of_the_level_is_the_least_one(monkeypatch):
     """Conjugate gradients against the normal equations, on two components of different size."""
     small, large = shapes.icosphere(2), shapes.torus(16, 10)

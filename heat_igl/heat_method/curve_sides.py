@@ -12,7 +12,7 @@ from heat_igl.mesh.grouping import next_in_run
 from heat_igl.sources import OrientedSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["has_gaps", "left_of_closed", "left_of_nearest", "zero_curve_in_gaps"]
+__all__ = ["has_gaps", "left_of_closed", "left_of_nearest", "vertices_on", "zero_curve_in_gaps"]
 
 # Ends of curves nearer to each other than this share of the mean edge length meet.
 _SAME_PLACE = 1e-6
@@ -78,6 +78,15 @@ def zero_curve_in_gaps(mesh: Mesh, phi: FloatArray, distance: FloatArray, h: flo
     return SurfaceCurve(faces[kept], start[kept], end[kept]) if kept.any() else None
 
 
+def vertices_on(mesh: Mesh, sources: OrientedSet) -> BoolArray:
+    """Which vertices (n,) are corners of the curves."""
+    on_curve = np.zeros(mesh.n_vertices, bool)
+    for barycentric in (sources.start, sources.end):
+        in_vertex = (barycentric == 0).sum(axis=1) == 2
+        on_curve[mesh.F[sources.faces[in_vertex], barycentric[in_vertex].argmax(axis=1)]] = True
+    return on_curve
+
+
 def left_of_closed(
     mesh: Mesh, triangulation: IntrinsicTriangulation, sources: OrientedSet
 ) -> tuple[BoolArray, BoolArray]:
@@ -100,13 +109,10 @@ def left_of_closed(
     left, is_known : (n,) bool
         Nothing is known of vertices on curves, of regions that see both sides, and of components without a curve.
     """
-    n = mesh.n_vertices
-    on_curve = np.zeros(n, bool)
+    n, on_curve = mesh.n_vertices, vertices_on(mesh, sources)
     is_met = np.zeros(len(mesh.edges), bool)
     for barycentric in (sources.start, sources.end):
-        n_zero = (barycentric == 0).sum(axis=1)
-        in_vertex, on_edge = n_zero == 2, n_zero == 1
-        on_curve[mesh.F[sources.faces[in_vertex], barycentric[in_vertex].argmax(axis=1)]] = True
+        on_edge = (barycentric == 0).sum(axis=1) == 1
         is_met[mesh.facets.of_face[sources.faces[on_edge], barycentric[on_edge].argmin(axis=1)]] = True
     tail, head = mesh.edges.T
     joins = ~(is_met | on_curve[tail] | on_curve[head])

@@ -9,7 +9,13 @@ import numpy as np
 
 from heat_igl.errors import MeshError, SourceError, require_choice
 from heat_igl.heat_method.curve_levels import CurveLevels, Level, Pieces
-from heat_igl.heat_method.curve_sides import has_gaps, left_of_closed, left_of_nearest, zero_curve_in_gaps
+from heat_igl.heat_method.curve_sides import (
+    has_gaps,
+    left_of_closed,
+    left_of_nearest,
+    vertices_on,
+    zero_curve_in_gaps,
+)
 from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.parts import prepare
@@ -148,10 +154,11 @@ class SignedHeatSolver:
         level : {"zero", "constant", "none"}, optional
             Asks for the integrated distance without `refine`, with this level. "zero" subtracts from each vertex the
             value at the place on the curves that its heat comes from, so that all curves are near 0: within 0.03 mean
-            edge lengths (root mean square) on coarse meshes, see docs/signed.md. "constant" makes the value nearly
-            constant along each curve, with a different level for each, and 0 in the mean over all. "none" only makes
-            the mean 0. `refine` measures from the curves in any case, and takes the sign from this if curves have
-            gaps. Where the integrated distance is meant and no level is given, it is "zero".
+            edge lengths (root mean square) on coarse meshes, and exactly at vertices on them, see docs/signed.md.
+            "constant" makes the value nearly constant along each curve, with a different level for each, and 0 in the
+            mean over all. "none" only makes the mean 0. `refine` measures from the curves in any case, and takes the
+            sign from this if curves have gaps. Where the integrated distance is meant and no level is given, it is
+            "zero".
 
         Returns
         -------
@@ -189,6 +196,8 @@ class SignedHeatSolver:
     def _from_heat(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) by integration, and which vertices (n,) are on the left."""
         phi = self._integrated(self._pieces(chosen), level)
+        if level == "zero":
+            phi[vertices_on(self._mesh, chosen)] = 0.0
         if level == "zero" and not has_gaps(self._mesh, chosen):
             left, is_known = left_of_closed(self._mesh, self._faces, chosen)
             return np.abs(phi), np.where(is_known, left, phi < 0)

@@ -6,10 +6,9 @@ cdef extern from *:
     #define LEAST_COSINE 0.9
     // More angle than this between both ends is no cone to interpolate in.
     #define WIDEST 1.5
-    // How much more the directions may differ than the cubic part, and what is taken if a walk cannot go on.
+    // How much more the directions may differ than the cubic part.
     #define TURN 100.0
-    #define ROUGHEST 0.1
     """
-    double LEAST_COSINE, WIDEST, TURN, ROUGHEST
+    double LEAST_COSINE, WIDEST, TURN
 
 cdef bint take_between(Query q, const Limit* right, const Limit* left, int k, double roughness) noexcept nogil

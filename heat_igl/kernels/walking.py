@@ -6,7 +6,7 @@ tells on which side to pass; docs/refinement.md derives the rule.
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.between import ROUGHEST, take_between
+from cython.cimports.heat_igl.kernels.between import take_between
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.walking import SHARE
 from cython.cimports.heat_igl.kernels.walks import (
@@ -88,7 +88,7 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
     wait_for: cython.int = -1
     turned: Savings
     while view.h >= 0:
-        if _ends_at_barrier(q, view.h, cython.address(right), cython.address(left), k):
+        if _is_barrier(q, view.h):
             break
         step = cython.address(q.t.step[view.h])
         # Where the walk goes next is known late, but both ways are known now.
@@ -147,14 +147,9 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def _ends_at_barrier(
-    q: Query, h: cython.int, right: cython.pointer[Limit], left: cython.pointer[Limit], k: cython.int
-) -> cython.bint:
-    """Whether a curve that is a source runs behind half-edge h; if so, note the path between the limits of the cone."""
-    if q.barrier.shape[0] == 0 or not q.barrier[h // 3]:
-        return False
-    take_between(q, right, left, k, ROUGHEST)
-    return True
+def _is_barrier(q: Query, h: cython.int) -> cython.bint:
+    """Whether a curve that is a source runs behind half-edge h: nothing beyond is nearer."""
+    return q.barrier.shape[0] > 0 and q.barrier[h // 3] != 0
 
 
 @cython.cfunc

@@ -27,7 +27,7 @@ from heat_igl.unfolding.asked import (
     with_samples,
 )
 from heat_igl.unfolding.bounds import Bounds
-from heat_igl.unfolding.curve_walks import CurveWalks
+from heat_igl.unfolding.curve_walks import CurveWalks, are_closed
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN
@@ -88,7 +88,7 @@ class UnfoldingSolver:
         two take it as well if the mesh is rough or flat with holes, and in small components. It is exact from vertices,
         points and curves. For the other two, a curve stands for points at most an eighth of a mean edge length apart;
         up to 6 edges from points and curves windows give the exact distance, and beyond, distance from a curve is too
-        long by 0.005 % at most.
+        long by 0.005 % at most. With "unfold", walks from closed curves alone begin at that distance, see `CurveWalks`.
     tolerance : float, optional
         As for `Refinement.unfold`, with the same default.
     cutoff : float
@@ -269,9 +269,16 @@ class UnfoldingSolver:
         return distance
 
     def _walks_of(self, sources: SourceSet) -> CurveWalks | None:
-        """The walks that begin at exact distances near curves; None for other sources, or another tolerance."""
+        """The walks that begin at exact distances near closed curves; None for other sources, or another tolerance.
+
+        None, too, if a corner of a face in which a curve runs may be farther away than those distances are known.
+        """
         has_others = len(sources.vertices) or len(sources.points.faces) or not len(sources.segments.faces)
-        return None if has_others or self._sweeps or self._tolerance is not None else self._curve_walks
+        faces, V, h = self._surface.faces, self._surface.V, self._domain.mean_edge_length
+        if has_others or self._sweeps or self._tolerance is not None or faces is None or V is None:
+            return None
+        is_near = faces.l[sources.segments.faces].max() <= NEAR_RADIUS * h
+        return self._curve_walks if is_near and are_closed(sources.segments, V, faces.F) else None
 
     @cached_property
     def _curve_walks(self) -> CurveWalks | None:
