@@ -31,7 +31,7 @@ def test_blocks_keep_to_the_memory_and_use_the_threads():
 def test_rows_are_worked_off_once_each_in_order(threads: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HEAT_IGL_NUM_THREADS", threads)
     for n, most in ((0, 5), (1, 5), (7, 5), (100, 5), (100, 1000)):
-        found = over_rows(lambda rows: np.arange(n)[rows], n, most)
+        found = over_rows(np.arange(n).__getitem__, n, most)
         assert np.concatenate([np.empty(0), *found]).tolist() == list(range(n))
         assert all(0 < len(rows) <= most for rows in found)
 
@@ -40,7 +40,7 @@ def test_rows_are_worked_off_by_all_processors_and_errors_come_through(monkeypat
     monkeypatch.setattr("heat_igl.runtime.threads.n_threads", lambda: 2)
     both_busy = threading.Barrier(2, timeout=10)
 
-    def wait_for_the_other(rows: slice) -> int:
+    def wait_for_the_other(_: slice) -> int:
         both_busy.wait()
         return threading.get_ident()
 
