@@ -14,6 +14,7 @@ from heat_igl.drawing.discs import discs
 from heat_igl.io import ply
 from heat_igl.kernels.local_planes import farthest_last, onto_quadrics, principal_axes
 from heat_igl.mesh.cloud_gaps import pinched_vertices, with_one_fan
+from heat_igl.mesh.cloud_orientation import oriented
 from heat_igl.mesh.cloud_triangles import cloud_triangles
 from heat_igl.mesh.neighbourhoods import neighbourhoods, point_tree, without_noise
 
@@ -206,13 +207,48 @@ def test_copies_of_a_point_are_at_distance_0_of_each_other() -> None:
     assert np.isfinite(HeatMethodSolver(PointCloud(P)).distance(3)).all()
 
 
-def test_many_copies_of_points_are_reached() -> None:
-    P = np.append(plane(300), plane(300)[np.random.default_rng(2).integers(0, 300, 400)], axis=0)
-    cloud = PointCloud(P)
-    assert cloud.has_copies
-    assert not PointCloud(P[:300]).has_copies
-    distance = HeatMethodSolver(cloud).distance(0)
-    np.testing.assert_allclose(distance, np.linalg.norm(P - P[0], axis=1), atol=0.1)
+@pytest.mark.parametrize("copies", ["at random", "six of each", "a thousand of one"])
+def test_copies_have_the_distance_of_the_point(copies: str) -> None:
+    """Distance by the sweep, walks and windows, from the front door, and cells: as on the distinct points."""
+    distinct = sphere(1200)
+    rng = np.random.default_rng(2)
+    of = {
+        "at random": np.append(np.arange(1200), rng.integers(0, 1200, 2000)),
+        "six of each": np.tile(np.arange(1200), 6),
+        "a thousand of one": np.append(np.arange(1200), np.full(1000, 7)),
+    }[copies]
+    cloud, alone = PointCloud(distinct[of]), PointCloud(distinct)
+    np.testing.assert_array_equal(cloud.originals, of)
+    source = len(of) - 1
+    for refine in ("sweep", "unfold", "exact"):
+        solver, other = HeatMethodSolver(cloud, refine=refine), HeatMethodSolver(alone, refine=refine)
+        found, expected = solver.distance(source), other.distance(int(of[source]))
+        np.testing.assert_array_equal(found, found[of])
+        assert found[source] == 0
+        assert mean_error(found, expected[of]) < (0.002 if refine == "sweep" else 1e-5)
+        cells = solver.voronoi([0, 1])
+        np.testing.assert_array_equal(cells.labels, cells.labels[of])
+    np.testing.assert_array_equal(
+        HeatMethodSolver(cloud).distance(0), HeatMethodSolver(cloud, refine="sweep").distance(0)
+    )
+    front_door = heat_igl.geodesic_distance(cloud, source)
+    np.testing.assert_allclose(front_door, heat_igl.geodesic_distance(alone, int(of[source]))[of], atol=1e-5)
+
+
+def test_copies_of_an_outlier_are_outliers() -> None:
+    cloud = PointCloud(np.append(sphere(500), [[0, 0, 5.0]] * 3, axis=0))
+    assert np.isinf(HeatMethodSolver(cloud).distance(0)[500:]).all()
+    assert cloud.report().unreferenced_vertices.tolist() == [500, 501, 502]
+
+
+@pytest.mark.parametrize("domain", ["points", "copies"])
+def test_heat_by_name_is_the_heat_method(domain: str) -> None:
+    """A solver on points sweeps unless heat is named, and `method` names it."""
+    P = sphere(1100)
+    cloud = PointCloud(P if domain == "points" else np.append(P, P[:40], axis=0))
+    by_heat = HeatMethodSolver(cloud, magnitude="damped").distance(3)
+    np.testing.assert_array_equal(heat_igl.geodesic_distance(cloud, 3, method="heat"), by_heat)
+    assert not np.array_equal(by_heat, HeatMethodSolver(cloud).distance(3))
 
 
 def two_sheets(n: int, gap: float) -> tuple[np.ndarray, np.ndarray]:
@@ -650,3 +686,68 @@ def test_quadrics_and_principal_axes() -> None:
 def test_operators_of_points_want_points():
     with pytest.raises(heat_igl.MeshError, match="cloud must be a PointCloud, not Mesh"):
         heat_igl.point_cloud_operators(heat_igl.shapes.grid(2))
+
+
+# Sheets, and the orientation of the triangles.
+
+
+@pytest.mark.parametrize("gap", [2.0, 3.0, 5.0])
+def test_sheets_without_normals_stay_apart(gap: float) -> None:
+    """In spacings; in the neighbourhoods of 30 points there are points of both sheets."""
+    n = 1500
+    P, _ = two_sheets(n, gap / np.sqrt(n))
+    inner = (np.abs(P[:, :2] - 0.5) < 0.35).all(axis=1)
+    upper = P[:, 2] > 0
+    F = PointCloud(P).F
+    F = F[inner[F].all(axis=1)]
+    joins = upper[F].any(axis=1) != upper[F].all(axis=1)
+    assert len(F) > 2000
+    assert not joins.any()
+
+
+def test_the_two_sides_of_a_thin_disc() -> None:
+    """Its rim joins them: the distance to the point opposite the centre is that over the rim."""
+    rng, n, thickness = np.random.default_rng(3), 3000, 0.12
+    radius, angle = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
+    radius[:2] = 0
+    flat = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    side = np.where(np.arange(n) % 2 == 0, 1, -1) * thickness / 2
+    # A round rim, so that there is one surface.
+    turn = np.pi * (rng.random(400) - 0.5)
+    around = 2 * np.pi * rng.random(400)
+    out = 1 + thickness / 2 * np.cos(turn)
+    rim = np.stack([out * np.cos(around), out * np.sin(around), thickness / 2 * np.sin(turn)], axis=1)
+    P = np.concatenate([np.append(flat, side[:, None], axis=1), rim])
+    distance = HeatMethodSolver(PointCloud(P), refine="exact").distance(0)
+    assert distance[1] == pytest.approx(2 + np.pi * thickness / 2, rel=0.03)
+
+
+def moebius_strip(m: int) -> tuple[np.ndarray, np.ndarray]:
+    """2 m triangles around a circle."""
+    turn = 2 * np.pi * np.arange(m) / m
+    ends = []
+    for side in (0.1, -0.1):
+        out = 1 + side * np.cos(turn / 2)
+        ends.append(np.stack([out * np.cos(turn), out * np.sin(turn), side * np.sin(turn / 2)], axis=1))
+    a, b = np.arange(m), np.arange(m) + m
+    # After a turn, the sides have changed places.
+    c, d = np.append(a[1:], m), np.append(b[1:], 0)
+    return np.concatenate(ends), np.concatenate([np.stack([a, c, b], 1), np.stack([c, d, b], 1)]).astype(np.int32)
+
+
+def test_triangles_that_contradict_are_left_out_if_they_are_few() -> None:
+    P, F = moebius_strip(1000)
+    found = oriented(P, F, None)
+    assert len(F) - 4 <= len(found) < len(F)
+    sides = np.concatenate([found[:, [0, 1]], found[:, [1, 2]], found[:, [2, 0]]])
+    assert len(np.unique(sides, axis=0)) == len(sides)
+    assert len(np.unique(found)) == len(P)
+    small = moebius_strip(50)
+    np.testing.assert_array_equal(np.sort(oriented(*small, None), axis=1), np.sort(small[1], axis=1))
+
+
+def test_directions_on_a_surface_that_cannot_be_oriented_are_an_error() -> None:
+    P, F = moebius_strip(1500)
+    solver = HeatMethodSolver(heat_igl.Mesh(P, F), refine="unfold")
+    with pytest.raises(MeshError, match="oriented"):
+        solver.directions(0)

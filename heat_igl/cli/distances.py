@@ -127,7 +127,7 @@ def _measured(
         phi = geodesic_distance(mesh, sources, method=method, cutoff=cutoff)
         seconds = time.perf_counter() - start
         return phi, [("seconds", f"{seconds:.3f}", seconds)]
-    solver = HeatMethodSolver.from_options(mesh, options)
+    solver = HeatMethodSolver.from_options(mesh, options.by_heat_on(mesh))
     start = time.perf_counter()
     phi = solver.distance(sources, cutoff)
     seconds = time.perf_counter() - start

@@ -8,8 +8,9 @@ import numpy as np
 
 from heat_igl.errors import MeshError, require_choice
 from heat_igl.heat_method.batches import checked_cutoff, cut_off
+from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.solver import HeatMethodSolver
-from heat_igl.mesh import MeshLike, as_mesh, as_simplices
+from heat_igl.mesh import MeshLike, PointCloud, as_mesh, as_simplices, nearest_copies
 from heat_igl.sources import Sources
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import distance_from_scratch, distance_to_targets
@@ -44,10 +45,10 @@ def geodesic_distance(
     method : {"unfold", "sweep", "heat", "exact"}
         "unfold" follows straight lines through strips of triangles: near-exact, and exact from vertices on meshes of up
         to 50 000 vertices, see `unfolded_distance`. "sweep" unfolds two triangles at a time. Both go through the
-        vertices in the order of Dijkstra's algorithm; polygons are cut into triangles. "heat" is `HeatMethodSolver`
-        with its defaults; on polygons it takes `polygon_operators`. "exact" is the polyhedral distance by windows.
-        Tetrahedra take "sweep" and "heat", which both are fronts there, see `FrontSolver`. On a `PointCloud`, whose
-        solver sweeps by default, "heat" takes the order of the vertices from heat.
+        vertices in the order of Dijkstra's algorithm; polygons are cut into triangles. "heat" is the heat method as
+        `HeatMethodSolver` has it by default, and on a `PointCloud`, whose solver sweeps by default, with
+        ``magnitude="damped"``; on polygons it takes `polygon_operators`. "exact" is the polyhedral distance by windows.
+        Tetrahedra take "sweep" and "heat", which both are fronts there, see `FrontSolver`.
     cutoff : float, optional
         Distances beyond this are ``inf``. With "unfold" and "exact", the others are exact, and the search ends there.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints, optional
@@ -86,9 +87,10 @@ def geodesic_distance(
     beyond = checked_cutoff(cutoff)
     if targets is not None and method in ("heat", "sweep"):
         raise ValueError(f"targets need method='unfold' or 'exact', whose search can end at them, not {method!r}")
+    given = as_mesh(mesh)
     if method == "heat":
-        return HeatMethodSolver(as_mesh(mesh)).distance(sources, beyond)
-    triangles = as_simplices(mesh)
+        return HeatMethodSolver.from_options(given, SolverOptions().by_heat_on(given)).distance(sources, beyond)
+    triangles = as_simplices(given)
     if triangles.is_tetrahedral:
         if method == "sweep":
             return HeatMethodSolver(triangles, refine="sweep").distance(sources, beyond)
@@ -100,4 +102,7 @@ def geodesic_distance(
         return np.asarray(cut_off(distance_to_targets(triangles, sources, targets), beyond))
     farthest = np.inf if beyond is None else beyond
     # Points near the cutoff, whose straight lines are known, may lie beyond it.
-    return np.asarray(cut_off(distance_from_scratch(triangles, sources, method, cutoff=farthest), beyond))
+    distance = distance_from_scratch(triangles, sources, method, cutoff=farthest)
+    if isinstance(given, PointCloud):
+        distance = distance[nearest_copies(distance, given.originals)]
+    return np.asarray(cut_off(distance, beyond))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from heat_igl.errors import positive, require_choice
 from heat_igl.linear import Backend
+from heat_igl.mesh import PointCloud
 from heat_igl.operators import Laplacian, Operators, check_laplacian
 from heat_igl.steps import Boundary
 from heat_igl.unfolding import Refine
@@ -76,6 +77,15 @@ class SolverOptions:
         """Whether fronts may take the place of heat: where no magnitude, time step, boundary or Laplacian is named."""
         is_default = self.magnitude == "auto" and self.boundary == "neumann" and self.laplacian != "cotan"
         return self.refine == "sweep" or (self.refine is None and is_default and self.default_time_step)
+
+    @property
+    def leaves_points(self) -> bool:
+        """Whether a sweep may take the place of heat on points: where nothing of the heat method is named."""
+        return self.refine is None and self.leaves_heat and self.laplacian == "auto"
+
+    def by_heat_on(self, mesh: object) -> SolverOptions:
+        """The options with which a solver on `mesh` takes heat, where they leave that open: points are swept."""
+        return replace(self, magnitude="damped") if isinstance(mesh, PointCloud) and self.leaves_points else self
 
     def damps(self, domain: Operators) -> bool:
         """Whether the field is damped on faces with heat from several sides: ``magnitude="auto"`` resolved."""

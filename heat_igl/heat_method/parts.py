@@ -71,6 +71,8 @@ class SolverParts:
         Time step for `damping`; None for a field of length 1.
     fitted : bool
         Whether the heat flow is fitted to the lengths of edges.
+    originals : (n,) int64 or None
+        The vertex whose distance each takes, where copies of points are left out of the triangles.
     checker : Checker or None
         Checks answers against bounds that need no reference; None if they need no check.
     diagnostics : Diagnostics
@@ -87,6 +89,7 @@ class SolverParts:
     step_raised: BoolArray
     t_damping: float | FloatArray | None
     fitted: bool
+    originals: IntArray | None
     checker: Checker | None
     diagnostics: Diagnostics
 
@@ -116,6 +119,7 @@ def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysi
     if isinstance(mesh, PointCloud):
         options = _for_points(mesh, options)
     begun: list[Future[Analysis]] = []
+    originals: IntArray | None = None
     with pool(1) as beside:
 
         def analyse(L: sp.csc_matrix) -> None:
@@ -131,18 +135,15 @@ def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysi
             domain = point_cloud_operators(mesh, options.triangulation, on_laplacian)
         else:
             # For an order, slivers at the boundary do no harm.
-            domain = operators(mesh.triangles, options.triangulation, on_laplacian)
+            domain = operators(mesh.distinct_triangles, options.triangulation, on_laplacian)
+            originals = mesh.originals if mesh.has_copies else None
         seconds = time.perf_counter() - start
-        return prepare(domain, options, begun[0].result if begun else lambda: known, seconds, mesh.V)
+        return prepare(domain, options, begun[0].result if begun else lambda: known, seconds, mesh.V, originals)
 
 
 def _for_points(cloud: PointCloud, options: SolverOptions) -> SolverOptions:
-    """The options with those left open chosen for a cloud: on scattered points the sweep is far nearer than heat.
-
-    Heat crosses the triangles of length 0 between many copies of points, in which unfolding gets lost.
-    """
-    leaves_heat = options.refine is None and options.leaves_heat and options.laplacian == "auto"
-    if leaves_heat and not cloud.has_copies:
+    """The options with those left open chosen for a cloud: on scattered points the sweep is far nearer than heat."""
+    if options.leaves_points:
         options = replace(options, refine="sweep")
     if options.refine is not None or options.t_coef is not None:
         return options
@@ -173,6 +174,7 @@ def prepare(
     known: Callable[[], Analysis | None] = lambda: None,
     seconds_operators: float = 0.0,
     V: FloatArray | None = None,
+    originals: IntArray | None = None,
 ) -> SolverParts:
     """The parts of a solver on `domain`: resolve the options, then factor the matrices.
 
@@ -188,6 +190,8 @@ def prepare(
         Time spent before, for the diagnostics.
     V : (n, 3) float64, optional
         Positions, to check answers against straight lines.
+    originals : (n,) int64, optional
+        With `refine`, the vertex whose distance each takes: see `PointCloud.originals`.
     """
     domain, options = _resolved(domain, options)
     damped = options.damps(domain)
@@ -200,7 +204,7 @@ def prepare(
     unfolding: UnfoldingSolver | None = front_solver
     if unfolding is None and options.refine is not None:
         # Before there are factors: most memory is needed while the tables are made.
-        unfolding = UnfoldingSolver(domain, options.refine)
+        unfolding = UnfoldingSolver(domain, options.refine, originals=originals)
     unfolded = time.perf_counter()
     found = analysis(domain.L, options.backend, known(), options.n_factors) if takes_heat else None
     analysed = time.perf_counter()
@@ -243,6 +247,7 @@ def prepare(
         step_raised=np.broadcast_to(np.asarray(step) > requested, domain.n_components),
         t_damping=t_damping,
         fitted=fitted,
+        originals=originals,
         checker=None if options.refine in ("unfold", "exact") else Checker(domain, V),
         diagnostics=diagnostics,
     )

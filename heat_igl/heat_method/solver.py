@@ -41,8 +41,7 @@ class HeatMethodSolver(PreparedSolver):
         Whatever `as_mesh` takes, or the positions V of a mesh whose faces are `F`. Polygons are solved on with
         `polygon_operators`, and with `refine` on their triangles. Tetrahedra take fronts instead of heat
         (`FrontSolver`), unless `magnitude`, a time step, a `boundary` or ``laplacian="cotan"`` is named. Points without
-        faces take ``refine="sweep"``, unless points are equal, or one of these or any `laplacian` is named:
-        ``magnitude="damped"`` is heat.
+        faces take ``refine="sweep"``, unless one of these or any `laplacian` is named: ``magnitude="damped"`` is heat.
     F : (m, 3) or (m, 4) array_like, optional
         Faces, when `mesh` is V.
     t_coef : float, optional
@@ -160,7 +159,8 @@ class HeatMethodSolver(PreparedSolver):
         return np.asarray(cut_off(distance, beyond))
 
     def _source_set(self, sources: Sources) -> SourceSet:
-        return source_set(sources, self.n_vertices, self._parts.given_faces)
+        chosen, originals = source_set(sources, self.n_vertices, self._parts.given_faces), self._parts.originals
+        return chosen if originals is None else chosen.with_vertices_moved(originals)
 
     def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
         return self._answers(source_sets)[0]

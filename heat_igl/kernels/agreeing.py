@@ -97,8 +97,10 @@ def orient(F: cython.int[:, ::1], n: cython.Py_ssize_t):
 
     Returns
     -------
-    (m,) int32
+    part : (m,) int32
         The part of each triangle: those that are joined by edges, counted from 0.
+    is_oriented : bool
+        Whether all neighbours run in opposite directions now.
     """
     m: cython.Py_ssize_t = F.shape[0]
     parts = np.full(m, -1, np.int32)
@@ -109,6 +111,7 @@ def orient(F: cython.int[:, ::1], n: cython.Py_ssize_t):
     f: cython.Py_ssize_t
     c: cython.Py_ssize_t
     n_parts: cython.int = 0
+    is_oriented: cython.bint = True
     with cython.nogil:
         for f in range(m):
             for c in range(3):
@@ -122,9 +125,10 @@ def orient(F: cython.int[:, ::1], n: cython.Py_ssize_t):
                 around[first[F[f, c]]] = cython.cast(cython.int, f)
         for f in range(m):
             if part[f] < 0:
-                _orient_part(F, f, n_parts, first, around, queue, part)
+                if not _orient_part(F, f, n_parts, first, around, queue, part):
+                    is_oriented = False
                 n_parts += 1
-    return parts
+    return parts, bool(is_oriented)
 
 
 @cython.cfunc
@@ -138,8 +142,9 @@ def _orient_part(
     around: cython.int[::1],
     queue: cython.int[::1],
     part: cython.int[::1],
-) -> cython.void:
-    """Give the part of triangle `start` the number, breadth first, and orient it like this triangle."""
+) -> cython.bint:
+    """Give the part of triangle `start` the number, breadth first, and orient it alike; whether that is possible."""
+    is_oriented: cython.bint = True
     begin: cython.Py_ssize_t = 0
     end: cython.Py_ssize_t = 1
     queue[0] = cython.cast(cython.int, start)
@@ -155,16 +160,22 @@ def _orient_part(
             head: cython.int = F[f, 0 if c == 2 else c + 1]
             for row in range(first[tail], first[tail + 1]):
                 g: cython.Py_ssize_t = around[row]
-                if part[g] >= 0:
+                if g == f:
                     continue
                 for e in range(3):
                     if F[g, e] == tail:
                         break
                 # From the tail, the neighbour must not go on to the head.
-                if F[g, 0 if e == 2 else e + 1] == head:
+                runs_alike: cython.bint = F[g, 0 if e == 2 else e + 1] == head
+                if part[g] >= 0:
+                    if runs_alike:
+                        is_oriented = False
+                    continue
+                if runs_alike:
                     F[g, 1], F[g, 2] = F[g, 2], F[g, 1]
                 elif F[g, 2 if e == 0 else e - 1] != head:
                     continue
                 part[g] = number
                 queue[end] = cython.cast(cython.int, g)
                 end += 1
+    return is_oriented

@@ -61,9 +61,12 @@ def tangent_planes(
         As of `principal_axes`.
     radius : (b,) float64
         Distance of the farthest neighbour that is left.
+    bend : (b,) float64
+        Ratio of the two smaller variances of all neighbours.
     """
     k: cython.Py_ssize_t = index.shape[1]
-    found, radii = np.empty((index.shape[0], 3, 3)), np.empty(index.shape[0])
+    found, radii, bends = np.empty((index.shape[0], 3, 3)), np.empty(index.shape[0]), np.empty(index.shape[0])
+    bent: cython.double[::1] = bends
     axes: cython.double[:, :, ::1] = found
     radius: cython.double[::1] = radii
     trial: cython.double[:, ::1] = np.empty((3, 3))
@@ -77,6 +80,7 @@ def tangent_planes(
             size: cython.Py_ssize_t = k
             _axes(P, index[row], square[row], axes[row], variances, work)
             bend: cython.double = variances[0] / max(variances[1], TINY)
+            bent[row] = bend
             for sixths in range(4, 1, -1):
                 fewer: cython.Py_ssize_t = 1 + (k - 1) * sixths // 6
                 if bend <= BENT or fewer < 8:
@@ -88,7 +92,7 @@ def tangent_planes(
             radius[row] = sqrt(square[row, size - 1])
             for j in range(size, k):
                 index[row, j] = -1
-    return found, radii
+    return found, radii, bends
 
 
 def farthest_last(P: cython.const[cython.double][:, ::1], index: cython.int[:, ::1]):

@@ -1,5 +1,6 @@
 """What distance is measured on: meshes, images and point clouds, and points and curves on them."""
 
+from heat_igl.mesh.cloud_copies import nearest_copies
 from heat_igl.mesh.level_segments import Segments, crossings, joined_segments, level_segments
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with
@@ -50,6 +51,7 @@ __all__ = [
     "joined_segments",
     "level_segments",
     "named_entries",
+    "nearest_copies",
     "read_paths_with",
     "region_boundary",
     "split_long_edges",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heat_igl.kernels.local_planes import farthest_last, onto_quadrics, principal_axes, tangent_planes
+from heat_igl.mesh.sheets import axes_along, one_sheet
 from heat_igl.runtime import over_rows
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -23,6 +24,8 @@ _K = 30
 _BLOCK = 1 << 12
 # Points in a leaf of the tree.
 _LEAF = 32
+# Ratio of the two smaller variances above which neighbours may be on several sheets.
+_SEVERAL_SHEETS = 0.04
 
 # Noise in shares of the spacing. Heights that vary by a share e of the spacing lengthen edges by the share e^2, so
 # below this one noise costs less than the heat method.
@@ -111,25 +114,32 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: 
     """Neighbours and tangent planes of the points of `tree`.
 
     Planes are found by principal components unless the normals (n, 3) of ``tree.P`` are given. Points weigh
-    1 - (d / r)^2, for d the distance and r the radius of the neighbourhood. Neighbourhoods that are far from flat, at
-    edges and thin parts, are made smaller if that makes them flatter, unless `shrinks` is False.
+    1 - (d / r)^2, for d the distance and r the radius of the neighbourhood. Where neighbourhoods are far from flat, at
+    edges and thin parts, neighbours on other sheets are left out, and neighbourhoods are made smaller if that makes
+    them flatter, unless `shrinks` is False.
     """
     P = tree.P
     k = min(_K, len(P) - 1)
     found = Neighbourhoods(np.empty((len(P), k + 1), np.int32), np.empty(len(P)), np.empty((len(P), 3, 3)))
+    bend = np.zeros(len(P))
 
     def fill(rows: slice) -> None:
         index, square = tree.nearest(np.arange(rows.start, rows.stop), k + 1)
         found.radius[rows] = np.sqrt(square[:, -1])
         if normals is not None:
-            found.axes[rows] = _completed(normals[rows])
+            found.axes[rows] = axes_along(normals[rows])
         elif shrinks:
-            found.axes[rows], found.radius[rows] = tangent_planes(P, index, square)
+            found.axes[rows], found.radius[rows], bend[rows] = tangent_planes(P, index, square)
         else:
-            found.axes[rows] = principal_axes(P, index, square)[0]
+            found.axes[rows], variances = principal_axes(P, index, square)
+            bend[rows] = variances[:, 0] / np.maximum(variances[:, 1], np.finfo(float).tiny)
         found.index[rows] = index
 
     over_rows(fill, len(P), _BLOCK)
+    bent = np.flatnonzero(bend > _SEVERAL_SHEETS)
+    if len(bent):
+        index, square = tree.nearest(bent, k + 1)
+        found.index[bent], found.radius[bent], found.axes[bent] = one_sheet(P, index, square, shrinks)
     return found
 
 
@@ -200,11 +210,3 @@ def _onto_quadrics(P: FloatArray, index: AnyArray) -> tuple[FloatArray, FloatArr
 
     over_rows(fill, b, _BLOCK)
     return moved, noise * np.sqrt(k / np.pi), thickness
-
-
-def _completed(normals: FloatArray) -> FloatArray:
-    """Orthonormal axes (n, 3, 3) whose last rows are the unit vectors `normals` (n, 3)."""
-    least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    x = np.cross(normals, least)
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    return np.stack([x, np.cross(normals, x), normals], axis=1)

@@ -8,11 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.kernels.agreeing import orient
-from heat_igl.mesh.cloud_triangles import cloud_triangles, with_points
+from heat_igl.mesh.cloud_copies import distinct_points, with_copies
+from heat_igl.mesh.cloud_orientation import oriented
+from heat_igl.mesh.cloud_triangles import cloud_triangles
 from heat_igl.mesh.connectivity import connected_components
 from heat_igl.mesh.mesh import Mesh, checked_positions
-from heat_igl.mesh.neighbourhoods import Neighbourhoods, PointTree, neighbourhoods, point_tree, without_noise
+from heat_igl.mesh.neighbourhoods import PointTree, neighbourhoods, point_tree, without_noise
 from heat_igl.mesh.report import MeshReport
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -109,16 +110,39 @@ class PointCloud:
         """The faces (m, 3) of `triangles`."""
         return self.triangles.F
 
+    @cached_property
+    def originals(self) -> IntArray:
+        """The first point (n,) that is equal to each: its own number where it is no copy of an earlier one."""
+        distinct, original = self._distinct
+        return distinct[original]
+
+    @cached_property
+    def _distinct(self) -> tuple[IntArray, IntArray]:
+        return distinct_points(self.P)
+
     @property
     def has_copies(self) -> bool:
         """Whether two of the points are equal."""
-        return len(_distinct(self.P)[0]) < len(self.P)
+        return len(self._distinct[0]) < len(self.P)
 
     @cached_property
     def triangles(self) -> Mesh:
         """The surface on which distance is measured: a mesh whose vertices are the points, with a boundary or without.
 
-        The triangles are Delaunay in the tangent planes of their corners; an edge has at most two of them. The vertices
+        It is `distinct_triangles` with the copies of points put into them: a copy is at most a ten-millionth of an
+        edge away from the point. Without copies it is the same mesh.
+        """
+        found = self.distinct_triangles
+        if not self.has_copies:
+            return found
+        V = found.V.copy()
+        return Mesh(V, with_copies(V, found.F, *self._distinct))
+
+    @cached_property
+    def distinct_triangles(self) -> Mesh:
+        """The triangles on the points that are no copy of an earlier one; the copies are in none of them.
+
+        They are Delaunay in the tangent planes of their corners; an edge has at most two of them. The vertices
         are `P`, unless the points are noisy: if at half of them the neighbours deviate from a quadric by more than
         1 / 20 of their spacing, and that is not detail, all are moved onto such quadrics. Neighbours are oriented alike
         as far as the surface allows it, and like the normals if there are any.
@@ -129,22 +153,19 @@ class PointCloud:
             If no three points are near enough to one another to make a triangle.
         """
         # Copies of a point would compete for the same triangles.
-        distinct, original = _distinct(self.P)
+        distinct, original = self._distinct
         # From here to the triangles, points are numbered by the tree, in which neighbours are near in memory.
         tree = without_noise(point_tree(self.P[distinct]))
         number = distinct[tree.order]
         normals = None if self.normals is None else self.normals[number]
-        near, triangles = _near_and_triangles(tree, normals)
+        triangles = _triangles(tree, normals)
         if not len(triangles):
             raise MeshError(
                 "no three points of P are neighbours on a surface: the points are too few or too unevenly spaced"
             )
-        _orient(tree.P, triangles, normals)
-        F, V = number[triangles], np.empty_like(self.P)
+        F, V = number[oriented(tree.P, triangles, normals)], np.empty_like(self.P)
         V[number] = tree.P
-        if len(distinct) < len(V):
-            F = _with_copies(V, F, near.axes[np.argsort(tree.order)], distinct, original)
-        return Mesh(V, F)
+        return Mesh(V[distinct[original]], F)
 
     @property
     def components(self) -> IntArray:
@@ -186,24 +207,6 @@ def _check_extent(P: FloatArray) -> None:
         raise MeshError(f"all {len(P)} points in P lie on a line: a surface needs points beside it")
 
 
-def _distinct(P: FloatArray) -> tuple[IntArray, IntArray]:
-    """The points (k,) that are no copy of an earlier one, and which of them each of the n points equals."""
-    # Copies have the same sum, whatever the factors.
-    total = np.sort(P[:, 0] + np.sqrt(2) * P[:, 1] + np.sqrt(3) * P[:, 2])
-    if (total[1:] > total[:-1]).all():
-        return np.arange(len(P)), np.arange(len(P))
-    order = np.lexsort(P.T)
-    is_new = np.ones(len(P), bool)
-    is_new[1:] = (P[order[1:]] != P[order[:-1]]).any(axis=1)
-    if is_new.all():
-        return np.arange(len(P)), np.arange(len(P))
-    # The sort is stable: the first of equal points has the smallest index.
-    distinct = np.sort(order[is_new])
-    original = np.empty(len(P), np.int64)
-    original[order] = np.searchsorted(distinct, order[is_new])[np.cumsum(is_new) - 1]
-    return distinct, original
-
-
 def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:
     """The normals as a new array of unit vectors."""
     try:
@@ -235,39 +238,18 @@ def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:
     return directions
 
 
-def _near_and_triangles(tree: PointTree, normals: FloatArray | None) -> tuple[Neighbourhoods, IntArray]:
-    """The neighbourhoods of points, and the triangles (m, 3) int32: of as few parts as larger neighbourhoods make."""
+def _triangles(tree: PointTree, normals: FloatArray | None) -> IntArray:
+    """The triangles (m, 3) int32 of points: of as few parts as those of neighbourhoods that are not made smaller."""
     near = neighbourhoods(tree, normals)
     F = cloud_triangles(tree.P, near, oriented=normals is not None)
     parts = _n_parts(F, len(tree.P)) if near.has_shrunk else 1
     if parts != 1:
-        larger = neighbourhoods(tree, shrinks=False)
-        joined = cloud_triangles(tree.P, larger, oriented=False)
+        joined = cloud_triangles(tree.P, neighbourhoods(tree, shrinks=False), oriented=False)
         if _n_parts(joined, len(tree.P)) < parts or not parts:
-            return larger, joined
-    return near, F
+            return joined
+    return F
 
 
 def _n_parts(F: IntArray, n: int) -> int:
     """How many parts the triangles F (m, 3) make, without points in no triangle."""
     return len(np.unique(connected_components(F, n)[F])) if len(F) else 0
-
-
-def _orient(P: FloatArray, F: IntArray, normals: FloatArray | None) -> None:
-    """Turn triangles of F (m, 3) until neighbours are oriented alike, and each part like most of the normals."""
-    part = orient(F, len(P))
-    if normals is not None:
-        area = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
-        along = np.bincount(part, np.einsum("fx,fx->f", area, normals[F].sum(axis=1)))
-        turned = along[part] < 0
-        F[turned] = F[turned, ::-1]
-
-
-def _with_copies(V: FloatArray, F: IntArray, axes: FloatArray, distinct: IntArray, original: IntArray) -> IntArray:
-    """The triangles with the copies of points put into them; V gets the positions of the copies.
-
-    Each of the points is a copy of ``distinct[original]``; the tangents `axes` (k, 3, 3) are those of `distinct`.
-    """
-    V[:] = V[distinct[original]]
-    copies = np.delete(np.arange(len(V)), distinct)
-    return with_points(V, F, axes[original], copies, distinct[original[copies]])

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -150,6 +150,14 @@ class SourceSet:
         if self.on_vertices_alone:
             return self.vertex_offset
         return np.concatenate([self.vertex_offset, self.points.offset, self.segments.offset])
+
+    def with_vertices_moved(self, to: IntArray) -> SourceSet:
+        """The same sources with vertex v at the vertex ``to[v]``; where several meet, the earliest stays."""
+        vertices = to[self.vertices]
+        order = np.lexsort((self.vertex_label, self.vertex_offset, vertices))
+        chosen = order[np.diff(vertices[order], prepend=-1) != 0]
+        label, offset = self.vertex_label[chosen], self.vertex_offset[chosen]
+        return replace(self, vertices=vertices[chosen], vertex_label=label, vertex_offset=offset)
 
 
 def source_set(sources: Sources, n: int, F: IntArray | None) -> SourceSet:

@@ -112,6 +112,8 @@ class UnfoldingSolver:
         As for `Refinement.unfold`, with the same default.
     cutoff : float
         With "exact", what is farther is ``inf``, and the search ends there.
+    originals : (n,) int64, optional
+        The vertex whose values each takes: itself, or that of which it is a copy, see `PointCloud.originals`.
 
     Raises
     ------
@@ -120,7 +122,12 @@ class UnfoldingSolver:
     """
 
     def __init__(
-        self, domain: UnfoldingDomain, refine: Refine, tolerance: float | None = None, cutoff: float = np.inf
+        self,
+        domain: UnfoldingDomain,
+        refine: Refine,
+        tolerance: float | None = None,
+        cutoff: float = np.inf,
+        originals: IntArray | None = None,
     ) -> None:
         surface = domain.surface
         if surface is None:
@@ -137,6 +144,7 @@ class UnfoldingSolver:
             self._refinement.keep_for_sweeps()
         self._surface = surface
         self._domain = domain
+        self._originals = originals
         self._given_faces = np.empty((0, 3), np.int64) if surface.given_faces is None else surface.given_faces
         self._spacing = _SPACING * domain.mean_edge_length
 
@@ -260,6 +268,10 @@ class UnfoldingSolver:
             self._bounds.shorten(distance, labels)
             if self._sweeps:
                 self._bounds.lengthen(distance, sources, points)
+        if self._originals is not None:
+            for values in (distance, labels, angles, origin):
+                if values is not None:
+                    values[...] = values[..., self._originals]
         return distance
 
     def _from_earliest(self, sources: SourceSet) -> tuple[FloatArray, SourceSet]:
@@ -356,13 +368,14 @@ class UnfoldingSolver:
         return asked.tolerance == 0 or self._domain.components.size <= _FEW_FOR_DIRECTIONS
 
     def _directed_walks(self, refinement: Refinement, u: FloatArray, asked: Asked) -> FloatArray:
+        directions = self.path_directions  # refuses surfaces without tangent planes, before there are walks
         starts = refinement.starts(asked.vertices, asked.offsets, asked.points, asked.point_offsets)
         walk = refinement.walks(-u, starts, TOLERANCE if asked.tolerance is None else asked.tolerance)
         row = refinement.number
         if asked.labels is not None:
             asked.labels[:] = walk["label"][row]
         if asked.angles is not None:
-            asked.angles[:] = self.path_directions.of_walks(walk, asked.points)
+            asked.angles[:] = directions.of_walks(walk, asked.points)
         return np.asarray(walk["distance"][row])
 
     @cached_property

@@ -13,7 +13,7 @@ import numpy as np
 
 from heat_igl import reference
 from heat_igl.errors import AccuracyWarning, ReferenceSolverError, shown
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat_method import HeatMethodSolver, SolverOptions
 from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
@@ -120,10 +120,7 @@ def resolved(method: Method) -> tuple[str, Prepare | None]:
 def _heat_solver(mesh: Mesh | PointCloud, options: Mapping[str, Any]) -> Solver:
     if isinstance(mesh, Mesh) and mesh.is_tetrahedral and "refine" in options:
         raise ReferenceSolverError(f"refine={options['refine']!r} unfolds triangles, and the mesh holds tetrahedra")
-    if isinstance(mesh, PointCloud) and not options:
-        # By default a solver on points sweeps.
-        return HeatMethodSolver(mesh, magnitude="damped")
-    return HeatMethodSolver(mesh, **options)
+    return HeatMethodSolver.from_options(mesh, SolverOptions(**options).by_heat_on(mesh))
 
 
 def run(
