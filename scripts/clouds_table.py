@@ -2,17 +2,21 @@
 
     python scripts/clouds_table.py [--sizes 5000 50000] [--noise 0 0.01] [--sources 6] [--seed 0] [--json FILE]
     python scripts/clouds_table.py --meshes bunny.obj ... [--sources 6] [--seed 0] [--json FILE]
+    python scripts/clouds_table.py --clock 15 [--sizes 5000 50000] [--noise 0 0.01] [--seed 0] [--json FILE]
 
 Random points on a sphere of radius 1, a torus of radii 1 and 0.4 (at most 144 000), a cylinder of radius 1 and height
 3, and a square with sides of length 1. Prints, as a Markdown table, the mean of |d - exact| / exact over points and
 sources in percent, seconds to make the solver, and seconds for one query. Seconds are those of all processors together,
 which other programs disturb least; potpourri3d uses one, this package all that there are. Noise is Gaussian in all
 coordinates, of the given standard deviation. With --meshes, points are the vertices of meshes, and exact is what
-unfolding finds on the mesh. Needs the extra ``bench``; docs/clouds.md shows the tables.
+unfolding finds on the mesh. With --clock, both solvers take turns so many times, and the medians of the ratios of their
+times by the clock are printed: of the solver with the first query, for which potpourri3d factors, of the solver alone,
+and of a later query. Needs the extra ``bench``; docs/clouds.md shows the tables.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -99,6 +103,43 @@ def measure(P: FloatArray, truth: Truth, k: int, rng: np.random.Generator) -> di
     }
 
 
+def clocked(P: FloatArray, repeats: int) -> tuple[float, ...]:
+    """Median ratios of times by the clock to potpourri3d's: of solver and first query, solver, and later query."""
+    import potpourri3d
+
+    def seconds(make: Callable[[], Callable[[int], FloatArray]]) -> tuple[float, float, float]:
+        start = time.perf_counter()
+        query = make()
+        made = time.perf_counter()
+        query(0)
+        asked = time.perf_counter()
+        query(len(P) // 2)
+        return asked - start, made - start, time.perf_counter() - asked
+
+    pairs = [
+        (
+            seconds(lambda: HeatMethodSolver(PointCloud(P)).distance),
+            seconds(lambda: potpourri3d.PointCloudHeatSolver(P).compute_distance),
+        )
+        for _ in range(repeats)
+    ]
+    ratios = [np.divide(*pair) for pair in pairs]
+    return tuple(np.median(ratios, axis=0).tolist())
+
+
+def clock_table(arguments: argparse.Namespace) -> None:
+    rows = []
+    for shape, n, noise in product(arguments.shapes, arguments.sizes, arguments.noise):
+        rng = np.random.default_rng(arguments.seed)
+        P = SHAPES[shape](n, rng)[0]
+        found = clocked(P + noise * rng.standard_normal(P.shape), arguments.clock)
+        rows.append((shape, str(n), f"{noise:g}", *(f"{ratio:.2f}" for ratio in found)))
+        print(rows[-1], file=sys.stderr, flush=True)
+    head = ["points on", "number", "noise", "solver and first query", "solver", "later query"]
+    result = {"environment": environment(), "rows": rows}
+    publish(result, "\n".join(table(head, rows)), json_file=arguments.json)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     parser = option_parser(__doc__)
     parser.add_argument("--shapes", nargs="+", choices=SHAPES, default=[*SHAPES], help="surfaces")
@@ -106,9 +147,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--sizes", nargs="+", type=int, default=[5000, 50000], help="numbers of points")
     parser.add_argument("--noise", nargs="+", type=float, default=[0.0, 0.01], help="standard deviations")
     parser.add_argument("--sources", type=int, default=6, help="per cloud (default 6)")
+    parser.add_argument("--clock", type=int, metavar="N", help="compare times by the clock, N times")
     add_seed(parser)
     add_json(parser)
     arguments = parser.parse_args(argv)
+    if arguments.clock:
+        clock_table(arguments)
+        return 0
     rows: list[dict[str, Any]] = []
 
     def add(shape: str, noise: float, points: Callable[[np.random.Generator], tuple[FloatArray, Truth]]) -> None:
