@@ -10,7 +10,7 @@ from conftest import perturbed
 
 from heat_igl import HeatMethodSolver, Mesh, MeshError, MissingExtraError, SourceError, shapes
 from heat_igl.operators import operators
-from heat_igl.runtime import PeakMemory, blocks
+from heat_igl.runtime import PeakMemory, blocks, over_rows
 
 
 def test_blocks_keep_to_the_memory_and_use_the_threads():
@@ -25,6 +25,33 @@ def test_blocks_keep_to_the_memory_and_use_the_threads():
     assert blocks.block_size(60_000_000, 64, 2) == (1, 1)
     # The bits of the results do not depend on the threads.
     assert blocks.block_size(10_000, 6, 64)[0] == blocks.block_size(10_000, 6, 1)[0]
+
+
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_rows_are_worked_off_once_each_in_order(threads: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HEAT_IGL_NUM_THREADS", threads)
+    for n, most in ((0, 5), (1, 5), (7, 5), (100, 5), (100, 1000)):
+        found = over_rows(np.arange(n).__getitem__, n, most)
+        assert np.concatenate([np.empty(0), *found]).tolist() == list(range(n))
+        assert all(0 < len(rows) <= most for rows in found)
+
+
+def test_rows_are_worked_off_by_all_processors_and_errors_come_through(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("heat_igl.runtime.threads.n_threads", lambda: 2)
+    both_busy = threading.Barrier(2, timeout=10)
+
+    def wait_for_the_other(_: slice) -> int:
+        both_busy.wait()
+        return threading.get_ident()
+
+    assert len(set(over_rows(wait_for_the_other, 8, 1))) == 2
+
+    def refuse_the_last(rows: slice) -> None:
+        if rows.stop == 8:
+            raise ValueError("row 7")
+
+    with pytest.raises(ValueError, match="row 7"):
+        over_rows(refuse_the_last, 8, 1)
 
 
 def test_in_order_works_on_several_threads_and_draws_no_more_than_it_has_room_for():

@@ -12,11 +12,13 @@ import heat_igl
 from heat_igl import HeatMethodSolver, MeshError, PointCloud, cli, farthest_points, read_point_cloud, shapes
 from heat_igl.drawing.discs import discs
 from heat_igl.io import ply
+from heat_igl.kernels.local_delaunay import delaunay_stars
 from heat_igl.kernels.local_planes import farthest_last, onto_quadrics, principal_axes
 from heat_igl.mesh.cloud_gaps import pinched_vertices, with_one_fan
 from heat_igl.mesh.cloud_orientation import oriented
 from heat_igl.mesh.cloud_triangles import cloud_triangles
 from heat_igl.mesh.neighbourhoods import neighbourhoods, point_tree, without_noise
+from heat_igl.mesh.sheets import one_sheet
 
 HEAT = {"magnitude": "damped"}
 
@@ -747,7 +749,65 @@ def test_triangles_that_contradict_are_left_out_if_they_are_few() -> None:
 
 
 def test_directions_on_a_surface_that_cannot_be_oriented_are_an_error() -> None:
-    P, F = moebius_strip(1500)
+    """On Klein's bottle, whose triangles are unfolded on a double cover."""
+    a, b = 60, 40
+    u, v = np.meshgrid(2 * np.pi * np.arange(a) / a, 2 * np.pi * np.arange(b) / b, indexing="ij")
+    out = 3 + np.cos(u / 2) * np.sin(v) - np.sin(u / 2) * np.sin(2 * v)
+    height = np.sin(u / 2) * np.sin(v) + np.cos(u / 2) * np.sin(2 * v)
+    P = np.stack([out * np.cos(u), out * np.sin(u), height], axis=-1).reshape(-1, 3)
+    number = np.arange(a * b).reshape(a, b)
+    # After a turn, v runs backwards.
+    number = np.append(number, number[:1, -np.arange(b) % b], axis=0)
+    number = np.append(number, number[:, :1], axis=1)
+    p, q, r, s = (each.ravel() for each in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+    F = np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
     solver = HeatMethodSolver(heat_igl.Mesh(P, F), refine="unfold")
-    with pytest.raises(MeshError, match="oriented"):
+    with pytest.raises(MeshError, match="oriented differently"):
         solver.directions(0)
+
+
+def test_neighbours_on_another_sheet_are_left_out() -> None:
+    P, _ = two_sheets(1500, 1.5 / np.sqrt(1500))
+    tree = point_tree(P)
+    index, square = tree.nearest(np.arange(len(P)), 31)
+    kept, _, axes = one_sheet(tree.P, index, square, False)
+    inner = (np.abs(tree.P[:, :2] - 0.5) < 0.35).all(axis=1)
+    is_other = (tree.P[kept, 2] > 0) != (tree.P[:, None, 2] > 0)
+    assert ((tree.P[index, 2] > 0) != (tree.P[:, None, 2] > 0))[inner].sum(axis=1).mean() > 10
+    assert (is_other & (kept >= 0))[inner].sum(axis=1).mean() < 0.1
+    assert (kept[inner] >= 0).sum(axis=1).mean() > 14
+    assert np.median(np.abs(axes[inner, 2, 2])) > 0.99
+
+
+def test_neighbours_across_a_right_angle_stay() -> None:
+    P = plane(2000)
+    folded = np.where(P[:, :1] < 0.5, P, np.stack([0 * P[:, 0] + 0.5, P[:, 1], P[:, 0] - 0.5], axis=1))
+    index, square = point_tree(folded).nearest(np.arange(2000), 31)
+    kept, _, _ = one_sheet(point_tree(folded).P, index, square, False)
+    assert (kept[:, :8] >= 0).mean() > 0.99
+
+
+def test_the_star_of_a_point_on_an_edge_is_that_of_the_unfolded_points() -> None:
+    from scipy.spatial import KDTree
+
+    flat = plane(600)
+    flat[:40, 0] = 0.5
+    turn = np.deg2rad(65)
+    along, right = flat[:, 0] - 0.5, flat[:, 0] > 0.5
+    height = -np.sin(turn) * np.abs(along)
+    folded = np.stack([np.cos(turn) * along, flat[:, 1], height], axis=1)
+    x, y, z = np.eye(3)
+    slope = {True: np.array([np.sin(turn), 0, np.cos(turn)]), False: np.array([-np.sin(turn), 0, np.cos(turn)])}
+    axes = np.stack([np.stack([np.cross(y, slope[bool(r)]), y, slope[bool(r)]]) for r in right])
+    axes[:40] = np.stack([x, y, z])
+    axes, flat_axes = np.ascontiguousarray(axes), np.tile(np.eye(3), (600, 1, 1))
+    index = KDTree(flat).query(flat, 31)[1].astype(np.int32)
+    largest = np.full(600, 0.1)
+
+    def stars(P: np.ndarray, axes: np.ndarray) -> set[tuple[int, ...]]:
+        corners = delaunay_stars(P, axes, index, largest, -2.0, 0, 40)[0]
+        return {tuple(row) for row in np.sort(corners, axis=1).tolist()}
+
+    expected, projected = stars(flat, flat_axes), stars(folded * [1, 1, 0], flat_axes)
+    # Neighbours that are hardly above or below the plane are projected in any case.
+    assert len(expected ^ stars(folded, axes)) < 0.3 * len(expected ^ projected)
