@@ -194,9 +194,18 @@ def pieces() -> Picture:
 
 
 def tetrahedra() -> Picture:
-    """Distance through a solid, by the heat method on tetrahedra."""
+    """Distance through a solid of tetrahedra, along straight lines."""
     mesh = shapes.box(12, (2.0, 1.0, 1.0))
     return plot(mesh, heat_igl.HeatMethodSolver(mesh).distance(0), sources=0, view=(215, -30))
+
+
+def voxels() -> Picture:
+    """Distance through voxels, in lines that bend around the edges of a wall."""
+    mask = np.ones((10, 24, 24), bool)
+    mask[:, :18, 11] = False
+    body = heat_igl.image_domain(mask)
+    source = body.index[-1, 4, 4]
+    return plot(body.mesh, heat_igl.HeatMethodSolver(body.mesh).distance(source), sources=source, view=(25, 50))
 
 
 def polygons() -> Picture:
@@ -286,6 +295,18 @@ def travel_time() -> Picture:
     return plot(mesh, time, sources=41, label="time")
 
 
+def fibres() -> Picture:
+    """Distance on a cylinder with helical fibres, across which lengths count three times."""
+    mesh = shapes.cylinder(96, 72, 4.0)
+    side = mesh.V[mesh.F].mean(axis=1)
+    along = np.stack([-side[:, 1], side[:, 0], np.full(mesh.n_faces, 0.5)], axis=1)
+    domain = heat_igl.metric_operators(mesh, heat_igl.fibre_metric(along, along=1, across=3))
+    source = 36 * 96 + 80
+    phi = heat_igl.HeatMethodSolver.from_operators(domain, refine="unfold").distance(source)
+    turned = heat_igl.Mesh(mesh.V[:, [1, 2, 0]], mesh.F)
+    return plot(turned, phi, sources=source, view=(20, 15))
+
+
 def maze() -> Picture:
     """Distance in the white pixels of an image."""
     mask = np.ones((60, 60), bool)
@@ -316,7 +337,8 @@ def unfolded() -> Picture:
 
 ENTRIES = (
     torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, scribble, grown, noisy, tool_path, pieces,
-    heat, error, unfolded, cut_locus, book, tetrahedra, polygons, cloud, maze, travel_time, directions, checkerboard,
+    heat, error, unfolded, cut_locus, book, tetrahedra, voxels, polygons, cloud, maze,
+    travel_time, fibres, directions, checkerboard,
     straightest, transported, extended, loops, bezier, asked,
 )  # fmt: skip
 

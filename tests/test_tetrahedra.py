@@ -11,7 +11,7 @@ from conftest import shared_path
 from scipy.spatial import Delaunay, cKDTree
 
 import heat_igl
-from heat_igl import HeatMethodSolver, OffsetSources, shapes
+from heat_igl import HeatMethodSolver, OffsetSources, SourceError, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.typing import BoolArray, FloatArray
@@ -265,6 +265,24 @@ def test_depth_below_a_surface():
     assert (found >= exact - 1e-12).all()
     assert np.mean(found[inner] / exact[inner] - 1) < 1e-4
     assert (found <= 1.02 * exact).all()
+
+
+def test_depth_below_boundary_faces():
+    """As docs/metrics.md has it: the nearest point of the boundary is always seen."""
+    rng = np.random.default_rng(0)
+    box = shapes.box(4)
+    V = box.V.copy()
+    inner = ~box.boundary
+    V[inner] += rng.uniform(-0.1, 0.1, (int(inner.sum()), 3))
+    mesh = Mesh(V, box.F)
+    walls = Mesh(mesh.V, mesh.facets.vertices[mesh.facets.n_faces == 1])
+    depth = heat_igl.closest_points(walls, mesh.V).gap
+    np.testing.assert_allclose(depth, np.minimum(mesh.V, 1 - mesh.V).min(axis=1), atol=1e-15)
+    assert (HeatMethodSolver(mesh).distance(mesh.boundary) >= depth - 1e-15).all()
+    with pytest.raises(
+        SourceError, match="points and curves lie on triangles, and this domain has none: name vertices"
+    ):
+        HeatMethodSolver(mesh).distance(heat_igl.SurfacePoints([3], [[0.2, 0.3, 0.5]]))
 
 
 def test_units_and_places_play_no_part():

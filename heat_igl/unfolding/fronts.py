@@ -22,7 +22,8 @@ __all__ = ["FrontSolver"]
 # Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
 _MOST_ROUNDS = 5
 # Up to so many vertices, a body is measured on halved tetrahedra as well: of a long edge, a part may see the source
-# although neither end does, and then such an edge is too coarse a source itself.
+# although neither end does, and then such an edge is too coarse a source itself. There, lines are followed again after
+# bends, since a vertex may see a source that no vertex around it sees. On finer bodies both are rare, and take time.
 _FEW = 1000
 _ROUNDING = 1e-9
 # What the kernel of bends knows of the way to a vertex.
@@ -60,8 +61,10 @@ class FrontSolver(UnfoldingSolver):
         self._lengths = np.ascontiguousarray(simplices.lengths)
         self._slowness = np.ascontiguousarray(simplices.slowness)
         self._V = np.empty((0, 3)) if simplices.V is None else np.ascontiguousarray(simplices.V)
-        is_small = simplices.V is not None and simplices.n <= _FEW and not is_halved
-        self._finer = FrontSolver(simplices.halved(), True) if is_small and len(self._reflex_edges[0]) else None
+        is_small = simplices.V is not None and simplices.n <= _FEW
+        self._looks_again = is_small or is_halved
+        is_refined = is_small and not is_halved and len(self._reflex_edges[0]) > 0
+        self._finer = FrontSolver(simplices.halved(), True) if is_refined else None
 
     @cached_property
     def _reflex_edges(self) -> tuple[AnyArray, FloatArray]:
@@ -144,11 +147,10 @@ class FrontSolver(UnfoldingSolver):
             if round_ and not is_seen.any() and not is_continued:
                 break
             if len(edges):
-                # After it, a vertex may know a source that it sees, and that none of the vertices around it sees.
                 bend_around(edges, outward, *domain, self._reach, vertices, offset, distance, begin, label, way)
             # Behind a point or an edge at which tetrahedra touch, no line continues.
             is_continued = self._continue_along_edges(distance, begin, label)
-            if not len(edges) and not is_continued:
+            if not is_continued and not (self._looks_again and len(edges)):
                 break
 
     def _continue_along_edges(self, distance: FloatArray, begin: FloatArray, label: AnyArray) -> bool:

@@ -183,14 +183,14 @@ CASES = (
         "image",
         "pixels of 1 by 2.5",
         "straight line",
-        {"heat": 0.02, "sweep": 0.01, "unfold": 0.001, "exact": 1e-9},
+        {"heat": 0.03, "sweep": 0.01, "unfold": 0.001, "exact": 1e-9},
         _long_pixels,
     ),
     DomainCase(
         "image",
         "wall of pixels of 1 by 2",
         "lines between the corners of the wall",
-        {"heat": 0.03, "sweep": 0.01, "unfold": 0.001, "exact": 1e-9},
+        {"heat": 0.04, "sweep": 0.01, "unfold": 0.001, "exact": 1e-9},
         _wall_of_pixels,
     ),
     DomainCase(
