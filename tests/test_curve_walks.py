@@ -74,6 +74,10 @@ def test_parts_that_the_known_vertices_separate_are_walked_one_by_one():
         south, north = mesh.V[:, 2] < height - 0.3, mesh.V[:, 2] > height + 0.3
         assert first[south].all() != first[north].all()
         assert first[south].any() != first[north].any()
+    # Of three parts two are not taken if that is more than half.
+    known = number[np.abs(np.abs(mesh.V[:, 2]) - 0.33) < 0.08]
+    first = walks._groups(known)[number][np.abs(np.abs(mesh.V[:, 2]) - 0.33) >= 0.08]
+    assert 0.3 < first.mean() <= 0.5
     # Without known vertices there is one part.
     assert walks._groups(number[:0]).all()
     assert len(equator) > 100
