@@ -68,11 +68,16 @@ def test_parts_that_the_known_vertices_separate_are_walked_one_by_one():
     unfolding = solvers(mesh)[0]._parts.last_steps
     walks = unfolding._curve_walks
     number = walks._refinement.number
-    known = number[np.abs(mesh.V[:, 2]) < 0.3]
-    first = walks._groups(known)[number]
-    south, north = mesh.V[:, 2] < -0.3, mesh.V[:, 2] > 0.3
-    assert first[south].all() != first[north].all()
-    assert first[south].any() != first[north].any()
+    for height in (0.0, 0.2):
+        known = number[np.abs(mesh.V[:, 2] - height) < 0.3]
+        first = walks._groups(known)[number]
+        south, north = mesh.V[:, 2] < height - 0.3, mesh.V[:, 2] > height + 0.3
+        assert first[south].all() != first[north].all()
+        assert first[south].any() != first[north].any()
+    # Of three parts two are not taken if that is more than half.
+    known = number[np.abs(np.abs(mesh.V[:, 2]) - 0.33) < 0.08]
+    first = walks._groups(known)[number][np.abs(np.abs(mesh.V[:, 2]) - 0.33) >= 0.08]
+    assert 0.3 < first.mean() <= 0.5
     # Without known vertices there is one part.
     assert walks._groups(number[:0]).all()
     assert len(equator) > 100

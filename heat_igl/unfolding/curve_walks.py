@@ -112,10 +112,10 @@ class CurveWalks:
         apart = incidence.components_without(self._faces_of_rows, is_known.view(np.uint8))
         size = np.bincount(apart, ~is_known)
         order = np.argsort(-size, kind="stable")
-        # The largest parts, until these are half of all.
-        before = np.cumsum(size[order]) - size[order]
+        # The largest part, and further ones as long as these are at most half of all.
         in_first = np.zeros(len(size), bool)
-        in_first[order[2 * before < size.sum()]] = True
+        in_first[order[2 * np.cumsum(size[order]) <= size.sum()]] = True
+        in_first[order[0]] = True
         return np.asarray(in_first[apart])
 
     def _barrier(self, segments: SourceSegments) -> AnyArray:
