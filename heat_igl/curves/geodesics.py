@@ -46,9 +46,11 @@ def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
     -----
     The curve gives a strip of faces, in which a funnel finds the shortest path (Lee and Preparata 1984). Where it bends
     at a vertex with an angle below pi on the other side, the strip is led there (Xin and Wang 2007). A loop is
-    straightened from one of its points to itself, then from another one, until its length stays the same. On a surface
-    with hills one class can have several locally shortest curves. Straight lines that leave the curve at small angles
-    are followed; one that meets the curve again after a shorter way, in the same class, replaces the part in between.
+    shortened at the vertex with the smallest angle first (Sharp and Crane 2020), then from one of its points to itself,
+    and from another one, until its length stays the same. On a surface with hills one class can have several locally
+    shortest curves. A loop that becomes less than half as long is shortened a second time in another order. Straight
+    lines that leave the curve at small angles are followed; one that meets the curve again after a shorter way, in the
+    same class, replaces the part in between.
 
     Examples
     --------

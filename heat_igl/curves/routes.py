@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from heat_igl.curves.shortening import Course
-from heat_igl.curves.tracing import Surface
+from heat_igl.curves.tracing import Surface, opposite_sides
 from heat_igl.errors import SourceError
 from heat_igl.kernels import routes
 from heat_igl.mesh import Mesh
@@ -29,11 +29,9 @@ def _straight_across(surface: Surface) -> tuple[FloatArray, AnyArray]:
     opposite : (3 m,) int32
         The half-edge on the other side, -1 if the edge has not two faces.
     """
-    triangle, first = surface.triangle, surface.first_side
-    opposite = np.full(3 * len(triangle), -1, np.int32)
-    inner = first[:-1][np.diff(first) == 2]
-    one, other = surface.side[inner], surface.side[inner + 1]
-    opposite[one], opposite[other] = other, one
+    triangle, opposite = surface.triangle, opposite_sides(surface)
+    one = np.flatnonzero(opposite > np.arange(len(opposite)))
+    other = opposite[one]
     length = np.full(len(opposite), np.inf)
     (x, y), (u, v), base = _apex(surface, one, one), _apex(surface, other, one), triangle["length"].reshape(-1)[one]
     with np.errstate(invalid="ignore"):

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from heat_igl.curves.places import snapped
-from heat_igl.curves.tracing import Surface, surface
+from heat_igl.curves.tracing import Surface, opposite_sides, surface
 from heat_igl.curves.words import crossing_letters
 from heat_igl.errors import SourceError
-from heat_igl.kernels import shortening
+from heat_igl.kernels import polar_angles, shortening
 from heat_igl.mesh import Mesh, SurfaceCurve
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -62,21 +62,24 @@ def course_of(mesh: Mesh, curve: SurfaceCurve) -> Course:
         If a face is not one of the mesh, a segment does not start where the one before it ends, or a closed curve has
         no length.
     """
-    ends = curve.positions(mesh)  # which checks the faces
+    faces = curve.faces
+    if faces.min() < 0 or faces.max() >= mesh.n_faces:
+        curve.positions(mesh)  # which says what is wrong
     count = len(curve) if curve.is_closed else len(curve) - 1
-    begins = np.einsum("kc,kcx->kx", curve.start, mesh.V[mesh.F[curve.faces]])
-    following = (np.arange(count) + 1) % len(curve)
-    if curve.is_closed and (ends[1:] == begins).all():
+    corner = mesh.V[mesh.F[faces]]
+    begins, ends = (np.einsum("kc,kcx->kx", place, corner) for place in (curve.start, curve.end))
+    if curve.is_closed and (begins == ends).all():
         raise SourceError("curve is closed and has no length: a loop needs two different points")
-    apart = ends[1 : count + 1] - begins[following]
-    gap = np.einsum("kx,kx->k", apart, apart)
-    faces, end = curve.faces, snapped(curve.end)
+    following = np.append(np.arange(1, len(curve)), 0)[:count]
+    apart = ends[:count] - begins[following]
+    is_apart = (apart * apart).sum(axis=1) > (_GAP * mesh.edge_lengths.mean()) ** 2 if apart.any() else False
+    end = snapped(curve.end)
     joins, share = _joins(mesh, faces[:count], faces[following], end[:count])
-    wrong = np.flatnonzero((gap > (_GAP * mesh.edge_lengths.mean()) ** 2 if gap.any() else False) | (share > _GAP))
+    wrong = np.flatnonzero(is_apart | (share > _GAP))
     if len(wrong):
         i = int(wrong[0])
         raise SourceError(
-            f"curve does not hold together: segment {i} ends in face {faces[i]} at {ends[i + 1].tolist()}, and segment "
+            f"curve does not hold together: segment {i} ends in face {faces[i]} at {ends[i].tolist()}, and segment "
             f"{following[i]} starts in face {faces[following[i]]} at {begins[following[i]].tolist()}: each segment "
             "must start where the one before it ends"
         )
@@ -89,17 +92,17 @@ def _joins(mesh: Mesh, f: IntArray, g: IntArray, at: FloatArray) -> tuple[AnyArr
     joins = np.full((len(f), 3), -1, np.int32)
     share = np.zeros(len(f))
     rows = np.flatnonzero(f != g)
-    f, g, at = f[rows], g[rows], at[rows]
+    if len(rows) < len(f):
+        f, g, at = f[rows], g[rows], at[rows]
     edges = mesh.facets.of_face
     # A point lies on the edge opposite a corner if the coordinate of this corner is 0.
-    off_edge = np.where((edges[f][:, :, None] == edges[g][:, None, :]), at[:, :, None], np.inf).reshape(len(f), 9)
-    here, there = np.divmod(off_edge.argmin(axis=1), 3)
-    by_edge = off_edge.min(axis=1, initial=np.inf) <= _GAP
-    corner = at.argmax(axis=1)
+    off_edge = np.where(edges[f][:, :, None] == edges[g][:, None, :], at[:, :, None], np.inf).reshape(len(f), 9)
+    nearest, corner, each = off_edge.argmin(axis=1), at.argmax(axis=1), np.arange(len(f))
+    by_edge = off_edge[each, nearest] <= _GAP
     vertex = mesh.F[f, corner]
-    off_vertex = np.where((mesh.F[g] == vertex[:, None]).any(axis=1), 1 - at.max(axis=1, initial=0), np.inf)
-    joins[rows[by_edge], 0], joins[rows[by_edge], 1] = (3 * f + here)[by_edge], (3 * g + there)[by_edge]
-    joins[rows[~by_edge], 2] = vertex[~by_edge]
+    off_vertex = np.where((mesh.F[g] == vertex[:, None]).any(axis=1), 1 - at[each, corner], np.inf)
+    found = 3 * f + nearest // 3, 3 * g + nearest % 3, vertex
+    joins[rows] = np.where(np.stack([by_edge, by_edge, ~by_edge], axis=1), np.stack(found, axis=1), -1)
     share[rows] = np.where(by_edge, 0.0, off_vertex)
     return joins, share
 
@@ -124,10 +127,13 @@ class Shortener:
         most_corners = int(np.diff(self.surface.first_corner).max())
         letters = crossing_letters(mesh)
         if letters is None:
-            ahead, letters = np.empty(0, _AHEAD), np.empty(0, np.int32)
+            empty = np.empty(0, np.int32)
+            shortcuts, directions = (np.empty(0, _AHEAD), empty), (np.empty(0), np.empty(0), empty)
         else:
-            ahead = _faces_ahead(self.surface)
-        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, ahead, letters)
+            opposite = opposite_sides(self.surface)
+            shortcuts = _faces_ahead(self.surface, opposite), letters
+            directions = *_directions(self.surface, opposite), opposite
+        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, shortcuts, directions)
 
     def shortest(self, course: Course, *, is_closed: bool = False) -> Shortened:
         """The locally shortest curve of the class of a course: between the ends, or as a loop."""
@@ -149,18 +155,27 @@ class Shortener:
         return Shortened(*found[1:])
 
 
-def _faces_ahead(surface: Surface) -> AnyArray:
+def _faces_ahead(surface: Surface, opposite: AnyArray) -> AnyArray:
     """The face behind each half-edge (3 m,) of an oriented manifold, for lines that enter there: `Ahead` in fans."""
-    triangle, first = surface.triangle, surface.first_side
-    opposite = np.full(3 * len(triangle), -1, np.int32)
-    inner = first[:-1][np.diff(first) == 2]
-    one, other = surface.side[inner], surface.side[inner + 1]
-    opposite[one], opposite[other] = other, one
+    triangle = surface.triangle
     ahead = np.empty((len(triangle), 3), _AHEAD)
     ahead["along"], ahead["above"], ahead["vertex"] = triangle["along"], triangle["above"], triangle["vertex"]
     across = opposite.reshape(-1, 3)
     ahead["after"] = np.stack([np.roll(across, -2, axis=1), np.roll(across, -1, axis=1)], axis=2)
     return ahead.ravel()
+
+
+def _directions(surface: Surface, opposite: AnyArray) -> tuple[FloatArray, FloatArray]:
+    """The angle (3 m,) of each corner's right side around its vertex, and the sums (n,), negative on the boundary."""
+    first = surface.first_corner[:-1].astype(np.int64)
+    is_used = np.diff(surface.first_corner) > 0
+    first[is_used] = surface.corner[first[is_used]]
+    first[~is_used] = -1
+    leaving = np.zeros(len(opposite))
+    angles = surface.triangle["angle"].ravel()
+    sums, _, closes = polar_angles.polar_angles(angles, opposite.astype(np.int64), first, leaving)
+    # The half-edge that leaves from a corner is the side opposite the corner before.
+    return np.roll(leaving.reshape(-1, 3), 1, axis=1).ravel(), np.where(closes, sums, -sums)
 
 
 def as_curve(parts: Sequence[Shortened], *, is_closed: bool) -> SurfaceCurve:

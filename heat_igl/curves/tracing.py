@@ -19,7 +19,7 @@ from heat_igl.mesh import Mesh
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["Goals", "Surface", "goals", "surface", "trace"]
+__all__ = ["Goals", "Surface", "goals", "opposite_sides", "surface", "trace"]
 
 # Edges are at least this long, in mean edge lengths: the kernel divides by lengths.
 _SHORTEST = 1e-12
@@ -86,6 +86,15 @@ def surface(mesh: Mesh) -> Surface:
     sides = group_by_label(mesh.facets.of_face.ravel(), len(mesh.facets.n_faces))
     corners = group_by_label(mesh.F.ravel(), mesh.n_vertices)
     return Surface(triangle, *(array.astype(np.int32) for array in (*sides, *corners)))
+
+
+def opposite_sides(surface: Surface) -> AnyArray:
+    """The half-edge (3 m,) int32 on the other side of each, -1 where the edge has not two faces."""
+    opposite = np.full(len(surface.side), -1, np.int32)
+    inner = surface.first_side[:-1][np.diff(surface.first_side) == 2]
+    one, other = surface.side[inner], surface.side[inner + 1]
+    opposite[one], opposite[other] = other, one
+    return opposite
 
 
 def goals(

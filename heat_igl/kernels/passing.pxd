@@ -26,7 +26,7 @@ cdef struct Choice:
 
 cdef class Saved:
     cdef Strip strip
-    cdef int face
+    cdef int face, vertex
     cdef Place start
 
     cdef int save(self, Course course) except -1 nogil

@@ -30,7 +30,7 @@ class Saved:
     @cython.exceptval(-1, check=False)
     def save(self, course: Course) -> cython.int:
         """Save a course as it is now."""
-        self.face, self.start = course.face, course.start
+        self.face, self.vertex, self.start = course.face, course.vertex, course.start
         return copy(course.strip, self.strip)
 
     @cython.cfunc
@@ -38,7 +38,7 @@ class Saved:
     @cython.exceptval(-1, check=False)
     def restore(self, course: Course) -> cython.int:
         """Make a course what was saved."""
-        course.face, course.start = self.face, self.start
+        course.face, course.vertex, course.start = self.face, self.vertex, self.start
         return copy(self.strip, course.strip)
 
 

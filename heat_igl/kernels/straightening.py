@@ -113,6 +113,16 @@ class Course:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
+    def lay_out(self, end_vertex: cython.int, end: cython.pointer[Place]) -> cython.int:
+        """Find the shortest path in the strip as it is, to `end_vertex`, or to the place `end` if that is -1."""
+        ends: Place[2]
+        ends[0] = ends[1] = end[0]
+        self._trim(end_vertex, end, ends)
+        return self._pull(end, ends, False)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
     def _pull(
         self, end: cython.pointer[Place], ends_on: cython.pointer[cython.const[Place]], slides: cython.bint
     ) -> cython.int:
@@ -195,7 +205,29 @@ class Course:
         after.this = _angle(to_there.x - bend.x, to_there.y - bend.y, last.x[far] - bend.x, last.y[far] - bend.y)
         before.other = self.s.triangle[f].angle[corner_of(self.s, f, v)] - before.this
         after.other = self.s.triangle[e].angle[corner_of(self.s, e, v)] - after.this
+        if self._is_one_way(bend.first, bend.last, v):
+            count: cython.int = self.detour.turn_back(
+                self.s, v, h, before.other, g, after.other, M_PI - NEARLY_STRAIGHT
+            )
+            if count >= -1:
+                return count
         return self.detour.find(self.s, v, h, before, e, -1, g, after, M_PI - NEARLY_STRAIGHT)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def _is_one_way(self, first: cython.int, last: cython.int, v: cython.int) -> cython.bint:
+        """Whether these crossings at v neither close around it nor cross an edge at which ways branch.
+
+        Then the angle on the side of the strip, pi at least, is the only one there.
+        """
+        j: cython.int
+        for j in range(first, last + 1):
+            h: cython.int = self.strip.crossing[j].leave
+            edge: cython.int = self.s.triangle[h // 3].edge[h % 3]
+            if self.s.first_side[edge + 1] != self.s.first_side[edge] + 2:
+                return False
+        return last - first < self.s.first_corner[v + 1] - self.s.first_corner[v] - 1
 
     @cython.cfunc
     @cython.nogil

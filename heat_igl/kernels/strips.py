@@ -139,6 +139,42 @@ class Detour:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
+    def turn_back(
+        self,
+        s: Surface,
+        v: cython.int,
+        h: cython.int,
+        before: cython.double,
+        end: cython.int,
+        after: cython.double,
+        limit: cython.double,
+    ) -> cython.int:
+        """The way around v from the face of half-edge h, away from h, to that of half-edge `end`, not through that one.
+
+        As `find` with the angles `before` and `after` in the first and the last face on this side. Returns how many
+        crossings, -1 if there is no way or none below `limit`, and -2 if an edge of more than two faces comes first.
+        """
+        leave: cython.int = other_side(s, h, v)
+        total: cython.double = before + after
+        count: cython.int = 0
+        while total < limit and count < self.way.shape[0]:
+            edge: cython.int = s.triangle[leave // 3].edge[leave % 3]
+            first: cython.int = s.first_side[edge]
+            n_sides: cython.int = s.first_side[edge + 1] - first
+            if n_sides != 2:
+                return -1 if n_sides == 1 else -2
+            enter: cython.int = s.side[first] + s.side[first + 1] - leave
+            self.way[count].leave, self.way[count].enter = leave, enter
+            count += 1
+            if enter // 3 == end // 3:
+                return count
+            total += s.triangle[enter // 3].angle[corner_of(s, enter // 3, v)]
+            leave = other_side(s, enter, v)
+        return -1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
     def _is_entered(self, g: cython.int, n_steps: cython.int) -> cython.bint:
         i: cython.int
         for i in range(n_steps):

@@ -1,0 +1,387 @@
+"""Loops as polylines: vertices with straight parts between them, shortened at one vertex after another.
+
+Where the parts at a joint have an angle below pi on one side, a funnel finds the shortest path between the joints
+before and after it in the strip that passes the joint on this side. The smallest angle comes first, as for flips of
+edges (Sharp and Crane 2020). Each step looks at a few faces only, and there is no fixed point on the loop.
+"""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.funnels import Layout
+from cython.cimports.heat_igl.kernels.polylines import GAIN_OF_PART, SAME_ANGLE
+from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
+from cython.cimports.heat_igl.kernels.straightening import NEARLY_STRAIGHT, Course
+from cython.cimports.heat_igl.kernels.strips import Strip
+from cython.cimports.heat_igl.kernels.surfaces import Place, at_corner, corner_of
+from cython.cimports.libc.math import INFINITY, M_PI, atan2, fabs, hypot
+
+__all__ = ["Polyline"]
+
+_JOINT = np.dtype(
+    [
+        *((name, "f8") for name in ("length", "leave", "arrive")),
+        *((name, "i4") for name in ("vertex", "face", "first", "count", "before", "after")),
+    ],
+    align=True,
+)
+_CROSSING = np.dtype([("leave", "i4"), ("enter", "i4")])
+# Joints for which there is room at first.
+_ROOM = 512
+
+
+@cython.final
+@cython.cclass
+class Polyline:
+    """The loop of a course on an oriented manifold, as joints that are linked in a ring.
+
+    `polar` (3 m,) is the angle of each corner's right side around its vertex, counterclockwise; `total` (n,) the sum of
+    the angles, negative on the boundary; `across` (3 m,) the half-edge on the other side, -1 for none. All are empty
+    if the surface is not an oriented manifold: then nothing may be read.
+    """
+
+    def __init__(self, course: Course, polar, total, across):
+        self.course, self.s = course, course.s
+        self.polar, self.total, self.across = polar, total, across
+        self.is_oriented = len(polar) > 0
+        self.strip, self.layout = Strip(), Layout()
+        self.crossing = np.empty(2 * _ROOM, _CROSSING)
+        self.joint, self.free, self.queue = np.empty(_ROOM, _JOINT), np.empty(_ROOM, np.int32), PriorityQueue(_ROOM)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def read(self) -> cython.bint:
+        """Take the base of the loop of a course, a vertex, and the bends as joints; False if there are no bends."""
+        n: cython.int = self.course.layout.n_bends - 1
+        i: cython.int
+        j: cython.int
+        after: cython.int
+        if n < 2:
+            return False
+        self.clear(n)
+        # Joint 0 is the base, and joint i is at bend i.
+        self.make(self.course.vertex)
+        for i in range(1, n):
+            bend = cython.address(self.course.layout.bend[i])
+            self.make(self.course.layout.gate[bend.last].vertex[bend.side])
+        for i in range(n):
+            bend = cython.address(self.course.layout.bend[i])
+            self.face = self.course.strip.crossing[bend.last].enter // 3 if i > 0 else self.course.face
+            self.strip.count = 0
+            for j in range(bend.last + 1, self.course.layout.bend[i + 1].first):
+                self.strip.push(self.course.strip.crossing[j].leave, self.course.strip.crossing[j].enter)
+            after = i + 1 if i < n - 1 else 0
+            self.trim(self.joint[i].vertex, self.joint[after].vertex)
+            if not self.lay_out(self.joint[i].vertex, self.joint[after].vertex) > 0.0:
+                return False
+            self.link(i, after)
+        for i in range(n):
+            self.check(i)
+        return True
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def clear(self, count: cython.int) -> cython.int:
+        """Forget the last loop, and make room for more than so many joints."""
+        i: cython.int
+        if 2 * count > self.joint.shape[0]:
+            with cython.gil:
+                self.joint, self.free = np.empty(4 * count, _JOINT), np.empty(4 * count, np.int32)
+                self.queue = PriorityQueue(4 * count)
+        while self.queue.count > 0:
+            self.queue.set_key(self.queue.first(), 0.0)
+        self.n_crossings = self.n_joints = self.some = 0
+        self.n_free = cython.cast(cython.int, self.joint.shape[0])
+        for i in range(self.n_free):
+            self.free[i] = self.n_free - 1 - i
+        return 0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def make(self, v: cython.int) -> cython.int:
+        """A new joint at vertex v, the first with number 0."""
+        self.n_free -= 1
+        self.n_joints += 1
+        k: cython.int = self.free[self.n_free]
+        self.joint[k].vertex = v
+        return k
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def remove(self, k: cython.int) -> cython.void:
+        """Forget a joint."""
+        self.queue.set_key(k, 0.0)
+        self.free[self.n_free] = k
+        self.n_free += 1
+        self.n_joints -= 1
+        if self.some == k:
+            self.some = self.joint[k].before
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def relax(self) -> cython.int:
+        """Shorten the loop at its joints until no angle is below pi, or one joint is left."""
+        while self.queue.count > 0 and self.n_joints > 1:
+            k: cython.int = cython.cast(cython.int, self.queue.first())
+            self.queue.set_key(k, 0.0)
+            self.shorten(k)
+        return 0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def shorten(self, k: cython.int) -> cython.int:
+        """Lead the loop past joint k on the side of the smaller angle, if that makes it shorter."""
+        p: cython.int = self.joint[k].before
+        q: cython.int = self.joint[k].after
+        v: cython.int = self.joint[p].vertex
+        w: cython.int = self.joint[q].vertex
+        on_left: cython.bint = False
+        angle: cython.double = self.angle(k, cython.address(on_left))
+        self.face, self.strip.count = self.joint[p].face, 0
+        self.push(p, self.strip)
+        n: cython.int = self.strip.count
+        f: cython.int = self.last_face()
+        goal: cython.int = self.joint[k].face
+        if not self.turn(self.strip, self.joint[k].vertex, f, goal, on_left, angle):
+            # On a spur, rounding decides which side has the smaller angle, and no faces may lie on the other one.
+            self.strip.count = n
+            if not self.turn(
+                self.strip, self.joint[k].vertex, self.last_face(), self.joint[k].face, not on_left, angle
+            ):
+                return 0
+        self.push(k, self.strip)
+        self.trim(v, w)
+        if self.strip.count == 0 and v == w:
+            return self.meet(p, k, q)
+        length: cython.double = self.joint[p].length + self.joint[k].length
+        if not self.lay_out(v, w) < length * (1.0 - GAIN_OF_PART) or self.layout.n_bends - 2 > self.n_free:
+            return 0
+        self.remove(k)
+        self.link(p, q)
+        self.check(p)
+        k = self.joint[p].after
+        while k != q:
+            self.check(k)
+            k = self.joint[k].after
+        self.check(q)
+        return 1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def angle(self, k: cython.int, on_left: cython.pointer[cython.bint]) -> cython.double:
+        """The smaller angle at joint k, and on which side it is."""
+        total: cython.double = self.total[self.joint[k].vertex]
+        # Counterclockwise from where the loop leaves to where it comes from.
+        left: cython.double = self.joint[self.joint[k].before].arrive - self.joint[k].leave
+        if total < 0.0:
+            # On the boundary there is one side.
+            on_left[0] = left > 0.0
+            return fabs(left)
+        if left < 0.0:
+            left += total
+        on_left[0] = left < 0.5 * total
+        return left if on_left[0] else total - left
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def check(self, k: cython.int) -> cython.void:
+        """Put joint k into the queue if the angle there is below pi, or else take it out."""
+        on_left: cython.bint = False
+        self.queue.set_key(k, max(M_PI - NEARLY_STRAIGHT - self.angle(k, cython.address(on_left)), 0.0))
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def turn(
+        self, strip: Strip, v: cython.int, f: cython.int, goal: cython.int, on_left: cython.bint, angle: cython.double
+    ) -> cython.bint:
+        """Lead a strip around v from face f to face `goal`; False if the faces between span more than `angle`.
+
+        The faces on the left of a path, which `on_left` takes, follow one another clockwise.
+        """
+        between: cython.double = 0.0
+        while f != goal:
+            leave: cython.int = 3 * f + (corner_of(self.s, f, v) + (2 if on_left else 1)) % 3
+            enter: cython.int = self.across[leave]
+            if enter < 0:
+                return False
+            strip.push(leave, enter)
+            f = enter // 3
+            if f != goal:
+                between += self.s.triangle[f].angle[corner_of(self.s, f, v)]
+                if between > angle + SAME_ANGLE:
+                    return False
+        return True
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def lay_out(self, v: cython.int, w: cython.int) -> cython.double:
+        """Find the shortest path in the strip, which is trimmed, from vertex v to vertex w; returns the length."""
+        start: Place = at_corner(corner_of(self.s, self.face, v))
+        self.layout.lay_out(self.s, self.face, cython.address(start), self.strip)
+        c: cython.int = corner_of(self.s, self.last_face(), w)
+        self.layout.pull_tight(self.layout.last.x[c], self.layout.last.y[c])
+        return self.layout.length()
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def link(self, a: cython.int, b: cython.int) -> cython.int:
+        """Make the path that is laid out the way from joint a to joint b, with new joints at the bends."""
+        n: cython.int = self.layout.n_bends
+        begin: cython.int = 0
+        f: cython.int = self.face
+        i: cython.int
+        for i in range(1, n):
+            bend = cython.address(self.layout.bend[i])
+            k: cython.int = b if i == n - 1 else self.make(self.layout.gate[bend.last].vertex[bend.side])
+            self.joint[a].after, self.joint[k].before = k, a
+            self.set_part(a, f, begin, bend.first, i)
+            if i < n - 1:
+                begin, f = bend.last + 1, self.strip.crossing[bend.last].enter // 3
+            a = k
+        return 0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def set_part(self, a: cython.int, f: cython.int, begin: cython.int, end: cython.int, i: cython.int) -> cython.int:
+        """Make the part after joint a the line to bend i of the layout: crossings `begin` to `end`, out of face f."""
+        joint = cython.address(self.joint[a])
+        p = cython.address(self.layout.bend[i - 1])
+        q = cython.address(self.layout.bend[i])
+        dx: cython.double = q.x - p.x
+        dy: cython.double = q.y - p.y
+        j: cython.int
+        c: cython.int = corner_of(self.s, f, joint.vertex)
+        joint.face, joint.first, joint.count, joint.length = f, self.n_crossings, max(end - begin, 0), hypot(dx, dy)
+        if joint.count == 0:
+            # An edge of face f.
+            t = cython.address(self.s.triangle[f])
+            e: cython.int = corner_of(self.s, f, self.joint[joint.after].vertex)
+            joint.leave = self.polar[3 * f + c] + (0.0 if e == (c + 1) % 3 else t.angle[c])
+            joint.arrive = self.polar[3 * f + e] + (0.0 if c == (e + 1) % 3 else t.angle[e])
+            return 0
+        if self.n_crossings + joint.count > self.crossing.shape[0]:
+            with cython.gil:
+                self.crossing = np.concatenate([self.crossing, np.empty(self.n_crossings + joint.count, _CROSSING)])
+        for j in range(begin, end):
+            self.crossing[self.n_crossings] = self.strip.crossing[j]
+            self.n_crossings += 1
+        # Seen from the start the right end of the first crossing is on the right, and from the end the left one.
+        gate = cython.address(self.layout.gate[begin])
+        angle: cython.double = _left_of(gate.x[1] - p.x, gate.y[1] - p.y, dx, dy)
+        joint.leave = self.polar[3 * f + c] + min(angle, self.s.triangle[f].angle[c])
+        gate = cython.address(self.layout.gate[end - 1])
+        h: cython.int = self.strip.crossing[end - 1].enter
+        angle = _left_of(gate.x[0] - q.x, gate.y[0] - q.y, -dx, -dy)
+        joint.arrive = self.polar[h] + min(angle, self.s.triangle[h // 3].angle[h % 3])
+        return 0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def meet(self, p: cython.int, k: cython.int, q: cython.int) -> cython.int:
+        """Take away a spur from joint p to joint k and back to joint q, which is at the vertex of p."""
+        self.remove(k)
+        after: cython.int = self.joint[q].after
+        before: cython.int = self.joint[p].before
+        if p == q:
+            # The loop contracts to a point.
+            self.joint[p].before = self.joint[p].after = p
+            self.joint[p].face, self.joint[p].count, self.joint[p].length = self.face, 0, 0.0
+            return 1
+        self.joint[p] = self.joint[q]
+        self.remove(q)
+        if after == p:
+            before = after = p
+        self.joint[p].before, self.joint[p].after = before, after
+        self.joint[before].after = self.joint[after].before = p
+        self.some = p
+        self.check(p)
+        return 1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def trim(self, v: cython.int, w: cython.int) -> cython.void:
+        """Drop crossings at vertex v from the start of the strip, and crossings at vertex w from the end."""
+        n_dropped: cython.int = 0
+        while n_dropped < self.strip.count:
+            h: cython.int = self.strip.crossing[n_dropped].leave
+            if self.s.triangle[h // 3].vertex[h % 3] == v:
+                break
+            self.face = self.strip.crossing[n_dropped].enter // 3
+            n_dropped += 1
+        self.strip.drop(n_dropped)
+        while self.strip.count > 0:
+            g: cython.int = self.strip.crossing[self.strip.count - 1].enter
+            if self.s.triangle[g // 3].vertex[g % 3] == w:
+                break
+            self.strip.count -= 1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def write(self) -> cython.int:
+        """Make the loop the strip of the course, based at a joint."""
+        k: cython.int = self.some
+        f: cython.int = self.joint[k].face
+        start: Place = at_corner(corner_of(self.s, f, self.joint[k].vertex))
+        self.course.begin(f, self.joint[k].vertex, cython.address(start))
+        while True:
+            self.push(k, self.course.strip)
+            k = self.joint[k].after
+            if k == self.some:
+                return 0
+            self.lead(self.joint[k].vertex, self.course.last_face(), self.joint[k].face)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def lead(self, v: cython.int, f: cython.int, goal: cython.int) -> cython.bint:
+        """Lead the strip of the course around v from face f to face `goal`, the shorter way; False if there is none."""
+        total: cython.double = self.total[v]
+        left: cython.double = self.polar[3 * f + corner_of(self.s, f, v)]
+        left -= self.polar[3 * goal + corner_of(self.s, goal, v)]
+        if total > 0.0 and left < 0.0:
+            left += total
+        on_left: cython.bint = left < 0.5 * total if total > 0.0 else left > 0.0
+        return self.turn(self.course.strip, v, f, goal, on_left, INFINITY)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def push(self, k: cython.int, strip: Strip) -> cython.int:
+        """Add the crossings of the part after joint k to a strip."""
+        j: cython.int
+        for j in range(self.joint[k].first, self.joint[k].first + self.joint[k].count):
+            strip.push(self.crossing[j].leave, self.crossing[j].enter)
+        return 0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def last_face(self) -> cython.int:
+        """The face in which the part that is made ends."""
+        n: cython.int = self.strip.count
+        if n == 0:
+            return self.face
+        return self.strip.crossing[n - 1].enter // 3
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _left_of(ax: cython.double, ay: cython.double, bx: cython.double, by: cython.double) -> cython.double:
+    """Angle from direction a counterclockwise to direction b, at least 0."""
+    return max(atan2(ax * by - ay * bx, ax * bx + ay * by), 0.0)
