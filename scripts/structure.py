@@ -36,11 +36,11 @@ ROOT = Path(__file__).resolve().parents[1]
 NAME = "heat_igl"
 BOUNDS = {
     "rooms": 23,
-    "arrows": 125,
+    "arrows": 126,
     "back-arrows": 0,
     "circles": 0,
     "rooms, heat_igl/__init__.py and scripts": 25,
-    "arrows, theirs and those for types too": 156,
+    "arrows, theirs and those for types too": 157,
     "longest bodies": 60,
     "longest bodies of kernels": 60,
     "longest classes": 300,

@@ -215,7 +215,7 @@ def changed(face: int, value: Any) -> FloatArray:
         (changed(3, [[1, 1, 0], [0, 1, 0], [0, 0, 1]]), r"metric\[3\] = .* must be symmetric"),
         (changed(2, np.nan), r"metric\[2\] = .* must be finite"),
         ("round", "metric must be real numbers"),
-        (1j * GOOD, "metric must be real numbers, not complex"),
+        (1j * GOOD, "metric must be real numbers, not an array of complex128"),
     ],
 )
 def test_wrong_metrics_are_refused(metric, message):
