@@ -87,9 +87,7 @@ def walk_through(q: Query, v: cython.int, k: cython.int) -> cython.int:
     far: cython.double = 4.0 * q.found.distance * q.found.distance
     wait_for: cython.int = -1
     turned: Savings
-    while view.h >= 0:
-        if _is_barrier(q, view.h):
-            break
+    while view.h >= 0 and not _is_barrier(q, view.h):
         step = cython.address(q.t.step[view.h])
         # Where the walk goes next is known late, but both ways are known now.
         prefetch(cython.address(q.t.step[max(step.to_right, 0)]))
