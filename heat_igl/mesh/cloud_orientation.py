@@ -99,8 +99,9 @@ def _flattest_tree(faces: IntArray, folds: FloatArray, m: int) -> BoolArray:
     order = np.lexsort((folds, pairs[:, 1], pairs[:, 0]))
     is_first = (np.diff(pairs[order], axis=0, prepend=-1) != 0).any(axis=1)
     chosen = order[is_first]
-    weights = sp.coo_array((folds[chosen] + 2, tuple(pairs[chosen].T)), (m, m)).tocsr()
-    numbers = sp.coo_array((chosen + 1, tuple(pairs[chosen].T)), (m, m)).tocsr()
+    places = tuple(pairs[chosen].T.astype(np.int32))  # scipy 1.15 builds no tree from others
+    weights = sp.coo_array((folds[chosen] + 2, places), (m, m)).tocsr()
+    numbers = sp.coo_array((chosen + 1, places), (m, m)).tocsr()
     tree = minimum_spanning_tree(weights)
     tree.data[:] = 1
     is_in_tree = np.zeros(len(faces), bool)
