@@ -7,8 +7,9 @@ import pytest
 from test_signed_distance import flat_perturbed
 from test_unfolding_sources import sheared
 
-from heat_igl import HeatMethodSolver, Mesh, SurfaceCurve, isolines, shapes
+from heat_igl import HeatMethodSolver, Mesh, SignedHeatSolver, SurfaceCurve, isolines, shapes
 from heat_igl.unfolding import curve_walks
+from heat_igl.unfolding.halves import first_half
 
 
 def solvers(mesh: Mesh) -> tuple[HeatMethodSolver, HeatMethodSolver]:
@@ -51,10 +52,11 @@ def test_distance_from_several_curves_is_near_exact_with_the_nearest_one():
     assert (found.labels == exact.labels).mean() > 0.999
 
 
-def test_the_number_of_threads_does_not_change_the_bits(monkeypatch):
+@pytest.mark.parametrize("make", [lambda mesh: solvers(mesh)[0], SignedHeatSolver], ids=["walks", "fronts"])
+def test_the_number_of_threads_does_not_change_the_bits(monkeypatch, make):
     mesh = shapes.blob(4)
     (curve,) = isolines(mesh, mesh.V[:, 2], 0.1)[0]
-    solver = solvers(mesh)[0]
+    solver = make(mesh)
     found = []
     for count in ("1", "2"):
         monkeypatch.setenv("HEAT_IGL_NUM_THREADS", count)
@@ -62,25 +64,19 @@ def test_the_number_of_threads_does_not_change_the_bits(monkeypatch):
     np.testing.assert_array_equal(*found)
 
 
-def test_parts_that_the_known_vertices_separate_are_walked_one_by_one():
+def test_halves_are_made_of_parts_that_known_vertices_separate():
     mesh = shapes.icosphere(4)
-    (equator,) = isolines(mesh, mesh.V[:, 2], 0.01)[0]
-    unfolding = solvers(mesh)[0]._parts.last_steps
-    walks = unfolding._curve_walks
-    number = walks._refinement.number
+    F, z = mesh.F.astype(np.int32), mesh.V[:, 2]
     for height in (0.0, 0.2):
-        known = number[np.abs(mesh.V[:, 2] - height) < 0.3]
-        first = walks._groups(known)[number]
-        south, north = mesh.V[:, 2] < height - 0.3, mesh.V[:, 2] > height + 0.3
+        first = first_half(F, np.abs(z - height) < 0.3)
+        south, north = z < height - 0.3, z > height + 0.3
         assert first[south].all() != first[north].all()
         assert first[south].any() != first[north].any()
     # Of three parts two are not taken if that is more than half.
-    known = number[np.abs(np.abs(mesh.V[:, 2]) - 0.33) < 0.08]
-    first = walks._groups(known)[number][np.abs(np.abs(mesh.V[:, 2]) - 0.33) >= 0.08]
-    assert 0.3 < first.mean() <= 0.5
+    is_known = np.abs(np.abs(z) - 0.33) < 0.08
+    assert 0.3 < first_half(F, is_known)[~is_known].mean() <= 0.5
     # Without known vertices there is one part.
-    assert walks._groups(number[:0]).all()
-    assert len(equator) > 100
+    assert first_half(F, np.zeros(mesh.n_vertices, bool)).all()
 
 
 def test_surfaces_without_fans_take_points_for_curves():

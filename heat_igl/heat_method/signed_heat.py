@@ -207,8 +207,10 @@ class SignedHeatSolver:
         """Distance (n,) from the curves, with their gaps closed, and which vertices (n,) are on the left."""
         sources = chosen.unoriented()
         if not has_gaps(self._mesh, chosen):
-            size = self._continued(self._near(sources))
-            left, is_known = left_of_closed(self._mesh, self._faces, chosen)
+            near, (left, is_known) = both(
+                lambda: self._near(sources), lambda: left_of_closed(self._mesh, self._faces, chosen)
+            )
+            size = self._continued(near)
             if (is_known | (size == 0) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
             return size, np.where(is_known, left, self._integrated(self._pieces(chosen), level) < 0)

@@ -29,10 +29,11 @@ def advance(
     total: cython.const[cython.double][::1],
     first: cython.const[cython.int][::1],
     incident: cython.const[cython.int][::1],
+    is_open: cython.const[cython.uchar][::1],
     d: cython.double[::1],
     back: cython.double[::1],
 ):
-    """Fill in the distances that are not known, from those that are.
+    """Fill in the distances of open vertices, from those of the others.
 
     Parameters
     ----------
@@ -43,8 +44,11 @@ def advance(
         Sum of the angles around each vertex; ``inf`` on the boundary.
     first, incident : (n + 1,) int32, (3 m,) int32
         The corners ``3 f + c`` at vertex v stand at ``first[v]`` to ``first[v + 1]`` of `incident`.
+    is_open : (n,) uint8
+        Which vertices are to be filled in. Nothing is read or written at vertices that are neither open nor in a
+        triangle with an open one, so two threads may fill in two parts that no triangle joins.
     d : (n,) float64
-        Distance, ``inf`` where it is not known; that is filled in, but for what no front reaches.
+        Distance, ``inf`` at open vertices; that is filled in, but for what no front reaches.
     back : (n,) float64
         The direction at each vertex in which the source lies; nan where it is not known. Filled in like `d`.
 
@@ -56,8 +60,7 @@ def advance(
     one = _CurvedFronts()
     one.triangle, one.total, one.first, one.incident = triangle, total, first, incident
     one.d, one.back = d, back
-    is_known = np.isfinite(d)
-    one.is_known, one.is_passed = is_known.view(np.uint8), is_known.astype(np.uint8)
+    one.is_open, one.is_passed = is_open, np.logical_not(is_open).view(np.uint8)
     one.queue = PriorityQueue(d.shape[0])
     with cython.nogil:
         one.run()
@@ -75,7 +78,7 @@ class _CurvedFronts:
     incident: cython.const[cython.int][::1]
     d: cython.double[::1]
     back: cython.double[::1]
-    is_known: cython.const[cython.uchar][::1]
+    is_open: cython.const[cython.uchar][::1]
     is_passed: cython.uchar[::1]
     queue: PriorityQueue
     n_visits: cython.longlong
@@ -84,19 +87,19 @@ class _CurvedFronts:
     @cython.nogil
     @cython.exceptval(check=False)
     def run(self) -> cython.void:
-        """Visit the rim of what is known, and whatever a front reaches from there."""
+        """Visit the vertices beside open ones, and whatever a front reaches from there."""
         n: cython.Py_ssize_t = self.d.shape[0]
         v: cython.longlong
         k: cython.int
         f: cython.int
         c: cython.int
         for v in range(n):
-            if not self.is_known[v]:
+            if self.is_open[v]:
                 continue
             for k in range(self.first[v], self.first[v + 1]):
                 f, c = self.incident[k] // 3, self.incident[k] % 3
                 t = cython.address(self.triangle[f])
-                if not (self.is_known[t.vertex[(c + 1) % 3]] and self.is_known[t.vertex[(c + 2) % 3]]):
+                if self.is_open[t.vertex[(c + 1) % 3]] or self.is_open[t.vertex[(c + 2) % 3]]:
                     self.queue.set_key(v, 1.0 / max(self.d[v], _LEAST))
                     break
         self.n_visits = 0
@@ -116,7 +119,7 @@ class _CurvedFronts:
     def arrive(self, t: cython.pointer[cython.const[Triangle]], c: cython.int) -> cython.void:
         """Let corner c of triangle t have the front that has passed the other two, if it is the first."""
         v: cython.int = t.vertex[c]
-        if self.is_known[v]:
+        if not self.is_open[v]:
             return
         i: cython.int = (c + 1) % 3
         j: cython.int = (c + 2) % 3

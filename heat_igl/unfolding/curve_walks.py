@@ -11,13 +11,13 @@ import numpy as np
 from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
 from heat_igl.intrinsic.layout import apex
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
-from heat_igl.kernels import incidence
 from heat_igl.mesh.grouping import next_in_run
 from heat_igl.runtime import both
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.directions import PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
+from heat_igl.unfolding.halves import first_half
 from heat_igl.unfolding.numbered import WalkStarts
 from heat_igl.unfolding.refinement import Refinement
 from heat_igl.unfolding.walks import unknown
@@ -91,7 +91,10 @@ class CurveWalks:
         """
         refinement, number = self._refinement, self._refinement.number
         starts, barrier = self._starts(segments, near), self._barrier(segments)
-        group, order = self._groups(starts.row), refinement.order(key)
+        is_known = np.zeros(len(number), bool)
+        is_known[starts.row] = True
+        # Walks from one half do not need the paths of the other, but for the rows that are known.
+        group, order = first_half(self._faces_of_rows, is_known), refinement.order(key)
 
         def walks(rows: BoolArray) -> AnyArray:
             some = order[rows[order]]
@@ -103,20 +106,6 @@ class CurveWalks:
         if labels is not None:
             labels[:] = walk["label"][number]
         return np.asarray(walk["distance"][number])
-
-    def _groups(self, known: AnyArray) -> BoolArray:
-        """About half of the rows: walks from these do not need the paths of the others, but for `known` rows."""
-        n = len(self._refinement.number)
-        is_known = np.zeros(n, bool)
-        is_known[known] = True
-        apart = incidence.components_without(self._faces_of_rows, is_known.view(np.uint8))
-        size = np.bincount(apart, ~is_known)
-        order = np.argsort(-size, kind="stable")
-        # The largest part, and further ones as long as these are at most half of all.
-        in_first = np.zeros(len(size), bool)
-        in_first[order[2 * np.cumsum(size[order]) <= size.sum()]] = True
-        in_first[order[0]] = True
-        return np.asarray(in_first[apart])
 
     def _barrier(self, segments: SourceSegments) -> AnyArray:
         """Which triangles (m,) of the tables hold parts of segments: nothing beyond is nearer than these."""

@@ -9,10 +9,12 @@ import numpy as np
 from heat_igl.intrinsic import IntrinsicTriangulation, PolarAngles, carried_angles, polar_angles
 from heat_igl.intrinsic.fans import aligned
 from heat_igl.kernels.curved_fronts import advance
+from heat_igl.runtime import both
 from heat_igl.sources import SourceSet
-from heat_igl.typing import FloatArray
+from heat_igl.typing import BoolArray, FloatArray
 from heat_igl.unfolding.asked import asked_of
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
+from heat_igl.unfolding.halves import first_half
 from heat_igl.unfolding.when_exact import FEW
 
 __all__ = ["CurvedFronts", "Front"]
@@ -77,6 +79,7 @@ class CurvedFronts:
         triangle = aligned(len(triangulation.F), _TRIANGLE)
         triangle["side"], triangle["vertex"] = triangulation.l, triangulation.F
         triangle["leaving"] = _at_corners(triangulation, carried)
+        self._F = np.ascontiguousarray(triangulation.F, np.int32)
         self._tables = (
             triangle,
             np.where(angles.on_boundary, np.inf, angles.sums),
@@ -104,7 +107,13 @@ class CurvedFronts:
     def continued(self, front: Front) -> FloatArray:
         """Distance (n,) at all vertices; ``inf`` where the front does not come."""
         distance, back = front.distance.copy(), front.back.copy()
-        advance(*self._tables, distance, back)
+        is_open = np.isinf(distance)
+        first = is_open & first_half(self._F, ~is_open)
+
+        def fill(part: BoolArray) -> None:
+            advance(*self._tables, part.view(np.uint8), distance, back)
+
+        both(lambda: fill(first), lambda: fill(is_open & ~first))
         return distance
 
     def _back(self, found: ExactSolution) -> FloatArray:
