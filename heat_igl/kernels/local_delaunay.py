@@ -1,11 +1,11 @@
-"""Triangles of a point cloud: Delaunay stars in tangent planes, and triangles that fit together."""
+"""Triangles of a point cloud: the Delaunay star of each point among its neighbours, in its tangent plane."""
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.local_delaunay import ALIKE, STEEP, InPlane
-from cython.cimports.libc.math import INFINITY, atan2, fabs, sqrt
+from cython.cimports.heat_igl.kernels.unrolling import InPlane, in_plane
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
-__all__ = ["delaunay_stars", "fitting_triangles"]
+__all__ = ["delaunay_stars"]
 
 
 def delaunay_stars(
@@ -91,7 +91,7 @@ def _neighbours_around(
             axes[i, 2, 0] * axes[j, 2, 0] + axes[i, 2, 1] * axes[j, 2, 1] + axes[i, 2, 2] * axes[j, 2, 2] < least_cosine
         ):
             continue
-        flat: InPlane = _in_plane(P, axes, i, j)
+        flat: InPlane = in_plane(P, axes, i, j)
         x, y = flat.x, flat.y
         square: cython.double = x * x + y * y
         # A point above the centre has no direction in the plane.
@@ -252,169 +252,3 @@ def _is_hidden(
     bx: cython.double = star[r, X] - star[p, X]
     by: cython.double = star[r, Y] - star[p, Y]
     return ax * by - ay * bx <= 0.0
-
-
-def fitting_triangles(
-    P: cython.const[cython.double][:, ::1],
-    axes: cython.const[cython.double][:, :, ::1],
-    triangles: cython.const[cython.int][:, ::1],
-    n_accepted: cython.Py_ssize_t,
-):
-    """Mask (m,) of `triangles` that overlap none before them: the first `n_accepted`, and those accepted one by one.
-
-    Two triangles overlap if they have a corner in common and, in the tangent plane of that corner, their angles
-    do. So no edge keeps more than two triangles.
-    """
-    m: cython.Py_ssize_t = triangles.shape[0]
-    accepted = np.zeros(m, np.bool_)
-    keep: cython.uchar[::1] = accepted.view(np.uint8)
-    head: cython.int[::1] = np.full(P.shape[0], -1, np.int32)
-    following: cython.int[:, ::1] = np.empty((m, 3), np.int32)
-    sector: cython.double[:, :, ::1] = np.empty((m, 3, 2))
-    f: cython.Py_ssize_t
-    c: cython.Py_ssize_t
-    with cython.nogil:
-        for f in range(m):
-            fits: cython.bint = True
-            for c in range(3):
-                if not _find_sector(P, axes, triangles, f, c, sector) and f >= n_accepted:
-                    fits = False
-                    break
-                if f >= n_accepted and _overlaps(triangles[f, c], f, c, head, following, sector):
-                    fits = False
-                    break
-            if fits:
-                keep[f] = 1
-                for c in range(3):
-                    following[f, c] = head[triangles[f, c]]
-                    head[triangles[f, c]] = 3 * f + c
-    return accepted
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _find_sector(
-    P: cython.const[cython.double][:, ::1],
-    axes: cython.const[cython.double][:, :, ::1],
-    triangles: cython.const[cython.int][:, ::1],
-    f: cython.Py_ssize_t,
-    c: cython.Py_ssize_t,
-    sector: cython.double[:, :, ::1],
-) -> cython.bint:
-    """Start of the angle of triangle f at corner c, counterclockwise, and size; False if it has none."""
-    at: cython.Py_ssize_t = triangles[f, c]
-    begin: cython.double = _direction(P, axes, at, triangles[f, (c + 1) % 3])
-    end: cython.double = _direction(P, axes, at, triangles[f, (c + 2) % 3])
-    width: cython.double = end - begin
-    if width < 0.0:
-        width += TURN
-    if width > 0.5 * TURN:
-        begin, width = end, TURN - width
-    sector[f, c, 0], sector[f, c, 1] = begin, width
-    return width > ROUNDING and width < 0.5 * TURN - ROUNDING
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _direction(
-    P: cython.const[cython.double][:, ::1],
-    axes: cython.const[cython.double][:, :, ::1],
-    i: cython.Py_ssize_t,
-    j: cython.Py_ssize_t,
-) -> cython.double:
-    """Angle of point j around point i in the tangent plane of i."""
-    flat: InPlane = _in_plane(P, axes, i, j)
-    return atan2(flat.y, flat.x)
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _in_plane(
-    P: cython.const[cython.double][:, ::1],
-    axes: cython.const[cython.double][:, :, ::1],
-    i: cython.Py_ssize_t,
-    j: cython.Py_ssize_t,
-) -> InPlane:
-    """Point j in the tangent plane of i, projected, or unrolled if it is steeply above or below; 0 right above it."""
-    dx: cython.double = P[j, 0] - P[i, 0]
-    dy: cython.double = P[j, 1] - P[i, 1]
-    dz: cython.double = P[j, 2] - P[i, 2]
-    found: InPlane
-    found.x = dx * axes[i, 0, 0] + dy * axes[i, 0, 1] + dz * axes[i, 0, 2]
-    found.y = dx * axes[i, 1, 0] + dy * axes[i, 1, 1] + dz * axes[i, 1, 2]
-    height: cython.double = dx * axes[i, 2, 0] + dy * axes[i, 2, 1] + dz * axes[i, 2, 2]
-    square: cython.double = found.x * found.x + found.y * found.y
-    if height * height > STEEP * square:
-        if square <= 1e-12 * height * height:
-            found.x = found.y = 0.0
-        else:
-            found = _unrolled(axes, i, j, found.x, found.y, height)
-    return found
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _unrolled(
-    axes: cython.const[cython.double][:, :, ::1],
-    i: cython.Py_ssize_t,
-    j: cython.Py_ssize_t,
-    x: cython.double,
-    y: cython.double,
-    height: cython.double,
-) -> InPlane:
-    """Point j in the tangent plane of i at its distance, turned about the line in which their planes meet.
-
-    Around a sharp edge projection makes the far side too short.
-    """
-    # The normal of j, in the tangent plane of i.
-    nx: cython.double = axes[j, 2, 0] * axes[i, 0, 0] + axes[j, 2, 1] * axes[i, 0, 1] + axes[j, 2, 2] * axes[i, 0, 2]
-    ny: cython.double = axes[j, 2, 0] * axes[i, 1, 0] + axes[j, 2, 1] * axes[i, 1, 1] + axes[j, 2, 2] * axes[i, 1, 2]
-    size: cython.double = sqrt(nx * nx + ny * ny)
-    found: InPlane
-    scale: cython.double
-    if size < ALIKE:
-        scale = sqrt(1.0 + height * height / (x * x + y * y))
-        found.x, found.y = scale * x, scale * y
-        return found
-    nx, ny = nx / size, ny / size
-    across: cython.double = nx * x + ny * y
-    along: cython.double = nx * y - ny * x
-    longer: cython.double = sqrt(across * across + height * height)
-    if across < 0.0:
-        longer = -longer
-    found.x = longer * nx - along * ny
-    found.y = longer * ny + along * nx
-    return found
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _overlaps(
-    vertex: cython.Py_ssize_t,
-    f: cython.Py_ssize_t,
-    c: cython.Py_ssize_t,
-    head: cython.int[::1],
-    following: cython.int[:, ::1],
-    sector: cython.double[:, :, ::1],
-) -> cython.bint:
-    """Whether the angle of triangle f at corner c overlaps one that was accepted at the same vertex."""
-    other: cython.Py_ssize_t = head[vertex]
-    while other >= 0:
-        g: cython.Py_ssize_t = other // 3
-        e: cython.Py_ssize_t = other % 3
-        ahead: cython.double = sector[g, e, 0] - sector[f, c, 0]
-        if ahead < 0.0:
-            ahead += TURN
-        if ahead < sector[f, c, 1] - ROUNDING or TURN - ahead < sector[g, e, 1] - ROUNDING:
-            return True
-        other = following[g, e]
-    return False

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.kernels.agreeing import agreement
-from heat_igl.kernels.local_delaunay import delaunay_stars, fitting_triangles
+from heat_igl.kernels.fitting_triangles import fitting_triangles
+from heat_igl.kernels.local_delaunay import delaunay_stars
 from heat_igl.mesh.cloud_gaps import pinched_vertices, with_gaps_closed, with_one_fan
 from heat_igl.mesh.connectivity import ascending_rows
 from heat_igl.mesh.grouping import group_by_label

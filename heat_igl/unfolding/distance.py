@@ -45,13 +45,17 @@ _MOST_OF_IT = 0.5
 
 
 @overload
-def unfolded_distance(
-    V: MeshLike, F: Sources, /, *, tolerance: float = ..., cutoff: float | None = ...
-) -> FloatArray: ...
+def unfolded_distance(V: MeshLike, F: Sources, /, *, tolerance: float = ..., cutoff: float | None = ...) -> FloatArray:
+    """Distance (n,) on a mesh, `V`, from sources, `F`."""
+
+
 @overload
 def unfolded_distance(
     V: MeshLike, F: ArrayLike | None, sources: Sources, *, tolerance: float = ..., cutoff: float | None = ...
-) -> FloatArray: ...
+) -> FloatArray:
+    """Distance (n,) on the triangles `F` between the positions `V`."""
+
+
 def unfolded_distance(
     V: MeshLike, F: Any = None, sources: Any = None, *, tolerance: float = TOLERANCE, cutoff: float | None = None
 ) -> FloatArray:
