@@ -85,7 +85,7 @@ def test_surfaces_without_fans_take_points_for_curves():
     fin = Mesh(np.vstack([mesh.V, 1.1 * mesh.V[edge].mean(axis=0)]), np.vstack([mesh.F, [*edge, mesh.n_vertices]]))
     (curve,) = isolines(fin, fin.V[:, 2], 0.1)[0]
     solver, exact = solvers(fin)
-    assert solver._parts.last_steps._curve_walks is None
+    assert solver._parts.last_steps._searches.curve_walks is None
     truth = exact.distance(curve)
     assert np.abs(solver.distance(curve) - truth).mean() < 2e-4 * truth.mean()
 

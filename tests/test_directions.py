@@ -22,7 +22,6 @@ def walking(mesh: Mesh, refine: str) -> HeatMethodSolver:
     solver = HeatMethodSolver(mesh, refine=refine)
     if refine == "unfold":
         solver._parts.last_steps._takes_windows = lambda _: False
-        solver._parts.last_steps._is_straight = lambda _: False
     return solver
 
 

@@ -14,7 +14,7 @@ from heat_igl.mesh import Mesh, MeshLike, PointCloud, PolygonMesh, as_mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators
 from heat_igl.steps import Boundary
 from heat_igl.typing import ArrayLike, FloatArray
-from heat_igl.unfolding import Refine, UnfoldingSolver
+from heat_igl.unfolding import OrderedSolver, Refine
 
 __all__ = ["PreparedSolver"]
 
@@ -148,7 +148,7 @@ class PreparedSolver(BatchedSolver):
     def is_exact(self) -> bool:
         """Whether distances are exact: with ``refine="exact"``, and on small or rough meshes with another `refine`."""
         last_steps = self._parts.last_steps
-        return isinstance(last_steps, UnfoldingSolver) and last_steps.is_exact
+        return isinstance(last_steps, OrderedSolver) and last_steps.is_exact
 
     @property
     def operators(self) -> Operators:

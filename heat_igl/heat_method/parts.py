@@ -32,7 +32,7 @@ from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.unfolding import FrontSolver, UnfoldingSolver
+from heat_igl.unfolding import FrontSolver, OrderedSolver, UnfoldingSolver
 
 __all__ = ["SolverParts", "prepare", "prepare_mesh", "prepare_polygons"]
 
@@ -61,8 +61,8 @@ class SolverParts:
         From sources to right-hand sides.
     factored : HeatFlow or None
         Step 1; None with ``refine="exact"`` and for fronts, which take no heat: `heat_flow` factors it on request.
-    last_steps : Integration or UnfoldingSolver
-        Steps 2 and 3, or the unfolding that takes their place with ``refine``.
+    last_steps : Integration or OrderedSolver
+        Steps 2 and 3, or what takes their place: unfolding with ``refine``, or fronts.
     time_steps : (n_components,) float64
         Time step of each component.
     step_raised : (n_components,) bool
@@ -84,7 +84,7 @@ class SolverParts:
     analysis: Analysis | None
     assembler: SourceAssembler
     factored: HeatFlow | None
-    last_steps: Integration | UnfoldingSolver
+    last_steps: Integration | OrderedSolver
     time_steps: FloatArray
     step_raised: BoolArray
     t_damping: float | FloatArray | None
@@ -201,7 +201,7 @@ def prepare(
     t_damping = step if damped else None
     front_solver = None if domain.simplices is None or not options.leaves_heat else FrontSolver(domain.simplices)
     takes_heat = options.refine != "exact" and front_solver is None
-    unfolding: UnfoldingSolver | None = front_solver
+    unfolding: OrderedSolver | None = front_solver
     if unfolding is None and options.refine is not None:
         # Before there are factors: most memory is needed while the tables are made.
         unfolding = UnfoldingSolver(domain, options.refine, originals=originals)
@@ -214,7 +214,7 @@ def prepare(
     factored = time.perf_counter()
     mass_unit = domain.mean_mass if heat_flow is None else heat_flow.mean_mass
     assembler = SourceAssembler(domain, step, mass_unit, plain=not damped, unfolds=unfolding is not None)
-    last_steps: Integration | UnfoldingSolver
+    last_steps: Integration | OrderedSolver
     if heat_flow is None or poisson is None or divergence is None:
         last_steps = unfolding or UnfoldingSolver(domain, "exact")
     else:

@@ -27,7 +27,7 @@ from heat_igl.runtime import warn_caller
 from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
 from heat_igl.steps import Boundary
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
-from heat_igl.unfolding import FrontSolver, PathAngles, Refine, UnfoldingSolver
+from heat_igl.unfolding import FrontSolver, OrderedSolver, PathAngles, Refine, UnfoldingSolver
 
 __all__ = ["HeatMethodSolver", "heat_method_distance"]
 
@@ -193,7 +193,7 @@ class HeatMethodSolver(PreparedSolver):
 
     def _source_terms(self, source_sets: list[SourceSet], for_field: bool = False) -> list[SourceTerm]:
         """Initial heat of each set, and what is known near it; unfolding reads that only `for_field`, in `solve`."""
-        if isinstance(self._parts.last_steps, UnfoldingSolver):
+        if isinstance(self._parts.last_steps, OrderedSolver):
             return [self._parts.assembler.term(sources, takes_lines=for_field) for sources in source_sets]
         terms = [self._parts.assembler.term(sources) for sources in source_sets]
         return [drop_overtaken(term, self._parts.heat_flow, self.operators.n) for term in terms]
@@ -205,7 +205,7 @@ class HeatMethodSolver(PreparedSolver):
     def _distances_from_heat(self, terms: list[SourceTerm], u: FloatArray) -> FloatArray:
         """Distances (k, n) from the heat of `_heat`: steps 2 and 3, or unfolding in the order of the heat."""
         last_steps = self._parts.last_steps
-        if isinstance(last_steps, UnfoldingSolver):
+        if isinstance(last_steps, OrderedSolver):
             return last_steps.distances([term.sources for term in terms], u)
         divergence = last_steps.divergence(terms, u)
         phi = last_steps.poisson.solve(divergence)
@@ -230,7 +230,7 @@ class HeatMethodSolver(PreparedSolver):
         chosen = self._source_set(sources)
         terms = self._source_terms([chosen])
         u = self._order(terms)
-        if isinstance(self._parts.last_steps, UnfoldingSolver):
+        if isinstance(self._parts.last_steps, OrderedSolver):
             distance, labels = self._parts.last_steps.labelled(chosen, u[:, 0])
         else:
             distance = self._distances_from_heat(terms, u)[0]
@@ -276,10 +276,10 @@ class HeatMethodSolver(PreparedSolver):
     ) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
         """Distance, labels, and angles and starts of the shortest paths."""
         last_steps = self._parts.last_steps
-        if not isinstance(last_steps, UnfoldingSolver) or self._parts.options.refine == "sweep":
-            raise ValueError('directions follow paths: make the solver with refine="unfold" or refine="exact"')
         if isinstance(last_steps, FrontSolver):
             raise MeshError("directions need triangles that fit together: fronts through this domain follow no paths")
+        if not isinstance(last_steps, UnfoldingSolver) or self._parts.options.refine == "sweep":
+            raise ValueError('directions follow paths: make the solver with refine="unfold" or refine="exact"')
         (term,) = self._source_terms([self._source_set(sources)])
         return last_steps.directed(term.sources, self._order([term])[:, 0], tolerance)
 

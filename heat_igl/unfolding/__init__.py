@@ -13,6 +13,7 @@ from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
 from heat_igl.unfolding.from_vertex import vectors_from
 from heat_igl.unfolding.fronts import FrontSolver
 from heat_igl.unfolding.local import blocks_within, distances_within, nearest_vertices, pair_distances
+from heat_igl.unfolding.ordered import OrderedSolver
 from heat_igl.unfolding.path_derivatives import Change
 from heat_igl.unfolding.path_lengths import PathLengths, SideChange, from_lines
 from heat_igl.unfolding.refinement import Known, Refine, Refinement
@@ -28,6 +29,7 @@ __all__ = [
     "Front",
     "FrontSolver",
     "Known",
+    "OrderedSolver",
     "Origin",
     "PathAngles",
     "PathLengths",

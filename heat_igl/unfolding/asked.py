@@ -9,6 +9,7 @@ import numpy as np
 
 from heat_igl.errors import is_number, shown
 from heat_igl.mesh import SurfacePoints
+from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.sources import NearField, SourcePoints, SourceSegments, SourceSet
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSolution
@@ -18,18 +19,18 @@ __all__ = [
     "Asked",
     "asked_of",
     "from_earliest",
-    "groups_of",
     "known_of",
     "labels_of",
     "require_share",
+    "starting_points",
     "with_samples",
 ]
 
 
 class Asked(NamedTuple):
-    """What distance starts from, and when; `labels` and `angles` are filled if given.
+    """The sources of one query with their offsets; `labels` and `angles` are filled if given.
 
-    Without `segments`, points stand for curves.
+    Without `segments`, points stand for curves, and `groups` says of each source which curve it is a point of.
     """
 
     vertices: IntArray
@@ -40,6 +41,7 @@ class Asked(NamedTuple):
     labels: IntArray | None
     angles: FloatArray | None
     tolerance: float | None
+    groups: IntArray | None
 
     @property
     def starts(
@@ -74,10 +76,11 @@ def asked_of(sources: SourceSet, points: SourcePoints, takes_curves: bool = True
         None,
         None,
         None,
+        _groups_of(sources, points),
     )
 
 
-def groups_of(sources: SourceSet, points: SourcePoints) -> IntArray | None:
+def _groups_of(sources: SourceSet, points: SourcePoints) -> IntArray | None:
     """For each source, which curve it is a point of, or itself; None if there are no curves."""
     if not len(sources.segments.faces):
         return None
@@ -92,6 +95,25 @@ def with_samples(sources: SourceSet, near_field: NearField, spacing: float) -> S
     """The points of a set, and points on its curves that are at most `spacing` apart."""
     samples, _ = near_field.samples(sources.segments, spacing)
     return sources.points.joined(samples).joined(sources.segments.ends())
+
+
+def starting_points(corner: IntArray, points: SourcePoints, origin: IntArray) -> SurfacePoints:
+    """The places (n,) at which paths start.
+
+    Parameters
+    ----------
+    corner : (k,) int64
+        A corner ``3 f + c`` of a face at each source vertex.
+    points : SourcePoints
+        p further sources.
+    origin : (n,) int64
+        The source of each path: a vertex below k, a point below k + p; a corner of face 0 stands for -1, no path.
+    """
+    # After vertices and points comes nothing, at which the index -1 looks.
+    corner, nothing = corner.astype(np.int64), np.zeros(1, np.int64)
+    faces = np.concatenate([corner // 3, points.faces, nothing])
+    barycentric = np.concatenate([np.eye(3)[corner % 3], points.barycentric, np.eye(3)[:1]])
+    return unchecked_points(faces[origin], barycentric[origin])
 
 
 def from_earliest(sources: SourceSet, components: IntArray, F: IntArray) -> tuple[FloatArray, SourceSet]:
@@ -110,10 +132,8 @@ def from_earliest(sources: SourceSet, components: IntArray, F: IntArray) -> tupl
     )
 
 
-def known_of(asked: Asked, near: ExactSolution | None) -> Known | None:
-    """Vertices that a sweep begins with."""
-    if near is None:
-        return None
+def known_of(asked: Asked, near: ExactSolution) -> Known:
+    """Vertices that a sweep begins with, from the exact distance near the sources."""
     is_found = np.isfinite(near.distance)
     is_found[asked.vertices] = False
     vertex = np.flatnonzero(is_found)

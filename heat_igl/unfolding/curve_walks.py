@@ -12,8 +12,9 @@ from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
 from heat_igl.intrinsic.layout import apex
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.mesh.grouping import next_in_run
+from heat_igl.operators import Surface
 from heat_igl.runtime import both
-from heat_igl.sources import SourceSegments
+from heat_igl.sources import SourceSegments, SourceSet
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.directions import PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
@@ -22,7 +23,7 @@ from heat_igl.unfolding.numbered import WalkStarts
 from heat_igl.unfolding.refinement import Refinement
 from heat_igl.unfolding.walks import unknown
 
-__all__ = ["CurveWalks", "are_closed"]
+__all__ = ["CurveWalks", "are_only_closed_curves"]
 
 # How large the cubic part of the distance between two vertices may be, as a share of the way to the nearer one. With
 # ten times as much the mean error of circles on a plane is 0.023 instead of 0.008 %, with half 0.005 %.
@@ -35,7 +36,19 @@ _PLACES = (0.02, 0.5, 0.98)
 _SAME_PLACE = 1e-6
 
 
-def are_closed(segments: SourceSegments, V: FloatArray, F: IntArray) -> bool:
+def are_only_closed_curves(sources: SourceSet, surface: Surface, reach: float) -> bool:
+    """Whether walks can begin near these sources: closed curves alone, in faces with sides no longer than `reach`.
+
+    Distance must be known up to `reach`, so that it is known at all corners of the faces in which curves run.
+    """
+    segments, faces, V = sources.segments, surface.faces, surface.V
+    has_others = len(sources.vertices) or len(sources.points.faces) or not len(segments.faces)
+    if has_others or faces is None or V is None:
+        return False
+    return bool(faces.l[segments.faces].max() <= reach) and _are_closed(segments, V, faces.F)
+
+
+def _are_closed(segments: SourceSegments, V: FloatArray, F: IntArray) -> bool:
     """Whether each segment ends at the beginning of the next of the same source, and the last at the first.
 
     Around the ends of open curves fronts are round, and points that stand for curves give smaller errors.

@@ -14,8 +14,8 @@ from heat_igl.mesh import connectivity
 from heat_igl.operators import MetricSimplices
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.ordered import OrderedSolver
 from heat_igl.unfolding.reflex_edges import reflex_edges
-from heat_igl.unfolding.solver import UnfoldingSolver
 
 __all__ = ["FrontSolver"]
 
@@ -30,7 +30,7 @@ _ROUNDING = 1e-9
 _STRAIGHT, _UNKNOWN = -1, -2
 
 
-class FrontSolver(UnfoldingSolver):
+class FrontSolver(OrderedSolver):
     """Distance by fronts that pass through simplices, each with edge lengths of its own; no heat is read.
 
     In space, distance follows straight lines from the sources, and lines that bend around edges of the body with more
