@@ -6,33 +6,21 @@ edges (Sharp and Crane 2020). Each step looks at a few faces only, and there is 
 """
 
 import cython
-import numpy as np
 from cython.cimports.heat_igl.kernels.funnels import Layout
+from cython.cimports.heat_igl.kernels.joints import Joints
 from cython.cimports.heat_igl.kernels.polylines import GAIN_OF_PART, SAME_ANGLE
-from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
-from cython.cimports.heat_igl.kernels.straightening import NEARLY_STRAIGHT, Course
+from cython.cimports.heat_igl.kernels.straightening import Course
 from cython.cimports.heat_igl.kernels.strips import Strip
 from cython.cimports.heat_igl.kernels.surfaces import Place, at_corner, corner_of
-from cython.cimports.libc.math import INFINITY, M_PI, atan2, fabs, hypot
+from cython.cimports.libc.math import INFINITY, atan2, hypot
 
 __all__ = ["Polyline"]
-
-_JOINT = np.dtype(
-    [
-        *((name, "f8") for name in ("length", "leave", "arrive")),
-        *((name, "i4") for name in ("vertex", "face", "first", "count", "before", "after")),
-    ],
-    align=True,
-)
-_CROSSING = np.dtype([("leave", "i4"), ("enter", "i4")])
-# Joints for which there is room at first.
-_ROOM = 512
 
 
 @cython.final
 @cython.cclass
 class Polyline:
-    """The loop of a course on an oriented manifold, as joints that are linked in a ring.
+    """The loop of a course on an oriented manifold, as joints with straight parts between them.
 
     `polar` (3 m,) is the angle of each corner's right side around its vertex, counterclockwise; `total` (n,) the sum of
     the angles, negative on the boundary; `across` (3 m,) the half-edge on the other side, -1 for none. All are empty
@@ -41,11 +29,9 @@ class Polyline:
 
     def __init__(self, course: Course, polar, total, across):
         self.course, self.s = course, course.s
-        self.polar, self.total, self.across = polar, total, across
+        self.polar, self.across = polar, across
         self.is_oriented = len(polar) > 0
-        self.strip, self.layout = Strip(), Layout()
-        self.crossing = np.empty(2 * _ROOM, _CROSSING)
-        self.joint, self.free, self.queue = np.empty(_ROOM, _JOINT), np.empty(_ROOM, np.int32), PriorityQueue(_ROOM)
+        self.joints, self.strip, self.layout = Joints(total), Strip(), Layout()
 
     @cython.cfunc
     @cython.nogil
@@ -58,12 +44,12 @@ class Polyline:
         after: cython.int
         if n < 2:
             return False
-        self.clear(n)
+        self.joints.clear(n)
         # Joint 0 is the base, and joint i is at bend i.
-        self.make(self.course.vertex)
+        self.joints.make(self.course.vertex)
         for i in range(1, n):
             bend = cython.address(self.course.layout.bend[i])
-            self.make(self.course.layout.gate[bend.last].vertex[bend.side])
+            self.joints.make(self.course.layout.gate[bend.last].vertex[bend.side])
         for i in range(n):
             bend = cython.address(self.course.layout.bend[i])
             self.face = self.course.strip.crossing[bend.last].enter // 3 if i > 0 else self.course.face
@@ -71,63 +57,23 @@ class Polyline:
             for j in range(bend.last + 1, self.course.layout.bend[i + 1].first):
                 self.strip.push(self.course.strip.crossing[j].leave, self.course.strip.crossing[j].enter)
             after = i + 1 if i < n - 1 else 0
-            self.trim(self.joint[i].vertex, self.joint[after].vertex)
-            if not self.lay_out(self.joint[i].vertex, self.joint[after].vertex) > 0.0:
+            self.trim(self.joints.joint[i].vertex, self.joints.joint[after].vertex)
+            if not self.lay_out(self.joints.joint[i].vertex, self.joints.joint[after].vertex) > 0.0:
                 return False
             self.link(i, after)
         for i in range(n):
-            self.check(i)
+            self.joints.check(i)
         return True
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
-    def clear(self, count: cython.int) -> cython.int:
-        """Forget the last loop, and make room for more than so many joints."""
-        i: cython.int
-        if 2 * count > self.joint.shape[0]:
-            with cython.gil:
-                self.joint, self.free = np.empty(4 * count, _JOINT), np.empty(4 * count, np.int32)
-                self.queue = PriorityQueue(4 * count)
-        while self.queue.count > 0:
-            self.queue.set_key(self.queue.first(), 0.0)
-        self.n_crossings = self.n_joints = self.some = 0
-        self.n_free = cython.cast(cython.int, self.joint.shape[0])
-        for i in range(self.n_free):
-            self.free[i] = self.n_free - 1 - i
-        return 0
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def make(self, v: cython.int) -> cython.int:
-        """A new joint at vertex v, the first with number 0."""
-        self.n_free -= 1
-        self.n_joints += 1
-        k: cython.int = self.free[self.n_free]
-        self.joint[k].vertex = v
-        return k
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def remove(self, k: cython.int) -> cython.void:
-        """Forget a joint."""
-        self.queue.set_key(k, 0.0)
-        self.free[self.n_free] = k
-        self.n_free += 1
-        self.n_joints -= 1
-        if self.some == k:
-            self.some = self.joint[k].before
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def relax(self) -> cython.int:
         """Shorten the loop at its joints until no angle is below pi, or one joint is left."""
-        while self.queue.count > 0 and self.n_joints > 1:
-            k: cython.int = cython.cast(cython.int, self.queue.first())
-            self.queue.set_key(k, 0.0)
+        while self.joints.count > 1:
+            k: cython.int = self.joints.sharpest()
+            if k < 0:
+                return 0
             self.shorten(k)
         return 0
 
@@ -136,65 +82,40 @@ class Polyline:
     @cython.exceptval(-1, check=False)
     def shorten(self, k: cython.int) -> cython.int:
         """Lead the loop past joint k on the side of the smaller angle, if that makes it shorter."""
-        p: cython.int = self.joint[k].before
-        q: cython.int = self.joint[k].after
-        v: cython.int = self.joint[p].vertex
-        w: cython.int = self.joint[q].vertex
+        p: cython.int = self.joints.joint[k].before
+        q: cython.int = self.joints.joint[k].after
+        v: cython.int = self.joints.joint[p].vertex
+        w: cython.int = self.joints.joint[q].vertex
         on_left: cython.bint = False
-        angle: cython.double = self.angle(k, cython.address(on_left))
-        self.face, self.strip.count = self.joint[p].face, 0
-        self.push(p, self.strip)
+        angle: cython.double = self.joints.angle(k, cython.address(on_left))
+        self.face, self.strip.count = self.joints.joint[p].face, 0
+        self.joints.push(p, self.strip)
         n: cython.int = self.strip.count
         f: cython.int = self.last_face()
-        goal: cython.int = self.joint[k].face
-        if not self.turn(self.strip, self.joint[k].vertex, f, goal, on_left, angle):
+        goal: cython.int = self.joints.joint[k].face
+        if not self.turn(self.strip, self.joints.joint[k].vertex, f, goal, on_left, angle):
             # On a spur, rounding decides which side has the smaller angle, and no faces may lie on the other one.
             self.strip.count = n
-            if not self.turn(
-                self.strip, self.joint[k].vertex, self.last_face(), self.joint[k].face, not on_left, angle
-            ):
+            if not self.turn(self.strip, self.joints.joint[k].vertex, f, goal, not on_left, angle):
                 return 0
-        self.push(k, self.strip)
+        self.joints.push(k, self.strip)
         self.trim(v, w)
         if self.strip.count == 0 and v == w:
-            return self.meet(p, k, q)
-        length: cython.double = self.joint[p].length + self.joint[k].length
-        if not self.lay_out(v, w) < length * (1.0 - GAIN_OF_PART) or self.layout.n_bends - 2 > self.n_free:
+            if self.joints.remove_spur(p, k, q):
+                self.joints.joint[p].face = self.face
+            return 1
+        length: cython.double = self.joints.joint[p].length + self.joints.joint[k].length
+        if not self.lay_out(v, w) < length * (1.0 - GAIN_OF_PART) or self.layout.n_bends - 2 > self.joints.n_free:
             return 0
-        self.remove(k)
+        self.joints.remove(k)
         self.link(p, q)
-        self.check(p)
-        k = self.joint[p].after
+        self.joints.check(p)
+        k = self.joints.joint[p].after
         while k != q:
-            self.check(k)
-            k = self.joint[k].after
-        self.check(q)
+            self.joints.check(k)
+            k = self.joints.joint[k].after
+        self.joints.check(q)
         return 1
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def angle(self, k: cython.int, on_left: cython.pointer[cython.bint]) -> cython.double:
-        """The smaller angle at joint k, and on which side it is."""
-        total: cython.double = self.total[self.joint[k].vertex]
-        # Counterclockwise from where the loop leaves to where it comes from.
-        left: cython.double = self.joint[self.joint[k].before].arrive - self.joint[k].leave
-        if total < 0.0:
-            # On the boundary there is one side.
-            on_left[0] = left > 0.0
-            return fabs(left)
-        if left < 0.0:
-            left += total
-        on_left[0] = left < 0.5 * total
-        return left if on_left[0] else total - left
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def check(self, k: cython.int) -> cython.void:
-        """Put joint k into the queue if the angle there is below pi, or else take it out."""
-        on_left: cython.bint = False
-        self.queue.set_key(k, max(M_PI - NEARLY_STRAIGHT - self.angle(k, cython.address(on_left)), 0.0))
 
     @cython.cfunc
     @cython.nogil
@@ -242,8 +163,8 @@ class Polyline:
         i: cython.int
         for i in range(1, n):
             bend = cython.address(self.layout.bend[i])
-            k: cython.int = b if i == n - 1 else self.make(self.layout.gate[bend.last].vertex[bend.side])
-            self.joint[a].after, self.joint[k].before = k, a
+            k: cython.int = b if i == n - 1 else self.joints.make(self.layout.gate[bend.last].vertex[bend.side])
+            self.joints.joint[a].after, self.joints.joint[k].before = k, a
             self.set_part(a, f, begin, bend.first, i)
             if i < n - 1:
                 begin, f = bend.last + 1, self.strip.crossing[bend.last].enter // 3
@@ -255,27 +176,21 @@ class Polyline:
     @cython.exceptval(-1, check=False)
     def set_part(self, a: cython.int, f: cython.int, begin: cython.int, end: cython.int, i: cython.int) -> cython.int:
         """Make the part after joint a the line to bend i of the layout: crossings `begin` to `end`, out of face f."""
-        joint = cython.address(self.joint[a])
+        joint = cython.address(self.joints.joint[a])
         p = cython.address(self.layout.bend[i - 1])
         q = cython.address(self.layout.bend[i])
         dx: cython.double = q.x - p.x
         dy: cython.double = q.y - p.y
-        j: cython.int
         c: cython.int = corner_of(self.s, f, joint.vertex)
-        joint.face, joint.first, joint.count, joint.length = f, self.n_crossings, max(end - begin, 0), hypot(dx, dy)
+        joint.face, joint.length = f, hypot(dx, dy)
+        self.joints.set_crossings(a, self.strip, begin, max(begin, end))
         if joint.count == 0:
             # An edge of face f.
             t = cython.address(self.s.triangle[f])
-            e: cython.int = corner_of(self.s, f, self.joint[joint.after].vertex)
+            e: cython.int = corner_of(self.s, f, self.joints.joint[joint.after].vertex)
             joint.leave = self.polar[3 * f + c] + (0.0 if e == (c + 1) % 3 else t.angle[c])
             joint.arrive = self.polar[3 * f + e] + (0.0 if c == (e + 1) % 3 else t.angle[e])
             return 0
-        if self.n_crossings + joint.count > self.crossing.shape[0]:
-            with cython.gil:
-                self.crossing = np.concatenate([self.crossing, np.empty(self.n_crossings + joint.count, _CROSSING)])
-        for j in range(begin, end):
-            self.crossing[self.n_crossings] = self.strip.crossing[j]
-            self.n_crossings += 1
         # Seen from the start the right end of the first crossing is on the right, and from the end the left one.
         gate = cython.address(self.layout.gate[begin])
         angle: cython.double = _left_of(gate.x[1] - p.x, gate.y[1] - p.y, dx, dy)
@@ -285,29 +200,6 @@ class Polyline:
         angle = _left_of(gate.x[0] - q.x, gate.y[0] - q.y, -dx, -dy)
         joint.arrive = self.polar[h] + min(angle, self.s.triangle[h // 3].angle[h % 3])
         return 0
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def meet(self, p: cython.int, k: cython.int, q: cython.int) -> cython.int:
-        """Take away a spur from joint p to joint k and back to joint q, which is at the vertex of p."""
-        self.remove(k)
-        after: cython.int = self.joint[q].after
-        before: cython.int = self.joint[p].before
-        if p == q:
-            # The loop contracts to a point.
-            self.joint[p].before = self.joint[p].after = p
-            self.joint[p].face, self.joint[p].count, self.joint[p].length = self.face, 0, 0.0
-            return 1
-        self.joint[p] = self.joint[q]
-        self.remove(q)
-        if after == p:
-            before = after = p
-        self.joint[p].before, self.joint[p].after = before, after
-        self.joint[before].after = self.joint[after].before = p
-        self.some = p
-        self.check(p)
-        return 1
 
     @cython.cfunc
     @cython.nogil
@@ -333,39 +225,29 @@ class Polyline:
     @cython.exceptval(-1, check=False)
     def write(self) -> cython.int:
         """Make the loop the strip of the course, based at a joint."""
-        k: cython.int = self.some
-        f: cython.int = self.joint[k].face
-        start: Place = at_corner(corner_of(self.s, f, self.joint[k].vertex))
-        self.course.begin(f, self.joint[k].vertex, cython.address(start))
+        k: cython.int = self.joints.some
+        f: cython.int = self.joints.joint[k].face
+        start: Place = at_corner(corner_of(self.s, f, self.joints.joint[k].vertex))
+        self.course.begin(f, self.joints.joint[k].vertex, cython.address(start))
         while True:
-            self.push(k, self.course.strip)
-            k = self.joint[k].after
-            if k == self.some:
+            self.joints.push(k, self.course.strip)
+            k = self.joints.joint[k].after
+            if k == self.joints.some:
                 return 0
-            self.lead(self.joint[k].vertex, self.course.last_face(), self.joint[k].face)
+            self.lead(self.joints.joint[k].vertex, self.course.last_face(), self.joints.joint[k].face)
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def lead(self, v: cython.int, f: cython.int, goal: cython.int) -> cython.bint:
         """Lead the strip of the course around v from face f to face `goal`, the shorter way; False if there is none."""
-        total: cython.double = self.total[v]
+        total: cython.double = self.joints.total[v]
         left: cython.double = self.polar[3 * f + corner_of(self.s, f, v)]
         left -= self.polar[3 * goal + corner_of(self.s, goal, v)]
         if total > 0.0 and left < 0.0:
             left += total
         on_left: cython.bint = left < 0.5 * total if total > 0.0 else left > 0.0
         return self.turn(self.course.strip, v, f, goal, on_left, INFINITY)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
-    def push(self, k: cython.int, strip: Strip) -> cython.int:
-        """Add the crossings of the part after joint k to a strip."""
-        j: cython.int
-        for j in range(self.joint[k].first, self.joint[k].first + self.joint[k].count):
-            strip.push(self.crossing[j].leave, self.crossing[j].enter)
-        return 0
 
     @cython.cfunc
     @cython.nogil
