@@ -114,4 +114,6 @@ def test_a_row_that_does_not_pass_sets_the_status(capsys: pytest.CaptureFixture[
 def test_unknown_kinds_are_refused(asked):
     with pytest.raises(ValueError, match=r"domains must be among 'point cloud', 'metric', .* not"):
         heat_igl.validate_domains(asked)
+    with pytest.raises(ValueError, match="domains is empty: choose among 'point cloud', 'metric'"):
+        heat_igl.validate_domains([])
     assert heat_igl.validate_domains("image").rows

@@ -109,7 +109,7 @@ def test_positions_in_the_plane():
     ("positions", "options", "message"),
     [
         ([[0, 0, 0]], {}, "two corners of a curve or more, not 1"),
-        ([[0] * 4, [1] * 4], {}, r"positions must have shape \(k, 3\), a row for each, not \(2, 4\)"),
+        ([[0] * 4, [1] * 4], {}, r"positions must have shape \(k, 3\), a row for each, or .*, not \(2, 4\)"),
         ([[0, 0, 0], [1, np.nan, 0]], {}, r"positions\[1\] = \[1.0, nan, 0.0\] is not finite"),
         ([["a", 0, 0], [1, 0, 0]], {}, "positions must be real numbers"),
         ([[0.5, 0.5, 0], [0.5, 0.5, 0]], {}, "all in one place"),

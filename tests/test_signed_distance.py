@@ -194,6 +194,8 @@ def test_points_with_normals():
         distance = SignedHeatSolver(mesh, refine=refine).distance(samples)
         assert mean_error(distance, truth) < 0.06
         np.testing.assert_array_equal(distance[far] < 0, truth[far] < 0)
+    in_plane = OrientedPoints(places, normals[:, :2])
+    np.testing.assert_array_equal(in_plane.normals, normals * [1, 1, 0])
     mixed = SignedHeatSolver(mesh).distance([samples, ring(mesh)])
     assert mean_error(mixed, truth) < 0.03
 
@@ -313,7 +315,8 @@ def test_the_smooth_part_of_the_level_is_the_least_one(monkeypatch):
     mesh = Mesh(V, np.concatenate([small.F, large.F + small.n_vertices]))
     curves = isolines(mesh, V @ [0.2, 0.4, 0.9], 0.1)[0]
     solver = SignedHeatSolver(mesh)
-    domain, pieces = solver.operators, solver._pieces(oriented_set(curves, mesh))
+    domain, integration = solver.operators, solver._integration
+    pieces = integration._pieces(oriented_set(curves, mesh))
     on_curves = curve_levels._OnCurves(domain, mesh.F, pieces)
     values = np.sin(5 * pieces.barycentric[:, 0] + pieces.faces)
     h = domain.mean_edge_lengths[on_curves.component]
@@ -324,7 +327,7 @@ def test_the_smooth_part_of_the_level_is_the_least_one(monkeypatch):
     off = []
     for steps in (3, 200):
         monkeypatch.setattr(curve_levels, "_SMOOTH_STEPS", steps)
-        found = solver._levels._smooth(values, on_curves)
+        found = integration._levels._smooth(values, on_curves)
         off.append(np.abs(found - truth).max() / np.abs(truth).max())
     assert off[1] < 1e-9
     assert off[0] < 0.2
@@ -434,8 +437,10 @@ def test_bad_curves():
             solver.distance(curves)
     with pytest.raises(ValueError, match="level must be one of 'zero', 'constant', 'none', not 'all'"):
         solver.distance(circle, level="all")
-    with pytest.raises(SourceError, match=r"normals must have shape \(1, 3\), not \(1, 2\)"):
-        OrientedPoints(point, [[1, 0]])
+    with pytest.raises(SourceError, match=r"normals must have shape \(1, 3\), not \(2, 3\)"):
+        OrientedPoints(point, [[1, 0, 0], [1, 0, 0]])
+    with pytest.raises(SourceError, match=r"normals must have shape \(k, 3\), .* or \(k, 2\) .*, not \(1, 4\)"):
+        OrientedPoints(point, [[1, 0, 0, 0]])
     with pytest.raises(SourceError, match=r"normals\[0\] = .* must be finite and not 0"):
         OrientedPoints(point, [[0, 0, 0]])
     with pytest.raises(SourceError, match="points must be SurfacePoints"):

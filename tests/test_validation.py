@@ -305,12 +305,12 @@ def test_what_counts_as_one_set_of_sources() -> None:
     mask = np.zeros(mesh.n_vertices, bool)
     mask[[3, 7]] = True
     for one in ([3, 7], (3, 7), np.array([3, 7]), mask, [[3, 7]], [mask]):
-        assert [sources.tolist() for sources in validate(mesh, one, [], None).source_sets] == [[3, 7]]
+        assert [sources.tolist() for sources in validate(mesh, one, ["heat"], None).source_sets] == [[3, 7]]
     for two in ([[3], [7]], [[3], 7], ([3], np.array([7]))):
-        assert [sources.tolist() for sources in validate(mesh, two, [], None).source_sets] == [[3], [7]]
-    assert validate(mesh, 3, [], None).source_sets[0].tolist() == [3]
+        assert [sources.tolist() for sources in validate(mesh, two, ["heat"], None).source_sets] == [[3], [7]]
+    assert validate(mesh, 3, ["heat"], None).source_sets[0].tolist() == [3]
     with pytest.raises(SourceError, match="is no vertex"):
-        validate(mesh, [[3], [99]], [], None)
+        validate(mesh, [[3], [99]], ["heat"], None)
 
 
 def test_several_sources_have_no_asymmetry() -> None:
@@ -319,12 +319,14 @@ def test_several_sources_have_no_asymmetry() -> None:
     assert row.triangle_excess is None
 
 
-def test_unknown_and_repeated_methods_are_refused() -> None:
+def test_unknown_repeated_and_no_methods_are_refused() -> None:
     mesh = shapes.grid(3)
     with pytest.raises(ValueError, match="'magic' is unknown: choose from heat, sweep, unfold, meshlab"):
         validate(mesh, 0, ["magic"])
     with pytest.raises(ValueError, match="'magic' is unknown"):
         validate(mesh, 0, ["heat"], "magic")
+    with pytest.raises(ValueError, match="methods is empty: choose from heat, sweep"):
+        validate(mesh, 0, [])
     with pytest.raises(ValueError, match="different names, not heat, heat"):
         validate(mesh, 0, ["heat", "heat"])
     with pytest.raises(ValueError, match="'heat' names a method of the package"):

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import reduce
 from typing import get_args
 
 import numpy as np
 
 from heat_igl.errors import MeshError, SourceError, require_choice
-from heat_igl.heat_method.curve_levels import CurveLevels, Level, Pieces
+from heat_igl.heat_method.curve_levels import Level
 from heat_igl.heat_method.curve_sides import (
     has_gaps,
     left_of_closed,
@@ -16,18 +15,17 @@ from heat_igl.heat_method.curve_sides import (
     vertices_on,
     zero_curve_in_gaps,
 )
-from heat_igl.heat_method.integration import Integration
+from heat_igl.heat_method.normal_integration import NormalIntegration
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.parts import prepare
 from heat_igl.heat_method.solver import HeatMethodSolver
-from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_gradient, lay_out, oriented
+from heat_igl.intrinsic import IntrinsicTriangulation, oriented
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
-from heat_igl.operators import Operators, divergence_matrix, edge_rotations, face_rotations, operators
-from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, both
+from heat_igl.operators import Operators, operators
+from heat_igl.runtime import both
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, source_set
-from heat_igl.steps import PoissonProblem, VectorHeatFlow
-from heat_igl.typing import AnyArray, BoolArray, FloatArray
+from heat_igl.typing import BoolArray, FloatArray
 from heat_igl.unfolding import CurvedFronts, Front, Refine
 
 __all__ = ["Level", "SignedHeatSolver"]
@@ -35,8 +33,6 @@ __all__ = ["Level", "SignedHeatSolver"]
 # Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
 # alike (docs/signed.md).
 _T_COEF = 0.25
-# Normals that sum to less than this share of the length of the curves have cancelled.
-_CANCELLED = 1e-9
 
 
 class SignedHeatSolver:
@@ -98,26 +94,14 @@ class SignedHeatSolver:
         options = SolverOptions(_T_COEF if is_default else t_coef, t, refine=refine, backend=backend)
         self._mesh = as_simplices(mesh)
         self._refines = refine is not None
-        domain, self._faces, self._triangulation = _oriented_domain(self._mesh)
+        domain, self._faces, triangulation = _oriented_domain(self._mesh)
         parts = prepare(domain, options, V=self._mesh.V)
-        self._heat_flow = parts.heat_flow
-        last_steps = parts.last_steps
-        if isinstance(last_steps, Integration):
-            self._poisson = last_steps.poisson
-        else:
-            self._poisson = PoissonProblem(domain, options.backend, parts.analysis)
-        self._vector_flow = VectorHeatFlow(
-            domain, edge_rotations(domain), _one_or_all(parts.time_steps), options.backend, parts.fitted
-        )
-        self._rotations = face_rotations(domain)
-        self._domain = domain
-        gradient = intrinsic_gradient(self._triangulation).tocsr()
-        self._D = divergence_matrix(gradient, self._triangulation.areas)
-        self._levels = CurveLevels(domain, self._mesh.F, self._heat_flow, self._poisson)
+        self._domain = parts.operators
+        self._integration = NormalIntegration(self._mesh, self._faces, triangulation, parts)
         self._unsigned = HeatMethodSolver._of(parts)
         self._fronts: CurvedFronts | None = None
         if refine is None and is_default:
-            self._fronts = CurvedFronts(self._faces, self._triangulation, domain.mean_edge_length)
+            self._fronts = CurvedFronts(self._faces, triangulation, domain.mean_edge_length)
 
     def __repr__(self) -> str:
         return repr(self._unsigned).replace("HeatMethodSolver", "SignedHeatSolver", 1)
@@ -195,7 +179,7 @@ class SignedHeatSolver:
 
     def _from_heat(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) by integration, and which vertices (n,) are on the left."""
-        phi = self._integrated(self._pieces(chosen), level)
+        phi = self._integration.distance(chosen, level)
         if level == "zero":
             phi[vertices_on(self._mesh, chosen)] = 0.0
         if level == "zero" and not has_gaps(self._mesh, chosen):
@@ -213,8 +197,8 @@ class SignedHeatSolver:
             size = self._continued(near)
             if (is_known | (size == 0) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
-            return size, np.where(is_known, left, self._integrated(self._pieces(chosen), level) < 0)
-        near, phi = both(lambda: self._near(sources), lambda: self._integrated(self._pieces(chosen), level))
+            return size, np.where(is_known, left, self._integration.distance(chosen, level) < 0)
+        near, phi = both(lambda: self._near(sources), lambda: self._integration.distance(chosen, level))
         left = left_of_nearest(self._faces, chosen, near.distance, phi < 0)
         closing = zero_curve_in_gaps(self._mesh, phi, near.distance, self._domain.mean_edge_length)
         return self._continued(near if closing is None else near.before(self._near([closing]))), left
@@ -228,58 +212,6 @@ class SignedHeatSolver:
     def _continued(self, front: Front) -> FloatArray:
         """Distance (n,) at all vertices, from that near the curves."""
         return front.distance if self._fronts is None else self._fronts.continued(front)
-
-    def _pieces(self, chosen: OrientedSet) -> Pieces:
-        """Segments and points with their normals in the planes of their faces."""
-        flat = lay_out(self._faces.l[chosen.faces]) @ np.array([1, 1j])
-        along = np.einsum("sc,sc->s", chosen.end - chosen.start, flat)
-        length = np.abs(along)
-        corners = self._mesh.V[self._mesh.F[chosen.point_faces]]
-        x, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        y = np.cross(np.cross(x, other), x)
-        at_points = [np.einsum("kx,kx->k", axis, chosen.normals) / np.linalg.norm(axis, axis=1) for axis in (x, y)]
-        normal = at_points[0] + 1j * at_points[1]
-        across = np.abs(normal) <= _CANCELLED * np.linalg.norm(chosen.normals, axis=1)
-        if across.any():
-            first = int(np.argmax(across))
-            raise SourceError(
-                f"normals[{first}] is that of the face, and has no direction on the surface "
-                f"({int(across.sum())} normals are like that): give the normals of the curve that the points sample"
-            )
-        return Pieces(
-            np.concatenate([chosen.faces, chosen.point_faces]),
-            np.concatenate([(chosen.start + chosen.end) / 2, chosen.point_barycentric]),
-            # To the right of a segment is its direction turned by -90 degrees.
-            np.concatenate([-1j * _unit(along), _unit(normal)]),
-            np.concatenate([length, np.full(len(normal), self._domain.mean_edge_length)]),
-            np.concatenate([chosen.label, chosen.point_label]),
-            np.arange(len(chosen.faces) + len(normal)) >= len(chosen.faces),
-        )
-
-    def _integrated(self, pieces: Pieces, level: Level) -> FloatArray:
-        """The signed distance (n,): steps 1 to 3 of the method, and the level."""
-        # Step 1: diffuse the normals, integrated against the hat functions.
-        corners = self._mesh.F[pieces.faces]
-        share = pieces.weight[:, None] * pieces.barycentric
-        at_corners = share * pieces.normal[:, None] * self._rotations.of_faces[pieces.faces].conj()
-        b = np.zeros(self.n_vertices, complex)
-        np.add.at(b, corners, at_corners)
-        largest = np.abs(b).max()
-        if largest <= _CANCELLED * share.max():
-            raise SourceError(
-                "the normals of the curves cancel: two curves run along each other in opposite directions"
-            )
-        Y = self._vector_flow.solve(b * (SOURCE_HEAT / largest))
-        # Step 2: the unit field in faces.
-        # Dividing by the largest first keeps squares in range. Corner by corner is faster than along an axis of three.
-        at_vertices = np.abs(Y)
-        size = reduce(np.maximum, (at_vertices[corner] for corner in self._triangulation.F.T))
-        scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > LOWEST_HEAT)
-        turned = zip(self._rotations.of_triangulation.T, self._triangulation.F.T, strict=True)
-        X = _unit(reduce(np.add, (rotation * (scale * Y[corner]) for rotation, corner in turned)))
-        # Step 3: L phi = D X.
-        phi = self._poisson.solve(self._D @ np.concatenate([X.real, X.imag]))
-        return phi - self._levels.of(phi, pieces, level)
 
 
 def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, IntrinsicTriangulation]:
@@ -315,14 +247,3 @@ def _shared_edge(mesh: Mesh) -> str:
         f"more than two faces meet at the edge{first}{count}: a curve that crosses it has no one left and right, and a "
         "sign no meaning beyond; separate the sheets, or take the sides of closed curves from cut(mesh, curves).sides"
     )
-
-
-def _one_or_all(steps: FloatArray) -> float | FloatArray:
-    """Time steps (n_components,) as one number if they are equal."""
-    return float(steps[0]) if (steps == steps[0]).all() else np.array(steps)
-
-
-def _unit(numbers: AnyArray) -> AnyArray:
-    """Complex numbers divided by their size; 0 stays."""
-    size = np.abs(numbers)
-    return np.divide(numbers, size, out=np.zeros_like(numbers), where=size > 0)

@@ -187,8 +187,8 @@ class Mesh:
 
         Parameters
         ----------
-        V : (n, 3) array_like
-            New positions of all vertices; copied to float64.
+        V : (n, 3) or (n, 2) array_like
+            New positions of all vertices, as for `Mesh`; copied to float64.
 
         Raises
         ------

@@ -7,13 +7,13 @@ from typing import NamedTuple
 import igl
 import numpy as np
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, refuse_masked
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import ON_SIDE_COMPUTED, SurfacePoints, require_triangles
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["ClosestPoints", "Projector", "checked_points", "closest_points"]
+__all__ = ["ClosestPoints", "Projector", "checked_points", "closest_points", "rows_in_space"]
 
 # A face is flat when twice its area is at most this share of the square of the longest side.
 _FLAT = 1e-12
@@ -81,13 +81,8 @@ def closest_points(mesh: MeshLike, positions: ArrayLike) -> ClosestPoints:
 
 def checked_points(positions: ArrayLike) -> FloatArray:
     """`positions` as a new (k, 3) float64 array, k at least 1; the errors are those of `closest_points`."""
-    try:
-        array = np.atleast_2d(np.array(positions, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise SourceError("positions must be real numbers of shape (k, 3)") from None
-    if array.ndim == 2 and array.shape[1] == 2:
-        array = np.pad(array, ((0, 0), (0, 1)))
-    if array.ndim != 2 or array.shape[1] != 3 or not len(array):
+    array = rows_in_space("positions", positions)
+    if not len(array):
         raise SourceError(f"positions must have shape (k, 3), a row for each, not {array.shape}")
     wrong = ~np.isfinite(array).all(axis=1)
     if wrong.any():
@@ -101,6 +96,24 @@ def checked_points(positions: ArrayLike) -> FloatArray:
             "that squares do not overflow"
         )
     return array
+
+
+def rows_in_space(name: str, rows: ArrayLike) -> FloatArray:
+    """Positions or vectors as a new (k, 3) float64 array: of shape (k, 3), (k, 2) in the plane z = 0, or one row.
+
+    Raises
+    ------
+    SourceError
+        If `rows`, called `name`, are no real numbers, or have another shape.
+    """
+    refuse_masked(name, rows, SourceError)
+    try:
+        array = np.atleast_2d(np.array(rows, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise SourceError(f"{name} must be real numbers of shape (k, 3)") from None
+    if array.ndim != 2 or array.shape[1] not in (2, 3):
+        raise SourceError(f"{name} must have shape (k, 3), a row for each, or (k, 2) in the plane, not {array.shape}")
+    return np.pad(array, ((0, 0), (0, 3 - array.shape[1])))
 
 
 class Projector:

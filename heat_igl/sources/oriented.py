@@ -10,6 +10,7 @@ import numpy as np
 
 from heat_igl.errors import SourceError
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, named_entries, region_boundary
+from heat_igl.mesh.projection import rows_in_space
 from heat_igl.sources.specification import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -28,9 +29,9 @@ class OrientedPoints:
     ----------
     points : SurfacePoints
         The k points.
-    normals : (k, 3) array_like
+    normals : (k, 3) or (k, 2) array_like
         Vectors in space that point to the positive side, of any length but 0; the part along the normal of the face is
-        left out.
+        left out. Two columns are x and y of vectors in the plane z = 0.
 
     Raises
     ------
@@ -58,12 +59,9 @@ class OrientedPoints:
                 f"points must be SurfacePoints, not {type(self.points).__name__}: closest_points(mesh, P).points finds "
                 "those of positions"
             )
-        try:
-            normals = np.atleast_2d(np.array(self.normals, dtype=np.float64))
-        except (TypeError, ValueError):
-            raise SourceError(f"normals must be real numbers of shape ({len(self.points)}, 3)") from None
-        if normals.shape != (len(self.points), 3):
-            raise SourceError(f"normals must have shape ({len(self.points)}, 3), not {normals.shape}")
+        normals = rows_in_space("normals", self.normals)
+        if len(normals) != len(self.points):
+            raise SourceError(f"normals must have shape ({len(self.points)}, 3), not {np.shape(self.normals)}")
         wrong = ~(np.isfinite(normals).all(axis=1) & normals.any(axis=1))
         if wrong.any():
             first = int(np.argmax(wrong))

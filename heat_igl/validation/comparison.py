@@ -78,7 +78,7 @@ def validate(
     SourceError
         If the sources do not name vertices of the mesh.
     ValueError
-        If a method is unknown, or two have one name; if the reference has the wrong shape.
+        If there are no methods, one is unknown, or two have one name; if the reference has the wrong shape.
 
     Examples
     --------
@@ -95,6 +95,8 @@ def validate(
     if not isinstance(methods, Iterable) or isinstance(methods, str) or getattr(methods, "ndim", 1) == 0:
         raise ValueError(f"methods must be a sequence of methods, not {shown(methods)}")
     chosen = [resolved(method) for method in methods]
+    if not chosen:
+        raise ValueError(f"methods is empty: choose from {', '.join(METHODS)}, or leave it out for the default")
     if len({label for label, _ in chosen}) < len(chosen):
         raise ValueError(f"methods must have different names, not {', '.join(label for label, _ in chosen)}")
     counter = Counter(progress, len(sets) * (len(chosen) + (reference is not None)))

@@ -49,7 +49,7 @@ def validate_domains(
     Raises
     ------
     ValueError
-        If a kind is unknown.
+        If there is no kind, or one is unknown.
 
     Examples
     --------
@@ -79,6 +79,8 @@ def validate_domains(
 
 def _known(domains: Iterable[str]) -> tuple[str, ...]:
     asked = (domains,) if isinstance(domains, str) else tuple(domains) if isinstance(domains, Iterable) else (domains,)
+    if not asked:
+        raise ValueError(f"domains is empty: choose among {', '.join(map(repr, DOMAINS))}, or leave it out for all")
     for kind in asked:
         if kind not in DOMAINS:
             raise ValueError(f"domains must be among {', '.join(map(repr, DOMAINS))}, not {shown(kind)}")
