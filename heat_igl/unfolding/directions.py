@@ -71,10 +71,10 @@ class PathDirections:
     def __init__(self, surface: Surface, refinement: Refinement | None = None) -> None:
         if surface.faces is None:
             raise MeshError("directions need the faces of the mesh, which this domain does not know")
-        #: Around the vertices of the triangulation.
         given = polar_angles(surface.faces)
         self._leaving = given.leaving
-        self.angles: PolarAngles = carried_angles(given, surface.unfolding)
+        #: Around the vertices of the triangulation.
+        self.angles: PolarAngles = given if surface.faces is surface.unfolding else carried_angles(given, surface.unfolding)
         self._faces, self._triangulation = surface.faces, surface.unfolding
         if refinement is not None:
             self._number, self._tables = refinement.number, refinement.tables
@@ -124,7 +124,10 @@ class PathDirections:
         return PathAngles(*found[:, self._number])
 
     def of_windows(self, found: ExactSolution, points: SurfacePoints | None = None) -> PathAngles:
-        """The angles of exact paths, of which `found` knows how they leave, with p sources at `points` in faces."""
+        """The angles of exact paths, of which `found` knows how they leave, with p sources at `points` in faces.
+
+        Without `points`, the departure of a path from a place inside a face counts in the triangle of that place.
+        """
         angles, origin, n = self.angles, found.origin, len(found.distance)
         if found.leaving is None:
             raise ValueError("of_windows needs a solution that was asked for with directed=True")
@@ -132,10 +135,13 @@ class PathDirections:
         corner, root, (x, y) = found.leaving.corner[row], origin.root[row], found.leaving.direction[row].T
         departure, back = np.full((2, n), np.nan)
         at_vertex = root < n
-        departure[row] = self._at_corners(corner, np.arctan2(y, x))
-        if not at_vertex.all() and points is not None:
-            turn = self._turns_in(points, root[~at_vertex] - n, corner[~at_vertex] // 3)
-            departure[row[~at_vertex]] = np.arctan2(y, x)[~at_vertex] + turn
+        seen = np.arctan2(y, x)
+        departure[row] = self._at_corners(corner, seen)
+        if not at_vertex.all():
+            departure[row[~at_vertex]] = seen[~at_vertex]
+            if points is not None:
+                turn = self._turns_in(points, root[~at_vertex] - n, corner[~at_vertex] // 3)
+                departure[row[~at_vertex]] += turn
         # Over the half-edge opposite, or from the source point in the same face.
         entered, crossing = origin.entered[row], origin.crossing[row]
         over = entered >= 0

@@ -27,6 +27,7 @@ from heat_igl.unfolding.asked import (
     with_samples,
 )
 from heat_igl.unfolding.bounds import Bounds
+from heat_igl.unfolding.curve_directions import CurveDirections
 from heat_igl.unfolding.curve_walks import CurveWalks, are_closed
 from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
@@ -188,9 +189,26 @@ class UnfoldingSolver:
             If `tolerance` is not a number from 0 to 1.
         """
         require_share(tolerance)
+        if self._takes_windows(sources) and len(sources.segments.faces):
+            return self._directed_from_curves(sources)
         labels, angles = np.empty((2, len(u)), np.int64), np.empty((3, len(u)))
         distance = self._measured(sources, u, labels[0], angles, tolerance, labels[1])
         return distance, labels[0], PathAngles(*angles), self._places(sources, labels[1])
+
+    def _directed_from_curves(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
+        earliest, relative = from_earliest(sources, self._domain.components, self._given_faces)
+        directions = self._curve_directions
+        starts = asked_of(relative, relative.points).starts
+        found = self._exact_on_given_faces.solve(*starts, cutoff=self._cutoff, directed=True)
+        angles, places = directions.of_windows(found)
+        distance = found.distance
+        if sources.offsets.any():
+            distance += self._domain.expand_to_vertices(earliest)
+        return distance, labels_of(sources, sources.points)[found.origin.label], angles, places
+
+    @cached_property
+    def _curve_directions(self) -> CurveDirections:
+        return CurveDirections(self._surface)
 
     def _places(self, sources: SourceSet, origin: IntArray) -> SurfacePoints:
         """Sources (n,), counted vertices first; a corner of face 0 where there is none."""
