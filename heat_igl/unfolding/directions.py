@@ -8,7 +8,6 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import PolarAngles, carried_angles, lay_out, polar_angles
-from heat_igl.intrinsic.layout import apex
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
@@ -74,7 +73,9 @@ class PathDirections:
         given = polar_angles(surface.faces)
         self._leaving = given.leaving
         #: Around the vertices of the triangulation.
-        self.angles: PolarAngles = given if surface.faces is surface.unfolding else carried_angles(given, surface.unfolding)
+        self.angles: PolarAngles = (
+            given if surface.faces is surface.unfolding else carried_angles(given, surface.unfolding)
+        )
         self._faces, self._triangulation = surface.faces, surface.unfolding
         if refinement is not None:
             self._number, self._tables = refinement.number, refinement.tables
@@ -145,8 +146,11 @@ class PathDirections:
         # Over the half-edge opposite, or from the source point in the same face.
         entered, crossing = origin.entered[row], origin.crossing[row]
         over = entered >= 0
-        l, half_edge = self._triangulation.l.ravel(), entered[over]  # noqa: E741
-        fx, fy = apex(l[half_edge], l[previous_half_edge(half_edge)], l[next_half_edge(half_edge)])
+        half_edge = entered[over]
+        # The vertex from the tail; from the angle, as libigl's areas are slow for a few thousand triangles.
+        side = self._triangulation.l.ravel()[previous_half_edge(half_edge)]
+        turn = angles.corners.ravel()[next_half_edge(half_edge)]
+        fx, fy = side * np.cos(turn), side * np.sin(turn)
         seen = np.arctan2(fy * crossing[over], fx * (fx - crossing[over]) + fy * fy)
         back[row[over]] = self._at_corners(half_edge, seen)
         faces = corner[~over] // 3
