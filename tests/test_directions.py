@@ -7,7 +7,17 @@ import pytest
 from conftest import flat_perturbed, load_script, perturbed
 
 import heat_igl
-from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, exp_map, log_map, shapes, tangent_frames
+from heat_igl import (
+    HeatMethodSolver,
+    Mesh,
+    SurfacePoints,
+    exp_map,
+    geodesic_path,
+    isolines,
+    log_map,
+    shapes,
+    tangent_frames,
+)
 from heat_igl.unfolding import ExactSurface, vectors_from
 
 REFINES = ["unfold", "exact"]
@@ -22,6 +32,7 @@ def walking(mesh: Mesh, refine: str) -> HeatMethodSolver:
     solver = HeatMethodSolver(mesh, refine=refine)
     if refine == "unfold":
         solver._parts.last_steps._takes_windows = lambda _: False
+        solver._parts.last_steps._follows_curves = lambda *_: False
     return solver
 
 
@@ -281,7 +292,7 @@ def test_paths_from_a_curve_start_at_the_nearest_place_on_it(refine):
     of_curve = found.labels == 0
     nearest = np.stack([np.clip(mesh.V[:, 0], 0.2, 0.8), np.full(mesh.n_vertices, 0.33), mesh.V[:, 2]], axis=1)
     # Walks within the tolerance of the shortest may start some points beside it.
-    beside = (0.07 if refine == "exact" else 0.4) * mesh.edge_lengths.mean()
+    beside = 1e-12 if refine == "exact" else 0.4 * mesh.edge_lengths.mean()
     np.testing.assert_allclose(place[of_curve], nearest[of_curve], atol=beside)
     np.testing.assert_array_equal(place[~of_curve], np.broadcast_to(mesh.V[0], place[~of_curve].shape))
     # The departure counts from the first side of the face of the start.
@@ -290,6 +301,35 @@ def test_paths_from_a_curve_start_at_the_nearest_place_on_it(refine):
     line = mesh.V - place
     off = angle_between(found.departure + side, np.arctan2(line[:, 1], line[:, 0]))
     assert off[of_curve].max() < 1e-6
+
+
+def test_exact_paths_from_curves_lead_back_to_the_vertices(sphere):
+    level, through_vertices = isolines(sphere, sphere.V[:, 2], 0.3)[0], geodesic_path(sphere, [5, 900])
+    for sources in (level, through_vertices, [level, SurfacePoints([7], [[0.2, 0.3, 0.5]]), 100]):
+        solver = HeatMethodSolver(sphere, refine="exact")
+        found = solver.directions(sources)
+        np.testing.assert_array_equal(found.distance, solver.distance(sources))
+        np.testing.assert_array_equal(found.labels, solver.voronoi(sources).labels)
+        ends = np.array([followed(sphere, found, v) for v in range(0, sphere.n_vertices, 9)])
+        off = np.linalg.norm(ends - sphere.V[::9], axis=1)
+        # The others bend at vertices.
+        assert (off < 1e-12).mean() > 0.5
+
+
+def followed(mesh: Mesh, found: heat_igl.Directions, v: int) -> np.ndarray:
+    """Where the geodesic ends that leaves the start of the path to vertex v in the direction of the departure."""
+    face, place = int(found.start.faces[v]), found.start.barycentric[v]
+    start = int(mesh.F[face, place.argmax()]) if place.max() == 1 else SurfacePoints([face], [place])
+    way = found.distance[v] * np.array([np.cos(found.departure[v]), np.sin(found.departure[v])])
+    return exp_map(mesh, start, [way]).positions(mesh)[0]
+
+
+def test_walks_leave_curves_to_windows_on_small_meshes():
+    mesh = perturbed(shapes.icosphere(4), 0.05)
+    curve = isolines(mesh, mesh.V[:, 2], 0.3)[0]
+    walks, exact = (HeatMethodSolver(mesh, refine=refine).directions(curve) for refine in REFINES)
+    np.testing.assert_allclose(walks.departure, exact.departure, atol=1e-9)
+    np.testing.assert_allclose(walks.distance, exact.distance, atol=1e-12)
 
 
 def test_unreachable_vertices_have_no_direction():

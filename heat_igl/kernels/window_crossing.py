@@ -65,6 +65,8 @@ def _arrive(
     x: cython.double = at - w.x
     leaving_x: cython.double = x * w.turn_x - w.depth * w.turn_y
     leaving_y: cython.double = x * w.turn_y + w.depth * w.turn_x
+    if w.is_plane:
+        leaving_x, leaving_y = w.turn_x + w.turn_y * w.depth * at, w.turn_y
     relax(s, s.vertex[h], distance, w.root, h, at, w.corner, leaving_x, leaving_y)
 
 
@@ -137,10 +139,10 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
     else:
         out.x = w.x * apex.cos_left - w.depth * apex.sin_left
         out.depth = w.x * apex.sin_left + w.depth * apex.cos_left
+        out.turn_x = w.turn_x * apex.cos_left - w.turn_y * apex.sin_left
+        out.turn_y = w.turn_x * apex.sin_left + w.turn_y * apex.cos_left
     if out.depth <= 0.0:
         return False
-    out.turn_x = w.turn_x * apex.cos_left - w.turn_y * apex.sin_left
-    out.turn_y = w.turn_x * apex.sin_left + w.turn_y * apex.cos_left
     scale = w.depth * apex.cos_left
     out.start = w.start * w.depth / (scale - lateral(w, w.start) * apex.sin_left)
     out.stop = apex.left_length
@@ -163,13 +165,14 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
         out.offset = w.offset + w.x * apex.x + w.depth * apex.y
         out.x = w.x * apex.cos_right - w.depth * apex.sin_right
         out.depth = w.x * apex.sin_right + w.depth * apex.cos_right
+        out.turn_x = w.turn_x + w.turn_y * (w.depth * apex.x - w.x * apex.y)
     else:
         out.x = apex.right_length - (x * apex.cos_right - w.depth * apex.sin_right)
         out.depth = x * apex.sin_right + w.depth * apex.cos_right
+        out.turn_x = w.turn_x * apex.cos_right + w.turn_y * apex.sin_right
+        out.turn_y = w.turn_y * apex.cos_right - w.turn_x * apex.sin_right
     if out.depth <= 0.0:
         return False
-    out.turn_x = w.turn_x * apex.cos_right + w.turn_y * apex.sin_right
-    out.turn_y = w.turn_y * apex.cos_right - w.turn_x * apex.sin_right
     scale = w.depth * apex.cos_right
     out.stop = apex.right_length - (apex.length - w.stop) * w.depth / (scale + lateral(w, w.stop) * apex.sin_right)
     out.start = 0.0

@@ -26,7 +26,9 @@ def relax(
     """Lower the distance of v to `distance` if that is shorter, and note the path: root, half-edge, and crossing.
 
     The straight last part of the path leaves the root out of a corner, in the direction (x, y). The frame of a corner
-    begins with the side to the next corner of the face. In the face f of a source point it is that of corner 3 f.
+    begins with the side to the next corner of the face. In the face f of a source point it is that of corner 3 f. Of a
+    segment in face f, x is the length along the segment at which the path starts, and y is 1 if the path leaves to the
+    left and -1 if to the right; both are 0 for corners of the same face.
     """
     if distance >= s.upper[v]:
         return

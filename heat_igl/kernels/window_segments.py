@@ -25,7 +25,7 @@ def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
     j: cython.int
     for c in range(3):
         at_corner(c, corner)
-        relax(s, s.vertex[3 * f + c], _distance(s, i, corner), root, -1, 0.0, -1, 0.0, 0.0)
+        relax(s, s.vertex[3 * f + c], _distance(s, i, corner), root, -1, 0.0, 3 * f, 0.0, 0.0)
         # On the side itself, the segment belongs to the face beyond it too.
         if ends[c] > 0.0 or ends[3 + c] > 0.0:
             _emit(s, 3 * f + c, ends, root, s.segment_offset[i])
@@ -75,8 +75,8 @@ def _emit(
     one.stop = min(one.stop, length)
     one.offset = offset - one.x * x + one.depth * depth
     one.root = root
-    one.corner = -1
-    one.turn_x = one.turn_y = 0.0
+    one.corner = h - c
+    one.turn_x, one.turn_y = (depth * rise - x * along) / norm, 1.0 if along > 0.0 else -1.0
     one.side = 0
     one.is_plane = True
     if one.stop - one.start > NARROW * length:

@@ -16,11 +16,13 @@ cdef extern from *:
     # parallel, and the root is a segment all of whose points are sources (Bommes and Kobbelt 2007).
     ctypedef struct Window:
         double x, depth      # the root laid out in the plane lies at (x, -depth); of a plane, the direction of the lines
-        double turn_x, turn_y  # the half-edge as a unit vector in the frame of `corner`
+        # The half-edge as a unit vector in the frame of `corner`; of a plane, how far along the segment the line
+        # through the tail starts, and 1 if lines leave the segment to the left, -1 to the right.
+        double turn_x, turn_y
         double start, stop   # from where to where along the half-edge
         double offset        # distance of the root; of a plane, the distance that it gives the tail
         int root             # vertex, n + p for source point p, or after those, n + p + i for source segment i
-        int corner           # of the root, out of which the lines leave it: see `relax`; -1 of a plane
+        int corner           # of the root, out of which the lines leave it: see `relax`
         unsigned int side    # of the apex: see the sides below
         unsigned int is_plane
 

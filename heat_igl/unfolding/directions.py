@@ -8,7 +8,6 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import PolarAngles, carried_angles, lay_out, polar_angles
-from heat_igl.intrinsic.layout import apex
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
@@ -71,10 +70,12 @@ class PathDirections:
     def __init__(self, surface: Surface, refinement: Refinement | None = None) -> None:
         if surface.faces is None:
             raise MeshError("directions need the faces of the mesh, which this domain does not know")
-        #: Around the vertices of the triangulation.
         given = polar_angles(surface.faces)
         self._leaving = given.leaving
-        self.angles: PolarAngles = carried_angles(given, surface.unfolding)
+        #: Around the vertices of the triangulation.
+        self.angles: PolarAngles = (
+            given if surface.faces is surface.unfolding else carried_angles(given, surface.unfolding)
+        )
         self._faces, self._triangulation = surface.faces, surface.unfolding
         if refinement is not None:
             self._number, self._tables = refinement.number, refinement.tables
@@ -124,7 +125,10 @@ class PathDirections:
         return PathAngles(*found[:, self._number])
 
     def of_windows(self, found: ExactSolution, points: SurfacePoints | None = None) -> PathAngles:
-        """The angles of exact paths, of which `found` knows how they leave, with p sources at `points` in faces."""
+        """The angles of exact paths, of which `found` knows how they leave, with p sources at `points` in faces.
+
+        Without `points`, the departure of a path from a place inside a face counts in the triangle of that place.
+        """
         angles, origin, n = self.angles, found.origin, len(found.distance)
         if found.leaving is None:
             raise ValueError("of_windows needs a solution that was asked for with directed=True")
@@ -132,15 +136,21 @@ class PathDirections:
         corner, root, (x, y) = found.leaving.corner[row], origin.root[row], found.leaving.direction[row].T
         departure, back = np.full((2, n), np.nan)
         at_vertex = root < n
-        departure[row] = self._at_corners(corner, np.arctan2(y, x))
-        if not at_vertex.all() and points is not None:
-            turn = self._turns_in(points, root[~at_vertex] - n, corner[~at_vertex] // 3)
-            departure[row[~at_vertex]] = np.arctan2(y, x)[~at_vertex] + turn
+        seen = np.arctan2(y, x)
+        departure[row] = self._at_corners(corner, seen)
+        if not at_vertex.all():
+            departure[row[~at_vertex]] = seen[~at_vertex]
+            if points is not None:
+                turn = self._turns_in(points, root[~at_vertex] - n, corner[~at_vertex] // 3)
+                departure[row[~at_vertex]] += turn
         # Over the half-edge opposite, or from the source point in the same face.
         entered, crossing = origin.entered[row], origin.crossing[row]
         over = entered >= 0
-        l, half_edge = self._triangulation.l.ravel(), entered[over]  # noqa: E741
-        fx, fy = apex(l[half_edge], l[previous_half_edge(half_edge)], l[next_half_edge(half_edge)])
+        half_edge = entered[over]
+        # The vertex from the tail; from the angle, as libigl's areas are slow for a few thousand triangles.
+        side = self._triangulation.l.ravel()[previous_half_edge(half_edge)]
+        turn = angles.corners.ravel()[next_half_edge(half_edge)]
+        fx, fy = side * np.cos(turn), side * np.sin(turn)
         seen = np.arctan2(fy * crossing[over], fx * (fx - crossing[over]) + fy * fy)
         back[row[over]] = self._at_corners(half_edge, seen)
         faces = corner[~over] // 3

@@ -14,6 +14,7 @@ from heat_igl.runtime import n_threads
 from heat_igl.sources import Sources, SourceSegments, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh, from_triangulation
+from heat_igl.unfolding.leaving import with_places
 from heat_igl.unfolding.window_search import Found, Leaving, Searched, search
 from heat_igl.unfolding.window_starts import starts_at
 
@@ -209,8 +210,10 @@ class ExactSurface:
         if done.leaving is None:
             return None
         edges = self._half_edges
-        corner, direction = (column[edges.number] for column in done.leaving)
-        return Leaving(edges.old_half_edge(corner), direction)
+        leaving = with_places(edges, done, done.leaving) if len(done.starts.segments.faces) else done.leaving
+        corner, direction = leaving.corner[edges.number], leaving.direction[edges.number]
+        place = None if leaving.place is None else leaving.place[edges.number]
+        return Leaving(edges.old_half_edge(corner), direction, place)
 
     def _result(self, found: Found, done: Searched, which: AnyArray, cutoff: float) -> tuple[FloatArray, Origin]:
         """Distance and origin of some of the places that the kernel found, in the caller's numbers and unit."""

@@ -27,7 +27,12 @@ from heat_igl.unfolding.ordered import OrderedSolver, UnfoldingDomain
 from heat_igl.unfolding.path_lengths import PathLengths, from_walks, from_windows
 from heat_igl.unfolding.refinement import Refine, Refinement
 from heat_igl.unfolding.surface_searches import SurfaceSearches, as_thin_as_given
-from heat_igl.unfolding.when_exact import FEW, costs_little_to_be_exact, directions_by_windows
+from heat_igl.unfolding.when_exact import (
+    FEW,
+    costs_little_to_be_exact,
+    curve_directions_by_windows,
+    directions_by_windows,
+)
 
 __all__ = ["UnfoldingSolver"]
 
@@ -119,7 +124,8 @@ class UnfoldingSolver(OrderedSolver):
     ) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
         """As `labelled`, and of each path the directions and the place at which it starts.
 
-        Points stand for curves. With a smaller `tolerance` than that of the solver the directions are more accurate.
+        Where walks find the directions, points stand for curves, see `curve_directions_by_windows`. With a smaller
+        `tolerance` than that of the solver the directions are more accurate.
         Windows give them, which are exact, if it is 0, or if it is smaller than the default and the mesh has at most
         50 000 vertices.
 
@@ -131,10 +137,28 @@ class UnfoldingSolver(OrderedSolver):
             If `tolerance` is not a number from 0 to 1.
         """
         require_share(tolerance)
+        if len(sources.segments.faces) and self._follows_curves(
+            sources, self._tolerance if tolerance is None else tolerance
+        ):
+            return self._directed_from_curves(sources)
         labels, angles = np.empty((2, len(u)), np.int64), np.empty((3, len(u)))
         distance = self._measured(sources, u, labels[0], angles, tolerance, labels[1])
         starts = starting_points(self._corner_at[sources.vertices], self._points(sources), labels[1])
         return distance, labels[0], PathAngles(*angles), starts
+
+    def _follows_curves(self, sources: SourceSet, tolerance: float | None) -> bool:
+        """Whether windows find the directions from curves; otherwise points stand for these."""
+        n, are_closed = len(self._domain.components), self._walks_of(sources) is not None
+        return self._takes_windows(sources) or curve_directions_by_windows(n, tolerance, are_closed)
+
+    def _directed_from_curves(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
+        earliest, relative = from_earliest(sources, self._domain.components, self._given_faces)
+        asked = asked_of(relative, relative.points)
+        found, angles, places = self._searches.directed_from_curves(asked, self._cutoff)
+        distance = found.distance
+        if sources.offsets.any():
+            distance += self._domain.expand_to_vertices(earliest)
+        return distance, labels_of(sources, sources.points)[found.origin.label], angles, places
 
     @cached_property
     def _corner_at(self) -> IntArray:

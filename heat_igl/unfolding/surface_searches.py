@@ -8,12 +8,13 @@ import igl
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.operators import Surface, unfolding_surface
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding.asked import Asked, known_of
+from heat_igl.unfolding.curve_directions import CurveDirections
 from heat_igl.unfolding.curve_walks import CurveWalks
-from heat_igl.unfolding.directions import PathDirections
+from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN
 from heat_igl.unfolding.numbered import TOLERANCE
@@ -66,6 +67,10 @@ class SurfaceSearches:
             return None
         return CurveWalks(faces, refinement, directions, self._on_given_faces)
 
+    @cached_property
+    def _curve_directions(self) -> CurveDirections:
+        return CurveDirections(self._surface)
+
     @property
     def refinement(self) -> Refinement:
         """The tables of sweeps and walks."""
@@ -86,6 +91,12 @@ class SurfaceSearches:
         if asked.angles is not None:
             asked.angles[:] = self._directions.of_windows(found, asked.points)
         return found.distance
+
+    def directed_from_curves(self, asked: Asked, cutoff: float) -> tuple[ExactSolution, PathAngles, SurfacePoints]:
+        """Exact distance up to a cutoff from sources with curves; the angles of the paths, and the places they leave."""
+        directions = self._curve_directions
+        found = self._on_given_faces.solve(*asked.starts, cutoff=cutoff, directed=True)
+        return found, *directions.of_windows(found)
 
     def by_sweep(self, u: FloatArray, asked: Asked, near: ExactSolution | None) -> FloatArray:
         """Distance by `Refinement.sweep`, which begins with the exact distance near the sources if that is given."""

@@ -86,10 +86,18 @@ class Leaving(NamedTuple):
         The corner of the root that the path leaves through; of a source point in face f, ``3 f``; -1 for none.
     direction : (n, 2) float64
         The direction in the plane of that corner, of any length. The first axis is the side to the next corner.
+    place : (n, 3) float64, optional
+        Barycentric coordinates of the place that the path leaves, in the triangle of the corner.
+
+    Notes
+    -----
+    For paths from segments a search notes a length along the segment and a side, see `window_distances.relax`;
+    `leaving.with_places` turns both into a direction and a place.
     """
 
     corner: AnyArray
     direction: FloatArray
+    place: FloatArray | None = None
 
     @classmethod
     def of(cls, n: int) -> Leaving:
