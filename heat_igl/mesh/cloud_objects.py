@@ -23,8 +23,8 @@ def cloud_of_points(mesh: Any) -> PointCloud | None:
     if type(mesh).__name__ not in _CLASSES:
         return None
     if hasattr(mesh, "point") and "positions" in mesh.point:  # open3d's cloud of tensors
-        tensors = [mesh.point[name] if name in mesh.point else None for name in ("positions", "normals")]
-        return _cloud(*(None if tensor is None else tensor.cpu().numpy() for tensor in tensors))
+        names = [name for name in ("positions", "normals") if name in mesh.point]
+        return _cloud(*(mesh.point[name].cpu().numpy() for name in names))
     for name in ("points", "vertices"):
         P = getattr(mesh, name, None)
         if P is not None and not callable(P):
@@ -78,7 +78,7 @@ def _active_normals(mesh: Any) -> AnyArray | None:
     return getattr(getattr(mesh, "point_data", None), "active_normals", None)
 
 
-def _cloud(P: Any, normals: Any) -> PointCloud:
+def _cloud(P: Any, normals: Any = None) -> PointCloud:
     """A cloud of positions (n, 3); normals that are missing or all 0 count as none."""
     directions = None if normals is None else np.asarray(normals)
     return PointCloud(np.asarray(P), directions if directions is not None and directions.any() else None)
