@@ -64,7 +64,8 @@ def geodesic_distance(
     Raises
     ------
     MeshError
-        If the mesh cannot be used or is not understood, or it holds tetrahedra and the method is "exact" or there are targets.
+        If the mesh cannot be used or is not understood, or if it holds tetrahedra and the method is "exact" or
+        there are targets.
     SourceError
         If `sources` does not describe places on the mesh.
     ValueError
