@@ -7,7 +7,7 @@ from typing import NamedTuple
 import igl
 import numpy as np
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, real_numbers
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import ON_SIDE_COMPUTED, SurfacePoints, require_triangles
@@ -81,10 +81,7 @@ def closest_points(mesh: MeshLike, positions: ArrayLike) -> ClosestPoints:
 
 def checked_points(positions: ArrayLike) -> FloatArray:
     """`positions` as a new (k, 3) float64 array, k at least 1; the errors are those of `closest_points`."""
-    try:
-        array = np.atleast_2d(np.array(positions, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise SourceError("positions must be real numbers of shape (k, 3)") from None
+    array = np.atleast_2d(real_numbers("positions", positions, SourceError))
     if array.ndim == 2 and array.shape[1] == 2:
         array = np.pad(array, ((0, 0), (0, 1)))
     if array.ndim != 2 or array.shape[1] != 3 or not len(array):
