@@ -210,16 +210,16 @@ def refuse_masked(name: str, values: object, error: type[ValueError] = ValueErro
         raise error(f"{name} has {int(np.sum(mask))} masked entries: fill or remove them")
 
 
-def real_numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """`values` as a new float64 array; a ValueError that calls them `name` if they are no real numbers."""
-    refuse_masked(name, values)
+def real_numbers(name: str, values: npt.ArrayLike, error: type[ValueError] = ValueError) -> npt.NDArray[np.float64]:
+    """`values` as a new float64 array; an `error` that calls them `name` if they are no real numbers."""
+    refuse_masked(name, values, error)
     try:
         # numpy would take dates as numbers of days, and read texts.
         if np.asarray(values).dtype.kind not in "cmMSU":
             return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} must be real numbers in an array, not {shown(values)}") from None
-    raise ValueError(f"{name} must be real numbers, not {shown(np.asarray(values))}")
+        raise error(f"{name} must be real numbers in an array, not {shown(values)}") from None
+    raise error(f"{name} must be real numbers, not {shown(values if np.ndim(values) == 0 else np.asarray(values))}")
 
 
 def as_array(name: str, values: npt.ArrayLike | None, error: type[ValueError] = ValueError) -> npt.NDArray[Any]:

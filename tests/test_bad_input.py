@@ -185,8 +185,43 @@ def choice_cases() -> Iterator[Case]:
             yield argument_case(f"{name} = {bad!r:.20}", lambda mesh, ask=ask, bad=bad: ask(mesh, bad), refused)
 
 
+def array_type_cases() -> Iterator[Case]:
+    """Three numbers of other types, which numpy would cast without asking."""
+    ways: dict[str, Callable[[Any], Any]] = {
+        "positions": lambda value: heat_igl.closest_points(heat_igl.shapes.icosphere(1), value),
+        "barycentric": lambda value: heat_igl.SurfacePoints([0], value),
+        "offsets": lambda value: heat_igl.OffsetSources([0, 1, 2], value),
+        "spacing": lambda value: heat_igl.image_domain(np.ones((2, 2, 2), bool), value),
+    }
+    wrong = {
+        "complex": np.array([1j, 0, 0]),
+        "texts": ["a", "0", "0"],
+        "dates": np.array([1, 0, 0], "datetime64[s]"),
+        "masked": np.ma.masked_array([1.0, 0, 0], [1, 0, 0]),
+    }
+    for name, ask in ways.items():
+        error = "ValueError" if name == "spacing" else "SourceError"
+        yield argument_case(f"{name}, neighbour", lambda _, ask=ask: ask([0.5, 0.25, 0.25]))
+        for kind, bad in wrong.items():
+            refused = rf"{name} (must be (real|one or three positive) numbers|has 1 masked)"
+            yield argument_case(f"{name}, {kind}", lambda _, ask=ask, bad=bad: ask(bad), refused, error=error)
+
+
+def operator_cases() -> Iterator[Case]:
+    for bad in (None, 3, heat_igl.shapes.icosphere(1)):
+        refused = "domain must be Operators, as metric_operators returns them, not "
+        yield argument_case(
+            f"operators = {bad!r:.20}",
+            lambda _, bad=bad: heat_igl.HeatMethodSolver.from_operators(bad),
+            refused,
+            error="TypeError",
+        )
+
+
 def argument_cases() -> Iterator[Case]:
     yield from number_cases()
+    yield from array_type_cases()
+    yield from operator_cases()
     yield from choice_cases()
     far = argument_case(
         "positions that overflow",

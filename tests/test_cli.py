@@ -357,6 +357,10 @@ def test_tetrahedra_go_to_vtu_only(tmp_path: Path, capsys: pytest.CaptureFixture
     assert cli.run(["distance", str(box), "--source", "0", "--output", str(tmp_path / "out.vtu")]) == 0
     distance = io.read_attributes(tmp_path / "out.vtu")["distance"]
     np.testing.assert_array_equal(distance, heat_igl.HeatMethodSolver(shapes.box(2)).distance(0))
+    # Straight lines have no time step; an option of heat asks for heat.
+    assert "time step" not in capsys.readouterr().out
+    assert cli.run(["distance", str(box), "--source", "0", "--t-coef", "1"]) == 0
+    assert "time step" in capsys.readouterr().out
 
 
 def test_a_failure_while_drawing_leaves_old_files_alone(

@@ -96,3 +96,25 @@ def test_failures_are_one_line(
     assert words in message
     assert message.count("\n") == 1
     assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.usefixtures("folder")
+def test_commands_for_curves_take_point_clouds(capsys: pytest.CaptureFixture[str]) -> None:
+    """Lines of one command are those that another reads; they lie on the triangles between the points."""
+    cloud = heat_igl.PointCloud(shapes.icosphere(3).V)
+    heat_igl.write_point_cloud("cloud.xyz", cloud)
+    assert cli.run(["isolines", "cloud.xyz", "--source=0", "--spacing=1.5", "--output=lines.obj"]) == 0
+    expected = heat_igl.isolines(cloud, heat_igl.geodesic_distance(cloud, 0), [1.5, 3.0])
+    np.testing.assert_array_equal(
+        np.concatenate([line.positions for line in read_polylines("lines.obj")]),
+        np.concatenate([curve.positions(cloud)[:-1] for level in expected for curve in level]),
+    )
+    assert cli.run(["path", "cloud.xyz", "--from=0", "--to=20", "--output=path.obj"]) == 0
+    assert f"{heat_igl.geodesic_distance(cloud, 0)[20]:.6g}" in capsys.readouterr().out
+    assert cli.run(["trace", "cloud.xyz", "--from=0", "--direction=1,0,0", "--length=1.5", "--output=line.obj"]) == 0
+    assert cli.run(["signed", "cloud.xyz", "--curves=lines.obj", "--output=signed.npy"]) == 0
+    assert (np.load("signed.npy") < 0).any()
+    assert cli.run(["cut", "cloud.xyz", "--curves=circle.obj", "--output=cut.ply"]) == 0
+    assert read_mesh("cut.ply").n_faces > cloud.n_faces
+    assert cli.run(["info", "cloud.xyz"]) == 0
+    assert "cloud.xyz: 642 points, 1280 triangles" in capsys.readouterr().out

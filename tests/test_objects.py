@@ -139,6 +139,77 @@ def test_what_is_not_understood_is_one_error(given: Any, message: str) -> None:
         as_mesh(given)
 
 
+class PointCloud:
+    """As those of trimesh and open3d."""
+
+    def __init__(self, **attributes: Any) -> None:
+        self.__dict__.update(attributes)
+
+
+class Tensor:
+    def __init__(self, array: np.ndarray) -> None:
+        self._array = array
+
+    def cpu(self) -> Tensor:
+        return self
+
+    def numpy(self) -> np.ndarray:
+        return self._array
+
+
+CLOUDS = {
+    "trimesh": (PointCloud(vertices=V), False),
+    "open3d": (PointCloud(points=V.tolist(), normals=2 * V, has_normals=lambda: True), True),
+    "open3d, without normals": (PointCloud(points=V, normals=V[:0], has_normals=lambda: False), False),
+    "tensors of open3d": (PointCloud(point={"positions": Tensor(V), "normals": Tensor(V)}), True),
+    "pyvista": (
+        SimpleNamespace(points=V, faces=F[:0], n_points=42, point_data=SimpleNamespace(active_normals=V)),
+        True,
+    ),
+    "normals that are all 0": (PointCloud(points=V, normals=0 * V, has_normals=lambda: True), False),
+    "meshio": (SimpleNamespace(points=V, cells_dict={"vertex": np.arange(42)[:, None]}), False),
+    "meshio, without cells": (SimpleNamespace(points=V, cells_dict={}), False),
+}
+
+
+@pytest.mark.parametrize(("given", "has_normals"), CLOUDS.values(), ids=CLOUDS)
+def test_points_become_a_cloud(given: Any, has_normals: bool) -> None:
+    cloud = as_mesh(given)
+    assert isinstance(cloud, heat_igl.PointCloud)
+    np.testing.assert_array_equal(cloud.P, V)
+    if has_normals:
+        np.testing.assert_allclose(cloud.normals, V, rtol=1e-15)
+    else:
+        assert cloud.normals is None
+
+
+@pytest.mark.parametrize("library", ["trimesh", "pyvista", "meshio", "open3d"])
+def test_points_of_the_libraries_themselves(library: str) -> None:
+    module = pytest.importorskip(library)
+    made: Any
+    if library == "trimesh":
+        made = module.PointCloud(V)
+    elif library == "pyvista":
+        made = module.PolyData(V)
+    elif library == "meshio":
+        made = module.Mesh(V, [])
+    else:
+        made = module.geometry.PointCloud(module.utility.Vector3dVector(V.copy()))
+    np.testing.assert_allclose(as_mesh(made).P, V, atol=1e-7)
+
+
+def test_cells_of_other_kinds_are_refused() -> None:
+    """Beside tetrahedra, hexahedra that are left out would be a hole."""
+    for kind, name in (("hexahedron", "hexahedron"), (12, "12 of VTK"), ("tetra10", "tetra10")):
+        cells = {"tetra": TETRAHEDRA, kind: np.zeros((5, 8), int)}
+        with pytest.raises(MeshError, match=f"holds 5 cells of kind {name};.*convert the cells"):
+            as_mesh(SimpleNamespace(points=CORNERS, cells_dict=cells))
+    cells = {"tetra": TETRAHEDRA, "line3": np.zeros((5, 3), int), "vertex": np.zeros((5, 1), int)}
+    assert as_mesh(SimpleNamespace(points=CORNERS, cells_dict=cells)).is_tetrahedral
+    with pytest.raises(MeshError, match="the mesh has no faces"):
+        as_mesh(SimpleNamespace(points=CORNERS, cells_dict={"line": F[:, :2]}))
+
+
 def test_faces_beside_a_mesh_are_refused() -> None:
     np.testing.assert_array_equal(as_mesh(V, F).F, F)
     with pytest.raises(MeshError, match="F is given beside a Mesh"):

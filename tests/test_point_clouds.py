@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import HeatMethodSolver, MeshError, PointCloud, cli, farthest_points, read_point_cloud, shapes
+from heat_igl import (
+    AccuracyWarning,
+    HeatMethodSolver,
+    MeshError,
+    PointCloud,
+    cli,
+    farthest_points,
+    read_point_cloud,
+    shapes,
+)
 from heat_igl.drawing.discs import discs
 from heat_igl.io import ply
 from heat_igl.kernels.local_delaunay import delaunay_stars
@@ -266,6 +275,28 @@ def test_normals_keep_sheets_apart_that_nearly_touch() -> None:
     distance = HeatMethodSolver(cloud).distance(0)
     assert np.isinf(distance[2000:]).all()
     assert np.isfinite(distance[:2000]).all()
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_normals_that_were_not_oriented_are_left_out(share: float) -> None:
+    """As estimated ones: distance is that without normals, not that on sheets of points with equal signs."""
+    P = sphere(2000)
+    normals = np.where(np.random.default_rng(1).random(2000) < share, -1, 1)[:, None] * P
+    with pytest.warns(AccuracyWarning, match="normals point to both sides .* pass normals=None") as caught:
+        F = PointCloud(P, normals).F
+    assert caught[0].filename == __file__
+    assert len(caught) == 1
+    np.testing.assert_array_equal(F, PointCloud(P).F)
+
+
+@pytest.mark.parametrize("thickness", [1.0, 1e-3])
+def test_normals_of_both_sides_of_a_thin_shell_are_oriented(thickness: float) -> None:
+    """Of two neighbours in three, or of every second one, the normals are opposite, and yet they do not contradict."""
+    P = sphere(4000)
+    outside = np.arange(4000) < 2000
+    radius = np.where(outside, 1, 1 - thickness * np.sqrt(4 * np.pi / 2000))[:, None]
+    cloud = PointCloud(radius * P, np.where(outside, 1, -1)[:, None] * P)
+    assert not np.isin(cloud.components[outside], cloud.components[~outside]).any()
 
 
 def test_sheets_further_apart_than_the_spacing_need_no_normals() -> None:

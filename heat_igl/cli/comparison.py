@@ -13,8 +13,8 @@ from rich.progress import Progress
 
 import heat_igl
 from heat_igl.cli.error_table import print_report
-from heat_igl.cli.options import JsonOption, MeshOrCloudArgument, positive
-from heat_igl.cli.output import check_json, check_outputs, print_json, print_rows, prints_json, say
+from heat_igl.cli.options import JsonOption, MeshArgument, positive
+from heat_igl.cli.output import check_json, check_outputs, described, print_json, print_rows, prints_json, say
 from heat_igl.drawing.output import Picture
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.reference.guarded import TIMEOUT
@@ -25,17 +25,19 @@ __all__ = ["info", "validate"]
 _DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
 
 
-def info(mesh: MeshOrCloudArgument, json_file: JsonOption = None) -> None:
+def info(mesh: MeshArgument, json_file: JsonOption = None) -> None:
     """Describe a mesh or the triangles of a point cloud: sizes, defects, and properties that affect distances."""
     check_json(json_file)
-    report = read_mesh_or_cloud(mesh).report()
+    loaded = read_mesh_or_cloud(mesh)
+    report = loaded.report()
     values = [getattr(report, field.name) for field in fields(report)]
     plain = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
-    print_rows([(*row, value) for row, value in zip(report.rows(), plain, strict=True)], json_file)
+    rows = [(*row, value) for row, value in zip(report.rows(), plain, strict=True)]
+    print_rows([described(mesh, loaded), *rows], json_file)
 
 
 def validate(
-    mesh: MeshOrCloudArgument,
+    mesh: MeshArgument,
     sources: Annotated[int, typer.Option(min=1, help="Single source vertices, one distance from each.")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="For drawing them.")] = 0,
     methods: Annotated[str, typer.Option(help=f"Separated by commas: {', '.join(METHODS)}.")] = _DEFAULT_METHODS,

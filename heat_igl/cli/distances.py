@@ -13,8 +13,8 @@ import typer
 from rich.console import Console
 
 import heat_igl
-from heat_igl.cli.options import JsonOption, MeshArgument, MeshOrCloudArgument, choice, position, positive
-from heat_igl.cli.output import Row, check_curves, check_json, check_outputs, print_rows, write_distance
+from heat_igl.cli.options import JsonOption, MeshArgument, choice, position, positive
+from heat_igl.cli.output import Row, check_curves, check_json, check_outputs, described, print_rows, write_distance
 from heat_igl.errors import SourceError
 from heat_igl.heat_method import (
     Backend,
@@ -27,8 +27,8 @@ from heat_igl.heat_method import (
     SolverOptions,
     geodesic_distance,
 )
-from heat_igl.io import is_flat, read_mesh, read_mesh_or_cloud
-from heat_igl.mesh import Mesh, PointCloud, closest_points
+from heat_igl.io import is_flat, read_mesh_or_cloud
+from heat_igl.mesh import Mesh, PointCloud, as_simplices, closest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import FloatArray
 
@@ -43,7 +43,7 @@ _MOST_LINES = 10000
 
 
 def distance(
-    mesh: MeshOrCloudArgument,
+    mesh: MeshArgument,
     source: Annotated[
         list[int] | None, typer.Option(metavar="VERTEX", help="Source vertex, counted from 0; repeat for several.")
     ] = None,
@@ -52,7 +52,7 @@ def distance(
     ] = None,
     method: Annotated[
         str | None,
-        choice(DistanceMethod, "Default: unfold, near-exact; heat on tetrahedra and with one of the options of heat."),
+        choice(DistanceMethod, "Default: unfold, near-exact; heat with one of the options of heat."),
     ] = None,
     cutoff: Annotated[float | None, typer.Option(help="Distances beyond this are inf.", callback=positive)] = None,
     output: Annotated[
@@ -92,7 +92,7 @@ def distance(
         cast(Refine | None, refine),
         cast(Backend, backend),
     )
-    chosen = _method(method, options, loaded)
+    chosen = _method(method, options)
     with Console(stderr=True).status("measuring"):
         _warm_up(loaded, chosen, options)
         phi, about = _measured(loaded, sources, chosen, options, cutoff)
@@ -101,8 +101,8 @@ def distance(
     print_rows([*rows, *(("wrote", str(path)) for path in written)], json_file)
 
 
-def _method(method: str | None, options: SolverOptions, mesh: Mesh | PointCloud) -> DistanceMethod:
-    """The method that is meant: options of the heat method ask for it, and tetrahedra leave no other."""
+def _method(method: str | None, options: SolverOptions) -> DistanceMethod:
+    """The method that is meant: options of the heat method ask for it."""
     given = [field.name for field in fields(options) if getattr(options, field.name) != field.default]
     if method not in (None, "heat") and given:
         raise ValueError(
@@ -110,7 +110,7 @@ def _method(method: str | None, options: SolverOptions, mesh: Mesh | PointCloud)
             "them away"
         )
     if method is None:
-        method = "heat" if given or _is_tetrahedral(mesh) else "unfold"
+        method = "heat" if given else "unfold"
     return cast(DistanceMethod, method)
 
 
@@ -161,12 +161,12 @@ def isolines(
     json_file: JsonOption = None,
 ) -> None:
     """Curves of equal distance from one or more source vertices."""
-    loaded = read_mesh(mesh)
+    loaded = as_simplices(mesh)
     sources = vertex_sources(np.array(source), loaded.n_vertices)
     check_curves(output)
     check_json(json_file)
     options = SolverOptions(refine=cast(Refine | None, refine))
-    phi, _ = _measured(loaded, sources, _method(method, options, loaded), options, None)
+    phi, _ = _measured(loaded, sources, _method(method, options), options, None)
     farthest = float(phi[np.isfinite(phi)].max())
     if farthest < spacing:
         raise ValueError(f"--spacing {spacing:g} makes no line: the farthest vertex is at {farthest:.3g}")
@@ -205,12 +205,9 @@ def _write(
 def _summary(path: Path, mesh: Mesh | PointCloud, phi: FloatArray, cutoff: float | None) -> list[Row]:
     finite = np.isfinite(phi)
     farthest = int(np.argmax(np.where(finite, phi, -1.0)))
-    kind = "tetrahedra" if _is_tetrahedral(mesh) else "triangles"
-    name, points = ("point cloud", "points") if isinstance(mesh, PointCloud) else ("mesh", "vertices")
-    counts = {"path": str(path), "n_vertices": mesh.n_vertices, f"n_{kind}": mesh.n_faces}
     greatest, mean, unreachable = float(phi[farthest]), float(phi[finite].mean()), int((~finite).sum())
     rows: list[Row] = [
-        (name, f"{path}: {mesh.n_vertices} {points}, {mesh.n_faces} {kind}", counts),
+        described(path, mesh),
         ("farthest", f"{greatest:.6g} at vertex {farthest}", {"distance": greatest, "vertex": farthest}),
     ]
     if unreachable:

@@ -11,13 +11,9 @@ import typer
 
 from heat_igl.errors import SourceError
 
-__all__ = ["JsonOption", "MeshArgument", "MeshOrCloudArgument", "choice", "one_of", "position", "positive"]
+__all__ = ["JsonOption", "MeshArgument", "choice", "one_of", "position", "positive"]
 
 MeshArgument = Annotated[
-    Path,
-    typer.Argument(metavar="MESH", help="OFF, OBJ, PLY, STL, MESH, MSH, VTU, VTP, GIFTI or FreeSurfer file."),
-]
-MeshOrCloudArgument = Annotated[
     Path,
     typer.Argument(
         metavar="MESH",

@@ -25,6 +25,7 @@ __all__ = [
     "check_outputs",
     "check_page",
     "check_writable",
+    "described",
     "print_json",
     "print_rows",
     "prints_json",
@@ -44,6 +45,14 @@ def say(message: str) -> None:
 
 # Name and text of a line, and what JSON holds in place of the text, if anything.
 Row = tuple[str, str] | tuple[str, str, Any]
+
+
+def described(path: Path, mesh: Mesh | PointCloud) -> Row:
+    """The line that names a mesh or a point cloud, with the numbers of vertices and faces."""
+    kind = "tetrahedra" if isinstance(mesh, Mesh) and mesh.is_tetrahedral else "triangles"
+    name, points = ("point cloud", "points") if isinstance(mesh, PointCloud) else ("mesh", "vertices")
+    counts = {"path": str(path), "n_vertices": mesh.n_vertices, f"n_{kind}": mesh.n_faces}
+    return name, f"{path}: {mesh.n_vertices} {points}, {mesh.n_faces} {kind}", counts
 
 
 def print_rows(rows: Sequence[Row], json_file: Path | None = None) -> None:

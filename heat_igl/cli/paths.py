@@ -12,8 +12,7 @@ import heat_igl
 from heat_igl.cli.options import JsonOption, MeshArgument, position
 from heat_igl.cli.output import Row, check_curves, check_json, print_rows
 from heat_igl.errors import SourceError
-from heat_igl.io import read_mesh
-from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, closest_points
+from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, as_simplices, closest_points
 
 __all__ = ["path", "trace"]
 
@@ -39,7 +38,7 @@ def path(
     json_file: JsonOption = None,
 ) -> None:
     """A geodesic through waypoints, a closed one, or the shortest path between two vertices."""
-    loaded = read_mesh(mesh)
+    loaded = as_simplices(mesh)
     check_curves(output)
     check_json(json_file)
     if (start is None) != (end is None) or (start is None) == (not waypoints) or (closed and not waypoints):
@@ -71,7 +70,7 @@ def trace(
     json_file: JsonOption = None,
 ) -> None:
     """A straight line on the surface, from a point in a direction."""
-    loaded = read_mesh(mesh)
+    loaded = as_simplices(mesh)
     check_curves(output)
     check_json(json_file)
     place, gap = _place(loaded, start)

@@ -13,8 +13,8 @@ from heat_igl.cli.options import JsonOption, MeshArgument, choice, positive
 from heat_igl.cli.output import Row, check_json, check_outputs, check_writable, print_rows, write_distance
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat_method import Level, Refine, SignedHeatSolver
-from heat_igl.io import MESH_SUFFIXES, read_mesh, read_polylines, write_mesh
-from heat_igl.mesh import Mesh, SurfaceCurve, curve_on
+from heat_igl.io import MESH_SUFFIXES, read_polylines, write_mesh
+from heat_igl.mesh import Mesh, SurfaceCurve, as_simplices, curve_on
 
 __all__ = ["cut", "projected", "signed"]
 
@@ -38,7 +38,7 @@ def signed(
     json_file: JsonOption = None,
 ) -> None:
     """Distance from curves, negative on their left; curves may have gaps."""
-    loaded = read_mesh(mesh)
+    loaded = as_simplices(mesh)
     drawn_on = projected(loaded, curves)
     check_outputs(loaded, output, picture)
     check_json(json_file)
@@ -75,7 +75,7 @@ def cut(
     json_file: JsonOption = None,
 ) -> None:
     """Cut a mesh along curves, so that they become edges."""
-    loaded = read_mesh(mesh)
+    loaded = as_simplices(mesh)
     if output.suffix.lower() not in MESH_SUFFIXES:
         raise MeshError(f"--output {output}: meshes go to {', '.join(MESH_SUFFIXES)} files")
     check_writable(output)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import TypeVar
 
+from heat_igl.errors import shown
 from heat_igl.heat_method.batches import BatchedSolver
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
@@ -47,6 +48,11 @@ class PreparedSolver(BatchedSolver):
         backend: Backend = "auto",
     ) -> Solver:
         """A solver on any domain that has operators; parameters as for the class."""
+        if not isinstance(domain, Operators):
+            raise TypeError(
+                f"domain must be Operators, as metric_operators returns them, not {shown(domain)}: "
+                "HeatMethodSolver(mesh) takes meshes"
+            )
         options = SolverOptions(t_coef, t, "intrinsic-delaunay", boundary, magnitude, refine, backend)
         return cls._of(prepare(domain, options))
 

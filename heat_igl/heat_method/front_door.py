@@ -36,8 +36,8 @@ def geodesic_distance(
     Parameters
     ----------
     mesh : mesh
-        Whatever `as_mesh` takes: `Mesh`, `PolygonMesh`, a pair (V, F), a path, or a mesh of trimesh, pyvista, open3d,
-        meshio and others.
+        Whatever `as_mesh` takes: `Mesh`, `PolygonMesh`, `PointCloud`, a pair (V, F), a path, or a mesh or point cloud
+        of trimesh, pyvista, open3d, meshio and others.
     sources : sources
         A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources` if
         distance begins at other values than 0, or a list of such. Faces of points on polygons are counted as those of
@@ -48,7 +48,7 @@ def geodesic_distance(
         vertices in the order of Dijkstra's algorithm; polygons are cut into triangles. "heat" is the heat method as
         `HeatMethodSolver` has it by default, and on a `PointCloud`, whose solver sweeps by default, with
         ``magnitude="damped"``; on polygons it takes `polygon_operators`. "exact" is the polyhedral distance by windows.
-        Tetrahedra take "sweep" and "heat", which both are fronts there, see `FrontSolver`.
+        In tetrahedra, all but "exact", which is refused, follow straight lines that bend at edges of the boundary.
     cutoff : float, optional
         Distances beyond this are ``inf``. With "unfold" and "exact", the others are exact, and the search ends there.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints, optional
@@ -64,7 +64,8 @@ def geodesic_distance(
     Raises
     ------
     MeshError
-        If the mesh cannot be used or is not understood, or `method` needs triangles and it holds tetrahedra.
+        If the mesh cannot be used or is not understood, or if it holds tetrahedra and the method is "exact" or
+        there are targets.
     SourceError
         If `sources` does not describe places on the mesh.
     ValueError
@@ -92,12 +93,13 @@ def geodesic_distance(
         return HeatMethodSolver.from_options(given, SolverOptions().by_heat_on(given)).distance(sources, beyond)
     triangles = as_simplices(given)
     if triangles.is_tetrahedral:
-        if method == "sweep":
-            return HeatMethodSolver(triangles, refine="sweep").distance(sources, beyond)
-        raise MeshError(
-            f"method={method!r} needs triangles, but the mesh holds tetrahedra: take method='sweep' or 'heat', which "
-            "follow fronts through them"
-        )
+        if method == "exact" or targets is not None:
+            asked = "targets need" if method != "exact" else "method='exact' needs"
+            raise MeshError(
+                f"{asked} triangles, but the mesh holds tetrahedra: leave it away, and straight lines are followed "
+                "through them, to all vertices"
+            )
+        return HeatMethodSolver(triangles, refine="sweep").distance(sources, beyond)
     if targets is not None:
         return np.asarray(cut_off(distance_to_targets(triangles, sources, targets), beyond))
     farthest = np.inf if beyond is None else beyond

@@ -1,4 +1,4 @@
-"""Meshes of other libraries as `Mesh` or `PolygonMesh`: recognized by their attributes, so nothing is imported."""
+"""Meshes and points of other libraries as those of this one: recognized by attributes, so nothing is imported."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import MeshError
+from heat_igl.mesh.cloud_objects import cloud_of_cells, cloud_of_points, cloud_of_poly_data, refuse_other_cells
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygons import PolygonMesh
@@ -21,8 +22,8 @@ MeshLike = Any
 """`Mesh`, `PolygonMesh`, `PointCloud`, a pair (V, F), a path, or a mesh of another library, see `as_mesh`."""
 
 _UNDERSTOOD = (
-    "a Mesh, PolygonMesh or PointCloud, a pair (V, F), a path, or a mesh of trimesh, pyvista or vtk, open3d, meshio, "
-    "pymeshlab, vedo or nibabel"
+    "a Mesh, PolygonMesh or PointCloud, a pair (V, F), a path, or a mesh or points of trimesh, pyvista or vtk, open3d, "
+    "meshio, pymeshlab, vedo or nibabel"
 )
 # Cells by the names of meshio and by the numbers of VTK.
 _TRIANGLES, _QUADS, _POLYGONS, _TETRAHEDRA = ("triangle", 5), ("quad", 9), ("polygon", 7), ("tetra", 10)
@@ -45,7 +46,8 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
         `Mesh`, `PolygonMesh` and `PointCloud` are returned as they are. Besides: a pair (V, F); a path, read by
         `read_mesh`, or by `read_point_cloud` if the file holds no faces; meshes of trimesh, pyvista and vtk (PolyData,
         UnstructuredGrid), open3d, meshio, pymeshlab (also a MeshSet: the current mesh), vedo, and nibabel (surfaces in
-        GIFTI). With `F`, the positions V (n, 3).
+        GIFTI). The point clouds of trimesh, open3d and vedo, and objects of pyvista, vtk and meshio that hold points
+        alone, become a `PointCloud`, with the normals of open3d, pyvista and vtk. With `F`, the positions V (n, 3).
     F : (m, 3) or (m, 4) array_like of int, optional
         Triangles or tetrahedra, when `mesh` is V.
 
@@ -88,7 +90,9 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
         return Mesh(*mesh)
     if isinstance(mesh, np.ndarray):
-        raise MeshError("faces F are missing: pass a mesh, positions V and faces F, or a pair (V, F)")
+        raise MeshError(
+            "faces F are missing: pass a mesh, positions V and faces F, or a pair (V, F); PointCloud(P) takes points"
+        )
     for convert in _CONVERSIONS:
         found = convert(mesh)
         if found is not None:
@@ -121,10 +125,11 @@ def _pymeshlab(mesh: Any) -> Mesh | PolygonMesh | None:
     return Mesh(mesh.vertex_matrix(), np.asarray(mesh.face_matrix(), np.int64))
 
 
-def _cells(mesh: Any) -> Mesh | PolygonMesh | None:
+def _cells(mesh: Any) -> Mesh | PolygonMesh | PointCloud | None:
     """Meshio's Mesh and pyvista's UnstructuredGrid: blocks of cells, each of one type."""
     if not (hasattr(mesh, "points") and isinstance(getattr(mesh, "cells_dict", None), Mapping)):
         return None
+    refuse_other_cells(mesh, (*_TRIANGLES, *_QUADS, *_POLYGONS, *_TETRAHEDRA))
     cells: Mapping[Any, AnyArray] = mesh.cells_dict
 
     def of(kinds: tuple[str, int]) -> list[AnyArray]:
@@ -133,18 +138,19 @@ def _cells(mesh: Any) -> Mesh | PolygonMesh | None:
     tetrahedra = of(_TETRAHEDRA)
     if tetrahedra:
         return Mesh(mesh.points, tetrahedra[0])
-    return _of_polygons(mesh.points, [*of(_TRIANGLES), *of(_QUADS), *of(_POLYGONS)])
+    polygons = [*of(_TRIANGLES), *of(_QUADS), *of(_POLYGONS)]
+    return (None if polygons else cloud_of_cells(mesh)) or _of_polygons(mesh.points, polygons)
 
 
-def _poly_data(mesh: Any) -> Mesh | PolygonMesh | None:
+def _poly_data(mesh: Any) -> Mesh | PolygonMesh | PointCloud | None:
     """PolyData of pyvista and vtk: polygons one after the other, each after the number of corners."""
     if hasattr(mesh, "points") and hasattr(mesh, "faces") and hasattr(mesh, "n_points"):
-        return _of_polygons(mesh.points, [_unpadded(np.asarray(mesh.faces))])
-    if hasattr(mesh, "GetPoints") and hasattr(mesh, "GetPolys"):
-        polygons = mesh.GetPolys()
-        corners, ends = (np.asarray(part) for part in (polygons.GetConnectivityArray(), polygons.GetOffsetsArray()))
-        return _of_polygons(np.asarray(mesh.GetPoints().GetData()), [np.split(corners, ends[1:-1])])
-    return None
+        P, polygons = mesh.points, _unpadded(np.asarray(mesh.faces))
+    elif hasattr(mesh, "GetPoints") and hasattr(mesh, "GetPolys"):
+        P, polygons = np.asarray(mesh.GetPoints().GetData()), _split(mesh.GetPolys())
+    else:
+        return None
+    return (None if len(polygons) else cloud_of_poly_data(mesh)) or _of_polygons(P, [polygons])
 
 
 def _vertices_and_faces(mesh: Any) -> Mesh | PolygonMesh | None:
@@ -175,7 +181,8 @@ def _gifti(mesh: Any) -> Mesh | PolygonMesh | None:
 
 
 # The more telling attributes first: pyvista's PolyData also has the attributes that the later ones look for.
-_CONVERSIONS: tuple[Callable[[Any], Mesh | PolygonMesh | None], ...] = (
+_CONVERSIONS: tuple[Callable[[Any], Mesh | PolygonMesh | PointCloud | None], ...] = (
+    cloud_of_points,
     _pymeshlab,
     _cells,
     _poly_data,
@@ -191,6 +198,12 @@ def _rows(faces: Any) -> AnyArray | list[IntArray]:
         return np.asarray(faces)
     except ValueError:
         return [np.asarray(face) for face in faces]
+
+
+def _split(polygons: Any) -> list[IntArray]:
+    """The polygons of a vtkCellArray."""
+    corners, ends = (np.asarray(part) for part in (polygons.GetConnectivityArray(), polygons.GetOffsetsArray()))
+    return np.split(corners, ends[1:-1]) if len(corners) else []
 
 
 def _unpadded(faces: IntArray) -> list[IntArray] | IntArray:
@@ -213,7 +226,7 @@ def _of_polygons(V: AnyArray, blocks: Iterable[AnyArray | list[IntArray]]) -> Me
     """Triangles if all faces are, polygons otherwise."""
     blocks = [block for block in blocks if len(block)]
     if not blocks:
-        raise MeshError("the mesh has no faces: a distance needs triangles, polygons or tetrahedra")
+        raise MeshError("the mesh has no faces: a distance needs triangles, polygons or tetrahedra, or a PointCloud")
     if all(isinstance(block, np.ndarray) and block.ndim == 2 and block.shape[1] == 3 for block in blocks):
         return Mesh(V, np.concatenate(blocks))
     polygons = [np.asarray(face, np.int64) for block in blocks for face in block]

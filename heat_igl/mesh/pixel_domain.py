@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heat_igl.errors import MeshError, SourceError, as_array, shown
+from heat_igl.errors import MeshError, SourceError, as_array, real_numbers, shown
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.voxels import TETRAHEDRA_PER_VOXEL, voxel_tetrahedra
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, IntArray
@@ -186,10 +186,10 @@ def _mask(mask: ArrayLike) -> BoolArray:
 
 def _spacing(spacing: float | Sequence[float], dimension: int) -> list[float]:
     try:
-        steps: list[float] = np.broadcast_to(np.asarray(spacing, dtype=np.float64), (dimension,)).tolist()
-    except (TypeError, ValueError):
+        steps: list[float] = np.broadcast_to(real_numbers("spacing", spacing), (dimension,)).tolist()
+    except ValueError:
         steps = [np.nan]
     if not all(0 < step < np.inf for step in steps):
         count = "two" if dimension == 2 else "three"
-        raise ValueError(f"spacing must be one or {count} positive numbers, not {spacing!r}")
+        raise ValueError(f"spacing must be one or {count} positive numbers, not {shown(spacing)}")
     return steps

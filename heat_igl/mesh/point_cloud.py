@@ -9,6 +9,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.mesh.cloud_copies import distinct_points, with_copies
+from heat_igl.mesh.cloud_normals import oriented_normals
 from heat_igl.mesh.cloud_orientation import oriented
 from heat_igl.mesh.cloud_triangles import cloud_triangles
 from heat_igl.mesh.connectivity import connected_components
@@ -36,7 +37,8 @@ class PointCloud:
     normals : (n, 3) array_like of real numbers, optional
         A normal for each point, of any length but 0, all pointing to the same side of the surface. They give the
         tangent planes, and tell sheets apart that nearly touch: neighbours whose normals point away are left out.
-        Without them, planes are fitted to the neighbours.
+        Without them, planes are fitted to the neighbours, and so they are, with an `AccuracyWarning`, if the normals
+        point to both sides at random, as those of ``estimate_normals`` of open3d before they are oriented.
 
     Attributes
     ----------
@@ -155,9 +157,10 @@ class PointCloud:
         # Copies of a point would compete for the same triangles.
         distinct, original = self._distinct
         # From here to the triangles, points are numbered by the tree, in which neighbours are near in memory.
-        tree = without_noise(point_tree(self.P[distinct]))
+        tree = point_tree(self.P[distinct])
         number = distinct[tree.order]
-        normals = None if self.normals is None else self.normals[number]
+        normals = oriented_normals(tree, None if self.normals is None else self.normals[number])
+        tree = without_noise(tree)
         triangles = _triangles(tree, normals)
         if not len(triangles):
             raise MeshError(

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import igl
 import numpy as np
 
-from heat_igl.errors import SourceError, refuse_masked
+from heat_igl.errors import SourceError, real_numbers
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import ON_SIDE_COMPUTED, SurfacePoints, require_triangles
@@ -106,11 +106,7 @@ def rows_in_space(name: str, rows: ArrayLike) -> FloatArray:
     SourceError
         If `rows`, called `name`, are no real numbers, or have another shape.
     """
-    refuse_masked(name, rows, SourceError)
-    try:
-        array = np.atleast_2d(np.array(rows, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise SourceError(f"{name} must be real numbers of shape (k, 3)") from None
+    array = np.atleast_2d(real_numbers(name, rows, SourceError))
     if array.ndim != 2 or array.shape[1] not in (2, 3):
         raise SourceError(f"{name} must have shape (k, 3), a row for each, or (k, 2) in the plane, not {array.shape}")
     return np.pad(array, ((0, 0), (0, 3 - array.shape[1])))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import SourceError, as_array, refuse_masked, truth
+from heat_igl.errors import SourceError, as_array, real_numbers, truth
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -202,11 +202,7 @@ def _face_indices(name: str, faces: ArrayLike) -> IntArray:
 
 
 def _coordinates(name: str, barycentric: ArrayLike, k: int) -> FloatArray:
-    refuse_masked(name, barycentric, SourceError)
-    try:
-        array = np.atleast_2d(np.array(barycentric, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise SourceError(f"{name} must be real numbers of shape ({k}, 3)") from None
+    array = np.atleast_2d(real_numbers(name, barycentric, SourceError))
     if array.shape != (k, 3):
         raise SourceError(f"{name} must have shape ({k}, 3), a row for each face, not {array.shape}")
     # By columns: along rows of three numbers, numpy takes ten times as long.

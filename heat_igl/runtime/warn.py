@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import sys
 import threading
@@ -12,7 +13,8 @@ from pathlib import Path
 
 __all__ = ["held_warnings", "warn_caller"]
 
-_PACKAGE = str(Path(__file__).parents[1]) + os.sep
+# Cached properties of the package are called by functools.
+_OURS = (str(Path(__file__).parents[1]) + os.sep, functools.__file__)
 _held = threading.local()
 
 
@@ -24,7 +26,7 @@ def warn_caller(message: str, category: type[Warning]) -> None:
         return
     # `skip_file_prefixes` of `warnings.warn` does this from Python 3.12 on.
     level, frame = 2, sys._getframe(1)
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_OURS):
         level, frame = level + 1, frame.f_back
     warnings.warn(message, category, stacklevel=level)
 

@@ -6,6 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from heat_igl.errors import shown
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.mesh import MeshLike
 from heat_igl.sampling.queries import as_solver
@@ -81,5 +82,5 @@ def farthest_cells(solver: HeatMethodSolver | MeshLike, k: int, *, start: ArrayL
 def _check_count(k: int, least: int, most: int) -> None:
     if not isinstance(k, int | np.integer) or isinstance(k, bool) or not least <= k <= most:
         raise ValueError(
-            f"k must be an integer from {least}, the vertices to start from, to {most}, all there are, not {k!r}"
+            f"k must be an integer from {least}, the vertices to start from, to {most}, all there are, not {shown(k)}"
         )

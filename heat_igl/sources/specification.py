@@ -11,7 +11,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from heat_igl.errors import SourceError, refuse_masked
+from heat_igl.errors import SourceError, real_numbers, refuse_masked
 from heat_igl.mesh import SurfaceCurve, SurfacePoints
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
@@ -256,11 +256,7 @@ def _first_of_wrong_type(array: AnyArray) -> str:
 
 
 def _checked_offsets(offsets: ArrayLike) -> FloatArray:
-    refuse_masked("offsets", offsets, SourceError)
-    try:
-        array = np.array(offsets, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SourceError(f"offsets must be real numbers, not {offsets!r}") from None
+    array = real_numbers("offsets", offsets, SourceError)
     if array.ndim > 1:
         raise SourceError(f"offsets must be one number or one for each source, not of shape {array.shape}")
     wrong = ~(np.isfinite(array) & (array >= 0))

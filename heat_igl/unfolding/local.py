@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, SourceError, positive
+from heat_igl.errors import MeshError, SourceError, positive, shown
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.runtime import available_memory, n_threads
 from heat_igl.sources import Sources, named_vertices
@@ -154,7 +154,7 @@ def nearest_vertices(mesh: MeshLike, k: int, sources: Sources | None = None) -> 
     ([[0, 1, 5]], [[0.0, 1.0, 1.0]])
     """
     if isinstance(k, bool) or not isinstance(k, int | np.integer) or k < 1:
-        raise ValueError(f"k must be a positive integer, not {k!r}")
+        raise ValueError(f"k must be a positive integer, not {shown(k)}")
     triangles = _triangles(mesh)
     chosen = _chosen(sources, triangles)
     edges = from_mesh(triangles, int(chosen[0]))

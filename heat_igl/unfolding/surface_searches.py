@@ -93,7 +93,7 @@ class SurfaceSearches:
         return found.distance
 
     def directed_from_curves(self, asked: Asked, cutoff: float) -> tuple[ExactSolution, PathAngles, SurfacePoints]:
-        """Exact distance up to a cutoff from sources with curves; the angles of the paths, and the places they leave."""
+        """Exact distance up to a cutoff from sources with curves; the angles of the paths, and where they start."""
         directions = self._curve_directions
         found = self._on_given_faces.solve(*asked.starts, cutoff=cutoff, directed=True)
         return found, *directions.of_windows(found)

@@ -118,8 +118,8 @@ def resolved(method: Method) -> tuple[str, Prepare | None]:
 
 
 def _heat_solver(mesh: Mesh | PolygonMesh | PointCloud, options: Mapping[str, Any]) -> Solver:
-    if isinstance(mesh, Mesh) and mesh.is_tetrahedral and "refine" in options:
-        raise ReferenceSolverError(f"refine={options['refine']!r} unfolds triangles, and the mesh holds tetrahedra")
+    if isinstance(mesh, Mesh) and mesh.is_tetrahedral and options.get("refine") == "unfold":
+        raise ReferenceSolverError("refine='unfold' unfolds triangles, and the mesh holds tetrahedra: take sweep")
     return HeatMethodSolver.from_options(mesh, SolverOptions(**options).by_heat_on(mesh))
 
 
