@@ -103,12 +103,13 @@ class Checker:
 
     def __init__(self, domain: Operators, V: FloatArray | None) -> None:
         self._V = None if V is None else np.ascontiguousarray(V, np.float64)
-        self._F = None if domain.surface is None else domain.surface.given_faces
+        given = domain.source_surface
+        self._F = None if given is None else given.given_faces
         self._referenced = domain.referenced
         vertices = _sample(np.flatnonzero(domain.referenced[: domain.n_given]), _MOST_VERTICES)
         self._vertices = vertices
         self._positions = None if V is None else np.ascontiguousarray(V[vertices])
-        faces = None if domain.surface is None else domain.surface.faces
+        faces = None if given is None else given.faces
         nowhere = np.empty(0, np.int64)
         self._i, self._j, self._length = nowhere, nowhere, np.empty(0)
         if faces is not None:

@@ -123,6 +123,10 @@ class PreparedSolver(BatchedSolver):
         ValueError
             If the solver was made from operators.
         """
+        fans = self.operators.fans
+        if fans is not None:
+            positions = fans.polygons.triangles.with_vertices(V).V
+            return self._of(prepare_polygons(PolygonMesh(positions, fans.polygons.polygons), self._parts.options))
         if self._mesh is None:
             raise ValueError(
                 "this solver was made from operators and has no vertices to move: use from_operators again"

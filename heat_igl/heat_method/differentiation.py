@@ -44,8 +44,10 @@ def differentiated(
             "fronts through faces that see their edges at several lengths have no derivative: let the metric or the "
             "speed change by less than 10 % from face to face"
         )
-    if surface is None or isinstance(mesh, PointCloud):
-        raise ValueError("derivatives need a surface of triangles: this domain has none, or is a point cloud")
+    if surface is None or parts.operators.fans is not None or isinstance(mesh, PointCloud):
+        raise ValueError(
+            "derivatives need a surface of triangles: this domain has none, or is a point cloud, or heat on polygons"
+        )
     if len(sources.segments.faces):
         raise ValueError(
             "derivatives are there for vertices and points, and a curve is among the sources: place points on it"

@@ -47,8 +47,8 @@ def geodesic_distance(
         to 50 000 vertices, see `unfolded_distance`. "sweep" unfolds two triangles at a time. Both go through the
         vertices in the order of Dijkstra's algorithm; polygons are cut into triangles. "heat" is the heat method as
         `HeatMethodSolver` has it by default, and on a `PointCloud`, whose solver sweeps by default, with
-        ``magnitude="damped"``; on polygons it takes `polygon_operators`. "exact" is the polyhedral distance by windows.
-        In tetrahedra, all but "exact", which is refused, follow straight lines that bend at edges of the boundary.
+        ``magnitude="damped"``; polygons get a vertex inside. "exact" is the polyhedral distance by windows. In
+        tetrahedra, all but "exact", which is refused, follow straight lines that bend at edges of the boundary.
     cutoff : float, optional
         Distances beyond this are ``inf``. With "unfold" and "exact", the others are exact, and the search ends there.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints, optional

@@ -23,9 +23,9 @@ from heat_igl.linear import Analysis
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
 from heat_igl.operators import (
     Operators,
+    fan_operators,
     operators,
     point_cloud_operators,
-    polygon_operators,
     without_refinement,
 )
 from heat_igl.runtime import in_order, n_threads, pool
@@ -109,7 +109,7 @@ class SolverParts:
     @property
     def given_faces(self) -> IntArray | None:
         """Vertices (m, 3) of the triangles that points and curves refer to."""
-        surface = self.operators.given_surface
+        surface = self.operators.source_surface
         return None if surface is None else surface.given_faces
 
 
@@ -157,15 +157,10 @@ def _t_coef_of_points(triangles: Mesh) -> float:
 
 
 def prepare_polygons(mesh: PolygonMesh, options: SolverOptions) -> SolverParts:
-    """The parts of a solver on polygons; there is one Laplacian on them, so an option for it is refused."""
-    if options.laplacian not in ("auto", "intrinsic-delaunay"):
-        raise ValueError(
-            f"laplacian={options.laplacian!r} chooses a triangulation, but the mesh holds polygons: leave it away, "
-            "or pass mesh.triangles"
-        )
+    """The parts of a solver on the triangles around the virtual vertices of polygons."""
     start = time.perf_counter()
-    domain = polygon_operators(mesh)
-    return prepare(domain, options, seconds_operators=time.perf_counter() - start)
+    domain = fan_operators(mesh, options.laplacian)
+    return prepare(domain, options, seconds_operators=time.perf_counter() - start, V=mesh.V)
 
 
 def prepare(

@@ -6,6 +6,7 @@ from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with
 from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
 from heat_igl.mesh.point_cloud import PointCloud
+from heat_igl.mesh.polygon_fans import PolygonFans
 from heat_igl.mesh.polygons import PolygonMesh, which_repeat_a_vertex
 from heat_igl.mesh.projection import ClosestPoints, closest_points
 from heat_igl.mesh.regions import region_boundary
@@ -34,6 +35,7 @@ __all__ = [
     "ON_SIDE",
     "ON_SIDE_COMPUTED",
     "PointCloud",
+    "PolygonFans",
     "PolygonMesh",
     "Segments",
     "SurfaceCurve",

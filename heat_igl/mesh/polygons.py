@@ -48,9 +48,9 @@ class PolygonMesh:
 
     Notes
     -----
-    Polygons need be neither planar nor convex, but the virtual vertex inside (see `polygon_operators`) should see every
-    corner; `triangles` need no such vertex. Corners on a straight side, as a polygon has beside smaller neighbours, are
-    fine.
+    Polygons need be neither planar nor convex, and may have corners on a straight side, as beside smaller neighbours.
+    On polygons that are not planar, paths and near-exact distances are measured on `triangles`, and heat on the
+    triangles around a virtual vertex in each polygon, see `PolygonFans`.
 
     Examples
     --------
@@ -74,7 +74,9 @@ class PolygonMesh:
         _check(corners, degree, len(positions))
         for array in (corners, degree):
             array.setflags(write=False)
-        triangles = Mesh(positions, triangulated(positions, corners, degree, partial(_named, corners, degree)))
+        with np.errstate(over="ignore", invalid="ignore"):  # `Mesh` refuses such positions by name
+            F = triangulated(positions, corners, degree, partial(_named, corners, degree))
+        triangles = Mesh(positions, F)
         object.__setattr__(self, "V", triangles.V)
         object.__setattr__(self, "corners", corners)
         object.__setattr__(self, "degree", degree)

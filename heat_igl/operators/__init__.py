@@ -15,7 +15,7 @@ from heat_igl.operators.metric import fibre_metric, metric_operators
 from heat_igl.operators.metric_derivatives import MetricSides
 from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.point_clouds import point_cloud_operators
-from heat_igl.operators.polygons import polygon_operators
+from heat_igl.operators.polygons import fan_operators, polygon_operators
 from heat_igl.operators.simplices import cotan_operators
 from heat_igl.operators.speed import speed_operators
 from heat_igl.operators.suitability import is_rough_or_narrow
@@ -40,8 +40,9 @@ __all__ = [
     "divergence_matrix",
     "edge_length_operators",
     "edge_rotations",
-    "fibre_metric",
     "face_rotations",
+    "fan_operators",
+    "fibre_metric",
     "intrinsic_operators",
     "is_rough_or_narrow",
     "metric_operators",

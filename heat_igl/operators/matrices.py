@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import require_choice
+from heat_igl.mesh import PolygonFans
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
 from heat_igl.operators.metric_derivatives import MetricSides
 from heat_igl.operators.metric_simplices import MetricSimplices
@@ -80,7 +81,9 @@ class Operators:
     metric : MetricSides or None
         The lengths of triangles in a metric, to be differentiated; None without one, and for fronts.
     drawn_on : Surface or None
-        The triangles that points and curves refer to where `surface` is None: those of polygons.
+        The triangles that points and curves refer to, where these are not `surface`: those of polygons.
+    fans : PolygonFans or None
+        Of polygons, the triangles of `surface` before any flip, to which points and curves are carried.
 
     Examples
     --------
@@ -114,6 +117,7 @@ class Operators:
     contrast: float = 1.0
     metric: MetricSides | None = None
     drawn_on: Surface | None = None
+    fans: PolygonFans | None = None
 
     def __repr__(self) -> str:
         return f"Operators({self.n} vertices, {len(self.weights)} faces)"
@@ -130,13 +134,19 @@ class Operators:
 
     @property
     def given_surface(self) -> Surface | None:
-        """The triangles that points and curves refer to: `surface`, or `drawn_on`."""
+        """The triangles around sources: `surface`, or `drawn_on`."""
         return self.surface if self.surface is not None else self.drawn_on
 
     @property
+    def source_surface(self) -> Surface | None:
+        """The triangles that points and curves refer to as they are given: `drawn_on`, or `surface`."""
+        return self.surface if self.drawn_on is None else self.drawn_on
+
+    @property
     def n_given(self) -> int:
-        """Number of vertices of the mesh; n if refinement has added none."""
-        return self.n if self.surface is None or self.surface.faces is None else self.surface.faces.n
+        """Number of vertices of the mesh; n if none were added by refinement or as virtual ones."""
+        given = self.source_surface
+        return self.n if given is None or given.faces is None else given.faces.n
 
     @property
     def dimension(self) -> int:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import igl
 import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import intrinsic_triangulation
-from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_mesh, connectivity
-from heat_igl.operators.matrices import Operators
+from heat_igl.mesh import Mesh, MeshLike, PolygonFans, PolygonMesh, as_mesh, connectivity
+from heat_igl.operators.matrices import Laplacian, Operators
 from heat_igl.operators.surface import Surface
+from heat_igl.operators.triangles import operators
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["polygon_operators"]
+__all__ = ["fan_operators", "polygon_operators"]
 
 # Share of the weights of L that may be negative while the heat flow is still fitted to lengths, which leaves these out.
 _NEGATIVE = 0.03
@@ -101,6 +104,15 @@ def polygon_operators(mesh: MeshLike) -> Operators:
         lengths=None if _negative_share(L) > _NEGATIVE else _chords(mesh.V, L),
         drawn_on=Surface(fans, fans, V=mesh.V),
     )
+
+
+def fan_operators(mesh: PolygonMesh, laplacian: Laplacian = "auto") -> Operators:
+    """The operators on the triangles between the sides and the virtual vertices of polygons (see `PolygonFans`).
+
+    The virtual vertices follow the n of the polygons, as added vertices. Edges are flipped as `laplacian` says.
+    """
+    fans, drawn = PolygonFans.of(mesh), intrinsic_triangulation(mesh.triangles)
+    return replace(operators(fans.mesh, laplacian), drawn_on=Surface(drawn, drawn, V=mesh.V), fans=fans)
 
 
 def _negative_share(L: sp.csc_matrix) -> float:

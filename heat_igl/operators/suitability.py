@@ -133,12 +133,14 @@ def refined(triangulation: IntrinsicTriangulation, component: IntArray, is_chose
         is_chosen[component[triangulation.F[:, 0]]], _area_per_vertex(triangulation, component) ** 0.5, np.inf
     )
     scale = min(1.0, (triangulation.n / _ENOUGH_VERTICES) ** 0.5)
-    return delaunay_refinement(
+    made = delaunay_refinement(
         triangulation,
         sheets * (_GROWTH * triangulation.n + _MORE),
         largest_radius=_LARGEST_RADIUS * scale if scale < 1 else np.inf,
         unit=unit,
     )
+    # Beside vertices in the same place, triangles are cut into ones without area.
+    return made if (made.areas > 0).all() else triangulation
 
 
 def _area_per_vertex(triangulation: IntrinsicTriangulation, component: IntArray) -> FloatArray:

@@ -153,12 +153,13 @@ class SourceAssembler:
         given = domain.given_surface
         self._faces = None if given is None or given.faces is None else NearField(given.faces)
         self._visible = self._faces
-        if surface is not None and domain.n_given < domain.n and not surface.triangulation.is_cover:
+        n_faces = domain.n if surface is None or surface.faces is None else surface.faces.n
+        if surface is not None and n_faces < domain.n and not surface.triangulation.is_cover:
             # Added vertices see sources too.
             self._visible = self.edges
         # In edges of the mesh: if vertices were added, the operators have shorter ones.
         self._radius = NEAR_RADIUS
-        if surface is not None and surface.faces is not None and domain.n_given < domain.n:
+        if surface is not None and surface.faces is not None and n_faces < domain.n:
             self._radius *= max(1.0, surface.faces.mean_edge_length / domain.mean_edge_length)
         # Triangulations on which the edges are straight lines: one, if none was flipped; on polygons, their triangles.
         self._straight = [field for field in (self.edges, self._faces) if field is not None]
@@ -169,6 +170,7 @@ class SourceAssembler:
 
     def term(self, sources: SourceSet, takes_lines: bool = True) -> SourceTerm:
         """Initial heat of `sources`, and the distances known around them; those of straight lines only if asked for."""
+        sources = self._carried(sources)
         rim = self._rim(sources)
         ring = self._ring(sources, rim)
         lines, far = self._straight_lines(sources, rim) if takes_lines else (_NONE, _NONE)
@@ -191,6 +193,19 @@ class SourceAssembler:
             near=near,
             seen=seen,
             far=far,
+        )
+
+    def _carried(self, sources: SourceSet) -> SourceSet:
+        """The sources with their points and curves in the triangles that are solved on, before any flip."""
+        fans, points, segments = self._domain.fans, sources.points, sources.segments
+        if fans is None or sources.on_vertices_alone:
+            return sources
+        faces, barycentric = fans.carry(points.faces, points.barycentric)
+        which, inside, start, end = fans.carry_segments(segments.faces, segments.start, segments.end)
+        return replace(
+            sources,
+            points=replace(points, faces=faces, barycentric=barycentric),
+            segments=SourceSegments(inside, start, end, segments.label[which], segments.offset[which]),
         )
 
     def _rim(self, sources: SourceSet) -> BoolArray:
@@ -247,6 +262,7 @@ class SourceAssembler:
         """The straight lines whose lengths are `SourceTerm.near` and `SourceTerm.far`."""
         if self._visible is None:
             raise ValueError("straight lines need triangles")
+        sources = self._carried(sources)
         return self._visible.lines(*self._in_sight(sources, self._rim(sources), self._visible))
 
     def _in_sight(
