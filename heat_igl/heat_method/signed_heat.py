@@ -195,7 +195,7 @@ class SignedHeatSolver:
 
     def _from_heat(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) by integration, and which vertices (n,) are on the left."""
-        phi = self._integrated(self._pieces(chosen), level)
+        phi = self._levelled(chosen, level)
         if level == "zero":
             phi[vertices_on(self._mesh, chosen)] = 0.0
         if level == "zero" and not has_gaps(self._mesh, chosen):
@@ -213,11 +213,27 @@ class SignedHeatSolver:
             size = self._continued(near)
             if (is_known | (size == 0) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
-            return size, np.where(is_known, left, self._integrated(self._pieces(chosen), level) < 0)
-        near, phi = both(lambda: self._near(sources), lambda: self._integrated(self._pieces(chosen), level))
+            return size, np.where(is_known, left, self._levelled(chosen, level) < 0)
+        pieces = self._pieces(chosen)
+
+        def integrated() -> tuple[FloatArray, FloatArray]:
+            phi = self._integrated(pieces)
+            smooth, rest = self._levels.smooth(phi, pieces, level)
+            return phi - smooth, rest
+
+        # The level needs that heat as well, and this thread has less to do.
+        (near, heat), (phi, rest) = both(lambda: (self._near(sources), self._levels.heat(pieces)), integrated)
+        if level != "none":
+            phi -= self._levels.extended(rest, pieces, heat)
         left = left_of_nearest(self._faces, chosen, near.distance, phi < 0)
         closing = zero_curve_in_gaps(self._mesh, phi, near.distance, self._domain.mean_edge_length)
         return self._continued(near if closing is None else near.before(self._near([closing]))), left
+
+    def _levelled(self, chosen: OrientedSet, level: Level) -> FloatArray:
+        """The integrated distance (n,) with its level."""
+        pieces = self._pieces(chosen)
+        phi = self._integrated(pieces)
+        return phi - self._levels.of(phi, pieces, level)
 
     def _near(self, sources: list[SurfaceCurve | SurfacePoints]) -> Front:
         """Distance from curves and points: near them, or with `refine` at all vertices."""
@@ -256,8 +272,8 @@ class SignedHeatSolver:
             np.arange(len(chosen.faces) + len(normal)) >= len(chosen.faces),
         )
 
-    def _integrated(self, pieces: Pieces, level: Level) -> FloatArray:
-        """The signed distance (n,): steps 1 to 3 of the method, and the level."""
+    def _integrated(self, pieces: Pieces) -> FloatArray:
+        """The signed distance (n,) up to a level: steps 1 to 3 of the method."""
         # Step 1: diffuse the normals, integrated against the hat functions.
         corners = self._mesh.F[pieces.faces]
         share = pieces.weight[:, None] * pieces.barycentric
@@ -278,8 +294,7 @@ class SignedHeatSolver:
         turned = zip(self._rotations.of_triangulation.T, self._triangulation.F.T, strict=True)
         X = _unit(reduce(np.add, (rotation * (scale * Y[corner]) for rotation, corner in turned)))
         # Step 3: L phi = D X.
-        phi = self._poisson.solve(self._D @ np.concatenate([X.real, X.imag]))
-        return phi - self._levels.of(phi, pieces, level)
+        return self._poisson.solve(self._D @ np.concatenate([X.real, X.imag]))
 
 
 def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, IntrinsicTriangulation]:

@@ -142,7 +142,9 @@ class _CurvedFronts:
         along: cython.double = _along(base, t.side[(c + 2) % 3], t.side[(c + 1) % 3])
         foot: cython.double = self.foot[v]
         # From the side to the next corner to the foot.
-        turn: cython.double = atan2(t.double_area * foot / base, t.side[(c + 2) % 3] * t.side[(c + 2) % 3] - along * foot)
+        turn: cython.double = atan2(
+            t.double_area * foot / base, t.side[(c + 2) % 3] * t.side[(c + 2) % 3] - along * foot
+        )
         self.back[v] = t.leaving[c] + turn
 
     @cython.cfunc
