@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,12 +15,14 @@ from heat_igl.heat_method.parts import SolverParts
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_gradient, lay_out
 from heat_igl.mesh import Mesh
 from heat_igl.operators import divergence_matrix, edge_rotations, face_rotations
-from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT
+from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, both
 from heat_igl.sources import OrientedSet
 from heat_igl.steps import PoissonProblem, VectorHeatFlow
 from heat_igl.typing import AnyArray, FloatArray
 
 __all__ = ["NormalIntegration"]
+
+Other = TypeVar("Other")
 
 # Normals that sum to less than this share of the length of the curves have cancelled.
 _CANCELLED = 1e-9
@@ -68,6 +72,26 @@ class NormalIntegration:
             If the normals of all curves cancel, or one of a point is that of the face.
         """
         pieces = self._pieces(chosen)
+        phi = self._integrated(pieces)
+        return phi - self._levels.of(phi, pieces, level)
+
+    def distance_beside(
+        self, other: Callable[[], Other], chosen: OrientedSet, level: Level
+    ) -> tuple[Other, FloatArray]:
+        """The result of a shorter computation, which runs on a thread of its own, and `distance`."""
+        pieces = self._pieces(chosen)
+
+        def integrated() -> tuple[FloatArray, FloatArray]:
+            phi = self._integrated(pieces)
+            smooth, rest = self._levels.smooth(phi, pieces, level)
+            return phi - smooth, rest
+
+        # The level needs that heat as well, and the other thread has less to do.
+        (found, heat), (phi, rest) = both(lambda: (other(), self._levels.heat(pieces)), integrated)
+        return found, phi if level == "none" else phi - self._levels.extended(rest, pieces, heat)
+
+    def _integrated(self, pieces: Pieces) -> FloatArray:
+        """The signed distance (n,) up to a level."""
         # Step 1: diffuse the normals, integrated against the hat functions.
         corners = self._F[pieces.faces]
         share = pieces.weight[:, None] * pieces.barycentric
@@ -88,8 +112,7 @@ class NormalIntegration:
         turned = zip(self._rotations.of_triangulation.T, self._triangulation.F.T, strict=True)
         X = _unit(reduce(np.add, (rotation * (scale * Y[corner]) for rotation, corner in turned)))
         # Step 3: L phi = D X.
-        phi = self._poisson.solve(self._D @ np.concatenate([X.real, X.imag]))
-        return phi - self._levels.of(phi, pieces, level)
+        return self._poisson.solve(self._D @ np.concatenate([X.real, X.imag]))
 
     def _pieces(self, chosen: OrientedSet) -> Pieces:
         """Segments and points with their normals in the planes of their faces."""

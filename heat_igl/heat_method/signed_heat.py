@@ -198,7 +198,7 @@ class SignedHeatSolver:
             if (is_known | (size == 0) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
             return size, np.where(is_known, left, self._integration.distance(chosen, level) < 0)
-        near, phi = both(lambda: self._near(sources), lambda: self._integration.distance(chosen, level))
+        near, phi = self._integration.distance_beside(lambda: self._near(sources), chosen, level)
         left = left_of_nearest(self._faces, chosen, near.distance, phi < 0)
         closing = zero_curve_in_gaps(self._mesh, phi, near.distance, self._domain.mean_edge_length)
         return self._continued(near if closing is None else near.before(self._near([closing]))), left

@@ -7,6 +7,7 @@ distance is a parabola: the directions at the ends give the slopes, so the front
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.curved_fronts import Triangle
+from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.libc.math import INFINITY, M_PI, atan2, cos, fabs, sqrt
 
@@ -38,8 +39,9 @@ def advance(
     Parameters
     ----------
     triangle : (m,) structures
-        The `vertex` at each of three corners, counterclockwise; the `side` opposite; and the direction of the side to
-        the next corner, `leaving`: an angle around the vertex, counterclockwise.
+        The `vertex` at each of three corners, counterclockwise; the `side` opposite; the directions of the sides to the
+        next corner, `leaving`, and to the one before, `ending`, angles around the vertex, counterclockwise; and
+        `double_area`, twice the area.
     total : (n,) float64
         Sum of the angles around each vertex; ``inf`` on the boundary.
     first, incident : (n + 1,) int32, (3 m,) int32
@@ -61,6 +63,7 @@ def advance(
     one.triangle, one.total, one.first, one.incident = triangle, total, first, incident
     one.d, one.back = d, back
     one.is_open, one.is_passed = is_open, np.logical_not(is_open).view(np.uint8)
+    one.came_from, one.foot = np.empty(d.shape[0], np.int32), np.empty(d.shape[0])
     one.queue = PriorityQueue(d.shape[0])
     with cython.nogil:
         one.run()
@@ -70,7 +73,10 @@ def advance(
 @cython.final
 @cython.cclass
 class _CurvedFronts:
-    """What is read and written, by triangle and by vertex. The vertices in the queue come in ascending order of `d`."""
+    """What is read and written, by triangle and by vertex. The vertices in the queue come in ascending order of `d`.
+
+    `came_from` and `foot` are the corner of an open vertex that has its distance, and the place on the side opposite.
+    """
 
     triangle: cython.const[Triangle][::1]
     total: cython.const[cython.double][::1]
@@ -80,6 +86,8 @@ class _CurvedFronts:
     back: cython.double[::1]
     is_open: cython.const[cython.uchar][::1]
     is_passed: cython.uchar[::1]
+    came_from: cython.int[::1]
+    foot: cython.double[::1]
     queue: PriorityQueue
     n_visits: cython.longlong
 
@@ -107,17 +115,44 @@ class _CurvedFronts:
             v = self.queue.first()
             self.queue.set_key(v, 0.0)
             self.is_passed[v] = True
+            if self.is_open[v]:
+                self.look_back(v)
             self.n_visits += 1
+            if self.queue.count > 0:
+                prefetch(cython.address(self.incident[self.first[self.queue.first()]]))
+            # All at once, as each takes longer to come than to be read.
+            for k in range(self.first[v], self.first[v + 1]):
+                t = cython.address(self.triangle[self.incident[k] // 3])
+                prefetch(t)
+                prefetch(cython.address(t.double_area))
             for k in range(self.first[v], self.first[v + 1]):
                 f, c = self.incident[k] // 3, self.incident[k] % 3
-                self.arrive(cython.address(self.triangle[f]), (c + 1) % 3)
-                self.arrive(cython.address(self.triangle[f]), (c + 2) % 3)
+                self.arrive(f, (c + 1) % 3)
+                self.arrive(f, (c + 2) % 3)
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def look_back(self, v: cython.longlong) -> cython.void:
+        """Set the direction in which the source lies, once the distance of v is not likely to change."""
+        c: cython.int = self.came_from[v] % 3
+        t = cython.address(self.triangle[self.came_from[v] // 3])
+        base: cython.double = t.side[c]
+        along: cython.double = _along(base, t.side[(c + 2) % 3], t.side[(c + 1) % 3])
+        foot: cython.double = self.foot[v]
+        # From the side to the next corner to the foot.
+        turn: cython.double = atan2(
+            t.double_area * foot / base, t.side[(c + 2) % 3] * t.side[(c + 2) % 3] - along * foot
+        )
+        self.back[v] = t.leaving[c] + turn
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def arrive(self, t: cython.pointer[cython.const[Triangle]], c: cython.int) -> cython.void:
-        """Let corner c of triangle t have the front that has passed the other two, if it is the first."""
+    def arrive(self, f: cython.int, c: cython.int) -> cython.void:
+        """Let corner c of triangle f have the front that has passed the other two, if it is the first."""
+        t = cython.address(self.triangle[f])
         v: cython.int = t.vertex[c]
         if not self.is_open[v]:
             return
@@ -136,17 +171,17 @@ class _CurvedFronts:
         if self.is_passed[v] and best <= max(da, db) and to_a * to_a + to_b * to_b > base * base:
             # Into an acute corner, a front comes after it has passed both other corners.
             return
-        # In the plane: a in the origin, b on the first axis, v above it.
-        along: cython.double = 0.5 * ((to_a - to_b) * (to_a + to_b) / base + base)
-        height: cython.double = sqrt(max(to_a * to_a - along * along, 0.0))
         foot: cython.double = -1.0
         if da + to_a < best:
             best, foot = da + to_a, 0.0
         if db + to_b < best:
             best, foot = db + to_b, base
         if fabs(db - da) < base:
+            # In the plane: a in the origin, b on the first axis, v above it.
+            along: cython.double = _along(base, to_a, to_b)
+            height: cython.double = t.double_area / base
             slope: cython.double = (db - da) / base
-            bend: cython.double = self.bend(t, c, atan2(height, base - along))
+            bend: cython.double = self.bend(t, c)
             s: cython.double = _shortest(slope, bend, base, along, height)
             value: cython.double = da + s * slope + 0.5 * bend * s * (s - base)
             value += sqrt((s - along) * (s - along) + height * height)
@@ -156,22 +191,22 @@ class _CurvedFronts:
             return
         self.is_passed[v] = False
         self.d[v] = best
-        self.back[v] = t.leaving[c] + atan2(height * foot, to_a * to_a - along * foot)
+        self.came_from[v], self.foot[v] = 3 * f + c, foot
         self.queue.set_key(v, 1.0 / max(best, _LEAST))
 
     @cython.cfunc
     @cython.inline
     @cython.nogil
     @cython.exceptval(check=False)
-    def bend(self, t: cython.pointer[cython.const[Triangle]], c: cython.int, angle: cython.double) -> cython.double:
-        """Second derivative of distance along the side opposite corner c, with `angle` at its end; 0 if not known."""
+    def bend(self, t: cython.pointer[cython.const[Triangle]], c: cython.int) -> cython.double:
+        """Second derivative of distance along the side opposite corner c; 0 if not known."""
         i: cython.int = (c + 1) % 3
         j: cython.int = (c + 2) % 3
         a: cython.int = t.vertex[i]
         b: cython.int = t.vertex[j]
         if self.back[a] != self.back[a] or self.back[b] != self.back[b]:
             return 0.0
-        return -(self.slope(b, t.leaving[j] + angle) + self.slope(a, t.leaving[i])) / t.side[c]
+        return -(self.slope(b, t.ending[j]) + self.slope(a, t.leaving[i])) / t.side[c]
 
     @cython.cfunc
     @cython.inline
@@ -186,6 +221,15 @@ class _CurvedFronts:
         turn: cython.double = fabs(side - self.back[v])
         turn = min(turn, fabs(self.total[v] - turn))
         return -cos(min(turn, M_PI))
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _along(base: cython.double, to_start: cython.double, to_end: cython.double) -> cython.double:
+    """How far from the start of the base the corner opposite lies along it, at these distances from both ends."""
+    return 0.5 * ((to_start - to_end) * (to_start + to_end) / base + base)
 
 
 @cython.cfunc

@@ -19,7 +19,10 @@ from heat_igl.unfolding.when_exact import FEW
 
 __all__ = ["CurvedFronts", "Front"]
 
-_TRIANGLE = np.dtype([("side", "f8", 3), ("leaving", "f8", 3), ("vertex", "i4", 3), ("spare", "i4")])
+_TRIANGLE = np.dtype(
+    [(name, "f8", 3) for name in ("side", "leaving", "ending")]
+    + [("double_area", "f8"), ("vertex", "i4", 3), ("spare", "i4")]
+)
 # Distance is exact within so many mean edge lengths. With 6 the error is 0.4 to 1 of that with 3, a query takes a fifth
 # more time; with 2 it is 1 to 1.4.
 _RADIUS = 3.0
@@ -79,6 +82,8 @@ class CurvedFronts:
         triangle = aligned(len(triangulation.F), _TRIANGLE)
         triangle["side"], triangle["vertex"] = triangulation.l, triangulation.F
         triangle["leaving"] = _at_corners(triangulation, carried)
+        triangle["ending"] = triangle["leaving"] + carried.corners
+        triangle["double_area"] = 2 * triangulation.areas
         self._F = np.ascontiguousarray(triangulation.F, np.int32)
         self._tables = (
             triangle,
