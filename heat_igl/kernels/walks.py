@@ -26,17 +26,15 @@ class Query:
         The triangulation.
     walk : (n + p,) structures
         What is known of n vertices and p sources inside faces; changed in place.
-    first_inside, inside
-        Those of `heat_igl.unfolding.walks.Points`; of length 0 if there are none.
-    tolerance, shortfall, max_steps, barrier, roughness
+    points, rules, barrier
         As `heat_igl.unfolding.walks.unfold` has them.
     """
 
-    def __init__(self, tables, walk, first_inside, inside, tolerance, shortfall, max_steps, barrier, roughness):
+    def __init__(self, tables, walk, points, rules, barrier):
         self.t = HalfEdges(tables)
-        self.walk, self.first_inside, self.inside = walk, first_inside, inside
-        self.tolerance, self.shortfall, self.max_steps = tolerance, shortfall, max_steps
-        self.barrier, self.roughness = barrier, roughness
+        self.walk, self.first_inside, self.inside = walk, points.first, points.inside
+        self.tolerance, self.shortfall, self.max_steps = rules.tolerance, rules.shortfall, rules.max_steps
+        self.has_holes, self.barrier, self.roughness = rules.has_holes, barrier, rules.roughness
         self.advice = np.zeros(np.diff(tables.first).max(), _ADVICE)
         self.cone = np.zeros(_MAX_CONES, _CONE)
 

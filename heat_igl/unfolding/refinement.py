@@ -19,7 +19,7 @@ from heat_igl.mesh import SurfacePoints
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles, WalkStarts
 from heat_igl.unfolding.path_derivatives import Paths, Places, Starts, Triangles, Ways, half_edge_arrays
-from heat_igl.unfolding.walks import INSIDE, Points, sweep, unknown, views
+from heat_igl.unfolding.walks import INSIDE, Begins, Points, sweep, unknown, views
 
 __all__ = ["Known", "Refine", "Refinement"]
 
@@ -202,9 +202,9 @@ class Refinement(NumberedTriangles):
         vertices, offsets, points, point_offsets = sources
         starts = self.starts(vertices, offsets if offsets.any() else None, points, point_offsets)
         n = len(self.number)
-        entered, share, reach = np.full(n, -1, np.int32), np.zeros(n), np.zeros(n)
-        walk = self.walks(self.order(key), starts, tolerance, entered=entered, share=share, reach=reach)
-        found = Ways(walk["distance"][:n].copy(), entered.astype(np.int64), share, reach)
+        begins = Begins(np.full(n, -1, np.int32), np.zeros(n), np.zeros(n))
+        walk = self.walks(self.order(key), starts, tolerance, begins=begins)
+        found = Ways(walk["distance"][:n].copy(), begins.entered.astype(np.int64), begins.share, begins.reach)
         places = Places.none()
         if points is not None:
             faces, barycentric, point, _ = self._faces_of(points)
