@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl.intrinsic import Adjacency, IntrinsicTriangulation, lay_out
 from heat_igl.mesh import grouping
 from heat_igl.sources.own_faces import seen_from_points, seen_from_segments
-from heat_igl.sources.specification import SourcePoints, SourceSegments, nearest_first
+from heat_igl.sources.source_sets import SourcePoints, SourceSegments, nearest_first
 from heat_igl.sources.windows import ROUNDING, SeenVertices, cross, joined
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
