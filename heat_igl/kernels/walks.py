@@ -1,4 +1,4 @@
-"""What a query of the unfolding reads and writes, and the ends of walks inside faces."""
+"""The data of one query of the unfolding, and paths that end at sources inside faces."""
 
 import cython
 import numpy as np
@@ -18,14 +18,14 @@ _CONE = np.dtype([("view", _VIEW), ("forecast", "f8"), ("a", "i4"), ("b", "i4")]
 @cython.final
 @cython.cclass
 class Query:
-    """The tables, what is known of each vertex, and room to work in.
+    """The tables, the known path of each vertex, and working memory.
 
     Parameters
     ----------
     tables : Tables
         The triangulation.
     walk : (n + p,) structures
-        What is known of n vertices and p sources inside faces; changed in place.
+        The known paths of n vertices and p sources inside faces; changed in place.
     points, rules, barrier
         As `heat_igl.unfolding.walks.unfold` has them.
     """
@@ -43,9 +43,9 @@ class Query:
 @cython.nogil
 @cython.exceptval(check=False)
 def arrive(q: Query, view: View, wx: cython.double, wy: cython.double) -> cython.bint:
-    """Note the straight paths to the sources inside the face behind a view; whether one is the shortest so far.
+    """Try the straight paths to the sources inside the face behind a view; true if one is the shortest so far.
 
-    That face is a, w, b; only what lies in the cone is seen in a straight line.
+    The face is a, w, b. Only sources in the cone are seen in a straight line.
     """
     # From w, its face runs first to b and then to a.
     at_w: cython.int = view.h % 3
