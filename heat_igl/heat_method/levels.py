@@ -153,8 +153,7 @@ class PinnedLevels:
         return np.asarray(level[self._lowest] + self._share)
 
     def _bound(self, distance: FloatArray) -> None:
-        """Limit the change of distances from the known ones to the lengths of edges; note the vertices decided by
-        it."""
+        """Limit differences from known distances to the lengths of edges; note the vertices that this decides."""
         near = self._term.near
         side, which, end, length = spokes(self._triangulation, near.vertex)
         for sign in (-1.0, 1.0):
