@@ -16,7 +16,7 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["NearField", "Seeds", "SightLines"]
 
-# Number of triangles that a window may cross, one after another. On ordinary meshes the radius ends it long before.
+# Number of triangles that a window may cross, one after another. On ordinary meshes the radius is reached long before.
 _MOST_LEVELS = 50
 
 
