@@ -76,7 +76,9 @@ def _table(report: ValidationReport, columns: tuple[_Column, ...]) -> Table:
     for column in columns:
         table.add_column(column.head, justify="right", no_wrap=True)
     for row in report.rows:
+        if row.failure is not None:
+            table.add_row(row.method, "failed")
+            continue
         cells = (column.value(row) for column in columns)
-        shown = ["failed"] if row.failure is not None else ["-" if cell is None else f"{cell:.3g}" for cell in cells]
-        table.add_row(row.method, *shown)
+        table.add_row(row.method, *("-" if cell is None else f"{cell:.3g}" for cell in cells))
     return table

@@ -41,12 +41,12 @@ def path(
     loaded = as_simplices(mesh)
     check_curves(output)
     check_json(json_file)
-    if (start is None) != (end is None) or (start is None) == (not waypoints) or (closed and not waypoints):
-        missing = "--to" if start is not None and end is None else "--from" if end is not None and start is None else ""
+    if (start is None) != (end is None):
+        missing = "--to" if end is None else "--from"
+        raise SourceError(f"{missing} is missing: name a vertex with each of --from and --to")
+    if (start is None) == (not waypoints) or (closed and not waypoints):
         raise SourceError(
-            f"{missing} is missing: name a vertex with each of --from and --to"
-            if missing
-            else "name two waypoints or more, such as 12 900, or one vertex with --from and one with --to, not both"
+            "name two waypoints or more, such as 12 900, or one vertex with --from and one with --to, not both"
         )
     if waypoints:
         places, gaps = zip(*(_place(loaded, text) for text in waypoints), strict=True)

@@ -1,7 +1,8 @@
 """Curves from a distance: isolines and the areas that they enclose, shortest paths."""
 
 from heat_igl.curves.bezier import geodesic_bezier
-from heat_igl.curves.cutting import CutMesh, MeshPiece, cut
+from heat_igl.curves.cut_mesh import CutMesh, MeshPiece
+from heat_igl.curves.cutting import cut
 from heat_igl.curves.geodesics import GeodesicPathSolver, geodesic_path, straighten
 from heat_igl.curves.handles import handle_loops
 from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas

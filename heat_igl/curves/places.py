@@ -21,7 +21,7 @@ Waypoints = Sources | Sequence[int | SurfacePoints]
 def places(name: str, mesh: Mesh, points: Sources, corner_at: IntArray | None = None) -> tuple[IntArray, FloatArray]:
     """Faces (k,) and barycentric coordinates (k, 3) of points, or of vertices in the order given.
 
-    `name` is that of the argument, for messages; `corner_at` is that of `corners`, for many calls.
+    `name` is the name of the argument, for messages; `corner_at`, the result of `corners`, saves time in many calls.
     """
     if isinstance(points, SurfacePoints):
         try:

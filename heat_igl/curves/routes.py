@@ -58,7 +58,7 @@ def _apex(surface: Surface, half_edge: AnyArray, base: AnyArray) -> tuple[FloatA
 
 
 class Router:
-    """Ways through places on a mesh, by a search that it makes ready once. Threads need one each."""
+    """Finds courses through places on a mesh; the tables are made once. Each thread needs an object of its own."""
 
     def __init__(self, mesh: Mesh, surface: Surface) -> None:
         self._mesh = mesh
@@ -71,7 +71,7 @@ class Router:
         Raises
         ------
         SourceError
-            If no way leads from a place to the next.
+            If no path leads from a place to the next.
         """
         found = []
         for i in range(len(faces) - 1):

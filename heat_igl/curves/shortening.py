@@ -1,4 +1,4 @@
-"""A curve on faces as the strip that it runs through, and the shortest curve of its class."""
+"""The strip of faces that a curve runs through, and the shortest curve of the same class."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Course(NamedTuple):
     Attributes
     ----------
     faces : (s,) int32
-        A face may follow upon itself.
+        A face may come twice in a row.
     joins : (s - 1, 3) int32, for loops (s, 3)
         From each face to the next: the half-edges on both sides of the edge between them, or else the vertex to turn
         around, the shorter way; -1 for none.
@@ -120,8 +120,8 @@ class Shortener:
         self.surface = surface(mesh)
         triangle = self.surface.triangle
         sums = np.bincount(triangle["vertex"].ravel(), triangle["angle"].ravel(), mesh.n_vertices)
-        # A path that is shortest on one side of a vertex is shortest of all if the angles sum to 2 pi or more, and on
-        # the boundary. On edges of more than two faces there are more than two sides.
+        # At a vertex with angles of 2 pi or more, and on the boundary, at most one side is locally shortest. On edges
+        # of more than two faces there are more than two sides.
         sums[mesh.facets.vertices[mesh.facets.n_faces != 2]] = np.inf
         half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
         most_corners = int(np.diff(self.surface.first_corner).max())
@@ -140,7 +140,8 @@ class Shortener:
         faces, joins, ends = course
         stuck, *found = self._kernel.shorten(faces, joins, ends, is_closed)
         if stuck >= 0:
-            # A vertex alone joins two faces: the loop passes there in any case, so it is a path from there to there.
+            # Two faces have only this vertex in common: every loop of the class passes it, so the loop is a path from
+            # it to itself.
             vertex = joins[stuck, 2]
             faces, joins = np.roll(faces, -stuck - 1), np.roll(joins, -stuck - 1, axis=0)[:-1]
             at = (self.surface.triangle["vertex"][faces[[0, -1]]] == vertex).astype(float)
@@ -156,7 +157,7 @@ class Shortener:
 
 
 def _faces_ahead(surface: Surface, opposite: AnyArray) -> AnyArray:
-    """The face behind each half-edge (3 m,) of an oriented manifold, for lines that enter there: `Ahead` in fans."""
+    """The face behind each half-edge (3 m,) of an oriented manifold, as the kernel of fans has it in `Ahead`."""
     triangle = surface.triangle
     ahead = np.empty((len(triangle), 3), _AHEAD)
     ahead["along"], ahead["above"], ahead["vertex"] = triangle["along"], triangle["above"], triangle["vertex"]

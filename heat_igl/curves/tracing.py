@@ -1,9 +1,9 @@
-"""The way down a distance over a triangulation, and straightening of the strip of faces on it: what kernels are given.
+"""Paths down a distance over a triangulation: the arguments of the kernels that trace and straighten them.
 
-The way is the steepest descent, or, where the path becomes too long, found by aiming at what the distance says ahead.
-A path is first a *strip*: a sequence of crossings, each from a half-edge of one face to a half-edge of the next on the
-same edge. Laid out in the plane the strip is a polygon, in which a funnel finds the shortest path; where that bends at
-a vertex which can be passed another way, the strip is led there.
+A path follows the steepest descent. If it becomes too long, it is aimed at points ahead by their distances. It is first
+a *strip*: a sequence of crossings, each from a half-edge of one face to a half-edge of the next on the same edge. Laid
+out in the plane the strip is a polygon, in which a funnel finds the shortest path; where that bends at a vertex which
+can be passed another way, the strip is led there.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Surface(NamedTuple):
 
 
 class Goals(NamedTuple):
-    """Where paths may end; see `goals`.
+    """Sources at which paths may end; see `goals`.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Goals(NamedTuple):
     inside : (p,) structures
         The segments, `start` and `end`, and the `offset` of each.
     escape : (n,) int32
-        The next vertex on a way along edges to a source, -1 where there is none: where descent ends too early.
+        The next vertex on a path along edges to a source, taken if the descent ends too early; -1 if there is none.
     """
 
     is_source: BoolArray
@@ -100,7 +100,7 @@ def opposite_sides(surface: Surface) -> AnyArray:
 def goals(
     is_source: BoolArray, first_inside: IntArray, inside: FloatArray, offset: FloatArray, escape: IntArray
 ) -> Goals:
-    """Where paths may end: `inside` (p, 2, 3) are ends of segments, equal ones for a point, `offset` (p,) theirs."""
+    """Sources at which paths may end: segments with ends `inside` (p, 2, 3), equal for a point, and offsets (p,)."""
     segment = np.empty(len(inside), _GOAL)
     segment["start"], segment["end"], segment["offset"] = inside[:, 0], inside[:, 1], offset
     return Goals(is_source, first_inside.astype(np.int32), segment, escape.astype(np.int32))
@@ -116,13 +116,13 @@ def trace(
     s : Surface
         Triangles.
     d : (n,) float64
-        What to descend.
+        The distance to descend.
     goals : Goals
-        Where to end.
+        Sources at which to end.
     face, barycentric : (k,) int64, (k, 3) float64
         Where to begin.
     max_steps : int
-        After so many steps without an end the descent is given up for `Goals.escape`.
+        After this many steps without an end, the path follows `Goals.escape`.
 
     Returns
     -------

@@ -14,7 +14,7 @@ __all__ = ["crossing_letters"]
 
 
 def crossing_letters(mesh: Mesh) -> AnyArray | None:
-    """The letter (3 m,) int32 of each half-edge that a strip leaves a face through.
+    """The letter (3 m,) int32 of each half-edge, for strips that leave the face over it.
 
     It is empty if all components are spheres or disks, and None if the mesh is not manifold or not oriented alike.
 
@@ -25,10 +25,10 @@ def crossing_letters(mesh: Mesh) -> AnyArray | None:
     Notes
     -----
     The edges that a spanning tree of the faces does not cross form a graph, to which the surface without one disk
-    contracts (Erickson and Whittlesey 2005). Without its loose ends it consists of chains of edges. Strips can be moved
-    over a vertex inside a chain, so all edges of a chain have one letter. Where chains meet, letters of strips
-    on both sides of the vertex differ, though these are of one class: at no more than 4 g - 2 vertices on a closed
-    surface of genus g. All holes are joined to one vertex.
+    contracts (Erickson and Whittlesey 2005). Once edges with a free end are removed, it consists of chains of edges.
+    Strips can be moved over a vertex inside a chain, so all edges of a chain have one letter. At a vertex between
+    chains, strips on the two sides have different letters although they are of one class. A closed surface of genus g
+    has at most 4 g - 2 such vertices. All holes are joined to one vertex.
     """
     edge = mesh.facets.of_face.ravel()
     begin, end = (mesh.F[:, [(c + turn) % 3 for c in range(3)]].ravel() for turn in (1, 2))

@@ -13,7 +13,7 @@ __all__ = ["discs"]
 # Radius in shares of the mean length of the edges at a point: neighbouring discs overlap, so no gaps show.
 _RADIUS = 0.8
 _CORNERS, _FEW_CORNERS = 8, 4
-# Above this number of points a disc is a few pixels wide, and a square does.
+# Above this number of points a disc is a few pixels wide, and is drawn as a square.
 _MANY = 20_000
 
 
@@ -27,7 +27,8 @@ def discs(cloud: PointCloud, values: FloatArray, is_flat: bool = False) -> tuple
     values : (n,) float64
         Value of each point; ``inf`` for none.
     is_flat : bool
-        Whether a disc has the value of the point everywhere; else values grow across it as they do around the point.
+        Whether a disc has the value of the point everywhere; else values change linearly, with the gradient at the
+        point.
 
     Returns
     -------

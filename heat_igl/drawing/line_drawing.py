@@ -1,4 +1,4 @@
-"""Line drawings of curves on a surface as SVG, with what lies behind the surface dotted or left out."""
+"""Line drawings of curves on a surface as SVG; hidden parts are dotted or left out."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ __all__ = ["Hidden", "write_line_drawing"]
 
 Hidden = Literal["dotted", "omitted"]
 
-# Pixels across the picture in which it is looked up what is in front: lines are cut to about a thousandth of it.
+# Width of the depth buffer in pixels: visible parts of lines end within about a thousandth of the picture.
 _PIXELS = 1600
-# A line is hidden that lies behind the surface by more than this share of the picture.
+# A line is hidden if it lies behind the surface by more than this share of the picture.
 _BEHIND = 0.01
-# Corners of a line that turn less than this, in radians, are left out.
+# Corners at which a line turns by less than this, in radians, are left out.
 _STRAIGHT = 1e-9
 
 
@@ -49,7 +49,7 @@ def write_line_drawing(
     curves : SurfaceCurve, or sequence of such of any depth
         For instance isolines or paths.
     hidden : {"dotted", "omitted"}
-        What happens to lines behind the surface. The file has them in the group "hidden", and others in "visible".
+        How to draw lines behind the surface. In the file they are in the group "hidden", and other lines in "visible".
     view, up
         The direction of the viewer, as for `plot`.
 
@@ -64,7 +64,7 @@ def write_line_drawing(
 
     Notes
     -----
-    Lengths across the view are those of the mesh. No library beyond the core is needed.
+    The drawing is a parallel projection in the unit of the mesh. Only core dependencies are needed.
     """
     target = Path(os.fspath(path))
     if target.suffix.lower() != ".svg":

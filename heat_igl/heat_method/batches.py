@@ -105,17 +105,8 @@ class BatchedSolver(ABC):
         shape = (len(chosen), self.n_vertices)
         if out is None:
             out = np.empty(shape, float_type(dtype))
-        elif not hasattr(out, "shape") or not hasattr(out, "dtype"):
-            raise ValueError(f"out must be an array of float64 or float32 of shape {shape}, not {shown(out)}")
-        elif tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f" or np.dtype(out.dtype).itemsize < 4:
-            # Half precision ends at 65504: larger distances would read inf, like vertices that no source reaches.
-            raise ValueError(
-                f"out must be an array of float64 or float32 of shape {shape}, not {out.dtype} of shape {out.shape}"
-            )
-        elif dtype is not None and float_type(dtype) != out.dtype:
-            raise ValueError(f"dtype is {np.dtype(dtype)}, but out holds {out.dtype}: leave one of them away")
-        elif isinstance(out, np.ndarray) and not out.flags.writeable:
-            raise ValueError("out is read-only: open a memmap with mode='r+'")
+        else:
+            _check_destination(out, shape, dtype)
         write = row_writer(out)
         with progress_bar("distances", len(chosen), truth("progress", progress)) as advance:
             for rows in self._blocks(chosen, len(chosen)):
@@ -194,6 +185,21 @@ def _is_list(source_sets: object) -> bool:
     """Whether these are several entries, and neither a text nor a single number in an array."""
     single = isinstance(source_sets, (str, bytes)) or getattr(source_sets, "ndim", 1) == 0
     return isinstance(source_sets, Iterable) and not single
+
+
+def _check_destination(out: AnyArray, shape: tuple[int, int], dtype: npt.DTypeLike | None) -> None:
+    """Refuse an array `out` that distances of this shape and type cannot be written to."""
+    if not hasattr(out, "shape") or not hasattr(out, "dtype"):
+        raise ValueError(f"out must be an array of float64 or float32 of shape {shape}, not {shown(out)}")
+    if tuple(out.shape) != shape or np.dtype(out.dtype).kind != "f" or np.dtype(out.dtype).itemsize < 4:
+        # Half precision ends at 65504: larger distances would read inf, like vertices that no source reaches.
+        raise ValueError(
+            f"out must be an array of float64 or float32 of shape {shape}, not {out.dtype} of shape {out.shape}"
+        )
+    if dtype is not None and float_type(dtype) != out.dtype:
+        raise ValueError(f"dtype is {np.dtype(dtype)}, but out holds {out.dtype}: leave one of them away")
+    if isinstance(out, np.ndarray) and not out.flags.writeable:
+        raise ValueError("out is read-only: open a memmap with mode='r+'")
 
 
 def checked_cutoff(value: float | None) -> float | None:

@@ -15,12 +15,12 @@ __all__ = ["AnswerCheck", "Checker"]
 
 # Mean shortfall from which on all distances are raised to straight lines.
 _RAISED = 0.005
-# A warning is due from these on: for the mean shortfall before distances are raised, the largest where they are not,
-# and the steepness. With the defaults, scans and most models stay below 0.002, 0.02 and 0.012.
+# Values from which on a warning is issued: mean shortfall before distances are raised, largest shortfall if they are
+# not, and steepness. With the defaults, scans and most models stay below 0.002, 0.02 and 0.012.
 _SHORT_ON_AVERAGE, _SHORT_AT_WORST, _TOO_STEEP = 0.05, 0.06, 0.025
 # Of tetrahedra, on which heat is less accurate: good ones of a box reach 0.05.
 _SHORT_IN_VOLUMES, _WORST_IN_VOLUMES = 0.1, 0.2
-# Vertices and edges that are looked at, so that the check takes a few percent of a query.
+# Vertices and edges to check: the check then takes a few percent of a query.
 _MOST_VERTICES, _MOST_EDGES = 2000, 1000
 # Lines from many sources to fewer vertices.
 _MOST_LINES = 16000
@@ -29,7 +29,7 @@ _FEW_SOURCES = 32
 
 
 class AnswerCheck(NamedTuple):
-    """By how much an answer leaves the bounds that need no reference, over some thousand vertices and edges.
+    """How far an answer violates the bounds that need no reference, at some thousand vertices and edges.
 
     Attributes
     ----------
@@ -57,11 +57,11 @@ class AnswerCheck(NamedTuple):
 
     @property
     def is_short(self) -> bool:
-        """Whether the answer is so far below straight lines that raising it to them pays."""
+        """Whether the answer is so far below straight lines that it should be raised to them."""
         return self.shortfall > _RAISED
 
     def complaint(self, is_surface: bool) -> str | None:
-        """The text of a warning, if the answer is worth one: how far off it is, where, and what to do."""
+        """The text of a warning, None if none is due: the size of the violation, the place, and a remedy."""
         if is_surface:
             problem = self._problem(_SHORT_ON_AVERAGE, _SHORT_AT_WORST)
             remedy = "use refine='unfold', or heat_igl.geodesic_distance"
@@ -135,9 +135,9 @@ class Checker:
         return AnswerCheck(shortfall, largest, shortest, steepness, steepest_vertex)
 
     def raise_to_lines(self, distance: FloatArray, sources: SourceSet) -> bool:
-        """Raise an answer (n,) to the straight lines from its sources, in place, and whether that was done.
+        """Raise an answer (n,) to the straight lines from the sources, in place; returns whether that was done.
 
-        It is left as it is where many sources begin at different values.
+        Nothing is done for many sources with different offsets.
         """
         places = self._places(sources)
         if places is None or self._V is None:

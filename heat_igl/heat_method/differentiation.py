@@ -1,4 +1,4 @@
-"""From an answer of a solver to its derivative: which parts of the solver are differentiated, and what is refused."""
+"""The derivative of a distance that a solver has found: selects the parts of the solver to differentiate."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def differentiated(
     Raises
     ------
     ValueError
-        If the domain is no surface of triangles, if a curve is among the sources, with ``refine="sweep"``, or where
-        vertices were added; and for what `HeatDerivative` refuses.
+        If the domain is no surface of triangles, if a curve is among the sources, with ``refine="sweep"``, if the
+        triangulation has added vertices, or as for `HeatDerivative`.
     """
     surface = parts.operators.surface
     if isinstance(parts.last_steps, FrontSolver) and parts.operators.is_surface:

@@ -1,6 +1,6 @@
 """The level of the integrated distance and the values known beside the sources, with their derivatives.
 
-`Integration.pin_levels` step by step, remembering which value decided at each vertex.
+The steps of `Integration.pin_levels`, with a record of the value that decided at each vertex.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class PinnedLevels:
         np.minimum.at(start, self._components[near.vertex], near.value)
         begin = np.where(reached, start[self._components], 0.0)
         distance = np.where(reached, phi - of_source - rest[self._components], 0.0)
-        #: Which known value a vertex takes over, and which vertices phi decides at.
+        #: The known value that a vertex takes over, and the vertices whose distance is decided by phi.
         self._taken = np.full(len(phi), -1)
         lowest = np.full(self._n_components, -1)
         order = np.argsort(-near.value, kind="stable")
@@ -153,7 +153,7 @@ class PinnedLevels:
         return np.asarray(level[self._lowest] + self._share)
 
     def _bound(self, distance: FloatArray) -> None:
-        """Change distances by no more than the lengths of edges from the known ones; remember where that decides."""
+        """Limit differences from known distances to the lengths of edges; note the vertices that this decides."""
         near = self._term.near
         side, which, end, length = spokes(self._triangulation, near.vertex)
         for sign in (-1.0, 1.0):

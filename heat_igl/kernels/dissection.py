@@ -1,4 +1,4 @@
-"""Nested dissection of a graph by sweeps; `heat_igl.linear.dissection` says how it goes.
+"""Nested dissection of a graph by sweeps; the method is explained in `heat_igl.linear.dissection`.
 
 A graph is given as scipy stores a symmetric matrix: the neighbours of v are ``neighbours[ends[v]:ends[v + 1]]``.
 """
@@ -46,7 +46,7 @@ def dissect_pieces(
 class Dissecting:
     """A graph that is being dissected.
 
-    Most of the arrays hold a value per vertex, used by the piece at hand alone.
+    Most arrays hold a value per vertex, which only the piece that is being cut uses.
     """
 
     ends: cython.const[cython.int][::1]
@@ -138,7 +138,7 @@ def _dissect_piece(d: Dissecting, piece: Piece) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def _line_up(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """Set f to how much nearer a vertex is to one end of the piece than to the other.
+    """Set f to the difference of the distances of a vertex from both ends of the piece.
 
     Returns the size of the piece, or that of the component in the queue if the piece is not connected.
     """
@@ -181,7 +181,7 @@ def _breadth_first(d: Dissecting, root: cython.int, distance: cython.int[::1]) -
         head += 1
         further: cython.int = distance[v] + 1
         for p in range(d.ends[v], d.ends[v + 1]):
-            # No branch: nobody could predict it. The queue has room for one too many.
+            # Without a branch, which would be unpredictable. The queue has room for one entry more.
             w: cython.int = d.neighbours[p]
             old: cython.int = distance[w]
             new: cython.bint = (d.piece[w] == here) & (old < 0)

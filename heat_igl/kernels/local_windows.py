@@ -1,4 +1,4 @@
-"""Many local searches by windows on one surface, each of which costs what it touches."""
+"""Many local searches by windows on one surface. The cost of each is proportional to the vertices that it visits."""
 
 import cython
 from cython.cimports.heat_igl.kernels.window_goal import aim_at
@@ -17,7 +17,7 @@ __all__ = ["search_each"]
 def _write_within(
     s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
 ) -> cython.int:
-    """All vertices within the cutoff and their distances; how many they are."""
+    """Store the vertices within the cutoff and their distances; returns their number."""
     i: cython.int
     v: cython.int
     n: cython.int = 0
@@ -36,7 +36,7 @@ def _write_within(
 def _write_nearest(
     s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
 ) -> cython.int:
-    """The nearest vertices, of equally near ones those with the lowest names, in order; how many they are."""
+    """Store the nearest vertices in order, equally near ones by ascending name; returns their number."""
     i: cython.int
     j: cython.int
     v: cython.int
@@ -73,28 +73,29 @@ def search_each(
     value: cython.double[::1],
     end: cython.longlong[::1],
 ) -> int:
-    """Distances from one vertex after the other, each search ended early; how many sources were done, -1 for no memory.
+    """Search from one vertex after the other; returns the number of sources done, -1 if memory ran out.
 
-    What a search touched is cleared after it, so that its cost depends on what is near alone.
+    Searches end early, and clear the entries that they changed, so the cost does not depend on the size of the mesh.
 
     Parameters
     ----------
     front : Front
-        In its first state, and in it again afterwards.
+        In its initial state, to which it returns.
     source : (k,)
         Vertices that distance starts from, each alone.
     goal, first_goal : (g,), (k + 1,)
-        The distances that are asked for, ``goal[first_goal[i]:first_goal[i + 1]]`` of source i, if there are any.
+        If not empty: the distances of ``goal[first_goal[i]:first_goal[i + 1]]`` are asked for from source i.
     cutoff : float
-        Otherwise all vertices up to here are asked for,
+        Without goals: all vertices up to this distance are asked for.
     n_nearest : int
-        and so many at most, the nearest; 0 for all.
+        At most this many of them, the nearest; 0 for all.
     name : (n,)
-        What vertices are called in `found`.
+        The number by which `found` refers to each vertex.
     found, value : (r,)
-        Take vertices and their distances, source after source. The last source done is the last whose results had room.
+        Take vertices and their distances, source after source. The search stops at the first source whose results do
+        not fit.
     end : (k,)
-        Takes where the results of each source end. Results for goals are one value each, and `found` is not used.
+        Takes the end of the results of each source. With goals each result is one value, and `found` is not used.
     """
     s: cython.pointer(Search) = cython.address(front.state)
     i: cython.int

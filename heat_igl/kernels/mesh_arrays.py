@@ -1,4 +1,4 @@
-"""What is wrong with the arrays of a mesh, and how far the positions in use extend: each in one pass."""
+"""Checks of the arrays of a mesh, and the bounding box of the vertices in use, each in one pass."""
 
 import cython
 import numpy as np
@@ -25,7 +25,7 @@ def all_finite(positions: cython.const[cython.double][:, ::1]) -> bool:
 
 
 def first_fault(faces: cython.const[cython.longlong][:, ::1], n: cython.longlong) -> int:
-    """OUTSIDE if some index in `faces` (m, k) is not in 0 ... n - 1, else REPEATS if a face has one twice, else 0."""
+    """OUTSIDE if an index in `faces` (m, k) is not in 0 ... n - 1, else REPEATS if a face has one twice, else 0."""
     f: cython.Py_ssize_t
     c: cython.Py_ssize_t
     d: cython.Py_ssize_t
@@ -47,7 +47,7 @@ def first_fault(faces: cython.const[cython.longlong][:, ::1], n: cython.longlong
 
 
 def bounds(positions: cython.const[cython.double][:, ::1], faces: cython.const[cython.longlong][:, ::1]):
-    """The lowest and the highest coordinates (2, 3) of the positions (n, 3) that faces (m, k) use."""
+    """Bounding box (2, 3) of the positions (n, 3) that faces (m, k) use: smallest and largest coordinates."""
     found = np.empty((2, 3))
     corners: cython.double[:, ::1] = found
     is_used: cython.uchar[::1] = np.zeros(positions.shape[0], np.uint8)

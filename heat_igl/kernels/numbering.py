@@ -27,8 +27,8 @@ def breadth_first(
 ):
     """Number vertices and faces in the order in which a breadth-first search over the faces meets them.
 
-    What a front touches together then lies together in memory. The search begins at face `start`, and goes on in the
-    first face that it has not met.
+    The data of a front is then contiguous in memory. The search begins at face `start`; each further component begins
+    at the first face that is left.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def breadth_first(
         Old number of each face; corners stay in place.
     """
     m: cython.int = twin.shape[0] // 3
-    # Each on its own, so that what is not needed any more can be let go of.
+    # One array after the other, so that memory is freed as soon as possible.
     vertices, twins, lengths = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m)
     rings = None if ring is None else np.empty(3 * m, np.int32)
     alignment = None if aligned is None else np.empty(3 * m, np.uint8)
@@ -85,7 +85,7 @@ def breadth_first(
 @cython.final
 @cython.cclass
 class _Search:
-    """What a breadth-first search over the faces reads, and writes by the new numbers."""
+    """Input and results of a breadth-first search over the faces."""
 
     vertex: cython.const[cython.int][::1]
     twin: cython.const[cython.int][::1]

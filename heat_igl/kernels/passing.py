@@ -1,4 +1,4 @@
-"""Paths passed on the other sides of vertices: where angles sum to less than 2 pi, both sides can be shortest."""
+"""Paths led past vertices on the other side: at a vertex with less than 2 pi, both ways can be locally shortest."""
 
 import cython
 import numpy as np
@@ -20,7 +20,7 @@ _CHOICE = np.dtype([("saved", "f8"), ("vertex", "i4"), ("first", "i4"), ("last",
 @cython.final
 @cython.cclass
 class Saved:
-    """The strip of a course and where it starts, to go back to."""
+    """A copy of the strip of a course and of its start, to return to."""
 
     def __init__(self):
         self.strip = Strip()
@@ -37,7 +37,7 @@ class Saved:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def restore(self, course: Course) -> cython.int:
-        """Make a course what was saved."""
+        """Make a course equal to the saved one."""
         course.face, course.vertex, course.start = self.face, self.vertex, self.start
         return copy(self.strip, course.strip)
 
@@ -45,7 +45,7 @@ class Saved:
 @cython.final
 @cython.cclass
 class Passing:
-    """The vertices that a path may pass on the other side, the most promising first, and its strip.
+    """The strip of a path, and the vertices that it may pass on the other side, the most promising first.
 
     `half_turn` (n,) is the cosine of half the sum of the angles at each vertex, -1 where one side only is shortest.
     """
@@ -59,7 +59,7 @@ class Passing:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def propose(self) -> cython.int:
-        """Keep the strip of a straightened path, and note the vertices not tried before; returns how many.
+        """Keep the strip of a straightened path, and note the vertices not tried before; returns their number.
 
         Laid flat, a path around one vertex is shorter on the other side if it spans more than half of the angles there.
         """
@@ -96,7 +96,7 @@ class Passing:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def note(self, j: cython.int, side: cython.int, saved: cython.double) -> cython.int:
-        """Note the vertex at a side of crossing j, in its place among the choices."""
+        """Insert the vertex at a side of crossing j into the sorted choices."""
         v: cython.int = self.course.layout.gate[j].vertex[side]
         if not saved > -self.largest_loss or self.is_tried(v):
             return 0

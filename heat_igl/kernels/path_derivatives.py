@@ -7,7 +7,8 @@ length s, and
     s^2 = - sum over pairs i < k of delta_i delta_k l_ik^2.
 
 By the envelope theorem the places on the edges count as fixed, so the derivative of s by l_ik is
-- delta_i delta_k l_ik / s. What is behind the end of a line is added by visiting the vertices in the order of distance.
+- delta_i delta_k l_ik / s. The rest of a path, behind the end of its last line, is added by visiting the vertices in
+the order of distance.
 """
 
 import cython
@@ -22,7 +23,7 @@ __all__ = ["pull_back", "push_forward"]
 @cython.nogil
 @cython.exceptval(check=False)
 def _squared(side: cython.pointer[cython.const[cython.double]], d: cython.pointer[Place]) -> cython.double:
-    """The square of a length in a face with these sides, between places that differ by d."""
+    """Squared length of a line in a face with these sides; d is the difference of the coordinates of the ends."""
     return -(d.c[1] * d.c[2] * side[0] ** 2 + d.c[2] * d.c[0] * side[1] ** 2 + d.c[0] * d.c[1] * side[2] ** 2)
 
 
@@ -107,7 +108,7 @@ def _along(
         total += _piece(
             sides, cython.address(one), cython.address(other), weight, of_face, tangent_of_face, none, nowhere
         )
-        # The same place in the face behind.
+        # The same point by coordinates in the next face.
         f = gate.enter - gate.enter % 3
         one.c[0] = one.c[1] = one.c[2] = 0.0
         tail_is_left: cython.bint = _tail_is_left(lines, gate)
@@ -192,8 +193,8 @@ def push_forward(
 ):
     """The derivative of all path lengths, `change` (n + e,), for sides that change by `tangent` (3 m,).
 
-    The source points' coordinates change by `moves` (e, 3). `change` is what the sources' offsets change by before.
-    Other arguments as for `pull_back`.
+    The source points' coordinates change by `moves` (e, 3). On entry, `change` holds the changes of the sources'
+    offsets. Other arguments as for `pull_back`.
     """
     lines = Lines(triangles, points, ways)
     end_moves: cython.pointer[cython.const[cython.double]] = cython.NULL

@@ -1,8 +1,8 @@
 """Strips of faces, and the shortest way around a vertex from one face to another.
 
 A strip is a sequence of crossings. If more than two faces meet at an edge, it crosses the edge from any of them into
-any other, and the ways around the ends of the edge branch, so the shortest is searched for. Nothing here needs faces
-that are oriented alike.
+any other, and the ways around the ends of the edge branch, so the shortest one is searched for. Faces need not be
+oriented alike.
 """
 
 import cython

@@ -30,27 +30,15 @@ def unfold(
     order: cython.const[cython.int][::1],
     tables,
     walk,
-    first_inside,
-    inside,
-    tolerance: cython.double,
-    shortfall: cython.double,
-    max_steps: cython.int,
-    max_passes: cython.int,
-    has_holes: cython.bint,
-    entered,
-    share,
-    reach,
+    points,
+    rules,
     barrier,
-    roughness,
+    begins,
 ):
-    """Pass over the vertices `order` (n,) until nothing is stale; see `heat_igl.unfolding.walks.unfold`.
-
-    The last three are filled with how each path begins, unless they are empty.
-    """
-    ways = _Ways()
-    ways.entered, ways.share, ways.reach = entered, share, reach
-    q = Query(tables, walk, first_inside, inside, tolerance, shortfall, max_steps, barrier, roughness)
-    q.has_holes = has_holes
+    """Pass over the vertices `order` (n,) until nothing is stale; see `heat_igl.unfolding.walks.unfold`."""
+    ways = _Ways(begins)
+    q = Query(tables, walk, points, rules, barrier)
+    max_passes: cython.int = rules.max_passes
     v: cython.int
     n: cython.int = q.t.first.shape[0] - 1
     is_stale: cython.uchar[::1] = np.empty(n, np.uint8)
@@ -65,11 +53,14 @@ def unfold(
 @cython.final
 @cython.cclass
 class _Ways:
-    """How the path of each vertex begins, as `heat_igl.unfolding.path_derivatives.Ways` has it; or empty arrays."""
+    """Fills the arrays of `heat_igl.unfolding.walks.Begins`, unless they are empty."""
 
     entered: cython.int[::1]
     share: cython.double[::1]
     reach: cython.double[::1]
+
+    def __init__(self, begins):
+        self.entered, self.share, self.reach = begins.entered, begins.share, begins.reach
 
     @cython.cfunc
     @cython.nogil

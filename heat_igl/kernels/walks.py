@@ -1,4 +1,4 @@
-"""What a query of the unfolding reads and writes, and the ends of walks inside faces."""
+"""The data of one query of the unfolding, and paths that end at sources inside faces."""
 
 import cython
 import numpy as np
@@ -18,25 +18,23 @@ _CONE = np.dtype([("view", _VIEW), ("forecast", "f8"), ("a", "i4"), ("b", "i4")]
 @cython.final
 @cython.cclass
 class Query:
-    """The tables, what is known of each vertex, and room to work in.
+    """The tables, the known path of each vertex, and working memory.
 
     Parameters
     ----------
     tables : Tables
         The triangulation.
     walk : (n + p,) structures
-        What is known of n vertices and p sources inside faces; changed in place.
-    first_inside, inside
-        Those of `heat_igl.unfolding.walks.Points`; of length 0 if there are none.
-    tolerance, shortfall, max_steps, barrier, roughness
+        The known paths of n vertices and p sources inside faces; changed in place.
+    points, rules, barrier
         As `heat_igl.unfolding.walks.unfold` has them.
     """
 
-    def __init__(self, tables, walk, first_inside, inside, tolerance, shortfall, max_steps, barrier, roughness):
+    def __init__(self, tables, walk, points, rules, barrier):
         self.t = HalfEdges(tables)
-        self.walk, self.first_inside, self.inside = walk, first_inside, inside
-        self.tolerance, self.shortfall, self.max_steps = tolerance, shortfall, max_steps
-        self.barrier, self.roughness = barrier, roughness
+        self.walk, self.first_inside, self.inside = walk, points.first, points.inside
+        self.tolerance, self.shortfall, self.max_steps = rules.tolerance, rules.shortfall, rules.max_steps
+        self.has_holes, self.barrier, self.roughness = rules.has_holes, barrier, rules.roughness
         self.advice = np.zeros(np.diff(tables.first).max(), _ADVICE)
         self.cone = np.zeros(_MAX_CONES, _CONE)
 
@@ -45,9 +43,9 @@ class Query:
 @cython.nogil
 @cython.exceptval(check=False)
 def arrive(q: Query, view: View, wx: cython.double, wy: cython.double) -> cython.bint:
-    """Note the straight paths to the sources inside the face behind a view; whether one is the shortest so far.
+    """Try the straight paths to the sources inside the face behind a view; true if one is the shortest so far.
 
-    That face is a, w, b; only what lies in the cone is seen in a straight line.
+    The face is a, w, b. Only sources in the cone are seen in a straight line.
     """
     # From w, its face runs first to b and then to a.
     at_w: cython.int = view.h % 3

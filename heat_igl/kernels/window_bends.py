@@ -1,7 +1,7 @@
 """Windows from vertices at which shortest paths can bend: the pseudo-sources of continuous Dijkstra.
 
-Paths bend where the angles around a vertex exceed 2 pi, into the directions beyond a straight angle on both sides; at
-the boundary; and where faces are not one fan, into all faces.
+Paths bend at a vertex with angles that sum to more than 2 pi, into directions at least pi from the arriving path on
+both sides; at the boundary; and, into all faces, at a vertex with several fans.
 """
 
 import cython
@@ -61,7 +61,7 @@ def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset:
 @cython.nogil
 @cython.exceptval(check=False)
 def _straighten(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Ray)) -> cython.bint:
-    """Go on over a side of corner k until the direction has turned by pi; whether the fan reaches that far.
+    """Turn around the vertex over a side of corner k by pi; true if the fan reaches that far.
 
     `ray` takes the corner that holds the direction, the side over which it was entered, and the angle between them.
     """
@@ -85,7 +85,7 @@ def _straighten(s: cython.pointer(Search), k: cython.int, side: cython.int, ray:
 @cython.nogil
 @cython.exceptval(check=False)
 def _reach(s: cython.pointer(Search), ray: cython.pointer(Ray)) -> cython.double:
-    """How far along the half-edge opposite the ray's corner, from its end on the ray's side, the ray meets it."""
+    """How far the ray meets the half-edge opposite its corner from the end on the side of the ray."""
     k: cython.int = ray.corner
     length: cython.double = s.length[k]
     p: cython.double = s.length[ray.side]
@@ -105,7 +105,7 @@ def _reach(s: cython.pointer(Search), ray: cython.pointer(Ray)) -> cython.double
 def _fill(
     s: cython.pointer(Search), v: cython.int, first: cython.pointer(Ray), last: cython.pointer(Ray)
 ) -> cython.void:
-    """Windows from v between two rays, or, without a second one, from the first ray to the boundary."""
+    """Windows from v between two rays, or between the first ray and the boundary if there is no second."""
     k: cython.int = first.corner
     side: cython.int = first.side
     near: cython.double = _reach(s, first) - SHADOW_MARGIN * s.length[k]

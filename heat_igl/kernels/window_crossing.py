@@ -1,4 +1,4 @@
-"""Windows cross a face: distances of the vertex and of the targets in it, and windows on its two other sides."""
+"""Windows cross a face: they give distances to the opposite vertex and the targets inside, and windows on two sides."""
 
 import cython
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
@@ -80,7 +80,7 @@ def _reach_apex(
     n: cython.int,
     apex: cython.pointer(Apex),
 ) -> cython.void:
-    """Distance of the apex, and on which side of it the lines of each window pass."""
+    """Distance of the apex, and the side on which the lines of each window pass it."""
     i: cython.int
     x: cython.double
     m: cython.double
@@ -118,7 +118,7 @@ def _reach_apex(
                 apex.nearest = distance
                 apex.best = i
             continue
-        # Just missed: over the end of the window, which costs next to nothing.
+        # The apex is just beside the window: the path over the end of the window is hardly longer.
         _arrive(s, h, w, _bent(w, b, apex.x, apex.y), b)
     if apex.best >= 0:
         w = windows + apex.best
@@ -130,7 +130,7 @@ def _reach_apex(
 @cython.nogil
 @cython.exceptval(check=False)
 def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
-    """The window over the side between the tail and the apex; whether there is one."""
+    """Make the window over the side between the tail and the apex; true if there is one."""
     scale: cython.double
     out[0] = w[0]
     if w.is_plane:
@@ -157,7 +157,7 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
 @cython.nogil
 @cython.exceptval(check=False)
 def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
-    """The window over the side between the apex and the head; whether there is one."""
+    """Make the window over the side between the apex and the head; true if there is one."""
     scale: cython.double
     x: cython.double = apex.length - w.x
     out[0] = w[0]
@@ -190,7 +190,7 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
 @cython.nogil
 @cython.exceptval(check=False)
 def _fetch(s: cython.pointer(Search), t: cython.int) -> cython.void:
-    """Begin to fetch what windows over half-edge t will need."""
+    """Prefetch the data for windows over half-edge t."""
     prefetch(s.slot + t)
     prefetch(s.length + t)
     prefetch(s.bulge + t)
@@ -227,7 +227,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
         _measure(s, h, windows, n, apex.x, apex.y)
     for i in range(n):
         w = windows + i
-        # Those that would cross a shorter way to the apex go no further.
+        # Windows whose lines would cross a shorter path to the apex go no further.
         is_best = apex.best < 0 or i == apex.best
         if w.side != RIGHT_OF_APEX and (
             is_best
@@ -287,7 +287,7 @@ def _measure(
                 at = w.stop
             distance = _bent(w, at, x, y)
             if y == 0.0:
-                # On the side itself: the path is known better, with its last face, to the copy in the face before.
+                # On the side itself: the copy in the face before knows the last face of the path.
                 distance += s.tolerance * distance
             if distance < s.target_distance[j]:
                 s.target_distance[j] = distance

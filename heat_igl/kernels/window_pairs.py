@@ -1,4 +1,4 @@
-"""Two fronts that share one exact search, a thread for each; `window_sharing` has what they do."""
+"""One exact search that two fronts share, each on a thread of its own; the algorithm is in `window_sharing`."""
 
 import cython
 from cython.cimports.cpython.pythread import (
@@ -22,19 +22,21 @@ def pair(
     round_length: cython.double,
     plenty: cython.longlong,
 ) -> None:
-    """Let two searches on one surface go on side by side: `search` from the sources on one, from none on the other.
+    """Prepare two fronts to share a search: `search` is called on both, on one with all sources, on the other with
+    none.
 
     Parameters
     ----------
     first, second : Front
-        For one search, with arrays of their own for what they write, but for `kind`. Each vertex has the smaller of
-        the two distances that they find.
+        The two fronts. Each has result arrays of its own; they share `kind` only. The distance of a vertex is the
+        smaller of the two that they find.
     upper, other_upper : (n,)
-        Must come full of infinity.
+        Upper bounds on distances; infinity at first.
     round_length : float
-        How far the distance goes between two meetings.
+        How far the search goes before the threads exchange distances.
     plenty : int
-        About so many windows on the front are work for two threads. When less than a third is left, one goes on alone.
+        With about this many windows on the front there is work for two threads. With less than a third, one goes on
+        alone.
     """
     _join(first, upper, second)
     _join(second, other_upper, first)
@@ -63,7 +65,7 @@ def _join(one: Front, upper: cython.double[::1], other: Front) -> None:
 
 
 def part(first: Front, second: Front) -> bool:
-    """Return what `pair` took; whether the distances are those of one thread to the bit, otherwise it must search."""
+    """Free what `pair` allocated; false if one thread must search again to get the bits of a search on one thread."""
     one: Front
     s: cython.pointer(Search)
     i: cython.int

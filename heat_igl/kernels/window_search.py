@@ -1,4 +1,4 @@
-"""Continuous Dijkstra: lists of windows cross their faces in ascending order, until what is asked for is known."""
+"""Continuous Dijkstra: lists of windows cross their faces in ascending order of distance, until the result is known."""
 
 import cython
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
@@ -17,7 +17,7 @@ from cython.cimports.libc.stdlib import free, malloc
 @cython.nogil
 @cython.exceptval(check=False)
 def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
-    """Whether no window with this key or a later one can come nearer to what is asked for."""
+    """Whether the result cannot change any more by windows with this key or a larger one."""
     j: cython.int
     while s.n_found < s.n_goals:
         if s.distance[s.goal[s.n_found]] > key:
@@ -86,7 +86,7 @@ def run(s: cython.pointer(Search)) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def narrow(s: cython.pointer(Search)) -> cython.void:
-    """End the search at the distance within which as many vertices as asked for are known to lie."""
+    """Lower the cutoff to a distance within which the requested number of vertices are known to lie."""
     i: cython.int
     j: cython.int
     low: cython.int = 0
@@ -131,7 +131,7 @@ def narrow(s: cython.pointer(Search)) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def forget(s: cython.pointer(Search)) -> cython.void:
-    """Clear all that a search wrote, for the next one on the same front."""
+    """Clear the entries that a search wrote, for the next search on the same front."""
     i: cython.int
     v: cython.int
     empty_front(s)

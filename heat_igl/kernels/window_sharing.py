@@ -1,14 +1,14 @@
-"""One search on two threads, each of which carries the windows on a part of the front.
+"""One search on two threads: each carries the windows on a part of the front.
 
-Each thread has a queue, lists and distances of its own, and goes on for a round: up to a key that both have agreed on.
-After a round each tells the other which distances it has found, and windows that are longer are cut as they are when
-one thread has found both. So only windows next to the line between the two parts go further than those of one thread,
-by the length of a round. Where much less waits in one part, a piece of the other is handed over. What is done depends
-on nothing but the two queues, never on which thread is faster.
+Each thread has a queue, lists and distances of its own. It works in rounds: up to a key that both have agreed on. After
+a round the threads exchange the distances that they have found, and cut windows that are longer, as one thread would
+do. So only windows next to the border of the two parts go further than in a search on one thread, by the length of a
+round. If one part has much less work left, it gets a piece of the other. All decisions depend on the two queues alone,
+never on which thread is faster.
 
-A distance is rounded along the faces that its path crosses, whoever carries the window. The exception are halves of a
-window that are joined behind a flat vertex, since both must wait in one list: `run_beside` ends when it meets one, and
-one thread does all. On surfaces with flat parts there are few windows anyway.
+Rounding of a distance depends on the faces that the path crosses, not on the thread. The exception are the halves of a
+window that are joined behind a flat vertex, since both must wait in one list: `run_beside` then ends, and one thread
+repeats the search. Surfaces with flat parts have few windows anyway.
 """
 
 import cython
@@ -57,7 +57,7 @@ def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def _load(s: cython.pointer(Search)) -> cython.longlong:
-    """About how much work waits, counted in windows; 0 if there is none."""
+    """Estimated work on the front, counted in windows; 0 if there is none."""
     return s.n_waiting + PER_LIST * s.n_heap
 
 
@@ -89,7 +89,7 @@ def _hear(s: cython.pointer(Search), news: cython.pointer(Entry), n: cython.int)
 @cython.nogil
 @cython.exceptval(check=False)
 def run_beside(s: cython.pointer(Search)) -> cython.void:
-    """As `run`, for one of two searches that have a thread each; both end together."""
+    """As `run`, for one of two searches on two threads; both return at the same time."""
     o: cython.pointer(Search) = s.other
     p: cython.int
     key: cython.double
@@ -117,7 +117,7 @@ def run_beside(s: cython.pointer(Search)) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def _balance(s: cython.pointer(Search)) -> cython.bint:
-    """Hand windows over if one thread has more to do; whether one has everything, as there is too little for two."""
+    """Hand windows over if one thread has more work; true if one got all, because there is too little work for two."""
     o: cython.pointer(Search) = s.other
     mine: cython.longlong = s.load[s.parity]
     theirs: cython.longlong = o.load[s.parity]
@@ -142,7 +142,7 @@ def _balance(s: cython.pointer(Search)) -> cython.bint:
 @cython.nogil
 @cython.exceptval(check=False)
 def _next_seed(s: cython.pointer(Search)) -> cython.int:
-    """A half-edge where windows wait, if possible next to the part of the other thread; -1 if there is none."""
+    """A half-edge with windows that wait, if possible next to the part of the other thread; -1 if there is none."""
     i: cython.int
     h: cython.int
     u: cython.int
@@ -163,7 +163,7 @@ def _next_seed(s: cython.pointer(Search)) -> cython.int:
 @cython.nogil
 @cython.exceptval(check=False)
 def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.int) -> cython.longlong:
-    """Hand over what waits at half-edge h; how much that is."""
+    """Hand over the windows that wait at half-edge h; returns their work."""
     place: cython.int = s.slot[h]
     one: cython.pointer(List) = cython.address(s.lists[place])
     n: cython.int = one.count
@@ -184,7 +184,7 @@ def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.i
 @cython.nogil
 @cython.exceptval(check=False)
 def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython.int) -> cython.longlong:
-    """Hand over a vertex from which windows are to start; how much that is."""
+    """Hand over a vertex from which windows are to start; returns the work."""
     if (
         s.kind[v] == PASSED
         or s.kind[v] == FLAT
@@ -197,7 +197,7 @@ def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython
         o.touched[o.n_touched] = v
         o.n_touched += 1
     s.emitted[v] = s.distance[v]
-    o.emitted[v] = INFINITY  # it may have come from there
+    o.emitted[v] = INFINITY  # the other search may have handed it over before
     o.distance[v] = o.upper[v] = s.distance[v]
     o.root[v] = s.root[v]
     o.label[v] = s.label[v]
@@ -215,7 +215,7 @@ def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython
 @cython.nogil
 @cython.exceptval(check=False)
 def _hand_over(s: cython.pointer(Search), o: cython.pointer(Search), amount: cython.longlong) -> cython.void:
-    """Give a connected piece of the front to the other search, which waits meanwhile."""
+    """Give a connected piece of the front to the other search, which waits until this is done."""
     queue: cython.p_int = cython.cast(cython.p_int, malloc((s.n_lists + 1) * cython.sizeof(cython.int)))
     n: cython.int = 0
     i: cython.int = 0

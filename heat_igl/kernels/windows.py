@@ -3,13 +3,13 @@
 A *window* is the part of a half-edge that straight lines from one root cross, all through the same faces; the root laid
 out in the plane before the half-edge gives the distance of every point of the window (Mitchell, Mount, Papadimitriou
 1987). Windows that enter a face over the same side wait there in one list and cross the face together, as in Qin et al.
-2016; the order of the lists is different here, see `window_lists`. Before a list crosses its face, windows lose what
-another path reaches sooner (`window_trimming`), and what would cross a shorter way to the corner ahead
-(`window_crossing`). Windows begin at sources (`window_sources`, `window_segments`), and at vertices at which shortest
-paths can bend (`window_bends`).
+2016; the order of the lists is different here, see `window_lists`. Before a list crosses its face, windows are cut to
+the points that no other path reaches sooner (`window_trimming`), and to the lines that cross no shorter path to the
+corner ahead (`window_crossing`). Windows begin at sources (`window_sources`, `window_segments`), and at vertices at
+which shortest paths can bend (`window_bends`).
 
-`search` is for one question about all vertices; `window_pairs` lets two threads share it, and `local_windows` has a
-search for many local ones.
+`search` finds the distances of all vertices for one set of sources. With `window_pairs` two threads share it.
+`local_windows` has many local searches.
 """
 
 import cython
@@ -36,13 +36,13 @@ class Front:
         Takes distances, and where the shortest paths come from, see `heat_igl.unfolding.window_search.Found`: nothing
         found yet at n vertices, with labels for as many source points and segments as there will be.
     tolerance : float
-        The fraction of a distance by which another way must be shorter before a window is cut.
+        A window is cut where another path is shorter by more than this fraction of the distance.
     leaving : Leaving, optional
         Takes in which direction the straight last parts of the paths leave their roots, see `window_distances.relax`:
         on surfaces whose faces are oriented alike.
     position : (3 n,), optional
-        Of the vertices in space, in the unit of the lengths. With one goal for a source, `search_each` then leaves out
-        what is too far from it along straight lines.
+        Positions of the vertices, in the unit of the lengths. With one goal for a source, `search_each` uses them to
+        leave out vertices that are too far from the goal along straight lines.
     """
 
     def __init__(
@@ -111,16 +111,16 @@ def search(
     cutoff: cython.double,
     statistics: cython.longlong[::1],
 ) -> bool:
-    """Exact distances from vertices, points and segments; false where memory runs out.
+    """Exact distances from vertices, points and segments; false if memory runs out.
 
     Parameters
     ----------
     front : Front
-        For one search alone, whose labels have room for the source points and segments. Of two that are a pair (see
-        `window_pairs`), one is given all sources, and the other one none.
+        Used for one search only; its labels have room for the source points and segments. Of a pair (see
+        `window_pairs`), one gets all sources and the other none.
     starts : Starts
-        The sources, see `heat_igl.unfolding.window_search.Starts`. One on a side comes once for every face there, and
-        the ends of segments must be among the points.
+        The sources, see `heat_igl.unfolding.window_search.Starts`. A source on a side is listed once for every face
+        there, and the ends of segments must be among the points.
     goal : (g,)
         With `stops_early`, the search ends when the distances of these vertices and of all targets are known.
     targets : Targets

@@ -1,10 +1,9 @@
-"""Nested dissection: an order of elimination with little fill, and the tree of separators that it goes by.
+"""Nested dissection: an order of elimination with little fill-in, and the tree of its separators.
 
 George (1973) with separators from a sweep: in each piece of the graph two vertices far apart are found by breadth-first
-searches, and the vertices are lined up by how much nearer they are to one than to the other. Every threshold along that
-line cuts the piece in two; all of them are weighed at once. On meshes this leaves somewhat more nonzeros than
-METIS's multilevel scheme, in a fraction of the time: METIS (pymetis) uses one processor and holds the interpreter's
-lock.
+searches, and the vertices are sorted by the difference of their distances from both. Every threshold in that order cuts
+the piece in two; all thresholds are compared in one pass. On meshes this leaves somewhat more nonzeros than METIS's
+multilevel scheme, in a fraction of the time: METIS (pymetis) uses one processor and holds the interpreter's lock.
 """
 
 from __future__ import annotations
@@ -20,11 +19,11 @@ from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 
 __all__ = ["Dissection", "dissect"]
 
-# Pieces with more vertices than this, and than this share of all, are cut one at a time and their parts side by side;
-# others are done in one go.
+# Pieces with more vertices than this, and than this share of all, are cut one at a time, and their parts are dissected
+# in parallel; smaller pieces are dissected by one thread.
 _LARGE = 3000
 _SHARE = 1 / 64
-# Small components are dissected together, so many vertices at a time.
+# Small components are dissected together, up to this many vertices at a time.
 _TOGETHER = 256
 
 
@@ -58,7 +57,7 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
     neighbours : (nnz,) int32
         Vertices.
     workers : Executor, optional
-        Threads to work with. The result does not depend on them.
+        Threads for large pieces. The result does not depend on them.
     """
     n = len(ends) - 1
     # A vertex with very many neighbours belongs to every separator.
@@ -102,8 +101,8 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
 def _apart(ends: IntArray, neighbours: IntArray) -> list[tuple[tuple[IntArray, IntArray], int, int]]:
     """Parts of a graph in breadth-first order that no edge joins, each with the first vertex and the end.
 
-    A part is looked through again for each component that is split off from it, so there are no more than `_TOGETHER`
-    vertices before the last component.
+    A part is searched again for each component that is split off from it, so all components but the last one have at
+    most `_TOGETHER` vertices together.
     """
     n = len(ends) - 1
     vertex = np.repeat(np.arange(n), np.diff(ends))

@@ -35,8 +35,8 @@ class Multigrid:
 
     Notes
     -----
-    Beside smoothed aggregation it is set up in a fraction of the time and memory and needs about as many iterations on
-    Laplacians of triangulations; and it uses no random numbers.
+    Compared with smoothed aggregation, the setup takes a fraction of the time and memory, and Laplacians of
+    triangulations need about as many iterations. It uses no random numbers.
     """
 
     backend = "iterative"

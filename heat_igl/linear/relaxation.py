@@ -1,10 +1,10 @@
 """Relaxation: Gauss-Seidel iteration on an M-matrix, which keeps the relative accuracy of small results.
 
-Heat falls by hundreds of decades over a mesh, and only its *relative* accuracy gives far directions: an iteration that
-stops at a residual would lose them. The heat matrix on a Delaunay triangulation is an M-matrix, so Gauss-Seidel from 0
-with a right-hand side that is nowhere negative adds up numbers of one sign and rises towards the solution at every
-unknown. Visiting unknowns outward from the source, a band that is already right follows the front, and each unknown is
-visited some tens to hundreds of times, however large the mesh.
+Heat decays by hundreds of orders of magnitude over a mesh, and far from the source the direction of its gradient
+depends on the *relative* accuracy: an iteration that stops at a residual would lose it. The heat matrix on a Delaunay
+triangulation is an M-matrix, so Gauss-Seidel from 0 with a right-hand side that is nowhere negative adds numbers of one
+sign, and converges from below at every unknown. Unknowns are visited outward from the source, in a band that moves with
+the front. Each is visited some tens to hundreds of times, on meshes of any size.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from heat_igl.typing import BoolArray, FloatArray
 
 __all__ = ["Relaxation"]
 
-# Relative change per sweep below which an unknown is left alone. The remaining error adds up along the way from the
-# source, to at most some 1e-8 on slivers; distances see the differences of neighbours only.
+# Relative change per sweep below which an unknown has converged. The remaining error adds up along the way from the
+# source, to at most some 1e-8 on slivers; distances depend on the differences of neighbours only.
 _TOLERANCE = 1e-11
-# A sweep goes out by one level of unknowns at a time; slivers need a thousand more.
+# Largest number of sweeps. A sweep advances by one breadth-first level; slivers need a thousand sweeps more.
 _MOST_SWEEPS = 200_000
 
 

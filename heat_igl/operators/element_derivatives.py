@@ -1,4 +1,4 @@
-"""What the heat method takes of triangles, to be differentiated by the lengths of their sides: weights and areas."""
+"""Derivatives of the weights and areas of triangles by the lengths of their sides."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Call a function in a child process, which may crash, hang or run out of memory without harm to the caller.
+"""Calls in a child process: it may crash, hang or run out of memory without harm to the caller.
 
 One child serves all calls, one after the other, until it fails; the next call starts another. Requests and replies
 are single lines of JSON on the child's standard streams. Arrays cross as ``.npy`` files that the child maps into
@@ -228,7 +228,7 @@ class GuardedProcess:
             messages.close()
 
     def _after_fork(self) -> None:
-        """In the forked process: a thread that does not exist there may have held the lock.
+        """Replace the lock in a forked process: a thread of the parent, which does not exist here, may have held it.
 
         The child belongs to the other process; `_running` finds that it cannot be waited for, and starts another.
         """

@@ -15,8 +15,8 @@ def meshlab(mesh: MeshLike, sources: Sources, *, timeout: float = TIMEOUT, memor
     """MeshLab's geodesic distance from selected vertices: a front that unfolds one triangle per step (pymeshlab).
 
     Neither exact nor a bound; 0.05 to 1 % from exact in the mean on ordinary meshes. The time explodes on some
-    meshes with slivers. Parameters, result and errors are those of `exact`, without the check of the result and its
-    demand for manifold surfaces.
+    meshes with slivers. Parameters, result and errors are those of `exact`, but the result is not checked, and the
+    surface need not be manifold.
     """
     return measured("meshlab", mesh, sources, timeout=timeout, memory=memory).distance
 

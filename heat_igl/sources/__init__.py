@@ -4,17 +4,8 @@ from heat_igl.sources.assembly import NEAR_RADIUS, SourceAssembler, SourceTerm, 
 from heat_igl.sources.near_field import NearField, Seeds, SightLines
 from heat_igl.sources.ordered import ordered_vertices
 from heat_igl.sources.oriented import Oriented, OrientedPoints, OrientedSet, oriented_set
-from heat_igl.sources.specification import (
-    OffsetSources,
-    SourcePoints,
-    Sources,
-    SourceSegments,
-    SourceSet,
-    named_vertices,
-    nearest_first,
-    source_set,
-    vertex_sources,
-)
+from heat_igl.sources.source_sets import SourcePoints, SourceSegments, SourceSet, nearest_first
+from heat_igl.sources.specification import OffsetSources, Sources, named_vertices, source_set, vertex_sources
 
 __all__ = [
     "NEAR_RADIUS",

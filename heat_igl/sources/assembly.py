@@ -11,7 +11,7 @@ import numpy as np
 from heat_igl.operators import Operators
 from heat_igl.runtime import SOURCE_HEAT
 from heat_igl.sources.near_field import NearField, Seeds, SightLines
-from heat_igl.sources.specification import SourcePoints, SourceSegments, SourceSet
+from heat_igl.sources.source_sets import SourcePoints, SourceSegments, SourceSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["NEAR_RADIUS", "SourceAssembler", "SourceTerm", "right_hand_side", "take_shorter"]

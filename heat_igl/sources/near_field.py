@@ -10,13 +10,13 @@ import numpy as np
 from heat_igl.intrinsic import Adjacency, IntrinsicTriangulation, lay_out
 from heat_igl.mesh import grouping
 from heat_igl.sources.own_faces import seen_from_points, seen_from_segments
-from heat_igl.sources.specification import SourcePoints, SourceSegments, nearest_first
+from heat_igl.sources.source_sets import SourcePoints, SourceSegments, nearest_first
 from heat_igl.sources.windows import ROUNDING, SeenVertices, cross, joined
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["NearField", "Seeds", "SightLines"]
 
-# Number of triangles that a window may cross, one after another. On ordinary meshes the radius ends it long before.
+# Number of triangles that a window may cross, one after another. On ordinary meshes the radius is reached long before.
 _MOST_LEVELS = 50
 
 

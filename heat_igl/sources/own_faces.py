@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.intrinsic import Adjacency, lay_out
-from heat_igl.sources.specification import SourcePoints, SourceSegments
+from heat_igl.sources.source_sets import SourcePoints, SourceSegments
 from heat_igl.sources.windows import ROUNDING, SeenVertices, Windows, enter
 from heat_igl.typing import FloatArray
 

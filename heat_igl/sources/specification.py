@@ -1,28 +1,30 @@
-"""Sources: the places at which distance begins, and the values there.
-
-`source_set` reads all that a user may pass and returns one clean object, `SourceSet`.
-"""
+"""All that a user may pass as sources, read and checked: `source_set` returns a `SourceSet`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, TypeGuard
 
 import numpy as np
 
 from heat_igl.errors import SourceError, real_numbers, refuse_masked
 from heat_igl.mesh import SurfaceCurve, SurfacePoints
+from heat_igl.sources.source_sets import (
+    NO_POINTS,
+    NO_SEGMENTS,
+    SourcePoints,
+    SourceSegments,
+    SourceSet,
+    nearest_first,
+)
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = [
     "OffsetSources",
-    "SourcePoints",
-    "SourceSegments",
-    "SourceSet",
     "Sources",
     "named_vertices",
-    "nearest_first",
+    "on_simplex",
     "source_set",
     "vertex_sources",
 ]
@@ -30,6 +32,7 @@ __all__ = [
 _ACCEPTED = "a vertex index, a sequence of vertex indices, or a boolean mask with one entry per vertex"
 # Barycentric coordinates below this are 0: the point lies on the edge, or in the vertex.
 _ON_RIM = 1e-12
+_NOWHERE = np.empty(0, np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,94 +73,6 @@ class OffsetSources:
 _PLACES = (SurfacePoints, SurfaceCurve, OffsetSources)
 # A list may hold several kinds.
 Sources = int | np.integer[Any] | Sequence[Any] | AnyArray | SurfacePoints | SurfaceCurve | OffsetSources
-
-
-@dataclass(frozen=True, eq=False)
-class SourcePoints:
-    """Points (k,) in faces, the label of the source that each belongs to, and the value at which distance begins."""
-
-    faces: IntArray
-    barycentric: FloatArray
-    label: IntArray
-    offset: FloatArray
-
-    def joined(self, other: SourcePoints) -> SourcePoints:
-        """These points and others."""
-        return SourcePoints(
-            np.concatenate([self.faces, other.faces]),
-            np.concatenate([self.barycentric, other.barycentric]),
-            np.concatenate([self.label, other.label]),
-            np.concatenate([self.offset, other.offset]),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class SourceSegments:
-    """Segments (s,) of curves, as `SourcePoints`."""
-
-    faces: IntArray
-    start: FloatArray
-    end: FloatArray
-    label: IntArray
-    offset: FloatArray
-
-    def ends(self) -> SourcePoints:
-        """Starts and ends of segments."""
-        return SourcePoints(
-            np.tile(self.faces, 2),
-            np.concatenate([self.start, self.end]),
-            np.tile(self.label, 2),
-            np.tile(self.offset, 2),
-        )
-
-
-_NOWHERE = np.empty(0, np.int64)
-_NO_POINTS = SourcePoints(_NOWHERE, np.empty((0, 3)), _NOWHERE, np.empty(0))
-_NO_SEGMENTS = SourceSegments(_NOWHERE, np.empty((0, 3)), np.empty((0, 3)), _NOWHERE, np.empty(0))
-
-
-@dataclass(frozen=True, eq=False)
-class SourceSet:
-    """One set of sources, checked.
-
-    Attributes
-    ----------
-    vertices : (k,) int64
-        Source vertices, ascending, each once.
-    vertex_label, vertex_offset : (k,) int64, (k,) float64
-        Which source a vertex is, and the value at which distance begins there.
-    points, segments
-        Points and curves in faces. The ends of segments are not among the points.
-    n_labels : int
-        How many sources there are, as the user counts them.
-    """
-
-    vertices: IntArray
-    vertex_label: IntArray
-    vertex_offset: FloatArray
-    points: SourcePoints
-    segments: SourceSegments
-    n_labels: int
-
-    @property
-    def on_vertices_alone(self) -> bool:
-        """Whether all sources are vertices."""
-        return not len(self.points.faces) and not len(self.segments.faces)
-
-    @property
-    def offsets(self) -> FloatArray:
-        """The offset of every vertex, point and segment."""
-        if self.on_vertices_alone:
-            return self.vertex_offset
-        return np.concatenate([self.vertex_offset, self.points.offset, self.segments.offset])
-
-    def with_vertices_moved(self, to: IntArray) -> SourceSet:
-        """The same sources with vertex v at the vertex ``to[v]``; where several meet, the earliest stays."""
-        vertices = to[self.vertices]
-        order = np.lexsort((self.vertex_label, self.vertex_offset, vertices))
-        chosen = order[np.diff(vertices[order], prepend=-1) != 0]
-        label, offset = self.vertex_label[chosen], self.vertex_offset[chosen]
-        return replace(self, vertices=vertices[chosen], vertex_label=label, vertex_offset=offset)
 
 
 def source_set(sources: Sources, n: int, F: IntArray | None) -> SourceSet:
@@ -329,7 +244,7 @@ class _Builder:
             raise SourceError(f"faces[{first}] = {faces[first]} is no face: indices run from 0 to {len(self._F) - 1}")
 
     def finish(self) -> SourceSet:
-        points = self._points_in_faces() if self._points else _NO_POINTS
+        points = self._points_in_faces() if self._points else NO_POINTS
         vertices, label = _concatenated(self._vertices, (_NOWHERE, _NOWHERE))
         # A vertex that is named twice is the one with the smallest offset; of equal ones, the first.
         kept = nearest_first(vertices, self._offset[label], label)
@@ -339,7 +254,7 @@ class _Builder:
             vertex_label=label,
             vertex_offset=self._offset[label],
             points=points,
-            segments=self._all_segments() if self._curves else _NO_SEGMENTS,
+            segments=self._all_segments() if self._curves else NO_SEGMENTS,
             n_labels=len(self._offset),
         )
 
@@ -362,17 +277,6 @@ class _Builder:
             [(c.faces, c.start, c.end, np.full(len(c), label)) for c, label in self._curves], none
         )
         return SourceSegments(faces, on_simplex(start), on_simplex(end), label, self._offset[label])
-
-
-def nearest_first(vertex: IntArray, value: FloatArray, label: IntArray) -> IntArray:
-    """Where the smallest of the values at each vertex is, of equal ones that of the first label; vertices ascending."""
-    if len(vertex) < 2:
-        return np.arange(len(vertex))
-    order = np.lexsort((label, value, vertex))
-    ordered = vertex[order]
-    first = np.ones(len(order), bool)
-    first[1:] = ordered[1:] != ordered[:-1]
-    return np.asarray(order[first])
 
 
 def on_simplex(barycentric: FloatArray) -> FloatArray:

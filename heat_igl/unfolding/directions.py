@@ -13,6 +13,7 @@ from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSolution
+from heat_igl.unfolding.located_points import side_direction
 from heat_igl.unfolding.refinement import Refinement
 
 __all__ = ["PathAngles", "PathDirections", "in_circle"]
@@ -183,9 +184,7 @@ class PathDirections:
         return turn
 
     def _direction(self, half_edge: IntArray) -> FloatArray:
-        """The angle (k,) of half-edges in their triangles, from the side of corners 0 and 1."""
-        angle, first = self.angles.corners.ravel(), half_edge - half_edge % 3
-        return np.choose(half_edge % 3, [np.pi - angle[first + 1], angle[first] - np.pi, np.zeros(len(half_edge))])
+        return side_direction(half_edge, self.angles.corners.ravel())
 
     def _turns(self, points: SurfacePoints) -> tuple[FloatArray, IntArray, FloatArray]:
         """The angle (p,) of corners 0 and 1 of the triangles that hold points, in the given faces; and the places.

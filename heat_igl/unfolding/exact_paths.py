@@ -1,4 +1,4 @@
-"""Exact shortest paths: the windows that arrived first, followed back to the sources."""
+"""Exact shortest paths, traced back to the sources through the windows that gave the distances."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from heat_igl.unfolding.window_starts import starts_at
 
 __all__ = ["ExactPaths", "PathStarts", "exact_paths"]
 
-# Segments that there is room for at first.
+# Initial room for segments.
 _ROOM = 2**14
 
 
 class PathStarts(NamedTuple):
-    """Where k paths begin, by the numbers of the tables: at a vertex, or where that is -1, at a target of the search.
+    """The ends of k paths to trace back, by the numbers of the tables: vertices, or targets of the search.
 
     Attributes
     ----------
     vertex : (k,) int32
-        The vertex, or -1.
+        The vertex; -1 for a target.
     face, barycentric : (k,) int32, (k, 3) float64
         The target, or a corner at the vertex.
     distance, root, entered, crossing : (k,)
-        What the search found there.
+        Result of the search there.
     """
 
     vertex: AnyArray
@@ -52,10 +52,10 @@ class ExactPaths(NamedTuple):
     faces : (s,) int64
         Face of each segment, path after path.
     points : (s, 2, 3) float64
-        Barycentric coordinates of its start and end.
+        Barycentric coordinates of the start and the end of each segment.
     first : (k + 1,) int64
-        Segments of path i are ``first[i]`` to ``first[i + 1]``; none where no source is reached, or where the path was
-        lost at needles.
+        Segments of path i are ``first[i]`` to ``first[i + 1]``; none if no source is reached, or if the path was lost
+        among needles.
     distance : (k,) float64
         Exact distance of each place.
     """
@@ -81,7 +81,7 @@ def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: Fl
     Returns
     -------
     ExactPaths
-        Of the length of the distance to rounding. A path that passes a vertex closer than rounding goes through it.
+        Their lengths are the distances, to rounding. A path that passes a vertex closer than rounding goes through it.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: Fl
 
 
 def _starts(edges: HalfEdges, done: Searched, vertex: IntArray) -> PathStarts:
-    """Where paths begin: at vertices by the caller's number, or where that is -1, at one target after the other."""
+    """Starts of paths, by the caller's numbers: `vertex`, or where that is -1, the targets one after the other."""
     at, place = done.targets.found, done.targets.place
     k, of_target = len(vertex), np.flatnonzero(vertex < 0)
     which = done.nearest_copy(len(of_target))
@@ -134,7 +134,7 @@ def _starts(edges: HalfEdges, done: Searched, vertex: IntArray) -> PathStarts:
 
 
 def _traced(edges: HalfEdges, done: Searched, starts: PathStarts) -> tuple[AnyArray, FloatArray, IntArray]:
-    """Faces and ends of all segments, and where the segments of each path end; room is doubled until they fit."""
+    """Faces and ends of all segments, and the end of each path's segments; the arrays are doubled until they fit."""
     room = _ROOM
     while True:
         face, place, ends = np.empty(room, np.int32), np.empty((room, 2, 3)), np.zeros(len(starts.vertex), np.int64)

@@ -1,4 +1,4 @@
-"""Two halves of the vertices beyond a curve, each of which one thread can measure without the other."""
+"""Vertices beside a curve in two halves, so that two threads can measure them independently."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ __all__ = ["first_half"]
 
 
 def first_half(F: AnyArray, is_known: BoolArray) -> BoolArray:
-    """About half (n,) of the vertices that are not known, in parts that no triangle joins to one of the other half.
+    """Mask (n,) of about half of the vertices that are not known; no triangle joins one of them to one of the other
+    half.
 
-    The two sides of a closed curve are such parts if the vertices near it are known. Where there is one part only, the
-    half is all of it.
+    If the vertices near a closed curve are known, the sides of the curve are separate parts. If there is only one part,
+    the mask holds all of it.
 
     Parameters
     ----------
@@ -26,7 +27,7 @@ def first_half(F: AnyArray, is_known: BoolArray) -> BoolArray:
     apart = incidence.components_without(F, is_known.view(np.uint8))
     size = np.bincount(apart, ~is_known)
     order = np.argsort(-size, kind="stable")
-    # The largest part, and further ones as long as these are at most half of all.
+    # The largest part, and further parts while together they have at most half of the vertices.
     in_first = np.zeros(len(size), bool)
     in_first[order[2 * np.cumsum(size[order]) <= size.sum()]] = True
     in_first[order[0]] = True

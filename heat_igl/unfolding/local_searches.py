@@ -1,4 +1,4 @@
-"""Searches by windows from one vertex after the other, on all processors; each ends at what it is asked for."""
+"""Searches by windows from one vertex after the other, on all processors. Each ends when the question is answered."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from heat_igl.unfolding.window_search import TOLERANCE, Found
 
 __all__ = ["CHUNK", "Chunk", "Near", "Workspace", "in_chunks", "nearest", "to_goals", "within"]
 
-#: Sources that a thread takes at a time: few enough that all threads end together.
+#: Sources that a thread takes at a time: so few that all threads end at about the same time.
 CHUNK = 64
-# Distances that a thread makes room for at first.
+# Initial number of results that a thread has room for.
 _ROOM = 2**16
 _NO_VERTICES = np.empty(0, np.int32)
 
 
 class Chunk(NamedTuple):
-    """Some of the sources: their positions, and their numbers in the tables."""
+    """Consecutive sources: their range, and their numbers in the tables."""
 
     start: int
     stop: int
@@ -32,7 +32,7 @@ class Chunk(NamedTuple):
 
 
 class Near(NamedTuple):
-    """How many vertices were found from each source, which, and how far, source after source."""
+    """The number of vertices found from each source, and the vertices and their distances, source after source."""
 
     counts: IntArray
     vertex: AnyArray
@@ -40,7 +40,7 @@ class Near(NamedTuple):
 
 
 class Workspace:
-    """What searches of one thread write, in the state in which each must find it."""
+    """The arrays that searches of one thread write. Every search leaves them in their initial state."""
 
     def __init__(self, edges: HalfEdges, position: FloatArray | None) -> None:
         self._names = edges.old_vertex
@@ -58,7 +58,7 @@ class Workspace:
         cutoff: float = np.inf,
         n_nearest: int = 0,
     ) -> IntArray:
-        """Search from each of `sources`; the end of the results of each, for as many as had room."""
+        """Search from each of `sources`; returns the end of the results of each source whose results fitted."""
         ends = np.zeros(len(sources), np.int64)
         n_done = local_windows.search_each(
             self._front,
@@ -78,7 +78,7 @@ class Workspace:
 
 
 def within(work: Workspace, part: Chunk, radius: float) -> Near:
-    """All vertices up to a radius; room is doubled until the results of the next source fit."""
+    """All vertices up to a radius; the arrays are doubled until the results of the next source fit."""
     rows, done, room = [], 0, _ROOM
     while done < len(part.vertices):
         found, value = np.empty(room, np.int32), np.empty(room)
@@ -99,7 +99,7 @@ def nearest(work: Workspace, part: Chunk, k: int) -> Near:
 
 
 def to_goals(work: Workspace, part: Chunk, goals: AnyArray, ends: IntArray) -> Near:
-    """Distances of the goals of a part: those of source i are numbers ``ends[i]`` to ``ends[i + 1]`` of all goals."""
+    """Distances of the goals of some sources; the goals of source i are ``ends[i]`` to ``ends[i + 1]`` of all goals."""
     first = ends[part.start : part.stop + 1] - ends[part.start]
     value = np.empty(len(goals))
     work.search(part.vertices, np.empty(1, np.int32), value, goals=goals, first_goal=first)
@@ -112,9 +112,9 @@ def in_chunks(
     search: Callable[[Workspace, Chunk], Near],
     position: FloatArray | None = None,
 ) -> list[Near]:
-    """What `search` finds from consecutive sources, on all processors; in the order of the sources.
+    """The results of `search` for chunks of consecutive sources, on all processors, in the order of the sources.
 
-    Sources are numbers in the tables: in ascending order, what searches read often is in the caches from the last one.
+    Sources are numbers in the tables. In ascending order, a search often finds its data in the processor's cache.
     """
     starts = range(0, len(sources), CHUNK)
     waiting = deque(enumerate(starts))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from heat_igl.intrinsic.fans import Tables
 from heat_igl.kernels.ordering import ascending
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.unfolding.walks import Points, unfold, unknown
+from heat_igl.unfolding.walks import NO_BARRIER, NO_POINTS, NOT_ASKED, Begins, Points, Rules, unfold, unknown
 
 __all__ = ["TOLERANCE", "NumberedTriangles", "WalkStarts"]
 
@@ -33,11 +33,11 @@ class WalkStarts(NamedTuple):
     walk: AnyArray
     offset: FloatArray
     n_points: int = 0
-    points: Points | None = None
+    points: Points = NO_POINTS
 
     @classmethod
     def ascending(
-        cls, row: AnyArray, walk: AnyArray, offset: FloatArray, n_points: int = 0, points: Points | None = None
+        cls, row: AnyArray, walk: AnyArray, offset: FloatArray, n_points: int = 0, points: Points = NO_POINTS
     ) -> WalkStarts:
         """Far ones first, so that of several for one vertex the nearest is written last."""
         order = np.argsort(-walk["distance"], kind="stable")
@@ -109,28 +109,27 @@ class NumberedTriangles:
         walk["distance"] = walk["offset"] = begin[walk["label"]]
         return WalkStarts.ascending(row, walk, begin)
 
-    def walks(self, order: AnyArray, starts: WalkStarts, tolerance: float = TOLERANCE, **options: Any) -> AnyArray:
+    def walks(
+        self,
+        order: AnyArray,
+        starts: WalkStarts,
+        tolerance: float = TOLERANCE,
+        *,
+        roughness: float = 0.0,
+        barrier: AnyArray = NO_BARRIER,
+        begins: Begins = NOT_ASKED,
+    ) -> AnyArray:
         """What is known of the path of each row after `Refinement.unfold`, of the rows in `order`.
 
-        More arguments are those of `heat_igl.unfolding.walks.unfold`.
+        `roughness` is one of the `Rules`; `barrier` and `begins` are arguments of `heat_igl.unfolding.walks.unfold`.
         """
-        # The walks are large: what is needed for a moment comes before.
-        has_holes = self.has_holes
+        # The walks are large: what is needed for a moment comes before. Below 1e-5, forecasts are wrong by as much
+        # because of the curvature on the way.
+        shortfall = max(_SHORTFALL * tolerance, 1e-5)
+        rules = Rules(tolerance, shortfall, _MAX_SEARCH, _MAX_PASSES, self.has_holes, roughness)
         walk = unknown(len(self.number) + starts.n_points)
         walk[starts.row] = starts.walk
-        unfold(
-            order,
-            self.tables,
-            walk,
-            starts.points,
-            tolerance=tolerance,
-            # Below 1e-5, forecasts are wrong by as much because of the curvature on the way.
-            shortfall=max(_SHORTFALL * tolerance, 1e-5),
-            max_steps=_MAX_SEARCH,
-            max_passes=_MAX_PASSES,
-            has_holes=has_holes,
-            **options,
-        )
+        unfold(order, self.tables, walk, starts.points, rules, barrier, begins)
         return walk
 
     def order(self, key: FloatArray) -> AnyArray:

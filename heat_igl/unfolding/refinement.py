@@ -17,16 +17,14 @@ from heat_igl.intrinsic.fans import Tables, breadth_first, tables
 from heat_igl.intrinsic.history import BACK_CORNERS
 from heat_igl.mesh import SurfacePoints
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.located_points import LocatedPoints, located_points
 from heat_igl.unfolding.numbered import TOLERANCE, NumberedTriangles, WalkStarts
 from heat_igl.unfolding.path_derivatives import Paths, Places, Starts, Triangles, Ways, half_edge_arrays
-from heat_igl.unfolding.walks import INSIDE, Points, sweep, unknown, views
+from heat_igl.unfolding.walks import Begins, sweep, unknown, views
 
 __all__ = ["Known", "Refine", "Refinement"]
 
 Refine = Literal["sweep", "unfold", "exact"]
-
-# A point whose barycentric coordinate is below this lies on the side of its face.
-_ON_SIDE = 1e-8
 
 
 class Known(NamedTuple):
@@ -202,14 +200,14 @@ class Refinement(NumberedTriangles):
         vertices, offsets, points, point_offsets = sources
         starts = self.starts(vertices, offsets if offsets.any() else None, points, point_offsets)
         n = len(self.number)
-        entered, share, reach = np.full(n, -1, np.int32), np.zeros(n), np.zeros(n)
-        walk = self.walks(self.order(key), starts, tolerance, entered=entered, share=share, reach=reach)
-        found = Ways(walk["distance"][:n].copy(), entered.astype(np.int64), share, reach)
+        begins = Begins(np.full(n, -1, np.int32), np.zeros(n), np.zeros(n))
+        walk = self.walks(self.order(key), starts, tolerance, begins=begins)
+        found = Ways(walk["distance"][:n].copy(), begins.entered.astype(np.int64), begins.share, begins.reach)
         places = Places.none()
         if points is not None:
-            faces, barycentric, point, _ = self._faces_of(points)
+            at = self._located(points)
             late = np.zeros(len(points)) if point_offsets is None else np.asarray(point_offsets, np.float64)
-            places = Places(faces, barycentric, point, late[point])
+            places = Places(at.faces, at.barycentric, at.point, late[at.point])
         is_source = np.zeros(n, bool)
         on_sheets = self.number[np.concatenate([vertices + self.n * sheet for sheet in range(self._n_sheets)])]
         is_source[on_sheets] = walk["distance"][on_sheets] >= np.tile(offsets, self._n_sheets)
@@ -259,59 +257,21 @@ class Refinement(NumberedTriangles):
             return at_vertices
         n, k = len(self.number), len(sources)
         row, walk, begin = at_vertices.row, at_vertices.walk, at_vertices.offset
-        faces, barycentric, point, turn = self._faces_of(points)
-        vertex, seen = views(faces, barycentric, self.faces, self.tables)
+        at = self._located(points)
+        vertex, seen = views(at.faces, at.barycentric, self.faces, self.tables)
         place = unknown(len(points))
         walk["distance"] = place["distance"] = 0.0
-        seen["label"], place["label"] = k + np.repeat(point, 3), k + np.arange(len(points))
-        seen["departure"] += np.repeat(turn, 3)
-        seen["root"], place["root"] = n + np.repeat(point, 3), n + np.arange(len(points))
+        seen["label"], place["label"] = k + np.repeat(at.point, 3), k + np.arange(len(points))
+        seen["departure"] += np.repeat(at.turn, 3)
+        seen["root"], place["root"] = n + np.repeat(at.point, 3), n + np.arange(len(points))
         row, walk = np.concatenate([row, vertex, n + np.arange(len(points))]), np.concatenate([walk, seen, place])
         begin = np.concatenate([begin, np.zeros(len(points)) if point_offsets is None else point_offsets])
         walk["offset"] = begin[walk["label"]]
         walk["distance"] += walk["offset"]
-        by_face = np.argsort(faces, kind="stable")
-        first = np.full(len(self.face), -1, np.int32)
-        first[faces[by_face][::-1]] = by_face[::-1]
-        inside = np.zeros(len(faces), INSIDE)
-        inside["barycentric"], inside["turn"], inside["following"], inside["row"] = barycentric, turn, -1, n + point
-        same = faces[by_face][1:] == faces[by_face][:-1]
-        inside["following"][by_face[:-1][same]] = by_face[1:][same]
-        return WalkStarts.ascending(row, walk, begin, len(points), Points(first, inside))
+        return WalkStarts.ascending(row, walk, begin, len(points), at.listed(len(self.face), n))
 
-    def _faces_of(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
-        """Triangles of the tables that hold points, coordinates in them, which point each is, and `Inside.turn`."""
-        faces, barycentric = self.triangulation.locate(points.faces, points.barycentric)
-        point = np.arange(len(faces))
-        if self._n_sheets == 2:
-            # On the other sheet faces are turned over: their corners 1 and 2 change places.
-            faces = np.concatenate([faces, faces + len(self.triangulation.F)])
-            barycentric = np.concatenate([barycentric, barycentric[:, [0, 2, 1]]])
-            point = np.tile(point, 2)
-        faces = self.face[faces]
-        # A point on a side also lies in the face beyond it.
-        i, c = np.nonzero(barycentric < _ON_SIDE)
-        beyond = self.tables.across(faces[i], c)
-        there = np.flatnonzero(beyond >= 0)
-        i, c, beyond = i[there], c[there], beyond[there]
-        following = beyond - beyond % 3 + (beyond + 1) % 3
-        other = np.zeros((len(i), 3))
-        # The corner after the far one is at the end, as seen from here, of the side that starts after corner c.
-        other[np.arange(len(i)), following % 3] = barycentric[i, (c + 2) % 3]
-        other[np.arange(len(i)), (following + 1) % 3] = barycentric[i, (c + 1) % 3]
-        # The same side runs the other way there.
-        turn = self._direction(3 * faces[i] + c) + np.pi - self._direction(beyond)
-        return (
-            np.concatenate([faces, following // 3]),
-            np.concatenate([barycentric, other]),
-            np.concatenate([point, point[i]]),
-            np.concatenate([np.zeros(len(point)), turn]),
-        )
-
-    def _direction(self, half_edge: IntArray) -> FloatArray:
-        """The angle (k,) of half-edges in their triangles, from the side of corners 0 and 1."""
-        first, angle = half_edge - half_edge % 3, self.tables.step["angle"]
-        return np.choose(half_edge % 3, [np.pi - angle[first + 1], angle[first] - np.pi, np.zeros(len(half_edge))])
+    def _located(self, points: SurfacePoints) -> LocatedPoints:
+        return located_points(self.triangulation, self.face, self.tables, self._n_sheets, points)
 
 
 def _on_base(

@@ -10,7 +10,20 @@ from heat_igl.intrinsic.fans import Tables, aligned
 from heat_igl.kernels import sweeping, unfolding
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["INSIDE", "WALK", "Points", "sweep", "unfold", "unknown", "views"]
+__all__ = [
+    "INSIDE",
+    "NOT_ASKED",
+    "NO_BARRIER",
+    "NO_POINTS",
+    "WALK",
+    "Begins",
+    "Points",
+    "Rules",
+    "sweep",
+    "unfold",
+    "unknown",
+    "views",
+]
 
 # What is known of the path of a vertex: its `distance`; the distance of the last bend (or source), `offset`; how far
 # that is away in a straight line, `reach`; the direction in which it lies, `angle` in the `fan` of the vertex (-1:
@@ -26,8 +39,7 @@ WALK = np.dtype(
 # that of the first face.
 INSIDE = np.dtype([("barycentric", "f8", 3), ("turn", "f8"), ("following", "i4"), ("row", "i4")])
 
-_NO_BARRIER = np.empty(0, np.uint8)
-_NOT_ASKED = np.empty(0, np.int32), np.empty(0)
+NO_BARRIER = np.empty(0, np.uint8)
 
 
 class Points(NamedTuple):
@@ -41,8 +53,59 @@ class Points(NamedTuple):
         The entries.
     """
 
-    first: AnyArray
-    inside: AnyArray
+    first: AnyArray = np.empty(0, np.int32)
+    inside: AnyArray = np.empty(0, INSIDE)
+
+
+class Rules(NamedTuple):
+    """When walks accept a path, and bounds of the search.
+
+    Attributes
+    ----------
+    tolerance : float
+        Relative gain below which a path is not straightened further.
+    shortfall : float
+        A vertex that is by more than this fraction farther than a neighbour promised is searched for a better path.
+    max_steps : int
+        Triangles that one search may cross.
+    max_passes : int
+        Passes over vertices that a later one may have improved.
+    has_holes : bool
+        Whether a closed curve on some component encloses no piece of surface.
+    roughness : float
+        A path through a place between two vertices is taken if the cubic part of the distance there is at most so large
+        as a share of the way to them, see `heat_igl.kernels.between`; it may then be shorter than any on the surface.
+        0 takes none.
+    """
+
+    tolerance: float
+    shortfall: float
+    max_steps: int
+    max_passes: int
+    has_holes: bool
+    roughness: float
+
+
+class Begins(NamedTuple):
+    """How the path of each row begins, see `heat_igl.unfolding.path_derivatives.Ways`; empty if that is not asked for.
+
+    Attributes
+    ----------
+    entered : (n,) int32
+        The half-edge over which the path leaves the first face, -1 along an edge.
+    share : (n,) float64
+        How far along that half-edge, as a share of its length.
+    reach : (n,) float64
+        Length of the straight part.
+    """
+
+    entered: AnyArray = np.empty(0, np.int32)
+    share: FloatArray = np.empty(0)
+    reach: FloatArray = np.empty(0)
+
+
+NO_POINTS = Points()
+NOT_ASKED = Begins()
 
 
 def unknown(n: int) -> AnyArray:
@@ -88,18 +151,10 @@ def unfold(
     order: AnyArray,
     t: Tables,
     walk: AnyArray,
-    points: Points | None,
-    *,
-    tolerance: float,
-    shortfall: float,
-    max_steps: int,
-    max_passes: int,
-    has_holes: bool = False,
-    barrier: AnyArray = _NO_BARRIER,
-    roughness: float = 0.0,
-    entered: AnyArray = _NOT_ASKED[0],
-    share: FloatArray = _NOT_ASKED[1],
-    reach: FloatArray = _NOT_ASKED[1],
+    points: Points,
+    rules: Rules,
+    barrier: AnyArray = NO_BARRIER,
+    begins: Begins = NOT_ASKED,
 ) -> None:
     """Distance by straight paths through strips of triangles, to be read from `walk`.
 
@@ -112,45 +167,16 @@ def unfold(
     walk : (n + p,) `WALK`
         What is known of each vertex and of each of p sources inside faces; changed in place. Distance is ``inf`` where
         nothing is known, and where no source is reached.
-    points : Points or None
+    points : Points
         The sources inside faces.
-    tolerance : float
-        Relative gain below which a path is not straightened further.
-    shortfall : float
-        A vertex that is by more than this fraction farther than a neighbour promised is searched for a better path.
-    max_steps : int
-        Triangles that one search may cross.
-    max_passes : int
-        Passes over vertices that a later one may have improved.
-    has_holes : bool
-        Whether a closed curve on some component encloses no piece of surface.
+    rules : Rules
+        When paths are accepted, and bounds of the search.
     barrier : (m,) uint8
         Triangles that no walk passes, since they hold sources that walks do not end at; empty for none.
-    roughness : float
-        A path through a place between two vertices is taken if the cubic part of the distance there is at most so large
-        as a share of the way to them, see `heat_igl.kernels.between`; it may then be shorter than any on the surface.
-        0 takes none.
-    entered, share, reach : (n,) int32, (n,) float64, (n,) float64, optional
-        Filled with how each path begins, see `heat_igl.unfolding.path_derivatives.Ways`.
+    begins : Begins
+        Filled with how each path begins, unless the arrays are empty.
     """
-    first, inside = (np.empty(0, np.int32), np.empty(0, INSIDE)) if points is None else points
-    unfolding.unfold(
-        order,
-        t,
-        walk,
-        first,
-        inside,
-        tolerance,
-        shortfall,
-        max_steps,
-        max_passes,
-        has_holes,
-        entered,
-        share,
-        reach,
-        barrier,
-        roughness,
-    )
+    unfolding.unfold(order, t, walk, points, rules, barrier, begins)
 
 
 def views(faces: IntArray, barycentric: FloatArray, F: AnyArray, t: Tables) -> tuple[AnyArray, AnyArray]:

@@ -1,4 +1,4 @@
-"""One search by windows on the tables of a surface: what the kernel is given, and what it leaves behind."""
+"""One search by windows on the tables of a surface: arguments and results of the kernel."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from heat_igl.unfolding.window_starts import NO_STARTS, Starts
 
 __all__ = ["TOLERANCE", "Found", "Leaving", "Searched", "Targets", "search"]
 
-#: What another way must be shorter by, as a fraction of the distance, before a window is cut: more than rounding adds
-#: up to. A larger number keeps a few windows more and changes no result.
+#: A window is cut where another path is shorter by this fraction of the distance: more than rounding adds : up to. A
+#: larger number keeps a few windows more and changes no result.
 TOLERANCE = 1e-11
-# On fewer vertices a search takes a few milliseconds, and a thread with its arrays a part of one.
+# On fewer vertices a search takes a few milliseconds, and starting a thread a good part of one.
 _FEWEST_SHARED = 10_000
-# Two threads meet after so many mean edge lengths. Shorter rounds cost time, longer ones more windows that cross the
-# line between the two parts.
+# Length of a round of two threads, in mean edge lengths. Shorter rounds cost time; longer ones make more windows that
+# cross the border of the two parts.
 _ROUND = 3.0
-# With about so many windows on the front there is work for two threads between two meetings: a tenth of a millisecond.
+# With about this many windows on the front, a round has work for two threads: a tenth of a millisecond.
 _PLENTY = 1000
 _NO_VERTICES = np.empty(0, np.int64)
 
@@ -34,7 +34,7 @@ _Run = Callable[[windows.Front, Starts, IntArray], bool]
 
 
 class Found(NamedTuple):
-    """What the kernel fills for each of some places."""
+    """Results of the kernel at k places."""
 
     distance: FloatArray
     root: AnyArray
@@ -44,12 +44,12 @@ class Found(NamedTuple):
 
     @classmethod
     def of(cls, k: int, n_labels: int) -> Found:
-        """Nothing found yet, at k places."""
+        """Initial values for k places."""
         nothing = np.full((2, k), -1, np.int32)
         return cls(np.full(k, np.inf), nothing[0], np.full(n_labels, -1, np.int32), nothing[1], np.zeros(k))
 
     def take_nearer(self, other: Found) -> None:
-        """Take over what was found nearer by another search."""
+        """Take over the results of another search that are nearer."""
         is_nearer = np.flatnonzero(other.distance < self.distance)
         for mine, theirs in zip(self, other, strict=True):
             mine[is_nearer] = theirs[is_nearer]
@@ -78,7 +78,8 @@ class Targets(NamedTuple):
 
 
 class Leaving(NamedTuple):
-    """How the straight last parts of the paths to n vertices leave the roots, on faces that are oriented alike.
+    """Directions in which the straight last parts of the paths to n vertices leave their roots, on faces oriented
+    alike.
 
     Attributes
     ----------
@@ -101,7 +102,7 @@ class Leaving(NamedTuple):
 
     @classmethod
     def of(cls, n: int) -> Leaving:
-        """Nothing found yet, at n vertices."""
+        """Initial values for n vertices."""
         return cls(np.full(n, -1, np.int32), np.zeros((n, 2)))
 
 
@@ -115,7 +116,7 @@ class Searched(NamedTuple):
     found : Found
         At the vertices.
     targets : Targets
-        The points that were asked for, and what was found there.
+        The target points with their results.
     n_windows, n_crossings : int
         As in `ExactSolution`.
     leaving : Leaving or None
@@ -175,12 +176,12 @@ def _require(is_done: bool) -> None:
 
 
 def _front(edges: HalfEdges, found: Found, leaving: Leaving | None = None) -> windows.Front:
-    """What the kernel writes in one search."""
+    """The arrays that the kernel writes in one search."""
     return windows.Front(edges.tables, found, TOLERANCE, leaving)
 
 
 def _beside(edges: HalfEdges, starts: Starts, found: Found, run: _Run) -> IntArray | None:
-    """Search on two threads; the statistics of both, or None if one thread has to search instead."""
+    """Search on two threads; returns the statistics of both, or None if one thread must repeat the search."""
     also, statistics, done = Found.of(edges.n, len(found.label)), np.zeros((2, 3), np.int64), []
     first, second = _front(edges, found), _front(edges, also)
     bounds = np.full((2, edges.n), np.inf)
@@ -199,6 +200,6 @@ def _beside(edges: HalfEdges, starts: Starts, found: Found, run: _Run) -> IntArr
 
 
 def _targets_at(edges: HalfEdges, points: SurfacePoints | None) -> Targets:
-    """Points for the kernel, before anything is found."""
+    """Target points for the kernel, with initial values."""
     place = edges.located(points)
     return Targets(place, *edges.by_face(place), edges.largest_circle(place), Found.of(len(place.faces), 0))

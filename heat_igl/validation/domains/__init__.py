@@ -78,7 +78,9 @@ def validate_domains(
 
 
 def _known(domains: Iterable[str]) -> tuple[str, ...]:
-    asked = (domains,) if isinstance(domains, str) else tuple(domains) if isinstance(domains, Iterable) else (domains,)
+    if isinstance(domains, str) or not isinstance(domains, Iterable):
+        domains = [domains]
+    asked = tuple(domains)
     if not asked:
         raise ValueError(f"domains is empty: choose among {', '.join(map(repr, DOMAINS))}, or leave it out for all")
     for kind in asked:

@@ -1,4 +1,4 @@
-"""What a shape of the zoo is, the list of all, and what several of them are made with."""
+"""The list of the shapes in the zoo, and functions that several of them share."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def shape(
 
 
 def seeded(seed: int) -> np.random.Generator:
-    """A generator that always gives the same numbers."""
+    """A random generator with a fixed seed."""
     return np.random.default_rng([20240815, seed])
 
 
@@ -120,7 +120,7 @@ def hull(points: FloatArray) -> Mesh:
 
 
 def boxes(cells: IntArray, size: FloatArray | float = 1.0) -> Mesh:
-    """The surface of a union of unit cells (k, 3), scaled by `size`: squares between a cell and what is none."""
+    """The surface of a union of unit cells (k, 3), scaled by `size`: the squares between a cell and empty space."""
     occupied = {tuple(cell) for cell in cells.tolist()}
     corners: list[list[int]] = []
     for cell in sorted(occupied):
