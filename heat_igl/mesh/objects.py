@@ -53,8 +53,9 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
         `Mesh`, `PolygonMesh` and `PointCloud` are returned as they are, and of an `ImageDomain` the mesh. Besides: a
         pair (V, F); a path, read by `read_mesh`, or by `read_point_cloud` if the file holds no faces; meshes of
         trimesh, pyvista and vtk (PolyData, UnstructuredGrid), open3d, meshio, pymeshlab (also a MeshSet: the current
-        mesh), vedo, and nibabel (surfaces in GIFTI). The point clouds of trimesh, open3d and vedo, and objects of pyvista, vtk and meshio that hold points
-        alone, become a `PointCloud`, with the normals of open3d, pyvista and vtk. With `F`, the positions V (n, 3).
+        mesh), vedo, and nibabel (surfaces in GIFTI). The point clouds of trimesh, open3d and vedo, and objects of
+        pyvista, vtk and meshio that hold points alone, become a `PointCloud`, with the normals of open3d, pyvista and
+        vtk. With `F`, the positions V (n, 3).
     F : (m, 3) or (m, 4) array_like of int, optional
         Triangles or tetrahedra, when `mesh` is V.
 
