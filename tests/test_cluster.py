@@ -124,6 +124,22 @@ def test_bad_files_are_rows_and_the_others_go_on(client, tmp_path):
     assert f"3 of {len(bad) + 3} meshes done, {len(bad)} failed" in report.to_markdown()
 
 
+def test_files_of_points_are_clouds(client, tmp_path, caplog):
+    """As those that are passed as objects; arrays in a folder are not taken."""
+    cloud = heat_igl.PointCloud(heat_igl.shapes.icosphere(2).V)
+    folder = tmp_path / "clouds"
+    folder.mkdir()
+    for name in ("a.xyz", "b.ply", "c.npy"):
+        heat_igl.write_point_cloud(folder / name, cloud)
+    (folder / "bad.xyz").write_text("0 0 0\n1 0\n")
+    report = cluster.distances(cluster.folder(folder), [0, [3, 5]], tmp_path / "store", client=client)
+    assert {row.name for row in report.rows if row.status == "done"} == {"a.xyz", "b.ply"}
+    assert [row.name for row in report.failed] == ["bad.xyz"]
+    assert caplog.text.count(str(folder / "bad.xyz")) == 1
+    found = zarr.open_group(tmp_path / "store")["a.xyz"]["distance"][:]
+    np.testing.assert_array_equal(found, heat_igl.HeatMethodSolver(cloud).distances([0, [3, 5]]).astype(np.float32))
+
+
 def test_a_source_that_a_mesh_does_not_have_is_a_row(client, tmp_path):
     report = cluster.distances({"fan": FAN, "ball": heat_igl.shapes.icosphere(2)}, [9], tmp_path / "s", client=client)
     (row,) = report.failed

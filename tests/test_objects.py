@@ -210,6 +210,18 @@ def test_cells_of_other_kinds_are_refused() -> None:
         as_mesh(SimpleNamespace(points=CORNERS, cells_dict={"line": F[:, :2]}))
 
 
+def test_an_image_domain_is_the_mesh_of_the_pixels() -> None:
+    domain = heat_igl.image_domain(np.ones((2, 3), bool))
+    assert as_mesh(domain) is domain.mesh
+
+
+def test_operators_and_solvers_are_refused_by_name() -> None:
+    with pytest.raises(MeshError, match=r"Operators: HeatMethodSolver.from_operators takes operators"):
+        as_mesh(heat_igl.speed_operators(SPHERE, np.ones(len(F))))
+    with pytest.raises(MeshError, match=r"HeatMethodSolver: a solver is asked itself"):
+        as_mesh(heat_igl.HeatMethodSolver(SPHERE))
+
+
 def test_faces_beside_a_mesh_are_refused() -> None:
     np.testing.assert_array_equal(as_mesh(V, F).F, F)
     with pytest.raises(MeshError, match="F is given beside a Mesh"):

@@ -87,6 +87,19 @@ def test_vertices_images_and_faces():
         assert (faces[:, 0] == pixel).all()
 
 
+def test_a_metric_per_pixel_is_a_linear_map():
+    """A constant tensor in the axes x and y: the triangles of a pixel have four different first sides."""
+    domain = image_domain(np.ones((7, 9), bool))
+    g = np.zeros((7, 9, 3, 3))
+    g[..., :2, :2] = [[3.0, 1.0], [1.0, 0.5]]
+    metric = heat_igl.metric_operators(domain.mesh, domain.per_face(g))
+    distance = heat_igl.HeatMethodSolver.from_operators(metric, refine="exact").distance(domain.index[0, 0])
+    x, y, _ = domain.mesh.V.T
+    np.testing.assert_allclose(distance, np.sqrt(3 * x**2 + 2 * x * y + 0.5 * y**2), atol=1e-12)
+    with pytest.raises(ValueError, match=r"image must have shape \(7, 9\), with further axes .* not \(9, 7, 3, 3\)"):
+        domain.per_face(g.swapaxes(0, 1))
+
+
 def test_wrong_images_are_refused():
     with pytest.raises(heat_igl.MeshError, match="mask must be a boolean image"):
         image_domain([[0, 1], [1, 1]])

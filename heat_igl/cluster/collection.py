@@ -12,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 
 from heat_igl.errors import MeshError, SourceError
-from heat_igl.io import MESH_SUFFIXES, is_mesh_path
+from heat_igl.io import MESH_SUFFIXES, is_mesh_or_cloud_path
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_simplices
 from heat_igl.sources import Sources, vertex_sources
 
@@ -32,7 +32,9 @@ class Item:
 
 
 def folder(path: str | os.PathLike[str]) -> dict[str, Path]:
-    """All mesh files below a folder, recognized by their suffix, with their paths relative to it as keys.
+    """All files of meshes and point clouds below a folder, recognized by their suffix; the keys are paths in it.
+
+    Arrays (.npy) are left out, since they may hold anything.
 
     Raises
     ------
@@ -42,9 +44,9 @@ def folder(path: str | os.PathLike[str]) -> dict[str, Path]:
     root = Path(path)
     if not root.is_dir():
         raise ValueError(f"{root} is not a folder of meshes")
-    found = {file.relative_to(root).as_posix(): file for file in sorted(root.rglob("*")) if is_mesh_path(file)}
+    found = {file.relative_to(root).as_posix(): file for file in sorted(root.rglob("*")) if is_mesh_or_cloud_path(file)}
     if not found:
-        raise ValueError(f"{root} holds no mesh: files must end in {', '.join(MESH_SUFFIXES)}")
+        raise ValueError(f"{root} holds no mesh: files must end in {', '.join(MESH_SUFFIXES)}, .xyz or .pcd")
     return found
 
 

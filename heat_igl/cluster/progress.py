@@ -57,7 +57,8 @@ class Watch:
         if reason is None:
             _LOG.info("%s: done (%d of %d)", label, self._n_done, self._n_meshes)
         else:
-            _LOG.error("%s: %s", label, reason)
+            # Errors of files begin with the path, which is the label.
+            _LOG.error("%s", reason if reason.startswith(label) else f"{label}: {reason}")
         if self._bar:
             self._bar.update(self._meshes, completed=self._n_done)
 

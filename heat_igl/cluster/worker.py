@@ -24,7 +24,7 @@ from heat_igl.cluster.solver_cache import SolverCache
 from heat_igl.cluster.store import MeshGroup, Store
 from heat_igl.errors import AccuracyWarning, BatchError
 from heat_igl.heat_method import HeatMethodSolver, SolverOptions
-from heat_igl.io import read_mesh
+from heat_igl.io import read_mesh_or_cloud
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.sampling import farthest_points
 from heat_igl.sources import vertex_sources
@@ -170,7 +170,7 @@ def _new(
 def _loaded(item: Item) -> Mesh | PointCloud:
     if isinstance(item.mesh, (Mesh, PointCloud)):
         return item.mesh
-    return read_mesh(item.mesh) if isinstance(item.mesh, Path) else Mesh(*item.mesh)
+    return read_mesh_or_cloud(item.mesh) if isinstance(item.mesh, Path) else Mesh(*item.mesh)
 
 
 def _fingerprint(mesh: Mesh | PointCloud) -> str:

@@ -103,7 +103,7 @@ class NormalIntegration:
             raise SourceError(
                 "the normals of the curves cancel: two curves run along each other in opposite directions"
             )
-        Y = self._vector_flow.solve(b * (SOURCE_HEAT / largest))
+        Y = self._vector_flow.solve(b / largest * SOURCE_HEAT)
         # Step 2: the unit field in faces.
         # Dividing by the largest first keeps squares in range. Corner by corner is faster than along an axis of three.
         at_vertices = np.abs(Y)

@@ -2,8 +2,14 @@
 
 from heat_igl.io.atomic import complete_file
 from heat_igl.io.curves import CURVE_SUFFIXES, is_flat, write_curves, write_svg
-from heat_igl.io.files import MESH_SUFFIXES, is_mesh_path, read_attributes, read_mesh, read_polygon_mesh, write_mesh
-from heat_igl.io.point_clouds import POINT_CLOUD_SUFFIXES, read_mesh_or_cloud, read_point_cloud, write_point_cloud
+from heat_igl.io.files import MESH_SUFFIXES, read_attributes, read_mesh, read_polygon_mesh, write_mesh
+from heat_igl.io.point_clouds import (
+    POINT_CLOUD_SUFFIXES,
+    is_mesh_or_cloud_path,
+    read_mesh_or_cloud,
+    read_point_cloud,
+    write_point_cloud,
+)
 from heat_igl.io.polylines import Polyline, read_polylines
 
 __all__ = [
@@ -13,7 +19,7 @@ __all__ = [
     "Polyline",
     "complete_file",
     "is_flat",
-    "is_mesh_path",
+    "is_mesh_or_cloud_path",
     "read_attributes",
     "read_mesh",
     "read_mesh_or_cloud",

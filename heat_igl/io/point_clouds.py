@@ -13,13 +13,19 @@ import numpy as np
 from heat_igl.errors import MeshError, shown
 from heat_igl.io import pcd, ply
 from heat_igl.io.atomic import replacing
-from heat_igl.io.files import MESH_SUFFIXES, checked_attributes, checked_path, file_bytes, read_mesh
+from heat_igl.io.files import MESH_SUFFIXES, checked_attributes, checked_path, file_bytes, is_mesh_path, read_mesh
 from heat_igl.io.packed import form_suffix, pack
 from heat_igl.io.text import Text, format_rows
 from heat_igl.mesh import Mesh, PointCloud, read_paths_with
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["POINT_CLOUD_SUFFIXES", "read_mesh_or_cloud", "read_point_cloud", "write_point_cloud"]
+__all__ = [
+    "POINT_CLOUD_SUFFIXES",
+    "is_mesh_or_cloud_path",
+    "read_mesh_or_cloud",
+    "read_point_cloud",
+    "write_point_cloud",
+]
 
 _Points = tuple[FloatArray, FloatArray | None]
 
@@ -85,6 +91,11 @@ def read_mesh_or_cloud(path: str | os.PathLike[str]) -> Mesh | PointCloud:
 
 
 read_paths_with(read_mesh_or_cloud)
+
+
+def is_mesh_or_cloud_path(path: Path) -> bool:
+    """Whether the extension of `path` is that of a mesh or a point cloud, but for .npy, which may hold anything."""
+    return is_mesh_path(path) or form_suffix(path) in (".xyz", ".pcd")
 
 
 def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud, /, **attributes: ArrayLike) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.mesh.cloud_objects import cloud_of_cells, cloud_of_points, cloud_of_poly_data, refuse_other_cells
 from heat_igl.mesh.mesh import Mesh
+from heat_igl.mesh.pixel_domain import ImageDomain
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygons import PolygonMesh
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
@@ -29,6 +30,12 @@ _UNDERSTOOD = (
 _TRIANGLES, _QUADS, _POLYGONS, _TETRAHEDRA = ("triangle", 5), ("quad", 9), ("polygon", 7), ("tetra", 10)
 
 
+# What else of this package might be taken for a mesh, by the end of the name of its class.
+_NOT_MESHES = {
+    "Operators": "HeatMethodSolver.from_operators takes operators, and the solver answers what is asked of a mesh",
+    "Solver": "a solver is asked itself, as in solver.distance(sources)",
+}
+
 _readers: list[Callable[[str | os.PathLike[str]], Mesh | PointCloud]] = []
 
 
@@ -43,11 +50,12 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     Parameters
     ----------
     mesh : mesh or array_like
-        `Mesh`, `PolygonMesh` and `PointCloud` are returned as they are. Besides: a pair (V, F); a path, read by
-        `read_mesh`, or by `read_point_cloud` if the file holds no faces; meshes of trimesh, pyvista and vtk (PolyData,
-        UnstructuredGrid), open3d, meshio, pymeshlab (also a MeshSet: the current mesh), vedo, and nibabel (surfaces in
-        GIFTI). The point clouds of trimesh, open3d and vedo, and objects of pyvista, vtk and meshio that hold points
-        alone, become a `PointCloud`, with the normals of open3d, pyvista and vtk. With `F`, the positions V (n, 3).
+        `Mesh`, `PolygonMesh` and `PointCloud` are returned as they are, and of an `ImageDomain` the mesh. Besides: a
+        pair (V, F); a path, read by `read_mesh`, or by `read_point_cloud` if the file holds no faces; meshes of
+        trimesh, pyvista and vtk (PolyData, UnstructuredGrid), open3d, meshio, pymeshlab (also a MeshSet: the current
+        mesh), vedo, and nibabel (surfaces in GIFTI). The point clouds of trimesh, open3d and vedo, and objects of
+        pyvista, vtk and meshio that hold points alone, become a `PointCloud`, with the normals of open3d, pyvista and
+        vtk. With `F`, the positions V (n, 3).
     F : (m, 3) or (m, 4) array_like of int, optional
         Triangles or tetrahedra, when `mesh` is V.
 
@@ -83,6 +91,8 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
         return Mesh(mesh, F)
     if isinstance(mesh, (Mesh, PolygonMesh, PointCloud)):
         return mesh
+    if isinstance(mesh, ImageDomain):
+        return mesh.mesh
     if isinstance(mesh, (str, os.PathLike)):
         if not _readers:
             import_module("heat_igl.io")  # which calls `read_paths_with`
@@ -97,6 +107,9 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
         found = convert(mesh)
         if found is not None:
             return found
+    for kind, remedy in _NOT_MESHES.items():
+        if type(mesh).__name__.endswith(kind):
+            raise MeshError(f"mesh is {_named(mesh)}: {remedy}")
     raise MeshError(f"mesh is {_named(mesh)}, which is not understood: pass {_UNDERSTOOD}")
 
 

@@ -96,7 +96,17 @@ class ImageDomain:
         return image
 
     def per_face(self, image: ArrayLike) -> AnyArray:
-        """Values per pixel, such as a speed, as values per face of `mesh` (m,).
+        """Values per pixel, such as a speed or a metric, as values per face of `mesh`.
+
+        Parameters
+        ----------
+        image : (rows, columns, ...) or (slices, rows, columns, ...) array_like
+            A number for each pixel, or an array such as a metric (3, 3) in the axes x, y, z of `mesh`: x runs along
+            the columns, the last axis of the image, and y along the rows.
+
+        Returns
+        -------
+        (m,) or (m, ...) array
 
         Raises
         ------
@@ -104,9 +114,12 @@ class ImageDomain:
             If `image` has another shape.
         """
         given = as_array("image", image)
-        if given.shape != self.index.shape:
-            raise ValueError(f"image must have shape {self.index.shape}, not {given.shape}")
-        return np.repeat(given[self.index >= 0], TETRAHEDRA_PER_VOXEL if self.index.ndim == 3 else _FACES_PER_PIXEL)
+        if given.shape[: self.index.ndim] != self.index.shape:
+            raise ValueError(
+                f"image must have shape {self.index.shape}, with further axes for arrays per pixel, not {given.shape}"
+            )
+        n_faces = TETRAHEDRA_PER_VOXEL if self.index.ndim == 3 else _FACES_PER_PIXEL
+        return np.repeat(given[self.index >= 0], n_faces, axis=0)
 
 
 def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> ImageDomain:

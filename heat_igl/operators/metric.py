@@ -26,6 +26,8 @@ __all__ = ["fibre_metric", "metric_operators", "operators_in_metric"]
 _ONE_LENGTH = 0.1
 # Share that has to remain of the length by which two sides of a triangle are longer than the third.
 _SLACK = 0.03
+# Largest squared factor of lengths, and one over the smallest: products of several areas stay in the range of doubles.
+_LARGEST = 1e120
 # Asymmetry of a metric, and a negative direction across a triangle, that are taken for rounding.
 _ROUNDING = 1e-9
 
@@ -278,7 +280,10 @@ def _checked(metric: ArrayLike, mesh: Mesh) -> FloatArray:
     g = real_numbers("metric", metric)
     shapes = [(m, 3, 3)] if p == 3 else [(m, 3, 3), (m, 2, 2)]
     if g.shape not in shapes:
-        raise ValueError(f"metric must have shape {' or '.join(map(str, shapes))}, one per face, not {g.shape}")
+        raise ValueError(
+            f"metric must have shape {' or '.join(map(str, shapes))}, one per face, not {g.shape}"
+            + _remedy(g.shape, mesh)
+        )
     transposed = np.swapaxes(g, 1, 2)
     size = np.abs(g).max(axis=(1, 2))
     _raise_at_first(~np.isfinite(size), "metric", g, "must be finite")
@@ -289,7 +294,19 @@ def _checked(metric: ArrayLike, mesh: Mesh) -> FloatArray:
         g = axes @ g @ np.swapaxes(axes, 1, 2)
     smallest = np.linalg.eigvalsh(g)[:, 0]
     _raise_at_first(~(smallest > 0), "metric", np.asarray(metric), "must be positive definite on its face")
+    outside = (smallest < 1 / _LARGEST) | (np.abs(g).max(axis=(1, 2)) > _LARGEST)
+    problem = f"must be between {1 / _LARGEST:g} and {_LARGEST:g}: take another unit, or remove the others"
+    _raise_at_first(outside, "metric", np.asarray(metric), problem)
     return np.asarray(g)
+
+
+def _remedy(shape: tuple[int, ...], mesh: Mesh) -> str:
+    """How one metric for all faces, or one for each vertex, becomes one for each face."""
+    if shape == (3, 3):
+        return f": np.broadcast_to(metric, ({mesh.n_faces}, 3, 3)) is the same on all"
+    if shape == (mesh.n_vertices, 3, 3):
+        return ": metric[mesh.F].mean(axis=1) is the mean over the corners"
+    return ""
 
 
 def _raise_at_first(bad: AnyArray, name: str, values: AnyArray, problem: str) -> None:

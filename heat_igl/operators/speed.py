@@ -67,14 +67,16 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     return replace(domain, metric=MetricSides.of(mesh, np.eye(3) / s[:, None, None] ** 2))
 
 
-# Lengths in the metric are squared, and their fourth powers give areas.
-_LARGEST = 1e100
+# As those of a metric, one over the square of a speed.
+_LARGEST = 1e60
 
 
 def _checked(speed: ArrayLike, m: int) -> FloatArray:
     s = real_numbers("speed", speed)
     if s.shape != (m,):
-        raise ValueError(f"speed must have shape ({m},), one per face, not {s.shape}")
+        raise ValueError(
+            f"speed must have shape ({m},), one per face, not {s.shape}: speed[mesh.F].mean(axis=1) of one per vertex"
+        )
     bad = ~((s > 0) & np.isfinite(s))
     if bad.any():
         first = int(np.argmax(bad))
