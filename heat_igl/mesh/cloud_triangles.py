@@ -14,6 +14,7 @@ from heat_igl.kernels.agreeing import agreement
 from heat_igl.kernels.fitting_triangles import fitting_triangles
 from heat_igl.kernels.local_delaunay import delaunay_stars
 from heat_igl.mesh.cloud_gaps import pinched_vertices, with_gaps_closed, with_one_fan
+from heat_igl.mesh.cloud_loops import with_loops_filled
 from heat_igl.mesh.connectivity import ascending_rows
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.neighbourhoods import Neighbourhoods
@@ -55,6 +56,7 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, oriented: bool) -> IntA
     F = with_gaps_closed(P, F, near, is_settled)
     is_pinched = pinched_vertices(F, is_settled)
     F = with_one_fan(np.concatenate([agreed[~is_open], F]), is_pinched)
+    F = with_loops_filled(P, F, near.reach, is_settled)
     return _with_isolated_points(P, F, near)
 
 
