@@ -7,6 +7,7 @@ from cython.cimports.libc.math import sqrt
 
 __all__ = ["filling_triangles"]
 
+
 def filling_triangles(
     P: cython.const[cython.double][:, ::1],
     ends: cython.const[cython.int][:, ::1],

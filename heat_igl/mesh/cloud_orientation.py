@@ -12,7 +12,7 @@ from heat_igl.mesh.connectivity import facets
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["oriented"]
+__all__ = ["neighbours_across_edges", "oriented"]
 
 # Share of the triangles that may be left out for the others to be oriented alike. Clouds of scans had up to 0.0008; at
 # 0.002 and 0.004, on thin and narrow parts of two coarse meshes, distance became up to four times as wrong.
@@ -47,8 +47,8 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> IntArray
     """The triangles F (m, 3) int32, neighbours oriented alike and each part like most of the normals (n, 3).
 
     Where triangles join sheets wrongly, no orientation may suit all neighbours. Then of each pair that contradicts it,
-    see `_contradictions`, one triangle is left out. All stay where that would tear the surface: where these are many, or
-    most of them flat, as on a surface with one side. Then as many neighbours as possible are oriented alike.
+    see `_contradictions`, one triangle is left out. All stay where that would tear the surface: where these are many,
+    or most of them flat, as on a surface with one side. Then as many neighbours as possible are oriented alike.
     """
     F = F.copy()
     part, is_oriented = orient(F, len(P))
@@ -77,7 +77,7 @@ def _contradictions(P: FloatArray, F: IntArray) -> _Contradictions:
     two sheets is among the last, and does not turn a part of a sheet around, as it may in a spanning tree of the
     flattest edges (Hoppe et al. 1992).
     """
-    first, second = _neighbours(F, len(P))
+    first, second = neighbours_across_edges(F, len(P))
     faces = np.stack([first // 3, second // 3], axis=1)
     runs_alike = F.ravel()[_next(first)] == F.ravel()[_next(second)]
     folds = _folds(P, F, first, second)
@@ -98,7 +98,7 @@ def _in_pairs(pairs: IntArray, m: int) -> IntArray:
 
 def _turned(pairs: IntArray, weight: FloatArray, m: int) -> BoolArray:
     """Which of m triangles to turn, for pairs (k, 2) with weights that are negative if just one of them should be."""
-    is_turned, group, size = np.zeros(m, bool), np.arange(m), np.ones(m)
+    is_turned, group, size = np.zeros(m, bool), np.arange(m), np.ones(m, np.int64)
     a, b = pairs.T
     while len(a):
         n_groups = len(size)
@@ -120,14 +120,14 @@ def _turned(pairs: IntArray, weight: FloatArray, m: int) -> BoolArray:
         is_joined[b[joins]], turns[b[joins]], to[b[joins]] = True, weight[joins] < 0, a[joins]
         to = (np.cumsum(~is_joined) - 1)[to]
         is_turned ^= turns[group]
-        group, size = to[group], np.bincount(to, size)
+        group, size = to[group], np.bincount(to, size).astype(np.int64)
         weight = np.where(turns[a] != turns[b], -weight, weight)
         a, b = to[a], to[b]
         a, b, weight = a[a != b], b[a != b], weight[a != b]
     return is_turned
 
 
-def _neighbours(F: IntArray, n: int) -> tuple[IntArray, IntArray]:
+def neighbours_across_edges(F: IntArray, n: int) -> tuple[IntArray, IntArray]:
     """Half-edges 3 f + c (k,), opposite corner c of triangle f, and those of the neighbours across the edges."""
     found = facets(F, n)
     sides = group_by_label(found.of_face.ravel(), len(found.vertices))
