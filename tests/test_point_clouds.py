@@ -576,26 +576,26 @@ def test_vectors_on_a_cloud():
 # The triangles fit together.
 
 
-def test_loops_of_outer_edges_are_filled_in_space() -> None:
-    """Holes in a fold, where tangent planes show no gap: small ones are closed, the border and wide ones stay."""
+@pytest.mark.parametrize(("angle", "width", "n_loops"), [(20, 1.1, 1), (180, 1.1, 1), (180, 3.6, 2)])
+def test_loops_of_outer_edges_are_filled_in_space(angle: float, width: float, n_loops: int) -> None:
+    """Holes in a fold, where tangent planes show no gap, and where it is flat: the border and wide holes stay."""
     mesh = heat_igl.shapes.grid(40)
-    across = mesh.V[:, 0] - mesh.V[:, 0].mean()
-    side = np.abs(across).max()
-    # Folded along a line until the two halves are 20 degrees apart.
-    half = np.deg2rad(10)
-    P = np.stack([np.abs(across) * np.cos(half), mesh.V[:, 1], across * np.sin(half)], axis=1)
-    spacing = 2 * side / 40
-    fold = np.abs(across) < spacing / 4
-    middle = np.abs(mesh.V[:, 1] - mesh.V[:, 1].mean())
-    reach = np.full(len(P), 3.1 * spacing)
-    settled = np.zeros(len(P), bool)
-    for width, closes in ((1.1 * spacing, True), (9.1 * spacing, False)):
-        hole = fold & (middle < width)
-        F = mesh.F[~hole[mesh.F].any(axis=1)].astype(np.int32)
-        filled = with_loops_filled(P, F, reach, settled)
-        assert (len(filled) > len(F)) == closes
-        outer = heat_igl.Mesh(P, filled).report().n_boundary_loops
-        assert outer == (1 if closes else 2)
+    x, y, _ = (mesh.V - mesh.V.mean(axis=0)).T
+    spacing = 2 * x.max() / 40
+    # The two halves are so many degrees apart.
+    half = np.deg2rad(angle / 2)
+    P = np.stack([np.abs(x) * np.cos(half), y, x * np.sin(half)], axis=1)
+    F = mesh.F[~(np.hypot(x, y) < width * spacing)[mesh.F].any(axis=1)].astype(np.int32)
+    filled = with_loops_filled(P, F, np.full(len(P), 3.1 * spacing), np.zeros(len(P), bool))
+    assert heat_igl.Mesh(P, F).report().n_boundary_loops == 2
+    assert heat_igl.Mesh(P, filled).report().n_boundary_loops == n_loops
+
+
+def test_the_border_of_a_small_piece_is_no_gap() -> None:
+    ball = heat_igl.shapes.icosphere(2)
+    F = ball.F[(ball.V[:, 2] > 0.5)[ball.F].all(axis=1)].astype(np.int32)
+    n = ball.n_vertices
+    np.testing.assert_array_equal(with_loops_filled(ball.V, F, np.full(n, 10.0), np.zeros(n, bool)), F)
 
 
 def is_a_surface(F: np.ndarray, n: int) -> bool:
