@@ -8,7 +8,7 @@ import numpy as np
 
 from heat_igl.errors import SourceError, require_choice
 from heat_igl.heat_method import HeatMethodSolver, VectorHeatSolver
-from heat_igl.mesh import MeshLike, SurfacePoints, as_simplices
+from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices, is_oriented_manifold
 from heat_igl.sources import Sources, ordered_vertices
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import directed_from_scratch, vectors_from
@@ -31,8 +31,9 @@ def log_map(
     Parameters
     ----------
     mesh : mesh, HeatMethodSolver or VectorHeatSolver
-        Whatever `as_mesh` takes, with triangles that are a manifold and oriented alike; or a solver on such a mesh.
-        A solver keeps the tables that a mesh needs for each source.
+        Whatever `as_mesh` takes, with triangles that are a manifold and oriented alike, which those of a `PointCloud`
+        need not be for paths from a vertex; or a solver on such a mesh. A solver keeps the tables that a mesh needs for
+        each source.
     source : int or SurfacePoints
         A vertex, or one point in a face.
     method : {"unfold", "exact", "vector-heat"}
@@ -75,15 +76,18 @@ def log_map(
     [4.0, 3.0, 5.0]
     """
     if isinstance(mesh, VectorHeatSolver):
-        return mesh.log_map(_one_vertex(source, mesh.operators.n_given))
+        return mesh.log_map(_one_vertex(source, mesh.n_vertices))
     if isinstance(mesh, HeatMethodSolver):
         _require_one(source, mesh.n_vertices)
         found = mesh.directions(source, tolerance=_TOLERANCE)
         return _vectors(found.distance, found.departure)
     require_choice("method", method, get_args(LogMapMethod))
+    mesh = as_mesh(mesh)
     triangles = as_simplices(mesh)
     if method == "vector-heat":
-        return VectorHeatSolver(triangles).log_map(_one_vertex(source, triangles.n_vertices))
+        return VectorHeatSolver(mesh).log_map(_one_vertex(source, triangles.n_vertices))
+    if isinstance(mesh, PointCloud) and not is_oriented_manifold(triangles):
+        return VectorHeatSolver(mesh, refine=method).log_map(_one_vertex(source, triangles.n_vertices))
     _require_one(source, triangles.n_vertices)
     by_windows = method == "exact" or triangles.n_vertices <= _FEW
     if by_windows and not triangles.is_tetrahedral and not isinstance(source, SurfacePoints):

@@ -12,9 +12,10 @@ from heat_igl.heat_method.outward_field import OutwardField
 from heat_igl.heat_method.parts import prepare
 from heat_igl.heat_method.path_transport import PathTransport
 from heat_igl.heat_method.solver import HeatMethodSolver
+from heat_igl.heat_method.two_sides import TwoSidedTransport
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.linear import Backend
-from heat_igl.mesh import MeshLike, as_simplices
+from heat_igl.mesh import MeshLike, PointCloud, as_mesh, as_simplices, is_oriented_manifold, two_sided_cover
 from heat_igl.operators import Operators, edge_rotations, operators
 from heat_igl.sources import Sources, ordered_vertices
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
@@ -29,7 +30,8 @@ class VectorHeatSolver:
     Parameters
     ----------
     mesh : mesh
-        Whatever `as_mesh` takes, with triangles, manifold and oriented alike.
+        Whatever `as_mesh` takes, with triangles, manifold and oriented alike. The triangles of a `PointCloud` may be
+        neither: heat then flows on both sides of them, see `TwoSidedTransport`.
     t_coef : float, optional
         t = t_coef h^2, with h the mean edge length of the intrinsic Delaunay triangulation; by default 1 for vectors as
         in the paper, and 0.5 for values as for `HeatMethodSolver`. Larger ones blend the sources more smoothly, and are
@@ -82,7 +84,13 @@ class VectorHeatSolver:
         refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> None:
+        mesh = as_mesh(mesh)
         triangles = as_simplices(mesh)
+        #: Vertices that vectors are given at and returned for.
+        self.n_vertices = triangles.n_vertices
+        has_two_sides = isinstance(mesh, PointCloud) and not is_oriented_manifold(triangles)
+        if has_two_sides:
+            triangles = two_sided_cover(triangles)
         self._frames: TangentFrames | None = tangent_frames(triangles)
         # Angles are carried over flips, not to added vertices.
         domain = operators(triangles, "intrinsic-delaunay")
@@ -91,16 +99,19 @@ class VectorHeatSolver:
         options = SolverOptions(t_coef, t, refine=refine, backend=backend)
         self._distance_solver = HeatMethodSolver._of(prepare(domain, options))
         #: How values and vectors travel from the sources: by diffusion, or along the shortest paths.
-        self._transport: HeatTransport | PathTransport
+        self._transport: HeatTransport | PathTransport | TwoSidedTransport
         if refine in ("unfold", "exact"):
             self._transport = PathTransport(self._distance_solver, self._frames.angles)
-            return
-        triangulation = domain.surface.triangulation
-        # Thirds of the triangles: with Voronoi areas, transport on spheres is wrong by 5 to 10 % more.
-        mass = np.bincount(triangulation.F.ravel(), np.repeat(triangulation.areas / 3, 3), domain.n)
-        self._transport = HeatTransport(
-            self._distance_solver, edge_rotations(domain), mass.astype(np.float64), OutwardField(domain.surface)
-        )
+        else:
+            triangulation = domain.surface.triangulation
+            # Thirds of the triangles: with Voronoi areas, transport on spheres is wrong by 5 to 10 % more.
+            mass = np.bincount(triangulation.F.ravel(), np.repeat(triangulation.areas / 3, 3), domain.n)
+            self._transport = HeatTransport(
+                self._distance_solver, edge_rotations(domain), mass.astype(np.float64), OutwardField(domain.surface)
+            )
+        if has_two_sides:
+            self._transport = TwoSidedTransport(self._transport, self._frames, self.n_vertices)
+            self._frames = self._transport.frames
 
     @classmethod
     def from_operators(
@@ -132,7 +143,7 @@ class VectorHeatSolver:
         if rotations.shape != domain.L.shape:
             raise ValueError(f"rotations must have the shape of L, {domain.L.shape}, not {rotations.shape}")
         solver = cls.__new__(cls)
-        solver._frames = None
+        solver._frames, solver.n_vertices = None, domain.n
         solver._distance_solver = HeatMethodSolver._of(prepare(domain, SolverOptions(t_coef, t, backend=backend)))
         solver._transport = HeatTransport(solver._distance_solver, rotations)
         return solver
@@ -149,7 +160,7 @@ class VectorHeatSolver:
 
     @property
     def operators(self) -> Operators:
-        """L and M of the triangulation that is solved on."""
+        """L and M of the triangulation that is solved on; of both sides of a cloud without an orientation."""
         return self._distance_solver.operators
 
     @property
@@ -162,8 +173,10 @@ class VectorHeatSolver:
 
         `sources` and errors are those of `transport`.
         """
-        components = self.operators.components
-        return np.isin(components, components[self._vertices(sources)])
+        components, vertices = self.operators.components, self._vertices(sources)
+        if isinstance(self._transport, TwoSidedTransport):
+            vertices = self._transport.on_both(vertices)
+        return np.isin(components, components[vertices])[: self.n_vertices]
 
     def extend(self, sources: Sources, values: ArrayLike) -> FloatArray:
         """Values at vertices, extended to all: each vertex gets about the value of the nearest source.
@@ -267,4 +280,4 @@ class VectorHeatSolver:
         return self._transport.log_map(int(vertices[0]))
 
     def _vertices(self, sources: Sources) -> IntArray:
-        return ordered_vertices(sources, self.operators.n)
+        return ordered_vertices(sources, self.n_vertices)

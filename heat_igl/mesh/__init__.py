@@ -1,6 +1,7 @@
 """What distance is measured on: meshes, images and point clouds, and points and curves on them."""
 
 from heat_igl.mesh.cloud_copies import nearest_copies
+from heat_igl.mesh.cloud_cover import is_oriented_manifold, two_sided_cover
 from heat_igl.mesh.level_segments import Segments, crossings, joined_segments, level_segments
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with
@@ -50,6 +51,7 @@ __all__ = [
     "edge_curve",
     "flat_curves",
     "image_domain",
+    "is_oriented_manifold",
     "joined_segments",
     "level_segments",
     "named_entries",
@@ -58,5 +60,6 @@ __all__ = [
     "region_boundary",
     "split_long_edges",
     "triangulated",
+    "two_sided_cover",
     "which_repeat_a_vertex",
 ]

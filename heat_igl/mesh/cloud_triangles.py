@@ -13,7 +13,9 @@ import numpy as np
 from heat_igl.kernels.agreeing import agreement
 from heat_igl.kernels.fitting_triangles import fitting_triangles
 from heat_igl.kernels.local_delaunay import delaunay_stars
+from heat_igl.mesh.cloud_fans import with_fans_joined
 from heat_igl.mesh.cloud_gaps import pinched_vertices, with_gaps_closed, with_one_fan
+from heat_igl.mesh.cloud_loops import with_loops_filled
 from heat_igl.mesh.connectivity import ascending_rows
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.neighbourhoods import Neighbourhoods
@@ -34,7 +36,7 @@ _OTHER_SHEET = -0.25
 def cloud_triangles(P: FloatArray, near: Neighbourhoods, oriented: bool) -> IntArray:
     """Triangles (m, 3) int32 on points; an edge has at most two.
 
-    Around each point they make one fan, unless several fans are the only connection between parts of the surface.
+    Around each point they make one fan, unless one that goes all the way around is the only connection to another part.
 
     Parameters
     ----------
@@ -55,6 +57,9 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, oriented: bool) -> IntA
     F = with_gaps_closed(P, F, near, is_settled)
     is_pinched = pinched_vertices(F, is_settled)
     F = with_one_fan(np.concatenate([agreed[~is_open], F]), is_pinched)
+    if is_pinched.any():
+        F = with_fans_joined(P, F, is_settled)
+    F = with_loops_filled(P, F, near.reach, is_settled)
     return _with_isolated_points(P, F, near)
 
 

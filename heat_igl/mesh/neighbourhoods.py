@@ -83,12 +83,16 @@ class Neighbourhoods:
         The points themselves and their neighbours, by distance; -1 after the last.
     radius : (n,) float64
         Distance of the farthest of them.
+    reach : (n,) float64
+        Distance of the farthest of all neighbours, also of those that are left out where a neighbourhood is made
+        smaller.
     axes : (n, 3, 3) float64
         Two tangents and the normal of each point, in rows, orthonormal.
     """
 
     index: IntArray
     radius: FloatArray
+    reach: FloatArray
     axes: FloatArray
 
     @property
@@ -120,12 +124,13 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: 
     """
     P = tree.P
     k = min(_K, len(P) - 1)
-    found = Neighbourhoods(np.empty((len(P), k + 1), np.int32), np.empty(len(P)), np.empty((len(P), 3, 3)))
+    n = len(P)
+    found = Neighbourhoods(np.empty((n, k + 1), np.int32), np.empty(n), np.empty(n), np.empty((n, 3, 3)))
     bend = np.zeros(len(P))
 
     def fill(rows: slice) -> None:
         index, square = tree.nearest(np.arange(rows.start, rows.stop), k + 1)
-        found.radius[rows] = np.sqrt(square[:, -1])
+        found.radius[rows] = found.reach[rows] = np.sqrt(square[:, -1])
         if normals is not None:
             found.axes[rows] = axes_along(normals[rows])
         elif shrinks:
