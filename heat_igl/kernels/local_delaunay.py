@@ -91,7 +91,9 @@ def _neighbours_around(
             axes[i, 2, 0] * axes[j, 2, 0] + axes[i, 2, 1] * axes[j, 2, 1] + axes[i, 2, 2] * axes[j, 2, 2] < least_cosine
         ):
             continue
-        flat: InPlane = in_plane(P, axes, i, j)
+        flat: InPlane = in_plane(
+            cython.address(P[i, 0]), cython.address(axes[i, 0, 0]), cython.address(P[j, 0]), cython.address(axes[j, 0, 0])
+        )
         x, y = flat.x, flat.y
         square: cython.double = x * x + y * y
         # A point above the centre has no direction in the plane.

@@ -32,7 +32,7 @@ def principal_axes(
     found, spread = np.empty((index.shape[0], 3, 3)), np.empty((index.shape[0], 3))
     axes: cython.double[:, :, ::1] = found
     variances: cython.double[:, ::1] = spread
-    work: cython.double[:, ::1] = np.empty((7, 3))
+    work: cython.double[:, ::1] = np.empty((6, 3))
     row: cython.Py_ssize_t
     with cython.nogil:
         for row in range(index.shape[0]):
@@ -71,7 +71,7 @@ def tangent_planes(
     radius: cython.double[::1] = radii
     trial: cython.double[:, ::1] = np.empty((3, 3))
     variances: cython.double[::1] = np.empty(3)
-    work: cython.double[:, ::1] = np.empty((7, 3))
+    work: cython.double[:, ::1] = np.empty((6, 3))
     row: cython.Py_ssize_t
     sixths: cython.Py_ssize_t
     j: cython.Py_ssize_t
@@ -142,35 +142,32 @@ def _axes(
     variances: cython.double[::1],
     work: cython.double[:, ::1],
 ) -> cython.void:
-    """The axes and variances of one point; `work` (7, 3) holds the covariance, the eigenvectors and a mean."""
+    """The axes and variances of one point; `work` (6, 3) holds the covariance and the eigenvectors."""
     x: cython.int
     y: cython.int
     j: cython.Py_ssize_t
-    for x in range(7):
-        for y in range(3):
-            work[x, y] = 1.0 if x == y + 3 else 0.0
     # In units of the radius: squares of tiny lengths would underflow.
     scale: cython.double = 1.0 / max(sqrt(square[square.shape[0] - 1]), TINY)
     total: cython.double = 0.0
+    # Sums in registers.
+    sx = sy = sz = xx = xy = xz = yy = yz = zz = cython.cast(cython.double, 0.0)
     for j in range(index.shape[0]):
         weight: cython.double = _weight(square, j)
         dx: cython.double = (P[index[j], 0] - P[index[0], 0]) * scale
         dy: cython.double = (P[index[j], 1] - P[index[0], 1]) * scale
         dz: cython.double = (P[index[j], 2] - P[index[0], 2]) * scale
         total += weight
-        work[6, 0] += weight * dx
-        work[6, 1] += weight * dy
-        work[6, 2] += weight * dz
-        work[0, 0] += weight * dx * dx
-        work[0, 1] += weight * dx * dy
-        work[0, 2] += weight * dx * dz
-        work[1, 1] += weight * dy * dy
-        work[1, 2] += weight * dy * dz
-        work[2, 2] += weight * dz * dz
+        sx, sy, sz = sx + weight * dx, sy + weight * dy, sz + weight * dz
+        xx, xy, xz = xx + weight * dx * dx, xy + weight * dx * dy, xz + weight * dx * dz
+        yy, yz, zz = yy + weight * dy * dy, yz + weight * dy * dz, zz + weight * dz * dz
+    sx, sy, sz = sx / total, sy / total, sz / total
+    work[0, 0], work[1, 1], work[2, 2] = xx / total - sx * sx, yy / total - sy * sy, zz / total - sz * sz
+    work[0, 1] = work[1, 0] = xy / total - sx * sy
+    work[0, 2] = work[2, 0] = xz / total - sx * sz
+    work[1, 2] = work[2, 1] = yz / total - sy * sz
     for x in range(3):
-        for y in range(x, 3):
-            work[x, y] = work[x, y] / total - (work[6, x] / total) * (work[6, y] / total)
-            work[y, x] = work[x, y]
+        for y in range(3):
+            work[3 + x, y] = 1.0 if x == y else 0.0
     for _sweep in range(30):
         if not (_rotate(work, 0, 1) | _rotate(work, 0, 2) | _rotate(work, 1, 2)):
             break

@@ -185,7 +185,9 @@ class LeafSearch:
             node: cython.Py_ssize_t = stack[top]
             apart: cython.double = 0.0
             for x in range(3):
-                beside: cython.double = max(max(self.boxes[node, x] - box[3 + x], box[x] - self.boxes[node, 3 + x]), 0.0)
+                beside: cython.double = max(
+                    max(self.boxes[node, x] - box[3 + x], box[x] - self.boxes[node, 3 + x]), 0.0
+                )
                 apart += beside * beside
             if apart > limit:
                 continue
