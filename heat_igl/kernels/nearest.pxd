@@ -2,14 +2,15 @@ cdef enum:
     # Radii that are tried for the points of a leaf, and points that may be within one.
     MOST_TRIES = 8
     MOST_POINTS = 4096
-    # Neighbours are put into so many shells of equal area, and sorted in these.
+    # Neighbours are put into so many shells of equal area, and sorted then.
     SHELLS = 64
 
 cdef extern from *:
     """
-    // Factors from the farthest neighbour in the last leaf to the radius of the next, and from one radius to others.
-    #define WIDER 1.08
-    #define LARGER 1.25
+    // Factors from the farthest neighbour in the last leaf to the radius of the next; from there to a larger one, more
+    // each time, and to a smaller one.
+    #define WIDER 1.03
+    #define LARGER 1.1
     #define SMALLER 0.6
     // Squares of smaller radii lose digits to underflow.
     #define LEAST_RADIUS 1e-140
@@ -44,5 +45,6 @@ cdef class LeafSearch:
         unsigned char[::1] found,
     ) noexcept nogil
     cdef double first_guess(self, Py_ssize_t leaf) noexcept nogil
+    cdef void sort(self, Py_ssize_t size) noexcept nogil
     cdef Py_ssize_t shell_of(self, Py_ssize_t j, double scale) noexcept nogil
     cdef void enclose(self, const long long[::1] chosen, double* box) noexcept nogil

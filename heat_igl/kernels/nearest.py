@@ -122,6 +122,7 @@ class LeafSearch:
         self.enclose(chosen, box)
         if self.radius == 0.0:
             self.radius = self.first_guess(leaf)
+        larger: cython.double = LARGER
         a: cython.Py_ssize_t
         for _ in range(MOST_TRIES):
             if not self.radius > LEAST_RADIUS:
@@ -142,7 +143,8 @@ class LeafSearch:
             if n_found == chosen.shape[0]:
                 self.radius = WIDER * sqrt(largest)
                 return
-            self.radius *= LARGER if is_short else SMALLER
+            self.radius *= larger if is_short else SMALLER
+            larger *= LARGER
         self.radius = 0.0
 
     @cython.cfunc
@@ -253,15 +255,7 @@ class LeafSearch:
         size: cython.Py_ssize_t = self.fill_shells(kept)
         if size > 8 * self.k:
             return 1
-        b: cython.Py_ssize_t
-        for j in range(1, size):
-            key: cython.double = self.keys[j]
-            value: cython.int = self.values[j]
-            b = j
-            while b > 0 and (self.keys[b - 1] > key or (self.keys[b - 1] == key and self.values[b - 1] > value)):
-                self.keys[b], self.values[b] = self.keys[b - 1], self.values[b - 1]
-                b -= 1
-            self.keys[b], self.values[b] = key, value
+        self.sort(size)
         for j in range(self.k):
             index[j], square[j] = self.values[j], self.keys[j]
         # Squares of distances may underflow, and then others are as near as the point itself.
@@ -276,28 +270,44 @@ class LeafSearch:
     @cython.nogil
     @cython.exceptval(check=False)
     def fill_shells(self, kept: cython.Py_ssize_t) -> cython.Py_ssize_t:
-        """Put the k nearest of the points that were kept, and a few more, into shells; return how many they are."""
+        """Put the points that were kept into shells; return how many are in those that hold the k nearest."""
         begin: cython.int[65]
         scale: cython.double = SHELLS / (self.radius * self.radius)
+        keys: cython.pointer[cython.double] = cython.address(self.keys[0])
+        values: cython.pointer[cython.int] = cython.address(self.values[0])
         j: cython.Py_ssize_t
         shell: cython.Py_ssize_t
+        size: cython.Py_ssize_t = 0
         for shell in range(SHELLS + 1):
             begin[shell] = 0
         for j in range(kept):
             begin[1 + self.shell_of(j, scale)] += 1
-        last: cython.Py_ssize_t = 0
         for shell in range(SHELLS):
             begin[shell + 1] += begin[shell]
-            if begin[shell] < self.k:
-                last = shell
-        size: cython.Py_ssize_t = begin[last + 1]
+            size = begin[shell + 1] if begin[shell] < self.k else size
         for j in range(kept):
             shell = self.shell_of(j, scale)
-            if shell <= last:
-                self.keys[begin[shell]] = self.square[self.kept[j]]
-                self.values[begin[shell]] = self.number[self.kept[j]]
-                begin[shell] += 1
+            keys[begin[shell]], values[begin[shell]] = self.square[self.kept[j]], self.number[self.kept[j]]
+            begin[shell] += 1
         return size
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def sort(self, size: cython.Py_ssize_t) -> cython.void:
+        """Sort the points in shells by distance, those that are as far by number: by insertion, as few are misplaced."""
+        keys: cython.pointer[cython.double] = cython.address(self.keys[0])
+        values: cython.pointer[cython.int] = cython.address(self.values[0])
+        j: cython.Py_ssize_t
+        for j in range(1, size):
+            key: cython.double = keys[j]
+            value: cython.int = values[j]
+            b: cython.Py_ssize_t = j
+            while b > 0 and (keys[b - 1] > key or (keys[b - 1] == key and values[b - 1] > value)):
+                keys[b], values[b] = keys[b - 1], values[b - 1]
+                b -= 1
+            keys[b], values[b] = key, value
 
     @cython.cfunc
     @cython.inline
