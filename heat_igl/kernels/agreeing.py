@@ -167,15 +167,16 @@ def _orient_part(
                         break
                 # From the tail, the neighbour must not go on to the head.
                 runs_alike: cython.bint = F[g, 0 if e == 2 else e + 1] == head
+                if not runs_alike and F[g, 2 if e == 0 else e - 1] != head:
+                    continue
                 if part[g] >= 0:
+                    is_oriented = is_oriented and not runs_alike
+                else:
                     if runs_alike:
-                        is_oriented = False
-                    continue
-                if runs_alike:
-                    F[g, 1], F[g, 2] = F[g, 2], F[g, 1]
-                elif F[g, 2 if e == 0 else e - 1] != head:
-                    continue
-                part[g] = number
-                queue[end] = cython.cast(cython.int, g)
-                end += 1
+                        F[g, 1], F[g, 2] = F[g, 2], F[g, 1]
+                    part[g] = number
+                    queue[end] = cython.cast(cython.int, g)
+                    end += 1
+                # An edge has no third triangle.
+                break
     return is_oriented

@@ -82,7 +82,9 @@ def _direction(
     j: cython.Py_ssize_t,
 ) -> cython.double:
     """Angle of point j around point i in the tangent plane of i."""
-    flat: InPlane = in_plane(P, axes, i, j)
+    flat: InPlane = in_plane(
+        cython.address(P[i, 0]), cython.address(axes[i, 0, 0]), cython.address(P[j, 0]), cython.address(axes[j, 0, 0])
+    )
     return atan2(flat.y, flat.x)
 
 

@@ -91,15 +91,20 @@ def _neighbours_around(
             axes[i, 2, 0] * axes[j, 2, 0] + axes[i, 2, 1] * axes[j, 2, 1] + axes[i, 2, 2] * axes[j, 2, 2] < least_cosine
         ):
             continue
-        flat: InPlane = in_plane(P, axes, i, j)
+        if size == FEW and n_sides == 0:
+            n_sides = _sides(_visible_hull(size, star, stack), star, stack)
+            reach = _reach(n_sides, star)
+        # In the plane, distances are shorter by a few percent at most, see `in_plane`; the others are farther away.
+        if _squared_distance(P, i, j) > 1.2 * reach:
+            break
+        flat: InPlane = in_plane(
+            cython.address(P[i, 0]), cython.address(axes[i, 0, 0]), cython.address(P[j, 0]), cython.address(axes[j, 0, 0])
+        )
         x, y = flat.x, flat.y
         square: cython.double = x * x + y * y
         # A point above the centre has no direction in the plane.
         if square <= 0.0:
             continue
-        if size == FEW and n_sides == 0:
-            n_sides = _sides(_visible_hull(size, star, stack), star, stack)
-            reach = _reach(n_sides, star)
         if square > reach or _is_inside(n_sides, star, x / square, y / square):
             continue
         # Grows with the angle, and needs no arctangent.
@@ -114,6 +119,19 @@ def _neighbours_around(
         members[b] = cython.cast(cython.int, j)
         size += 1
     return size
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _squared_distance(
+    P: cython.const[cython.double][:, ::1], i: cython.Py_ssize_t, j: cython.Py_ssize_t
+) -> cython.double:
+    dx: cython.double = P[j, 0] - P[i, 0]
+    dy: cython.double = P[j, 1] - P[i, 1]
+    dz: cython.double = P[j, 2] - P[i, 2]
+    return dx * dx + dy * dy + dz * dz
 
 
 @cython.cfunc
