@@ -95,6 +95,9 @@ class UnfoldingSolver:
         With "exact", what is farther is ``inf``, and the search ends there.
     originals : (n,) int64, optional
         The vertex whose values each takes: itself, or that of which it is a copy, see `PointCloud.originals`.
+    orders_itself : bool
+        Whether sweeps go through the vertices in the order in which their own front meets them, and not in that of the
+        heat, which is not read then.
 
     Raises
     ------
@@ -109,6 +112,7 @@ class UnfoldingSolver:
         tolerance: float | None = None,
         cutoff: float = np.inf,
         originals: IntArray | None = None,
+        orders_itself: bool = False,
     ) -> None:
         surface = domain.surface
         if surface is None:
@@ -121,6 +125,7 @@ class UnfoldingSolver:
         require_share(tolerance)
         self._tolerance, self._cutoff = tolerance, cutoff
         self._sweeps = refine == "sweep" and not self.is_exact
+        self._orders_itself = orders_itself and self._sweeps
         if self._refinement is not None and self._sweeps:
             self._refinement.keep_for_sweeps()
         self._surface = surface
@@ -144,6 +149,11 @@ class UnfoldingSolver:
     @cached_property
     def _faces(self) -> NearField | None:
         return None if self._surface.faces is None else NearField(self._surface.faces)
+
+    @property
+    def reads_heat(self) -> bool:
+        """Whether the order of the heat is read."""
+        return not (self.is_exact or self._orders_itself)
 
     def distances(self, source_sets: Sequence[SourceSet], u: FloatArray) -> FloatArray:
         """Distances (k, n) for heat (n, k).
@@ -358,7 +368,7 @@ class UnfoldingSolver:
         elif asked.tolerance is not None:
             unfolded = partial(unfolded, tolerance=asked.tolerance)
         return unfolded(
-            -u,
+            None if self._orders_itself else -u,
             asked.vertices,
             offsets=asked.offsets,
             points=asked.points,
