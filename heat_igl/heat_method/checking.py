@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.kernels import checking
-from heat_igl.operators import Operators
+from heat_igl.operators import Surface
 from heat_igl.sources import SourceSet
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["AnswerCheck", "Checker"]
 
@@ -95,21 +95,22 @@ class Checker:
 
     Parameters
     ----------
-    domain : Operators
-        The domain.
+    surface : Surface or None
+        The triangles of the domain.
+    referenced : (n,) bool
+        Vertices that a face uses.
     V : (n, 3) float64, optional
-        Positions of its vertices; straight lines are left out without them.
+        Positions of the vertices; straight lines are left out without them.
     """
 
-    def __init__(self, domain: Operators, V: FloatArray | None) -> None:
+    def __init__(self, surface: Surface | None, referenced: BoolArray, V: FloatArray | None) -> None:
         self._V = None if V is None else np.ascontiguousarray(V, np.float64)
-        given = domain.source_surface
-        self._F = None if given is None else given.given_faces
-        self._referenced = domain.referenced
-        vertices = _sample(np.flatnonzero(domain.referenced[: domain.n_given]), _MOST_VERTICES)
+        self._F = None if surface is None else surface.given_faces
+        self._referenced = referenced
+        vertices = _sample(np.flatnonzero(referenced), _MOST_VERTICES)
         self._vertices = vertices
         self._positions = None if V is None else np.ascontiguousarray(V[vertices])
-        faces = None if given is None else given.faces
+        faces = None if surface is None else surface.faces
         nowhere = np.empty(0, np.int64)
         self._i, self._j, self._length = nowhere, nowhere, np.empty(0)
         if faces is not None:

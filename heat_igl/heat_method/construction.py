@@ -9,6 +9,7 @@ from heat_igl.errors import shown
 from heat_igl.heat_method.batches import BatchedSolver
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
+from heat_igl.heat_method.point_parts import prepare_points
 from heat_igl.heat_method.solution import Diagnostics
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, PolygonMesh, as_mesh
@@ -132,10 +133,13 @@ class PreparedSolver(BatchedSolver):
                 "this solver was made from operators and has no vertices to move: use from_operators again"
             )
         moved = self._mesh.with_vertices(V)
-        return self._of(prepare_mesh(moved, self._parts.options, self._parts.analysis), moved)
+        prepared = prepare_points if isinstance(moved, PointCloud) else prepare_mesh
+        return self._of(prepared(moved, self._parts.options, self._parts.analysis), moved)
 
     def _set_up(self, mesh: Mesh | PolygonMesh | PointCloud, options: SolverOptions) -> None:
-        if not isinstance(mesh, PolygonMesh):
+        if isinstance(mesh, PointCloud):
+            self._mesh, self._parts = mesh, prepare_points(mesh, options)
+        elif not isinstance(mesh, PolygonMesh):
             self._mesh, self._parts = mesh, prepare_mesh(mesh, options)
         elif options.refine is not None:
             self._mesh, self._parts = mesh.triangles, prepare_mesh(mesh.triangles, options)
@@ -183,8 +187,8 @@ class PreparedSolver(BatchedSolver):
     @property
     def n_vertices(self) -> int:
         """Length of a distance array: the vertices of the mesh. The operators may have more."""
-        return self.operators.n_given
+        return self._parts.n_vertices
 
     @property
     def _n_faces(self) -> int:
-        return len(self.operators.weights)
+        return self._parts.n_faces

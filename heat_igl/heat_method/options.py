@@ -83,6 +83,12 @@ class SolverOptions:
         """Whether a sweep may take the place of heat on points: where nothing of the heat method is named."""
         return self.refine is None and self.leaves_heat and self.laplacian == "auto"
 
+    @property
+    def names_no_heat(self) -> bool:
+        """Whether nothing of the heat method is named, so that a sweep of points may do without heat."""
+        is_default = self.magnitude == "auto" and self.boundary == "neumann" and self.default_time_step
+        return self.refine == "sweep" and is_default and self.laplacian in ("auto", "intrinsic-delaunay")
+
     def by_heat_on(self, mesh: object) -> SolverOptions:
         """The options with which a solver on `mesh` takes heat, where they leave that open: points are swept."""
         return replace(self, magnitude="damped") if isinstance(mesh, PointCloud) and self.leaves_points else self

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-import igl
 import numpy as np
 import scipy.sparse as sp
 
@@ -36,11 +35,6 @@ from heat_igl.unfolding import FrontSolver, OrderedSolver, UnfoldingSolver
 
 __all__ = ["SolverParts", "prepare", "prepare_mesh", "prepare_polygons"]
 
-# For points, see docs/clouds.md: the sides of random points' triangles differ so much that heat needs a larger step.
-_T_COEF_EVEN, _T_COEF_RANDOM = 0.5, 1.0
-# Median ratio of the longest to the shortest side above which points count as random: these have 1.9, the vertices of
-# meshes 1.2 to 1.8.
-_RANDOM_SIDES = 1.82
 # Ratio of speeds from which on heat, with one time step for all, is worse than 2 %: docs/metrics.md.
 _LARGEST_CONTRAST = 30.0
 
@@ -60,7 +54,8 @@ class SolverParts:
     assembler : SourceAssembler
         From sources to right-hand sides.
     factored : HeatFlow or None
-        Step 1; None with ``refine="exact"`` and for fronts, which take no heat: `heat_flow` factors it on request.
+        Step 1; None with ``refine="exact"``, for fronts and for swept points, which take no heat: `heat_flow` factors
+        it on request.
     last_steps : Integration or OrderedSolver
         Steps 2 and 3, or what takes their place: unfolding with ``refine``, or fronts.
     time_steps : (n_components,) float64
@@ -107,6 +102,21 @@ class SolverParts:
         return ElementSlopes(self.operators, self.time_steps, self.t_damping, self.fitted)
 
     @property
+    def n_vertices(self) -> int:
+        """Length of a distance array."""
+        return self.operators.n_given
+
+    @property
+    def n_faces(self) -> int:
+        """Faces of the domain."""
+        return len(self.operators.weights)
+
+    @property
+    def is_surface(self) -> bool:
+        """Whether the domain has two dimensions."""
+        return self.operators.is_surface
+
+    @property
     def given_faces(self) -> IntArray | None:
         """Vertices (m, 3) of the triangles that points and curves refer to."""
         surface = self.operators.source_surface
@@ -116,8 +126,6 @@ class SolverParts:
 def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysis | None = None) -> SolverParts:
     """The parts of a solver on `mesh`; a `known` order of elimination is taken if it fits."""
     start = time.perf_counter()
-    if isinstance(mesh, PointCloud):
-        options = _for_points(mesh, options)
     begun: list[Future[Analysis]] = []
     originals: IntArray | None = None
     with pool(1) as beside:
@@ -141,21 +149,6 @@ def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysi
         return prepare(domain, options, begun[0].result if begun else lambda: known, seconds, mesh.V, originals)
 
 
-def _for_points(cloud: PointCloud, options: SolverOptions) -> SolverOptions:
-    """The options with those left open chosen for a cloud: on scattered points the sweep is far nearer than heat."""
-    if options.leaves_points:
-        options = replace(options, refine="sweep")
-    if options.refine is not None or options.t_coef is not None:
-        return options
-    return replace(options, t_coef=_t_coef_of_points(cloud.triangles))
-
-
-def _t_coef_of_points(triangles: Mesh) -> float:
-    sides = np.sort(igl.edge_lengths(triangles.V, triangles.F), axis=1)
-    is_random = np.median(sides[:, 2] / np.maximum(sides[:, 0], np.finfo(float).tiny)) > _RANDOM_SIDES
-    return _T_COEF_RANDOM if is_random else _T_COEF_EVEN
-
-
 def prepare_polygons(mesh: PolygonMesh, options: SolverOptions) -> SolverParts:
     """The parts of a solver on the triangles around the virtual vertices of polygons."""
     start = time.perf_counter()
@@ -170,6 +163,7 @@ def prepare(
     seconds_operators: float = 0.0,
     V: FloatArray | None = None,
     originals: IntArray | None = None,
+    unfolding: OrderedSolver | None = None,
 ) -> SolverParts:
     """The parts of a solver on `domain`: resolve the options, then factor the matrices.
 
@@ -187,6 +181,8 @@ def prepare(
         Positions, to check answers against straight lines.
     originals : (n,) int64, optional
         With `refine`, the vertex whose distance each takes: see `PointCloud.originals`.
+    unfolding : OrderedSolver, optional
+        The last steps, if they are there before; nothing is factored for one that reads no heat.
     """
     domain, options = _resolved(domain, options)
     damped = options.damps(domain)
@@ -194,9 +190,9 @@ def prepare(
     step, requested = time_step(options, domain, fitted)
     check_large_step(options, domain)
     t_damping = step if damped else None
-    front_solver = None if domain.simplices is None or not options.leaves_heat else FrontSolver(domain.simplices)
-    takes_heat = options.refine != "exact" and front_solver is None
-    unfolding: OrderedSolver | None = front_solver
+    if domain.simplices is not None and options.leaves_heat:
+        unfolding = FrontSolver(domain.simplices)
+    takes_heat = options.refine != "exact" and unfolding is None
     if unfolding is None and options.refine is not None:
         # Before there are factors: most memory is needed while the tables are made.
         unfolding = UnfoldingSolver(domain, options.refine, originals=originals)
@@ -243,7 +239,9 @@ def prepare(
         t_damping=t_damping,
         fitted=fitted,
         originals=originals,
-        checker=None if options.refine in ("unfold", "exact") else Checker(domain, V),
+        checker=None
+        if options.refine in ("unfold", "exact")
+        else Checker(domain.source_surface, domain.referenced[: domain.n_given], V),
         diagnostics=diagnostics,
     )
 

@@ -167,10 +167,14 @@ class HeatMethodSolver(PreparedSolver):
 
     def _answers(self, source_sets: list[SourceSet]) -> tuple[FloatArray, list[str | None]]:
         """Distances (k, n) from k sets of sources, and what is wrong with them: the method from end to end."""
-        terms = self._source_terms(source_sets)
-        distances = self._distances_from_heat(terms, self._order(terms))
+        last_steps = self._parts.last_steps
+        if isinstance(last_steps, OrderedSolver):
+            distances = last_steps.distances(source_sets, self._order(source_sets))
+        else:
+            terms = self._source_terms(source_sets)
+            distances = self._distances_from_heat(terms, self._heat(terms))
         checks = [self._check(*pair) for pair in zip(distances, source_sets, strict=True)]
-        return distances, [None if check is None else check.complaint(self.operators.is_surface) for check in checks]
+        return distances, [None if check is None else check.complaint(self._parts.is_surface) for check in checks]
 
     def _check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck | None:
         """Check one answer (n,), and raise it to straight lines where it is far below them.
@@ -185,11 +189,12 @@ class HeatMethodSolver(PreparedSolver):
             return check._replace(raised=self._parts.checker.raise_to_lines(distance, sources))
         return check
 
-    def _order(self, terms: list[SourceTerm]) -> FloatArray:
-        """Heat at all vertices of the operators, or zeros where the last steps do not read it."""
-        if self.is_exact:
-            return np.zeros((self.operators.n, len(terms)))
-        return self._heat(terms)
+    def _order(self, source_sets: list[SourceSet]) -> FloatArray:
+        """Heat (n, k) of k sets of sources, for the order in which to unfold; zeros where that is not read."""
+        last_steps = self._parts.last_steps
+        if isinstance(last_steps, OrderedSolver) and not last_steps.reads_heat:
+            return np.zeros((self.n_vertices, len(source_sets)))
+        return self._heat(self._source_terms(source_sets))
 
     def _source_terms(self, source_sets: list[SourceSet], for_field: bool = False) -> list[SourceTerm]:
         """Initial heat of each set, and what is known near it; unfolding reads that only `for_field`, in `solve`."""
@@ -228,15 +233,14 @@ class HeatMethodSolver(PreparedSolver):
         """
         beyond = checked_cutoff(cutoff)
         chosen = self._source_set(sources)
-        terms = self._source_terms([chosen])
-        u = self._order(terms)
         if isinstance(self._parts.last_steps, OrderedSolver):
-            distance, labels = self._parts.last_steps.labelled(chosen, u[:, 0])
+            distance, labels = self._parts.last_steps.labelled(chosen, self._order([chosen])[:, 0])
         else:
-            distance = self._distances_from_heat(terms, u)[0]
+            terms = self._source_terms([chosen])
+            distance = self._distances_from_heat(terms, self._heat(terms))[0]
             labels = warmest_sources(terms[0], self._parts.heat_flow, self.operators.n)[: self.n_vertices]
         check = self._check(distance, chosen)
-        _warn(check and check.complaint(self.operators.is_surface))
+        _warn(check and check.complaint(self._parts.is_surface))
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
@@ -281,8 +285,8 @@ class HeatMethodSolver(PreparedSolver):
             raise MeshError("directions need triangles that fit together: fronts through this domain follow no paths")
         if not isinstance(last_steps, UnfoldingSolver) or self._parts.options.refine == "sweep":
             raise ValueError('directions follow paths: make the solver with refine="unfold" or refine="exact"')
-        (term,) = self._source_terms([self._source_set(sources)])
-        return last_steps.directed(term.sources, self._order([term])[:, 0], tolerance)
+        chosen = self._source_set(sources)
+        return last_steps.directed(chosen, self._order([chosen])[:, 0], tolerance)
 
     @cached_property
     def _frames(self) -> TangentFrames:

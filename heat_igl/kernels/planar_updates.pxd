@@ -5,7 +5,7 @@
 # ab, lies below it at (s.beyond_along, -s.beyond_depth). da, db, dw, dv are distances from one source at these corners.
 
 from heat_igl.kernels.half_edges cimport Spoke
-from libc.math cimport INFINITY, sqrt
+from libc.math cimport INFINITY, fabs, sqrt
 
 cdef extern from *:
     """
@@ -15,15 +15,22 @@ cdef extern from *:
     double CLOSE
 
 
-cdef inline double across_side(double da, double db, const Spoke* s) noexcept nogil:
-    # Squared distance at v from a point source: infinite unless the straight line between them crosses ab. Without
-    # branches, which at random cost more than the arithmetic.
+cdef inline bint crosses_side(double da, double db, const Spoke* s, double* squared) noexcept nogil:
+    # Whether the straight line from a point source to v crosses ab; the squared distance at v, if it does.
+    #
+    # Without branches, which at random cost more than the arithmetic: the caller counts by the result, or discards it.
     cdef double x = 0.5 * ((da - db) * (da + db) / s.base + s.base)
     cdef double y_squared = da * da - x * x
-    cdef double y = sqrt(max(y_squared, 0.0))
+    cdef double y = sqrt(fabs(y_squared))  # a choice of the larger of this and 0 would be a branch
     cdef double crossing = x * s.height + s.along * y  # times y + height
-    cdef double squared = (s.along - x) * (s.along - x) + (s.height + y) * (s.height + y)
-    return squared if (y_squared >= 0) & (crossing >= 0) & (crossing <= (y + s.height) * s.base) else INFINITY
+    squared[0] = (s.along - x) * (s.along - x) + (s.height + y) * (s.height + y)
+    return (y_squared >= 0) & (crossing >= 0) & (crossing <= (y + s.height) * s.base)
+
+
+cdef inline double across_side(double da, double db, const Spoke* s) noexcept nogil:
+    # Squared distance at v from a point source: infinite unless the straight line between them crosses ab.
+    cdef double squared
+    return squared if crosses_side(da, db, s, &squared) else INFINITY
 
 
 cdef inline double front_across_side(double da, double db, const Spoke* s) noexcept nogil:
@@ -56,9 +63,11 @@ cdef inline double across_two(double da, double db, double dw, const Spoke* s) n
     cdef double ux = s.along - wx
     cdef double uy = s.height + wy
     cdef bint is_right = ux * (y + s.height) < uy * (s.along - x)
-    cdef double sign = 1.0 if is_right else -1.0
-    cdef double px = 0.0 if is_right else s.base
-    cdef double dp = da if is_right else db
+    # Read from places, since a choice between values would be a branch.
+    cdef double* at = [da, db, 0.0, s.base, 1.0, -1.0]
+    cdef double sign = at[5 - is_right]
+    cdef double px = at[3 - is_right]
+    cdef double dp = at[1 - is_right]
     cdef double ex = wx - px
     cdef double square = ex * ex + wy * wy
     if not sign * (y * ex - (x - px) * wy) > CLOSE * square:

@@ -14,3 +14,4 @@ cdef enum:
     GIVE_UP = 50
     # Spokes that a processor keeps in its own cache.
     CACHED = 1 << 14
+    SIDES = 16

@@ -7,30 +7,35 @@ planar_updates.pxd has the formulas. Here is which vertex is updated when, and f
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.front_queue import FrontQueue, Waiting, clear, put, take
 from cython.cimports.heat_igl.kernels.half_edges import HalfEdges
 from cython.cimports.heat_igl.kernels.planar_updates import (
     across_side,
     across_two,
     beyond_side,
     comes_nearer_to_a,
+    crosses_side,
     front_across_side,
     over_one,
 )
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
-from cython.cimports.heat_igl.kernels.sweeping import CACHED, GIVE_UP, GO_BACK, NEGLIGIBLE, SWEEP_ROUNDING
+from cython.cimports.heat_igl.kernels.sweeping import SIDES, CACHED, GIVE_UP, GO_BACK, NEGLIGIBLE, SWEEP_ROUNDING
 from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["sweep"]
 
+_WAITING = np.dtype([("vertex", "i4"), ("following", "i4")])
+
 
 def sweep(
-    order: cython.const[cython.int][::1],
+    order,
     tables,
     d: cython.double[::1],
     label,
     offset: cython.const[cython.double][::1],
     group: cython.const[cython.longlong][::1],
     is_stale: cython.uchar[::1],
+    width: cython.double = 0.0,
 ):
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, in the given order.
 
@@ -44,12 +49,20 @@ def sweep(
     ``group[label]``, points of a curve, a straight front comes in, from the source of the end that it passes nearer to.
     Between ends of other sources, one end and the corner beyond the side have to be measured from the same.
     """
-    n = order.shape[0]
-    rank = np.empty(n, np.int32)
-    rank[order] = np.arange(n, dtype=np.int32)
+    n = d.shape[0]
     one = _Sweep()
     one.t = HalfEdges(tables)
-    one.order, one.rank, one.d, one.is_stale, one.offset, one.group = order, rank, d, is_stale, offset, group
+    one.d, one.is_stale, one.offset, one.group = d, is_stale, offset, group
+    if order is None:
+        one.n_ordered = 0
+        one.order, one.rank = np.empty(n, np.int32), np.full(n, n, np.int32)
+        one.key, one.waiting = np.full(n, np.inf), np.empty(one.t.spoke.shape[0] + n, _WAITING)
+        one.put_known(width)
+    else:
+        one.n_ordered = n
+        rank = np.empty(n, np.int32)
+        rank[order] = np.arange(n, dtype=np.int32)
+        one.order, one.rank = order, rank
     one.is_flat = tables.is_flat.view(np.uint8)
     one.has_labels = label is not None
     one.label = label if one.has_labels else np.empty(0, np.int32)
@@ -64,8 +77,12 @@ class _Sweep:
     """Arrays that a sweep reads and writes; by vertex but for `order`, the vertices, and `offset`, by source."""
 
     t: HalfEdges
-    order: cython.const[cython.int][::1]
-    rank: cython.const[cython.int][::1]
+    order: cython.int[::1]
+    rank: cython.int[::1]
+    n_ordered: cython.Py_ssize_t
+    key: cython.double[::1]
+    waiting: Waiting[::1]
+    ahead: FrontQueue
     is_flat: cython.const[cython.uchar][::1]
     is_stale: cython.uchar[::1]
     d: cython.double[::1]
@@ -88,7 +105,7 @@ class _Sweep:
         is_large: cython.bint = self.t.spoke.shape[0] > CACHED
         self.n_visits = 0
         while self.n_visits < GIVE_UP * n:
-            if i == n:
+            if i == self.n_ordered and not self.goes_on():
                 if again == n:
                     break
                 i, again = again, n
@@ -108,6 +125,46 @@ class _Sweep:
                     again = min(again, back)
 
     @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def put_known(self, width: cython.double) -> cython.void:
+        """Begin a front at the vertices whose distance is known."""
+        v: cython.int
+        clear(cython.address(self.ahead), cython.address(self.waiting[0]), width)
+        for v in range(self.d.shape[0]):
+            if self.d[v] < INFINITY:
+                self.key[v] = self.d[v]
+                put(cython.address(self.ahead), v, self.d[v])
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def goes_on(self) -> cython.bint:
+        """Let the front go on to the next vertex, by the edges from those that it has passed; false at the end."""
+        n: cython.Py_ssize_t = self.order.shape[0]
+        k: cython.int
+        v: cython.int
+        if self.n_ordered == n:
+            return False
+        if self.n_ordered > 0:
+            v = self.order[self.n_ordered - 1]
+            for k in range(self.t.first[v], self.t.first[v + 1]):
+                s = cython.address(self.t.spoke[k])
+                key: cython.double = self.d[v] + s.length
+                if key < self.key[s.neighbour]:
+                    self.key[s.neighbour] = key
+                    put(cython.address(self.ahead), s.neighbour, key)
+        while True:
+            v = take(cython.address(self.ahead), cython.address(self.key[0]))
+            if v < 0:
+                return False
+            if self.rank[v] == n:
+                self.order[self.n_ordered] = v
+                self.rank[v] = self.n_ordered
+                self.n_ordered += 1
+                return True
+
+    @cython.cfunc
     @cython.inline
     @cython.nogil
     @cython.exceptval(check=False)
@@ -116,13 +173,13 @@ class _Sweep:
         n: cython.Py_ssize_t = self.order.shape[0]
         k: cython.int
         v: cython.int
-        if i + 3 < n:
+        if i + 3 < self.n_ordered:
             prefetch(cython.address(self.t.first[self.order[i + 3]]))
-        if i + 1 < n:
+        if i + 1 < self.n_ordered:
             v = self.order[i + 1]
             for k in range(self.t.first[v], self.t.first[v + 1]):
                 prefetch(cython.address(self.t.spoke[k]))
-        if i < n:
+        if i < self.n_ordered:
             v = self.order[i]
             for k in range(self.t.first[v], self.t.first[v + 1]):
                 prefetch(cython.address(self.d[self.t.spoke[k].neighbour]))
@@ -133,14 +190,62 @@ class _Sweep:
     @cython.exceptval(check=False)
     def visit(self, v: cython.int) -> cython.Py_ssize_t:
         """Give v the best value from the triangles at it; returns the lowest rank that becomes stale, or n."""
-        k: cython.int
         old: cython.double = self.d[v]
-        best: cython.double = old
+        begin: cython.double = 0.0
+        if self.has_labels:
+            begin = self.offset[self.label[v]] if self.lower_labelled(v) else 0.0
+        else:
+            self.lower(v)
+        return self.mark(v, old, begin) if self.d[v] < old else self.order.shape[0]
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def lower(self, v: cython.int) -> cython.void:
+        """Lower v to the best value from the triangles at it, if there is one source.
+
+        All triangles are computed and the best is chosen without branches, which at random cost more than arithmetic.
+        """
+        k: cython.int
+        j: cython.int
+        spoke: cython.int = self.t.first[v]
+        best: cython.double = self.d[v]
+        across: cython.double = INFINITY  # squared
+        found: cython.double[SIDES]
+        at: cython.int[SIDES]
+        n_found: cython.int = 0
+        for k in range(self.t.first[v], self.t.first[v + 1]):
+            s = cython.address(self.t.spoke[k])
+            da: cython.double = self.d[s.neighbour]
+            db: cython.double = self.d[s.next_neighbour]
+            along: cython.double = da + s.length
+            best = along if along < best else best
+            at[n_found] = k
+            n_found += crosses_side(da, db, s, cython.address(found[n_found])) & ((da < best) | (db < best))
+            if n_found == SIDES:
+                break
+        for j in range(n_found):
+            if found[j] < across:
+                spoke, across = at[j], found[j]
+        across = sqrt(across)
+        if across < best:
+            across = self.seen_from_beyond(spoke, across, cython.NULL)
+            best = across if across < best else best
+        self.d[v] = best
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def lower_labelled(self, v: cython.int) -> cython.bint:
+        """Lower v to the best value from the triangles at it, with the source of that; whether there is one."""
+        k: cython.int
+        best: cython.double = self.d[v]
         across: cython.double = INFINITY  # squared
         squared: cython.double
-        begin: cython.double = 0.0
+        begin: cython.double
         # The triangle of the best value of either kind.
-        nearest: cython.int = -1
+        nearest: cython.int
         ignored: cython.int = -1
         along_edge: cython.int = v
         spoke: cython.int = self.t.first[v]
@@ -152,36 +257,27 @@ class _Sweep:
                 best, along_edge = da + s.length, s.neighbour
             if not min(da, db) < best:
                 continue
-            if not self.has_labels:
-                squared = across_side(da, db, s)
-            elif self.label[s.neighbour] == self.label[s.next_neighbour]:
+            if self.label[s.neighbour] == self.label[s.next_neighbour]:
                 begin = self.offset[self.label[s.neighbour]]
                 squared = begin + sqrt(across_side(da - begin, db - begin, s))
-                squared = squared * squared
             elif self.is_of_one_curve(self.label[s.neighbour], self.label[s.next_neighbour]):
                 squared = front_across_side(da, db, s)
-                squared = squared * squared
             else:
                 squared = self.between_cells(k, best, cython.address(ignored))
-                squared = squared * squared
+            squared = squared * squared
             if squared < across:
                 spoke, across = k, squared
         across = sqrt(across)
-        if self.has_labels:
-            nearest = self.label[along_edge]
+        nearest = self.label[along_edge]
         if across < best:
             source: cython.int = -1
             across = self.seen_from_beyond(spoke, across, cython.address(source))
             if across < best:
                 best, nearest = across, source
-        if not best < old:
-            return self.order.shape[0]
-        self.d[v] = best
-        begin = 0.0
-        if self.has_labels:
-            self.label[v] = nearest
-            begin = self.offset[nearest]
-        return self.mark(v, old, begin)
+        if not best < self.d[v]:
+            return False
+        self.d[v], self.label[v] = best, nearest
+        return True
 
     @cython.cfunc
     @cython.nogil
@@ -275,7 +371,8 @@ class _Sweep:
         dv: cython.double = self.d[v]
         for k in range(self.t.first[v], self.t.first[v + 1]):
             a = self.t.spoke[k].neighbour
-            if dv < self.d[a] and not self.is_stale[a]:
+            # Either alone is true at random.
+            if (dv < self.d[a]) & (not self.is_stale[a]):
                 self.is_stale[a] = True
                 lowest = min(lowest, self.rank[a])
         return lowest
@@ -301,20 +398,14 @@ class _Sweep:
             db: cython.double = self.d[b] - begin
             right: cython.double = s.length
             left: cython.double = self.t.spoke[s.next].length
-            if (
-                not self.is_stale[a]
-                and db < da
-                and 2.0 * da * s.along < right * right
-                and beyond_side(s.base, s.along, s.height, left, db, dv) < da * da * self.kept(a)
-            ):
+            if (not self.is_stale[a]) & (db < da) & (2.0 * da * s.along < right * right) and beyond_side(
+                s.base, s.along, s.height, left, db, dv
+            ) < da * da * self.kept(a):
                 self.is_stale[a] = True
                 lowest = min(lowest, self.rank[a])
-            if (
-                not self.is_stale[b]
-                and da < db
-                and 2.0 * db * (s.base - s.along) < left * left
-                and beyond_side(s.base, s.base - s.along, s.height, right, da, dv) < db * db * self.kept(b)
-            ):
+            if (not self.is_stale[b]) & (da < db) & (2.0 * db * (s.base - s.along) < left * left) and beyond_side(
+                s.base, s.base - s.along, s.height, right, da, dv
+            ) < db * db * self.kept(b):
                 self.is_stale[b] = True
                 lowest = min(lowest, self.rank[b])
         return lowest

@@ -45,6 +45,11 @@ class OrderedSolver(ABC):
 
     is_exact: bool
 
+    @property
+    def reads_heat(self) -> bool:
+        """Whether the order of the heat is read."""
+        return not self.is_exact
+
     def distances(self, source_sets: Sequence[SourceSet], u: FloatArray) -> FloatArray:
         """Distances (k, n) for heat (n, k).
 

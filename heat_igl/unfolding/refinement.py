@@ -26,6 +26,11 @@ __all__ = ["Known", "Refine", "Refinement"]
 
 Refine = Literal["sweep", "unfold", "exact"]
 
+# In units of the median edge, and the edges that are looked at for that. Wider bands let a front go back more often,
+# of narrower ones many are empty.
+_BAND = 0.1
+_SAMPLE = 10_000
+
 
 class Known(NamedTuple):
     """Distances that are known before a sweep, at vertices that are no sources.
@@ -97,7 +102,7 @@ class Refinement(NumberedTriangles):
 
     def sweep(
         self,
-        key: FloatArray,
+        key: FloatArray | None,
         sources: IntArray,
         offsets: FloatArray | None = None,
         points: SurfacePoints | None = None,
@@ -110,9 +115,10 @@ class Refinement(NumberedTriangles):
 
         Parameters
         ----------
-        key : (n,) float64
+        key : (n,) float64 or None
             Vertices are visited in ascending order of this: ``-heat``, or a rough distance. A wrong order costs
-            time; the change is smaller than the sweep's error.
+            time; the change is smaller than the sweep's error. None for the order in which a front meets them, by the
+            distance of the neighbours that it has passed and the edges from there.
         sources : (k,) int64
             Vertices that distance starts from.
         offsets : (k,) float64, optional
@@ -150,8 +156,15 @@ class Refinement(NumberedTriangles):
             if label is not None:
                 label[row] = np.tile(known.source, self._n_sheets)
         group = np.arange(len(starts.offset)) if groups is None else np.ascontiguousarray(groups, np.int64)
-        sweep(self.order(key), self._swept, distance[:n], label, starts.offset, group, is_stale)
+        order = None if key is None else self.order(key)
+        sweep(order, self._swept, distance[:n], label, starts.offset, group, is_stale, self._band)
         return _on_base(self.number, self._n_sheets, distance, label, labels)
+
+    @cached_property
+    def _band(self) -> float:
+        """Width of the bands of distance in which a front takes the next vertex."""
+        lengths = self._swept.spoke["length"]
+        return _BAND * float(np.median(lengths[:: len(lengths) // _SAMPLE + 1]))
 
     def unfold(
         self,

@@ -63,6 +63,9 @@ class UnfoldingSolver(OrderedSolver):
         With "exact", what is farther is ``inf``, and the search ends there.
     originals : (n,) int64, optional
         The vertex whose values each takes: itself, or that of which it is a copy, see `PointCloud.originals`.
+    orders_itself : bool
+        Whether sweeps go through the vertices in the order in which their own front meets them, and not in that of the
+        heat, which is not read then.
 
     Raises
     ------
@@ -77,6 +80,7 @@ class UnfoldingSolver(OrderedSolver):
         tolerance: float | None = None,
         cutoff: float = np.inf,
         originals: IntArray | None = None,
+        orders_itself: bool = False,
     ) -> None:
         surface = domain.surface
         if surface is None:
@@ -88,6 +92,7 @@ class UnfoldingSolver(OrderedSolver):
         require_share(tolerance)
         self._tolerance, self._cutoff = tolerance, cutoff
         self._sweeps = refine == "sweep" and not self.is_exact
+        self._orders_itself = orders_itself and self._sweeps
         if self._refinement is not None and self._sweeps:
             self._refinement.keep_for_sweeps()
         self._surface = surface
@@ -104,6 +109,11 @@ class UnfoldingSolver(OrderedSolver):
     @cached_property
     def _near_field(self) -> NearField | None:
         return None if self._surface.faces is None else NearField(self._surface.faces)
+
+    @property
+    def reads_heat(self) -> bool:
+        """Whether the order of the heat is read."""
+        return super().reads_heat and not self._orders_itself
 
     def paths(self, sources: SourceSet, u: FloatArray) -> PathLengths:
         """The paths whose lengths are the distances from vertices and points, for heat (n,).
@@ -287,7 +297,7 @@ class UnfoldingSolver(OrderedSolver):
         if by_windows:
             return self._searches.by_windows(asked, self._cutoff)
         if self._sweeps:
-            return self._searches.by_sweep(u, asked, near)
+            return self._searches.by_sweep(None if self._orders_itself else -u, asked, near)
         return self._searches.by_walks(u, asked)
 
     def _points(self, sources: SourceSet) -> SourcePoints:

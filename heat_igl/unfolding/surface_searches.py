@@ -98,12 +98,15 @@ class SurfaceSearches:
         found = self._on_given_faces.solve(*asked.starts, cutoff=cutoff, directed=True)
         return found, *directions.of_windows(found)
 
-    def by_sweep(self, u: FloatArray, asked: Asked, near: ExactSolution | None) -> FloatArray:
-        """Distance by `Refinement.sweep`, which begins with the exact distance near the sources if that is given."""
+    def by_sweep(self, key: FloatArray | None, asked: Asked, near: ExactSolution | None) -> FloatArray:
+        """Distance by `Refinement.sweep` in the order of a key (n,), or None for that of the front.
+
+        It begins with the exact distance near the sources if that is given.
+        """
         # Which point of a curve is nearest is not known.
         known = None if near is None or asked.groups is not None else known_of(asked, near)
         return self.refinement.sweep(
-            -u,
+            key,
             asked.vertices,
             offsets=asked.offsets,
             points=asked.points,

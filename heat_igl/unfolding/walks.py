@@ -116,20 +116,21 @@ def unknown(n: int) -> AnyArray:
 
 
 def sweep(
-    order: AnyArray,
+    order: AnyArray | None,
     t: Tables,
     d: FloatArray,
     label: AnyArray | None,
     offset: FloatArray,
     group: IntArray,
     is_stale: AnyArray,
+    band: float,
 ) -> float:
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex; returns the visits per vertex.
 
     Parameters
     ----------
-    order : (n,) int32
-        Vertices, near ones first.
+    order : (n,) int32 or None
+        Vertices, near ones first. None to find them on the way: those next to vertices that were visited, nearest first.
     t : Tables
         The triangulation.
     d : (n,) float64
@@ -142,8 +143,10 @@ def sweep(
         What each source is a point of: of one curve, or of nothing else.
     is_stale : (n,) bool
         Vertices to be visited; others only if what they depend on changes.
+    band : float
+        Without `order`, vertices whose distance differs by less than this may be visited in any order.
     """
-    visits: float = sweeping.sweep(order, t, d, label, offset, group, is_stale.view(np.uint8))
+    visits: float = sweeping.sweep(order, t, d, label, offset, group, is_stale.view(np.uint8), band)
     return visits
 
 

@@ -1,0 +1,138 @@
+"""Preparation of a solver on points: swept without heat, as long as nobody asks for that."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
+
+import igl
+import numpy as np
+
+from heat_igl.heat_method.checking import Checker
+from heat_igl.heat_method.options import SolverOptions
+from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh
+from heat_igl.linear import Analysis
+from heat_igl.mesh import Mesh, PointCloud
+from heat_igl.operators import Surface, operators, unfolding_surface
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding import UnfoldingSolver
+
+__all__ = ["prepare_points"]
+
+# See docs/clouds.md: the sides of random points' triangles differ so much that heat needs a larger step.
+_T_COEF_EVEN, _T_COEF_RANDOM = 0.5, 1.0
+# Median ratio of the longest to the shortest side above which points count as random: these have 1.9, the vertices of
+# meshes 1.2 to 1.8.
+_RANDOM_SIDES = 1.82
+
+
+def prepare_points(cloud: PointCloud, options: SolverOptions, known: Analysis | None = None) -> SolverParts:
+    """The parts of a solver on `cloud`; a `known` order of elimination is taken if it fits and anything is factored."""
+    options = _for_points(cloud, options)
+    return _SweptParts(cloud, options) if options.names_no_heat else prepare_mesh(cloud, options, known)
+
+
+def _for_points(cloud: PointCloud, options: SolverOptions) -> SolverOptions:
+    """The options with those left open chosen for a cloud: on scattered points the sweep is far nearer than heat."""
+    if options.leaves_points:
+        options = replace(options, refine="sweep")
+    if options.refine is not None or options.t_coef is not None:
+        return options
+    return replace(options, t_coef=_t_coef_of_points(cloud.triangles))
+
+
+def _t_coef_of_points(triangles: Mesh) -> float:
+    sides = np.sort(igl.edge_lengths(triangles.V, triangles.F), axis=1)
+    is_random = np.median(sides[:, 2] / np.maximum(sides[:, 0], np.finfo(float).tiny)) > _RANDOM_SIDES
+    return _T_COEF_RANDOM if is_random else _T_COEF_EVEN
+
+
+@dataclass(frozen=True, eq=False)
+class _SweptSurface:
+    """Triangles of points as `UnfoldingSolver` takes them, before there are operators."""
+
+    mesh: Mesh
+    surface: Surface
+
+    @property
+    def components(self) -> IntArray:
+        return self.mesh.components
+
+    @property
+    def mean_edge_length(self) -> float:
+        return self.surface.triangulation.mean_edge_length
+
+    def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
+        return np.asarray(of_component[self.components])
+
+
+class _SweptParts(SolverParts):
+    """The parts of a solver that sweeps the triangles of points in an order of its own.
+
+    A query needs the triangles, the tables of the sweep and the check alone. Everything else is made when it is first
+    read: the operators, the time step and the diagnostics together, without factors, and the factors of the heat flow
+    once heat is asked for. Threads that ask at the same time may make them twice, and all get the same values.
+    """
+
+    def __init__(self, cloud: PointCloud, options: SolverOptions) -> None:
+        mesh = cloud.distinct_triangles
+        surface = unfolding_surface(mesh)
+        originals = cloud.originals if cloud.has_copies else None
+        referenced = np.zeros(mesh.n_vertices, bool)
+        referenced[mesh.F] = True
+        # Nothing is set after this; a frozen dataclass refuses even what the constructor sets.
+        self.__dict__.update(
+            options=options,
+            analysis=None,
+            factored=None,
+            last_steps=UnfoldingSolver(_SweptSurface(mesh, surface), "sweep", originals=originals, orders_itself=True),
+            originals=originals,
+            checker=Checker(surface, referenced, cloud.V),
+            _mesh=mesh,
+            _V=cloud.V,
+            _surface=surface,
+        )
+
+    _mesh: Mesh
+    _V: FloatArray
+    _surface: Surface
+
+    def __getattr__(self, name: str) -> Any:
+        # Called for what the constructor has not set.
+        if name not in _FIELDS:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return getattr(self._all, name)
+
+    @cached_property
+    def _all(self) -> SolverParts:
+        """All parts, with operators and without factors."""
+        start, sweep = time.perf_counter(), self.last_steps
+        domain = operators(self._mesh, self.options.triangulation)
+        seconds = time.perf_counter() - start
+        unfolding = sweep if isinstance(sweep, UnfoldingSolver) else None
+        return prepare(domain, self.options, lambda: None, seconds, self._V, self.originals, unfolding)
+
+    @property
+    def n_vertices(self) -> int:
+        """Length of a distance array."""
+        return self._mesh.n_vertices
+
+    @property
+    def n_faces(self) -> int:
+        """Faces of the domain."""
+        return self._mesh.n_faces
+
+    @property
+    def is_surface(self) -> bool:
+        """Whether the domain has two dimensions."""
+        return True
+
+    @property
+    def given_faces(self) -> IntArray | None:
+        """Vertices (m, 3) of the triangles that points and curves refer to."""
+        return self._surface.given_faces
+
+
+_FIELDS = {field.name for field in fields(SolverParts)}
