@@ -167,6 +167,11 @@ class PathDirections:
         angles, v = self.angles, self._triangulation.F.ravel()[corner]
         return _polar(angles.leaving[previous_half_edge(corner)], seen, angles.scale[v], angles.on_boundary[v])
 
+    def around_corners(self, corner: IntArray, departure: FloatArray) -> FloatArray:
+        """Polar angles (k,) of directions at corners, whose angles (k,) count from the first sides of the triangles."""
+        seen = departure - self._direction(previous_half_edge(corner))
+        return in_circle(self._at_corners(corner, seen - _WHOLE * np.rint(seen / _WHOLE)))
+
     def _turns_in(self, points: SurfacePoints, point: IntArray, faces: IntArray) -> FloatArray:
         """By how much angles (k,) in triangles are turned from those in the given faces of points on them.
 
