@@ -137,9 +137,12 @@ class PathDirections:
         departure, back = np.full((2, n), np.nan)
         at_vertex = root < n
         seen = np.arctan2(y, x)
-        departure[row] = self._at_corners(corner, seen)
-        if not at_vertex.all():
-            departure[row[~at_vertex]] = seen[~at_vertex]
+        if at_vertex.all():
+            departure[row] = self._at_corners(corner, seen)
+        else:
+            outward = np.flatnonzero(at_vertex)
+            departure[row] = seen
+            departure[row[outward]] = self._at_corners(corner[outward], seen[outward])
             if points is not None:
                 turn = self._turns_in(points, root[~at_vertex] - n, corner[~at_vertex] // 3)
                 departure[row[~at_vertex]] += turn
