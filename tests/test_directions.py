@@ -15,6 +15,7 @@ from heat_igl import (
     geodesic_path,
     isolines,
     log_map,
+    region_boundary,
     shapes,
     tangent_frames,
 )
@@ -314,6 +315,15 @@ def test_exact_paths_from_curves_lead_back_to_the_vertices(sphere):
         off = np.linalg.norm(ends - sphere.V[::9], axis=1)
         # The others bend at vertices.
         assert (off < 1e-12).mean() > 0.5
+
+
+def test_exact_paths_from_curves_along_edges_lead_back_to_the_vertices():
+    mesh = shapes.cylinder(12, 30)
+    ring = region_boundary(mesh, faces=mesh.V[mesh.F].mean(axis=1)[:, 2] < np.median(mesh.V[:, 2]))
+    found = HeatMethodSolver(mesh, refine="exact").directions(ring)
+    # Paths that start at an end of a segment count their departure around the vertex there.
+    ends = np.array([followed(mesh, found, v) for v in np.flatnonzero(found.distance > 0)])
+    np.testing.assert_allclose(ends, mesh.V[found.distance > 0], atol=1e-12)
 
 
 def followed(mesh: Mesh, found: heat_igl.Directions, v: int) -> np.ndarray:

@@ -72,7 +72,7 @@ def course_of(mesh: Mesh, curve: SurfaceCurve) -> Course:
         raise SourceError("curve is closed and has no length: a loop needs two different points")
     following = np.append(np.arange(1, len(curve)), 0)[:count]
     apart = ends[:count] - begins[following]
-    is_apart = (apart * apart).sum(axis=1) > (_GAP * mesh.edge_lengths.mean()) ** 2 if apart.any() else False
+    is_apart = np.einsum("kx,kx->k", apart, apart) > (_GAP * mesh.edge_lengths.mean()) ** 2 if apart.any() else False
     end = snapped(curve.end)
     joins, share = _joins(mesh, faces[:count], faces[following], end[:count])
     wrong = np.flatnonzero(is_apart | (share > _GAP))
@@ -101,8 +101,10 @@ def _joins(mesh: Mesh, f: IntArray, g: IntArray, at: FloatArray) -> tuple[AnyArr
     by_edge = off_edge[each, nearest] <= _GAP
     vertex = mesh.F[f, corner]
     off_vertex = np.where((mesh.F[g] == vertex[:, None]).any(axis=1), 1 - at[each, corner], np.inf)
-    found = 3 * f + nearest // 3, 3 * g + nearest % 3, vertex
-    joins[rows] = np.where(np.stack([by_edge, by_edge, ~by_edge], axis=1), np.stack(found, axis=1), -1)
+    # Column by column is faster: on small meshes these checks take half of the time.
+    joins[rows, 0] = np.where(by_edge, 3 * f + nearest // 3, -1)
+    joins[rows, 1] = np.where(by_edge, 3 * g + nearest % 3, -1)
+    joins[rows, 2] = np.where(by_edge, -1, vertex)
     share[rows] = np.where(by_edge, 0.0, off_vertex)
     return joins, share
 

@@ -17,9 +17,9 @@ __all__ = ["CurveLevels", "Level", "Pieces"]
 Level = Literal["zero", "constant", "none"]
 
 # Values on the curves are extended in so many rounds, each time what is left of them, times this factor: what a round
-# leaves is rough, and the heat takes a mean of it. On random levels of five meshes 0.047 mean edge lengths are left
-# (root mean square) by one round at most, 0.029 by two, and 0.016 by four without factors; with them 0.023 by two and
-# 0.014 by three. Each round takes a thirtieth of a query.
+# leaves is rough, and the heat takes a mean of it. On random levels of five meshes one round leaves at most 0.047 mean
+# edge lengths (root mean square), two 0.029 and four 0.016 without factors; with them two leave 0.023 and three 0.014.
+# Each round takes a thirtieth of a query.
 _LEVEL_FACTORS = (1.0, 1.4, 1.8)
 # This share of the values on the curves is extended by a function of small gradient, the rest from the nearest place.
 # On 40 broken curves (docs/signed.md), 31, 37, 38, 38 and 35 have at most the error of potpourri3d's better answer for

@@ -39,7 +39,7 @@ class Directions:
         Unit vectors in space, tangent at the vertices: the gradient of the distance.
     start : SurfacePoints
         The n places at which the paths start: the source, or the place on a curve, in the face in which `departure`
-        counts. Any place where no source is reached.
+        counts; at a corner of this face `departure` counts around the vertex. Any place where no source is reached.
 
     Notes
     -----

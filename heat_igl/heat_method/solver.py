@@ -263,7 +263,8 @@ class HeatMethodSolver(PreparedSolver):
         Returns
         -------
         Directions
-            Distances and labels as those of `voronoi`, angles in the frames of `tangent_frames`, and the gradient.
+            Distances and labels as those of `voronoi` (those of ``refine="exact"`` where paths from curves are found
+            exactly), angles in the frames of `tangent_frames`, and the gradient.
 
         Raises
         ------

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from heat_igl.mesh import SurfacePoints
+from heat_igl.mesh import ON_SIDE, SurfacePoints
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Surface
 from heat_igl.typing import IntArray
@@ -41,8 +41,8 @@ class CurveDirections:
     def of_windows(self, found: ExactSolution) -> tuple[PathAngles, SurfacePoints]:
         """The angles of the paths to n vertices, and the places (n,) at which the paths start.
 
-        The departure of a path from a place inside a face counts in that face. Where no source is reached, the place is
-        a corner of face 0.
+        The departure of a path from a place inside a face counts in that face, and from a corner around the vertex.
+        Where no source is reached, the place is a corner of face 0.
         """
         root, leaving = found.origin.root, found.leaving
         if leaving is None or leaving.place is None:
@@ -52,10 +52,16 @@ class CurveDirections:
         at_vertex = np.flatnonzero((start >= 0) & (start < n))
         corner = np.where(root < 0, 0, leaving.corner[first])
         corner[at_vertex] = self._corner_at[start[at_vertex]]
-        barycentric = leaving.place[first]
+        barycentric, faces = leaving.place[first], corner // 3
         others = np.append(at_vertex, np.flatnonzero(root < 0))
         barycentric[others] = np.eye(3)[corner[others] % 3]
-        return self._directions.of_windows(found), unchecked_points(corner // 3, barycentric)
+        angles = self._directions.of_windows(found)
+        # A segment that ends at a vertex leads there too, with an angle in the face.
+        at_corner = np.flatnonzero((start >= n) & (barycentric.max(axis=1) > 1 - ON_SIDE))
+        corner = corner[at_corner] // 3 * 3 + barycentric[at_corner].argmax(axis=1)
+        angles.departure[at_corner] = self._directions.around_corners(corner, angles.departure[at_corner])
+        barycentric[at_corner] = np.eye(3)[corner % 3]
+        return angles, unchecked_points(faces, barycentric)
 
 
 def _first_parts(found: ExactSolution) -> IntArray:

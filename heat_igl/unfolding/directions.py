@@ -138,9 +138,12 @@ class PathDirections:
         departure, back = np.full((2, n), np.nan)
         at_vertex = root < n
         seen = np.arctan2(y, x)
-        departure[row] = self._at_corners(corner, seen)
-        if not at_vertex.all():
-            departure[row[~at_vertex]] = seen[~at_vertex]
+        if at_vertex.all():
+            departure[row] = self._at_corners(corner, seen)
+        else:
+            outward = np.flatnonzero(at_vertex)
+            departure[row] = seen
+            departure[row[outward]] = self._at_corners(corner[outward], seen[outward])
             if points is not None:
                 turn = self._turns_in(points, root[~at_vertex] - n, corner[~at_vertex] // 3)
                 departure[row[~at_vertex]] += turn
@@ -167,6 +170,11 @@ class PathDirections:
         """Polar angles (k,) of directions that are turned by `seen` from the side to the next corner."""
         angles, v = self.angles, self._triangulation.F.ravel()[corner]
         return _polar(angles.leaving[previous_half_edge(corner)], seen, angles.scale[v], angles.on_boundary[v])
+
+    def around_corners(self, corner: IntArray, departure: FloatArray) -> FloatArray:
+        """Polar angles (k,) of directions at corners, whose angles (k,) count from the first sides of the triangles."""
+        seen = departure - self._direction(previous_half_edge(corner))
+        return in_circle(self._at_corners(corner, seen - _WHOLE * np.rint(seen / _WHOLE)))
 
     def _turns_in(self, points: SurfacePoints, point: IntArray, faces: IntArray) -> FloatArray:
         """By how much angles (k,) in triangles are turned from those in the given faces of points on them.
