@@ -140,7 +140,7 @@ class PathDirections:
         # Over the half-edge opposite, or from the source point in the same face.
         entered, crossing = origin.entered[row], origin.crossing[row]
         over = entered >= 0
-        l, half_edge = self._triangulation.l.ravel(), entered[over]  # noqa: E741
+        l, half_edge = self._triangulation.l.ravel(), entered[over]
         fx, fy = apex(l[half_edge], l[previous_half_edge(half_edge)], l[next_half_edge(half_edge)])
         seen = np.arctan2(fy * crossing[over], fx * (fx - crossing[over]) + fy * fy)
         back[row[over]] = self._at_corners(half_edge, seen)
