@@ -159,7 +159,7 @@ def test_mollification():
         ([[1.0, 1.0, 1.0], [1.5, 1.0, 1.0]], "edge between faces 0 and 1 two lengths"),
     ],
 )
-def test_lengths_that_make_no_triangles_are_refused(l, message):  # noqa: E741
+def test_lengths_that_make_no_triangles_are_refused(l, message):
     F = np.array([[0, 1, 2], [3, 2, 1]])
     with pytest.raises(MeshError, match=message):
         from_edge_lengths(l, F, 4)

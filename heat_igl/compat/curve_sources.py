@@ -158,9 +158,9 @@ class MeshSignedHeatSolver:
         curves: Sequence[Sequence[Node]],
         curve_signs: Sequence[bool] = (),
         points: Sequence[Node] = (),
-        preserve_source_normals: bool = False,  # noqa: ARG002
+        preserve_source_normals: bool = False,
         level_set_constraint: str = "ZeroSet",
-        soft_level_set_weight: float = -1,  # noqa: ARG002
+        soft_level_set_weight: float = -1,
     ) -> FloatArray:
         """Distance (n,) from the nearest curve or point, positive on the left of the curves.
 

@@ -27,7 +27,7 @@ class EdgeFlipGeodesicSolver:
     last two arguments of the methods limit the work of potpourri3d, and are not read.
     """
 
-    def __init__(self, V: ArrayLike, F: ArrayLike, t_coef: float = 1.0) -> None:  # noqa: ARG002
+    def __init__(self, V: ArrayLike, F: ArrayLike, t_coef: float = 1.0) -> None:
         self._mesh = Mesh(V, F)
 
     @cached_property
@@ -38,8 +38,8 @@ class EdgeFlipGeodesicSolver:
         self,
         v_start: int,
         v_end: int,
-        max_iterations: int | None = None,  # noqa: ARG002
-        max_relative_length_decrease: float | None = None,  # noqa: ARG002
+        max_iterations: int | None = None,
+        max_relative_length_decrease: float | None = None,
     ) -> FloatArray:
         """Corners (k, 3) of the path from one vertex to another."""
         if v_start == v_end:
@@ -49,8 +49,8 @@ class EdgeFlipGeodesicSolver:
     def find_geodesic_path_poly(
         self,
         v_list: Sequence[int],
-        max_iterations: int | None = None,  # noqa: ARG002
-        max_relative_length_decrease: float | None = None,  # noqa: ARG002
+        max_iterations: int | None = None,
+        max_relative_length_decrease: float | None = None,
     ) -> FloatArray:
         """Corners (k, 3) of the geodesic in the class of the shortest paths from vertex to vertex."""
         return straighten(self._mesh, geodesic_path(self._mesh, v_list)).positions(self._mesh)
@@ -58,8 +58,8 @@ class EdgeFlipGeodesicSolver:
     def find_geodesic_loop(
         self,
         v_list: Sequence[int],
-        max_iterations: int | None = None,  # noqa: ARG002
-        max_relative_length_decrease: float | None = None,  # noqa: ARG002
+        max_iterations: int | None = None,
+        max_relative_length_decrease: float | None = None,
     ) -> FloatArray:
         """Corners (k, 3) of the closed geodesic in the class of a loop, the last as the first; it may be a point."""
         around = geodesic_path(self._mesh, [*v_list, v_list[0]])
@@ -73,7 +73,7 @@ class GeodesicTracer:
     `max_iterations` limits the number of faces that a geodesic crosses.
     """
 
-    def __init__(self, V: ArrayLike, F: ArrayLike, t_coef: float = 1.0) -> None:  # noqa: ARG002
+    def __init__(self, V: ArrayLike, F: ArrayLike, t_coef: float = 1.0) -> None:
         self._mesh = Mesh(V, F)
 
     def trace_geodesic_from_vertex(

@@ -220,9 +220,9 @@ class PointCloudHeatSolver(_Framed):
         self,
         curves: Sequence[Sequence[int]],
         cloud_normals: ArrayLike,
-        preserve_source_normals: bool = False,  # noqa: ARG002
+        preserve_source_normals: bool = False,
         level_set_constraint: str = "ZeroSet",
-        soft_level_set_weight: float = -1,  # noqa: ARG002
+        soft_level_set_weight: float = -1,
     ) -> FloatArray:
         """Distance (n,) from the nearest of the curves from point to point, negative on their left.
 
@@ -257,7 +257,7 @@ class PointCloudLocalTriangulation:
     `with_degeneracy_heuristic` is not read.
     """
 
-    def __init__(self, P: ArrayLike, with_degeneracy_heuristic: bool = True) -> None:  # noqa: ARG002
+    def __init__(self, P: ArrayLike, with_degeneracy_heuristic: bool = True) -> None:
         self._cloud = PointCloud(P)
 
     def get_local_triangulation(self) -> IntArray:

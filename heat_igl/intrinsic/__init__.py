@@ -3,6 +3,7 @@
 from heat_igl.intrinsic.adjacency import Adjacency
 from heat_igl.intrinsic.delaunay import intrinsic_delaunay
 from heat_igl.intrinsic.double_cover import double_cover
+from heat_igl.intrinsic.frame_axes import tangent_frames
 from heat_igl.intrinsic.gluing import from_edge_lengths, from_gluing, intrinsic_triangulation, oriented
 from heat_igl.intrinsic.gradient import intrinsic_gradient
 from heat_igl.intrinsic.history import Covered, Flipped, Merged, Refined, Turned
@@ -10,7 +11,7 @@ from heat_igl.intrinsic.layout import apex, corner_angles, lay_out
 from heat_igl.intrinsic.mollification import mollify
 from heat_igl.intrinsic.polar_angles import PolarAngles, carried_angles, polar_angles, transport_angles
 from heat_igl.intrinsic.refinement import delaunay_refinement
-from heat_igl.intrinsic.tangent_frames import TangentFrames, checked_vectors, tangent_frames
+from heat_igl.intrinsic.tangent_frames import TangentFrames, checked_vectors
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.intrinsic.tufted import closed_cover, has_nonmanifold_edges, tufted_cover
 

@@ -139,7 +139,7 @@ class _Flips:
         return np.asarray(changed)
 
 
-def _cotangents(l: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: E741
+def _cotangents(l: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Cotangent (k, 3) at each corner of triangles with edge lengths `l` (k, 3), and a bound (k,) on the rounding."""
     square = l * l
     total = np.asarray(sum(square.T))

@@ -70,7 +70,7 @@ class Tables(NamedTuple):
 
 def breadth_first(
     F: IntArray,
-    l: FloatArray,  # noqa: E741
+    l: FloatArray,
     twin: IntArray,
     n: int,
 ) -> tuple[AnyArray, AnyArray, AnyArray, FloatArray, AnyArray]:
@@ -88,7 +88,7 @@ def breadth_first(
     return number, face, vertex.reshape(-1, 3), length.reshape(-1, 3), new_twin
 
 
-def tables(F: AnyArray, l: FloatArray, twin: AnyArray, n: int) -> Tables:  # noqa: E741
+def tables(F: AnyArray, l: FloatArray, twin: AnyArray, n: int) -> Tables:
     """The tables of m oriented triangles on n vertices; `twin` is -1 on the boundary, -2 at edges of more than two.
 
     Faces and half-edges as `breadth_first` returns them.

@@ -21,7 +21,7 @@ _SAME_LENGTH = 1e-9
 
 
 def from_edge_lengths(
-    l: ArrayLike,  # noqa: E741
+    l: ArrayLike,
     F: IntArray,
     n: int,
     facets: connectivity.Facets | None = None,
@@ -64,7 +64,7 @@ def from_edge_lengths(
     return IntrinsicTriangulation(F, lengths + added[:, None], twin, aligned, n, lengthening=float(added.max()))
 
 
-def from_gluing(l: ArrayLike, F: IntArray, n: int, twin: ArrayLike) -> IntrinsicTriangulation:  # noqa: E741
+def from_gluing(l: ArrayLike, F: IntArray, n: int, twin: ArrayLike) -> IntrinsicTriangulation:
     """Triangles with given edge lengths that are glued as `twin` says; degenerate ones are mollified.
 
     Edges may join the same two vertices, or a vertex with itself.
@@ -112,7 +112,7 @@ def from_gluing(l: ArrayLike, F: IntArray, n: int, twin: ArrayLike) -> Intrinsic
     return IntrinsicTriangulation(F, lengths + added[:, None], mate, aligned, n, lengthening=float(added.max()))
 
 
-def _checked_lengths(l: ArrayLike, F: IntArray) -> FloatArray:  # noqa: E741
+def _checked_lengths(l: ArrayLike, F: IntArray) -> FloatArray:
     lengths = real_numbers("l", l)
     if lengths.shape != F.shape:
         raise MeshError(f"l must have one length per side of F, shape {F.shape}, but it has shape {lengths.shape}")

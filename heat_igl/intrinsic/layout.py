@@ -35,7 +35,7 @@ def apex(base: FloatArray, left: FloatArray, right: FloatArray) -> tuple[FloatAr
     return x, np.asarray(height)
 
 
-def lay_out(l: FloatArray) -> FloatArray:  # noqa: E741
+def lay_out(l: FloatArray) -> FloatArray:
     """Corners (k, 3, 2) of triangles with edge lengths `l` (k, 3): corner 0 at the origin, corner 1 at (l[:, 2], 0)."""
     x, y = apex(l[:, 2], l[:, 1], l[:, 0])
     corners = np.zeros((len(l), 3, 2))
@@ -43,7 +43,7 @@ def lay_out(l: FloatArray) -> FloatArray:  # noqa: E741
     return corners
 
 
-def corner_angles(l: FloatArray) -> FloatArray:  # noqa: E741
+def corner_angles(l: FloatArray) -> FloatArray:
     """Angle (k, 3) at each corner of triangles with edge lengths `l` (k, 3), opposite the corners.
 
     From half the angle, ``tan^2 = (s - b)(s - c) / (s (s - a))`` with s half the perimeter. The error is that of a

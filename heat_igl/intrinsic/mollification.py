@@ -14,7 +14,7 @@ __all__ = ["mollify"]
 _MARGIN = 1e-8
 
 
-def mollify(l: FloatArray, F: IntArray, margin: float | None = None) -> FloatArray:  # noqa: E741
+def mollify(l: FloatArray, F: IntArray, margin: float | None = None) -> FloatArray:
     """The length to add to the edges so that no triangle is degenerate (Sharp and Crane 2020, section 4.5).
 
     Parameters

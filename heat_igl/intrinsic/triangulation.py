@@ -78,7 +78,7 @@ class IntrinsicTriangulation:
     """
 
     F: IntArray
-    l: FloatArray  # noqa: E741 - the literature's name
+    l: FloatArray
     twin: IntArray
     aligned: BoolArray
     n: int

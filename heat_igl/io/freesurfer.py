@@ -44,7 +44,7 @@ def read(path: Path, data: bytes) -> Contents:
     return Contents(V, cells, {})
 
 
-def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:  # noqa: ARG001
+def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
     """Write triangles."""
     # The stamp is part of the file: without it, nibabel writes the name of the user and the time.
     _freesurfer("writing").write_geometry(str(path), mesh.V, mesh.F, create_stamp="created by heat_igl")

@@ -136,7 +136,7 @@ def read(path: Path, data: bytes) -> Contents:
     return Contents(V, cells, {})
 
 
-def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:  # noqa: ARG001
+def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
     """Write triangles or tetrahedra as MESH, version 2 (double precision)."""
     keyword = "Tetrahedra" if mesh.is_tetrahedral else "Triangles"
     path.write_text(

@@ -252,7 +252,7 @@ def read(path: Path, data: bytes) -> Contents:
     return Contents(V, cells, {})
 
 
-def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:  # noqa: ARG001
+def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
     """Write triangles or tetrahedra as text MSH, version 2.2, which most programs can read."""
     number = 4 if mesh.is_tetrahedral else 2
     vertices = np.column_stack([np.arange(1, mesh.n_vertices + 1), mesh.V])

@@ -62,6 +62,6 @@ def read(path: Path, data: bytes) -> Contents:
     return Contents(V, cells, {})
 
 
-def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:  # noqa: ARG001
+def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
     """Write triangles as OBJ."""
     path.write_text(format_rows("v %r %r %r\n", mesh.V) + format_rows("f %d %d %d\n", mesh.F + 1))

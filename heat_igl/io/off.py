@@ -87,7 +87,7 @@ def _polygons(text: Text, lines: IntArray) -> Cells:
     return Cells(corners, degree)
 
 
-def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:  # noqa: ARG001
+def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
     """Write triangles as OFF."""
     counts = f"OFF\n{mesh.n_vertices} {mesh.n_faces} 0\n"
     path.write_text(counts + format_rows("%r %r %r\n", mesh.V) + format_rows("3 %d %d %d\n", mesh.F))

@@ -92,7 +92,7 @@ def _merged(points: FloatArray) -> tuple[FloatArray, IntArray]:
     return points[first[order]][used], F_flat.reshape(-1, 3)
 
 
-def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:  # noqa: ARG001
+def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
     """Write triangles as text STL, because the binary form has no room for double precision."""
     corners = mesh.V[mesh.F]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

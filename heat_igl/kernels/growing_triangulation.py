@@ -22,7 +22,7 @@ class GrowingTriangulation:
     aligned twin. Two sides of one face may be twins.
     """
 
-    def __init__(self, F, l, twin, n_vertices, most_new):  # noqa: E741 - the literature's name
+    def __init__(self, F, l, twin, n_vertices, most_new):
         """Copy the triangulation, with room for `most_new` more vertices."""
         m, rows = len(F), len(F) + 2 * most_new
         self.F, self.l, self.twin = np.empty((rows, 3), np.int64), np.empty((rows, 3)), np.empty(3 * rows, np.int64)

@@ -41,7 +41,7 @@ def first_spokes(F: cython.const[cython.int][:, ::1], twin: cython.const[cython.
 
 def fill(
     F: cython.const[cython.int][:, ::1],
-    l: cython.const[cython.double][:, ::1],  # noqa: E741
+    l: cython.const[cython.double][:, ::1],
     twin: cython.const[cython.int][::1],
     first: cython.const[cython.int][::1],
     spoke: Spoke[::1],
@@ -74,7 +74,7 @@ def fill(
 @cython.exceptval(check=False)
 def _shapes(
     F: cython.const[cython.int][:, ::1],
-    l: cython.const[cython.double][:, ::1],  # noqa: E741
+    l: cython.const[cython.double][:, ::1],
     twin: cython.const[cython.int][::1],
     step: Step[::1],
 ) -> cython.void:
@@ -167,7 +167,7 @@ def _fans(
 @cython.nogil
 @cython.exceptval(check=False)
 def _fill_spokes(
-    l: cython.const[cython.double][:, ::1],  # noqa: E741
+    l: cython.const[cython.double][:, ::1],
     twin: cython.const[cython.int][::1],
     step: Step[::1],
     spoke: Spoke[::1],

@@ -17,7 +17,7 @@ __all__ = ["refine"]
 
 def refine(
     F,
-    l,  # noqa: E741
+    l,
     twin,
     n: cython.longlong,
     unit,

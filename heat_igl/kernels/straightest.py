@@ -15,13 +15,13 @@ class Triangles:
     `half` (m, 3) is at each corner half the sum of the angles around the vertex, and negative on the boundary.
     """
 
-    l: cython.double[:, ::1]  # noqa: E741
+    l: cython.double[:, ::1]
     area: cython.double[::1]
     angle: cython.double[:, ::1]
     twin: cython.longlong[::1]
     half: cython.double[:, ::1]
 
-    def __init__(self, l, area, angle, twin, half):  # noqa: E741
+    def __init__(self, l, area, angle, twin, half):
         self.l, self.area, self.angle, self.twin, self.half = l, area, angle, twin, half
 
 

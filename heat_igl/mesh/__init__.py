@@ -2,6 +2,7 @@
 
 from heat_igl.mesh.cloud_copies import nearest_copies
 from heat_igl.mesh.cloud_cover import is_oriented_manifold, two_sided_cover
+from heat_igl.mesh.edge_curves import edge_curve
 from heat_igl.mesh.level_segments import Segments, crossings, joined_segments, level_segments
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with
@@ -13,7 +14,7 @@ from heat_igl.mesh.projection import ClosestPoints, closest_points
 from heat_igl.mesh.regions import region_boundary
 from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
 from heat_igl.mesh.subdivision import split_long_edges
-from heat_igl.mesh.surface_curves import curve_on, edge_curve
+from heat_igl.mesh.surface_curves import curve_on
 from heat_igl.mesh.surface_points import (
     ON_SIDE,
     ON_SIDE_COMPUTED,

@@ -1,10 +1,11 @@
 """What a source is, the right-hand side it gives, and the exact distance near it."""
 
-from heat_igl.sources.assembly import NEAR_RADIUS, SourceAssembler, SourceTerm, right_hand_side, take_shorter
+from heat_igl.sources.assembly import NEAR_RADIUS, SourceAssembler, take_shorter
 from heat_igl.sources.near_field import NearField, Seeds, SightLines
 from heat_igl.sources.ordered import ordered_vertices
 from heat_igl.sources.oriented import Oriented, OrientedPoints, OrientedSet, oriented_set
 from heat_igl.sources.source_sets import SourcePoints, SourceSegments, SourceSet, nearest_first
+from heat_igl.sources.source_terms import SourceTerm, right_hand_side
 from heat_igl.sources.specification import OffsetSources, Sources, named_vertices, source_set, vertex_sources
 
 __all__ = [

@@ -152,7 +152,7 @@ class CurveWalks:
         entered, crossing = near.origin.entered[vertex], near.origin.crossing[vertex]
         corner, seen = entered.copy(), np.zeros(len(vertex))
         over = entered >= 0
-        half_edge, l = entered[over], self._faces.l.ravel()  # noqa: E741
+        half_edge, l = entered[over], self._faces.l.ravel()
         fx, fy = apex(l[half_edge], l[previous_half_edge(half_edge)], l[next_half_edge(half_edge)])
         seen[over] = np.arctan2(fy * crossing[over], fx * (fx - crossing[over]) + fy * fy)
         # In the same face.
