@@ -454,6 +454,32 @@ def test_formats(tmp_path, kind: str) -> None:
     assert read_point_cloud(written(tmp_path, kind, P, 0 * P)).normals is None
 
 
+@pytest.mark.parametrize("kind", ["ply", "xyz", "npy", "pcd binary"])
+@pytest.mark.parametrize("missing", [0.0, np.nan])
+def test_missing_normals_of_a_file_leave_all_out(tmp_path, kind: str, missing: float) -> None:
+    """As programs write them that find no plane at an outlier."""
+    P = sphere(40).astype(np.float32).astype(np.float64)
+    path = written(tmp_path, kind, P, with_entry(P, 7, missing))
+    with pytest.warns(
+        AccuracyWarning, match="1 of 40 normals are 0 or not finite, the first that of point 7"
+    ) as caught:
+        cloud = read_point_cloud(path)
+    assert cloud.normals is None
+    assert caught[0].filename == __file__
+    np.testing.assert_array_equal(cloud.P, P)
+
+
+@pytest.mark.parametrize("kind", ["xyz", "npy"])
+def test_colours_are_no_normals(tmp_path, kind: str) -> None:
+    P = sphere(40)
+    colours = np.random.default_rng(0).integers(0, 256, (40, 3))
+    for columns in (colours, colours / 255, np.full((40, 3), 128)):
+        assert read_point_cloud(written(tmp_path, kind, P, columns)).normals is None
+    # Normals of a plane lie in the range of colours.
+    upwards = np.tile([0, 0, 1], (40, 1))
+    np.testing.assert_array_equal(read_point_cloud(written(tmp_path, kind, P, upwards)).normals, upwards)
+
+
 def test_faces_of_a_mesh_are_ignored(tmp_path) -> None:
     mesh = shapes.icosphere(1)
     for name in ("mesh.ply", "mesh.obj"):

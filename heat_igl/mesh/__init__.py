@@ -1,6 +1,7 @@
 """What distance is measured on: meshes, images and point clouds, and points and curves on them."""
 
 from heat_igl.mesh.cloud_copies import nearest_copies
+from heat_igl.mesh.cloud_normals import usable_normals
 from heat_igl.mesh.level_segments import Segments, crossings, joined_segments, level_segments
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with
@@ -56,5 +57,6 @@ __all__ = [
     "region_boundary",
     "split_long_edges",
     "triangulated",
+    "usable_normals",
     "which_repeat_a_vertex",
 ]

@@ -1,4 +1,4 @@
-"""Normals of a cloud that were not oriented: found, reported and left out."""
+"""Normals of a cloud that are missing or were not oriented: found, reported and left out."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from heat_igl.errors import AccuracyWarning
 from heat_igl.runtime import warn_caller
-from heat_igl.typing import FloatArray
+from heat_igl.typing import AnyArray, FloatArray
 
 if TYPE_CHECKING:
     from heat_igl.mesh.neighbourhoods import PointTree
 
-__all__ = ["oriented_normals"]
+__all__ = ["oriented_normals", "usable_normals"]
 
 _K = 10
 # Points at which neighbours are looked at.
@@ -53,4 +53,28 @@ def oriented_normals(tree: PointTree, normals: FloatArray | None) -> FloatArray 
         "each other), as if they were estimated and not oriented: they are not used; orient them, or pass normals=None",
         AccuracyWarning,
     )
+    return None
+
+
+def usable_normals(normals: AnyArray, where: str = "") -> AnyArray | None:
+    """The normals (n, 3) of a file or of another library; None if they are all 0, or if some are missing.
+
+    `where` is the beginning of the warning.
+
+    Warns
+    -----
+    AccuracyWarning
+        If some normals, but not all, are 0 or not finite.
+    """
+    if normals.dtype.kind not in "iuf" or normals.ndim != 2:
+        return normals  # which is an error of the cloud
+    missing = ~(np.isfinite(normals).all(axis=1) & normals.any(axis=1))
+    if not missing.any():
+        return normals
+    if normals.any():
+        warn_caller(
+            f"{where}{int(missing.sum())} of {len(normals)} normals are 0 or not finite, the first that of point "
+            f"{int(np.argmax(missing))}: no normals are taken, and planes are fitted to the points",
+            AccuracyWarning,
+        )
     return None
