@@ -258,7 +258,10 @@ def checked_path(path: str | os.PathLike[str], suffixes: Collection[str], packed
     if suffix not in suffixes:
         if found.is_dir():
             raise MeshError(f"{found} is a directory: name a mesh file in it")
-        raise MeshError(f"{found}: unknown extension '{found.suffix}'; the formats are {', '.join(suffixes)}")
+        raise MeshError(
+            f"{found}: unknown extension '{found.suffix}'; the formats are {', '.join(suffixes)}; for others, take "
+            "another library and arrays"
+        )
     return found
 
 
