@@ -13,7 +13,15 @@ import numpy as np
 from heat_igl.errors import MeshError, shown
 from heat_igl.io import pcd, ply
 from heat_igl.io.atomic import replacing
-from heat_igl.io.files import MESH_SUFFIXES, checked_attributes, checked_path, file_bytes, is_mesh_path, read_mesh
+from heat_igl.io.files import (
+    MESH_SUFFIXES,
+    POINT_SUFFIXES,
+    checked_attributes,
+    checked_path,
+    file_bytes,
+    is_mesh_path,
+    read_mesh,
+)
 from heat_igl.io.packed import form_suffix, pack
 from heat_igl.io.text import Text, format_rows
 from heat_igl.mesh import Mesh, PointCloud, read_paths_with, usable_normals
@@ -92,7 +100,7 @@ def read_mesh_or_cloud(path: str | os.PathLike[str]) -> Mesh | PointCloud:
     MissingExtraError
         As `read_mesh`.
     """
-    path = checked_path(path, (*MESH_SUFFIXES, ".xyz", ".npy", ".pcd"), (*MESH_SUFFIXES, *POINT_CLOUD_SUFFIXES))
+    path = checked_path(path, (*MESH_SUFFIXES, *POINT_SUFFIXES), (*MESH_SUFFIXES, *POINT_CLOUD_SUFFIXES))
     suffix = form_suffix(path)
     if suffix not in MESH_SUFFIXES:
         return read_point_cloud(path)
