@@ -269,7 +269,7 @@ class SignedHeatSolver:
             raise SourceError(
                 "the normals of the curves cancel: two curves run along each other in opposite directions"
             )
-        Y = self._vector_flow.solve(b / largest * SOURCE_HEAT)
+        Y = self._vector_flow.solve(b * (SOURCE_HEAT / largest))
         # Step 2: the unit field in faces.
         # Dividing by the largest first keeps squares in range. Corner by corner is faster than along an axis of three.
         at_vertices = np.abs(Y)
