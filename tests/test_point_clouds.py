@@ -289,6 +289,15 @@ def test_normals_that_were_not_oriented_are_left_out(share: float) -> None:
     np.testing.assert_array_equal(F, PointCloud(P).F)
 
 
+@pytest.mark.parametrize("share", [0.01, 0.04])
+def test_single_normals_that_point_to_the_other_side_are_turned(share: float) -> None:
+    P = sphere(2000)
+    turned = np.random.default_rng(2).random(2000) < share
+    cloud = PointCloud(P, np.where(turned, -1, 1)[:, None] * P)
+    np.testing.assert_array_equal(cloud.F, PointCloud(P, P).F)
+    np.testing.assert_allclose(cloud.normals[turned], -P[turned], atol=1e-14)
+
+
 @pytest.mark.parametrize("thickness", [1.0, 1e-3])
 def test_normals_of_both_sides_of_a_thin_shell_are_oriented(thickness: float) -> None:
     """Of two neighbours in three, or of every second one, the normals are opposite, and yet they do not contradict."""

@@ -38,7 +38,8 @@ class PointCloud:
         A normal for each point, of any length but 0, all pointing to the same side of the surface. They give the
         tangent planes, and tell sheets apart that nearly touch: neighbours whose normals point away are left out.
         Without them, planes are fitted to the neighbours, and so they are, with an `AccuracyWarning`, if the normals
-        point to both sides at random, as those of ``estimate_normals`` of open3d before they are oriented.
+        point to both sides at random, as those of ``estimate_normals`` of open3d before they are oriented. Single ones
+        that contradict their neighbours are turned over, but for `normals`.
 
     Attributes
     ----------
