@@ -226,6 +226,17 @@ def cloud() -> Picture:
     return plot(cloud.triangles, phi, sources=0)
 
 
+def scan() -> Picture:
+    """A scan of hilly ground with noise, and a pond without points: each point is drawn as a disc."""
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(-3, 3, (2, 20000))
+    height = 1.5 * np.exp(-((x - 1) ** 2) - y**2) + np.exp(-((x + 1.5) ** 2) - (y - 1) ** 2)
+    ground = np.stack([x, y, height + 0.01 * rng.standard_normal(len(x))], axis=1)
+    cloud = heat_igl.PointCloud(ground[np.hypot(x + 0.8, y + 1.4) > 0.7])
+    source = int(np.argmax(cloud.P[:, :2].sum(axis=1)))
+    return plot(cloud, heat_igl.geodesic_distance(cloud, source), sources=source, view=(20, -40), up="z")
+
+
 def directions() -> Picture:
     """The first coordinate of the log map: how far along one direction of the tangent plane each vertex lies."""
     mesh = shapes.blob(5)
@@ -337,7 +348,7 @@ def unfolded() -> Picture:
 
 ENTRIES = (
     torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, scribble, grown, noisy, tool_path, pieces,
-    heat, error, unfolded, cut_locus, book, tetrahedra, voxels, polygons, cloud, maze,
+    heat, error, unfolded, cut_locus, book, tetrahedra, voxels, polygons, cloud, scan, maze,
     travel_time, fibres, directions, checkerboard,
     straightest, transported, extended, loops, bezier, asked,
 )  # fmt: skip

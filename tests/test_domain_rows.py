@@ -93,8 +93,10 @@ def test_the_report_in_every_format(capsys: pytest.CaptureFixture[str]):
     assert again["rows"][0]["mean"] == report.rows[0].mean
     assert again["rows"][0]["passed"] is True
     lines = report.to_markdown().splitlines()
-    assert len({line.count("|") for line in lines[2:]}) == 1
-    assert len(lines) == 4 + len(report.rows)
+    table = lines[2 : 4 + len(report.rows)]
+    assert len({line.count("|") for line in table}) == 1
+    assert lines[len(table) + 2] == ""
+    assert "default, a solver without options" in lines[len(table) + 3]
     assert cli.run(["validate-domains", "--domain", "polygons"]) == 0
     assert capsys.readouterr().out == report.to_markdown()
     assert cli.run(["validate-domains", "--domain=polygons", "--json=-"]) == 0

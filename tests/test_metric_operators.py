@@ -215,8 +215,6 @@ def changed(face: int, value: Any) -> FloatArray:
         (changed(3, [[1, 1, 0], [0, 1, 0], [0, 0, 1]]), r"metric\[3\] = .* must be symmetric"),
         (np.eye(3), r"one per face, not \(3, 3\): np.broadcast_to\(metric, \(18, 3, 3\)\) is the same on all"),
         (GOOD[:16], r"one per face, not \(16, 3, 3\): metric\[mesh.F\].mean\(axis=1\) is the mean over the corners"),
-        (changed(6, 1e130 * np.eye(3)), r"metric\[6\] = .* must be between 1e-120 and 1e\+120.*\(1 of 18"),
-        (changed(7, np.diag([1, 1e-130, 1])), r"metric\[7\] = .* must be between 1e-120"),
         (changed(2, np.nan), r"metric\[2\] = .* must be finite"),
         ("round", "metric must be real numbers"),
         (1j * GOOD, "metric must be real numbers, not an array of complex128"),

@@ -222,6 +222,14 @@ def test_operators_and_solvers_are_refused_by_name() -> None:
         as_mesh(heat_igl.HeatMethodSolver(SPHERE))
 
 
+def test_grids_of_pyvista_name_the_way_to_cells() -> None:
+    class StructuredGrid:
+        """As that of pyvista, whose cells are not stored."""
+
+    with pytest.raises(MeshError, match=r"StructuredGrid: pass .cast_to_unstructured_grid\(\).triangulate\(\)"):
+        as_mesh(StructuredGrid())
+
+
 def test_faces_beside_a_mesh_are_refused() -> None:
     np.testing.assert_array_equal(as_mesh(V, F).F, F)
     with pytest.raises(MeshError, match="F is given beside a Mesh"):

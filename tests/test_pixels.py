@@ -81,6 +81,7 @@ def test_vertices_images_and_faces():
     labels = np.arange(domain.mesh.n_vertices)
     assert domain.image(labels, outside=-1).tolist() == [[0, 1, -1], [-1, 2, 3]]
     assert domain.image(labels, outside=-1).dtype.kind == "i"
+    assert domain.image([labels, -labels], outside=9)[1].tolist() == [[0, -1, 9], [9, -2, -3]]
     per_face = domain.per_face([[1, 2, 9], [9, 3, 4]])
     assert per_face.tolist() == np.repeat([1, 2, 3, 4], 4).tolist()
     for pixel, faces in enumerate(domain.mesh.F.reshape(-1, 4, 3)):

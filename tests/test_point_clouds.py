@@ -291,6 +291,15 @@ def test_normals_that_were_not_oriented_are_left_out(share: float) -> None:
     np.testing.assert_array_equal(F, PointCloud(P).F)
 
 
+@pytest.mark.parametrize("share", [0.01, 0.04])
+def test_single_normals_that_point_to_the_other_side_are_turned(share: float) -> None:
+    P = sphere(2000)
+    turned = np.random.default_rng(2).random(2000) < share
+    cloud = PointCloud(P, np.where(turned, -1, 1)[:, None] * P)
+    np.testing.assert_array_equal(cloud.F, PointCloud(P, P).F)
+    np.testing.assert_allclose(cloud.normals[turned], -P[turned], atol=1e-14)
+
+
 @pytest.mark.parametrize("thickness", [1.0, 1e-3])
 def test_normals_of_both_sides_of_a_thin_shell_are_oriented(thickness: float) -> None:
     """Of two neighbours in three, or of every second one, the normals are opposite, and yet they do not contradict."""
@@ -370,11 +379,15 @@ BAD = {
     "all equal": ((np.ones((9, 3)),), "all 9 points in P are equal"),
     "on a line": ((LINE,), "all 30 points in P lie on a line"),
     "on a line far away": ((LINE + 1e6,), "all 30 points in P lie on a line"),
-    "nan": ((with_entry(sphere(9), 4, np.nan),), r"P\[4, 0\] is nan \(1 of 9 points are not finite\)"),
+    "nan": (
+        (with_entry(sphere(9), 4, np.nan),),
+        r"P\[4, 0\] is nan \(1 of 9 points are not finite.*: P\[numpy.isfinite",
+    ),
     "one column": ((np.zeros((9, 1)),), r"P must have shape \(n, 3\), or \(n, 2\) in the plane, but .* \(9, 1\)"),
     "huge": ((1e70 * sphere(9),), "P spans .* rescale P"),
     "normals nan": ((sphere(9), with_entry(sphere(9), 2, np.nan)), r"normals\[2, 0\] is nan \(1 of 9 normals"),
     "normals zero": ((sphere(9), with_entry(sphere(9), 5, 0)), r"normals\[5\] has length 0 \(1 of 9 normals have\)"),
+    "a path": (("scan.ply",), "P must hold real numbers, .*; as_mesh takes files and clouds of other libraries"),
     "too few normals": ((sphere(9), sphere(8)), r"normals must have shape \(9, 3\)"),
     "complex normals": ((sphere(9), sphere(9) * 1j), "normals must hold real numbers"),
 }
@@ -454,6 +467,32 @@ def test_formats(tmp_path, kind: str) -> None:
     np.testing.assert_array_equal(cloud.P, P)
     np.testing.assert_allclose(cloud.normals, P, atol=1e-6)
     assert read_point_cloud(written(tmp_path, kind, P, 0 * P)).normals is None
+
+
+@pytest.mark.parametrize("kind", ["ply", "xyz", "npy", "pcd binary"])
+@pytest.mark.parametrize("missing", [0.0, np.nan])
+def test_missing_normals_of_a_file_leave_all_out(tmp_path, kind: str, missing: float) -> None:
+    """As programs write them that find no plane at an outlier."""
+    P = sphere(40).astype(np.float32).astype(np.float64)
+    path = written(tmp_path, kind, P, with_entry(P, 7, missing))
+    with pytest.warns(
+        AccuracyWarning, match="1 of 40 normals are 0 or not finite, the first that of point 7"
+    ) as caught:
+        cloud = read_point_cloud(path)
+    assert cloud.normals is None
+    assert caught[0].filename == __file__
+    np.testing.assert_array_equal(cloud.P, P)
+
+
+@pytest.mark.parametrize("kind", ["xyz", "npy"])
+def test_colours_are_no_normals(tmp_path, kind: str) -> None:
+    P = sphere(40)
+    colours = np.random.default_rng(0).integers(0, 256, (40, 3))
+    for columns in (colours, colours / 255, np.full((40, 3), 128)):
+        assert read_point_cloud(written(tmp_path, kind, P, columns)).normals is None
+    # Normals of a plane lie in the range of colours.
+    upwards = np.tile([0, 0, 1], (40, 1))
+    np.testing.assert_array_equal(read_point_cloud(written(tmp_path, kind, P, upwards)).normals, upwards)
 
 
 def test_faces_of_a_mesh_are_ignored(tmp_path) -> None:

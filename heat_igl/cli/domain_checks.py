@@ -12,7 +12,7 @@ from rich.table import Table
 import heat_igl
 from heat_igl.cli.options import JsonOption
 from heat_igl.cli.output import check_json, print_json, prints_json, say
-from heat_igl.validation.domains import DOMAINS, DomainReport
+from heat_igl.validation.domains import DOMAINS, LEGEND, DomainReport
 
 __all__ = ["validate_domains"]
 
@@ -63,3 +63,4 @@ def _print(report: DomainReport) -> None:
         mean = "failed" if row.mean is None else f"{100 * row.mean:.2g}"
         table.add_row(row.case, row.method, mean, f"{100 * row.bound:g}", "yes" if row.passed else "NO")
     console.print(table)
+    console.print(f"\n{LEGEND}")

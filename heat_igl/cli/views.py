@@ -11,7 +11,7 @@ from rich.console import Console
 
 from heat_igl.cli.demo import demonstrate
 from heat_igl.cli.options import JsonOption, MeshArgument, choice, positive
-from heat_igl.cli.output import Row, check_json, check_page, check_writable, print_rows, say
+from heat_igl.cli.output import check_json, check_page, check_writable, described, print_rows, say
 from heat_igl.cli.regions import projected
 from heat_igl.errors import ReferenceSolverError
 from heat_igl.heat_method import Boundary, Refine, SignedHeatSolver, SolverOptions
@@ -72,9 +72,8 @@ def view(
     shown.page(mesh.name, method).save(target)
     if problem:
         say(f"no window: {problem}")
-    counts = {"path": str(mesh), "n_vertices": loaded.n_vertices}
-    rows: list[Row] = [("mesh", f"{mesh}: {loaded.n_vertices} vertices", counts)]
-    print_rows([*rows, ("wrote", f"{target} (open it in a browser)", str(target))], json_file)
+    written = ("wrote", f"{target} (open it in a browser)", str(target))
+    print_rows([described(mesh, loaded), written], json_file)
 
 
 def _signed(mesh: Mesh | PointCloud, curves: Path) -> dict[str, FloatArray]:

@@ -25,6 +25,7 @@ from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = [
     "MESH_SUFFIXES",
+    "POINT_SUFFIXES",
     "checked_attributes",
     "checked_path",
     "file_bytes",
@@ -57,6 +58,8 @@ _FORMATS = {
 } | dict.fromkeys(freesurfer.SUFFIXES, _Format(freesurfer.read, freesurfer.write, packed=False))
 
 MESH_SUFFIXES = tuple(_FORMATS)
+# Formats of points alone.
+POINT_SUFFIXES = (".xyz", ".npy", ".pcd")
 _PACKED = tuple(suffix for suffix, form in _FORMATS.items() if form.packed)
 
 _ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
@@ -258,7 +261,12 @@ def checked_path(path: str | os.PathLike[str], suffixes: Collection[str], packed
     if suffix not in suffixes:
         if found.is_dir():
             raise MeshError(f"{found} is a directory: name a mesh file in it")
-        raise MeshError(f"{found}: unknown extension '{found.suffix}'; the formats are {', '.join(suffixes)}")
+        remedy = (
+            "read_point_cloud and write_point_cloud take points" if suffix in POINT_SUFFIXES else "take another library"
+        )
+        raise MeshError(
+            f"{found}: unknown extension '{found.suffix}'; the formats are {', '.join(suffixes)}; for others, {remedy}"
+        )
     return found
 
 

@@ -248,8 +248,10 @@ def parse(path: Path, data: bytes, needed: tuple[str, ...]) -> tuple[Header, Tab
     count = {element.name: element.n for element in header.elements}
     for name in needed:
         if not count.get(name) or sum(element.name == name for element in header.elements) > 1:
-            strips = " (triangle strips are not supported)" if "tristrips" in count else ""
-            raise MeshError(f"{path}: the header announces no element '{name}', or announces it twice{strips}")
+            remedy = " (triangle strips are not supported)" if "tristrips" in count else ""
+            if name == "face" and not remedy and count.get("vertex"):
+                remedy = ": read_point_cloud reads points without faces"
+            raise MeshError(f"{path}: the header announces no element '{name}', or announces it twice{remedy}")
     if header.order:
         found = _binary(path, data, header)
     else:

@@ -13,11 +13,19 @@ import numpy as np
 from heat_igl.errors import MeshError, shown
 from heat_igl.io import pcd, ply
 from heat_igl.io.atomic import replacing
-from heat_igl.io.files import MESH_SUFFIXES, checked_attributes, checked_path, file_bytes, is_mesh_path, read_mesh
+from heat_igl.io.files import (
+    MESH_SUFFIXES,
+    POINT_SUFFIXES,
+    checked_attributes,
+    checked_path,
+    file_bytes,
+    is_mesh_path,
+    read_mesh,
+)
 from heat_igl.io.packed import form_suffix, pack
 from heat_igl.io.text import Text, format_rows
-from heat_igl.mesh import Mesh, PointCloud, read_paths_with
-from heat_igl.typing import ArrayLike, FloatArray
+from heat_igl.mesh import Mesh, PointCloud, read_paths_with, usable_normals
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = [
     "POINT_CLOUD_SUFFIXES",
@@ -26,6 +34,10 @@ __all__ = [
     "read_point_cloud",
     "write_point_cloud",
 ]
+
+# Largest value of a colour, and the smallest difference from length 1 of what is no normal.
+_BRIGHTEST = 255
+_NOT_OF_LENGTH_1 = 0.01
 
 _Points = tuple[FloatArray, FloatArray | None]
 
@@ -38,9 +50,9 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
     path : path-like
         The extension, in upper or lower case, selects the format. .ply: the vertices, and their properties nx, ny, nz
         as normals. .obj: the lines v, and the lines vn as normals if there are as many. .xyz: a point in each line,
-        three coordinates, or three and a normal, or two in the plane z = 0; separated by white space or commas, "#"
-        starts a comment. .npy: an array (n, 3), (n, 6) with normals, or (n, 2). .pcd: the fields x, y, z and normal_x,
-        normal_y, normal_z, text or binary. A further .gz stands for a file packed by gzip.
+        three coordinates, or three and a normal or a colour, or two in the plane z = 0; separated by white space or
+        commas, "#" starts a comment. .npy: an array (n, 3), (n, 6) with normals or colours, or (n, 2). .pcd: the fields
+        x, y, z and normal_x, normal_y, normal_z, text or binary. A further .gz stands for a file packed by gzip.
 
     Returns
     -------
@@ -50,8 +62,17 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
     Raises
     ------
     MeshError
-        If the file is missing, unreadable or damaged, or the points cannot be used. Normals that are all 0, as some
-        programs write them, count as none.
+        If the file is missing, unreadable or damaged, or the points cannot be used.
+
+    Warns
+    -----
+    AccuracyWarning
+        If some normals are 0 or not finite: then none are taken.
+
+    Notes
+    -----
+    Normals that are all 0, as some programs write them, count as none. Three numbers from 0 to 255 after the
+    coordinates that are not of length 1 are a colour.
 
     Examples
     --------
@@ -63,10 +84,8 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
     """
     path = checked_path(path, POINT_CLOUD_SUFFIXES, POINT_CLOUD_SUFFIXES)
     P, normals = _FORMATS[form_suffix(path)](path, file_bytes(path))
-    if normals is not None and not normals.any():
-        normals = None
     try:
-        return PointCloud(P, normals)
+        return PointCloud(P, None if normals is None else usable_normals(normals, f"{path}: "))
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
 
@@ -81,7 +100,7 @@ def read_mesh_or_cloud(path: str | os.PathLike[str]) -> Mesh | PointCloud:
     MissingExtraError
         As `read_mesh`.
     """
-    path = checked_path(path, (*MESH_SUFFIXES, ".xyz", ".npy", ".pcd"), (*MESH_SUFFIXES, *POINT_CLOUD_SUFFIXES))
+    path = checked_path(path, (*MESH_SUFFIXES, *POINT_SUFFIXES), (*MESH_SUFFIXES, *POINT_CLOUD_SUFFIXES))
     suffix = form_suffix(path)
     if suffix not in MESH_SUFFIXES:
         return read_point_cloud(path)
@@ -175,10 +194,10 @@ def _from_xyz(path: Path, data: bytes) -> _Points:
         raise text.error(
             line,
             "a point has 3 numbers, or 6 with a normal, or 2 in the plane, and all points as many "
-            f"({int(wrong.sum())} lines differ)",
+            f"({int(wrong.sum())} lines differ); PointCloud(numpy.loadtxt(path)[:, :3]) takes the first three of more",
         )
     values = text.all_numbers().reshape(-1, width)
-    return values[:, :3], values[:, 3:] if width == 6 else None
+    return values[:, :3], _normals_or_colours(values[:, 3:])
 
 
 def _from_npy(path: Path, data: bytes) -> _Points:
@@ -192,7 +211,18 @@ def _from_npy(path: Path, data: bytes) -> _Points:
             f"{path}: the array must have shape (n, 3), (n, 6) with normals, or (n, 2) in the plane, but its shape is "
             f"{shape}"
         )
-    return array[:, :3], array[:, 3:] if array.shape[1] == 6 else None
+    return array[:, :3], _normals_or_colours(array[:, 3:])
+
+
+def _normals_or_colours(columns: AnyArray) -> AnyArray | None:
+    """The columns (n, 3) after the coordinates if they are normals; None for colours, or if there are no columns."""
+    if columns.shape[1] != 3:
+        return None
+    if columns.dtype.kind not in "iuf":
+        return columns  # which is an error of the cloud
+    length = np.linalg.norm(columns.astype(np.float64), axis=1)
+    may_be_colours = bool(((columns >= 0) & (columns <= _BRIGHTEST)).all())
+    return None if may_be_colours and (np.abs(length - 1) > _NOT_OF_LENGTH_1).any() else columns
 
 
 _FORMATS: dict[str, Callable[[Path, bytes], _Points]] = {

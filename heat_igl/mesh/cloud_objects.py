@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import MeshError
+from heat_igl.mesh.cloud_normals import usable_normals
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.typing import AnyArray
 
@@ -79,6 +80,4 @@ def _active_normals(mesh: Any) -> AnyArray | None:
 
 
 def _cloud(P: Any, normals: Any = None) -> PointCloud:
-    """A cloud of positions (n, 3); normals that are missing or all 0 count as none."""
-    directions = None if normals is None else np.asarray(normals)
-    return PointCloud(np.asarray(P), directions if directions is not None and directions.any() else None)
+    return PointCloud(np.asarray(P), None if normals is None else usable_normals(np.asarray(normals)))

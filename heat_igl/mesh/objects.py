@@ -30,10 +30,14 @@ _UNDERSTOOD = (
 _TRIANGLES, _QUADS, _POLYGONS, _TETRAHEDRA = ("triangle", 5), ("quad", 9), ("polygon", 7), ("tetra", 10)
 
 
-# What else of this package might be taken for a mesh, by the end of the name of its class.
+# What else might be taken for a mesh, by the end of the name of the class.
 _NOT_MESHES = {
     "Operators": "HeatMethodSolver.from_operators takes operators, and the solver answers what is asked of a mesh",
     "Solver": "a solver is asked itself, as in solver.distance(sources)",
+    **dict.fromkeys(
+        ("StructuredGrid", "RectilinearGrid", "ImageData"),
+        "pass .cast_to_unstructured_grid().triangulate() of it, tetrahedra, or triangles if it is flat",
+    ),
 }
 
 _readers: list[Callable[[str | os.PathLike[str]], Mesh | PointCloud]] = []

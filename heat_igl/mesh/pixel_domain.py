@@ -78,7 +78,18 @@ class ImageDomain:
         return found
 
     def image(self, values: ArrayLike, outside: float = np.inf) -> AnyArray:
-        """Values per vertex (n,), such as a distance, as an image; `outside` off the domain.
+        """Values per vertex, such as a distance, as an image; `outside` off the domain.
+
+        Parameters
+        ----------
+        values : (..., n) array_like
+            Also several distances, (k, n), which become (k, rows, columns).
+        outside : number
+            For pixels that are not in the mask.
+
+        Returns
+        -------
+        (..., rows, columns) or (..., slices, rows, columns) array
 
         Raises
         ------
@@ -86,13 +97,14 @@ class ImageDomain:
             If `values` has another length.
         """
         given = as_array("values", values)
-        if given.shape != (self.mesh.n_vertices,):
+        if given.shape[-1:] != (self.mesh.n_vertices,):
             raise ValueError(f"values must have shape ({self.mesh.n_vertices},), one per vertex, not {given.shape}")
         if np.ndim(outside):
             raise ValueError(f"outside must be a number, not {shown(outside)}")
         inside = self.index >= 0
-        image = np.full(self.index.shape, outside, dtype=np.result_type(given.dtype, np.min_scalar_type(outside)))
-        image[inside] = given[self.index[inside]]
+        shape = given.shape[:-1] + self.index.shape
+        image = np.full(shape, outside, dtype=np.result_type(given.dtype, np.min_scalar_type(outside)))
+        image[..., inside] = given[..., self.index[inside]]
         return image
 
     def per_face(self, image: ArrayLike) -> AnyArray:

@@ -38,7 +38,8 @@ class PointCloud:
         A normal for each point, of any length but 0, all pointing to the same side of the surface. They give the
         tangent planes, and tell sheets apart that nearly touch: neighbours whose normals point away are left out.
         Without them, planes are fitted to the neighbours, and so they are, with an `AccuracyWarning`, if the normals
-        point to both sides at random, as those of ``estimate_normals`` of open3d before they are oriented.
+        point to both sides at random, as those of ``estimate_normals`` of open3d before they are oriented. Single ones
+        that contradict their neighbours are turned over, but for `normals`.
 
     Attributes
     ----------
@@ -77,7 +78,7 @@ class PointCloud:
         try:
             positions = checked_positions(P)
         except MeshError as error:
-            raise MeshError(str(error).replace("V", "P", 1).replace("vertices", "points")) from None
+            raise MeshError(str(error).replace("V", "P", 1).replace("vertices", "points") + _remedy(P)) from None
         _check_extent(positions)
         directions = None if normals is None else _checked_normals(normals, len(positions))
         for array in (positions, directions):
@@ -190,6 +191,15 @@ class PointCloud:
     def report(self) -> MeshReport:
         """The report of `triangles`: outliers are unreferenced vertices."""
         return self.triangles.report()
+
+
+def _remedy(P: object) -> str:
+    """The end of an error of positions: how points without coordinates are left out, or what takes other objects."""
+    if not isinstance(P, (np.ndarray, list, tuple)):
+        return "; as_mesh takes files and clouds of other libraries"
+    if isinstance(P, np.ndarray) and P.dtype.kind == "f" and P.ndim == 2 and not np.isfinite(P).all():
+        return ": P[numpy.isfinite(P).all(axis=1)] are the others"
+    return ""
 
 
 def _check_extent(P: FloatArray) -> None:

@@ -45,7 +45,7 @@ def point_cloud_operators(
     True
     """
     if not isinstance(cloud, PointCloud):
-        raise MeshError(f"cloud must be a PointCloud, not {shown(cloud)}")
+        raise MeshError(f"cloud must be a PointCloud, not {shown(cloud)}: PointCloud(P) makes one of points")
     check_laplacian(laplacian)
     mesh = cloud.triangles
     # The triangles of scattered points are even enough.

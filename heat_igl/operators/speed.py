@@ -67,8 +67,8 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     return replace(domain, metric=MetricSides.of(mesh, np.eye(3) / s[:, None, None] ** 2))
 
 
-# As those of a metric, one over the square of a speed.
-_LARGEST = 1e60
+# Lengths in the metric are squared, and their fourth powers give areas.
+_LARGEST = 1e100
 
 
 def _checked(speed: ArrayLike, m: int) -> FloatArray:

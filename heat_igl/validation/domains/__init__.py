@@ -11,11 +11,11 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning, FactorizationError, MeshError, shown
 from heat_igl.validation.domains import body_cases, surface_cases
 from heat_igl.validation.domains.case import DomainCase, Problem, solver_for
-from heat_igl.validation.domains.report import DomainReport, DomainRow
+from heat_igl.validation.domains.report import LEGEND, DomainReport, DomainRow
 from heat_igl.validation.error_norms import relative_error
 from heat_igl.validation.methods import Counter, Progress
 
-__all__ = ["CASES", "DOMAINS", "DomainCase", "DomainReport", "DomainRow", "Problem", "validate_domains"]
+__all__ = ["CASES", "DOMAINS", "LEGEND", "DomainCase", "DomainReport", "DomainRow", "Problem", "validate_domains"]
 
 #: All cases, kind after kind.
 CASES: tuple[DomainCase, ...] = (*surface_cases.CASES, *body_cases.CASES)
