@@ -230,6 +230,11 @@ def changed(face: int, value: Any) -> FloatArray:
         (changed(5, np.diag([1, 0, 1])), r"metric\[5\] = .* must be positive definite"),
         (changed(3, [[1, 1, 0], [0, 1, 0], [0, 0, 1]]), r"metric\[3\] = .* must be symmetric"),
         (changed(2, np.nan), r"metric\[2\] = .* must be finite"),
+        (
+            changed(7, 1e200 * np.eye(3)),
+            r"metric\[7\] = .* must have entries and eigenvalues between 1e-120 and 1e\+120",
+        ),
+        (changed(8, 1e-200 * np.eye(3)), r"metric\[8\] = .* take another unit \(1 of 18 are not\)"),
         ("round", "metric must be real numbers"),
         (1j * GOOD, "metric must be real numbers, not an array of complex128"),
     ],

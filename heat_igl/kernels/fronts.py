@@ -71,7 +71,7 @@ def advance(
 def _begin_in_own_regions(one: _Fronts, d, begin, label, arrived):
     """Lower `d` (n,) to the ways that stay in a region, the triangles of one slowness, beside their source.
 
-    Elsewhere, fronts that passed through faster regions may be there first, and straight lines from the source are lost.
+    Where fronts that passed through faster regions are first, straight lines from the source would be lost.
     """
     sources = np.flatnonzero(np.isfinite(d))
     corners, slowness = np.asarray(one.corners), np.asarray(one.slowness)
@@ -320,8 +320,8 @@ class _Fronts:
         j: cython.int = self.corners[s, b]
         bends_i: cython.bint = self.is_refracted(s, i)
         bends_j: cython.bint = self.is_refracted(s, j)
-        if bends_i == bends_j:
-            if bends_i or self.entered[i] == self.entered[j]:
+        if bends_i == bends_j or self.p == 3:
+            if bends_i or self.p == 3 or self.entered[i] == self.entered[j]:
                 return 0.5 * (self.begins(s, a) + self.begins(s, b))
         elif bends_j and self.entered[i] == self.arrived[j]:
             return self.begin[i]
@@ -355,7 +355,7 @@ class _Fronts:
     @cython.nogil
     @cython.exceptval(check=False)
     def is_refracted(self, s: cython.int, i: cython.int) -> cython.bint:
-        """Whether the front at vertex i came through simplices of another slowness; one at its source came through none."""
+        """Whether the front at vertex i, if it is not at its source, came through simplices of another slowness."""
         return self.arrived[i] != self.slowness[s] and self.d[i] != self.begin[i]
 
     @cython.cfunc

@@ -29,14 +29,14 @@ def refracted(
     high: cython.double = 1.0
     _k: cython.int
     way.share, way.length, way.behind, way.radius = 0.0, INFINITY, 0.0, 0.0
-    if _slope(x, y, base, along, height, behind, 0.0) >= 0:
+    if _slope(0.0, base, behind, x, along, y, height) >= 0:
         return way
     way.share = 1.0
-    if _slope(x, y, base, along, height, behind, 1.0) <= 0:
+    if _slope(1.0, base, behind, x, along, y, height) <= 0:
         return way
     way.share = 0.5
     for _k in range(60):
-        slope: cython.double = _slope(x, y, base, along, height, behind, way.share)
+        slope: cython.double = _slope(way.share, base, behind, x, along, y, height)
         if slope > 0:
             high = way.share
         else:
@@ -81,13 +81,13 @@ def _far(a: cython.double, b: cython.double) -> cython.double:
 @cython.nogil
 @cython.exceptval(check=False)
 def _slope(
-    x: cython.double,
-    y: cython.double,
-    base: cython.double,
-    along: cython.double,
-    height: cython.double,
-    behind: cython.double,
     share: cython.double,
+    base: cython.double,
+    behind: cython.double,
+    x: cython.double,
+    along: cython.double,
+    y: cython.double,
+    height: cython.double,
 ) -> cython.double:
     """Derivative of the length of the way by `share`; at a source on the edge, into the edge."""
     first: cython.double = _far(share * base - x, y)
