@@ -12,6 +12,7 @@ import heat_igl
 from heat_igl import fibre_metric, metric_operators, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Operators, operators
+from heat_igl.reference.baselines import graph_distance
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation import relative_error
 
@@ -167,6 +168,21 @@ def test_layers_by_snells_law():
     assert np.abs(found[far] / exact - 1).max() < 0.005
 
 
+@pytest.mark.parametrize("ratio", [2.0, 5.0, 20.0])
+def test_no_distance_is_negative_where_fibres_change_at_every_edge(ratio):
+    """Distance is no longer than along edges, and no shorter than in the plane in the metric's shortest direction."""
+    mesh = flat(shapes.grid(16))
+    angle = np.random.default_rng(0).uniform(0, np.pi, mesh.n_faces)
+    fibres = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    domain = metric_operators(mesh, fibre_metric(fibres, along=1.0, across=ratio))
+    assert domain.surface is None
+    for source in (0, 100):
+        found, line = distance(domain, source), np.linalg.norm(mesh.V - mesh.V[source], axis=1)
+        assert (found >= line * (1 - 1e-9)).mean() > 0.95
+        assert found[line > 0].min() > 0
+        assert (found <= ratio * graph_distance(mesh, source) * (1 + 1e-9)).all()
+
+
 def test_a_metric_on_tetrahedra_is_a_linear_map():
     mesh, A = shapes.box(6), stretch(10.0)
     A[2, 0] = 0.5
@@ -216,6 +232,11 @@ def changed(face: int, value: Any) -> FloatArray:
         (np.eye(3), r"one per face, not \(3, 3\): np.broadcast_to\(metric, \(18, 3, 3\)\) is the same on all"),
         (GOOD[:16], r"one per face, not \(16, 3, 3\): metric\[mesh.F\].mean\(axis=1\) is the mean over the corners"),
         (changed(2, np.nan), r"metric\[2\] = .* must be finite"),
+        (
+            changed(7, 1e200 * np.eye(3)),
+            r"metric\[7\] = .* must have entries and eigenvalues between 1e-120 and 1e\+120",
+        ),
+        (changed(8, 1e-200 * np.eye(3)), r"metric\[8\] = .* take another unit \(1 of 18 are not\)"),
         ("round", "metric must be real numbers"),
         (1j * GOOD, "metric must be real numbers, not an array of complex128"),
     ],

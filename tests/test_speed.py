@@ -136,7 +136,11 @@ def test_refraction_at_a_straight_border(speeds):
         errors.append(float(np.nanmean(relative_error(solver(mesh, speed).distance(source), exact))))
     assert errors[1] < max(0.8 * errors[0], 5e-5)
     assert errors[2] < max(0.8 * errors[1], 5e-5)
-    assert errors[2] < 5e-4
+    assert errors[2] < (1e-4 if speeds != (1.0, 2.0) else 5e-4)
+    # From the border itself, straight lines in the slow half and the waves that the fast half sends there.
+    source = int(np.argmin(np.linalg.norm(mesh.V - [0.25, 0, 0], axis=1)))
+    exact = by_fermat(mesh.V[source, :2], mesh.V[:, :2], *speeds)
+    assert np.nanmean(relative_error(solver(mesh, speed).distance(source), exact)) < 1e-4
 
 
 def test_what_needs_triangles_that_fit_is_refused_at_jumps():
@@ -162,7 +166,7 @@ def test_what_needs_triangles_that_fit_is_refused_at_jumps():
         ([np.inf] + [1.0] * 17, r"speed\[0\] = inf must be positive and finite"),
         (["fast"] * 18, "speed must be real numbers"),
         (np.full(18, 1j), "speed must be real numbers, not an array of complex128"),
-        (np.where(np.arange(18) == 4, 1e-200, 1), r"speed\[4\] = 1e-200 is not between 1e-100 and 1e\+100 \(1 of 18"),
+        (np.where(np.arange(18) == 4, 1e-200, 1), r"speed\[4\] = 1e-200 is not between 1e-60 and 1e\+60 \(1 of 18"),
     ],
 )
 def test_wrong_speeds_are_refused(speed, message):

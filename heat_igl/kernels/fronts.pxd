@@ -12,3 +12,5 @@ cdef extern from *:
 cdef enum:
     # Visits per vertex after which the kernel gives up.
     MOST_VISITS = 100
+    # Sources, and regions beside them, up to which fronts first stay in these regions.
+    MOST_REGIONS = 8

@@ -6,7 +6,8 @@ refracted. Seen from a vertex, the source lies behind the opposite side of a sim
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, MOST_VISITS, STRAIGHT
+from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, MOST_REGIONS, MOST_VISITS, STRAIGHT
+from cython.cimports.heat_igl.kernels.refraction import Refracted, refracted
 from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["advance"]
@@ -55,13 +56,48 @@ def advance(
     one.order, one.corners, one.lengths, one.slowness = order, corners, lengths, slowness
     one.first, one.incident, one.d, one.label = first, incident, d, label
     one.begin, one.is_stale = begin, np.ones(n, np.uint8)
-    one.arrived = np.ones(n)
+    one.arrived, one.entered = np.ones(n), np.zeros(n)
     rank = np.empty(n, np.int32)
     rank[order] = np.arange(n, dtype=np.int32)
     one.rank = rank
+    one.only = 0.0
+    if one.p == 2:
+        _begin_in_own_regions(one, np.asarray(d), np.asarray(begin), np.asarray(label), np.asarray(one.arrived))
     with cython.nogil:
         one.run()
     return one.n_visits
+
+
+def _begin_in_own_regions(one: _Fronts, d, begin, label, arrived):
+    """Lower `d` (n,) to the ways that stay in a region, the triangles of one slowness, beside their source.
+
+    Where fronts that passed through faster regions are first, straight lines from the source would be lost.
+    """
+    sources = np.flatnonzero(np.isfinite(d))
+    corners, slowness = np.asarray(one.corners), np.asarray(one.slowness)
+    if len(sources) > MOST_REGIONS:
+        return
+    beside = np.concatenate([np.asarray(one.incident)[one.first[v] : one.first[v + 1]] for v in sources])
+    regions = np.unique(slowness[beside // corners.shape[1]])
+    if len(regions) > MOST_REGIONS or len(np.unique(slowness)) < 2:
+        return
+    found = d.copy(), begin.copy(), label.copy(), arrived.copy()
+    given = d.copy(), begin.copy(), label.copy(), arrived.copy()
+    for region in regions.tolist():
+        one.only = region
+        for values, start in zip((d, begin, label, arrived), given, strict=True):
+            values[:] = start
+        np.asarray(one.is_stale)[:] = 1
+        with cython.nogil:
+            one.run()
+        nearer = d < found[0]
+        for values, kept in zip((d, begin, label, arrived), found, strict=True):
+            kept[nearer] = values[nearer]
+    one.only = 0.0
+    for values, kept in zip((d, begin, label, arrived), found, strict=True):
+        values[:] = kept
+    np.asarray(one.is_stale)[:] = 1
+    np.asarray(one.entered)[:] = 0
 
 
 @cython.final
@@ -84,6 +120,7 @@ class _Fronts:
     label: cython.int[::1]
     begin: cython.double[::1]
     arrived: cython.double[::1]
+    entered: cython.double[::1]
     is_stale: cython.uchar[::1]
     rank: cython.const[cython.int][::1]
     n_visits: cython.longlong
@@ -92,6 +129,9 @@ class _Fronts:
     best_begin: cython.double
     best_label: cython.int
     best_simplex: cython.int
+    best_entered: cython.double
+    # Slowness of the triangles that fronts stay in; 0 for all.
+    only: cython.double
 
     @cython.cfunc
     @cython.nogil
@@ -130,6 +170,7 @@ class _Fronts:
         self.d[v] = self.best
         self.begin[v], self.label[v] = self.best_begin, self.best_label
         self.arrived[v] = self.slowness[self.best_simplex]
+        self.entered[v] = self.best_entered
         if old - self.best <= GAIN * (self.best - self.best_begin):
             return n
         for k in range(self.first[v], self.first[v + 1]):
@@ -148,6 +189,8 @@ class _Fronts:
     @cython.exceptval(check=False)
     def through(self, s: cython.int, v: cython.int) -> cython.void:
         """What corner v of simplex s gets from the other corners: each alone, two at a time, and all three."""
+        if self.only != 0.0 and self.slowness[s] != self.only:
+            return
         a: cython.int = (v + 1) % (self.p + 1)
         b: cython.int = (v + 2) % (self.p + 1)
         c: cython.int = (v + 3) % (self.p + 1)
@@ -189,10 +232,35 @@ class _Fronts:
     @cython.inline
     @cython.nogil
     @cython.exceptval(check=False)
-    def take(self, value: cython.double, begin: cython.double, label: cython.int, s: cython.int) -> cython.void:
-        """Keep a value if it is the best so far."""
+    def take(self, value: cython.double, begin: cython.double, i: cython.int, s: cython.int) -> cython.void:
+        """Keep a value of the front at vertex i if it is the best so far."""
         if value < self.best:
-            self.best, self.best_begin, self.best_label, self.best_simplex = value, begin, label, s
+            self.best, self.best_begin, self.best_label, self.best_simplex = value, begin, self.label[i], s
+            self.best_entered = self.arrived[i] if self.is_refracted(s, i) else self.entered[i]
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def take_later(
+        self,
+        value: cython.double,
+        begin: cython.double,
+        behind: cython.double,
+        i: cython.int,
+        j: cython.int,
+        s: cython.int,
+    ) -> cython.void:
+        """Keep a value of the front that passes between vertices i and j and goes on for `behind`, if it is the best.
+
+        A front that was refracted before is not known well enough to be earlier between two vertices than at both.
+        """
+        if self.entered[i] != 0.0 or self.entered[j] != 0.0:
+            earliest: cython.double = min(self.d[i], self.d[j]) + behind
+            if value < earliest:
+                begin += earliest - value
+                value = earliest
+        self.take(value, begin, i, s)
 
     @cython.cfunc
     @cython.inline
@@ -203,7 +271,7 @@ class _Fronts:
         i: cython.int = self.corners[s, a]
         value: cython.double = self.d[i] + self.lengths[s, v, a]
         if value < self.best:
-            self.take(value, self.begins(s, a), self.label[i], s)
+            self.take(value, self.begins(s, a), i, s)
 
     @cython.cfunc
     @cython.nogil
@@ -217,9 +285,13 @@ class _Fronts:
             return
         to_a: cython.double = self.lengths[s, v, a]
         to_b: cython.double = self.lengths[s, v, b]
+        before: cython.double = self.length_before(s, i, j)
+        if before > 0:
+            self.refract(s, v, a, b, before)
+            return
         start: cython.double = -INFINITY  # of fronts from several sources: straight
         if self.label[i] == self.label[j]:
-            start = 0.5 * (self.begins(s, a) + self.begins(s, b))
+            start = self.common_begin(s, a, b)
         start = max(start, min(self.d[i], self.d[j]) - STRAIGHT * (base + to_a))
         da: cython.double = self.d[i] - start
         db: cython.double = self.d[j] - start
@@ -233,7 +305,80 @@ class _Fronts:
         crossing: cython.double = x * height + along * y  # times y + height
         if 0 <= crossing <= (y + height) * base:
             across: cython.double = sqrt((along - x) * (along - x) + (height + y) * (height + y))
-            self.take(start + across, start, self.label[i], s)
+            if self.p == 2:
+                self.take_later(start + across, start, across * height / (y + height), i, j, s)
+            else:
+                self.take(start + across, start, i, s)
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def common_begin(self, s: cython.int, a: cython.int, b: cython.int) -> cython.double:
+        """Where the front at corners a and b seems to begin, seen in s: as the one of the two says that it met in s."""
+        i: cython.int = self.corners[s, a]
+        j: cython.int = self.corners[s, b]
+        bends_i: cython.bint = self.is_refracted(s, i)
+        bends_j: cython.bint = self.is_refracted(s, j)
+        if bends_i == bends_j or self.p == 3:
+            if bends_i or self.p == 3 or self.entered[i] == self.entered[j]:
+                return 0.5 * (self.begins(s, a) + self.begins(s, b))
+        elif bends_j and self.entered[i] == self.arrived[j]:
+            return self.begin[i]
+        elif bends_i and self.entered[j] == self.arrived[i]:
+            return self.begin[j]
+        return -INFINITY
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def length_before(self, s: cython.int, i: cython.int, j: cython.int) -> cython.double:
+        """Length of the edge ij in the triangle from which a front meets triangle s there; 0 if it is not refracted."""
+        k: cython.int
+        c: cython.int
+        if self.p == 3 or self.label[i] != self.label[j]:
+            return 0.0
+        if not (self.is_refracted(s, i) or self.is_refracted(s, j)):
+            return 0.0
+        for k in range(self.first[i], self.first[i + 1]):
+            other: cython.int = self.incident[k] // 3
+            at: cython.int = self.incident[k] % 3
+            for c in range(3):
+                if self.corners[other, c] == j and other != s:
+                    if self.is_refracted(other, i) or self.is_refracted(other, j):
+                        return 0.0
+                    return self.lengths[other, at, c]
+        return 0.0
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def is_refracted(self, s: cython.int, i: cython.int) -> cython.bint:
+        """Whether the front at vertex i, if it is not at its source, came through simplices of another slowness."""
+        return self.arrived[i] != self.slowness[s] and self.d[i] != self.begin[i]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def refract(self, s: cython.int, v: cython.int, a: cython.int, b: cython.int, before: cython.double) -> cython.void:
+        """Through the edge ab, which was `before` long in the triangle that the front came through."""
+        i: cython.int = self.corners[s, a]
+        j: cython.int = self.corners[s, b]
+        base: cython.double = self.lengths[s, a, b]
+        to_a: cython.double = self.lengths[s, v, a]
+        to_b: cython.double = self.lengths[s, v, b]
+        start: cython.double = 0.5 * (self.begin[i] + self.begin[j])
+        start = max(start, min(self.d[i], self.d[j]) - STRAIGHT * before)
+        da: cython.double = self.d[i] - start
+        db: cython.double = self.d[j] - start
+        x: cython.double = 0.5 * ((da - db) * (da + db) / before + before)
+        along: cython.double = 0.5 * ((to_a - to_b) * (to_a + to_b) / base + base)
+        height: cython.double = sqrt(max(to_a * to_a - along * along, 0.0))
+        way: Refracted = refracted(x, sqrt(max(da * da - x * x, 0.0)), before, along, height, base)
+        if start + way.length < self.best:
+            radius: cython.double = min(way.radius, STRAIGHT * (base + to_a))
+            self.take_later(start + way.length, start + way.length - radius, way.behind, i, j, s)
 
     @cython.cfunc
     @cython.nogil
@@ -281,6 +426,6 @@ class _Fronts:
         of_b: cython.double = (px - of_c * cx) / base
         if of_c >= 0 and of_b >= 0 and of_b + of_c <= height:
             across: cython.double = sqrt((vx - x) * (vx - x) + (vy - y) * (vy - y) + height * height)
-            self.take(start + across, start, self.label[i], s)
+            self.take(start + across, start, i, s)
             return True
         return False

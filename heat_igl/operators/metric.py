@@ -26,6 +26,8 @@ __all__ = ["fibre_metric", "metric_operators", "operators_in_metric"]
 _ONE_LENGTH = 0.1
 # Share that has to remain of the length by which two sides of a triangle are longer than the third.
 _SLACK = 0.03
+# Squared lengths in a metric per squared length; areas are their squares.
+_LARGEST = 1e120
 # Asymmetry of a metric, and a negative direction across a triangle, that are taken for rounding.
 _ROUNDING = 1e-9
 
@@ -292,6 +294,13 @@ def _checked(metric: ArrayLike, mesh: Mesh) -> FloatArray:
         g = axes @ g @ np.swapaxes(axes, 1, 2)
     smallest = np.linalg.eigvalsh(g)[:, 0]
     _raise_at_first(~(smallest > 0), "metric", np.asarray(metric), "must be positive definite on its face")
+    _raise_at_first(
+        (smallest < 1 / _LARGEST) | (size > _LARGEST),
+        "metric",
+        np.asarray(metric),
+        f"must have entries and eigenvalues between {1 / _LARGEST:g} and {_LARGEST:g}, or squares leave the range of "
+        "doubles: take another unit",
+    )
     return np.asarray(g)
 
 

@@ -67,8 +67,8 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     return replace(domain, metric=MetricSides.of(mesh, np.eye(3) / s[:, None, None] ** 2))
 
 
-# Lengths in the metric are squared, and their fourth powers give areas.
-_LARGEST = 1e100
+# Lengths in the metric are squared, and their fourth powers give areas; edges may be longer and shorter than 1.
+_LARGEST = 1e60
 
 
 def _checked(speed: ArrayLike, m: int) -> FloatArray:

@@ -176,7 +176,7 @@ CASES = (
         "polygons",
         "concave polygons in a square",
         "straight line",
-        {"heat": 0.05, "sweep": 0.01, "unfold": 0.001, "exact": 1e-9},
+        {"heat": 0.03, "sweep": 0.01, "unfold": 0.001, "exact": 1e-9},
         _concave,
     ),
     DomainCase(
