@@ -11,9 +11,10 @@ sources in percent, seconds to make the solver, and seconds for one query. Secon
 which other programs disturb least; potpourri3d uses one, this package all that there are. Noise is Gaussian in all
 coordinates, of the given standard deviation. With --meshes, points are the vertices of meshes, and exact is what
 unfolding finds on the mesh. With --log-maps, logarithmic maps on the vertices are compared with the exact one of the
-mesh: the median angle between them, and the mean of |v - exact| / |exact| for the vectors. With --clock, both solvers take turns so many times, and the medians of the ratios of their
-times by the clock are printed: of the solver with the first query, for which potpourri3d factors, of the solver alone,
-and of a later query. Needs the extra ``bench``; docs/clouds.md shows the tables.
+mesh: the median angle between them, and the mean of |v - exact| / |exact| for the vectors. With --clock, both solvers
+take turns so many times, and the medians of the ratios of their times by the clock are printed: of the solver with the
+first query, for which potpourri3d factors, of the solver alone, and of a later query. Needs the extra ``bench``;
+docs/clouds.md shows the tables.
 """
 
 from __future__ import annotations

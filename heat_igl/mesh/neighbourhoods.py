@@ -222,7 +222,7 @@ def _nearest(tree: PointTree, chosen: IntArray, k: int, stride: int = 1) -> AnyA
     fewer = KDTree(tree.P[::stride])
 
     def fill(rows: slice) -> AnyArray:
-        near = stride * fewer.query(tree.P[chosen[rows]], k + 1)[1].astype(np.int32)
+        near: AnyArray = stride * fewer.query(tree.P[chosen[rows]], k + 1)[1].astype(np.int32)
         # The point itself comes first: if it is not among them, in place of the farthest.
         is_other = near[:, 0] != chosen[rows]
         near[is_other, 1:] = near[is_other, :-1]
