@@ -1,6 +1,6 @@
 """Distance on point clouds: error and time, beside potpourri3d's solver on the same points.
 
-    python scripts/clouds_table.py [--sizes 5000 50000] [--noise 0 0.01] [--sources 6] [--seed 0] [--json FILE]
+    python scripts/clouds_table.py [--sizes 5000 50000] [--noise 0 0.01] [--methods default] [--sources 6]
     python scripts/clouds_table.py --meshes bunny.obj ... [--sources 6] [--seed 0] [--json FILE]
     python scripts/clouds_table.py --log-maps bunny.obj ... [--sources 6] [--seed 0] [--json FILE]
     python scripts/clouds_table.py --clock 15 [--sizes 5000 50000] [--noise 0 0.01] [--seed 0] [--json FILE]
@@ -94,16 +94,22 @@ def timed(
     return 100 * float(np.mean(errors)), made, asked
 
 
-def measure(P: FloatArray, truth: Truth, k: int, rng: np.random.Generator) -> dict[str, tuple[float, float, float]]:
+METHODS = ("heat", "default", "unfold", "potpourri3d")
+
+
+def measure(
+    P: FloatArray, truth: Truth, methods: Sequence[str], k: int, rng: np.random.Generator
+) -> dict[str, tuple[float, float, float]]:
     import potpourri3d
 
     sources = rng.choice(len(P), k, replace=False).tolist()
-    return {
-        "heat": timed(lambda: HeatMethodSolver(PointCloud(P), magnitude="damped").distance, sources, truth),
-        "default": timed(lambda: HeatMethodSolver(PointCloud(P)).distance, sources, truth),
-        "unfold": timed(lambda: HeatMethodSolver(PointCloud(P), refine="unfold").distance, sources, truth),
-        "potpourri3d": timed(lambda: potpourri3d.PointCloudHeatSolver(P).compute_distance, sources, truth),
+    make: dict[str, Callable[[], Callable[[int], FloatArray]]] = {
+        "heat": lambda: HeatMethodSolver(PointCloud(P), magnitude="damped").distance,
+        "default": lambda: HeatMethodSolver(PointCloud(P)).distance,
+        "unfold": lambda: HeatMethodSolver(PointCloud(P), refine="unfold").distance,
+        "potpourri3d": lambda: potpourri3d.PointCloudHeatSolver(P).compute_distance,
     }
+    return {name: timed(make[name], sources, truth) for name in methods}
 
 
 def clocked(P: FloatArray, repeats: int) -> tuple[float, ...]:
@@ -190,6 +196,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--log-maps", nargs="+", default=[], metavar="FILE", help="logarithmic maps on their vertices")
     parser.add_argument("--sizes", nargs="+", type=int, default=[5000, 50000], help="numbers of points")
     parser.add_argument("--noise", nargs="+", type=float, default=[0.0, 0.01], help="standard deviations")
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, help="what is measured")
     parser.add_argument("--sources", type=int, default=6, help="per cloud (default 6)")
     parser.add_argument("--clock", type=int, metavar="N", help="compare times by the clock, N times")
     add_seed(parser)
@@ -205,7 +212,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         P, truth = points(rng)
         if noise:
             P = P + noise * rng.standard_normal(P.shape)
-        found = measure(P, truth, arguments.sources, rng)
+        found = measure(P, truth, arguments.methods, arguments.sources, rng)
         rows.append({"shape": shape, "points": len(P), "noise": noise, **found})
         print(rows[-1], file=sys.stderr, flush=True)
 
@@ -214,7 +221,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not arguments.meshes:
         for shape, n, noise in product(arguments.shapes, arguments.sizes, arguments.noise):
             add(shape, noise, partial(SHAPES[shape], n))
-    methods = ("heat", "default", "unfold", "potpourri3d")
+    methods = arguments.methods
     head = ["points on", "number", "noise", *(f"{m}, %" for m in methods), *(f"{m}, s + s" for m in methods)]
     cells = [
         (

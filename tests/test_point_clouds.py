@@ -228,6 +228,14 @@ def test_density_that_grows_a_hundredfold() -> None:
         assert mean_error(found, np.linalg.norm(P - P[0], axis=1)) < 0.005
 
 
+def test_rows_ten_times_as_far_apart_as_their_points() -> None:
+    x, y = np.meshgrid(np.linspace(0, 1, 200), np.linspace(0, 1, 20))
+    P = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+    P[:, 0] += np.random.default_rng(0).normal(0, 1e-3, len(P))
+    found = HeatMethodSolver(PointCloud(P)).distance(0)
+    assert mean_error(found, np.linalg.norm(P - P[0], axis=1)) < 0.01
+
+
 @pytest.mark.parametrize("n", [4, 5, 8, 12, 20])
 def test_few_points_in_a_plane(n: int) -> None:
     """Distance is no shorter than a straight line, and equal to it if the way stays inside, as from most points."""
