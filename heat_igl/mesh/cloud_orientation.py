@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.kernels.agreeing import orient
+from heat_igl.mesh.cloud_fans import with_fans_joined
 from heat_igl.mesh.cloud_gaps import pinched_vertices, with_one_fan
 from heat_igl.mesh.connectivity import facets
 from heat_igl.mesh.grouping import group_by_label
@@ -57,7 +58,8 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> IntArray
         left_out = _in_pairs(found.pairs, len(F))
         if len(left_out) <= _MOST_LEFT_OUT * len(F) and np.median(found.folds) > _FLAT:
             kept = np.delete(F, left_out, axis=0)
-            F = with_one_fan(kept, pinched_vertices(kept, np.zeros(len(P), bool)))
+            none = np.zeros(len(P), bool)
+            F = with_fans_joined(P, with_one_fan(kept, pinched_vertices(kept, none)), none)
             part, _ = orient(F, len(P))
         else:
             F = found.F
