@@ -1,7 +1,8 @@
 """Distance on point clouds: error and time, beside potpourri3d's solver on the same points.
 
-    python scripts/clouds_table.py [--sizes 5000 50000] [--noise 0 0.01] [--sources 6] [--seed 0] [--json FILE]
+    python scripts/clouds_table.py [--sizes 5000 50000] [--noise 0 0.01] [--methods default] [--sources 6]
     python scripts/clouds_table.py --meshes bunny.obj ... [--sources 6] [--seed 0] [--json FILE]
+    python scripts/clouds_table.py --log-maps bunny.obj ... [--sources 6] [--seed 0] [--json FILE]
     python scripts/clouds_table.py --clock 15 [--sizes 5000 50000] [--noise 0 0.01] [--seed 0] [--json FILE]
 
 Random points on a sphere of radius 1, a torus of radii 1 and 0.4 (at most 144 000), a cylinder of radius 1 and height
@@ -9,9 +10,11 @@ Random points on a sphere of radius 1, a torus of radii 1 and 0.4 (at most 144 0
 sources in percent, seconds to make the solver, and seconds for one query. Seconds are those of all processors together,
 which other programs disturb least; potpourri3d uses one, this package all that there are. Noise is Gaussian in all
 coordinates, of the given standard deviation. With --meshes, points are the vertices of meshes, and exact is what
-unfolding finds on the mesh. With --clock, both solvers take turns so many times, and the medians of the ratios of their
-times by the clock are printed: of the solver with the first query, for which potpourri3d factors, of the solver alone,
-and of a later query. Needs the extra ``bench``; docs/clouds.md shows the tables.
+unfolding finds on the mesh. With --log-maps, logarithmic maps on the vertices are compared with the exact one of the
+mesh: the median angle between them, and the mean of |v - exact| / |exact| for the vectors. With --clock, both solvers
+take turns so many times, and the medians of the ratios of their times by the clock are printed: of the solver with the
+first query, for which potpourri3d factors, of the solver alone, and of a later query. Needs the extra ``bench``;
+docs/clouds.md shows the tables.
 """
 
 from __future__ import annotations
@@ -27,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl import HeatMethodSolver, PointCloud, read_mesh, shapes
+from heat_igl import HeatMethodSolver, PointCloud, VectorHeatSolver, log_map, read_mesh, shapes, tangent_frames
 from heat_igl.typing import FloatArray
 
 from scaffold import add_json, add_seed, environment, option_parser, publish, table
@@ -91,16 +94,22 @@ def timed(
     return 100 * float(np.mean(errors)), made, asked
 
 
-def measure(P: FloatArray, truth: Truth, k: int, rng: np.random.Generator) -> dict[str, tuple[float, float, float]]:
+METHODS = ("heat", "default", "unfold", "potpourri3d")
+
+
+def measure(
+    P: FloatArray, truth: Truth, methods: Sequence[str], k: int, rng: np.random.Generator
+) -> dict[str, tuple[float, float, float]]:
     import potpourri3d
 
     sources = rng.choice(len(P), k, replace=False).tolist()
-    return {
-        "heat": timed(lambda: HeatMethodSolver(PointCloud(P), magnitude="damped").distance, sources, truth),
-        "default": timed(lambda: HeatMethodSolver(PointCloud(P)).distance, sources, truth),
-        "unfold": timed(lambda: HeatMethodSolver(PointCloud(P), refine="unfold").distance, sources, truth),
-        "potpourri3d": timed(lambda: potpourri3d.PointCloudHeatSolver(P).compute_distance, sources, truth),
+    make: dict[str, Callable[[], Callable[[int], FloatArray]]] = {
+        "heat": lambda: HeatMethodSolver(PointCloud(P), magnitude="damped").distance,
+        "default": lambda: HeatMethodSolver(PointCloud(P)).distance,
+        "unfold": lambda: HeatMethodSolver(PointCloud(P), refine="unfold").distance,
+        "potpourri3d": lambda: potpourri3d.PointCloudHeatSolver(P).compute_distance,
     }
+    return {name: timed(make[name], sources, truth) for name in methods}
 
 
 def clocked(P: FloatArray, repeats: int) -> tuple[float, ...]:
@@ -140,19 +149,61 @@ def clock_table(arguments: argparse.Namespace) -> None:
     publish(result, "\n".join(table(head, rows)), json_file=arguments.json)
 
 
+def log_maps(file: str, sources: int, rng: np.random.Generator) -> dict[str, tuple[float, float]]:
+    """Median angle in degrees and mean error in percent of the vectors of each method, in the planes of the mesh."""
+    import potpourri3d
+
+    mesh = read_mesh(file)
+    on_mesh = tangent_frames(mesh)
+    heat, unfold = (VectorHeatSolver(PointCloud(mesh.V), refine=refine) for refine in (None, "unfold"))
+    peer = potpourri3d.PointCloudHeatSolver(mesh.V)
+    of_peer = peer.get_tangent_frames()
+    found: dict[str, list[tuple[float, float]]] = {"heat": [], "unfold": [], "potpourri3d": []}
+    for i in rng.choice(mesh.n_vertices, sources, replace=False).tolist():
+        exact = log_map(mesh, i, method="exact")
+        away = np.linalg.norm(exact, axis=1) > 0
+        for name, solver in (("heat", heat), ("unfold", unfold)):
+            vectors = solver.log_map(i) @ [solver.frames.x[i], solver.frames.y[i]]
+            found[name].append(_apart(on_mesh.from_world(vectors, np.full(len(vectors), i))[away], exact[away]))
+        vectors = peer.compute_log_map(i) @ np.stack([of_peer[0][i], of_peer[1][i]])
+        in_plane = on_mesh.from_world(vectors, np.full(len(vectors), i))
+        found["potpourri3d"].append(_apart(in_plane[away], exact[away]))
+    return {name: tuple(np.mean(errors, axis=0).tolist()) for name, errors in found.items()}
+
+
+def _apart(found: FloatArray, exact: FloatArray) -> tuple[float, float]:
+    a, b = (vectors @ [1, 1j] for vectors in (found, exact))
+    angle = np.abs(np.angle(a * b.conj()))[a != 0]
+    return float(np.degrees(np.median(angle))), float(100 * np.mean(np.abs(a - b) / np.abs(b)))
+
+
+def log_map_table(arguments: argparse.Namespace) -> None:
+    rows: list[dict[str, Any]] = []
+    for file in arguments.log_maps:
+        found = log_maps(file, arguments.sources, np.random.default_rng(arguments.seed))
+        rows.append({"vertices of": Path(file).stem, **found})
+        print(rows[-1], file=sys.stderr, flush=True)
+    methods = ("heat", "unfold", "potpourri3d")
+    head = ["vertices of", *(f"{m}, degrees, %" for m in methods)]
+    cells = [(str(row["vertices of"]), *(f"{row[m][0]:.2g}, {row[m][1]:.2g}" for m in methods)) for row in rows]
+    publish({"environment": environment(), "rows": rows}, "\n".join(table(head, cells)), json_file=arguments.json)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     parser = option_parser(__doc__)
     parser.add_argument("--shapes", nargs="+", choices=SHAPES, default=[*SHAPES], help="surfaces")
     parser.add_argument("--meshes", nargs="+", default=[], metavar="FILE", help="points are the vertices of these")
+    parser.add_argument("--log-maps", nargs="+", default=[], metavar="FILE", help="logarithmic maps on their vertices")
     parser.add_argument("--sizes", nargs="+", type=int, default=[5000, 50000], help="numbers of points")
     parser.add_argument("--noise", nargs="+", type=float, default=[0.0, 0.01], help="standard deviations")
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, help="what is measured")
     parser.add_argument("--sources", type=int, default=6, help="per cloud (default 6)")
     parser.add_argument("--clock", type=int, metavar="N", help="compare times by the clock, N times")
     add_seed(parser)
     add_json(parser)
     arguments = parser.parse_args(argv)
-    if arguments.clock:
-        clock_table(arguments)
+    if arguments.clock or arguments.log_maps:
+        (clock_table if arguments.clock else log_map_table)(arguments)
         return 0
     rows: list[dict[str, Any]] = []
 
@@ -161,7 +212,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         P, truth = points(rng)
         if noise:
             P = P + noise * rng.standard_normal(P.shape)
-        found = measure(P, truth, arguments.sources, rng)
+        found = measure(P, truth, arguments.methods, arguments.sources, rng)
         rows.append({"shape": shape, "points": len(P), "noise": noise, **found})
         print(rows[-1], file=sys.stderr, flush=True)
 
@@ -170,7 +221,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not arguments.meshes:
         for shape, n, noise in product(arguments.shapes, arguments.sizes, arguments.noise):
             add(shape, noise, partial(SHAPES[shape], n))
-    methods = ("heat", "default", "unfold", "potpourri3d")
+    methods = arguments.methods
     head = ["points on", "number", "noise", *(f"{m}, %" for m in methods), *(f"{m}, s + s" for m in methods)]
     cells = [
         (

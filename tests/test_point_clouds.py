@@ -95,6 +95,8 @@ def test_nothing_depends_on_where_how_large_or_in_which_order() -> None:
     assert triangles(1e20 * P) == expected
     assert triangles(P @ turn.T + 1000) == expected
     assert {tuple(sorted(order[list(row)])) for row in triangles(P[order])} == expected
+    distance = HeatMethodSolver(PointCloud(P)).distance(0)
+    np.testing.assert_allclose(HeatMethodSolver(PointCloud(P + 1e6)).distance(0), distance, atol=1e-8)
 
 
 def test_a_grid_of_cocircular_points_has_no_gap() -> None:
@@ -185,6 +187,14 @@ def test_noise_is_taken_away_and_clean_points_stay() -> None:
     assert without_noise(detailed) is detailed
 
 
+def test_noise_of_many_spacings_is_taken_away() -> None:
+    """Where all neighbours lie within the noise, some of the points show the surface."""
+    P, noise = plane(10_000), 0.05
+    triangles = PointCloud(P + noise * np.random.default_rng(1).standard_normal(P.shape)).triangles
+    assert triangles.V[:, 2].std() < 0.2 * noise
+    assert np.unique(triangles.components).size == 1
+
+
 def test_more_neighbours_are_not_taken_where_the_surface_bends() -> None:
     """On a torus of radii 1 and 0.4 that 1500 points sample: 120 of them go half around the tube."""
     P = shapes.torus(240, 600).V
@@ -209,6 +219,43 @@ def test_an_outlier_is_unreachable_and_changes_nothing_else() -> None:
     assert np.isfinite(distance[:-1]).all()
     assert mean_error(distance[:-1], on_sphere(P, 0)) < 0.015
     assert cloud.report().unreferenced_vertices.tolist() == [2000]
+
+
+def test_one_point_in_a_hundred_is_an_outlier() -> None:
+    P = sphere(3000)
+    strays = np.random.default_rng(3).uniform(-2, 2, (30, 3))
+    found = HeatMethodSolver(PointCloud(np.concatenate([P, strays]))).distance(0)
+    assert (np.isinf(found[3000:]) | (np.abs(np.linalg.norm(strays, axis=1) - 1) < 0.2)).all()
+    assert mean_error(found[:3000], on_sphere(P, 0)) < 0.003
+
+
+def test_density_that_grows_a_hundredfold() -> None:
+    x, y = np.random.default_rng(0).random((2, 20_000))
+    for across in ((100**x - 1) / 99, np.where(x < 0.5, x / 50, 2 * x - 1)):
+        P = np.stack([across, y, np.zeros(len(x))], axis=1)
+        found = HeatMethodSolver(PointCloud(P)).distance(0)
+        assert mean_error(found, np.linalg.norm(P - P[0], axis=1)) < 0.005
+
+
+def test_rows_ten_times_as_far_apart_as_their_points() -> None:
+    x, y = np.meshgrid(np.linspace(0, 1, 200), np.linspace(0, 1, 20))
+    P = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+    P[:, 0] += np.random.default_rng(0).normal(0, 1e-3, len(P))
+    found = HeatMethodSolver(PointCloud(P)).distance(0)
+    assert mean_error(found, np.linalg.norm(P - P[0], axis=1)) < 0.01
+
+
+@pytest.mark.parametrize("n", [4, 5, 8, 12, 20])
+def test_few_points_in_a_plane(n: int) -> None:
+    """Distance is no shorter than a straight line, and equal to it if the way stays inside, as from most points."""
+    P = plane(n, seed=n)
+    cloud = PointCloud(P)
+    found = HeatMethodSolver(cloud).distance(0)
+    straight = np.linalg.norm(P - P[0], axis=1)
+    assert (found >= straight - 1e-12).all()
+    assert np.median(found - straight) < 1e-9
+    vectors = heat_igl.VectorHeatSolver(cloud, refine="unfold").log_map(0)
+    np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), found, atol=1e-9)
 
 
 def test_copies_of_a_point_are_at_distance_0_of_each_other() -> None:
@@ -356,11 +403,17 @@ def test_a_batch_on_dask_takes_clouds(tmp_path) -> None:
     zarr = pytest.importorskip("zarr")
     from heat_igl import cluster
 
-    cloud = PointCloud(sphere(300))
-    cluster.distances({"cloud": cloud}, [[0], [1]], tmp_path / "store", dtype="float64")
-    stored = [array for _, array in zarr.open_group(tmp_path / "store", mode="r")["cloud"].arrays() if array.ndim == 2]
-    expected = HeatMethodSolver(cloud).distances([0, 1])
-    assert any(a.shape == expected.shape and np.allclose(a[:], expected, atol=1e-9) for a in stored)
+    P = sphere(300)
+    clouds = {
+        "distinct": PointCloud(P),
+        "with copies": PointCloud(np.concatenate([P, P[:150]]), np.tile(P, (2, 1))[:450]),
+    }
+    cluster.distances(clouds, [[0], [1]], tmp_path / "store", dtype="float64")
+    for name, cloud in clouds.items():
+        group = zarr.open_group(tmp_path / "store", mode="r")[name]
+        stored = [array for _, array in group.arrays() if array.ndim == 2]
+        expected = HeatMethodSolver(cloud).distances([0, 1])
+        assert any(a.shape == expected.shape and np.allclose(a[:], expected, atol=1e-9) for a in stored)
 
 
 # Bad arguments.
@@ -560,6 +613,19 @@ def test_the_command_line_takes_clouds(tmp_path, kind: str, capsys) -> None:
     np.testing.assert_array_equal(np.load(out), expected)
     assert json.loads(capsys.readouterr().out)["point_cloud"]["n_vertices"] == 40
     assert cli.run(["info", str(path)]) == 0
+
+
+def test_the_command_line_takes_clouds_with_copies(tmp_path) -> None:
+    pytest.importorskip("typer")
+    pytest.importorskip("matplotlib")
+    P = sphere(300)
+    path, out, picture = tmp_path / "scan.npy", tmp_path / "out.npy", tmp_path / "out.png"
+    np.save(path, np.concatenate([P, P[::2]]))
+    assert cli.run(["distance", str(path), "--source=3", f"--output={out}", f"--picture={picture}"]) == 0
+    found = np.load(out)
+    np.testing.assert_array_equal(found[300:], found[:300:2])
+    np.testing.assert_allclose(found[:300], heat_igl.geodesic_distance(PointCloud(P), 3), atol=1e-5)
+    assert picture.stat().st_size > 1000
 
 
 def test_a_file_with_faces_is_a_mesh(tmp_path, capsys) -> None:

@@ -35,6 +35,8 @@ _NOISE = 0.05
 # Above this ratio of the two smaller variances, a neighbourhood is no disc: more points are needed to see the surface.
 _THICKNESS = 0.05
 _LARGEST_K = 120
+# Above this one the neighbourhood is a ball within the noise.
+_NO_SURFACE = 0.5
 _MOST_PASSES = 8
 # A pass that leaves more than this share of the noise is the last.
 _HARDLY_CHANGED = 0.9
@@ -175,16 +177,17 @@ def without_noise(tree: PointTree) -> PointTree:
 
     Points are noisy if neighbours deviate from the quadric by more than 1 / 20 of their spacing at half of the points,
     and this is not detail, from which a quadric of half as many neighbours would deviate by less. Then all points are
-    moved along their normals, until the deviation is smaller or hardly changes; the neighbours stay the same.
+    moved along their normals, until the deviation is smaller or hardly changes; the neighbours stay the same. Where
+    noise is many spacings, neighbours are first found among some of the points, and then among more.
     """
     n = len(tree.P)
     if n <= 4 * _K:
         return tree
     sample = np.unique(np.linspace(0, n - 1, _SAMPLE).astype(np.int64))
 
-    def of_sample(k: int) -> tuple[float, float]:
+    def of_sample(k: int, stride: int = 1) -> tuple[float, float]:
         """Medians of the noise and of the thickness."""
-        _, noise, thickness = _onto_quadrics(tree.P, _nearest(tree, sample, k))
+        _, noise, thickness = _onto_quadrics(tree.P, _nearest(tree, sample, k, stride))
         return float(np.median(noise)), float(np.median(thickness))
 
     few, _ = of_sample(_K // 2)
@@ -193,31 +196,62 @@ def without_noise(tree: PointTree) -> PointTree:
     noise, thickness = of_sample(_K)
     if few < _NOISE_NOT_DETAIL * noise:
         return tree
-    index = _nearest(tree, np.arange(n), _number_of_neighbours(of_sample, thickness, n))
-    P, before = tree.P, np.inf
+    moved = tree
+    for k, stride in _spreads(of_sample, thickness, n):
+        index = _nearest(moved, np.arange(n), k, stride)
+        moved = moved.moved(_smoothed(moved.P, index, sample))
+    return moved
+
+
+def _smoothed(P: FloatArray, index: IntArray, sample: IntArray) -> FloatArray:
+    """The points, moved onto quadrics of fixed neighbours until the noise of the sample is small or hardly changes."""
+    before = np.inf
     for _ in range(_MOST_PASSES):
         P = _onto_quadrics(P, index)[0]
         noise = float(np.median(_onto_quadrics(P, index[sample])[1]))
         if noise <= _NOISE or noise > _HARDLY_CHANGED * before:
             break
         before = noise
-    return tree.moved(P)
+    return P
 
 
-def _number_of_neighbours(of_sample: Callable[[int], tuple[float, float]], thickness: float, n: int) -> int:
-    """How many of n points show the surface: more than `_K` if noise thickens these, not if the surface bends."""
-    k, most = _K, min(_LARGEST_K, n // 4)
+def _spreads(of_sample: Callable[[int, int], tuple[float, float]], thickness: float, n: int) -> list[tuple[int, int]]:
+    """How many neighbours, and among every how many-th of n points, in the order in which they are taken.
+
+    More than `_K` if noise thickens these, and not if the surface bends. Where as many as are taken show no surface at
+    all, they are taken among fewer points first.
+    """
+    k, stride, most = _K, 1, min(_LARGEST_K, n // 4)
     found = {k: thickness}
     while thickness > _THICKNESS and k < most:
         k = min(2 * k, most)
-        _, thickness = of_sample(k)
+        _, thickness = of_sample(k, 1)
         found[k] = thickness
-    return min(found, key=found.__getitem__)
+    if thickness <= _NO_SURFACE:
+        return [(min(found, key=found.__getitem__), 1)]
+    while thickness > _NO_SURFACE / 2 and n // (4 * stride) >= 4 * k:
+        stride *= 4
+        _, thickness = of_sample(k, stride)
+    return [(k, stride), (k, 1)]
 
 
-def _nearest(tree: PointTree, chosen: IntArray, k: int) -> AnyArray:
-    """The indices (b, k + 1) int32 of some points of the tree and of their k neighbours."""
-    return np.concatenate(over_rows(lambda rows: tree.nearest(chosen[rows], k + 1)[0], len(chosen), _BLOCK))
+def _nearest(tree: PointTree, chosen: IntArray, k: int, stride: int = 1) -> AnyArray:
+    """The indices (b, k + 1) int32 of some points of the tree and of their k neighbours, among every `stride`-th."""
+    if stride == 1:
+        return np.concatenate(over_rows(lambda rows: tree.nearest(chosen[rows], k + 1)[0], len(chosen), _BLOCK))
+    from scipy.spatial import KDTree  # takes as long to import as the rest of the package
+
+    fewer = KDTree(tree.P[::stride])
+
+    def fill(rows: slice) -> AnyArray:
+        near: AnyArray = stride * fewer.query(tree.P[chosen[rows]], k + 1)[1].astype(np.int32)
+        # The point itself comes first: if it is not among them, in place of the farthest.
+        is_other = near[:, 0] != chosen[rows]
+        near[is_other, 1:] = near[is_other, :-1]
+        near[:, 0] = chosen[rows]
+        return near
+
+    return np.concatenate(over_rows(fill, len(chosen), _BLOCK))
 
 
 def _onto_quadrics(P: FloatArray, index: AnyArray) -> tuple[FloatArray, FloatArray, FloatArray]:
