@@ -212,7 +212,13 @@ def _number_of_neighbours(of_sample: Callable[[int], tuple[float, float]], thick
 
 def _nearest(tree: PointTree, chosen: IntArray, k: int) -> AnyArray:
     """The indices (b, k + 1) int32 of some points of the tree and of their k neighbours."""
-    return np.concatenate(over_rows(lambda rows: tree.nearest(chosen[rows], k + 1)[0], len(chosen), _BLOCK))
+    index = np.empty((len(chosen), k + 1), np.int32)
+
+    def fill(rows: slice) -> None:
+        index[rows], _ = tree.nearest(chosen[rows], k + 1)
+
+    over_rows(fill, len(chosen), _BLOCK)
+    return index
 
 
 def _onto_quadrics(P: FloatArray, index: AnyArray) -> tuple[FloatArray, FloatArray, FloatArray]:
