@@ -94,7 +94,7 @@ def test_a_point_of_a_paraboloid_stays_on_it() -> None:
     x, y = rng(8).uniform(-1, 1, (2, 20))
     x, y = np.append(x, -x), np.append(y, -y)
     P = np.stack([x, y, 0.3 * x**2 - 0.2 * x * y + 0.1 * y**2], axis=1)
-    P = np.append(np.zeros((1, 3)), P, axis=0) + [0, 0, 5]
+    P = np.append(np.zeros((1, 3)), P, axis=0) + np.array([0, 0, 5])
     for scale in (1, 1e-50, 1e50):
         moved, deviation, _ = onto_quadrics(scale * P, np.arange(41, dtype=np.int32)[None])
         np.testing.assert_allclose(moved / scale, P[:1], atol=1e-6)

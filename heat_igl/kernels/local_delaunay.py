@@ -98,7 +98,10 @@ def _neighbours_around(
         if _squared_distance(P, i, j) > 1.2 * reach:
             break
         flat: InPlane = in_plane(
-            cython.address(P[i, 0]), cython.address(axes[i, 0, 0]), cython.address(P[j, 0]), cython.address(axes[j, 0, 0])
+            cython.address(P[i, 0]),
+            cython.address(axes[i, 0, 0]),
+            cython.address(P[j, 0]),
+            cython.address(axes[j, 0, 0]),
         )
         x, y = flat.x, flat.y
         square: cython.double = x * x + y * y

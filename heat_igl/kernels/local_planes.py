@@ -141,9 +141,7 @@ def _axes(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def principal(
-    work: cython.double[:, ::1], axes: cython.double[:, ::1], variances: cython.double[::1]
-) -> cython.void:
+def principal(work: cython.double[:, ::1], axes: cython.double[:, ::1], variances: cython.double[::1]) -> cython.void:
     """The axes of most, less and least variance, and the variances, ascending, of the covariance in rows 0 to 2."""
     x: cython.int
     y: cython.int

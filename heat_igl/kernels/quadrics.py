@@ -99,29 +99,27 @@ def _covariance(local: cython.double[:, ::1], work: cython.double[:, ::1]) -> cy
     """The covariance in rows 0 to 2 of `work`, and the sum of the weights in row 3."""
     part: cython.double[40]
     sums: cython.double[10]
-    j: cython.Py_ssize_t
-    block: cython.Py_ssize_t
-    lane: cython.Py_ssize_t
     c: cython.Py_ssize_t
+    lane: cython.Py_ssize_t
+    block: cython.Py_ssize_t
     for c in range(10 * LANES):
         part[c] = 0.0
     for block in range(local.shape[1] // LANES):
-        j = LANES * block
         for lane in range(LANES):
-            x: cython.double = local[0, j + lane]
-            y: cython.double = local[1, j + lane]
-            z: cython.double = local[2, j + lane]
-            w: cython.double = local[3, j + lane]
-            part[lane] += w
-            part[LANES + lane] += w * x
-            part[2 * LANES + lane] += w * y
-            part[3 * LANES + lane] += w * z
-            part[4 * LANES + lane] += w * x * x
-            part[5 * LANES + lane] += w * x * y
-            part[6 * LANES + lane] += w * x * z
-            part[7 * LANES + lane] += w * y * y
-            part[8 * LANES + lane] += w * y * z
-            part[9 * LANES + lane] += w * z * z
+            j: cython.Py_ssize_t = LANES * block + lane
+            wx: cython.double = local[3, j] * local[0, j]
+            wy: cython.double = local[3, j] * local[1, j]
+            wz: cython.double = local[3, j] * local[2, j]
+            part[lane] += local[3, j]
+            part[LANES + lane] += wx
+            part[2 * LANES + lane] += wy
+            part[3 * LANES + lane] += wz
+            part[4 * LANES + lane] += wx * local[0, j]
+            part[5 * LANES + lane] += wx * local[1, j]
+            part[6 * LANES + lane] += wx * local[2, j]
+            part[7 * LANES + lane] += wy * local[1, j]
+            part[8 * LANES + lane] += wy * local[2, j]
+            part[9 * LANES + lane] += wz * local[2, j]
     for c in range(10):
         sums[c] = 0.0
         for lane in range(LANES):
