@@ -1,13 +1,7 @@
-cdef enum:
-    # Sums over neighbours are taken in so many parts, which vectors hold.
-    LANES = 4
-
 cdef extern from *:
     """
     // Least weight of a neighbour.
     #define LEAST_WEIGHT 1e-3
-    // Points on a line leave a quadric undetermined; so much on the diagonal, per neighbour, makes the smallest one.
-    #define DIAGONAL 1e-9
     // Lengths are divided by no less.
     #define TINY 2.3e-308
     // Ratio of the two smaller variances above which fewer neighbours are tried, and the share of it that these must
@@ -15,4 +9,6 @@ cdef extern from *:
     #define BENT 0.02
     #define FLATTER 0.7
     """
-    double LEAST_WEIGHT, DIAGONAL, TINY, BENT, FLATTER
+    double LEAST_WEIGHT, TINY, BENT, FLATTER
+
+cdef void principal(double[:, ::1] work, double[:, ::1] axes, double[::1] variances) noexcept nogil

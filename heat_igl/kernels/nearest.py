@@ -296,7 +296,10 @@ class LeafSearch:
     @cython.nogil
     @cython.exceptval(check=False)
     def sort(self, size: cython.Py_ssize_t) -> cython.void:
-        """Sort the points in shells by distance, those that are as far by number: by insertion, as few are misplaced."""
+        """Sort the points in shells by distance: by insertion, since few are misplaced.
+
+        Equal distances stay in the order in which leaves are found, which is that of the numbers.
+        """
         keys: cython.pointer[cython.double] = cython.address(self.keys[0])
         values: cython.pointer[cython.int] = cython.address(self.values[0])
         j: cython.Py_ssize_t
@@ -304,7 +307,7 @@ class LeafSearch:
             key: cython.double = keys[j]
             value: cython.int = values[j]
             b: cython.Py_ssize_t = j
-            while b > 0 and (keys[b - 1] > key or (keys[b - 1] == key and values[b - 1] > value)):
+            while b > 0 and keys[b - 1] > key:
                 keys[b], values[b] = keys[b - 1], values[b - 1]
                 b -= 1
             keys[b], values[b] = key, value

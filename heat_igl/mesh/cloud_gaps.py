@@ -38,11 +38,14 @@ def with_gaps_closed(P: FloatArray, F: IntArray, near: Neighbourhoods, is_settle
     largest = _LARGEST_GAP * near.radius
     for _ in range(_MOST_ROUNDS):
         ears = _ears(P, _outer_edges(F, is_settled), near.axes, largest)
-        both = np.concatenate([F, ears])
-        fits = fitting_triangles(P, near.axes, both, len(F))
-        if fits.sum() == len(F):
+        # Only triangles with a corner in common may overlap.
+        is_near = np.zeros(len(P), bool)
+        is_near[ears] = True
+        around = F[is_near[F].any(axis=1)]
+        fits = fitting_triangles(P, near.axes, np.concatenate([around, ears]), len(around))[len(around) :]
+        if not fits.any():
             break
-        F = both[fits]
+        F = np.concatenate([F, ears[fits]])
     return np.concatenate([F, _three_sided(P, _outer_edges(F, is_settled), largest)])
 
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heat_igl.kernels.local_planes import farthest_last, onto_quadrics, principal_axes, tangent_planes
+from heat_igl.kernels.local_planes import principal_axes, tangent_planes
 from heat_igl.kernels.nearest import leaf_boxes, nearest_points
+from heat_igl.kernels.quadrics import onto_quadrics
 from heat_igl.mesh.sheets import axes_along, one_sheet
 from heat_igl.runtime import over_rows
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -257,17 +258,14 @@ def _nearest(tree: PointTree, chosen: IntArray, k: int, stride: int = 1) -> AnyA
 def _onto_quadrics(P: FloatArray, index: AnyArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Points (b, 3), moved onto quadrics that are fitted to their neighbours.
 
-    In each row of `index` (b, k + 1), the point comes first; the farthest of its neighbours is brought to the end.
-    Also returns the noise (b,) in shares of the spacing, and the ratio (b,) of the two smaller variances.
+    In each row of `index` (b, k + 1), the point comes first. Also returns the noise (b,) in shares of the spacing, and
+    the ratio (b,) of the two smaller variances.
     """
     b, k = len(index), index.shape[1] - 1
     moved, noise, thickness = np.empty((b, 3)), np.empty(b), np.empty(b)
 
     def fill(rows: slice) -> None:
-        square = farthest_last(P, index[rows])
-        axes, variances = principal_axes(P, index[rows], square)
-        moved[rows], noise[rows] = onto_quadrics(P, index[rows], square, axes)
-        thickness[rows] = variances[:, 0] / np.maximum(variances[:, 1], np.finfo(float).tiny)
+        moved[rows], noise[rows], thickness[rows] = onto_quadrics(P, index[rows])
 
     over_rows(fill, b, _BLOCK)
     return moved, noise * np.sqrt(k / np.pi), thickness
