@@ -123,8 +123,10 @@ class PreparedSolver(BatchedSolver):
                 "this solver was made from operators and has no vertices to move: use from_operators again"
             )
         moved = self._mesh.with_vertices(V)
-        prepared = prepare_points if isinstance(moved, PointCloud) else prepare_mesh
-        return self._of(prepared(moved, self._parts.options, self._parts.analysis), moved)
+        options, known = self._parts.options, self._parts.analysis
+        if isinstance(moved, PointCloud):
+            return self._of(prepare_points(moved, options, known), moved)
+        return self._of(prepare_mesh(moved, options, known), moved)
 
     def _set_up(self, mesh: Mesh | PolygonMesh | PointCloud, options: SolverOptions) -> None:
         if isinstance(mesh, PointCloud):

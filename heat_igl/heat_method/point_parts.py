@@ -87,9 +87,7 @@ class _SweptParts(SolverParts):
             options=options,
             analysis=None,
             factored=None,
-            last_steps=UnfoldingSolver(
-                _SweptSurface(mesh, surface), "sweep", originals=originals, orders_itself=True
-            ),
+            last_steps=UnfoldingSolver(_SweptSurface(mesh, surface), "sweep", originals=originals, orders_itself=True),
             originals=originals,
             checker=Checker(surface, referenced, cloud.V),
             _mesh=mesh,

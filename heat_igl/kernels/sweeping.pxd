@@ -14,4 +14,7 @@ cdef enum:
     GIVE_UP = 50
     # Spokes that a processor keeps in its own cache.
     CACHED = 1 << 14
+    # Sides of the triangles at a vertex that straight lines cross: more are held only for a moment.
     SIDES = 16
+    # A front knows so many vertices in advance, whose data can be fetched meanwhile.
+    AHEAD = 4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Protocol
 
 import igl
@@ -360,21 +360,14 @@ class UnfoldingSolver:
             return found.distance
         if asked.angles is not None:
             return self._directed_walks(self._refinement, u, asked)
-        unfolded = self._refinement.unfold
+        starts = asked.vertices, asked.offsets, asked.points, asked.point_offsets, asked.labels
         if self._sweeps:
             # Which point of a curve is nearest is not known.
             known = None if groups is not None else known_of(asked, near)
-            unfolded = partial(self._refinement.sweep, known=known, groups=groups)
-        elif asked.tolerance is not None:
-            unfolded = partial(unfolded, tolerance=asked.tolerance)
-        return unfolded(
-            None if self._orders_itself else -u,
-            asked.vertices,
-            offsets=asked.offsets,
-            points=asked.points,
-            point_offsets=asked.point_offsets,
-            labels=asked.labels,
-        )
+            key = None if self._orders_itself else -u
+            return self._refinement.sweep(key, *starts, known=known, groups=groups)
+        tolerance = TOLERANCE if asked.tolerance is None else asked.tolerance
+        return self._refinement.unfold(-u, starts[0], tolerance, *starts[1:])
 
     def _directed_walks(self, refinement: Refinement, u: FloatArray, asked: Asked) -> FloatArray:
         directions = self.path_directions  # refuses surfaces without tangent planes, before there are walks
