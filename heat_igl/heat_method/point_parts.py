@@ -77,27 +77,31 @@ class _SweptParts(SolverParts):
     """
 
     def __init__(self, cloud: PointCloud, options: SolverOptions) -> None:
+        start = time.perf_counter()
         mesh = cloud.distinct_triangles
         surface = unfolding_surface(mesh)
         originals = cloud.originals if cloud.has_copies else None
         referenced = np.zeros(mesh.n_vertices, bool)
         referenced[mesh.F] = True
+        sweep = UnfoldingSolver(_SweptSurface(mesh, surface), "sweep", originals=originals, orders_itself=True)
         # Nothing is set after this; a frozen dataclass refuses even what the constructor sets.
         self.__dict__.update(
             options=options,
             analysis=None,
             factored=None,
-            last_steps=UnfoldingSolver(_SweptSurface(mesh, surface), "sweep", originals=originals, orders_itself=True),
+            last_steps=sweep,
             originals=originals,
             checker=Checker(surface, referenced, cloud.V),
             _mesh=mesh,
             _V=cloud.V,
             _surface=surface,
+            _seconds=time.perf_counter() - start,
         )
 
     _mesh: Mesh
     _V: FloatArray
     _surface: Surface
+    _seconds: float
 
     def __getattr__(self, name: str) -> Any:
         # Called for what the constructor has not set.
@@ -110,7 +114,7 @@ class _SweptParts(SolverParts):
         """All parts, with operators and without factors."""
         start, sweep = time.perf_counter(), self.last_steps
         domain = operators(self._mesh, self.options.triangulation)
-        seconds = time.perf_counter() - start
+        seconds = self._seconds + time.perf_counter() - start
         unfolding = sweep if isinstance(sweep, UnfoldingSolver) else None
         return prepare(domain, self.options, lambda: None, seconds, self._V, self.originals, unfolding)
 
