@@ -60,11 +60,13 @@ class _SweptSurface:
     def components(self) -> IntArray:
         return self.mesh.components
 
-    @property
+    @cached_property
     def mean_edge_length(self) -> float:
         return self.surface.triangulation.mean_edge_length
 
     def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
+        if len(of_component) == 1:
+            return np.broadcast_to(of_component, self.mesh.n_vertices)
         return np.asarray(of_component[self.components])
 
 

@@ -252,15 +252,15 @@ class UnfoldingSolver:
         else:
             near = None if takes_curves else self._near(relative, by_windows)
             distance = self._unfolded(u, asked, near, groups, by_windows)
-        start = self._domain.expand_to_vertices(earliest)
         if sources.offsets.any():
-            distance += start
+            distance += self._domain.expand_to_vertices(earliest)
         if origin is not None and labels is not None:
             origin[:] = labels
         if labels is not None:
             labels[:] = labels_of(sources, points)[labels]
         if near is not None:
             at = np.flatnonzero(np.isfinite(near.distance))
+            start = self._domain.expand_to_vertices(earliest)
             distance[at] = start[at] + near.distance[at]
             if labels is not None:
                 labels[at] = labels_of(sources, sources.points)[near.origin.label[at]]
