@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,8 +16,9 @@ from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh
 from heat_igl.linear import Analysis
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.operators import Surface, operators, unfolding_surface
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding import UnfoldingSolver
+from heat_igl.unfolding.distance import MeshDomain
 
 __all__ = ["prepare_points"]
 
@@ -49,25 +50,13 @@ def _t_coef_of_points(triangles: Mesh) -> float:
     return _T_COEF_RANDOM if is_random else _T_COEF_EVEN
 
 
-@dataclass(frozen=True, eq=False)
-class _SweptSurface:
+class _SweptSurface(MeshDomain):
     """Triangles of points as `UnfoldingSolver` takes them, before there are operators."""
-
-    mesh: Mesh
-    surface: Surface
-
-    @property
-    def components(self) -> IntArray:
-        return self.mesh.components
 
     @cached_property
     def mean_edge_length(self) -> float:
+        """Mean length of the edges that are unfolded across, as operators have it."""
         return self.surface.triangulation.mean_edge_length
-
-    def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
-        if len(of_component) == 1:
-            return np.broadcast_to(of_component, self.mesh.n_vertices)
-        return np.asarray(of_component[self.components])
 
 
 class _SweptParts(SolverParts):
