@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,8 +16,9 @@ from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh
 from heat_igl.linear import Analysis
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.operators import Surface, operators, unfolding_surface
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding import UnfoldingSolver
+from heat_igl.unfolding.distance import MeshDomain
 
 __all__ = ["prepare_points"]
 
@@ -49,23 +50,13 @@ def _t_coef_of_points(triangles: Mesh) -> float:
     return _T_COEF_RANDOM if is_random else _T_COEF_EVEN
 
 
-@dataclass(frozen=True, eq=False)
-class _SweptSurface:
+class _SweptSurface(MeshDomain):
     """Triangles of points as `UnfoldingSolver` takes them, before there are operators."""
 
-    mesh: Mesh
-    surface: Surface
-
-    @property
-    def components(self) -> IntArray:
-        return self.mesh.components
-
-    @property
+    @cached_property
     def mean_edge_length(self) -> float:
+        """Mean length of the edges that are unfolded across, as operators have it."""
         return self.surface.triangulation.mean_edge_length
-
-    def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
-        return np.asarray(of_component[self.components])
 
 
 class _SweptParts(SolverParts):
@@ -77,27 +68,31 @@ class _SweptParts(SolverParts):
     """
 
     def __init__(self, cloud: PointCloud, options: SolverOptions) -> None:
+        start = time.perf_counter()
         mesh = cloud.distinct_triangles
         surface = unfolding_surface(mesh)
         originals = cloud.originals if cloud.has_copies else None
         referenced = np.zeros(mesh.n_vertices, bool)
         referenced[mesh.F] = True
+        sweep = UnfoldingSolver(_SweptSurface(mesh, surface), "sweep", originals=originals, orders_itself=True)
         # Nothing is set after this; a frozen dataclass refuses even what the constructor sets.
         self.__dict__.update(
             options=options,
             analysis=None,
             factored=None,
-            last_steps=UnfoldingSolver(_SweptSurface(mesh, surface), "sweep", originals=originals, orders_itself=True),
+            last_steps=sweep,
             originals=originals,
             checker=Checker(surface, referenced, cloud.V),
             _mesh=mesh,
             _V=cloud.V,
             _surface=surface,
+            _seconds=time.perf_counter() - start,
         )
 
     _mesh: Mesh
     _V: FloatArray
     _surface: Surface
+    _seconds: float
 
     def __getattr__(self, name: str) -> Any:
         # Called for what the constructor has not set.
@@ -110,7 +105,7 @@ class _SweptParts(SolverParts):
         """All parts, with operators and without factors."""
         start, sweep = time.perf_counter(), self.last_steps
         domain = operators(self._mesh, self.options.triangulation)
-        seconds = time.perf_counter() - start
+        seconds = self._seconds + time.perf_counter() - start
         unfolding = sweep if isinstance(sweep, UnfoldingSolver) else None
         return prepare(domain, self.options, lambda: None, seconds, self._V, self.originals, unfolding)
 

@@ -42,6 +42,7 @@ class HeatMethodSolver(PreparedSolver):
         `polygon_operators`, and with `refine` on their triangles. Tetrahedra take fronts instead of heat
         (`FrontSolver`), unless `magnitude`, a time step, a `boundary` or ``laplacian="cotan"`` is named. Points without
         faces take ``refine="sweep"``, unless one of these or any `laplacian` is named: ``magnitude="damped"`` is heat.
+        That sweep follows a front of its own, and operators and factors are made when something asks for them.
     F : (m, 3) or (m, 4) array_like, optional
         Faces, when `mesh` is V.
     t_coef : float, optional

@@ -3,6 +3,8 @@
 # Keys beyond the last band of the ring wait in that one, and are put again when it comes. A vertex may be there several
 # times. The order inside a band is that in which vertices were put.
 
+from libc.math cimport INFINITY, floor
+
 cdef enum:
     BANDS = 1024
 
@@ -50,14 +52,40 @@ cdef inline void put(FrontQueue* q, int vertex, double key) noexcept nogil:
     q.n_waiting += 1
 
 
+cdef inline void leap(FrontQueue* q, const double* key) noexcept nogil:
+    # Go on to the nearest band in which a vertex waits: all of them are far ahead.
+    cdef int slot, place, following
+    cdef int left = -1
+    cdef double nearest = INFINITY
+    for slot in range(BANDS):
+        place = q.first[slot]
+        q.first[slot] = -1
+        while place >= 0:
+            following = q.place[place].following
+            nearest = min(nearest, key[q.place[place].vertex])
+            q.place[place].following = left
+            left = place
+            place = following
+    q.band = floor(nearest * q.per_length)
+    while left >= 0:
+        following = q.place[left].following
+        append(q, left, key[q.place[left].vertex])
+        left = following
+
+
 cdef inline int take(FrontQueue* q, const double* key) noexcept nogil:
     # Take a vertex of the nearest band; -1 if none is left. `key` is the distance of each.
     cdef int slot, place
+    cdef int n_passed = 0
     while q.n_waiting > 0:
         slot = <int> (<long long> q.band & (BANDS - 1))
         place = q.first[slot]
         if place < 0:
             q.band += 1.0
+            n_passed += 1
+            if n_passed == BANDS:
+                n_passed = 0
+                leap(q, key)
             continue
         q.first[slot] = q.place[place].following
         if key[q.place[place].vertex] * q.per_length >= q.band + 1.0:

@@ -63,11 +63,9 @@ cdef inline double across_two(double da, double db, double dw, const Spoke* s) n
     cdef double ux = s.along - wx
     cdef double uy = s.height + wy
     cdef bint is_right = ux * (y + s.height) < uy * (s.along - x)
-    # Read from places, since a choice between values would be a branch.
-    cdef double* at = [da, db, 0.0, s.base, 1.0, -1.0]
-    cdef double sign = at[5 - is_right]
-    cdef double px = at[3 - is_right]
-    cdef double dp = at[1 - is_right]
+    cdef double sign = 1.0 if is_right else -1.0
+    cdef double px = 0.0 if is_right else s.base
+    cdef double dp = da if is_right else db
     cdef double ex = wx - px
     cdef double square = ex * ex + wy * wy
     if not sign * (y * ex - (x - px) * wy) > CLOSE * square:

@@ -12,6 +12,9 @@ cdef enum:
     # all, a random one 20 to 40.
     GO_BACK = 10
     GIVE_UP = 50
-    # Spokes that a processor keeps in its own cache.
-    CACHED = 1 << 14
+    # Spokes up to which it costs more to fetch them ahead of time than to wait for them.
+    CACHED = 1 << 15
+    # Sides of the triangles at a vertex that straight lines cross: more are held only for a moment.
     SIDES = 16
+    # A front knows so many vertices in advance, whose data can be fetched meanwhile.
+    AHEAD = 4

@@ -1,4 +1,4 @@
-"""Kernel of the sweep: distance by unfolding two triangles at a time, in a given order.
+"""Kernel of the sweep: distance by unfolding two triangles at a time, in a given order or in that of a front.
 
 Seen from a vertex v, a source lies behind the side ab of a triangle at v, at the intersection of circles about a and b.
 The triangle beyond ab has the third corner w, which is nearer to the source and so places it more accurately:
@@ -19,7 +19,7 @@ from cython.cimports.heat_igl.kernels.planar_updates import (
     over_one,
 )
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
-from cython.cimports.heat_igl.kernels.sweeping import SIDES, CACHED, GIVE_UP, GO_BACK, NEGLIGIBLE, SWEEP_ROUNDING
+from cython.cimports.heat_igl.kernels.sweeping import AHEAD, CACHED, GIVE_UP, GO_BACK, NEGLIGIBLE, SIDES, SWEEP_ROUNDING
 from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["sweep"]
@@ -39,6 +39,10 @@ def sweep(
 ):
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, in the given order.
 
+    `order` (n,) int32 may be None. Then a front finds it, as Dijkstra's algorithm would with the values of the sweep:
+    the next vertex is the nearest one, along an edge, to those that were visited. Vertices in a band of the given width
+    may come in any order, so that they need no heap.
+
     If a vertex turns out to be nearer than one that came before it, the sweep goes back to that one at once, before
     the error there spreads. Returns the number of visits per vertex. Vertices that are not in `is_stale` (n,) bool
     are visited only if a value that they depend on changes.
@@ -52,9 +56,10 @@ def sweep(
     n = d.shape[0]
     one = _Sweep()
     one.t = HalfEdges(tables)
+    one.is_large = one.t.spoke.shape[0] > CACHED
     one.d, one.is_stale, one.offset, one.group = d, is_stale, offset, group
     if order is None:
-        one.n_ordered = 0
+        one.n_ordered = one.n_passed = 0
         one.order, one.rank = np.empty(n, np.int32), np.full(n, n, np.int32)
         one.key, one.waiting = np.full(n, np.inf), np.empty(one.t.spoke.shape[0] + n, _WAITING)
         one.put_known(width)
@@ -74,12 +79,18 @@ def sweep(
 @cython.final
 @cython.cclass
 class _Sweep:
-    """Arrays that a sweep reads and writes; by vertex but for `order`, the vertices, and `offset`, by source."""
+    """Arrays that a sweep reads and writes; by vertex but for `order`, the vertices, and `offset`, by source.
+
+    Of a front, the first `n_ordered` entries of `order` are known, and vertices beyond them have rank n. The neighbours
+    of the first `n_passed` are in the queue `ahead`, by their `key`, the distance along an edge.
+    """
 
     t: HalfEdges
     order: cython.int[::1]
     rank: cython.int[::1]
+    is_large: cython.bint
     n_ordered: cython.Py_ssize_t
+    n_passed: cython.Py_ssize_t
     key: cython.double[::1]
     waiting: Waiting[::1]
     ahead: FrontQueue
@@ -102,16 +113,17 @@ class _Sweep:
         again: cython.Py_ssize_t = n  # rank to begin at once more when the end is reached
         back: cython.Py_ssize_t
         v: cython.int
-        is_large: cython.bint = self.t.spoke.shape[0] > CACHED
         self.n_visits = 0
         while self.n_visits < GIVE_UP * n:
-            if i == self.n_ordered and not self.goes_on():
+            if i + AHEAD > self.n_ordered and self.n_ordered < n:
+                self.order_ahead(i)
+            if i == self.n_ordered:
                 if again == n:
                     break
                 i, again = again, n
             v = self.order[i]
             i += 1
-            if is_large:
+            if self.is_large:
                 self.read_ahead(i)
             if not self.is_stale[v]:
                 continue
@@ -139,30 +151,37 @@ class _Sweep:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def goes_on(self) -> cython.bint:
-        """Let the front go on to the next vertex, by the edges from those that it has passed; false at the end."""
-        n: cython.Py_ssize_t = self.order.shape[0]
-        k: cython.int
+    def order_ahead(self, i: cython.Py_ssize_t) -> cython.void:
+        """Let the front go on until it is known which vertices come after rank i, or it has met all."""
         v: cython.int
-        if self.n_ordered == n:
-            return False
-        if self.n_ordered > 0:
-            v = self.order[self.n_ordered - 1]
-            for k in range(self.t.first[v], self.t.first[v + 1]):
-                s = cython.address(self.t.spoke[k])
-                key: cython.double = self.d[v] + s.length
-                if key < self.key[s.neighbour]:
-                    self.key[s.neighbour] = key
-                    put(cython.address(self.ahead), s.neighbour, key)
-        while True:
+        while self.n_passed + 1 < i:
+            self.reach_neighbours()
+        while self.n_ordered < i + AHEAD:
             v = take(cython.address(self.ahead), cython.address(self.key[0]))
             if v < 0:
-                return False
-            if self.rank[v] == n:
+                if self.n_ordered > i or self.n_passed == i:
+                    return
+                self.reach_neighbours()
+            elif self.rank[v] == self.order.shape[0]:
                 self.order[self.n_ordered] = v
                 self.rank[v] = self.n_ordered
                 self.n_ordered += 1
-                return True
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def reach_neighbours(self) -> cython.void:
+        """Put the neighbours of the next vertex that the front has passed into the queue."""
+        k: cython.int
+        v: cython.int = self.order[self.n_passed]
+        self.n_passed += 1
+        for k in range(self.t.first[v], self.t.first[v + 1]):
+            s = cython.address(self.t.spoke[k])
+            key: cython.double = self.d[v] + s.length
+            if key < self.key[s.neighbour]:
+                self.key[s.neighbour] = key
+                put(cython.address(self.ahead), s.neighbour, key)
 
     @cython.cfunc
     @cython.inline
@@ -170,7 +189,6 @@ class _Sweep:
     @cython.exceptval(check=False)
     def read_ahead(self, i: cython.Py_ssize_t) -> cython.void:
         """Prefetch the data of the next visits: on large meshes that takes longer than the visits."""
-        n: cython.Py_ssize_t = self.order.shape[0]
         k: cython.int
         v: cython.int
         if i + 3 < self.n_ordered:
@@ -208,10 +226,10 @@ class _Sweep:
         All triangles are computed and the best is chosen without branches, which at random cost more than arithmetic.
         """
         k: cython.int
-        j: cython.int
         spoke: cython.int = self.t.first[v]
         best: cython.double = self.d[v]
         across: cython.double = INFINITY  # squared
+        # The sides that a straight line crosses, with the squared distance; mostly one or two.
         found: cython.double[SIDES]
         at: cython.int[SIDES]
         n_found: cython.int = 0
@@ -224,10 +242,11 @@ class _Sweep:
             at[n_found] = k
             n_found += crosses_side(da, db, s, cython.address(found[n_found])) & ((da < best) | (db < best))
             if n_found == SIDES:
-                break
-        for j in range(n_found):
-            if found[j] < across:
-                spoke, across = at[j], found[j]
+                n_found = _keep_smallest(found, at)
+        # By branches, which the processor mostly guesses, and so goes on before the values are there.
+        for k in range(n_found):
+            if found[k] < across:
+                spoke, across = at[k], found[k]
         across = sqrt(across)
         if across < best:
             across = self.seen_from_beyond(spoke, across, cython.NULL)
@@ -417,3 +436,15 @@ class _Sweep:
     def kept(self, v: cython.int) -> cython.double:
         """The part of v's distance that a shorter one must fall below to count."""
         return 1 - SWEEP_ROUNDING if self.is_flat[v] else 1 - NEGLIGIBLE
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _keep_smallest(values: cython.pointer[cython.double], at: cython.pointer[cython.int]) -> cython.int:
+    """Keep the smallest of `SIDES` values, and the place of it; returns how many are left, one."""
+    i: cython.int
+    for i in range(1, SIDES):
+        if values[i] < values[0]:
+            values[0], at[0] = values[i], at[i]
+    return 1

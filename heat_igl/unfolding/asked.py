@@ -117,7 +117,12 @@ def starting_points(corner: IntArray, points: SourcePoints, origin: IntArray) ->
 
 
 def from_earliest(sources: SourceSet, components: IntArray, F: IntArray) -> tuple[FloatArray, SourceSet]:
-    """When distance begins on each component (n_components,), and the sources with their offsets from there."""
+    """When distance begins on each component (n_components,), and the sources with their offsets from there.
+
+    On components without sources it never does, and any value will do.
+    """
+    if sources.on_vertices_alone and not sources.vertex_offset.any():
+        return np.zeros(int(components.max()) + 1), sources
     points, segments = sources.points, sources.segments
     places = [components[at] for at in (sources.vertices, F[points.faces, 0], F[segments.faces, 0])]
     offsets = [sources.vertex_offset, points.offset, segments.offset]

@@ -33,7 +33,7 @@ from heat_igl.unfolding.refinement import Refine
 from heat_igl.unfolding.single_query import single_query
 from heat_igl.unfolding.solver import UnfoldingSolver
 
-__all__ = ["directed_from_scratch", "distance_from_scratch", "distance_to_targets", "unfolded_distance"]
+__all__ = ["MeshDomain", "directed_from_scratch", "distance_from_scratch", "distance_to_targets", "unfolded_distance"]
 
 # Up to so many vertices, one exact query from vertices takes half to all of the time of an unfolded one on meshes of
 # objects, and 1.5 times on a fine sphere: the tables of the windows are made faster.
@@ -158,7 +158,7 @@ def _prepared(
     mesh: Mesh, chosen: SourceSet, refine: Refine, tolerance: float | None, cutoff: float
 ) -> tuple[UnfoldingSolver, FloatArray]:
     """A solver for one set of sources, and an order of the vertices."""
-    domain = _Domain(mesh, unfolding_surface(mesh))
+    domain = MeshDomain(mesh, unfolding_surface(mesh))
     solver = UnfoldingSolver(domain, refine, tolerance, cutoff)
     return solver, np.zeros(mesh.n_vertices) if solver.is_exact else -_along_edges(domain, chosen)
 
@@ -238,7 +238,7 @@ def _within_reach(mesh: Mesh, sources: SourceSet, cutoff: float) -> BoolArray:
 
 
 @dataclass(frozen=True, eq=False)
-class _Domain:
+class MeshDomain:
     """A mesh as `UnfoldingSolver` takes it."""
 
     mesh: Mesh
@@ -246,22 +246,26 @@ class _Domain:
 
     @property
     def components(self) -> IntArray:
+        """Component label (n,) of each vertex."""
         return self.mesh.components
 
     @cached_property
     def mean_edge_length(self) -> float:
+        """Mean length of the edges of the mesh."""
         return float(self.mesh.edge_lengths.mean())
 
     @cached_property
     def near_field(self) -> NearField:
+        """Straight lines on the faces of the mesh."""
         faces = self.surface.unfolding if self.surface.faces is None else self.surface.faces
         return NearField(faces)
 
     def expand_to_vertices(self, of_component: AnyArray) -> AnyArray:
+        """The value (n,) of each vertex's component."""
         return np.asarray(of_component[self.components])
 
 
-def _along_edges(domain: _Domain, sources: SourceSet) -> FloatArray:
+def _along_edges(domain: MeshDomain, sources: SourceSet) -> FloatArray:
     """Length (n,) of the shortest path along edges from the sources, whose points reach the corners of their faces."""
     mesh = domain.mesh
     if sources.on_vertices_alone and not sources.vertex_offset.any():

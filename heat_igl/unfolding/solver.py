@@ -204,7 +204,6 @@ class UnfoldingSolver(OrderedSolver):
         """
         # Tolerances are relative to the distance: the common part is added afterwards.
         earliest, relative = from_earliest(sources, self._domain.components, self._given_faces)
-        start = self._domain.expand_to_vertices(earliest)
         by_windows = self._takes_windows(sources)
         walks = None if by_windows or angles is not None else self._walks_of(relative)
         near: ExactSolution | None = None
@@ -220,13 +219,14 @@ class UnfoldingSolver(OrderedSolver):
             by_windows = by_windows or (angles is not None and directions_by_windows(len(u), asked.tolerance))
             near, distance = self._with_near(u, asked, relative, by_windows)
         if sources.offsets.any():
-            distance += start
+            distance += self._domain.expand_to_vertices(earliest)
         if origin is not None and labels is not None:
             origin[:] = labels
         if labels is not None:
             labels[:] = labels_of(sources, points)[labels]
         if near is not None:
             at = np.flatnonzero(np.isfinite(near.distance))
+            start = self._domain.expand_to_vertices(earliest)
             distance[at] = start[at] + near.distance[at]
             if labels is not None:
                 labels[at] = labels_of(sources, sources.points)[near.origin.label[at]]

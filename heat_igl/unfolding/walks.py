@@ -130,7 +130,7 @@ def sweep(
     Parameters
     ----------
     order : (n,) int32 or None
-        Vertices, near ones first. None to find them on the way: those next to vertices that were visited, nearest first.
+        Vertices, near ones first. None to find them on the way: those next to visited vertices, nearest first.
     t : Tables
         The triangulation.
     d : (n,) float64
