@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.bends import BESIDE, LEVEL, MOST_ROUNDS, SLACK
+from cython.cimports.heat_igl.kernels.bends import LEVEL, MOST_ROUNDS, SLACK
 from cython.cimports.heat_igl.kernels.bent_ways import GAIN
 from cython.cimports.heat_igl.kernels.bodies import Body
 from cython.cimports.heat_igl.kernels.fitted_bends import FittedBends
@@ -36,6 +36,7 @@ def bend_around(
     outward: cython.const[cython.double][:, ::1],
     wall: cython.const[cython.double][::1],
     body: Body,
+    beside: cython.double,
     sources: cython.const[cython.int][::1],
     offset: cython.const[cython.double][::1],
     d: cython.double[::1],
@@ -60,6 +61,9 @@ def bend_around(
         Cosine of the angle between that direction and the walls.
     body : Body
         Tetrahedra.
+    beside : float
+        Share of the longest edge at a vertex by which it may lie beside the part of the body that an edge hides, and
+        the search still goes on behind it: a larger one finds more of what is hidden in coarse bodies, and takes time.
     sources, offset : (k,) int32, (k,) float64
         Vertex of each source, and the value at which distance begins there.
     d, begin, label : (n,) float64, (n,) float64, (n,) int32
@@ -86,7 +90,7 @@ def bend_around(
     one.bends = all_bends
     one.corners, one.first, one.incident, one.positions = body.corners, body.first, body.incident, body.positions
     one.first_neighbour, one.neighbours, one.reach = body.first_neighbour, body.neighbours, body.reach
-    one.sources, one.offset = sources, offset
+    one.beside, one.sources, one.offset = beside, sources, offset
     one.d, one.begin, one.label, one.way = d, begin, label, way
     one.seen, one.lit, one.queue = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
     i: cython.int
@@ -117,6 +121,7 @@ class _Search(FittedBends):
     reach: cython.const[cython.double][::1]
     seen: cython.int[::1]
     queue: cython.int[::1]
+    beside: cython.double
     is_below: cython.bint
 
     @cython.cfunc
@@ -169,7 +174,7 @@ class _Search(FittedBends):
     @cython.nogil
     @cython.exceptval(check=False)
     def is_hidden_from_before(self, i: cython.int, v: cython.int) -> cython.bint:
-        """Whether v lies behind the edge, or beside that at most as far as half of its longest edge; sets `is_below`.
+        """Whether v lies behind the edge, or beside that at most so far as was allowed; sets `is_below`.
 
         Seen along the edge, the line from v to the point from which the way comes passes outside, and v is not below
         the plane of the wall behind the edge.
@@ -193,9 +198,9 @@ class _Search(FittedBends):
             before_side += y * across
             out += off * bend.outward[k]
             side += off * across
-        near: cython.double = BESIDE * self.reach[v]
+        near: cython.double = self.beside * self.reach[v]
         below: cython.double = out - bend.wall * sqrt(out * out + side * side)
-        self.is_below = below > LEVEL * near
+        self.is_below = below > LEVEL * self.reach[v]
         if below > near:
             return False
         if not bend.has_before:

@@ -26,8 +26,14 @@ class Body:
         Of the vertices.
     """
 
-    def __init__(self, corners, first, incident, positions):
-        self._arrays = corners, first, incident, positions
+    def __init__(
+        self,
+        corners: cython.const[cython.int][:, ::1],
+        first: cython.const[cython.int][::1],
+        incident: cython.const[cython.int][::1],
+        positions: cython.const[cython.double][:, ::1],
+    ):
+        self._arrays = tuple(map(np.asarray, (corners, first, incident, positions)))
         self.corners, self.first, self.incident, self.positions = corners, first, incident, positions
         n: cython.Py_ssize_t = positions.shape[0]
         m: cython.Py_ssize_t = corners.shape[0]

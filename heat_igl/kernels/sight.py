@@ -49,7 +49,8 @@ def look_around(
     one = _Sight()
     one.corners, one.first, one.incident, one.positions = body.corners, body.first, body.incident, body.positions
     one.first_neighbour, one.neighbours, one.ray = body.first_neighbour, body.neighbours, Ray(body)
-    one.sources, one.offset, one.turns, one.guess, one.d, one.begin, one.label = sources, offset, turns, guess, d, begin, label
+    one.sources, one.offset, one.turns, one.guess = sources, offset, turns, guess
+    one.d, one.begin, one.label = d, begin, label
     is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
     one.is_waiting = is_waiting
     i: cython.Py_ssize_t

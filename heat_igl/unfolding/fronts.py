@@ -26,6 +26,8 @@ _MOST_ROUNDS = 5
 # Up to so many vertices, every vertex looks for the only source, and for several again after bends, since a vertex may
 # see a source that no vertex around it sees. On finer bodies that is rare, and takes time.
 _FEW = 1000
+# How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
+_BESIDE, _BESIDE_OF_FEW = 0.5, 2.0
 # What the kernel of bends knows of the way to a vertex.
 _STRAIGHT, _UNKNOWN = -1, -2
 
@@ -115,6 +117,7 @@ class FrontSolver(UnfoldingSolver):
         way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
         way[vertices] = _STRAIGHT
         turns = np.isin(vertices, edges).astype(np.uint8)
+        beside = _BESIDE_OF_FEW if self._simplices.n <= _FEW else _BESIDE
         is_continued = False
         for round_ in range(_MOST_ROUNDS):
             before = distance.copy()
@@ -124,7 +127,7 @@ class FrontSolver(UnfoldingSolver):
             if round_ and not is_seen.any() and not is_continued:
                 break
             if len(edges):
-                bend_around(edges, outward, wall, self._body, vertices, offset, distance, begin, label, way)
+                bend_around(edges, outward, wall, self._body, beside, vertices, offset, distance, begin, label, way)
             # Behind a point or an edge at which tetrahedra touch, no line continues.
             is_continued = self._continue_along_edges(distance, begin, label)
             if not is_continued and not (self._looks_again and len(edges) and len(vertices) > 1):
