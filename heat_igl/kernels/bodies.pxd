@@ -10,5 +10,5 @@ cdef class Body:
     cdef double[::1] reach
 
     cdef int across(self, int t, int o) noexcept nogil
-    cdef int count_around(self, int v, int[::1] mark) noexcept nogil
-    cdef void list_around(self, int v, int[::1] mark) noexcept nogil
+    cdef int list_around(self, int v, int[::1] mark, int[::1] into, int at) noexcept nogil
+    cdef double longest_edge(self, int v) noexcept nogil

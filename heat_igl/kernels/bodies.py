@@ -41,18 +41,20 @@ class Body:
         counts, all_marks = np.zeros(n + 1, np.int32), np.full(n, -1, np.int32)
         n_around: cython.int[::1] = counts
         mark: cython.int[::1] = all_marks
+        one_list: cython.int[::1] = np.empty(n, np.int32)
         i: cython.Py_ssize_t
         with cython.nogil:
             for i in range(4 * m):
                 self.behind[i // 4, i % 4] = self.across(i // 4, i % 4)
             for i in range(n):
-                n_around[i + 1] = self.count_around(i, mark)
+                n_around[i + 1] = self.list_around(i, mark, one_list, 0)
         all_marks[:] = -1
         self.first_neighbour = np.cumsum(counts, dtype=np.int32)
         self.neighbours = np.empty(int(self.first_neighbour[n]), np.int32)
         with cython.nogil:
             for i in range(n):
-                self.list_around(i, mark)
+                self.list_around(i, mark, self.neighbours, self.first_neighbour[i])
+                self.reach[i] = self.longest_edge(i)
 
     def __reduce__(self):
         """What it was made of."""
@@ -82,41 +84,32 @@ class Body:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def count_around(self, v: cython.int, mark: cython.int[::1]) -> cython.int:
-        """Number of neighbours of v; `reach` becomes the longest edge there."""
+    def list_around(self, v: cython.int, mark: cython.int[::1], into: cython.int[::1], at: cython.int) -> cython.int:
+        """Write the neighbours of v down from a place on; returns the place behind them."""
         k: cython.int
         c: cython.int
-        i: cython.int
-        found: cython.int = 0
-        longest: cython.double = 0.0
         mark[v] = v
         for k in range(self.first[v], self.first[v + 1]):
             for c in range(4):
                 u: cython.int = self.corners[self.incident[k] // 4, c]
                 if mark[u] != v:
                     mark[u] = v
-                    found += 1
-                    squared: cython.double = 0.0
-                    for i in range(3):
-                        off: cython.double = self.positions[u, i] - self.positions[v, i]
-                        squared += off * off
-                    longest = max(longest, squared)
-        self.reach[v] = sqrt(longest)
-        return found
+                    into[at] = u
+                    at += 1
+        return at
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def list_around(self, v: cython.int, mark: cython.int[::1]) -> cython.void:
-        """Write down the neighbours of v."""
+    def longest_edge(self, v: cython.int) -> cython.double:
+        """The distance of v from its farthest neighbour."""
         k: cython.int
-        c: cython.int
-        at: cython.int = self.first_neighbour[v]
-        mark[v] = v
-        for k in range(self.first[v], self.first[v + 1]):
-            for c in range(4):
-                u: cython.int = self.corners[self.incident[k] // 4, c]
-                if mark[u] != v:
-                    mark[u] = v
-                    self.neighbours[at] = u
-                    at += 1
+        i: cython.int
+        longest: cython.double = 0.0
+        for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
+            squared: cython.double = 0.0
+            for i in range(3):
+                off: cython.double = self.positions[self.neighbours[k], i] - self.positions[v, i]
+                squared += off * off
+            longest = max(longest, squared)
+        return sqrt(longest)
