@@ -265,6 +265,18 @@ def test_offsets_and_components():
     assert (found.labels[cube.n_vertices :] == -1).all()
 
 
+def test_vertices_of_no_tetrahedron():
+    """They are neither seen nor see anything, as sources too."""
+    box = shapes.box(3)
+    mesh = Mesh(np.concatenate([box.V, [[0.5, 0.5, 3.0]]]), box.F)
+    exact = np.linalg.norm(box.V - box.V[5], axis=1)
+    solver = HeatMethodSolver(mesh)
+    for sources in (5, [5, box.n_vertices]):
+        np.testing.assert_allclose(solver.distance(sources)[:-1], exact, rtol=1e-9)
+    assert np.isinf(solver.distance(5)[-1])
+    assert np.isinf(solver.distance(box.n_vertices)[:-1]).all()
+
+
 def test_the_method_of_the_paper_on_request():
     """A magnitude, a time step, a boundary condition and the cotangent Laplacian ask for heat."""
     box = shapes.box(5)

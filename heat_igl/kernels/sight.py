@@ -179,6 +179,8 @@ class _Sight:
     def sees(self, v: cython.int, label: cython.int) -> cython.bint:
         """Whether the straight line from v to a source stays in the tetrahedra."""
         source: cython.int = self.sources[label]
+        if self.first[v] == self.first[v + 1] or self.first[source] == self.first[source + 1]:
+            return False
         into: cython.int = -1 if self.turns[label] else self.incident[self.first[source]] // 4
         goal = cython.address(self.positions[source, 0])
         k: cython.int
