@@ -2,10 +2,12 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.bends import MOST_ROUNDS, SLACK
+from cython.cimports.heat_igl.kernels.bends import LEVEL, MOST_ROUNDS, SLACK
 from cython.cimports.heat_igl.kernels.bent_ways import GAIN
+from cython.cimports.heat_igl.kernels.bodies import Body
 from cython.cimports.heat_igl.kernels.fitted_bends import FittedBends
 from cython.cimports.heat_igl.kernels.rays import Ray
+from cython.cimports.libc.math import sqrt
 
 __all__ = ["bend_around"]
 
@@ -19,6 +21,7 @@ _BEND = np.dtype(
         ("start", "f8"),
         ("along", "f8"),
         ("height", "f8"),
+        ("wall", "f8"),
         ("a", "i4"),
         ("b", "i4"),
         ("fits", "i4"),
@@ -31,11 +34,9 @@ _BEND = np.dtype(
 def bend_around(
     edges: cython.const[cython.int][:, ::1],
     outward: cython.const[cython.double][:, ::1],
-    corners: cython.const[cython.int][:, ::1],
-    first: cython.const[cython.int][::1],
-    incident: cython.const[cython.int][::1],
-    positions: cython.const[cython.double][:, ::1],
-    reach: cython.const[cython.double][::1],
+    wall: cython.const[cython.double][::1],
+    body: Body,
+    beside: cython.double,
     sources: cython.const[cython.int][::1],
     offset: cython.const[cython.double][::1],
     d: cython.double[::1],
@@ -56,10 +57,13 @@ def bend_around(
         Edges of the body around which ways bend, roughly from near to far.
     outward : (e, 3) float64
         Direction out of the body at each, halfway between the two walls; zero where more than two meet.
-    corners, first, incident, positions
-        The body, as for `heat_igl.kernels.sight.look_around`.
-    reach : (n,) float64
-        Longest edge at each vertex.
+    wall : (e,) float64
+        Cosine of the angle between that direction and the walls.
+    body : Body
+        Tetrahedra.
+    beside : float
+        Share of the longest edge at a vertex by which it may lie beside the part of the body that an edge hides, and
+        the search still goes on behind it: a larger one finds more of what is hidden in coarse bodies, and takes time.
     sources, offset : (k,) int32, (k,) float64
         Vertex of each source, and the value at which distance begins there.
     d, begin, label : (n,) float64, (n,) float64, (n,) int32
@@ -72,20 +76,21 @@ def bend_around(
     int
         Number of times that vertices were searched around an edge.
     """
-    n, e = positions.shape[0], edges.shape[0]
+    n, e = body.positions.shape[0], edges.shape[0]
     all_bends = np.zeros(e, _BEND)
     ends = np.asarray(edges)
-    X = np.asarray(positions)[ends]
+    X = np.asarray(body.positions)[ends]
     all_bends["a"], all_bends["b"] = ends.T
     all_bends["length"] = np.linalg.norm(X[:, 1] - X[:, 0], axis=1)
     all_bends["tangent"] = (X[:, 1] - X[:, 0]) / all_bends["length"][:, None]
-    all_bends["outward"] = outward
+    all_bends["outward"], all_bends["wall"] = outward, wall
     all_bends["at"] = np.inf
     one = _Search()
-    one.ray = Ray(corners, first, incident, positions)
+    one.ray = Ray(body)
     one.bends = all_bends
-    one.corners, one.first, one.incident, one.positions = corners, first, incident, positions
-    one.reach, one.sources, one.offset = reach, sources, offset
+    one.corners, one.first, one.incident, one.positions = body.corners, body.first, body.incident, body.positions
+    one.first_neighbour, one.neighbours, one.reach = body.first_neighbour, body.neighbours, body.reach
+    one.beside, one.sources, one.offset = beside, sources, offset
     one.d, one.begin, one.label, one.way = d, begin, label, way
     one.seen, one.lit, one.queue = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
     i: cython.int
@@ -106,11 +111,18 @@ def bend_around(
 @cython.final
 @cython.cclass
 class _Search(FittedBends):
-    """The vertices around an edge that is searched: `seen` (n,) has the last search that came to each."""
+    """The vertices around an edge that is searched: `seen` (n,) has the last search that came to each.
 
+    `is_below` tells whether the vertex that was last looked at is hidden by the wall behind the edge.
+    """
+
+    first_neighbour: cython.const[cython.int][::1]
+    neighbours: cython.const[cython.int][::1]
     reach: cython.const[cython.double][::1]
     seen: cython.int[::1]
     queue: cython.int[::1]
+    beside: cython.double
+    is_below: cython.bint
 
     @cython.cfunc
     @cython.nogil
@@ -132,10 +144,13 @@ class _Search(FittedBends):
             # Farther along, ways are shorter around another edge.
             if not is_better and (self.beyond > self.reach[u] or value > old + SLACK * self.reach[u]):
                 continue
-            if not self.is_hidden_from_before(i, u) or not self.sees(i, u):
+            if not self.is_hidden_from_before(i, u):
                 continue
-            self.lit[u] = stamp
-            if is_better:
+            # A vertex that gains nothing, or sees nothing of the edge, may lie between those that do.
+            if is_better and not self.is_below:
+                if not self.sees(i, u):
+                    continue
+                self.lit[u] = stamp
                 self.d[u], self.way[u] = value, i
                 self.begin[u] = value - self.away(u)
                 self.label[u] = self.label[bend.a if self.share < 0.5 else bend.b]
@@ -147,32 +162,31 @@ class _Search(FittedBends):
     def push_around(self, v: cython.int, size: cython.int, stamp: cython.int) -> cython.int:
         """Put the neighbours of v that the search has not come to at the end of the queue; returns its size."""
         k: cython.int
-        c: cython.int
-        for k in range(self.first[v], self.first[v + 1]):
-            for c in range(4):
-                u: cython.int = self.corners[self.incident[k] // 4, c]
-                if self.seen[u] != stamp:
-                    self.seen[u] = stamp
-                    self.queue[size] = u
-                    size += 1
+        for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
+            u: cython.int = self.neighbours[k]
+            if self.seen[u] != stamp:
+                self.seen[u] = stamp
+                self.queue[size] = u
+                size += 1
         return size
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
     def is_hidden_from_before(self, i: cython.int, v: cython.int) -> cython.bint:
-        """Whether v lies behind the edge, or beside that at most as far as its longest edge.
+        """Whether v lies behind the edge, or beside that at most so far as was allowed; sets `is_below`.
 
-        Seen along the edge, the line from v to the point from which the way comes passes outside.
+        Seen along the edge, the line from v to the point from which the way comes passes outside, and v is not below
+        the plane of the wall behind the edge.
         """
         bend = cython.address(self.bends[i])
-        if not bend.has_before:
+        self.is_below = False
+        if bend.outward[0] == 0 and bend.outward[1] == 0 and bend.outward[2] == 0:
             return True
         before_out: cython.double = 0.0
         before_side: cython.double = 0.0
         out: cython.double = 0.0
         side: cython.double = 0.0
-        is_known: cython.bint = False
         k: cython.int
         for k in range(3):
             j: cython.int = (k + 1) % 3
@@ -184,12 +198,14 @@ class _Search(FittedBends):
             before_side += y * across
             out += off * bend.outward[k]
             side += off * across
-            is_known = is_known or bend.outward[k] != 0
-        if not is_known:
+        near: cython.double = self.beside * self.reach[v]
+        below: cython.double = out - bend.wall * sqrt(out * out + side * side)
+        self.is_below = below > LEVEL * self.reach[v]
+        if below > near:
+            return False
+        if not bend.has_before:
             return True
         if before_side < 0:
             before_side, side = -before_side, -side
-        near: cython.double = self.reach[v]
-        out += near
-        side = min(side - near, 0.0)
-        return before_out * -side + out * before_side >= 0
+        behind: cython.double = out * before_side - side * before_out
+        return side <= near and behind >= -near * sqrt(before_out * before_out + before_side * before_side)

@@ -13,6 +13,7 @@ cdef struct Bend:
     double before[3]  # the point from which the way comes to the middle
     double length
     double start, along, height  # distance is start + |(x - along, height)|, x along the edge
+    double wall  # cosine of the angle between `outward` and the walls
     int a, b
     int fits, has_before
 

@@ -10,4 +10,5 @@ cdef class EdgeSight(BentWays):
     cdef bint has_end(self, int t, int i) noexcept nogil
     cdef bint sees(self, int i, int v) noexcept nogil
     cdef bint arrives(self, int i) noexcept nogil
+    cdef bint arrives_from(self, int v, int begin, int i) noexcept nogil
     cdef bint is_lit_from(self, int v, int i, const double* x, double share) noexcept nogil

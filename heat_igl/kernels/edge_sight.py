@@ -40,12 +40,21 @@ class EdgeSight(BentWays):
         for k in range(self.first[v], self.first[v + 1]):
             if self.has_end(self.incident[k] // 4, i):
                 return True
+        begin: cython.int = self.ray.cone(v, self.x)
+        if begin >= 0:
+            return self.arrives_from(v, begin, i)
         for k in range(self.first[v], self.first[v + 1]):
-            if self.ray.begins(self.incident[k], self.x):
-                self.ray.aim(v, self.incident[k] // 4, self.x, -1, NUDGE)
-                if self.ray.enters(self.incident[k] // 4) and self.arrives(i):
-                    return True
+            if self.ray.begins(self.incident[k], self.x) and self.arrives_from(v, self.incident[k], i):
+                return True
         return False
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def arrives_from(self, v: cython.int, begin: cython.int, i: cython.int) -> cython.bint:
+        """Whether the line from v to `x` that begins in the tetrahedron of a corner gets to edge i."""
+        self.ray.aim(v, begin // 4, self.x, -1, NUDGE)
+        return self.ray.enters(begin // 4, begin % 4) and self.arrives(i)
 
     @cython.cfunc
     @cython.nogil

@@ -1,7 +1,8 @@
 """A straight line through tetrahedra, from one to the next."""
 
 import cython
-from cython.cimports.heat_igl.kernels.rays import ON_SIDE
+from cython.cimports.heat_igl.kernels.bodies import Body
+from cython.cimports.heat_igl.kernels.rays import MOST_TURNS, ON_SIDE
 from cython.cimports.libc.math import fabs
 
 __all__ = ["Ray"]
@@ -12,12 +13,69 @@ __all__ = ["Ray"]
 class Ray:
     """A line from p along w, the tetrahedron t that it is in, and the triangle abc through which it leaves t.
 
-    `corners` (m, 4) int32 are the tetrahedra, `first` (n + 1,) and `incident` (4 m,) int32 the corners ``4 t + corner``
-    that meet in each vertex, `positions` (n, 3) those of the vertices. `sign` tells the order of abc.
+    `sign` tells the order of abc.
+
+    Parameters
+    ----------
+    body : Body
+        The tetrahedra.
     """
 
-    def __init__(self, corners, first, incident, positions):
-        self.corners, self.first, self.incident, self.positions = corners, first, incident, positions
+    def __init__(self, body: Body):
+        self.corners, self.first, self.incident = body.corners, body.first, body.incident
+        self.positions, self.behind = body.positions, body.behind
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def cone(self, v: cython.int, goal: cython.pointer[cython.const[cython.double]]) -> cython.int:
+        """The corner ``4 t + corner`` at v through whose tetrahedron the line to a point begins, well inside; else -1.
+
+        From tetrahedron to tetrahedron around v, through the side that the line lies farthest behind. That ends at the
+        boundary, and where the line runs along a side.
+        """
+        k: cython.int = self.incident[self.first[v]]
+        self.aim(v, k // 4, goal, -1, 0.0)
+        _turns: cython.int
+        i: cython.int
+        for _turns in range(MOST_TURNS):
+            side: cython.int = self.worst_side(k)
+            if side < 0:
+                return k if side == -1 else -1
+            t: cython.int = self.behind[k // 4, side]
+            if t < 0:
+                return -1
+            for i in range(4):
+                if self.corners[t, i] == v:
+                    k = 4 * t + i
+        return -1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def worst_side(self, k: cython.int) -> cython.int:
+        """The side of the cone at corner k that the line is farthest behind: the corner opposite it in the tetrahedron.
+
+        -1 if the line is inside the cone, -2 if it is along a side.
+        """
+        t: cython.int = k // 4
+        o: cython.int = k % 4
+        a: cython.int = self.corners[t, (o + 1) % 4]
+        b: cython.int = self.corners[t, (o + 2) % 4]
+        c: cython.int = self.corners[t, (o + 3) % 4]
+        sign: cython.double = 1.0 if self.volume(self.corners[t, o], a, b, c) > 0 else -1.0
+        of_a: cython.double = sign * self.side(b, c)
+        of_b: cython.double = sign * self.side(c, a)
+        of_c: cython.double = sign * self.side(a, b)
+        least: cython.double = min(of_a, of_b, of_c)
+        slack: cython.double = ON_SIDE * (fabs(of_a) + fabs(of_b) + fabs(of_c))
+        if least > slack:
+            return -1
+        if least >= -slack:
+            return -2
+        if least == of_a:
+            return (o + 1) % 4
+        return (o + 2) % 4 if least == of_b else (o + 3) % 4
 
     @cython.cfunc
     @cython.nogil
@@ -64,15 +122,15 @@ class Ray:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def enters(self, t: cython.int) -> cython.bint:
-        """Find the triangle through which the line, which begins inside t, leaves it."""
+    def enters(self, t: cython.int, o: cython.int) -> cython.bint:
+        """Find the triangle through which the line, which begins inside t, leaves it; opposite corner o at first."""
         i: cython.int
         self.t = t
-        for i in range(4):
+        for i in range(o, o + 4):
             self.a = self.corners[t, (i + 1) % 4]
             self.b = self.corners[t, (i + 2) % 4]
             self.c = self.corners[t, (i + 3) % 4]
-            self.sign = self.leaves(self.corners[t, i], self.a, self.b, self.c, 0.0)
+            self.sign = self.leaves(self.corners[t, i % 4], self.a, self.b, self.c, 0.0)
             if self.sign != 0:
                 return True
         return False
@@ -83,10 +141,14 @@ class Ray:
     def cross(self) -> cython.int:
         """Go through abc; returns the fourth vertex of the tetrahedron behind it, or -1 on the boundary."""
         i: cython.int
-        self.t = self.behind(self.t, self.a, self.b, self.c)
+        for i in range(4):
+            u: cython.int = self.corners[self.t, i]
+            if u != self.a and u != self.b and u != self.c:
+                break
+        self.t = self.behind[self.t, i]
         if self.t >= 0:
             for i in range(4):
-                u: cython.int = self.corners[self.t, i]
+                u = self.corners[self.t, i]
                 if u != self.a and u != self.b and u != self.c:
                     return u
         return -1
@@ -139,32 +201,22 @@ class Ray:
         if min(sign * of_a, sign * of_b, sign * of_c) < least:
             return 0
         # The line leaves where o lies behind: w and the normal of abc that points away from o agree.
-        volume: cython.double = 0.0
+        return sign if sign * self.volume(o, a, b, c) > 0 else 0
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def volume(self, o: cython.int, a: cython.int, b: cython.int, c: cython.int) -> cython.double:
+        """Six times the volume of oabc, with the sign of the order of its corners."""
+        found: cython.double = 0.0
         i: cython.int
         for i in range(3):
             j: cython.int = (i + 1) % 3
             k: cython.int = (i + 2) % 3
             at: cython.double = self.positions[o, i]
-            volume += (self.positions[a, i] - at) * (
+            found += (self.positions[a, i] - at) * (
                 (self.positions[b, j] - self.positions[o, j]) * (self.positions[c, k] - self.positions[o, k])
                 - (self.positions[b, k] - self.positions[o, k]) * (self.positions[c, j] - self.positions[o, j])
             )
-        return sign if sign * volume > 0 else 0
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def behind(self, t: cython.int, a: cython.int, b: cython.int, c: cython.int) -> cython.int:
-        """The other tetrahedron with the corners a, b and c, or -1."""
-        k: cython.int
-        i: cython.int
-        for k in range(self.first[a], self.first[a + 1]):
-            other: cython.int = self.incident[k] // 4
-            if other != t:
-                n_shared: cython.int = 0
-                for i in range(4):
-                    u: cython.int = self.corners[other, i]
-                    n_shared += u in (b, c)
-                if n_shared == 2:
-                    return other
-        return -1
+        return found

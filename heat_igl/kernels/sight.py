@@ -2,6 +2,7 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.bodies import Body
 from cython.cimports.heat_igl.kernels.lines import STRAIGHT_LINE, straight
 from cython.cimports.heat_igl.kernels.rays import MOST_STEPS, NUDGE, Ray
 from cython.cimports.heat_igl.kernels.sight import GAIN, MOST_LOOKS, MOST_PASSES
@@ -12,17 +13,18 @@ __all__ = ["look_around"]
 
 def look_around(
     order: cython.const[cython.int][::1],
-    corners: cython.const[cython.int][:, ::1],
-    first: cython.const[cython.int][::1],
-    incident: cython.const[cython.int][::1],
-    positions: cython.const[cython.double][:, ::1],
+    body: Body,
     sources: cython.const[cython.int][::1],
     offset: cython.const[cython.double][::1],
+    turns: cython.const[cython.uchar][::1],
+    guess: cython.int[::1],
     d: cython.double[::1],
     begin: cython.double[::1],
     label: cython.int[::1],
 ):
     """Lower `d` (n,) to straight lines from the sources of neighbours, as far as these lines stay inside.
+
+    Each vertex first looks for a given source, if any.
 
     Where the cell of a source is narrow, the tetrahedra through which a line comes in may have all their corners in
     other cells. Candidates are then the sources of all vertices around (Danielsson 1980, there for pixels), and a line
@@ -32,22 +34,23 @@ def look_around(
     ----------
     order : (n,) int32
         All vertices, roughly from near to far.
-    corners : (m, 4) int32
+    body : Body
         Tetrahedra.
-    first, incident : (n + 1,) int32, (4 m,) int32
-        Corners ``4 * tetrahedron + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
-    positions : (n, 3) float64
-        Of the vertices.
     sources, offset : (k,) int32, (k,) float64
         Vertex of each source, and the value at which distance begins there.
+    turns : (k,) uint8
+        Whether ways bend at the source, so that not all tetrahedra there see the same.
+    guess : (n,) int32
+        A source that each vertex looks for first, or -1; changed.
     d, begin, label : (n,) float64, (n,) float64, (n,) int32
         Distances, the value at which the front that arrives seems to begin, and the source of each; changed.
     """
     n = order.shape[0]
     one = _Sight()
-    one.corners, one.first, one.incident, one.positions = corners, first, incident, positions
-    one.ray = Ray(corners, first, incident, positions)
-    one.sources, one.offset, one.d, one.begin, one.label = sources, offset, d, begin, label
+    one.corners, one.first, one.incident, one.positions = body.corners, body.first, body.incident, body.positions
+    one.first_neighbour, one.neighbours, one.ray = body.first_neighbour, body.neighbours, Ray(body)
+    one.sources, one.offset, one.turns, one.guess = sources, offset, turns, guess
+    one.d, one.begin, one.label = d, begin, label
     is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
     one.is_waiting = is_waiting
     i: cython.Py_ssize_t
@@ -72,8 +75,12 @@ class _Sight:
     first: cython.const[cython.int][::1]
     incident: cython.const[cython.int][::1]
     positions: cython.const[cython.double][:, ::1]
+    first_neighbour: cython.const[cython.int][::1]
+    neighbours: cython.const[cython.int][::1]
     sources: cython.const[cython.int][::1]
     offset: cython.const[cython.double][::1]
+    turns: cython.const[cython.uchar][::1]
+    guess: cython.int[::1]
     d: cython.double[::1]
     begin: cython.double[::1]
     label: cython.int[::1]
@@ -88,26 +95,42 @@ class _Sight:
         below: cython.double = self.d[v]
         if below < INFINITY:
             below -= GAIN * (below - self.begin[v])
+        looks: cython.int = MOST_LOOKS
+        nearest: cython.int = self.guess[v]
+        if nearest >= 0:
+            self.guess[v] = -1
+            # There is no other.
+            if self.sources.shape[0] == 1:
+                looks = 0
+            if self.line(v, nearest) < below and self.sees(v, nearest):
+                self.take(v, nearest)
+                return True
         above: cython.double = -INFINITY
-        k: cython.int
-        c: cython.int
         _looks: cython.int
-        for _looks in range(MOST_LOOKS):
-            nearest: cython.int = self.nearest_around(v, v, above, below, -1)
+        for _looks in range(looks):
+            nearest = self.nearest_around(v, v, above, below, -1)
             if self.label[v] >= 0:
                 # On a boundary of sources the nearest one may be a neighbour of the one that was found.
                 nearest = self.nearest_around(self.sources[self.label[v]], v, above, below, nearest)
             if nearest < 0:
                 return False
-            above = self.line(v, nearest)
             if self.sees(v, nearest):
-                self.d[v], self.begin[v], self.label[v] = above, self.offset[nearest], nearest
-                for k in range(self.first[v], self.first[v + 1]):
-                    for c in range(4):
-                        u: cython.int = self.corners[self.incident[k] // 4, c]
-                        self.is_waiting[u] = True
+                self.take(v, nearest)
                 return True
+            above = self.line(v, nearest)
         return False
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def take(self, v: cython.int, label: cython.int) -> cython.void:
+        """Give v the straight line from a source, and wake those around it that may have use for this source."""
+        self.d[v], self.begin[v], self.label[v] = self.line(v, label), self.offset[label], label
+        k: cython.int
+        for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
+            u: cython.int = self.neighbours[k]
+            if self.label[u] != label or not self.is_lit(u, label):
+                self.is_waiting[u] = True
 
     @cython.cfunc
     @cython.nogil
@@ -120,15 +143,14 @@ class _Sight:
             below = self.line(v, nearest)
         before: cython.int = nearest
         k: cython.int
-        c: cython.int
-        for k in range(self.first[centre], self.first[centre + 1]):
-            for c in range(4):
-                label: cython.int = self.label[self.corners[self.incident[k] // 4, c]]
-                if label >= 0 and label != before:
-                    before = label
-                    value: cython.double = self.line(v, label)
-                    if above < value < below:
-                        below, nearest = value, label
+        for k in range(self.first_neighbour[centre] - 1, self.first_neighbour[centre + 1]):
+            at_centre: cython.bint = k < self.first_neighbour[centre]
+            label: cython.int = self.label[centre if at_centre else self.neighbours[k]]
+            if label >= 0 and label != before:
+                before = label
+                value: cython.double = self.line(v, label)
+                if above < value < below:
+                    below, nearest = value, label
         return nearest
 
     @cython.cfunc
@@ -157,19 +179,24 @@ class _Sight:
     def sees(self, v: cython.int, label: cython.int) -> cython.bint:
         """Whether the straight line from v to a source stays in the tetrahedra."""
         source: cython.int = self.sources[label]
-        into: cython.int = self.incident[self.first[source]] // 4
+        if self.first[v] == self.first[v + 1] or self.first[source] == self.first[source + 1]:
+            return False
+        into: cython.int = -1 if self.turns[label] else self.incident[self.first[source]] // 4
         goal = cython.address(self.positions[source, 0])
         k: cython.int
-        c: cython.int
-        for k in range(self.first[v], self.first[v + 1]):
-            t: cython.int = self.incident[k] // 4
-            for c in range(4):
-                if self.corners[t, c] == source:
-                    return True
-            if self.ray.begins(self.incident[k], goal):
-                self.ray.aim(v, t, goal, into, NUDGE)
-                return self.ray.enters(t) and self.arrives(label)
-        return False
+        for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
+            if self.neighbours[k] == source:
+                return True
+        begin: cython.int = self.ray.cone(v, goal)
+        if begin < 0:
+            for k in range(self.first[v], self.first[v + 1]):
+                if self.ray.begins(self.incident[k], goal):
+                    begin = self.incident[k]
+                    break
+        if begin < 0:
+            return False
+        self.ray.aim(v, begin // 4, goal, into, NUDGE)
+        return self.ray.enters(begin // 4, begin % 4) and self.arrives(label)
 
     @cython.cfunc
     @cython.nogil

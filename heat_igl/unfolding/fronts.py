@@ -6,8 +6,10 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from heat_igl.kernels.bends import bend_around
+from heat_igl.kernels.bodies import Body
 from heat_igl.kernels.fronts import advance
 from heat_igl.kernels.sight import look_around
 from heat_igl.mesh import connectivity
@@ -21,11 +23,11 @@ __all__ = ["FrontSolver"]
 
 # Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
 _MOST_ROUNDS = 5
-# Up to so many vertices, a body is measured on halved tetrahedra as well: of a long edge, a part may see the source
-# although neither end does, and then such an edge is too coarse a source itself. There, lines are followed again after
-# bends, since a vertex may see a source that no vertex around it sees. On finer bodies both are rare, and take time.
+# Up to so many vertices, every vertex looks for the only source, and for several again after bends, since a vertex may
+# see a source that no vertex around it sees. On finer bodies that is rare, and takes time.
 _FEW = 1000
-_ROUNDING = 1e-9
+# How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
+_BESIDE, _BESIDE_OF_FEW = 0.5, 2.0
 # What the kernel of bends knows of the way to a vertex.
 _STRAIGHT, _UNKNOWN = -1, -2
 
@@ -47,11 +49,9 @@ class FrontSolver(OrderedSolver):
     ----------
     simplices : MetricSimplices
         The domain. Lengths are those of space where `V` is known.
-    is_halved : bool
-        Whether tetrahedra are not to be halved again.
     """
 
-    def __init__(self, simplices: MetricSimplices, is_halved: bool = False) -> None:
+    def __init__(self, simplices: MetricSimplices) -> None:
         self.is_exact = True
         self._simplices = simplices
         self._corners = np.ascontiguousarray(simplices.corners, np.int32)
@@ -61,24 +61,17 @@ class FrontSolver(OrderedSolver):
         self._lengths = np.ascontiguousarray(simplices.lengths)
         self._slowness = np.ascontiguousarray(simplices.slowness)
         self._V = np.empty((0, 3)) if simplices.V is None else np.ascontiguousarray(simplices.V)
-        is_small = simplices.V is not None and simplices.n <= _FEW
-        self._looks_again = is_small or is_halved
-        is_refined = is_small and not is_halved and len(self._reflex_edges[0]) > 0
-        self._finer = FrontSolver(simplices.halved(), True) if is_refined else None
+        self._looks_again = simplices.V is not None and simplices.n <= _FEW
 
     @cached_property
-    def _reflex_edges(self) -> tuple[AnyArray, FloatArray]:
-        """Edges around which ways bend (e, 2), and their directions out of the body (e, 3)."""
-        edges, outward = reflex_edges(self._simplices.corners, self._V)
-        return edges.astype(np.int32), outward
+    def _reflex_edges(self) -> tuple[AnyArray, FloatArray, FloatArray]:
+        """Edges around which ways bend (e, 2), directions out of the body (e, 3), and cosines to the walls (e,)."""
+        edges, outward, wall = reflex_edges(self._simplices.corners, self._V)
+        return edges.astype(np.int32), outward, wall
 
     @cached_property
-    def _reach(self) -> FloatArray:
-        """Longest edge at each vertex (n,)."""
-        reach = np.zeros(self._simplices.n)
-        pairs, lengths = self._simplices.edges
-        np.maximum.at(reach, pairs.ravel(), np.repeat(lengths, 2))
-        return reach
+    def _body(self) -> Body:
+        return Body(self._corners, self._first, self._incident, self._V)
 
     @cached_property
     def _edge_graph(self) -> sp.csr_array:
@@ -108,50 +101,44 @@ class FrontSolver(OrderedSolver):
             advance(self._order(vertices), *mesh, self._lengths, self._slowness, distance, begin, label)
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, [-1]])[label]
-        if self._finer is not None:
-            self._take_shorter(self._finer, sources, distance, labels)
         return distance
-
-    @staticmethod
-    def _take_shorter(finer: FrontSolver, sources: SourceSet, distance: FloatArray, labels: IntArray | None) -> None:
-        """Lower distance to that on halved tetrahedra."""
-        n = len(distance)
-        other = np.full(finer._simplices.n, -1)
-        found = finer._distance(sources, distance, other)[:n]
-        # Longer by rounding alone, a distance stays as it is.
-        shorter = found < distance * (1 - _ROUNDING)
-        distance[shorter] = found[shorter]
-        if labels is not None:
-            labels[shorter] = other[:n][shorter]
 
     def _follow_lines(
         self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, begin: FloatArray, label: AnyArray
     ) -> None:
         """Lower distance to straight lines, and to ways of straight lines that bend around edges of the body."""
-        domain = self._corners, self._first, self._incident, self._V
         order = self._order(vertices, straight=len(vertices) == 1)
-        edges, outward = self._reflex_edges
+        edges, outward, wall = self._reflex_edges
         if len(edges):
             rank = np.empty(len(order), np.int64)
             rank[self._order(vertices)] = np.arange(len(order))
             near = np.argsort(rank[edges].max(axis=1), kind="stable")
-            edges, outward = edges[near], outward[near]
+            edges, outward, wall = edges[near], outward[near], wall[near]
         way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
         way[vertices] = _STRAIGHT
+        turns = np.isin(vertices, edges).astype(np.uint8)
+        beside = _BESIDE_OF_FEW if self._simplices.n <= _FEW else _BESIDE
         is_continued = False
         for round_ in range(_MOST_ROUNDS):
             before = distance.copy()
-            look_around(order, *domain, vertices, offset, distance, begin, label)
+            look_around(order, self._body, vertices, offset, turns, self._nearest(vertices), distance, begin, label)
             is_seen = distance < before
             way[is_seen] = _STRAIGHT
             if round_ and not is_seen.any() and not is_continued:
                 break
             if len(edges):
-                bend_around(edges, outward, *domain, self._reach, vertices, offset, distance, begin, label, way)
+                bend_around(edges, outward, wall, self._body, beside, vertices, offset, distance, begin, label, way)
             # Behind a point or an edge at which tetrahedra touch, no line continues.
             is_continued = self._continue_along_edges(distance, begin, label)
-            if not is_continued and not (self._looks_again and len(edges)):
+            if not is_continued and not (self._looks_again and len(edges) and len(vertices) > 1):
                 break
+
+    def _nearest(self, vertices: AnyArray) -> AnyArray:
+        """The source (n,) that each vertex looks for first: the nearest in space, or -1 for those of its neighbours."""
+        n = self._simplices.n
+        if len(vertices) == 1:
+            return np.full(n, 0 if n <= _FEW else -1, np.int32)
+        return np.asarray(cKDTree(self._V[vertices]).query(self._V)[1], np.int32)
 
     def _continue_along_edges(self, distance: FloatArray, begin: FloatArray, label: AnyArray) -> bool:
         """Give vertices that nothing has reached a distance along edges; returns whether there were any."""

@@ -13,7 +13,7 @@ __all__ = ["reflex_edges"]
 _FLAT = 1e-6
 
 
-def reflex_edges(corners: IntArray, V: FloatArray) -> tuple[IntArray, FloatArray]:
+def reflex_edges(corners: IntArray, V: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
     """Boundary edges at which the inside takes more than half a turn, and edges where more than two walls meet.
 
     Parameters
@@ -29,6 +29,8 @@ def reflex_edges(corners: IntArray, V: FloatArray) -> tuple[IntArray, FloatArray
         Vertices of each edge.
     outward : (e, 3) float64
         Unit vector out of the body, halfway between the two walls; zero where more than two meet.
+    wall : (e,) float64
+        Cosine of the angle between that vector and the walls.
     """
     n = len(V)
     found = connectivity.facets(corners, n)
@@ -55,7 +57,7 @@ def reflex_edges(corners: IntArray, V: FloatArray) -> tuple[IntArray, FloatArray
     # The sides of a slit coincide, at a whole turn.
     cosine = np.einsum("ij,ij->i", along_wall[one], along_wall[other])
     bends = (counts > 2) | ((counts == 2) & ((sine < -_FLAT) | ((sine < _FLAT) & (cosine > 0))))
-    return edges[bends], outward[bends]
+    return edges[bends], outward[bends], np.einsum("ij,ij->i", along_wall[one], outward)[bends]
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
