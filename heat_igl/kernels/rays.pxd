@@ -3,9 +3,9 @@ from heat_igl.kernels.bodies cimport Body
 cdef extern from *:
     """
     // Part of a triangle by which a straight line may miss it, along its rim.
-    #define ON_SIDE 1e-6
+    #define ON_SIDE 1e-9
     // Part of the way to the middle of a tetrahedron by which the ends of a line are moved inside.
-    #define NUDGE 1e-4
+    #define NUDGE 1e-6
     """
     double ON_SIDE, NUDGE
 
