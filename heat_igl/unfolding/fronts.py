@@ -23,9 +23,12 @@ __all__ = ["FrontSolver"]
 
 # Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
 _MOST_ROUNDS = 5
-# Up to so many vertices, every vertex looks for the only source, and for several again after bends, since a vertex may
-# see a source that no vertex around it sees. On finer bodies that is rare, and takes time.
+# Up to so many vertices, a body with such edges is measured on halved tetrahedra as well: of a long edge, a part may see
+# the source although neither end does, and then such an edge is too coarse a source itself. Also, every vertex looks for
+# the only source, and for several again after bends, since a vertex may see a source that no vertex around it sees. On
+# finer bodies both are rare, and take time.
 _FEW = 1000
+_ROUNDING = 1e-9
 # How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
 _BESIDE, _BESIDE_OF_FEW = 0.5, 2.0
 # What the kernel of bends knows of the way to a vertex.
@@ -49,9 +52,11 @@ class FrontSolver(OrderedSolver):
     ----------
     simplices : MetricSimplices
         The domain. Lengths are those of space where `V` is known.
+    is_halved : bool
+        Whether tetrahedra are not to be halved again.
     """
 
-    def __init__(self, simplices: MetricSimplices) -> None:
+    def __init__(self, simplices: MetricSimplices, is_halved: bool = False) -> None:
         self.is_exact = True
         self._simplices = simplices
         self._corners = np.ascontiguousarray(simplices.corners, np.int32)
@@ -61,7 +66,9 @@ class FrontSolver(OrderedSolver):
         self._lengths = np.ascontiguousarray(simplices.lengths)
         self._slowness = np.ascontiguousarray(simplices.slowness)
         self._V = np.empty((0, 3)) if simplices.V is None else np.ascontiguousarray(simplices.V)
-        self._looks_again = simplices.V is not None and simplices.n <= _FEW
+        self._is_small = simplices.V is not None and simplices.n <= _FEW
+        is_refined = self._is_small and not is_halved and len(self._reflex_edges[0]) > 0
+        self._finer = FrontSolver(simplices.halved(), is_halved=True) if is_refined else None
 
     @cached_property
     def _reflex_edges(self) -> tuple[AnyArray, FloatArray, FloatArray]:
@@ -101,7 +108,21 @@ class FrontSolver(OrderedSolver):
             advance(self._order(vertices), *mesh, self._lengths, self._slowness, distance, begin, label)
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, [-1]])[label]
+        if self._finer is not None:
+            self._take_shorter(self._finer, sources, distance, labels)
         return distance
+
+    @staticmethod
+    def _take_shorter(finer: FrontSolver, sources: SourceSet, distance: FloatArray, labels: IntArray | None) -> None:
+        """Lower distance to that on halved tetrahedra."""
+        n = len(distance)
+        other = np.full(finer._simplices.n, -1)
+        found = finer._distance(sources, distance, other)[:n]
+        # Longer by rounding alone, a distance stays as it is.
+        shorter = found < distance * (1 - _ROUNDING)
+        distance[shorter] = found[shorter]
+        if labels is not None:
+            labels[shorter] = other[:n][shorter]
 
     def _follow_lines(
         self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, begin: FloatArray, label: AnyArray
@@ -117,7 +138,7 @@ class FrontSolver(OrderedSolver):
         way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
         way[vertices] = _STRAIGHT
         turns = np.isin(vertices, edges).astype(np.uint8)
-        beside = _BESIDE_OF_FEW if self._simplices.n <= _FEW else _BESIDE
+        beside = _BESIDE_OF_FEW if self._is_small else _BESIDE
         is_continued = False
         for round_ in range(_MOST_ROUNDS):
             before = distance.copy()
@@ -130,14 +151,13 @@ class FrontSolver(OrderedSolver):
                 bend_around(edges, outward, wall, self._body, beside, vertices, offset, distance, begin, label, way)
             # Behind a point or an edge at which tetrahedra touch, no line continues.
             is_continued = self._continue_along_edges(distance, begin, label)
-            if not is_continued and not (self._looks_again and len(edges) and len(vertices) > 1):
+            if not is_continued and not (self._is_small and len(edges) and len(vertices) > 1):
                 break
 
     def _nearest(self, vertices: AnyArray) -> AnyArray:
         """The source (n,) that each vertex looks for first: the nearest in space, or -1 for those of its neighbours."""
-        n = self._simplices.n
         if len(vertices) == 1:
-            return np.full(n, 0 if n <= _FEW else -1, np.int32)
+            return np.full(self._simplices.n, 0 if self._is_small else -1, np.int32)
         return np.asarray(cKDTree(self._V[vertices]).query(self._V)[1], np.int32)
 
     def _continue_along_edges(self, distance: FloatArray, begin: FloatArray, label: AnyArray) -> bool:
