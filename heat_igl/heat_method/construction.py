@@ -124,14 +124,14 @@ class PreparedSolver(BatchedSolver):
         ValueError
             If the solver was made from operators.
         """
-        fans = self.operators.fans
-        if fans is not None:
+        if self._mesh is None:
+            fans = self.operators.fans
+            if fans is None:
+                raise ValueError(
+                    "this solver was made from operators and has no vertices to move: use from_operators again"
+                )
             positions = fans.polygons.triangles.with_vertices(V).V
             return self._of(prepare_polygons(PolygonMesh(positions, fans.polygons.polygons), self._parts.options))
-        if self._mesh is None:
-            raise ValueError(
-                "this solver was made from operators and has no vertices to move: use from_operators again"
-            )
         moved = self._mesh.with_vertices(V)
         options, known = self._parts.options, self._parts.analysis
         if isinstance(moved, PointCloud):

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import igl
 import numpy as np
@@ -13,10 +12,12 @@ import numpy as np
 from heat_igl.heat_method.checking import Checker
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh
+from heat_igl.heat_method.solution import Diagnostics
 from heat_igl.linear import Analysis
 from heat_igl.mesh import Mesh, PointCloud
-from heat_igl.operators import Surface, operators, unfolding_surface
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.operators import Operators, operators, unfolding_surface
+from heat_igl.sources import SourceAssembler
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import UnfoldingSolver
 from heat_igl.unfolding.distance import MeshDomain
 
@@ -69,45 +70,44 @@ class _SweptParts(SolverParts):
 
     def __init__(self, cloud: PointCloud, options: SolverOptions) -> None:
         start = time.perf_counter()
-        mesh = cloud.distinct_triangles
-        surface = unfolding_surface(mesh)
-        originals = cloud.originals if cloud.has_copies else None
-        referenced = np.zeros(mesh.n_vertices, bool)
-        referenced[mesh.F] = True
-        sweep = UnfoldingSolver(_SweptSurface(mesh, surface), "sweep", originals=originals, orders_itself=True)
-        # Nothing is set after this; a frozen dataclass refuses even what the constructor sets.
-        self.__dict__.update(
-            options=options,
-            analysis=None,
-            factored=None,
-            last_steps=sweep,
-            originals=originals,
-            checker=Checker(surface, referenced, cloud.V),
-            _mesh=mesh,
-            _V=cloud.V,
-            _surface=surface,
-            _seconds=time.perf_counter() - start,
-        )
-
-    _mesh: Mesh
-    _V: FloatArray
-    _surface: Surface
-    _seconds: float
-
-    def __getattr__(self, name: str) -> Any:
-        # Called for what the constructor has not set.
-        if name not in _FIELDS:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        return getattr(self._all, name)
+        self._cloud, self._options, self._mesh = cloud, options, cloud.distinct_triangles
+        self._surface = unfolding_surface(self._mesh)
+        referenced = np.zeros(self._mesh.n_vertices, bool)
+        referenced[self._mesh.F] = True
+        self._checker = Checker(self._surface, referenced, cloud.V)
+        domain = _SweptSurface(self._mesh, self._surface)
+        self._sweep = UnfoldingSolver(domain, "sweep", originals=self.originals, orders_itself=True)
+        self._seconds = time.perf_counter() - start
 
     @cached_property
-    def _all(self) -> SolverParts:
+    def _for_heat(self) -> SolverParts:
         """All parts, with operators and without factors."""
-        start, sweep = time.perf_counter(), self.last_steps
+        start = time.perf_counter()
         domain = operators(self._mesh, self.options.triangulation)
         seconds = self._seconds + time.perf_counter() - start
-        unfolding = sweep if isinstance(sweep, UnfoldingSolver) else None
-        return prepare(domain, self.options, lambda: None, seconds, self._V, self.originals, unfolding)
+        return prepare(domain, self.options, lambda: None, seconds, self._cloud.V, self.originals, self._sweep)
+
+    # What a query needs, before anything is made for heat.
+
+    @property
+    def options(self) -> SolverOptions:
+        """As the user gave them."""
+        return self._options
+
+    @property
+    def last_steps(self) -> UnfoldingSolver:
+        """The sweep."""
+        return self._sweep
+
+    @property
+    def checker(self) -> Checker:
+        """Checks answers against straight lines."""
+        return self._checker
+
+    @property
+    def originals(self) -> IntArray | None:
+        """The point (n,) whose distance each takes; None if there are no copies."""
+        return self._cloud.originals if self._cloud.has_copies else None
 
     @property
     def n_vertices(self) -> int:
@@ -129,5 +129,47 @@ class _SweptParts(SolverParts):
         """Vertices (m, 3) of the triangles that points and curves refer to."""
         return self._surface.given_faces
 
+    # What heat needs.
 
-_FIELDS = {field.name for field in fields(SolverParts)}
+    @property
+    def analysis(self) -> None:
+        """No order of elimination: that of the heat flow is found with the factors."""
+
+    @property
+    def factored(self) -> None:
+        """No heat flow: `heat_flow` factors it."""
+
+    @property
+    def operators(self) -> Operators:
+        """The domain."""
+        return self._for_heat.operators
+
+    @property
+    def assembler(self) -> SourceAssembler:
+        """From sources to right-hand sides."""
+        return self._for_heat.assembler
+
+    @property
+    def time_steps(self) -> FloatArray:
+        """Time step (n_components,) of each component."""
+        return self._for_heat.time_steps
+
+    @property
+    def step_raised(self) -> BoolArray:
+        """Whether that (n_components,) is more than was asked for."""
+        return self._for_heat.step_raised
+
+    @property
+    def t_damping(self) -> float | FloatArray | None:
+        """Time step for `damping`."""
+        return self._for_heat.t_damping
+
+    @property
+    def fitted(self) -> bool:
+        """Whether the heat flow is fitted to the lengths of edges."""
+        return self._for_heat.fitted
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """For the user."""
+        return self._for_heat.diagnostics

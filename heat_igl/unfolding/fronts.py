@@ -23,10 +23,10 @@ __all__ = ["FrontSolver"]
 
 # Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
 _MOST_ROUNDS = 5
-# Up to so many vertices, a body with such edges is measured on halved tetrahedra as well: of a long edge, a part may see
-# the source although neither end does, and then such an edge is too coarse a source itself. Also, every vertex looks for
-# the only source, and for several again after bends, since a vertex may see a source that no vertex around it sees. On
-# finer bodies both are rare, and take time.
+# Up to so many vertices, a body around whose edges ways bend is measured on halved tetrahedra as well: of a long edge,
+# a part may see the source although neither end does, and then such an edge is too coarse a source itself. Also, every
+# vertex looks for the only source, and for several again after bends, since a vertex may see a source that no vertex
+# around it sees. On finer bodies both are rare, and take time.
 _FEW = 1000
 _ROUNDING = 1e-9
 # How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
