@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heat_igl.kernels.local_planes import principal_axes, tangent_planes
-from heat_igl.kernels.nearest import leaf_boxes, nearest_points
 from heat_igl.kernels.quadrics import onto_quadrics
 from heat_igl.mesh.sheets import axes_along, one_sheet
 from heat_igl.runtime import over_rows
@@ -25,7 +24,7 @@ __all__ = ["Neighbourhoods", "PointTree", "neighbourhoods", "point_tree", "witho
 _K = 30
 # Points at a time: bounds the memory for their neighbours.
 _BLOCK = 1 << 12
-# Most points in a leaf of the tree.
+# Points in a leaf of the tree.
 _LEAF = 32
 # Ratio of the two smaller variances above which neighbours may be on several sheets.
 _SEVERAL_SHEETS = 0.04
@@ -58,41 +57,26 @@ class PointTree:
         The points, leaf by leaf.
     order : (n,) int64
         Which of the given points each is.
-    first : (l + 1,) int32
-        Leaf i holds the points from ``first[i]`` to ``first[i + 1]``; l is a power of 2.
     """
 
     P: FloatArray
     order: IntArray
-    first: AnyArray
-
-    @cached_property
-    def boxes(self) -> FloatArray:
-        """The extent of all nodes of the tree, see `leaf_boxes`."""
-        return np.asarray(leaf_boxes(self.P, self.first), np.float64)
 
     @cached_property
     def tree(self) -> KDTree:
-        """The tree of `P`, for points that have not their neighbours near in memory."""
-        return _tree(self.P, _LEAF)
+        """The tree of `P`."""
+        return _tree(self.P)
 
     def nearest(self, chosen: IntArray, k: int) -> tuple[AnyArray, FloatArray]:
-        """The k nearest points (b, k) int32 of some of `P`, themselves first, and the squared distances (b, k).
-
-        The points are chosen in ascending order.
-        """
-        index, square, found = nearest_points(self.P, self.first, self.boxes, chosen, k)
-        if not found.all():
-            rest = np.flatnonzero(~found)
-            distance, near = self.tree.query(self.P[chosen[rest]], k)
-            # Squares of distances may underflow, and then others are as near as the point itself.
-            near[:, 0] = chosen[rest]
-            index[rest], square[rest] = near, np.square(distance)
-        return index, square
+        """The k nearest points (b, k) int32 of some of `P`, themselves first, and the squared distances (b, k)."""
+        distance, index = self.tree.query(self.P[chosen], k)
+        # Squares of distances may underflow, and then others are as near as the point itself.
+        index[:, 0] = chosen
+        return index.astype(np.int32), np.square(distance)
 
     def moved(self, P: FloatArray) -> PointTree:
         """The same points, in the same order, at other positions (n, 3)."""
-        return PointTree(P, self.order, self.first)
+        return PointTree(P, self.order)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,18 +109,14 @@ class Neighbourhoods:
 
 def point_tree(P: FloatArray) -> PointTree:
     """The points P (n, 3), sorted as in the leaves of a k-d tree."""
-    # As scipy divides points: at the median of the longest side, until no part is larger than a leaf.
-    first = np.array([0, len(P)])
-    while np.diff(first).max() > _LEAF:
-        first = np.insert(first, np.arange(1, len(first)), first[:-1] + np.diff(first) // 2)
-    order = np.asarray(_tree(P, int(np.diff(first).max())).indices, np.int64)
-    return PointTree(P[order], order, first.astype(np.int32))
+    order = np.asarray(_tree(P).indices, np.int64)
+    return PointTree(P[order], order)
 
 
-def _tree(P: FloatArray, leaf: int) -> KDTree:
+def _tree(P: FloatArray) -> KDTree:
     from scipy.spatial import KDTree  # takes as long to import as the rest of the package
 
-    return KDTree(P, leaf)
+    return KDTree(P, _LEAF)
 
 
 def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: bool = True) -> Neighbourhoods:
