@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, read_mesh, shapes
 from heat_igl.operators import MetricSimplices
@@ -38,11 +37,6 @@ from scaffold import add_json, add_seed, environment, option_parser, publish, ta
 Cut = Callable[[FloatArray], BoolArray]
 # A body of more vertices is halved once for its reference.
 _MANY = 3000
-# How far vertices of smooth walls are moved.
-_UNEVEN = 1e-3
-
-
-# The bodies, in the unit cube or around the origin.
 
 
 def random(n: int, cut: Cut, rng: np.random.Generator) -> Mesh:
@@ -67,7 +61,7 @@ def shell(hollow: float, points: int, rng: np.random.Generator) -> Mesh:
     P = rng.uniform(-1, 1, (20 * points, 3))
     radius = np.linalg.norm(P, axis=1)
     between = P[(radius > hollow + 0.05) & (radius < 0.95)][:points]
-    walls = moved(np.concatenate([hollow * sphere, sphere]), _UNEVEN, rng)
+    walls = moved(np.concatenate([hollow * sphere, sphere]), 1e-3, rng)
     ball = delaunay(np.concatenate([walls, between]))
     return part(ball, ball.F.max(axis=1) >= len(sphere))
 
@@ -75,7 +69,7 @@ def shell(hollow: float, points: int, rng: np.random.Generator) -> Mesh:
 def ring(around: int, along: int, points: int, rng: np.random.Generator) -> Mesh:
     """The inside of a torus of these vertices, and random points in it."""
     P = rng.uniform(-1.4, 1.4, (20 * points, 3)) * [1, 1, 2 / 7]
-    wall = moved(shapes.torus(around, along, 0.4).V, _UNEVEN, rng)
+    wall = moved(shapes.torus(around, along, 0.4).V, 1e-3, rng)
     hull = delaunay(np.concatenate([wall, P[in_tube(P, 0.34)][:points]]))
     return part(hull, in_tube(hull.V[hull.F].mean(axis=1), 0.4))
 
@@ -84,16 +78,15 @@ def in_tube(P: FloatArray, radius: float) -> BoolArray:
     return np.asarray(np.hypot(np.hypot(P[:, 0], P[:, 1]) - 1, P[:, 2]) < radius)
 
 
-def in_box(P: FloatArray, low: npt.ArrayLike, high: npt.ArrayLike) -> BoolArray:
+def in_box(P: FloatArray, low: float | list[float], high: float | list[float]) -> BoolArray:
     return np.asarray(((np.asarray(low) < P) & (np.asarray(high) > P)).all(axis=1))
 
 
-def in_ball(P: FloatArray, middle: npt.ArrayLike, radius: float) -> BoolArray:
+def in_ball(P: FloatArray, middle: list[float], radius: float) -> BoolArray:
     return np.asarray(np.linalg.norm(P - np.asarray(middle), axis=1) < radius)
 
 
 def holes(P: FloatArray) -> BoolArray:
-    """Four square holes along z."""
     return np.asarray((np.floor(5 * P[:, :2]).astype(int) % 2 == 1).all(axis=1))
 
 
@@ -123,18 +116,12 @@ def bodies(rng: np.random.Generator) -> Iterator[tuple[str, Mesh]]:
     yield "cube without two balls, random", random(20, two_balls, rng)
 
 
-# The measurements.
-
-
 def reference(mesh: Mesh) -> Callable[[int], FloatArray]:
-    """Distance at the vertices on tetrahedra halved twice, or once.
-
-    Of several sources, each vertex first looks for the nearest in space. So all of them look for the source if there is
-    another, far from all, in no tetrahedron.
-    """
+    """Distance at the vertices on tetrahedra halved twice, or once."""
     finer = MetricSimplices.in_space(mesh).halved()
     if mesh.n_vertices <= _MANY:
         finer = finer.halved()
+    # Of two sources, each vertex first looks for the nearer in space: the other is far away, in no tetrahedron.
     far = mesh.V.max(axis=0) + 10 * np.ptp(mesh.V, axis=0)
     solver = HeatMethodSolver(Mesh(np.vstack([finer.V, far]), finer.corners))
     return lambda i: solver.distance([i, finer.n])[: mesh.n_vertices]
@@ -176,9 +163,6 @@ def measured(name: str, mesh: Mesh, sources: Sequence[int]) -> dict[str, Any]:
     return row | {"asked": asked, "asked_given": asked_given, "ratio": asked / asked_heat}
 
 
-# The table.
-
-
 def cells(row: dict[str, Any]) -> list[str]:
     """Percents below 1e-4 are rounded to 0."""
     default, given = row["default"], row["given"]
@@ -187,9 +171,6 @@ def cells(row: dict[str, Any]) -> list[str]:
     unhalved = f"{mean} and {longer}" if row["is_halved"] else "-"
     asked = f"{row['asked']:.0f}" + (f" ({row['asked_given']:.0f})" if row["is_halved"] else "")
     return [row["body"], str(row["vertices"]), str(row["edges"]), *errors, unhalved, asked, f"{row['ratio']:.0f}"]
-
-
-HEAD = "body|vertices|edges|mean, %|longer, %|shorter, %|below lines, %|not halved, %|ms|ratio to heat".split("|")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -208,7 +189,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         rows.append(measured(name, mesh, sources))
         print(rows[-1], file=sys.stderr, flush=True)
     result = {"environment": environment(), "bodies": rows}
-    publish(result, "\n".join(table(HEAD, map(cells, rows))), json_file=arguments.json)
+    head = "body|vertices|edges|mean, %|longer, %|shorter, %|below lines, %|not halved, %|ms|ratio to heat".split("|")
+    publish(result, "\n".join(table(head, map(cells, rows))), json_file=arguments.json)
     return 0
 
 
