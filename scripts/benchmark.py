@@ -35,9 +35,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from heat_igl import HeatMethodSolver, Mesh, MissingExtraError, ReferenceSolverError, reference, shapes
+from heat_igl import HeatMethodSolver, Mesh, MissingExtraError, ReferenceSolverError, read_mesh, reference, shapes
 from heat_igl.demo import sample_mesh
-from heat_igl.io import read_mesh
 from heat_igl.runtime import PeakMemory
 
 import peers
