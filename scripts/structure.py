@@ -40,7 +40,7 @@ BOUNDS = {
     "back-arrows": 0,
     "circles": 0,
     "rooms, heat_igl/__init__.py and scripts": 25,
-    "arrows, theirs and those for types too": 157,
+    "arrows, theirs and those for types too": 158,
     "longest bodies": 60,
     "longest bodies of kernels": 60,
     "longest classes": 300,
