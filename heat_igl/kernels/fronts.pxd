@@ -4,10 +4,8 @@ cdef extern from *:
     #define GAIN 1e-5
     // A front from this many edges away is straight: farther away, its curve is lost in the digits.
     #define STRAIGHT 1e4
-    // Height of a triangle over its base below which spheres about the corners lose too many digits where they meet.
-    #define FLAT 1e-3
     """
-    double GAIN, STRAIGHT, FLAT
+    double GAIN, STRAIGHT
 
 cdef enum:
     # Visits per vertex after which the kernel gives up.

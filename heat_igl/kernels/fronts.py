@@ -6,8 +6,9 @@ refracted. Seen from a vertex, the source lies behind the opposite side of a sim
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.fronts import FLAT, GAIN, MOST_REGIONS, MOST_VISITS, STRAIGHT
+from cython.cimports.heat_igl.kernels.fronts import GAIN, MOST_REGIONS, MOST_VISITS, STRAIGHT
 from cython.cimports.heat_igl.kernels.refraction import Refracted, refracted
+from cython.cimports.heat_igl.kernels.spatial_updates import Edges, across_base, foot
 from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["advance"]
@@ -295,11 +296,11 @@ class _Fronts:
         start = max(start, min(self.d[i], self.d[j]) - STRAIGHT * (base + to_a))
         da: cython.double = self.d[i] - start
         db: cython.double = self.d[j] - start
-        x: cython.double = 0.5 * ((da - db) * (da + db) / base + base)
+        x: cython.double = foot(da, db, base)
         y_squared: cython.double = da * da - x * x
         if not y_squared >= 0:
             return
-        along: cython.double = 0.5 * ((to_a - to_b) * (to_a + to_b) / base + base)
+        along: cython.double = foot(to_a, to_b, base)
         height: cython.double = sqrt(max(to_a * to_a - along * along, 0.0))
         y: cython.double = sqrt(y_squared)
         crossing: cython.double = x * height + along * y  # times y + height
@@ -372,8 +373,8 @@ class _Fronts:
         start = max(start, min(self.d[i], self.d[j]) - STRAIGHT * before)
         da: cython.double = self.d[i] - start
         db: cython.double = self.d[j] - start
-        x: cython.double = 0.5 * ((da - db) * (da + db) / before + before)
-        along: cython.double = 0.5 * ((to_a - to_b) * (to_a + to_b) / base + base)
+        x: cython.double = foot(da, db, before)
+        along: cython.double = foot(to_a, to_b, base)
         height: cython.double = sqrt(max(to_a * to_a - along * along, 0.0))
         way: Refracted = refracted(x, sqrt(max(da * da - x * x, 0.0)), before, along, height, base)
         if start + way.length < self.best:
@@ -384,48 +385,22 @@ class _Fronts:
     @cython.nogil
     @cython.exceptval(check=False)
     def across_triangle(self, s: cython.int, v: cython.int, a: cython.int, b: cython.int, c: cython.int) -> cython.bint:
-        """Through the triangle abc, if the straight line passes there, and whether it does.
-
-        The source lies where spheres about the corners meet, on the other side.
-        """
+        """Through the triangle abc, if the straight line passes there, and whether it does."""
         i: cython.int = self.corners[s, a]
         j: cython.int = self.corners[s, b]
         k: cython.int = self.corners[s, c]
-        base: cython.double = self.lengths[s, a, b]
         start: cython.double = -INFINITY
         if self.label[i] == self.label[j] and self.label[i] == self.label[k]:
             start = (self.begins(s, a) + self.begins(s, b) + self.begins(s, c)) / 3
-        start = max(start, min(self.d[i], self.d[j], self.d[k]) - STRAIGHT * (base + self.lengths[s, v, a]))
-        da: cython.double = self.d[i] - start
-        db: cython.double = self.d[j] - start
-        dc: cython.double = self.d[k] - start
-        # a in the origin, b on the first axis, c in the plane of the first two, v above it.
-        ac: cython.double = self.lengths[s, a, c]
-        bc: cython.double = self.lengths[s, b, c]
-        cx: cython.double = 0.5 * ((ac - bc) * (ac + bc) / base + base)
-        cy: cython.double = sqrt(max(ac * ac - cx * cx, 0.0))
-        if not cy > FLAT * base:
+        nearest: cython.double = min(self.d[i], self.d[j], self.d[k])
+        start = max(start, nearest - STRAIGHT * (self.lengths[s, a, b] + self.lengths[s, v, a]))
+        edges: Edges
+        edges.ab, edges.ac, edges.bc = self.lengths[s, a, b], self.lengths[s, a, c], self.lengths[s, b, c]
+        edges.va, edges.vb, edges.vc = self.lengths[s, v, a], self.lengths[s, v, b], self.lengths[s, v, c]
+        across: cython.double = across_base(
+            cython.address(edges), self.d[i] - start, self.d[j] - start, self.d[k] - start
+        )
+        if across == INFINITY:
             return False
-        x: cython.double = 0.5 * ((da - db) * (da + db) / base + base)
-        y: cython.double = 0.5 * ((da - dc) * (da + dc) + ac * ac - 2 * cx * x) / cy
-        z_squared: cython.double = da * da - x * x - y * y
-        if not z_squared >= 0:
-            return False
-        z: cython.double = sqrt(z_squared)
-        to_a: cython.double = self.lengths[s, v, a]
-        to_b: cython.double = self.lengths[s, v, b]
-        to_c: cython.double = self.lengths[s, v, c]
-        vx: cython.double = 0.5 * ((to_a - to_b) * (to_a + to_b) / base + base)
-        vy: cython.double = 0.5 * ((to_a - to_c) * (to_a + to_c) + ac * ac - 2 * cx * vx) / cy
-        vz: cython.double = sqrt(max(to_a * to_a - vx * vx - vy * vy, 0.0))
-        # The straight line meets the plane in (px, py), times z + vz.
-        height: cython.double = z + vz
-        px: cython.double = x * vz + vx * z
-        py: cython.double = y * vz + vy * z
-        of_c: cython.double = py / cy
-        of_b: cython.double = (px - of_c * cx) / base
-        if of_c >= 0 and of_b >= 0 and of_b + of_c <= height:
-            across: cython.double = sqrt((vx - x) * (vx - x) + (vy - y) * (vy - y) + height * height)
-            self.take(start + across, start, i, s)
-            return True
-        return False
+        self.take(start + across, start, i, s)
+        return True

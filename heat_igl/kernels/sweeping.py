@@ -7,7 +7,7 @@ planar_updates.pxd has the formulas. Here is which vertex is updated when, and f
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.front_queue import FrontQueue, Waiting, clear, put, take
+from cython.cimports.heat_igl.kernels.front_order import FrontOrder
 from cython.cimports.heat_igl.kernels.half_edges import HalfEdges
 from cython.cimports.heat_igl.kernels.planar_updates import (
     across_side,
@@ -24,8 +24,6 @@ from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["sweep"]
 
-_WAITING = np.dtype([("vertex", "i4"), ("following", "i4")])
-
 
 def sweep(
     order,
@@ -39,9 +37,7 @@ def sweep(
 ):
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, in the given order.
 
-    `order` (n,) int32 may be None. Then a front finds it, as Dijkstra's algorithm would with the values of the sweep:
-    the next vertex is the nearest one, along an edge, to those that were visited. Vertices in a band of the given width
-    may come in any order, so that they need no heap.
+    `order` (n,) int32 may be None. Then a front finds it in bands of the given width, see `FrontOrder`.
 
     If a vertex turns out to be nearer than one that came before it, the sweep goes back to that one at once, before
     the error there spreads. Returns the number of visits per vertex. Vertices that are not in `is_stale` (n,) bool
@@ -59,10 +55,9 @@ def sweep(
     one.is_large = one.t.spoke.shape[0] > CACHED
     one.d, one.is_stale, one.offset, one.group = d, is_stale, offset, group
     if order is None:
-        one.n_ordered = one.n_passed = 0
-        one.order, one.rank = np.empty(n, np.int32), np.full(n, n, np.int32)
-        one.key, one.waiting = np.full(n, np.inf), np.empty(one.t.spoke.shape[0] + n, _WAITING)
-        one.put_known(width)
+        one.n_ordered = 0
+        one.front = FrontOrder(one.t, d, width)
+        one.order, one.rank = one.front.order, one.front.rank
     else:
         one.n_ordered = n
         rank = np.empty(n, np.int32)
@@ -81,8 +76,7 @@ def sweep(
 class _Sweep:
     """Arrays that a sweep reads and writes; by vertex but for `order`, the vertices, and `offset`, by source.
 
-    Of a front, the first `n_ordered` entries of `order` are known, and vertices beyond them have rank n. The neighbours
-    of the first `n_passed` are in the queue `ahead`, by their `key`, the distance along an edge.
+    The first `n_ordered` entries of `order` are known, and a `front` finds the others.
     """
 
     t: HalfEdges
@@ -90,10 +84,7 @@ class _Sweep:
     rank: cython.int[::1]
     is_large: cython.bint
     n_ordered: cython.Py_ssize_t
-    n_passed: cython.Py_ssize_t
-    key: cython.double[::1]
-    waiting: Waiting[::1]
-    ahead: FrontQueue
+    front: FrontOrder
     is_flat: cython.const[cython.uchar][::1]
     is_stale: cython.uchar[::1]
     d: cython.double[::1]
@@ -116,7 +107,7 @@ class _Sweep:
         self.n_visits = 0
         while self.n_visits < GIVE_UP * n:
             if i + AHEAD > self.n_ordered and self.n_ordered < n:
-                self.order_ahead(i)
+                self.n_ordered = self.front.advance(i, AHEAD)
             if i == self.n_ordered:
                 if again == n:
                     break
@@ -135,53 +126,6 @@ class _Sweep:
                     i = back
                 else:
                     again = min(again, back)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def put_known(self, width: cython.double) -> cython.void:
-        """Begin a front at the vertices whose distance is known."""
-        v: cython.int
-        clear(cython.address(self.ahead), cython.address(self.waiting[0]), width)
-        for v in range(self.d.shape[0]):
-            if self.d[v] < INFINITY:
-                self.key[v] = self.d[v]
-                put(cython.address(self.ahead), v, self.d[v])
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def order_ahead(self, i: cython.Py_ssize_t) -> cython.void:
-        """Let the front go on until it is known which vertices come after rank i, or it has met all."""
-        v: cython.int
-        while self.n_passed + 1 < i:
-            self.reach_neighbours()
-        while self.n_ordered < i + AHEAD:
-            v = take(cython.address(self.ahead), cython.address(self.key[0]))
-            if v < 0:
-                if self.n_ordered > i or self.n_passed == i:
-                    return
-                self.reach_neighbours()
-            elif self.rank[v] == self.order.shape[0]:
-                self.order[self.n_ordered] = v
-                self.rank[v] = self.n_ordered
-                self.n_ordered += 1
-
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def reach_neighbours(self) -> cython.void:
-        """Put the neighbours of the next vertex that the front has passed into the queue."""
-        k: cython.int
-        v: cython.int = self.order[self.n_passed]
-        self.n_passed += 1
-        for k in range(self.t.first[v], self.t.first[v + 1]):
-            s = cython.address(self.t.spoke[k])
-            key: cython.double = self.d[v] + s.length
-            if key < self.key[s.neighbour]:
-                self.key[s.neighbour] = key
-                put(cython.address(self.ahead), s.neighbour, key)
 
     @cython.cfunc
     @cython.inline
