@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import subprocess
 import sys
 import sysconfig
@@ -129,10 +130,24 @@ def _copy_sources() -> None:
             copy.write_text(text, encoding="utf8")
 
 
+def _read_by(source: Path) -> set[Path]:
+    """A kernel's source, its own declarations, and those that they take from other kernels, directly or not."""
+    found, waiting = {source}, [source, source.with_suffix(".pxd")]
+    while waiting:
+        path = waiting.pop()
+        if path.exists():
+            found.add(path)
+            names = re.findall(r"heat_igl\.kernels\.(\w+)", path.read_text(encoding="utf8"))
+            declared = {source.with_name(f"{name}.pxd") for name in names}
+            waiting += declared - found
+            found |= {one for one in declared if one.exists()}
+    return found
+
+
 def _translated(name: str) -> Path:
-    """The C file of a module, written anew where the source or any declaration is newer."""
+    """The C file of a module, written anew where its source or a declaration that it reads is newer."""
     source, into = COPIES / KERNELS / f"{name}.py", C_FILES / f"{name}.c"
-    read = [Path(__file__), *(COPIES / KERNELS).glob("*.pxd"), *([source] if name != SHARED else [])]
+    read = [Path(__file__), *(_read_by(source) if name != SHARED else [])]
     if into.exists() and into.stat().st_mtime > max(path.stat().st_mtime for path in read):
         return into
     into.parent.mkdir(parents=True, exist_ok=True)
