@@ -449,9 +449,30 @@ def test_two_fields_stand_side_by_side(browser: Browser) -> None:
     browser.click(at + np.array([left.shape[1], 0, 0]))
     assert browser.sources() == [vertex]
     assert browser.text("readout").endswith("): 0, exact 0.8, half 0.4")
-    assert browser.text("method").endswith("Other fields are as given: exact, half.")
+    assert browser.text("method").endswith("Other fields keep their own source: exact, half.")
     choose(browser, "beside", "")
     assert browser.on_canvas(vertex)[0] > at[0]
+
+
+def test_a_field_that_does_not_follow_a_click_keeps_its_source(browser: Browser) -> None:
+    """After a click, each half marks the place at which the field that it shows is least."""
+    mesh, front, _, distance = sphere()
+    browser.open(page(mesh, distance, sources=front, fields={"exact": distance}, beside="exact", view=(0, 0)))
+    width = halves(browser.image())[0].shape[1]
+    chosen = int(np.argmin(np.linalg.norm(mesh.V - [0.6, 0.0, 0.8], axis=1)))
+    browser.click(browser.on_canvas(chosen))
+    for column, (least, field) in enumerate([(chosen, "distance"), (front, "exact")]):
+        image = halves(browser.image())[column]
+        panel = browser.run("return window.heatIgl.panels()")[column]
+        assert panel["field"] == field
+        assert panel["least"] == least
+        red = np.abs(image - [0.91, 0.0, 0.043]).max(axis=2) < 0.1
+        rows, columns = np.nonzero(red)
+        np.testing.assert_allclose([columns.mean(), rows.mean()], browser.on_canvas(least)[:2], atol=2)
+    assert browser.text("label2") == "exact, as given"
+    assert browser.on_canvas(chosen)[0] < width
+    browser.driver.find_element("id", "reset").click()
+    assert not browser.run("return document.getElementById('scale2').checkVisibility()")
 
 
 def test_a_signed_field_is_white_at_0(browser: Browser) -> None:

@@ -133,7 +133,7 @@ def page(
     fields : dict of str to (n,) or (n, 2) array_like, optional
         More fields to choose from, by the names that the page shows: values at the vertices, such as the exact distance
         or a signed one, with white for 0 if both signs occur; or vectors of a logarithmic map, drawn as a checkerboard.
-        They do not follow clicks.
+        They do not follow clicks: after one, they are drawn with the sources that they were given with.
     beside : str, optional
         The field that is drawn to the right of the distance at first: a name in `fields`, or "log map" if `sources` are
         vertices.

@@ -3,7 +3,7 @@
 class Renderer {
   // `meta` has the tables of colours and the strengths of the lines and stripes.
   constructor(canvas, gl, V, F, meta) {
-    Object.assign(this, { canvas, gl, nVertices: V.length / 3, nCorners: F.length, nDots: 0 });
+    Object.assign(this, { canvas, gl, nVertices: V.length / 3, nCorners: F.length });
     const inked = (text) => text.replaceAll("LINE_INK", meta.lineInk).replaceAll("STRIPE_INK", meta.stripeInk);
     this.surfaceProgram = this.program(SURFACE_VERTEX, inked(SURFACE_FRAGMENT));
     this.discProgram = this.program(DISC_VERTEX, inked(DISC_FRAGMENT));
@@ -13,8 +13,6 @@ class Renderer {
       position: [this.buffer(V), 3], normal: [this.buffer(vertexNormals(V, F)), 3], radius: [this.buffer(discRadii(V, F)), 1],
     };
     this.triangles = gl.createBuffer();
-    this.dotBuffer = this.buffer(new Float32Array(0));
-    this.dotArrays = this.arrays(this.dotProgram, { position: [this.dotBuffer, 3] });
     gl.bindVertexArray(null);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.triangles);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, F, gl.STATIC_DRAW);
@@ -67,26 +65,23 @@ class Renderer {
 
   // What a panel is drawn from; `fillPanel` fills it.
   panelBuffers() {
-    const value = this.buffer(new Float32Array(0)), needles = this.buffer(new Float32Array(0));
-    const made = { value, needles, nNeedles: 0 };
+    const [value, needles, dots] = [0, 1, 2].map(() => this.buffer(new Float32Array(0)));
+    const made = { value, needles, dots, nNeedles: 0, nDots: 0 };
     made.onSurface = this.arrays(this.surfaceProgram, { ...this.shared, value: [value, 3] });
     this.gl.bindBuffer(this.gl.ELEMENT_ARRAY_BUFFER, this.triangles);
     made.onDiscs = this.arrays(this.discProgram, { ...this.shared, value: [value, 3] });
     made.onNeedles = this.arrays(this.needleProgram, { position: [needles, 3] });
+    made.onDots = this.arrays(this.dotProgram, { position: [dots, 3] });
     this.gl.bindVertexArray(null);
     return made;
   }
 
-  // Three numbers per vertex (two of the field, and 1 where it is finite), and the corners of the needles.
-  fillPanel(panel, values, needles) {
+  // Three numbers per vertex (two of the field, and 1 where it is finite), the corners of the needles, and the sources.
+  fillPanel(panel, values, needles, dots) {
     this.fill(panel.value, values);
     this.fill(panel.needles, needles);
-    panel.nNeedles = needles.length / 3;
-  }
-
-  setDots(positions) {
-    this.fill(this.dotBuffer, Float32Array.from(positions));
-    this.nDots = positions.length / 3;
+    this.fill(panel.dots, Float32Array.from(dots));
+    [panel.nNeedles, panel.nDots] = [needles.length / 3, dots.length / 3];
   }
 
   // Draw panels side by side; `style` is a number as shaders.js has it.
@@ -102,7 +97,7 @@ class Renderer {
       gl.viewport(i * across, 0, across, height);
       this.drawField(panel, camera, style, asPoints, ratio);
       this.drawNeedles(panel, camera);
-      this.drawDots(camera, ratio);
+      this.drawDots(panel, camera, ratio);
     });
   }
 
@@ -140,16 +135,16 @@ class Renderer {
   }
 
   // Dots behind the surface are drawn too, as shaders.js has it.
-  drawDots(camera, ratio) {
+  drawDots(panel, camera, ratio) {
     const gl = this.gl;
     this.use(this.dotProgram, camera);
-    gl.uniform1f(this.dotProgram.size, (this.nDots <= 20 ? 11 : 5) * ratio);
-    gl.bindVertexArray(this.dotArrays);
+    gl.uniform1f(this.dotProgram.size, (panel.nDots <= 20 ? 11 : 5) * ratio);
+    gl.bindVertexArray(panel.onDots);
     gl.depthMask(false);
     for (const [isHidden, compare] of [[1, gl.GREATER], [0, gl.LEQUAL]]) {
       gl.depthFunc(compare);
       gl.uniform1i(this.dotProgram.isHidden, isHidden);
-      gl.drawArrays(gl.POINTS, 0, this.nDots);
+      gl.drawArrays(gl.POINTS, 0, panel.nDots);
     }
     gl.depthFunc(gl.LESS);
     gl.depthMask(true);

@@ -37,6 +37,8 @@
     return map;
   }
   const isMap = (field) => field === "log map" || meta.fields.some(([name, width]) => name === field && width === 2);
+  // Fields that were given do not follow clicks: they keep the sources that they were made with.
+  const isGiven = (field) => meta.fields.some(([name]) => name === field);
   const canMap = () => Boolean(sweepFaces) && sources.length > 0;
 
   function showPanel(at) {
@@ -48,7 +50,7 @@
     for (let v = 0; v < n; v++) {
       if (isFinite(valueAt(v))) triples.set(at.isMap ? [found[2 * v], found[2 * v + 1], 1] : [found[v], 0, 1], 3 * v);
     }
-    renderer.fillPanel(at, triples, byId("directions").checked ? arrows(V, F, valueAt) : new Float32Array(0));
+    renderer.fillPanel(at, triples, byId("directions").checked ? arrows(V, F, valueAt) : new Float32Array(0), isGiven(at.field) ? meta.dots : dots);
   }
 
   function showValues() {
@@ -68,7 +70,6 @@
       const across = at.high - at.low;
       at.spacing = asked > across / 1000 ? asked : roundSpacing(across * meta.unit) / meta.unit;
     }
-    renderer.setDots(dots);
     showScales();
     redraw();
   }
@@ -86,13 +87,15 @@
   function showScale(suffix, at) {
     drawBar(byId("bar" + suffix), at, byId("style").value, meta);
     byId("ticks" + suffix).replaceChildren(...ticks(at, written));
-    byId("label" + suffix).textContent = at.field === "distance" ? meta.label : at.field === "log map" ? "length in the log map" : at.field;
+    const names = { distance: meta.label, "log map": "length in the log map" };
+    byId("label" + suffix).textContent = (names[at.field] || at.field) + (isComputed && isGiven(at.field) ? ", as given" : "");
   }
 
   function showScales() {
     const [left, right] = shown();
     showScale("", left);
-    byId("scale2").hidden = !right || (right.row === left.row && right.low === left.low && right.high === left.high);
+    const follow = right && isGiven(left.field) === isGiven(right.field);
+    byId("scale2").hidden = !right || ((follow || !isComputed) && (right.row === left.row && right.low === left.low && right.high === left.high));
     if (!byId("scale2").hidden) showScale("2", right);
   }
 
@@ -118,7 +121,7 @@
     isComputed = true;
     map = null;
     dots = chosen.flatMap((s) => [V[3 * s], V[3 * s + 1], V[3 * s + 2]]);
-    const others = meta.fields.length ? " Other fields are as given: " + meta.fields.map(([name]) => name).join(", ") + "." : "";
+    const others = meta.fields.length ? " Other fields keep their own source: " + meta.fields.map(([name]) => name).join(", ") + "." : "";
     byId("method").textContent = "Computed in this page by the sweep, which unfolds triangles: " + milliseconds.solve.toFixed(0) + " ms." + others;
     showValues();
     return milliseconds;
@@ -212,6 +215,13 @@
     setSources,
     pick,
     onCanvas: (v) => camera.project(V, v),
+    // For each panel: its field, the vertex at which that is least, and the positions of the sources drawn there.
+    panels: () => shown().map((at) => {
+      const found = numbers(at.field), size = (v) => (at.isMap ? Math.hypot(found[2 * v], found[2 * v + 1]) : found[v]);
+      let least = 0;
+      for (let v = 1; v < n; v++) if (size(v) < size(least)) least = v;
+      return { field: at.field, least, dots: isGiven(at.field) ? meta.dots : dots };
+    }),
     state,
     saved,
   };
