@@ -23,7 +23,7 @@ from heat_igl.heat_method.several_sources import drop_overtaken
 from heat_igl.intrinsic import mollify
 from heat_igl.sources import SourceAssembler, source_set
 from heat_igl.typing import FloatArray
-from heat_igl.validation.zoo import SHAPES
+from heat_igl.validation.zoo import FAMILIES, SHAPES
 from tests.conftest import load_script, shared_path
 
 # Mean error in percent over three sources as measured; a bound on either side.
@@ -59,6 +59,16 @@ def test_a_third_is_held_out() -> None:
     assert len(SHAPES) >= 60
     assert 0.33 < np.mean([shape.held_out for shape in SHAPES]) < 0.5
     assert len(BY_NAME) == len(SHAPES)
+
+
+@pytest.mark.parametrize("kind", FAMILIES)
+def test_a_seed_is_a_mesh_of_its_own(kind: str) -> None:
+    one, again, other = (FAMILIES[kind](seed) for seed in (1, 1, 2))
+    assert np.array_equal(one.V, again.V)
+    assert np.array_equal(one.F, again.F)
+    assert not np.array_equal(one.V, other.V)
+    assert one.n_faces > 10
+    assert len(np.unique(one.F)) == one.n_vertices
 
 
 @pytest.mark.parametrize("name", MEASURED)

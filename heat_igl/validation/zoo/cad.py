@@ -7,7 +7,7 @@ import numpy as np
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
 from heat_igl.validation.shapes import cylinder, lattice_faces
-from heat_igl.validation.zoo.registry import boxes, compact, delaunay, merged, raised, seeded, shape
+from heat_igl.validation.zoo.registry import boxes, compact, delaunay, merged, raised, seeded, shape, walls
 
 
 @shape("CAD", _128=64, _512=256)
@@ -89,13 +89,8 @@ def _gear() -> Mesh:
     r, at = np.linalg.norm(middle, axis=1), np.arctan2(middle[:, 1], middle[:, 0]) % (2 * np.pi)
     F = F[(r > 0.998) & (r < np.interp(at, np.append(angle, 2 * np.pi), np.append(radius, radius[0])))]
     n = len(rim)
-    # Walls along the edges that only one triangle has.
-    sides = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
-    _, which, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    a, b = sides[count[which.reshape(-1)] == 1].T
-    walls = np.concatenate([np.stack([a, b + n, b], axis=1), np.stack([a, a + n, b + n], axis=1)])
     V = np.concatenate([raised(rim, 1.0), raised(rim, 0.0)])
-    return compact(V, np.concatenate([F, F[:, ::-1] + n, walls]))
+    return compact(V, np.concatenate([F, F[:, ::-1] + n, walls(F, n)]))
 
 
 @shape("CAD")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -12,17 +14,21 @@ from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = [
+    "FAMILIES",
     "SHAPES",
     "Shape",
     "boxes",
     "compact",
     "delaunay",
+    "family",
     "hull",
     "joined",
     "merged",
     "raised",
+    "ring",
     "seeded",
     "shape",
+    "walls",
 ]
 
 
@@ -66,6 +72,24 @@ def shape(
     return register
 
 
+FAMILIES: dict[str, Callable[[int], Mesh]] = {}
+"""All kinds with random members, by name: seed -> mesh, the same bits at every call."""
+
+
+def family(name: str) -> Callable[[Callable[[np.random.Generator], Mesh]], Callable[[int], Mesh]]:
+    """Register a function of a random generator as a kind of shapes, and make it one of a seed."""
+
+    def register(make: Callable[[np.random.Generator], Mesh]) -> Callable[[int], Mesh]:
+        @wraps(make)
+        def member(seed: int) -> Mesh:
+            return make(np.random.default_rng([20261123, crc32(name.encode()), seed]))
+
+        FAMILIES[name] = member
+        return member
+
+    return register
+
+
 def seeded(seed: int) -> np.random.Generator:
     """A random generator with a fixed seed."""
     return np.random.default_rng([20240815, seed])
@@ -76,6 +100,20 @@ def delaunay(points: FloatArray) -> IntArray:
     from scipy.spatial import Delaunay  # takes as long to import as the rest of the package
 
     return np.asarray(Delaunay(points).simplices, np.int64)
+
+
+def ring(around: int) -> FloatArray:
+    """Points (around, 2) of the unit circle."""
+    angle = 2 * np.pi * np.arange(around) / around
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def walls(F: IntArray, above: int) -> IntArray:
+    """Triangles between the boundary of F and the same boundary with `above` added to its vertices."""
+    sides = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
+    _, which, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
+    a, b = sides[count[which.reshape(-1)] == 1].T
+    return np.concatenate([np.stack([a, b + above, b], axis=1), np.stack([a, a + above, b + above], axis=1)])
 
 
 def raised(points: FloatArray, height: AnyArray | float = 0.0) -> FloatArray:
