@@ -218,8 +218,9 @@ def carved_voxels(rng: Generator) -> Mesh:
     """A block of cells out of which random boxes were cut, without cells that touch in edges or corners alone."""
     where = np.ones(tuple(rng.integers(5, 12, 3)), bool)
     for _ in range(int(rng.integers(3, 25))):
-        (a, b, c), (i, j, k) = rng.integers(0, where.shape).tolist(), rng.integers(1, 5, 3).tolist()
-        where[a : a + i, b : b + j, c : c + k] = False
+        low, size = rng.integers(0, where.shape), rng.integers(1, 5, 3)
+        cell = np.indices(where.shape).T - low
+        where[((cell >= 0) & (cell < size)).all(axis=-1).T] = False
     return boxes(np.argwhere(where) if where.any() else np.zeros((1, 3), np.int64), rng.uniform(0.3, 1.0, 3))
 
 
