@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import flat_perturbed, load_script, perturbed
+from scipy.spatial import ConvexHull
 
 import heat_igl
 from heat_igl import (
@@ -35,6 +36,13 @@ def walking(mesh: Mesh, refine: str) -> HeatMethodSolver:
         solver._parts.last_steps._takes_windows = lambda _: False
         solver._parts.last_steps._follows_curves = lambda *_: False
     return solver
+
+
+def convex_hull(P: np.ndarray) -> Mesh:
+    """The hull of points around the origin, its faces counterclockwise from outside."""
+    F = ConvexHull(P).simplices
+    inward = np.linalg.det(P[F]) < 0
+    return Mesh(P, np.where(inward[:, None], F[:, ::-1], F))
 
 
 def straight(mesh: Mesh, source: int | SurfacePoints) -> np.ndarray:
@@ -119,6 +127,19 @@ def test_the_exponential_map_undoes_the_log_map_along_straight_paths(way, bunny)
     np.testing.assert_allclose(np.hypot(*log.T), heat_igl.geodesic_distance(bunny, start, method="exact"), rtol=1e-9)
 
 
+@pytest.mark.parametrize("seed", [25, 1, 2, 3])
+@pytest.mark.parametrize("place", [(0, 3e-4, 0.9997), (0, 0.4, 0.6), (1, 0, 0), (0.2, 0.5, 0.3)])
+def test_exp_map_undoes_the_log_map_from_edges_that_were_flipped(seed, place):
+    rng = np.random.default_rng(seed)
+    P = rng.normal(size=(100, 3))
+    # Stretched as much, a hull has thin faces, of which almost all edges are flipped.
+    mesh = convex_hull(P / np.linalg.norm(P, axis=1, keepdims=True) * [1, 10, 100])
+    start = SurfacePoints([int(rng.integers(mesh.n_faces))], np.array([place]))
+    log = log_map(mesh, start, method="exact")
+    gap = np.linalg.norm(exp_map(mesh, start, log).positions(mesh) - mesh.V, axis=1)
+    assert gap.max() < 1e-9 * np.hypot(*log.T).max()  # on a convex body no path bends
+
+
 @pytest.mark.parametrize(
     "mesh",
     [
@@ -157,6 +178,25 @@ def test_the_log_map_of_a_vertex_needs_its_faces_and_edges():
     turned = Mesh(grid.V, np.concatenate([grid.F[:1, ::-1], grid.F[1:]]))
     with pytest.raises(heat_igl.MeshError, match="has faces that are oriented differently"):
         log_map(turned, 24)
+
+
+def test_a_point_on_a_side_of_a_triangle_that_is_glued_to_itself():
+    """Around the tip of a spike one triangle is left after flips, and two copies of the point lie in it."""
+    sphere = shapes.icosphere(2)
+    rng = np.random.default_rng(335)
+    mesh = Mesh(sphere.V * np.exp(rng.normal(size=(sphere.n_vertices, 1)) * 0.3) * [1, 4, 20], sphere.F)
+    unfolding = heat_igl.operators.operators(mesh).surface.unfolding
+    side = np.flatnonzero(unfolding.twin // 3 == np.arange(unfolding.twin.size) // 3)
+    tips = unfolding.tail(side)
+    tips = tips[np.bincount(unfolding.F.ravel())[tips] == 1]
+    assert len(tips)
+    for tip in tips[:3]:
+        for face in np.flatnonzero((tip == mesh.F).any(axis=1)):
+            at_tip = 1.0 * (tip == mesh.F[face])
+            start = SurfacePoints([face], [0.4 * at_tip + 0.6 * np.roll(at_tip, 1)])
+            log = log_map(mesh, start, method="exact")
+            gap = np.linalg.norm(exp_map(mesh, start, log).positions(mesh) - mesh.V, axis=1)
+            assert gap[straight(mesh, start)].max() < 1e-12 * np.hypot(*log.T).max()
 
 
 def test_departures_are_those_of_straightened_paths(bunny):

@@ -46,8 +46,8 @@ def log_map(
     -------
     (n, 2) float64
         Vectors as long as the distance, in the direction in which the shortest path departs: in the frame of
-        `tangent_frames` at a vertex, and with the first axis along the side of corners 0 and 1 in a face, as
-        `exp_map` takes them. 0 at the source and where it does not reach.
+        `tangent_frames` at a vertex (also if it is given as a point), and with the first axis along the side of
+        corners 0 and 1 in a face, as `exp_map` takes them. 0 at the source and where it does not reach.
 
     Raises
     ------

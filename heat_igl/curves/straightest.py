@@ -36,8 +36,9 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
         A vertex, or one point in a face.
     direction : (2,) or (3,) array_like
         The length does not matter. Two components are those of the frame: at a vertex see `tangent_frames`; in a face
-        the first axis runs from corner 0 to corner 1, and the second to the side of corner 2. Three components are a
-        vector in space, whose part along the normal of the vertex or face is left out.
+        the first axis runs from corner 0 to corner 1, and the second to the side of corner 2; a point in a vertex has
+        the frame of the vertex. Three components are a vector in space, whose part along the normal of the vertex or
+        face is left out.
     length : float
         In the mesh's unit, 0 or more.
 
@@ -78,10 +79,10 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
     True
     """
     tracer = Tracer(as_simplices(mesh))
-    begin = tracer.starts("start", start)
+    vector = real_numbers("direction", direction)
+    begin = tracer.starts("start", start, vector.shape != (3,))
     if len(begin.faces) != 1:
         raise SourceError(f"start must be one vertex or point, not {len(begin.faces)}")
-    vector = real_numbers("direction", direction)
     if vector.ndim != 1:
         raise ValueError(f"direction must be one vector (2,) or (3,), but it has shape {vector.shape}")
     distance = _checked_length(length)
@@ -175,8 +176,8 @@ class Tracer:
 
     def exp(self, source: Sources, vectors: ArrayLike) -> SurfacePoints:
         """The exponential map; see `exp_map`."""
-        begin = self.starts("source", source)
         array = real_numbers("vectors", vectors)
+        begin = self.starts("source", source, array.shape[-1:] != (3,))
         k = len(array) if array.ndim == 2 else 1
         if not k:
             raise ValueError(f"vectors must be one vector or more, but it has shape {array.shape}")
@@ -200,13 +201,18 @@ class Tracer:
                 "the mesh"
             )
 
-    def starts(self, name: str, points: Sources) -> _Starts:
-        """Starts of geodesics: vertices in the order given, or points in faces."""
+    def starts(self, name: str, points: Sources, in_frame: bool = True) -> _Starts:
+        """Starts of geodesics: vertices in the order given, or points in faces.
+
+        A point in a vertex is the vertex for components `in_frame`; a vector in space is in the plane of its face.
+        """
         if isinstance(points, SurfacePoints):
             points.positions(self._mesh)  # which checks the faces
             weights = np.where(points.barycentric < ON_SIDE, 0.0, points.barycentric)
             weights /= weights.sum(axis=1, keepdims=True)
-            return _Starts(points.faces, np.ascontiguousarray(weights), np.full(len(points), -1))
+            corner = self._mesh.F[points.faces, weights.argmax(axis=1)]
+            vertices = np.where((weights.max(axis=1) == 1) & in_frame, corner, -1)
+            return _Starts(points.faces.copy(), np.ascontiguousarray(weights), vertices)
         vertices = ordered_vertices(points, self._mesh.n_vertices, name)
         corner = self._frames.angles.first[vertices]
         if (corner < 0).any():

@@ -126,6 +126,31 @@ class Flipped(NamedTuple):
         )
         return faces, barycentric
 
+    def turn(self, before: IntArray, after: IntArray) -> FloatArray:
+        """By how much directions at points turn from the faces (k,) after the change to those before it.
+
+        Angles in a face count from the side of its corners 0 and 1. To add is what leads from an angle in the face
+        after the change to the angle of the same direction in the face before.
+        """
+        turn = np.zeros(len(before))
+        moved, edge, in_second = self.moved(before)
+        ab, pa, bp, aq, qb = self.lengths[:, edge]
+        # As in `carry`: a at the origin, b on the first axis.
+        (px, py), (qx, qy) = apex(ab, pa, bp), apex(ab, aq, qb)
+        p, q, a, b = px + 1j * py, qx - 1j * qy, np.zeros(len(edge), complex), ab + 0j
+        first, second = self.half_edge[edge], self.mate[edge]
+        to_second = after[moved] == second // 3
+        old = np.where(in_second, [q, b, a], [p, a, b])
+        new = np.where(to_second, [q, b, p], [p, a, q])
+        axes = []
+        for corners, side in ((old, np.where(in_second, second, first)), (new, np.where(to_second, second, first))):
+            # The first of the three stands at the corner opposite the edge that is flipped.
+            start, end = ((c - side) % 3 for c in (0, 1))
+            k = np.arange(len(edge))
+            axes.append(corners[end, k] - corners[start, k])
+        turn[moved] = np.angle(axes[1] * axes[0].conj())
+        return turn
+
     def moved(self, faces: IntArray) -> tuple[IntArray, IntArray, BoolArray]:
         """The points whose faces (k,) change, which edge is flipped there, and whether the face is its second."""
         sides = np.concatenate([self.half_edge, self.mate])

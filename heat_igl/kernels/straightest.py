@@ -70,7 +70,7 @@ class _Tracer:
         goes_on: cython.bint = length > 0.0 and self.start(face, turn)
         while goes_on and idle <= MOST_IDLE:
             self.lay_out()
-            step: cython.double = self.find_exit()
+            step: cython.double = self.find_exit(travelled[0])
             ends: cython.bint = step >= left
             if ends:
                 share: cython.double = left / step
@@ -192,10 +192,11 @@ class _Tracer:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def find_exit(self) -> cython.double:
+    def find_exit(self, travelled: cython.double) -> cython.double:
         """Find the point at which the ray leaves the face; returns the length of the segment up to there.
 
-        The exit is the share `face.share` of the side from point `face.k` of the layout to the next.
+        `travelled` is the length up to this face. The exit is the share `face.share` of the side from point `face.k`
+        of the layout to the next.
         """
         p = cython.address(self.face)
         dx: cython.double = self.ray.dx
@@ -226,17 +227,31 @@ class _Tracer:
         share: cython.double = 1.0 if dx * (p.x[c] - p.x[k]) + dy * (p.y[c] - p.y[k]) > 0.0 else 0.0
         if b - a > 0.0:
             share = -a / (b - a)
-        if share < ON_SIDE:
+        p.k = k
+        # Rounding moves a ray by a share of the way that it has come: near its start it may pass a vertex close by.
+        come: cython.double = travelled + self.along(c, share)
+        near: cython.double = ON_SIDE * min(come / self.tables.l[p.f, (p.side + k) % 3], 1.0)
+        if share < near:
             share = 0.0
-        elif share > 1.0 - ON_SIDE:
+        elif share > 1.0 - near:
             share = 1.0
-        p.k, p.share = k, share
+        p.share = share
         # The corner of the face at point 0 of the layout is the one after the side.
         self.leave[(p.side + 1 + k) % 3] = 1.0 - share
         self.leave[(p.side + 1 + c) % 3] = share
         self.leave[(p.side + k) % 3] = 0.0
-        along: cython.double = (p.x[k] + share * (p.x[c] - p.x[k]) - p.start_x) * dx
-        return max(along + (p.y[k] + share * (p.y[c] - p.y[k]) - p.start_y) * dy, 0.0)
+        return self.along(c, share)
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def along(self, c: cython.int, share: cython.double) -> cython.double:
+        """How far ahead of the start of the segment a share of the side from point `face.k` to point c lies."""
+        p = cython.address(self.face)
+        x: cython.double = p.x[p.k] + share * (p.x[c] - p.x[p.k]) - p.start_x
+        y: cython.double = p.y[p.k] + share * (p.y[c] - p.y[p.k]) - p.start_y
+        return max(x * self.ray.dx + y * self.ray.dy, 0.0)
 
     @cython.cfunc
     @cython.nogil

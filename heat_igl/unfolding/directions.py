@@ -8,6 +8,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import PolarAngles, carried_angles, lay_out, polar_angles
+from heat_igl.intrinsic.history import Flipped
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
@@ -19,10 +20,6 @@ from heat_igl.unfolding.refinement import Refinement
 __all__ = ["PathAngles", "PathDirections", "in_circle"]
 
 _WHOLE = 2 * np.pi
-# How far a second point in a face is from the first, in lengths of the shortest side.
-_ASIDE = 1e-3
-# In so many directions.
-_ROUND = 8
 
 
 def in_circle(angles: FloatArray) -> FloatArray:
@@ -121,7 +118,7 @@ class PathDirections:
         back[row] = _polar(self._begin[row], walk["angle"][row], scale[row], on_boundary[row])
         if points is not None:
             inside = row[root[row] >= n]
-            departure[inside] += self._turns(points)[0][root[inside] - n]
+            departure[inside] += self._turns(points)[root[inside] - n]
         found = _handed_on(row, root, departure, back, np.where(on_boundary, scale, 1.0))
         return PathAngles(*found[:, self._number])
 
@@ -144,9 +141,9 @@ class PathDirections:
             outward = np.flatnonzero(at_vertex)
             departure[row] = seen
             departure[row[outward]] = self._at_corners(corner[outward], seen[outward])
-            if points is not None:
-                turn = self._turns_in(points, root[~at_vertex] - n, corner[~at_vertex] // 3)
-                departure[row[~at_vertex]] += turn
+            if points is not None and found.leaving.turn is not None:
+                inside = row[~at_vertex]
+                departure[inside] += found.leaving.turn[inside] + self._turns(points)[root[~at_vertex] - n]
         # Over the half-edge opposite, or from the source point in the same face.
         entered, crossing = origin.entered[row], origin.crossing[row]
         over = entered >= 0
@@ -176,48 +173,20 @@ class PathDirections:
         seen = departure - self._direction(previous_half_edge(corner))
         return in_circle(self._at_corners(corner, seen - _WHOLE * np.rint(seen / _WHOLE)))
 
-    def _turns_in(self, points: SurfacePoints, point: IntArray, faces: IntArray) -> FloatArray:
-        """By how much angles (k,) in triangles are turned from those in the given faces of points on them.
-
-        A point on a side is also in the triangle beyond.
-        """
-        turns, home, inside = self._turns(points)
-        turn = turns[point]
-        beyond = np.flatnonzero(home[point] != faces)
-        sides = 3 * home[point[beyond], None] + np.arange(3)
-        leads_there = self._triangulation.twin[sides] // 3 == faces[beyond, None]
-        c = np.where(leads_there, inside[point[beyond]], np.inf).argmin(axis=1)
-        side = sides[np.arange(len(c)), c]
-        turn[beyond] += self._direction(side) + np.pi - self._direction(self._triangulation.twin[side])
-        return turn
-
     def _direction(self, half_edge: IntArray) -> FloatArray:
         return side_direction(half_edge, self.angles.corners.ravel())
 
-    def _turns(self, points: SurfacePoints) -> tuple[FloatArray, IntArray, FloatArray]:
-        """The angle (p,) of corners 0 and 1 of the triangles that hold points, in the given faces; and the places.
-
-        Flips have turned the triangles. A second point nearby, in the given face and in the triangle, shows how far.
-        The places are the triangles (p,) and the barycentric coordinates (p, 3).
-        """
-        given, triangulation, p = self._faces, self._triangulation, len(points)
-        angle = np.arange(_ROUND) * (_WHOLE / _ROUND) + 0.1
-        length = _ASIDE * given.l[points.faces].min(axis=1)
-        step = length[:, None] * np.cos(angle), length[:, None] * np.sin(angle)
-        # All in one go, as flips are followed one round after another.
-        beside = points.barycentric[:, None] + _barycentric_steps(lay_out(given.l[points.faces]), *step)
-        faces, barycentric = triangulation.locate(
-            np.append(points.faces, np.repeat(points.faces, _ROUND)),
-            np.concatenate([points.barycentric, np.maximum(beside, 0.0).reshape(-1, 3)]),
-        )
-        home, inside = faces[:p], barycentric[:p]
-        there = barycentric[p:].reshape(p, _ROUND, 3)
-        # By how much both points are inside.
-        margin = np.minimum(beside.min(axis=2), there.min(axis=2))
-        best = np.where(faces[p:].reshape(p, _ROUND) == home[:, None], margin, -np.inf).argmax(axis=1)
-        ahead = there[np.arange(p), best] - inside
-        dx, dy = np.einsum("pc,pcx->xp", ahead, lay_out(triangulation.l[home]))
-        return angle[best] - np.arctan2(dy, dx), home, inside
+    def _turns(self, points: SurfacePoints) -> FloatArray:
+        """The angle (p,) of corners 0 and 1 of the triangles that hold points, in the given faces: flips turn them."""
+        faces, barycentric = points.faces, points.barycentric
+        turn = np.zeros(len(points))
+        for flips in self._triangulation.history:
+            if not isinstance(flips, Flipped):
+                continue  # with other changes there are no polar angles
+            after, barycentric = flips.carry(faces, barycentric)
+            turn += flips.turn(faces, after)
+            faces = after
+        return turn
 
 
 def _polar(begin: FloatArray, angles: FloatArray, scale: FloatArray, on_boundary: BoolArray) -> FloatArray:
@@ -259,11 +228,3 @@ def _handed_on(row: IntArray, root: IntArray, departure: FloatArray, back: Float
     found[0, row], found[1, row] = in_circle(departure[top[row]]), in_circle(back[row])
     found[2, row] = turning[row] - _WHOLE * np.rint(turning[row] / _WHOLE)
     return found
-
-
-def _barycentric_steps(corners: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """How barycentric coordinates (k, s, 3) change over steps (x, y), (k, s) each, in triangles (k, 3, 2)."""
-    (ab_x, ab_y), (ac_x, ac_y) = ((corners[:, c] - corners[:, 0]).T[:, :, None] for c in (1, 2))
-    area = ab_x * ac_y - ab_y * ac_x
-    b, c = (x * ac_y - y * ac_x) / area, (ab_x * y - ab_y * x) / area
-    return np.stack([-b - c, b, c], axis=2)

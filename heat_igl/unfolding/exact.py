@@ -14,7 +14,7 @@ from heat_igl.runtime import n_threads
 from heat_igl.sources import Sources, SourceSegments, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh, from_triangulation
-from heat_igl.unfolding.leaving import with_places
+from heat_igl.unfolding.leaving import with_places, with_turns
 from heat_igl.unfolding.window_search import Found, Leaving, Searched, search
 from heat_igl.unfolding.window_starts import starts_at
 
@@ -210,10 +210,10 @@ class ExactSurface:
         if done.leaving is None:
             return None
         edges = self._half_edges
-        leaving = with_places(edges, done, done.leaving) if len(done.starts.segments.faces) else done.leaving
+        leaving = (with_places if len(done.starts.segments.faces) else with_turns)(edges, done, done.leaving)
         corner, direction = leaving.corner[edges.number], leaving.direction[edges.number]
-        place = None if leaving.place is None else leaving.place[edges.number]
-        return Leaving(edges.old_half_edge(corner), direction, place)
+        place, turn = (None if of is None else of[edges.number] for of in (leaving.place, leaving.turn))
+        return Leaving(edges.old_half_edge(corner), direction, place, turn)
 
     def _result(self, found: Found, done: Searched, which: AnyArray, cutoff: float) -> tuple[FloatArray, Origin]:
         """Distance and origin of some of the places that the kernel found, in the caller's numbers and unit."""

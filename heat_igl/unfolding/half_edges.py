@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation
+from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, lay_out
 from heat_igl.kernels import numbering, window_surface
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSegments
@@ -68,16 +68,20 @@ class Located(NamedTuple):
         Coordinates in it; exactly 0 on a side.
     point : (q,) int64
         Which point it is.
+    turn : (q,) float64
+        What is added to the angle of a direction in the triangle to count it in the first triangle of the same point:
+        both count from the side of corners 0 and 1. On faces that are oriented alike.
     """
 
     faces: AnyArray
     barycentric: FloatArray
     point: IntArray
+    turn: FloatArray
 
 
 #: No points, and no segments, in any triangles.
-NO_POINTS = Located(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, np.int64))
-NO_SEGMENTS = Located(np.empty(0, np.int32), np.empty((0, 2, 3)), np.empty(0, np.int64))
+NO_POINTS = Located(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, np.int64), np.empty(0))
+NO_SEGMENTS = NO_POINTS._replace(barycentric=np.empty((0, 2, 3)))
 
 
 class Numbered(NamedTuple):
@@ -199,7 +203,7 @@ class HalfEdges:
         barycentric = np.where(barycentric < _ON_SIDE, 0.0, barycentric)
         barycentric /= barycentric.sum(axis=-1, keepdims=True)
         point = np.arange(len(faces))
-        rows = [(faces, barycentric, point)]
+        rows = [(faces, barycentric, point, np.zeros(len(faces)))]
         is_zero = (barycentric == 0).all(axis=1)
         i, c = np.nonzero(is_zero & (is_zero.sum(axis=1) == 1)[:, None])
         start = here = 3 * faces[i] + c
@@ -214,9 +218,16 @@ class HalfEdges:
             other, k = np.zeros((len(i), *barycentric.shape[1:])), np.arange(len(i))
             other[k, :, (here + 1) % 3] = np.where(same_way, tail, head)
             other[k, :, (here + 2) % 3] = np.where(same_way, head, tail)
-            rows.append((here // 3, other, point[i]))
-        faces, barycentric, point = (np.concatenate(column) for column in zip(*rows, strict=True))
-        return Located(faces.astype(np.int32), np.ascontiguousarray(barycentric), point)
+            # The same side runs the other way there.
+            rows.append((here // 3, other, point[i], np.angle(-self._along(start) * self._along(here).conj())))
+        faces, barycentric, point, turn = (np.concatenate(column) for column in zip(*rows, strict=True))
+        return Located(faces.astype(np.int32), np.ascontiguousarray(barycentric), point, turn)
+
+    def _along(self, half_edge: IntArray) -> AnyArray:
+        """Half-edges (k,) as complex numbers in their triangles, of which the side of corners 0 and 1 is real."""
+        corners = lay_out(self.tables.length.reshape(-1, 3)[half_edge // 3]) @ np.array([1, 1j])
+        k = np.arange(len(half_edge))
+        return np.asarray(corners[k, (half_edge + 2) % 3] - corners[k, (half_edge + 1) % 3])
 
     def by_face(self, located: Located) -> tuple[AnyArray, AnyArray]:
         """The first point of each triangle, and the next point of the same triangle; -1 for none."""

@@ -9,7 +9,19 @@ from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges
 from heat_igl.unfolding.window_search import Leaving, Searched
 
-__all__ = ["with_places"]
+__all__ = ["with_places", "with_turns"]
+
+
+def with_turns(edges: HalfEdges, done: Searched, leaving: Leaving) -> Leaving:
+    """How paths leave their roots, with the turns to the first triangles of source points.
+
+    Which triangle a path leaves through does not say by which side of it, if two of them are glued to each other.
+    """
+    point = done.found.root.astype(np.int64) - edges.n
+    row = np.flatnonzero((leaving.corner >= 0) & (point >= 0))
+    turn = np.zeros(len(point))
+    turn[row] = done.starts.points.turn[point[row]]
+    return leaving._replace(turn=turn)
 
 
 def with_places(edges: HalfEdges, done: Searched, leaving: Leaving) -> Leaving:

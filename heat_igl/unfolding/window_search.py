@@ -89,6 +89,8 @@ class Leaving(NamedTuple):
         The direction in the plane of that corner, of any length. The first axis is the side to the next corner.
     place : (n, 3) float64, optional
         Barycentric coordinates of the place that the path leaves, in the triangle of the corner.
+    turn : (n,) float64, optional
+        The angle that leads from a direction in that triangle to the same in the first triangle of a source point.
 
     Notes
     -----
@@ -99,6 +101,7 @@ class Leaving(NamedTuple):
     corner: AnyArray
     direction: FloatArray
     place: FloatArray | None = None
+    turn: FloatArray | None = None
 
     @classmethod
     def of(cls, n: int) -> Leaving:
