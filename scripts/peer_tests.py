@@ -1,10 +1,11 @@
 """Run the test files of other libraries against the drop-in modules: how many of their tests pass, and why others fail.
 
     python scripts/peer_tests.py potpourri3d=FILE.py igl=FILE.py --only exact_geodesic heat_geodesics
-    python scripts/peer_tests.py potpourri3d=potpourri3d/test/potpourri3d_test.py --json FILE
+    python scripts/peer_tests.py gdist=tvb-gdist/tests/test_gdist.py pygeodesic=pygeodesic/tests/test_pygeodesic.py
 
 A test file is run where it lies, unchanged; ``import potpourri3d`` in it finds `heat_igl.compat.potpourri3d`, and
-``import igl`` finds `heat_igl.compat.igl`. With ``--only``, tests that mention none of these words in their source are
+``import igl`` finds `heat_igl.compat.igl`; gdist and pygeodesic likewise. Tests run in the folder above
+theirs, whose data they may read. With ``--only``, tests that mention none of these words in their source are
 left out. The exit status is 1 if a test fails that is not in the list of known differences below.
 """
 
@@ -31,6 +32,8 @@ KNOWN = {
     "test_octree": "it fails with libigl 2.6.3 itself, whose marching_cubes returns another number of arrays",
 }
 
+_NAMES = ("potpourri3d", "igl", "gdist", "pygeodesic")
+
 # Run by the interpreter of the tests: puts the drop-in in the place of the library, and reports in JSON.
 _RUNNER = """
 import importlib, inspect, json, sys
@@ -41,6 +44,9 @@ module = importlib.import_module(f"heat_igl.compat.{name}")
 if name in sys.modules:  # libigl, whose submodules stay
     module.__path__ = sys.modules[name].__path__
 sys.modules[name] = module
+if name == "pygeodesic":  # the drop-in stands for pygeodesic.geodesic
+    module.geodesic, module.__version__, module.__path__ = module, "", []
+    sys.modules["pygeodesic.geodesic"] = module
 
 
 class Reports:
@@ -70,7 +76,7 @@ def outcomes(name: str, path: Path, words: Sequence[str]) -> list[dict[str, str]
         out = Path(folder) / "found.json"
         arguments = [name, str(path), json.dumps(list(words)), str(out)]
         done = subprocess.run(
-            [sys.executable, "-c", _RUNNER, *arguments], capture_output=True, text=True, cwd=folder,
+            [sys.executable, "-c", _RUNNER, *arguments], capture_output=True, text=True, cwd=path.parents[1],
             env={**os.environ, "PYTHONPATH": str(Path(heat_igl.__file__).parents[1])},
         )  # fmt: skip
         if not out.exists():
@@ -96,7 +102,7 @@ def markdown(results: dict[str, list[dict[str, str]]]) -> str:
 
 def main(argv: Sequence[str] | None = None) -> int:
     parser = option_parser(inspect.getdoc(sys.modules[__name__]))
-    parser.add_argument("files", nargs="+", metavar="NAME=FILE", help="potpourri3d or igl, and a test file of it")
+    parser.add_argument("files", nargs="+", metavar="NAME=FILE", help="a drop-in, and a test file of its library")
     parser.add_argument("--only", nargs="+", default=[], metavar="WORD", help="tests with one of these in their source")
     add_json(parser)
     add_output(parser, "peer_tests")
@@ -104,8 +110,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     results: dict[str, list[dict[str, str]]] = {}
     for given in options.files:
         name, _, path = given.partition("=")
-        if name not in ("potpourri3d", "igl") or not Path(path).is_file():
-            parser.error(f"{given}: expected potpourri3d=FILE or igl=FILE, with a file that exists")
+        if name not in _NAMES or not Path(path).is_file():
+            parser.error(f"{given}: expected NAME=FILE, with one of {', '.join(_NAMES)} and a file that exists")
         results[name] = results.get(name, []) + outcomes(name, Path(path).resolve(), options.only)
     result: dict[str, Any] = {"environment": environment(), "tests": results}
     publish(result, markdown(results), folder=options.output, name="peer_tests", json_file=options.json)

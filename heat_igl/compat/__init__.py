@@ -1,1 +1,1 @@
-"""Drop-in modules: functions of potpourri3d and of libigl under their own names, computed by this package."""
+"""Drop-in modules: functions of potpourri3d, libigl, gdist and pygeodesic by their names, on this package."""
