@@ -36,11 +36,11 @@ ROOT = Path(__file__).resolve().parents[1]
 NAME = "heat_igl"
 BOUNDS = {
     "rooms": 23,
-    "arrows": 126,
+    "arrows": 140,
     "back-arrows": 0,
     "circles": 0,
     "rooms, heat_igl/__init__.py and scripts": 25,
-    "arrows, theirs and those for types too": 158,
+    "arrows, theirs and those for types too": 175,
     "longest bodies": 60,
     "longest bodies of kernels": 60,
     "longest classes": 300,
