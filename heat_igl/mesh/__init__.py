@@ -4,6 +4,7 @@ from heat_igl.mesh.cloud_copies import nearest_copies
 from heat_igl.mesh.cloud_cover import is_oriented_manifold, two_sided_cover
 from heat_igl.mesh.cloud_normals import usable_normals
 from heat_igl.mesh.edge_curves import edge_curve
+from heat_igl.mesh.heights import Terrain, terrain
 from heat_igl.mesh.level_segments import Segments, crossings, joined_segments, level_segments
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with
@@ -43,6 +44,7 @@ __all__ = [
     "Segments",
     "SurfaceCurve",
     "SurfacePoints",
+    "Terrain",
     "as_mesh",
     "as_simplices",
     "checked_faces",
@@ -61,6 +63,7 @@ __all__ = [
     "read_paths_with",
     "region_boundary",
     "split_long_edges",
+    "terrain",
     "triangulated",
     "two_sided_cover",
     "usable_normals",

@@ -12,7 +12,7 @@ from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.voxels import TETRAHEDRA_PER_VOXEL, voxel_tetrahedra
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, IntArray
 
-__all__ = ["ImageDomain", "image_domain"]
+__all__ = ["ImageDomain", "checked_spacing", "image_domain"]
 
 _FACES_PER_PIXEL = 4
 
@@ -125,13 +125,17 @@ class ImageDomain:
         ValueError
             If `image` has another shape.
         """
+        n_faces = TETRAHEDRA_PER_VOXEL if self.index.ndim == 3 else _FACES_PER_PIXEL
+        return np.repeat(self._of_pixels(image), n_faces, axis=0)
+
+    def _of_pixels(self, image: ArrayLike) -> AnyArray:
+        """Values of the pixels of the domain, in the order of their vertices."""
         given = as_array("image", image)
         if given.shape[: self.index.ndim] != self.index.shape:
             raise ValueError(
                 f"image must have shape {self.index.shape}, with further axes for arrays per pixel, not {given.shape}"
             )
-        n_faces = TETRAHEDRA_PER_VOXEL if self.index.ndim == 3 else _FACES_PER_PIXEL
-        return np.repeat(given[self.index >= 0], n_faces, axis=0)
+        return np.asarray(given[self.index >= 0])
 
 
 def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> ImageDomain:
@@ -171,7 +175,7 @@ def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> Ima
     (2, 3)
     """
     inside = _mask(mask)
-    steps = _spacing(spacing, inside.ndim)
+    steps = checked_spacing(spacing, inside.ndim)
     if inside.ndim == 3:
         V, tetrahedra, index = voxel_tetrahedra(inside, steps)
         return ImageDomain(Mesh(V, tetrahedra), index)
@@ -209,7 +213,8 @@ def _mask(mask: ArrayLike) -> BoolArray:
     return array
 
 
-def _spacing(spacing: float | Sequence[float], dimension: int) -> list[float]:
+def checked_spacing(spacing: float | Sequence[float], dimension: int) -> list[float]:
+    """The distance between pixels along each axis; a ValueError as for `image_domain`."""
     try:
         steps: list[float] = np.broadcast_to(real_numbers("spacing", spacing), (dimension,)).tolist()
     except ValueError:
