@@ -7,6 +7,7 @@ from heat_igl.runtime.aliases import alias_modules
 
 if TYPE_CHECKING:
     from heat_igl import cluster, reference, sampling
+    from heat_igl.applications import geodesic_errors, parcel_distances, smooth
     from heat_igl.curves import (
         CentroidalSites,
         CutMesh,
@@ -173,6 +174,7 @@ __all__ = [
     "geodesic_bezier",
     "geodesic_centre",
     "geodesic_distance",
+    "geodesic_errors",
     "geodesic_path",
     "handle_loops",
     "heat_method_distance",
@@ -185,6 +187,7 @@ __all__ = [
     "nearest_vertices",
     "offset_curves",
     "pair_distances",
+    "parcel_distances",
     "plots",
     "point_cloud_operators",
     "polygon_operators",
@@ -199,6 +202,7 @@ __all__ = [
     "sampling",
     "shapes",
     "shortest_paths",
+    "smooth",
     "speed_operators",
     "split_long_edges",
     "straighten",
@@ -283,6 +287,7 @@ _LAZY = {
     "geodesic_bezier": "curves",
     "geodesic_centre": "sampling",
     "geodesic_distance": "heat_method",
+    "geodesic_errors": "applications",
     "geodesic_path": "curves",
     "handle_loops": "curves",
     "heat_method": "heat_method",
@@ -301,6 +306,7 @@ _LAZY = {
     "offset_curves": "curves",
     "operators": "operators",
     "pair_distances": "unfolding",
+    "parcel_distances": "applications",
     "read_distances_within": "unfolding",
     "write_distances_within": "unfolding",
     "plots": "drawing.plots",
@@ -317,6 +323,7 @@ _LAZY = {
     "sampling": "sampling",
     "shapes": "validation.shapes",
     "shortest_paths": "curves",
+    "smooth": "applications",
     "sources": "sources",
     "speed_operators": "operators",
     "split_long_edges": "mesh",

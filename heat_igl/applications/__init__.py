@@ -1,4 +1,4 @@
-"""Applications of geodesic distance: landmark-guided search on edges, and analysis of particles in binary images.
+"""Applications of geodesic distance: maps on a cortex, errors of matches, search on edges, particles in images.
 
 notebooks/10_applications.ipynb shows them. `heat_igl.torch` and `heat_igl.jax`, distance as a function that PyTorch and
 JAX differentiate, are imported by these names alone.
@@ -7,13 +7,18 @@ JAX differentiate, are imported by these names alone.
 from __future__ import annotations
 
 from heat_igl.applications.edge_search import EdgePath, EdgeSearch
+from heat_igl.applications.matches import geodesic_errors
 from heat_igl.applications.particles import particle_length, reconstruct, skeleton, zones_of_influence
+from heat_igl.applications.surface_maps import parcel_distances, smooth
 
 __all__ = [
     "EdgePath",
     "EdgeSearch",
+    "geodesic_errors",
+    "parcel_distances",
     "particle_length",
     "reconstruct",
     "skeleton",
+    "smooth",
     "zones_of_influence",
 ]

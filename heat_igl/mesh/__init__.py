@@ -15,6 +15,7 @@ from heat_igl.mesh.polygons import PolygonMesh, which_repeat_a_vertex
 from heat_igl.mesh.projection import ClosestPoints, closest_points
 from heat_igl.mesh.regions import region_boundary
 from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
+from heat_igl.mesh.sub_mesh import SubMesh, sub_mesh
 from heat_igl.mesh.subdivision import split_long_edges
 from heat_igl.mesh.surface_curves import curve_on
 from heat_igl.mesh.surface_points import (
@@ -42,6 +43,7 @@ __all__ = [
     "PolygonFans",
     "PolygonMesh",
     "Segments",
+    "SubMesh",
     "SurfaceCurve",
     "SurfacePoints",
     "Terrain",
@@ -63,6 +65,7 @@ __all__ = [
     "read_paths_with",
     "region_boundary",
     "split_long_edges",
+    "sub_mesh",
     "terrain",
     "triangulated",
     "two_sided_cover",

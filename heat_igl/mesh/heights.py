@@ -63,8 +63,8 @@ def terrain(heights: ArrayLike, spacing: float | Sequence[float] = 1.0, nodata: 
     Parameters
     ----------
     heights : (rows, columns) array_like of real numbers
-        Height at the centre of each cell, in the unit of `spacing`: an array, a masked array, or xarray's DataArray. NaN
-        and masked cells have no ground.
+        Height at the centre of each cell, in the unit of `spacing`: an array, a masked array, or xarray's DataArray.
+        Cells that are NaN or masked have no ground.
     spacing : float or (float, float), optional
         Distance between the centres of neighbouring cells: one number, or from row to row before from column to column.
     nodata : float, optional

@@ -1,0 +1,214 @@
+"""Maps on a cortex, or any other surface: distances between parcels, and smoothing by a width."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+import scipy.sparse as sp
+
+from heat_igl.errors import MeshError, as_array, positive, real_numbers, require_choice, truth
+from heat_igl.linear import factorize
+from heat_igl.mesh import Mesh, MeshLike, SubMesh, as_simplices, sub_mesh
+from heat_igl.operators import operators
+from heat_igl.runtime import progress_bar
+from heat_igl.sampling import as_solver
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
+from heat_igl.unfolding import pair_distances
+
+__all__ = ["Statistic", "parcel_distances", "smooth"]
+
+Statistic = Literal["mean", "min", "centre"]
+
+# Pairs of vertices in memory at a time.
+_PAIRS = 2**20
+# Of heat flow: with 6, 8 and 12 the width of the kernel is .36, .39 and .18 % too large, with 4 it is 6 % too small.
+_STEPS = 8
+
+
+def parcel_distances(
+    mesh: MeshLike,
+    labels: ArrayLike,
+    *,
+    statistic: Statistic = "mean",
+    region: ArrayLike | None = None,
+    progress: bool = False,
+) -> FloatArray:
+    """Geodesic distances between parcels of a surface, never from all vertices to all at once.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles on n vertices: whatever `as_mesh` takes.
+    labels : (n,) array_like of int
+        The parcel of each vertex. A negative label is no parcel; 0 is one.
+    statistic : {"mean", "min", "centre"}
+        "mean" is the mean distance over all pairs of a vertex of one parcel and a vertex of the other, by one query for
+        each vertex. "min" is the distance between the nearest vertices, by one query for each parcel. "centre" is the
+        distance between the vertices with the smallest mean distance to those of their parcels.
+    region : (n,) or (m,) array_like of bool, optional
+        Vertices, or faces, that paths may enter. Vertices outside count in no parcel.
+    progress : bool
+        Show a progress bar on standard error (extra ``cli``).
+
+    Returns
+    -------
+    (p, p) float64
+        For the p distinct labels in ascending order, symmetric, in the mesh's unit; ``inf`` between parcels that are
+        not joined. On the diagonal 0; for "mean" the mean over all pairs of a parcel.
+
+    Raises
+    ------
+    MeshError
+        If the mesh cannot be used, or holds tetrahedra; if `region` is no mask of it.
+    ValueError
+        If `labels` are not n integers, or name no parcel.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(8, 1)  # 9 vertices on either side
+    >>> labels = [0, 0, 0, -1, -1, -1, 5, 5, 5] * 2
+    >>> heat_igl.parcel_distances(mesh, labels, statistic="min").round(6).tolist()
+    [[0.0, 4.0], [4.0, 0.0]]
+    """
+    require_choice("statistic", statistic, get_args(Statistic))
+    triangles, part = _part(mesh, region)
+    names, vertices, parcel = _parcels(labels, triangles.n_vertices, part)
+    p, n = len(names), triangles.n_vertices
+    solver = as_solver(triangles)
+    if statistic == "min":
+        rows = solver.distances([vertices[parcel == i] for i in range(p)], progress=progress)
+        found = np.full((p, p), np.inf)
+        np.minimum.at(found.T, parcel, rows[:, vertices].T)
+    elif statistic == "centre":
+        centres = [_centre(triangles, vertices[parcel == i]) for i in range(p)]
+        found = solver.distances(centres, progress=progress)[:, centres]
+    else:
+        member = sp.csr_array((np.ones(len(vertices)), (parcel, vertices)), shape=(p, n))
+        found = np.zeros((p, p))
+        with progress_bar("vertices", len(vertices), truth("progress", progress)) as advance:
+            for i, row in zip(parcel, solver.iter_distances(vertices.tolist()), strict=True):
+                found[i] += member @ row
+                advance(1)
+        counts = np.bincount(parcel)
+        found /= counts[:, None] * counts
+    return np.asarray((found + found.T) / 2)
+
+
+def _part(mesh: MeshLike, region: ArrayLike | None) -> tuple[Mesh, SubMesh | None]:
+    """The triangles that paths may enter, and where they are in the mesh."""
+    triangles = as_simplices(mesh)
+    if triangles.is_tetrahedral:
+        raise MeshError("maps on a surface need triangles, and the mesh holds tetrahedra")
+    part = None if region is None else sub_mesh(triangles, region)
+    return triangles if part is None else part.mesh, part
+
+
+def _parcels(labels: ArrayLike, n: int, part: SubMesh | None) -> tuple[IntArray, IntArray, IntArray]:
+    """The labels of p parcels, the vertices (k,) of the part that are in one, and which (k,) that is."""
+    given = as_array("labels", labels)
+    n = n if part is None else part.n_whole
+    if given.dtype.kind not in "iu" or given.shape != (n,):
+        raise ValueError(f"labels must be integers of shape ({n},), not {given.dtype} of shape {given.shape}")
+    names = np.unique(given[given >= 0])
+    if not len(names):
+        raise ValueError("labels name no parcel: all are negative")
+    label = given if part is None else given[part.vertices]
+    vertices = np.flatnonzero(label >= 0)
+    parcel = np.searchsorted(names, label[vertices])
+    lost = np.bincount(parcel, minlength=len(names)) == 0
+    if lost.any():
+        raise ValueError(
+            f"labels: no vertex of parcel {names[np.argmax(lost)]} lies in the region ({int(lost.sum())} of "
+            f"{len(names)} parcels): give these vertices a negative label"
+        )
+    return names, vertices, parcel
+
+
+def _centre(mesh: Mesh, vertices: IntArray) -> int:
+    """Of some vertices, the one with the smallest mean distance to the others; the first of equally good ones."""
+    rows = max(_PAIRS // len(vertices), 1)
+    totals = [
+        pair_distances(mesh, np.stack(np.meshgrid(some, vertices, indexing="ij"), axis=-1).reshape(-1, 2))
+        .reshape(len(some), -1)
+        .sum(axis=1)
+        for some in np.split(vertices, range(rows, len(vertices), rows))
+    ]
+    return int(vertices[np.argmin(np.concatenate(totals))])
+
+
+def smooth(mesh: MeshLike, values: ArrayLike, fwhm: float, *, region: ArrayLike | None = None) -> FloatArray:
+    """Values smoothed along a surface, as by a Gaussian of geodesic distance.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles on n vertices: whatever `as_mesh` takes.
+    values : (n,) or (k, n) array_like
+        One map, or k.
+    fwhm : float
+        Full width of the Gaussian at half of its height, in the mesh's unit.
+    region : (n,) or (m,) array_like of bool, optional
+        Vertices, or faces, that values are smoothed over; nothing flows across the border, and values elsewhere stay.
+
+    Returns
+    -------
+    (n,) or (k, n) float64
+        Inside, the sum of the values times the areas of the vertices (``operators.M``) stays, on every component.
+
+    Raises
+    ------
+    MeshError
+        If the mesh cannot be used, or holds tetrahedra; if `region` is no mask of it.
+    ValueError
+        If `values` are not real and finite, one for each vertex, or `fwhm` is not positive.
+
+    Notes
+    -----
+    Heat flow on the intrinsic Delaunay triangulation for the time ``fwhm**2 / (16 log 2)``, in eight steps of second
+    order that damp all frequencies (Alexander 1977: two stages, one matrix, which is factored once). In the plane the
+    width is then .4 % too large. Of widths below about four edges, the mesh resolves the Gaussian only coarsely.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.icosphere(3)
+    >>> noise = np.random.default_rng(0).normal(size=mesh.n_vertices)
+    >>> bool(heat_igl.smooth(mesh, noise, 0.5).std() < 0.2 * noise.std())
+    True
+    """
+    triangles, part = _part(mesh, region)
+    n = triangles.n_vertices if part is None else part.n_whole
+    given = real_numbers("values", values)
+    if given.ndim not in (1, 2) or given.shape[-1] != n:
+        raise ValueError(f"values must have shape ({n},) or (k, {n}), not {given.shape}")
+    bad = ~np.isfinite(given)
+    if bad.any():
+        first = np.argwhere(bad)[0].tolist()
+        raise ValueError(
+            f"values{first} is {given[tuple(first)]} ({int(bad.sum())} of {given.size} are not finite): fill them, or "
+            "leave these vertices out by region"
+        )
+    inside = given if part is None else given[..., part.vertices]
+    smoothed = _diffused(triangles, inside.T, positive("fwhm", fwhm) ** 2 / (16 * np.log(2))).T
+    if part is None:
+        return np.ascontiguousarray(smoothed)
+    given[..., part.vertices] = smoothed
+    return given
+
+
+def _diffused(mesh: Mesh, values: FloatArray, time: float) -> FloatArray:
+    """Heat (n,) or (n, k) after a time, from values at the vertices."""
+    domain = operators(mesh, "intrinsic-delaunay")
+    mass, inner = domain.M.diagonal(), domain.referenced
+    # w = 1 / (1 - z / root) for z = t lambda: the step is (1 + sqrt 2) w^2 - sqrt 2 w, of order 2, and 0 for z = -inf.
+    step = time / _STEPS * (1 - np.sqrt(0.5))
+    factor = factorize((domain.M - step * domain.L).tocsc(), free=inner)
+    u = np.array(values)
+    for _ in range(_STEPS):
+        v = factor.solve((mass * u.T).T)
+        w = factor.solve((mass * v.T).T)
+        u[inner] = ((1 + np.sqrt(2)) * w - np.sqrt(2) * v)[inner]
+    return u

@@ -1,0 +1,152 @@
+"""Maps on a surface against definitions: parcel distances from full matrices, widths of smoothed deltas, match errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import heat_igl
+from heat_igl import Mesh, MeshError, SourceError, geodesic_errors, parcel_distances, shapes, smooth
+
+
+def bumpy() -> Mesh:
+    mesh = shapes.icosphere(2)
+    return Mesh(mesh.V * np.random.default_rng(3).uniform(0.7, 1.3, (mesh.n_vertices, 1)), mesh.F)
+
+
+def some_labels(n: int) -> np.ndarray:
+    """Five parcels of unequal size with gaps between their names, and a fifth of the vertices in none."""
+    return np.random.default_rng(4).choice([-1, 0, 3, 4, 9, 20], n, p=[0.2, 0.1, 0.3, 0.2, 0.15, 0.05])
+
+
+def all_distances(mesh: Mesh) -> np.ndarray:
+    return np.stack([heat_igl.geodesic_distance(mesh, v, method="exact") for v in range(mesh.n_vertices)])
+
+
+@pytest.fixture(scope="module")
+def cases():
+    """A mesh, a region of it or None, and all distances in the region."""
+    mesh = bumpy()
+    region = mesh.V[:, 2] < 0.5
+    of_faces = mesh.V[mesh.F].mean(axis=1)[:, 2] < 0.5
+    found = [(mesh, None, all_distances(mesh))]
+    for mask, faces in ((region, region[mesh.F].all(axis=1)), (of_faces, of_faces)):
+        used, F = np.unique(mesh.F[faces], return_inverse=True)
+        distance = np.full((mesh.n_vertices,) * 2, np.inf)
+        distance[np.ix_(used, used)] = all_distances(Mesh(mesh.V[used], F.reshape(-1, 3)))
+        found.append((mesh, mask, distance))
+    return found
+
+
+@pytest.mark.parametrize("case", range(3))
+def test_parcel_distances_are_those_of_the_full_matrix(cases, case):
+    mesh, region, distance = cases[case]
+    labels = some_labels(mesh.n_vertices)
+    inside = np.isfinite(distance).any(axis=1)
+    parcels = [np.flatnonzero((labels == name) & inside) for name in (0, 3, 4, 9, 20)]
+    blocks = [[distance[np.ix_(a, b)] for b in parcels] for a in parcels]
+    centres = [a[blocks[i][i].sum(axis=1).argmin()] for i, a in enumerate(parcels)]
+    expected = {
+        "mean": [[block.mean() for block in row] for row in blocks],
+        "min": [[block.min() for block in row] for row in blocks],
+        "centre": distance[np.ix_(centres, centres)],
+    }
+    for statistic, values in expected.items():
+        found = parcel_distances(mesh, labels, statistic=statistic, region=region)
+        np.testing.assert_allclose(found, values, rtol=2e-5)
+        assert (found == found.T).all()
+
+
+def test_parcels_on_other_components_are_infinitely_far():
+    square = shapes.grid(2)
+    mesh = Mesh(np.concatenate([square.V, square.V + 2]), np.concatenate([square.F, square.F + 9]))
+    labels = np.repeat([0, 1], 9)
+    for statistic in ("mean", "min", "centre"):
+        found = parcel_distances(mesh, labels, statistic=statistic)
+        assert np.isinf(found[0, 1])
+        assert np.isfinite(found.diagonal()).all()
+
+
+def test_parcels_name_what_is_wrong():
+    mesh = shapes.grid(3)
+    with pytest.raises(ValueError, match=r"labels must be integers of shape \(16,\), not float64"):
+        parcel_distances(mesh, np.zeros(16))
+    with pytest.raises(ValueError, match="labels name no parcel"):
+        parcel_distances(mesh, -np.ones(16, int))
+    with pytest.raises(ValueError, match=r"no vertex of parcel 1 lies in the region \(1 of 2 parcels\)"):
+        parcel_distances(mesh, np.arange(16) // 8, region=mesh.V[:, 1] < 0.5)
+    with pytest.raises(MeshError, match="region must be a mask of bool, with 16 entries for vertices or 18 for faces"):
+        parcel_distances(mesh, np.arange(16), region=[True, False])
+    with pytest.raises(MeshError, match="region selects 1 vertices, and no whole face"):
+        parcel_distances(mesh, np.arange(16), region=np.arange(16) == 3)
+    with pytest.raises(ValueError, match="statistic must be one of"):
+        parcel_distances(mesh, np.arange(16), statistic="max")
+
+
+def width(distance: np.ndarray, heat: np.ndarray) -> float:
+    """Twice the distance at which heat is half of the largest: where a parabola of its logarithm says so."""
+    near = heat > 0.25 * heat.max()
+    a, b = np.linalg.lstsq(
+        np.stack([np.ones(near.sum()), distance[near] ** 2], axis=1), np.log(heat[near]), rcond=None
+    )[0]
+    return 2 * float(np.sqrt((np.log(heat.max() / 2) - a) / b))
+
+
+@pytest.mark.parametrize("fwhm", [0.3, 0.6])
+def test_width_of_a_smoothed_delta_on_a_sphere(fwhm):
+    mesh = shapes.icosphere(5)
+    delta = np.zeros(mesh.n_vertices)
+    delta[77] = 1.0
+    angle = np.arccos(np.clip(mesh.V @ mesh.V[77], -1, 1))
+    assert width(angle, smooth(mesh, delta, fwhm)) == pytest.approx(fwhm, rel=0.03)
+
+
+def test_smoothing_in_a_plane_is_a_gaussian():
+    mesh = shapes.grid(64)
+    middle = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1)))
+    delta = np.zeros(mesh.n_vertices)
+    delta[middle] = 64.0**2
+    sigma = 0.2 / np.sqrt(8 * np.log(2))
+    r = np.linalg.norm(mesh.V - mesh.V[middle], axis=1)
+    gaussian = np.exp(-(r**2) / (2 * sigma**2)) / (2 * np.pi * sigma**2)
+    np.testing.assert_allclose(smooth(mesh, delta, 0.2), gaussian, atol=0.02 * gaussian.max())
+
+
+def test_smoothing_keeps_the_sum_and_is_linear():
+    mesh = bumpy()
+    operators = heat_igl.HeatMethodSolver(mesh, laplacian="intrinsic-delaunay").operators
+    values = np.random.default_rng(1).normal(size=(2, mesh.n_vertices))
+    mass = operators.M.diagonal()[: mesh.n_vertices]
+    smoothed = smooth(mesh, values, 0.7)
+    np.testing.assert_allclose(smoothed @ mass, values @ mass, atol=1e-12 * mass.sum())
+    np.testing.assert_allclose(smooth(mesh, values[0] - 2 * values[1], 0.7), [1, -2] @ smoothed, atol=1e-12)
+    np.testing.assert_allclose(smooth(mesh, np.ones(mesh.n_vertices), 0.7), 1, atol=1e-12)
+
+
+def test_smoothing_stays_in_its_region():
+    mesh = shapes.grid(20)
+    region = mesh.V[:, 0] < 0.45
+    values = np.where(mesh.V[:, 0] > 0.45, 100.0, np.random.default_rng(0).normal(size=mesh.n_vertices))
+    found = smooth(mesh, values, 0.4, region=region)
+    assert (found[~region] == values[~region]).all()
+    assert np.abs(found[region]).max() < np.abs(values[region]).max()
+    with pytest.raises(ValueError, match=r"values\[0\] is nan \(1 of 441"):
+        smooth(mesh, np.where(np.arange(441) == 0, np.nan, 1.0), 0.4)
+    with pytest.raises(ValueError, match=r"values must have shape \(441,\)"):
+        smooth(mesh, np.zeros(440), 0.4)
+    with pytest.raises(ValueError, match="fwhm must be a positive number"):
+        smooth(mesh, np.zeros(441), 0)
+
+
+def test_errors_of_matches():
+    mesh = bumpy()
+    rng = np.random.default_rng(5)
+    truth, matches = rng.integers(mesh.n_vertices, size=(2, 40))
+    expected = all_distances(mesh)[truth, matches] / np.sqrt(mesh.measures.sum())
+    np.testing.assert_allclose(geodesic_errors(mesh, matches, truth), expected, rtol=1e-12)
+    # The same on a mesh in another unit.
+    np.testing.assert_allclose(geodesic_errors(Mesh(1000 * mesh.V, mesh.F), matches, truth), expected, rtol=1e-12)
+    with pytest.raises(ValueError, match="there are 2 matches and 1 entries of truth"):
+        geodesic_errors(mesh, [0, 1], [0])
+    with pytest.raises(SourceError, match=r"matches\[1\] = 999 is no vertex"):
+        geodesic_errors(mesh, [0, 999], [0, 0])
