@@ -1,4 +1,4 @@
-"""Maps on a surface against definitions: parcel distances from full matrices, widths of smoothed deltas, match errors."""
+"""Maps on a surface: parcel distances from full matrices, widths of smoothed deltas, errors of matches."""
 
 from __future__ import annotations
 

@@ -41,9 +41,9 @@ def geodesic_errors(mesh: MeshLike, matches: Sources, truth: Sources) -> FloatAr
 
     Notes
     -----
-    The protocol is that of Kim, Lipman and Funkhouser (2011). The share of errors up to each threshold is the curve that
-    papers draw: ``np.searchsorted(np.sort(errors), thresholds, side="right") / len(errors)``. Distances are found for
-    the pairs alone (`pair_distances`); no matrix of all distances is needed.
+    The protocol is that of Kim, Lipman and Funkhouser (2011). The curve that papers draw is the share of errors up to
+    each threshold: ``np.searchsorted(np.sort(errors), thresholds, side="right") / len(errors)``. Distances are found
+    for the pairs alone (`pair_distances`); no matrix of all distances is needed.
 
     Examples
     --------
