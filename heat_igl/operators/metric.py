@@ -63,7 +63,8 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
         straight: there is no `surface`, flips end at such edges, and `HeatMethodSolver` takes the fronts of
         `FrontSolver` by default and with ``refine="sweep"``; other refinements are refused, and sources are vertices.
 
-        Tetrahedra are treated like the latter.
+        Tetrahedra: in one metric for all, distance is exact as in space. In any other, it is that of a scheme of first
+        order, sharpened to second where the metric and the distance are smooth, see `FrontSolver`.
 
     Raises
     ------
@@ -153,20 +154,21 @@ def fibre_metric(directions: ArrayLike, along: ArrayLike, across: ArrayLike) -> 
 def operators_in_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian = "auto") -> Operators:
     """`metric_operators` of a checked mesh and metric g (m, p, p), in the planes of triangles or in space."""
     # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T: edges times C have the lengths of the metric.
-    factor = np.linalg.cholesky(g)
     p = mesh.F.shape[1] - 1
+    if p == 3:
+        return _of_tetrahedra(mesh, MetricSimplices.in_metric(mesh, g[:, None]), g)
+    factor = np.linalg.cholesky(g)
     slowness = np.prod(np.diagonal(factor, axis1=1, axis2=2), axis=1) ** (1 / p)
-    corners = mesh.V[mesh.F] if p == 3 else lay_out(igl.edge_lengths(mesh.V, mesh.F))
+    corners = lay_out(igl.edge_lengths(mesh.V, mesh.F))
     # Relative to the first corner: digits would be lost far from the origin.
     corners = (corners - corners[:, :1]) @ factor
     lengths = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=3)
-    if p == 3:
-        return _of_tetrahedra(mesh, corners, MetricSimplices(mesh.F, lengths, slowness, mesh.n_vertices))
     sides, fit_together = _smoothed(mesh, lengths[:, [1, 2, 0], [2, 0, 1]])
     if fit_together:
         domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
         return replace(domain, contrast=float(slowness.max() / slowness.min()))
-    return _refracting(mesh, sides, slowness, laplacian)
+    least = float(np.sqrt(np.linalg.eigvalsh(g)[:, 0].min()))
+    return _refracting(mesh, sides, slowness, least, laplacian)
 
 
 def _smoothed(mesh: Mesh, sides: FloatArray) -> tuple[FloatArray, bool]:
@@ -189,7 +191,7 @@ def _smoothed(mesh: Mesh, sides: FloatArray) -> tuple[FloatArray, bool]:
     return smoothed, bool(is_one.all() and not differs.any())
 
 
-def _refracting(mesh: Mesh, sides: FloatArray, slowness: FloatArray, laplacian: Laplacian) -> Operators:
+def _refracting(mesh: Mesh, sides: FloatArray, slowness: FloatArray, least: float, laplacian: Laplacian) -> Operators:
     """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
     glued = _glued_where_equal(mesh, sides + mollify(sides, mesh.F)[:, None])
     triangulation = glued if laplacian == "cotan" else intrinsic_delaunay(glued)
@@ -201,7 +203,7 @@ def _refracting(mesh: Mesh, sides: FloatArray, slowness: FloatArray, laplacian: 
     # Where triangles fit together, fronts go straight on. A flip keeps the numbers of its two faces, and their region.
     regions = _regions(glued)
     mean = np.exp(np.bincount(regions, np.log(slowness)) / np.bincount(regions))
-    simplices = MetricSimplices(triangulation.F, lengths, mean[regions], mesh.n_vertices)
+    simplices = MetricSimplices(triangulation.F, lengths, mean[regions], mesh.n_vertices, None, mesh.V, least)
     return replace(domain, simplices=simplices, contrast=float(slowness.max() / slowness.min()))
 
 
@@ -223,9 +225,12 @@ def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
     return replace(apart, l=sides, twin=twin)
 
 
-def _of_tetrahedra(mesh: Mesh, corners: FloatArray, simplices: MetricSimplices) -> Operators:
-    """The operators of tetrahedra with corners (m, 4, 3) in a space of their own."""
+def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> Operators:
+    """The operators of tetrahedra with a metric g (m, 3, 3) on each, for heat, and `simplices` for fronts."""
     m, n = mesh.n_faces, mesh.n_vertices
+    # Each in a space of its own: edges times C have the lengths of the metric C C^T.
+    corners = mesh.V[mesh.F]
+    corners = (corners - corners[:, :1]) @ np.linalg.cholesky(g)
     domain = cotan_operators(mesh)
     apart = np.arange(4 * m).reshape(-1, 4)
     # In units of the mean length: libigl multiplies up to six of them.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["MetricSimplices"]
+
+# Differences between tensors that are taken for rounding.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +30,13 @@ class MetricSimplices:
     n : int
         Number of vertices.
     V : (n, 3) float64 or None
-        Positions, if lengths are those of space.
+        Positions, if lengths are the distances between them.
+    place : (n, 3) float64 or None
+        Positions in the space in which the metric is given.
+    least : float
+        Smallest length in any metric per length in that space: no path is shorter than a straight line times this.
+    tensors : (m, q, 3, 3) float64 or None
+        A metric that is not the same everywhere: of each simplex (q = 1), or at each of its corners (q = p + 1).
     """
 
     corners: IntArray
@@ -35,13 +44,47 @@ class MetricSimplices:
     slowness: FloatArray
     n: int
     V: FloatArray | None = None
+    place: FloatArray | None = None
+    least: float = 1.0
+    tensors: FloatArray | None = None
 
     @classmethod
     def in_space(cls, mesh: Mesh) -> MetricSimplices:
         """The faces of a mesh, by the positions of its vertices."""
         X = mesh.V[mesh.F]
         lengths = np.linalg.norm(X[:, :, None] - X[:, None], axis=3)
-        return cls(mesh.F, lengths, np.ones(mesh.n_faces), mesh.n_vertices, mesh.V)
+        return cls(mesh.F, lengths, np.ones(mesh.n_faces), mesh.n_vertices, mesh.V, mesh.V)
+
+    @classmethod
+    def in_metric(cls, mesh: Mesh, tensors: FloatArray) -> MetricSimplices:
+        """The faces of a mesh with a metric (m, q, 3, 3) on each, or at each of its corners.
+
+        Where it is the same everywhere, distance is that in space after a linear map.
+        """
+        first = tensors[0, 0]
+        if np.abs(tensors - first).max() <= _ROUNDING * np.abs(first).max():
+            # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T; relative to a vertex, as digits are lost far from the origin.
+            return cls.in_space(Mesh((mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(first), mesh.F))
+        p = mesh.F.shape[1] - 1
+        slowness = np.linalg.det(tensors.mean(axis=1)) ** (1 / (2 * p))
+        least = float(np.sqrt(np.linalg.eigvalsh(tensors)[..., 0].min()))
+        simplices = cls(mesh.F, np.empty(0), slowness, mesh.n_vertices, None, mesh.V, least, tensors)
+        squares = simplices.squared_lengths()
+        lengths = np.sqrt(squares[:, 0])
+        if tensors.shape[1] > 1:
+            # Along an edge, the tensor is linear from end to end: the integral of its square root.
+            a, b = np.sqrt(np.einsum("miij->mij", squares)), np.sqrt(np.einsum("mjij->mij", squares))
+            total = a + b + np.eye(p + 1)
+            lengths = 2 / 3 * (a * a + a * b + b * b) / total
+        return replace(simplices, lengths=lengths)
+
+    def squared_lengths(self) -> FloatArray:
+        """Squared distances (m, q, p + 1, p + 1) between the corners, in each of the `tensors`."""
+        if self.place is None or self.tensors is None:
+            raise ValueError("these simplices have lengths, and no tensors")
+        X = self.place[self.corners]
+        e = X[:, :, None] - X[:, None]
+        return np.ascontiguousarray(np.einsum("mijx,mqxy,mijy->mqij", e, self.tensors, e, optimize=True))
 
     @property
     def edges(self) -> tuple[IntArray, FloatArray]:

@@ -8,9 +8,11 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from heat_igl.kernels import bounds
 from heat_igl.kernels.bends import bend_around
 from heat_igl.kernels.bodies import Body
 from heat_igl.kernels.fronts import advance
+from heat_igl.kernels.hopf_lax import HopfLax
 from heat_igl.kernels.sight import look_around
 from heat_igl.mesh import connectivity
 from heat_igl.operators import MetricSimplices
@@ -29,6 +31,8 @@ _MOST_ROUNDS = 5
 # around it sees. On finer bodies both are rare, and take time.
 _FEW = 1000
 _ROUNDING = 1e-9
+# With more sources that begin at different values, lines are bounded by the nearest one and the first value.
+_MANY = 100
 # How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
 _BESIDE, _BESIDE_OF_FEW = 0.5, 2.0
 # What the kernel of bends knows of the way to a vertex.
@@ -41,11 +45,14 @@ class FrontSolver(OrderedSolver):
     In space, distance follows straight lines from the sources, and lines that bend around edges of the body with more
     than half a turn inside: once its ends know their distances, such an edge is a source itself.
 
-    Where each simplex has lengths of its own, a vertex gets its distance from the other corners of a simplex: from each
-    alone along an edge, and from two or three by the point behind the edge or triangle between them that lies at their
-    distances, if the straight line from it crosses there.
+    In a metric that changes from tetrahedron to tetrahedron, the Hopf-Lax formula on each is iterated until distances
+    are a fixed point, and then with distance of second order on facets (`heat_igl.kernels.hopf_lax`).
 
-    Where a front passes into a simplex of another slowness, it is refracted: its values along the facet stay, which is
+    Where each triangle has lengths of its own, a vertex gets its distance from the other corners of a triangle: from
+    each alone along an edge, and from two by the point behind the edge between them that lies at their distances, if
+    the straight line from it crosses there.
+
+    Where a front passes into a triangle of another slowness, it is refracted: its values along the facet stay, which is
     Snell's law, and its radius is divided by the square of the ratio of speeds, as that of a paraxial ray.
 
     Parameters
@@ -66,9 +73,37 @@ class FrontSolver(OrderedSolver):
         self._lengths = np.ascontiguousarray(simplices.lengths)
         self._slowness = np.ascontiguousarray(simplices.slowness)
         self._V = np.empty((0, 3)) if simplices.V is None else np.ascontiguousarray(simplices.V)
+        self._in_metric = None if simplices.tensors is None else self._measured(simplices.tensors)
         self._is_small = simplices.V is not None and simplices.n <= _FEW
         is_refined = self._is_small and not is_halved and len(self._reflex_edges[0]) > 0
         self._finer = FrontSolver(simplices.halved(), is_halved=True) if is_refined else None
+
+    def _measured(self, tensors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """What `HopfLax` reads of tensors: squared lengths, inverses (m, 3, 3), and the positions."""
+        inverse = np.ascontiguousarray(np.linalg.inv(tensors.mean(axis=1)))
+        return self._simplices.squared_lengths(), inverse, np.ascontiguousarray(self._simplices.place)
+
+    @cached_property
+    def _edges(self) -> tuple[AnyArray, FloatArray]:
+        pairs, lengths = self._simplices.edges
+        return pairs.astype(np.int32), np.ascontiguousarray(lengths)
+
+    def _keep_bounds(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
+        """Raise distance to what no path is shorter than, the straight line; lower it to paths along edges."""
+        place, least = self._simplices.place, self._simplices.least
+        if place is not None:
+            if np.ptp(offset) == 0 or len(offset) > _MANY:
+                line = least * cKDTree(place[vertices]).query(place)[0] + offset.min()
+            else:
+                line = np.full(len(place), np.inf)
+                for vertex, start in zip(vertices, offset, strict=True):
+                    np.minimum(line, start + least * np.linalg.norm(place - place[vertex], axis=1), out=line)
+            line[vertices] = offset.min()
+            np.maximum(distance, line * (1 - _ROUNDING), out=distance)
+        if bounds.is_longer(*self._edges, distance):
+            labels = label.astype(np.int64)
+            bounds.shorten(*self._edges, *bounds.incident_edges(self._edges[0], len(distance)), distance, labels)
+            label[:] = labels
 
     @cached_property
     def _reflex_edges(self) -> tuple[AnyArray, FloatArray, FloatArray]:
@@ -103,9 +138,14 @@ class FrontSolver(OrderedSolver):
         label[vertices] = np.arange(len(vertices))
         if self._simplices.V is not None:
             self._follow_lines(vertices, offset, distance, begin, label)
+        elif self._in_metric is not None:
+            HopfLax(self._corners, self._first, self._incident, *self._in_metric).distance(
+                distance, label, offset, True
+            )
         else:
             mesh = self._corners, self._first, self._incident
             advance(self._order(vertices), *mesh, self._lengths, self._slowness, distance, begin, label)
+        self._keep_bounds(vertices, offset, distance, label)
         if labels is not None:
             labels[:] = np.concatenate([sources.vertex_label, [-1]])[label]
         if self._finer is not None:
