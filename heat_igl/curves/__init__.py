@@ -6,6 +6,7 @@ from heat_igl.curves.cutting import cut
 from heat_igl.curves.geodesics import GeodesicPathSolver, geodesic_path, straighten
 from heat_igl.curves.handles import handle_loops
 from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas
+from heat_igl.curves.local_log_maps import LogMapsWithin, log_maps_within
 from heat_igl.curves.log_map import log_map
 from heat_igl.curves.means import karcher_mean
 from heat_igl.curves.paths import shortest_paths
@@ -13,6 +14,7 @@ from heat_igl.curves.relaxation import CentroidalSites, centroidal_voronoi
 from heat_igl.curves.straightest import exp_map, trace_geodesic
 
 __all__ = [
+    "LogMapsWithin",
     "CentroidalSites",
     "CutMesh",
     "GeodesicPathSolver",
@@ -27,6 +29,7 @@ __all__ = [
     "isolines",
     "karcher_mean",
     "log_map",
+    "log_maps_within",
     "offset_curves",
     "shortest_paths",
     "straighten",

@@ -11,7 +11,7 @@ from heat_igl.mesh import SurfacePoints
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding import PathAngles, in_circle
 
-__all__ = ["Directions", "carried", "directions"]
+__all__ = ["Directions", "carried", "directions", "rigid_angles"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,15 +92,20 @@ def carried(angles: PathAngles, labels: IntArray, sources: IntArray, polar: Pola
         Around the vertices.
     """
     start = sources[np.maximum(labels, 0)]
-    # As transport has it, see `PolarAngles.rigid`.
-    flat = angles.departure / polar.scale[start] + (np.pi - polar.sums[start]) / 2
-    departure = np.where(polar.on_boundary[start], flat, angles.departure)
+    departure = rigid_angles(angles.departure, polar, start)
     turn = _arrival(angles.back, polar) - departure - angles.turning
     return np.where(labels < 0, 0.0, np.exp(1j * np.where(np.isnan(turn), 0.0, turn)))
 
 
+def rigid_angles(angles: FloatArray, polar: PolarAngles, vertices: IntArray) -> FloatArray:
+    """Polar angles (k,) at vertices (k,) as transport has them: on the boundary in the plane of the faces.
+
+    See `PolarAngles.rigid`.
+    """
+    flat = angles / polar.scale[vertices] + (np.pi - polar.sums[vertices]) / 2
+    return np.where(polar.on_boundary[vertices], flat, angles)
+
+
 def _arrival(back: FloatArray, polar: PolarAngles) -> FloatArray:
     """The angle (n,) in the frame opposite the polar angle `back` (n,)."""
-    # On the boundary in the plane of the faces, as `PolarAngles.rigid`.
-    flat = back / polar.scale + (np.pi - polar.sums) / 2
-    return in_circle(np.where(polar.on_boundary, flat, back) + np.pi)
+    return in_circle(rigid_angles(back, polar, np.arange(len(back))) + np.pi)

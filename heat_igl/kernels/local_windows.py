@@ -33,6 +33,30 @@ def _write_within(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def _write_ways(s: cython.pointer(Search), way: cython.p_int, line: cython.p_double) -> cython.void:
+    """Store how the paths to the vertices within the cutoff come there, in the order of `_write_within`.
+
+    Of each path the root, the corner out of which it leaves that and the half-edge by which it enters its last face;
+    and the direction out of the corner and the crossing of the half-edge.
+    """
+    i: cython.int
+    v: cython.int
+    n: cython.int = 0
+    for i in range(s.n_touched):
+        v = s.touched[i]
+        if s.distance[v] <= s.cutoff:
+            way[3 * n] = s.root[v]
+            way[3 * n + 1] = s.corner[v]
+            way[3 * n + 2] = s.entered[v]
+            line[3 * n] = s.leaving[2 * v]
+            line[3 * n + 1] = s.leaving[2 * v + 1]
+            line[3 * n + 2] = s.crossing[v]
+            n += 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def _write_nearest(
     s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
 ) -> cython.int:
@@ -72,6 +96,8 @@ def search_each(
     found: cython.int[::1],
     value: cython.double[::1],
     end: cython.longlong[::1],
+    way: cython.int[:, ::1],
+    line: cython.double[:, ::1],
 ) -> int:
     """Search from one vertex after the other; returns the number of sources done, -1 if memory ran out.
 
@@ -96,6 +122,9 @@ def search_each(
         not fit.
     end : (k,)
         Takes the end of the results of each source. With goals each result is one value, and `found` is not used.
+    way, line : (r, 3)
+        If not empty, on a front that finds in which direction paths leave: take how the path to each vertex within the
+        cutoff runs, see `_write_ways`, by the numbers of the tables.
     """
     s: cython.pointer(Search) = cython.address(front.state)
     i: cython.int
@@ -135,6 +164,8 @@ def search_each(
                         narrow(s)
                     at += _write_nearest(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
                 else:
+                    if way.shape[0] > 0:
+                        _write_ways(s, cython.address(way[at, 0]), cython.address(line[at, 0]))
                     at += _write_within(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
             end[i] = at
             n_done += 1

@@ -139,4 +139,6 @@ def forget(s: cython.pointer(Search)) -> cython.void:
         v = s.touched[i]
         s.distance[v] = s.emitted[v] = INFINITY
         s.root[v] = s.label[v] = s.entered[v] = -1
+        if s.corner != cython.NULL:
+            s.corner[v] = -1
     s.n_touched = s.n_found = 0

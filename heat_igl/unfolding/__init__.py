@@ -1,7 +1,7 @@
 """Near-exact distance by planar unfolding, in an order of the vertices that heat or Dijkstra's algorithm gives."""
 
 from heat_igl.unfolding.curved_fronts import CurvedFronts, Front
-from heat_igl.unfolding.directions import PathAngles, in_circle
+from heat_igl.unfolding.directions import PathAngles, PathDirections, WindowWays, in_circle
 from heat_igl.unfolding.distance import (
     directed_from_scratch,
     distance_from_scratch,
@@ -32,11 +32,13 @@ __all__ = [
     "OrderedSolver",
     "Origin",
     "PathAngles",
+    "PathDirections",
     "PathLengths",
     "Refine",
     "Refinement",
     "SideChange",
     "UnfoldingSolver",
+    "WindowWays",
     "blocks_within",
     "directed_from_scratch",
     "distance_from_scratch",

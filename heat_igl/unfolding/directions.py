@@ -17,7 +17,7 @@ from heat_igl.unfolding.exact import ExactSolution
 from heat_igl.unfolding.located_points import side_direction
 from heat_igl.unfolding.refinement import Refinement
 
-__all__ = ["PathAngles", "PathDirections", "in_circle"]
+__all__ = ["PathAngles", "PathDirections", "WindowWays", "in_circle"]
 
 _WHOLE = 2 * np.pi
 
@@ -47,6 +47,31 @@ class PathAngles(NamedTuple):
     departure: FloatArray
     back: FloatArray
     turning: FloatArray
+
+
+class WindowWays(NamedTuple):
+    """How n paths run that windows found.
+
+    Attributes
+    ----------
+    vertex : (n,) int64
+        The vertex that each leads to.
+    root : (n,) int64
+        The path that leads to its last bend or its source vertex; n + i for source point i, -1 for no path.
+    corner : (n,) int64
+        Corner ``3 f + c`` of the triangulation out of which the straight last part leaves the root; -1 for no path.
+    direction : (n, 2) float64
+        There, from the side to the next corner.
+    entered, crossing : (n,) int64, (n,) float64
+        As in `Origin`.
+    """
+
+    vertex: IntArray
+    root: IntArray
+    corner: IntArray
+    direction: FloatArray
+    entered: IntArray
+    crossing: FloatArray
 
 
 class PathDirections:
@@ -127,11 +152,18 @@ class PathDirections:
 
         Without `points`, the departure of a path from a place inside a face counts in the triangle of that place.
         """
-        angles, origin, n = self.angles, found.origin, len(found.distance)
-        if found.leaving is None:
+        origin, leaving = found.origin, found.leaving
+        if leaving is None:
             raise ValueError("of_windows needs a solution that was asked for with directed=True")
-        row = np.flatnonzero((found.leaving.corner >= 0) & (origin.root >= 0))
-        corner, root, (x, y) = found.leaving.corner[row], origin.root[row], found.leaving.direction[row].T
+        vertices = np.arange(len(found.distance))
+        ways = WindowWays(vertices, origin.root, leaving.corner, leaving.direction, origin.entered, origin.crossing)
+        return self.of_ways(ways, points)
+
+    def of_ways(self, ways: WindowWays, points: SurfacePoints | None = None) -> PathAngles:
+        """The angles of paths that are named one after the other; `points` as for `of_windows`."""
+        angles, n = self.angles, len(ways.vertex)
+        row = np.flatnonzero((ways.corner >= 0) & (ways.root >= 0))
+        corner, root, (x, y) = ways.corner[row], ways.root[row], ways.direction[row].T
         departure, back = np.full((2, n), np.nan)
         at_vertex = root < n
         seen = np.arctan2(y, x)
@@ -145,7 +177,7 @@ class PathDirections:
                 inside = row[~at_vertex]
                 departure[inside] += found.leaving.turn[inside] + self._turns(points)[root[~at_vertex] - n]
         # Over the half-edge opposite, or from the source point in the same face.
-        entered, crossing = origin.entered[row], origin.crossing[row]
+        entered, crossing = ways.entered[row], ways.crossing[row]
         over = entered >= 0
         half_edge = entered[over]
         # The vertex from the tail; from the angle, as libigl's areas are slow for a few thousand triangles.
@@ -156,12 +188,13 @@ class PathDirections:
         back[row[over]] = self._at_corners(half_edge, seen)
         faces = corner[~over] // 3
         if len(faces):
-            at = (self._triangulation.F[faces] == row[~over, None]).argmax(axis=1)
+            at = (self._triangulation.F[faces] == ways.vertex[row[~over], None]).argmax(axis=1)
             k, places = np.arange(len(faces)), lay_out(self._triangulation.l[faces])
             ux, uy = (places[k, (at + 1) % 3] - places[k, at]).T
             seen = np.arctan2(uy * x[~over] - ux * y[~over], -ux * x[~over] - uy * y[~over])
             back[row[~over]] = self._at_corners(3 * faces + at, seen)
-        return PathAngles(*_handed_on(row, origin.root, departure, back, np.where(angles.on_boundary, angles.scale, 1)))
+        scale = np.where(angles.on_boundary, angles.scale, 1.0)[ways.vertex]
+        return PathAngles(*_handed_on(row, ways.root, departure, back, scale))
 
     def _at_corners(self, corner: IntArray, seen: FloatArray) -> FloatArray:
         """Polar angles (k,) of directions that are turned by `seen` from the side to the next corner."""

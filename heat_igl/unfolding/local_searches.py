@@ -12,15 +12,25 @@ from heat_igl.kernels import local_windows, windows
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges
-from heat_igl.unfolding.window_search import TOLERANCE, Found
+from heat_igl.unfolding.window_search import TOLERANCE, Found, Leaving
 
-__all__ = ["CHUNK", "Chunk", "Near", "Workspace", "in_chunks", "nearest", "to_goals", "within"]
+__all__ = [
+    "CHUNK",
+    "Chunk",
+    "Near",
+    "Workspace",
+    "in_chunks",
+    "nearest",
+    "to_goals",
+    "within",
+]
 
 #: Sources that a thread takes at a time: so few that all threads end at about the same time.
 CHUNK = 64
 # Initial number of results that a thread has room for.
 _ROOM = 2**16
 _NO_VERTICES = np.empty(0, np.int32)
+_NO_WAYS, _NO_LINES = np.empty((0, 3), np.int32), np.empty((0, 3))
 
 
 class Chunk(NamedTuple):
@@ -32,20 +42,29 @@ class Chunk(NamedTuple):
 
 
 class Near(NamedTuple):
-    """The number of vertices found from each source, and the vertices and their distances, source after source."""
+    """The number of vertices found from each source, and the vertices and their distances, source after source.
+
+    From a directed search, `way` and `line` (r, 3) say how the path to each runs, see `local_windows.search_each`.
+    """
 
     counts: IntArray
     vertex: AnyArray
     distance: FloatArray
+    way: AnyArray = _NO_WAYS
+    line: FloatArray = _NO_LINES
 
 
 class Workspace:
-    """The arrays that searches of one thread write. Every search leaves them in their initial state."""
+    """The arrays that searches of one thread write. Every search leaves them in their initial state.
 
-    def __init__(self, edges: HalfEdges, position: FloatArray | None) -> None:
-        self._names = edges.old_vertex
+    With `directed`, searches find in which directions paths leave; the faces must be oriented alike.
+    """
+
+    def __init__(self, edges: HalfEdges, position: FloatArray | None = None, directed: bool = False) -> None:
+        self._names, self.is_directed = edges.old_vertex, directed
         self._found = Found.of(edges.n, edges.n)
-        self._front = windows.Front(edges.tables, self._found, TOLERANCE, position=position)
+        leaving = Leaving.of(edges.n) if directed else None
+        self._front = windows.Front(edges.tables, self._found, TOLERANCE, leaving, position)
 
     def search(
         self,
@@ -57,6 +76,8 @@ class Workspace:
         first_goal: AnyArray | None = None,
         cutoff: float = np.inf,
         n_nearest: int = 0,
+        way: AnyArray = _NO_WAYS,
+        line: FloatArray = _NO_LINES,
     ) -> IntArray:
         """Search from each of `sources`; returns the end of the results of each source whose results fitted."""
         ends = np.zeros(len(sources), np.int64)
@@ -71,6 +92,8 @@ class Workspace:
             found,
             value,
             ends,
+            way,
+            line,
         )
         if n_done < 0:
             raise MemoryError("the windows of the exact distance do not fit into memory")
@@ -82,12 +105,16 @@ def within(work: Workspace, part: Chunk, radius: float) -> Near:
     rows, done, room = [], 0, _ROOM
     while done < len(part.vertices):
         found, value = np.empty(room, np.int32), np.empty(room)
-        ends = work.search(part.vertices[done:], found, value, cutoff=radius)
+        way, line = np.empty((room, 3), np.int32), np.empty((room, 3))
+        if not work.is_directed:
+            way, line = _NO_WAYS, _NO_LINES
+        ends = work.search(part.vertices[done:], found, value, cutoff=radius, way=way, line=line)
         if not len(ends):
             room *= 2
             continue
         done += len(ends)
-        rows.append(Near(np.diff(ends, prepend=0), found[: ends[-1]].copy(), value[: ends[-1]].copy()))
+        n = ends[-1]
+        rows.append(Near(np.diff(ends, prepend=0), found[:n].copy(), value[:n].copy(), way[:n].copy(), line[:n].copy()))
     return Near(*(np.concatenate(column) for column in zip(*rows, strict=True)))
 
 
@@ -111,6 +138,7 @@ def in_chunks(
     sources: AnyArray,
     search: Callable[[Workspace, Chunk], Near],
     position: FloatArray | None = None,
+    directed: bool = False,
 ) -> list[Near]:
     """The results of `search` for chunks of consecutive sources, on all processors, in the order of the sources.
 
@@ -133,5 +161,5 @@ def in_chunks(
                 waiting.clear()  # for a Ctrl-C, other threads end with the chunk at hand
                 raise
 
-    side_by_side(run, [Workspace(edges, position) for _ in range(min(n_threads(), len(starts)))])
+    side_by_side(run, [Workspace(edges, position, directed) for _ in range(min(n_threads(), len(starts)))])
     return parts
