@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         CutMesh,
         GeodesicPathSolver,
         centroidal_voronoi,
+        curve_through,
         cut,
         enclosed_areas,
         exp_map,
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
         log_maps_within,
         offset_curves,
         shortest_paths,
+        signed_distance,
         straighten,
         sublevel_areas,
         trace_geodesic,
@@ -80,6 +82,9 @@ if TYPE_CHECKING:
         region_boundary,
         split_long_edges,
         terrain,
+        to_open3d,
+        to_pyvista,
+        to_trimesh,
     )
     from heat_igl.operators import (
         Operators,
@@ -116,6 +121,11 @@ if TYPE_CHECKING:
     from heat_igl.validation.samples import sample_mesh
 
 __all__ = [
+    "to_trimesh",
+    "to_pyvista",
+    "to_open3d",
+    "signed_distance",
+    "curve_through",
     "AccuracyWarning",
     "BatchError",
     "CentroidalSites",
@@ -227,6 +237,11 @@ __version__ = "0.1.0"
 
 # Lazy attribute -> submodule, imported on first use: a call loads the rooms that it needs and no others.
 _LAZY = {
+    "to_trimesh": "mesh",
+    "to_pyvista": "mesh",
+    "to_open3d": "mesh",
+    "signed_distance": "curves",
+    "curve_through": "curves",
     "AccuracyWarning": "errors",
     "BatchError": "errors",
     "CentroidalSites": "curves",

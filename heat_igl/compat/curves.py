@@ -125,7 +125,7 @@ class MeshMarchingTrianglesSolver:
     def marching_triangles(self, u: ArrayLike, isoval: float = 0.0) -> Curves:
         """The curves on which the values u (n,) are `isoval`; every point is one of a face."""
         curves: Curves = []
-        for curve in isolines(self._mesh, u, isoval)[0]:
+        for curve in isolines(self._mesh, u, float(isoval))[0]:
             faces = [int(curve.faces[0]), *curve.faces.tolist()]
             points = [curve.start[0].tolist(), *curve.end.tolist()]
             curves.append(list(zip(faces, points, strict=True)))

@@ -3,6 +3,7 @@
 from heat_igl.curves.bezier import geodesic_bezier
 from heat_igl.curves.cut_mesh import CutMesh, MeshPiece
 from heat_igl.curves.cutting import cut
+from heat_igl.curves.drawn_curves import curve_through, signed_distance
 from heat_igl.curves.geodesics import GeodesicPathSolver, geodesic_path, straighten
 from heat_igl.curves.handles import handle_loops
 from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, sublevel_areas
@@ -20,6 +21,7 @@ __all__ = [
     "GeodesicPathSolver",
     "MeshPiece",
     "centroidal_voronoi",
+    "curve_through",
     "cut",
     "enclosed_areas",
     "exp_map",
@@ -32,6 +34,7 @@ __all__ = [
     "log_maps_within",
     "offset_curves",
     "shortest_paths",
+    "signed_distance",
     "straighten",
     "sublevel_areas",
     "trace_geodesic",

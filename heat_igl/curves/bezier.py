@@ -76,7 +76,7 @@ def geodesic_bezier(mesh: MeshLike, points: Waypoints, pieces: int = 32) -> Surf
         found.append(places[0])
     found.append((faces[-1], barycentric[-1]))
     ends: tuple[IntArray, FloatArray] = np.array([face for face, _ in found]), np.array([b for _, b in found])
-    return as_curve(solver.geodesics(*ends), is_closed=False)
+    return as_curve(solver.geodesics(*ends), is_closed=False).on(triangles)
 
 
 def _along(leg: Shortened, share: float, corners: FloatArray) -> tuple[int, FloatArray]:

@@ -160,7 +160,7 @@ class GeodesicPathSolver:
         course = course_of(self._mesh, curve)
         with self._one_at_a_time:
             found = self._shortener.shortest(course, is_closed=curve.is_closed)
-        return as_curve([found], is_closed=curve.is_closed)
+        return as_curve([found], is_closed=curve.is_closed).on(self._mesh)
 
     def path(self, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
         """The geodesic through waypoints, or the closed one of their loop.
@@ -177,7 +177,7 @@ class GeodesicPathSolver:
             around = np.append(np.arange(len(faces)), 0)
             with self._one_at_a_time:
                 return self._loop(self._routes.legs(faces[around], barycentric[around]))
-        return as_curve(self.geodesics(faces, barycentric), is_closed=False)
+        return as_curve(self.geodesics(faces, barycentric), is_closed=False).on(self._mesh)
 
     def log_vectors(self, face: int, barycentric: FloatArray, faces: IntArray, ends: FloatArray) -> FloatArray:
         """The log maps (k, 2) at a place inside a face, of places with barycentric coordinates `ends` (k, 3) in faces.
@@ -225,4 +225,4 @@ class GeodesicPathSolver:
                 "the loop through the waypoints contracts to a point, so no closed geodesic belongs to it: lead it "
                 "around a handle, or name the first waypoint again at the end for a loop that passes all of them"
             )
-        return as_curve([found], is_closed=True)
+        return as_curve([found], is_closed=True).on(self._mesh)

@@ -31,8 +31,9 @@ def isolines(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> list[list[
         Triangles.
     values : (n,) array_like
         A value per vertex, for instance a distance. Faces with an infinite value are ignored.
-    levels : float or (k,) array_like
-        Levels, in any order.
+    levels : int, float or (k,) array_like
+        Levels, in any order, or one float; an int is a number of levels, evenly spaced between the smallest and the
+        largest finite value.
 
     Returns
     -------
@@ -53,18 +54,24 @@ def isolines(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> list[list[
     -----
     The curves of a level bound ``{values < level}``. They follow the lower side of a plateau at the level, cross a
     vertex at the level like any other point, and there is no curve around a minimum or maximum at the level.
-    This is the convention of libigl's ``isolines``. The lengths of a curve are ``curve.lengths(mesh)``.
+    This is the convention of libigl's ``isolines``.
 
     Examples
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.grid(10)
     >>> (curve,), none = heat_igl.isolines(mesh, mesh.V[:, 0], [0.25, 2.0])  # of the coordinate x
-    >>> round(float(curve.lengths(mesh).sum()), 6), none
+    >>> round(curve.length, 6), none
     (1.0, [])
+    >>> [curve.points[0, 0].round(6) for (curve,) in heat_igl.isolines(mesh, mesh.V[:, 0], 3)]
+    [0.25, 0.5, 0.75]
     """
     mesh = as_simplices(mesh)
-    checked, wanted = _checked(mesh, values, levels)
+    if isinstance(levels, int | np.integer) and not isinstance(levels, bool):
+        checked, _ = _checked(mesh, values, [])
+        wanted = _evenly_spaced(checked, int(levels))
+    else:
+        checked, wanted = _checked(mesh, values, levels)
     return [_curves(mesh, checked, level) for level in wanted]
 
 
@@ -175,6 +182,14 @@ def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArra
     return np.asarray(area[part[one_below[first]]])
 
 
+def _evenly_spaced(values: FloatArray, k: int) -> FloatArray:
+    """K levels between the smallest and the largest finite value."""
+    finite = values[np.isfinite(values)]
+    if k < 1 or not len(finite):
+        raise ValueError(f"levels must be a positive number of levels between finite values, or a list, not {k}")
+    return np.linspace(finite.min(), finite.max(), k + 2)[1:-1]
+
+
 def _checked(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> tuple[FloatArray, FloatArray]:
     if mesh.is_tetrahedral:
         raise MeshError("isolines need triangles, but the mesh is tetrahedral")
@@ -211,4 +226,4 @@ def _areas_below(mesh: Mesh, values: FloatArray, level: float) -> FloatArray:
 
 
 def _curves(mesh: Mesh, values: FloatArray, level: float) -> list[SurfaceCurve]:
-    return joined_segments(level_segments(mesh, values, level))
+    return joined_segments(level_segments(mesh, values, level), mesh)

@@ -107,7 +107,7 @@ def shortest_paths(
         longer = _too_long(mesh, values - chosen.offsets.min(), paths, face, barycentric)
         if len(longer):
             paths |= _exact(mesh, chosen, face, barycentric, longer)
-    return [paths[i] for i in range(len(face))]
+    return [paths[i].on(mesh) for i in range(len(face))]
 
 
 def _straightened(

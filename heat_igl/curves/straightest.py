@@ -277,7 +277,7 @@ class Tracer:
         faces, points = np.empty(n, np.int64), np.empty((n, 2, 3))
         given: tuple[Any, ...] = (start.faces, start.barycentric, turn, length)
         kernel.trace(self._tables, *given, *found, np.zeros(1, np.int64), faces, points)
-        return SurfaceCurve(faces, points[:, 0], points[:, 1])
+        return SurfaceCurve(faces, points[:, 0], points[:, 1], mesh=self._mesh)
 
 
 def _checked_length(length: float) -> float:

@@ -4,6 +4,7 @@ from heat_igl.mesh.cloud_copies import nearest_copies
 from heat_igl.mesh.cloud_cover import is_oriented_manifold, two_sided_cover
 from heat_igl.mesh.cloud_normals import usable_normals
 from heat_igl.mesh.edge_curves import edge_curve
+from heat_igl.mesh.exports import to_open3d, to_pyvista, to_trimesh
 from heat_igl.mesh.heights import Terrain, terrain
 from heat_igl.mesh.level_segments import Segments, crossings, joined_segments, level_segments
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
@@ -67,6 +68,9 @@ __all__ = [
     "split_long_edges",
     "sub_mesh",
     "terrain",
+    "to_open3d",
+    "to_pyvista",
+    "to_trimesh",
     "triangulated",
     "two_sided_cover",
     "usable_normals",

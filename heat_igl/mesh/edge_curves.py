@@ -66,4 +66,4 @@ def edge_curve(mesh: MeshLike, vertices: ArrayLike, *, closed: bool = False) -> 
     face_of[mesh.facets.of_face.ravel()] = np.repeat(np.arange(mesh.n_faces), 3)
     faces = face_of[at]
     start, end = ((mesh.F[faces] == ends[:, None]).astype(float) for ends in (path[:-1], path[1:]))
-    return SurfaceCurve(faces, start, end, is_closed=closed)
+    return SurfaceCurve(faces, start, end, is_closed=closed, mesh=mesh)

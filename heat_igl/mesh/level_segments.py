@@ -92,8 +92,8 @@ def level_segments(mesh: Mesh, values: FloatArray, level: float) -> Segments:
     return Segments(found.faces, start, end, ends)
 
 
-def joined_segments(segments: Segments) -> list[SurfaceCurve]:
-    """Segments joined to curves, in the order of their first segments; those of no length are left out."""
+def joined_segments(segments: Segments, mesh: Mesh) -> list[SurfaceCurve]:
+    """Segments joined to curves on a mesh, in the order of their first segments; those of no length are left out."""
     faces, start, end, ends = segments
     has_length = (start != end).any(axis=1)
     curves = []
@@ -104,7 +104,7 @@ def joined_segments(segments: Segments) -> list[SurfaceCurve]:
         if len(segment):
             first = np.where(is_reversed, end[segment], start[segment])
             last = np.where(is_reversed, start[segment], end[segment])
-            curves.append(SurfaceCurve(faces[segment], first, last, is_closed))
+            curves.append(SurfaceCurve(faces[segment], first, last, is_closed, mesh))
     return curves
 
 

@@ -226,6 +226,16 @@ class Mesh:
         return Mesh, (self.V, self.F)
 
     @property
+    def vertices(self) -> FloatArray:
+        """A copy of `V` that may be written to, for libraries that take no read-only arrays."""
+        return self.V.copy()
+
+    @property
+    def faces(self) -> IntArray:
+        """A copy of `F` that may be written to, for libraries that take no read-only arrays."""
+        return self.F.copy()
+
+    @property
     def n_vertices(self) -> int:
         """Number of vertices n."""
         return len(self.V)

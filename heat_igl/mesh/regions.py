@@ -61,7 +61,7 @@ def region_boundary(
         segments = level_segments(triangles, np.where(mask, 0.0, 1.0), 0.5)
     if not len(segments.faces):
         raise SourceError("the region has no boundary inside the mesh: it is empty, or consists of whole components")
-    return joined_segments(segments)
+    return joined_segments(segments, triangles)
 
 
 def _along_edges(mesh: Mesh, is_inside: BoolArray) -> Segments:

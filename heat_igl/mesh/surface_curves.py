@@ -92,7 +92,7 @@ def curve_on(
     joiner = _PolylineJoiner(mesh, tolerance, _SMALLEST_PIECE * h)
     pieces = joiner.join(np.concatenate([samples, ends[-1:]]), np.append(line, len(counts) - 1))
     faces, start, end = (np.array(column) for column in zip(*pieces, strict=True))
-    return SurfaceCurve(faces, start, end, is_closed=closed)
+    return SurfaceCurve(faces, start, end, is_closed=closed, mesh=mesh)
 
 
 class _Samples:

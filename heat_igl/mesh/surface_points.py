@@ -99,6 +99,8 @@ class SurfaceCurve:
         segment before it ends, though mostly in another face.
     is_closed : bool
         Whether the last segment ends at the start of the first.
+    mesh : mesh, optional
+        The mesh that the curve lies on, for `length` and `points`. Curves made by functions of this package have it.
 
     Raises
     ------
@@ -109,9 +111,9 @@ class SurfaceCurve:
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.Mesh([[0, 0, 0], [6, 0, 0], [0, 8, 0]], [[0, 1, 2]])
-    >>> middle = heat_igl.SurfaceCurve([0], [[0.5, 0.5, 0]], [[0.5, 0, 0.5]])
-    >>> float(middle.lengths(mesh).sum())
-    5.0
+    >>> middle = heat_igl.SurfaceCurve([0], [[0.5, 0.5, 0]], [[0.5, 0, 0.5]], mesh=mesh)
+    >>> middle.length, middle.points.tolist()
+    (5.0, [[3.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
     >>> heat_igl.geodesic_distance(mesh, middle).round(6).tolist()
     [2.4, 3.0, 4.0]
     """
@@ -120,9 +122,12 @@ class SurfaceCurve:
     start: FloatArray
     end: FloatArray
     is_closed: bool = False
+    mesh: Mesh | None = None
 
     def __post_init__(self) -> None:
         faces = _face_indices("faces", self.faces)
+        if self.mesh is not None:
+            object.__setattr__(self, "mesh", as_simplices(self.mesh))
         object.__setattr__(self, "faces", faces)
         object.__setattr__(self, "start", _coordinates("start", self.start, len(faces)))
         object.__setattr__(self, "end", _coordinates("end", self.end, len(faces)))
@@ -134,23 +139,50 @@ class SurfaceCurve:
     def __repr__(self) -> str:
         return f"SurfaceCurve({len(self)} segments, {'closed' if self.is_closed else 'open'})"
 
-    def positions(self, mesh: MeshLike) -> FloatArray:
+    def positions(self, mesh: MeshLike | None = None) -> FloatArray:
         """Positions (s + 1, 3) of the corners of the polyline on `mesh`; on a closed curve the last is the first again.
 
-        Errors are those of `SurfacePoints.positions`.
+        Without `mesh`, on the curve's own. Errors are those of `SurfacePoints.positions`, and a ValueError if the curve
+        does not know its mesh.
         """
+        mesh = self.mesh if mesh is None else mesh
+        if mesh is None:
+            raise ValueError("this curve does not know its mesh: name it, as in curve.positions(mesh)")
         first = _in_space(mesh, self.faces[:1], self.start[:1])
         return np.concatenate([first, _in_space(mesh, self.faces, self.end)])
 
-    def lengths(self, mesh: MeshLike) -> FloatArray:
-        """Length (s,) of each segment on `mesh`, in the unit of the mesh; errors as for `positions`."""
+    def lengths(self, mesh: MeshLike | None = None) -> FloatArray:
+        """Length (s,) of each segment on `mesh`, in the unit of the mesh; mesh and errors as for `positions`."""
         return np.asarray(np.linalg.norm(np.diff(self.positions(mesh), axis=0), axis=1))
 
+    @property
+    def points(self) -> FloatArray:
+        """Positions (s + 1, 3) of the corners on the curve's own mesh, see `positions`."""
+        return self.positions()
 
-def unchecked_curve(faces: IntArray, start: FloatArray, end: FloatArray, is_closed: bool) -> SurfaceCurve:
+    @property
+    def length(self) -> float:
+        """Length on the curve's own mesh, in the unit of the mesh."""
+        return float(self.lengths().sum())
+
+    def reversed(self) -> SurfaceCurve:
+        """The same curve in the other direction; what was on the left is on the right."""
+        return unchecked_curve(
+            self.faces[::-1].copy(), self.end[::-1].copy(), self.start[::-1].copy(), self.is_closed, self.mesh
+        )
+
+    def on(self, mesh: Mesh) -> SurfaceCurve:
+        """The same curve with `mesh` as its own."""
+        return unchecked_curve(self.faces, self.start, self.end, self.is_closed, mesh)
+
+
+def unchecked_curve(
+    faces: IntArray, start: FloatArray, end: FloatArray, is_closed: bool, mesh: Mesh | None = None
+) -> SurfaceCurve:
     """A `SurfaceCurve` of int64 faces (s,), and float64 coordinates (s, 3) that are known to be right."""
     curve = object.__new__(SurfaceCurve)
-    for name, value in (("faces", faces), ("start", start), ("end", end), ("is_closed", is_closed)):
+    values = {"faces": faces, "start": start, "end": end, "is_closed": is_closed, "mesh": mesh}
+    for name, value in values.items():
         object.__setattr__(curve, name, value)
     return curve
 

@@ -75,7 +75,12 @@ def farthest_cells(solver: HeatMethodSolver | MeshLike, k: int, *, start: ArrayL
     for i in range(k):
         sites[i] = first[i] if i < len(first) else np.argmax(np.minimum(distance, open_to_choice))
         open_to_choice[sites[i]] = -np.inf
-        claim_nearer(distance, labels, i, solver.distance(int(sites[i])))
+        # No vertex is farther from the sites so far than the one chosen, so no vertex beyond that is nearer to it.
+        reach = np.inf if i < len(first) else distance[sites[i]]
+        if reach > 0:
+            claim_nearer(distance, labels, i, solver.distance(int(sites[i]), cutoff=float(reach)))
+        else:
+            labels[sites[i]] = i
     return VoronoiCells(sites, labels, distance)
 
 
