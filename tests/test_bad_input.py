@@ -26,7 +26,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import heat_igl
-from heat_igl import MeshError
+from heat_igl import AccuracyWarning, MeshError
 
 EXTENSIONS = ("off", "obj", "ply", "stl", "mesh", "msh", "vtu")
 
@@ -726,7 +726,7 @@ def fuzz(directory: Path, rounds: int) -> dict[str, Any]:
         outcome["tried"] += 1
         try:
             heat_igl.read_mesh(path)
-        except MeshError as error:
+        except (MeshError, AccuracyWarning) as error:  # warnings are errors here
             if file not in str(error):
                 outcome["unclear"].append([file, content.hex(), str(error)])
             return False

@@ -227,7 +227,7 @@ def test_an_interrupt_ends_the_command_without_a_traceback(tmp_path: Path) -> No
         # A process started in the background inherits that interrupts are ignored; a user's is not.
         "import signal, sys, time; from heat_igl import cli; from heat_igl.cli import comparison\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "def read_mesh_or_cloud(path):\n    print('ready', flush=True)\n    time.sleep(60)\n"
+        "def read_mesh_or_cloud(path, points):\n    print('ready', flush=True)\n    time.sleep(60)\n"
         "comparison.read_mesh_or_cloud = read_mesh_or_cloud; sys.exit(cli.run(['info', 'a.off']))"
     )
     with subprocess.Popen(
@@ -412,7 +412,7 @@ def test_demo_goes_on_without_pymeshlab_and_without_references(
 
 
 def test_a_fault_of_the_package_is_not_hidden(sphere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(_: object) -> None:
+    def broken(*_: object) -> None:
         raise TypeError("a bug")
 
     monkeypatch.setattr(comparison, "read_mesh_or_cloud", broken)

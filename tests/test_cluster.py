@@ -133,11 +133,17 @@ def test_files_of_points_are_clouds(client, tmp_path, caplog):
         heat_igl.write_point_cloud(folder / name, cloud)
     (folder / "bad.xyz").write_text("0 0 0\n1 0\n")
     report = cluster.distances(cluster.folder(folder), [0, [3, 5]], tmp_path / "store", client=client)
-    assert {row.name for row in report.rows if row.status == "done"} == {"a.xyz", "b.ply"}
-    assert [row.name for row in report.failed] == ["bad.xyz"]
+    assert {row.name for row in report.rows if row.status == "done"} == {"a.xyz"}
+    # A PLY file without faces may be a damaged mesh.
+    assert [row.name for row in report.failed] == ["b.ply", "bad.xyz"]
+    assert "--points" in report.failed[0].reason
     assert caplog.text.count(str(folder / "bad.xyz")) == 1
     found = zarr.open_group(tmp_path / "store")["a.xyz"]["distance"][:]
     np.testing.assert_array_equal(found, heat_igl.HeatMethodSolver(cloud).distances([0, [3, 5]]).astype(np.float32))
+    as_points = cluster.distances(
+        cluster.folder(folder, points=True), [0, [3, 5]], tmp_path / "points", client=client, points=True
+    )
+    assert [row.status for row in as_points.rows] == ["done", "done", "failed"]
 
 
 def test_a_source_that_a_mesh_does_not_have_is_a_row(client, tmp_path):

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import stat
 import struct
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from heat_igl import Mesh, MeshError, MissingExtraError, read_attributes, read_mesh, write_mesh
+import heat_igl
+from heat_igl import AccuracyWarning, Mesh, MeshError, MissingExtraError, read_attributes, read_mesh, write_mesh
 from heat_igl.io import files
 
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="needs meshio")
@@ -454,6 +457,40 @@ def test_vtu_polygons_and_quadrilaterals(tmp_path: Path) -> None:
     assert same(read_mesh(tmp_path / "a.vtu"), V4, [[0, 1, 3], [0, 3, 2]])
 
 
+# --- files that are cut short -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("extension", "lost"), [(".off", 2), (".ply", 2), (".obj", 2), (".obj", 4)])
+def test_a_last_face_that_may_be_cut_is_a_warning(tmp_path: Path, extension: str, lost: int) -> None:
+    """Of "4 8 9 10 11", the beginning "4 8 9 10 1" is a face as well, and in OBJ, so is "9 10 11"."""
+    vertices = "".join(f"{i} {i * i} 0\n" for i in range(12))
+    header = "ply\nformat ascii 1.0\nelement vertex 12\nproperty float x\nproperty float y\nproperty float z\n"
+    header += "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    counted = vertices + "8 0 1 2 3 4 5 6 7\n4 8 9 10 11\n"
+    content = {
+        ".off": "OFF\n12 2 0\n" + counted,
+        ".ply": header + counted,
+        ".obj": "v " + vertices.replace("\n", "\nv ")[:-2] + "f 1 2 3 4 5 6 7 8\nf 9 10 11 12\n",
+    }[extension]
+    assert read_mesh(save(tmp_path / f"a{extension}", content)).n_vertices == 12
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read_mesh(save(tmp_path / f"b{extension}", content[:-lost]))
+    assert re.search(rf"b{extension}, last line \(.*\): no line break ends it", str(caught[-1].message))
+
+
+def test_an_obj_file_that_lost_faces_is_a_warning_and_one_without_any_an_error(tmp_path: Path) -> None:
+    write_mesh(tmp_path / "a.obj", grid(9))
+    lines = (tmp_path / "a.obj").read_text().splitlines(keepends=True)
+    with pytest.warns(AccuracyWarning, match=r"b.obj: no face uses \d+ of the 81 vertices, .*cut short"):
+        read_mesh(save(tmp_path / "b.obj", "".join(lines[:140])))
+    cut = save(tmp_path / "c.obj", "".join(lines[:58]))
+    for read in (read_mesh, heat_igl.as_mesh):
+        with pytest.raises(MeshError, match=r"c.obj: the file has no faces .* read_point_cloud, or --points"):
+            read(cut)
+    assert heat_igl.read_point_cloud(cut).n_vertices == 58
+
+
 # --- replacing files --------------------------------------------------------------------------------------------------
 
 
@@ -539,6 +576,7 @@ def real(name: str) -> Path:
     return path
 
 
+@pytest.mark.filterwarnings("ignore:.*no face uses")
 @pytest.mark.parametrize("name", REAL)
 def test_real_meshes_are_read_whole_and_written_back(tmp_path: Path, name: str) -> None:
     mesh = read_mesh(real(name))
@@ -559,6 +597,7 @@ def test_real_attributes() -> None:
     assert airplane.max() == pytest.approx(1.543193660475573, rel=1e-15)
 
 
+@pytest.mark.filterwarnings("ignore:.*no face uses")
 def test_the_same_airplane_from_two_formats() -> None:
     obj, ply = read_mesh(real("airplane.obj")), read_mesh(real("colored_airplane.ply"))
     assert np.array_equal(obj.F, ply.F)

@@ -608,11 +608,16 @@ def test_the_command_line_takes_clouds(tmp_path, kind: str, capsys) -> None:
     pytest.importorskip("typer")
     P = sphere(40).astype(np.float32).astype(np.float64)
     path, out = written(tmp_path, kind, P, P), tmp_path / "out.npy"
-    assert cli.run(["distance", str(path), "--source=3", f"--output={out}", "--json=-"]) == 0
+    points = ["--points"] if kind in ("ply", "obj") else []
+    assert cli.run(["distance", str(path), "--source=3", f"--output={out}", "--json=-", *points]) == 0
     expected = heat_igl.geodesic_distance(read_point_cloud(path), 3)
     np.testing.assert_array_equal(np.load(out), expected)
     assert json.loads(capsys.readouterr().out)["point_cloud"]["n_vertices"] == 40
-    assert cli.run(["info", str(path)]) == 0
+    assert cli.run(["info", str(path), *points]) == 0
+    capsys.readouterr()
+    if points:
+        assert cli.run(["info", str(path)]) == 1
+        assert "--points" in capsys.readouterr().err
 
 
 def test_the_command_line_takes_clouds_with_copies(tmp_path) -> None:
@@ -635,7 +640,8 @@ def test_a_file_with_faces_is_a_mesh(tmp_path, capsys) -> None:
         assert cli.run(["distance", str(tmp_path / name), "--source=3", "--json=-"]) == 0
         assert json.loads(capsys.readouterr().out)["mesh"]["n_triangles"] == 80
     heat_igl.write_point_cloud(tmp_path / "cloud.ply", PointCloud(sphere(40)))
-    assert cli.run(["distance", str(tmp_path / "cloud.ply"), "--source=3", f"--output={tmp_path / 'a.vtu'}"]) != 0
+    cloud = [str(tmp_path / "cloud.ply"), "--points"]
+    assert cli.run(["distance", *cloud, "--source=3", f"--output={tmp_path / 'a.vtu'}"]) != 0
     assert "points with distances go to .ply, .npy or .csv files" in capsys.readouterr().err
 
 

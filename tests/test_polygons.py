@@ -419,6 +419,7 @@ def test_a_corner_on_a_straight_side_is_fine():
     assert np.flatnonzero(~domain.boundary).tolist() == [4]
 
 
+@pytest.mark.filterwarnings("ignore:.*no face uses 1 of the 9 vertices")
 def test_polygons_are_read_from_files(tmp_path):
     off, obj, ply = tmp_path / "a.off", tmp_path / "a.obj", tmp_path / "a.ply"
     rows = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in MIXED.V.tolist())
@@ -512,9 +513,13 @@ def test_concave_polygons_of_files(tmp_path):
     assert mesh.measures.sum() == pytest.approx(3)
     assert heat_igl.read_polygon_mesh(tmp_path / "l.obj").degree.tolist() == [6]
     (tmp_path / "crossed.obj").write_text(text + "f 1 2 3\nf 1 3 2 6 4 5\n")
-    for read in (heat_igl.read_mesh, heat_igl.read_polygon_mesh):
-        with pytest.raises(heat_igl.MeshError, match=r"crossed.obj: .*1.*: sides of this polygon cross each other"):
-            read(tmp_path / "crossed.obj")
+    with pytest.warns(
+        heat_igl.AccuracyWarning, match=r"crossed.obj, face 1 .*: sides of this polygon cross each other"
+    ):
+        mesh = heat_igl.read_mesh(tmp_path / "crossed.obj")
+    assert mesh.F.tolist() == [[0, 1, 2], [0, 2, 1], [0, 1, 5], [0, 5, 3], [0, 3, 4]]
+    assert mesh.report().crossed_polygons.tolist() == [1]
+    assert pickle.loads(pickle.dumps(mesh)).report().crossed_polygons.tolist() == [1]
 
 
 @pytest.mark.parametrize(
@@ -527,10 +532,16 @@ def test_concave_polygons_of_files(tmp_path):
         (RAMP, range(len(RAMP))),
     ],
 )
-def test_polygons_that_cross_themselves_are_refused(V, order):
+def test_polygons_that_cross_themselves_are_named_and_measured(V, order):
     V = np.concatenate([V, np.asarray(V) + np.array([9, 0, 0])])
     polygons = [[0, 1, 2], order] if len(order) > 3 else [order]
-    with pytest.raises(heat_igl.MeshError, match=r"polygons\[1\] = \[\d.*\]: sides of this polygon cross each other"):
-        PolygonMesh(V, polygons)
-    with pytest.raises(heat_igl.MeshError, match="cross each other"):
-        PolygonMesh(turned(V), polygons)
+    said = r"polygons\[1\] = \[\d.*\]: sides of this polygon cross each other \(1 of 2 polygons"
+    for positions in (V, turned(V)):
+        with pytest.warns(heat_igl.AccuracyWarning, match=said):
+            mesh = PolygonMesh(positions, polygons)
+        assert mesh.triangles.report().crossed_polygons.tolist() == [1]
+        # The corners of the polygon are reached within it, no nearer than straight through space.
+        distance = heat_igl.geodesic_distance(mesh, order[0])
+        straight = np.linalg.norm(positions[list(order)] - positions[order[0]], axis=1)
+        assert np.isfinite(distance[list(order)]).all()
+        assert (distance[list(order)] >= straight * (1 - 1e-9)).all()

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from heat_igl.cli.options import JsonOption, choice, one_of
+from heat_igl.cli.options import JsonOption, PointsOption, choice, one_of
 from heat_igl.cli.output import check_json, print_json, prints_json, say
 from heat_igl.heat_method import Refine
 
@@ -28,6 +28,7 @@ def batch(
     workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; one a processor.")] = None,
     refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
     dtype: Annotated[str, typer.Option(help="Of the distances.", callback=one_of(("float32", "float64")))] = "float32",
+    points: PointsOption = False,
     log: Annotated[Path | None, typer.Option(help="File for a log of meshes and blocks.")] = None,
     dashboard: Annotated[bool, typer.Option(help="Serve Dask's dashboard (needs bokeh).")] = False,
     json_file: JsonOption = None,
@@ -36,9 +37,14 @@ def batch(
     from heat_igl import cluster
 
     check_json(json_file)
-    meshes = cluster.folder(folder)
+    meshes = cluster.folder(folder, points)
     plan = sources if sources == "all" or sources.startswith("farthest:") else cluster.read_source_sets(sources)
-    options: dict[str, Any] = {"refine": refine, "dtype": dtype, "progress": Console(stderr=True).is_terminal}
+    options: dict[str, Any] = {
+        "refine": refine,
+        "dtype": dtype,
+        "points": points,
+        "progress": Console(stderr=True).is_terminal,
+    }
     with cluster.connected(scheduler, workers, dashboard) as client, _logged(log):
         if dashboard:
             say(f"dashboard: {client.dashboard_link}")
@@ -47,7 +53,7 @@ def batch(
         print_json(report.to_dict(), json_file)
     if not prints_json(json_file):
         print(report.to_markdown(), end="")
-    if report.failed:
+    if report.failed or report.unfinished:
         raise typer.Exit(1)
 
 

@@ -13,7 +13,7 @@ from rich.progress import Progress
 
 import heat_igl
 from heat_igl.cli.error_table import print_report
-from heat_igl.cli.options import JsonOption, MeshArgument, positive
+from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, positive
 from heat_igl.cli.output import check_json, check_outputs, described, print_json, print_rows, prints_json, say
 from heat_igl.drawing.output import Picture
 from heat_igl.io import read_mesh_or_cloud
@@ -25,10 +25,10 @@ __all__ = ["info", "validate"]
 _DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
 
 
-def info(mesh: MeshArgument, json_file: JsonOption = None) -> None:
+def info(mesh: MeshArgument, points: PointsOption = False, json_file: JsonOption = None) -> None:
     """Describe a mesh or the triangles of a point cloud: sizes, defects, and properties that affect distances."""
     check_json(json_file)
-    loaded = read_mesh_or_cloud(mesh)
+    loaded = read_mesh_or_cloud(mesh, points)
     report = loaded.report()
     values = [getattr(report, field.name) for field in fields(report)]
     plain = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
@@ -43,6 +43,7 @@ def validate(
     methods: Annotated[str, typer.Option(help=f"Separated by commas: {', '.join(METHODS)}.")] = _DEFAULT_METHODS,
     reference: Annotated[str, typer.Option(help="Method to measure errors against.")] = "exact",
     timeout: Annotated[float, typer.Option(help="Seconds for one native solve.", callback=positive)] = TIMEOUT,
+    points: PointsOption = False,
     json_file: JsonOption = None,
     picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for errors on the surface.")] = None,
     fail_above: Annotated[
@@ -51,7 +52,7 @@ def validate(
     ] = None,
 ) -> None:
     """Errors of methods against a reference, with time and memory."""
-    loaded = read_mesh_or_cloud(mesh)
+    loaded = read_mesh_or_cloud(mesh, points)
     drawn_sources = draw_sources(loaded, sources, seed)
     check_outputs(loaded, None, picture)
     check_json(json_file)

@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 
 import heat_igl
-from heat_igl.cli.options import JsonOption, MeshArgument, choice, position, positive
+from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, choice, position, positive
 from heat_igl.cli.output import Row, check_curves, check_json, check_outputs, described, print_rows, write_distance
 from heat_igl.errors import SourceError
 from heat_igl.heat_method import (
@@ -68,18 +68,19 @@ def distance(
     magnitude: Annotated[str, choice(Magnitude, "Heat: length of the field that is integrated.")] = "auto",
     refine: Annotated[str | None, choice(Refine, "Heat: unfold triangles in its order, near-exact; or exact.")] = None,
     backend: Annotated[str, choice(Backend, "Heat: linear solver.")] = "auto",
+    points: PointsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Distance from one or more sources: vertices, or points of the surface."""
-    loaded = read_mesh_or_cloud(mesh)
+    loaded = read_mesh_or_cloud(mesh, points)
     if not source and not at:
         raise SourceError("no source: name vertices with --source, or positions with --at x,y,z")
     vertices = vertex_sources(np.array(source), loaded.n_vertices) if source else None
     sources: Any = vertices
     gaps: list[Row] = []
     if at:
-        points, gap = closest_points(loaded, [position(text) for text in at])
-        sources = points if vertices is None else [vertices, points]
+        places, gap = closest_points(loaded, [position(text) for text in at])
+        sources = places if vertices is None else [vertices, places]
         gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap), gap.tolist())]
     check_outputs(loaded, output, picture)
     check_json(json_file)
@@ -158,10 +159,11 @@ def isolines(
     output: Annotated[Path, typer.Option(help="OBJ, SVG or DXF file for the lines; dotted behind, in SVG.")],
     method: Annotated[str | None, choice(DistanceMethod, "Default: unfold, near-exact.")] = None,
     refine: Annotated[str | None, choice(Refine, "Heat: unfold triangles in its order, near-exact; or exact.")] = None,
+    points: PointsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Curves of equal distance from one or more source vertices."""
-    loaded = as_simplices(mesh)
+    loaded = as_simplices(read_mesh_or_cloud(mesh, points))
     sources = vertex_sources(np.array(source), loaded.n_vertices)
     check_curves(output)
     check_json(json_file)

@@ -11,16 +11,17 @@ import typer
 
 from heat_igl.errors import SourceError
 
-__all__ = ["JsonOption", "MeshArgument", "choice", "one_of", "position", "positive"]
+__all__ = ["JsonOption", "MeshArgument", "PointsOption", "choice", "one_of", "position", "positive"]
 
 MeshArgument = Annotated[
     Path,
     typer.Argument(
         metavar="MESH",
-        help="OFF, OBJ, PLY, STL, MESH, MSH, VTU, VTP, GIFTI or FreeSurfer file; or a point cloud: XYZ, NPY, PCD, and "
-        "PLY or OBJ without faces.",
+        help="OFF, OBJ, PLY, STL, MESH, MSH, VTU, VTP, GIFTI or FreeSurfer file; or a point cloud: XYZ, NPY or PCD, "
+        "and with --points PLY or OBJ.",
     ),
 ]
+PointsOption = Annotated[bool, typer.Option("--points", help="The file holds points; faces are not read.")]
 JsonOption = Annotated[
     Path | None,
     typer.Option("--json", metavar="FILE", help="JSON file for the results; with - they are printed as JSON."),

@@ -9,9 +9,10 @@ from typing import Annotated
 import typer
 
 import heat_igl
-from heat_igl.cli.options import JsonOption, MeshArgument, position
+from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, position
 from heat_igl.cli.output import Row, check_curves, check_json, print_rows
 from heat_igl.errors import SourceError
+from heat_igl.io import read_mesh_or_cloud
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, as_simplices, closest_points
 
 __all__ = ["path", "trace"]
@@ -35,10 +36,11 @@ def path(
     end: Annotated[
         int | None, typer.Option("--to", metavar="VERTEX", help="Vertex where the shortest path ends.")
     ] = None,
+    points: PointsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """A geodesic through waypoints, a closed one, or the shortest path between two vertices."""
-    loaded = as_simplices(mesh)
+    loaded = as_simplices(read_mesh_or_cloud(mesh, points))
     check_curves(output)
     check_json(json_file)
     if (start is None) != (end is None):
@@ -67,10 +69,11 @@ def trace(
     direction: Annotated[str, typer.Option(metavar="X,Y,Z", help="Direction in space; its length does not matter.")],
     length: Annotated[float, typer.Option(help="Length of the line, in the unit of the mesh.")],
     output: CurveOutput,
+    points: PointsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """A straight line on the surface, from a point in a direction."""
-    loaded = as_simplices(mesh)
+    loaded = as_simplices(read_mesh_or_cloud(mesh, points))
     check_curves(output)
     check_json(json_file)
     place, gap = _place(loaded, start)

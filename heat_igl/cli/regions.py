@@ -9,11 +9,11 @@ import numpy as np
 import typer
 
 import heat_igl
-from heat_igl.cli.options import JsonOption, MeshArgument, choice, positive
+from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, choice, positive
 from heat_igl.cli.output import Row, check_json, check_outputs, check_writable, print_rows, write_distance
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat_method import Level, Refine, SignedHeatSolver
-from heat_igl.io import MESH_SUFFIXES, read_polylines, write_mesh
+from heat_igl.io import MESH_SUFFIXES, read_mesh_or_cloud, read_polylines, write_mesh
 from heat_igl.mesh import Mesh, SurfaceCurve, as_simplices, curve_on
 
 __all__ = ["cut", "projected", "signed"]
@@ -35,10 +35,11 @@ def signed(
     t_coef: Annotated[
         float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=positive)
     ] = None,
+    points: PointsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Distance from curves, negative on their left; curves may have gaps."""
-    loaded = as_simplices(mesh)
+    loaded = as_simplices(read_mesh_or_cloud(mesh, points))
     drawn_on = projected(loaded, curves)
     check_outputs(loaded, output, picture)
     check_json(json_file)
@@ -72,10 +73,11 @@ def cut(
     curves: CurvesOption,
     output: Annotated[Path, typer.Option(help="File for the cut mesh; with --split, one for each piece beside it.")],
     split: Annotated[bool, typer.Option("--split", help="Write each piece to a file of its own.")] = False,
+    points: PointsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Cut a mesh along curves, so that they become edges."""
-    loaded = as_simplices(mesh)
+    loaded = as_simplices(read_mesh_or_cloud(mesh, points))
     if output.suffix.lower() not in MESH_SUFFIXES:
         raise MeshError(f"--output {output}: meshes go to {', '.join(MESH_SUFFIXES)} files")
     check_writable(output)

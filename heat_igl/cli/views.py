@@ -10,12 +10,12 @@ import typer
 from rich.console import Console
 
 from heat_igl.cli.demo import demonstrate
-from heat_igl.cli.options import JsonOption, MeshArgument, choice, positive
+from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, choice, positive
 from heat_igl.cli.output import check_json, check_page, check_writable, described, print_rows, say
 from heat_igl.cli.regions import projected
 from heat_igl.errors import ReferenceSolverError
 from heat_igl.heat_method import Boundary, Refine, SignedHeatSolver, SolverOptions
-from heat_igl.io import read_mesh_or_cloud, read_point_cloud
+from heat_igl.io import read_mesh_or_cloud
 from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import FloatArray
@@ -37,7 +37,7 @@ def view(
     curves: Annotated[
         Path | None, typer.Option(metavar="OBJ", help="Show the signed distance from these polylines, too.")
     ] = None,
-    points: Annotated[bool, typer.Option("--points", help="The file holds points; faces are not read.")] = False,
+    points: PointsOption = False,
     html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -45,7 +45,7 @@ def view(
     from heat_igl.drawing.viewer import Exploration, Window, display_problem
 
     check_json(json_file)
-    loaded = read_point_cloud(mesh) if points else read_mesh_or_cloud(mesh)
+    loaded = read_mesh_or_cloud(mesh, points)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
     options = SolverOptions(t_coef, boundary=cast(Boundary, boundary), refine=cast(Refine | None, refine))
     target = html or Path(f"{mesh.stem}-view.html")

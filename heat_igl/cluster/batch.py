@@ -39,6 +39,7 @@ def distances(
     client: Any = None,
     refine: Refine | None = None,
     dtype: str = "float32",
+    points: bool = False,
     progress: bool = False,
     **options: Any,
 ) -> BatchReport:
@@ -60,6 +61,9 @@ def distances(
         See `HeatMethodSolver`.
     dtype : {"float32", "float64"}
         Type to which the distances are rounded.
+    points : bool
+        Read all files as point clouds, by `read_point_cloud`. Otherwise .xyz, .npy and .pcd files hold points, and a
+        file of another format without faces fails.
     progress : bool
         Show on standard error how many meshes and blocks are done (extra ``cli``).
     **options
@@ -90,7 +94,7 @@ def distances(
     plan = SourcePlan.of(sources)
     solver_options = SolverOptions(refine=refine, **options)
     opened = Store(store, {"sources": str(plan), "dtype": dtype, "solver": {"refine": refine, **options}})
-    tasks = [Task(item, opened.path.resolve(), plan, dtype, solver_options) for item in items(meshes)]
+    tasks = [Task(item, opened.path.resolve(), plan, dtype, solver_options) for item in items(meshes, points)]
     with ExitStack() as stack:
         client = stack.enter_context(connected()) if client is None else client
         watch = stack.enter_context(watched(client, len(tasks), progress))

@@ -29,12 +29,13 @@ class Item:
     name: str
     label: str
     mesh: Path | Mesh | PointCloud | tuple[Any, Any]
+    points: bool = False  # whether a file is read as a point cloud, whatever the format
 
 
-def folder(path: str | os.PathLike[str]) -> dict[str, Path]:
-    """All files of meshes and point clouds below a folder, recognized by their suffix; the keys are paths in it.
+def folder(path: str | os.PathLike[str], points: bool = False) -> dict[str, Path]:
+    """All files of meshes and of point clouds (.xyz, .pcd) below a folder; the keys are paths in it.
 
-    Arrays (.npy) are left out, since they may hold anything.
+    With `points`, all files that `read_point_cloud` reads. Arrays (.npy) are left out, since they may hold anything.
 
     Raises
     ------
@@ -44,13 +45,19 @@ def folder(path: str | os.PathLike[str]) -> dict[str, Path]:
     root = Path(path)
     if not root.is_dir():
         raise ValueError(f"{root} is not a folder of meshes")
-    found = {file.relative_to(root).as_posix(): file for file in sorted(root.rglob("*")) if is_mesh_or_cloud_path(file)}
+    found = {
+        file.relative_to(root).as_posix(): file
+        for file in sorted(root.rglob("*"))
+        if is_mesh_or_cloud_path(file, points)
+    }
     if not found:
-        raise ValueError(f"{root} holds no mesh: files must end in {', '.join(MESH_SUFFIXES)}, .xyz or .pcd")
+        suffixes = (".ply", ".obj") if points else MESH_SUFFIXES
+        kind = "point cloud" if points else "mesh"
+        raise ValueError(f"{root} holds no {kind}: files must end in {', '.join(suffixes)}, .xyz or .pcd")
     return found
 
 
-def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike]) -> Iterator[Item]:
+def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike], points: bool = False) -> Iterator[Item]:
     """The meshes with their names: keys of a mapping; file names, or positions, in a sequence.
 
     Raises
@@ -74,7 +81,7 @@ def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike]) -> Iterator[Item]
         seen.add(name)
         label = os.fspath(mesh) if isinstance(mesh, str | os.PathLike) else name
         # A name may hold the separator of zarr's groups.
-        yield Item(quote(name, safe=" ()[]"), label, _held(mesh, label))
+        yield Item(quote(name, safe=" ()[]"), label, _held(mesh, label), points)
 
 
 def _held(mesh: MeshLike, label: str) -> Path | Mesh | PointCloud | tuple[Any, Any]:

@@ -170,7 +170,7 @@ def _new(
 def _loaded(item: Item) -> Mesh | PointCloud:
     if isinstance(item.mesh, (Mesh, PointCloud)):
         return item.mesh
-    return read_mesh_or_cloud(item.mesh) if isinstance(item.mesh, Path) else Mesh(*item.mesh)
+    return read_mesh_or_cloud(item.mesh, item.points) if isinstance(item.mesh, Path) else Mesh(*item.mesh)
 
 
 def _fingerprint(mesh: Mesh | PointCloud) -> str:

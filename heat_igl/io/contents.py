@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import MeshError
-from heat_igl.mesh import triangulated, which_repeat_a_vertex
+from heat_igl.errors import AccuracyWarning, MeshError
+from heat_igl.mesh import Mesh, which_repeat_a_vertex
+from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Cells", "Contents", "check", "integers", "select"]
+__all__ = ["Cells", "Contents", "check", "integers", "select", "warn_if_cut"]
 
 
 class Cells(NamedTuple):
@@ -40,12 +41,21 @@ class Contents(NamedTuple):
     cells: Cells
     attributes: dict[str, AnyArray]
 
-    @property
-    def F(self) -> IntArray:
-        """Triangles (m, 3) or tetrahedra (m, 4); polygons are cut into triangles as by `triangulated`."""
-        if self.cells.tetrahedra:
-            return self.cells.corners.reshape(-1, 4)
-        return triangulated(self.V, self.cells.corners, self.cells.degree, lambda i: f"face {i} (counted from 0)")
+    def mesh(self, path: Path) -> Mesh:
+        """The mesh of the file; polygons are cut into triangles.
+
+        Raises
+        ------
+        MeshError
+            If the positions cannot be used.
+        """
+        corners, degree, tetrahedra = self.cells
+        try:
+            if tetrahedra:
+                return Mesh(self.V, corners.reshape(-1, 4))
+            return Mesh.of_polygons(self.V, corners, degree, lambda i: f"{path}, face {i} (counted from 0)")
+        except MeshError as error:
+            raise MeshError(f"{path}: {error}") from None
 
 
 def integers(values: FloatArray, where: Callable[[int], str], what: str = "index") -> IntArray:
@@ -100,6 +110,37 @@ def check(
         raise MeshError(
             f"{where}: a face repeats a vertex ({int(bad.sum())} of {len(degree)} faces do): "
             "remove these faces, they have no area"
+        )
+
+
+def warn_if_cut(path: Path, data: bytes, cells: Cells, last: int, n: int, counted: bool = True) -> None:
+    """Warn if the last line of a text file has no end and may be the beginning of a longer line with another face.
+
+    Parameters
+    ----------
+    path, data
+        The file.
+    cells : Cells
+        Polygons, of which the last stands in the last line.
+    last : int
+        The last index, as it stands in the file.
+    n : int
+        Number of vertices: with one more digit, `last` may still be an index.
+    counted : bool
+        Whether the number of corners stands before them. Otherwise the last polygon may have lost corners.
+
+    Warns
+    -----
+    AccuracyWarning
+        With the last line.
+    """
+    longer = 0 < 10 * last <= n or (not counted and cells.degree[-1] < cells.degree.max())
+    if longer and not data.endswith((b"\n", b"\r")):
+        line = data.rsplit(b"\n", 1)[-1].strip()[:60].decode("utf-8", "backslashreplace")
+        warn_caller(
+            f"{path}, last line ({line}): no line break ends it, so the file may be cut short there: add one if the "
+            "line is complete",
+            AccuracyWarning,
         )
 
 

@@ -105,7 +105,7 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     Mesh(3 vertices, 1 triangles)
     """
     path, contents = _load(path)
-    return _mesh(path, contents)
+    return contents.mesh(path)
 
 
 def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
@@ -178,7 +178,7 @@ def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
     if not _FORMATS[form_suffix(path)].attributes:
         raise MeshError(f"{path}: this format holds no vertex attributes; {_those_with('attributes')} do")
     path, contents = _load(path)
-    _mesh(path, contents)
+    contents.mesh(path)
     return contents.attributes
 
 
@@ -293,13 +293,6 @@ def file_bytes(path: Path) -> bytes:
         raise MeshError(f"{path}: no such file (looked in {path.absolute().parent})") from error
     except OSError as error:
         raise MeshError(f"{path} cannot be read: {error.strerror or error}") from error
-
-
-def _mesh(path: Path, contents: Contents) -> Mesh:
-    try:
-        return Mesh(contents.V, contents.F)
-    except MeshError as error:
-        raise MeshError(f"{path}: {error}") from None
 
 
 def checked_attributes(attributes: Mapping[str, ArrayLike], n: int) -> dict[str, FloatArray]:

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from heat_igl.errors import MeshError
-from heat_igl.io.contents import Cells, Contents, check, integers
+from heat_igl.errors import AccuracyWarning, MeshError
+from heat_igl.io.contents import Cells, Contents, check, integers, warn_if_cut
 from heat_igl.io.text import Text, format_rows
 from heat_igl.mesh import Mesh
-from heat_igl.typing import FloatArray
+from heat_igl.runtime import warn_caller
+from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["read", "write"]
 
@@ -36,7 +37,10 @@ def read(path: Path, data: bytes) -> Contents:
     V_lines, F_lines = np.flatnonzero(is_v), np.flatnonzero(is_f)
     for lines, name in ((V_lines, "vertices (lines that start with v)"), (F_lines, "faces (lines that start with f)")):
         if not len(lines):
-            raise MeshError(f"{path}: the file has no {name}, so it is no mesh")
+            raise MeshError(
+                f"{path}: the file has no {name}, so it is no mesh; it may be cut short, and read_point_cloud, or "
+                "--points on the command line, reads points"
+            )
     for lines, name in ((V_lines, "vertex needs three coordinates"), (F_lines, "face needs three corners or more")):
         short = text.count[lines] < 4
         if short.any():
@@ -59,7 +63,21 @@ def read(path: Path, data: bytes) -> Contents:
         corners = number - 1
     cells = Cells(corners, degree)
     check(V, cells, lambda i: text.where(V_lines[i]), lambda i: text.where(F_lines[i]), base=1)
+    _warn_of_unused(path, len(V), corners)
+    warn_if_cut(path, data, cells, abs(int(number[-1])), len(V), counted=False)
     return Contents(V, cells, {})
+
+
+def _warn_of_unused(path: Path, n: int, corners: IntArray) -> None:
+    """Warn of vertices without a face: OBJ has no counts, so nothing else tells that the last faces are lost."""
+    used = np.zeros(n, bool)
+    used[corners] = True
+    if not used.all():
+        warn_caller(
+            f"{path}: no face uses {int((~used).sum())} of the {n} vertices, such as vertex {int(np.argmin(used)) + 1} "
+            "(counted from 1): the file may be cut short; distances there are inf",
+            AccuracyWarning,
+        )
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:

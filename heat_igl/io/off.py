@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io.contents import Cells, Contents, check, integers
+from heat_igl.io.contents import Cells, Contents, check, integers, warn_if_cut
 from heat_igl.io.text import Text, format_rows, ragged
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
@@ -68,6 +68,7 @@ def read(path: Path, data: bytes) -> Contents:
     cells = _polygons(text, np.arange(begin, begin + m))
     first = begin - n
     check(V, cells, lambda i: text.where(first + i), lambda i: text.where(begin + i), base=0)
+    warn_if_cut(path, data, cells, int(cells.corners[-1]), n)
     return Contents(V, cells, {})
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.io import ply_tables
-from heat_igl.io.contents import Cells, Contents, check, integers
+from heat_igl.io.contents import Cells, Contents, check, integers, warn_if_cut
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray
 
@@ -43,6 +43,8 @@ def read(path: Path, data: bytes) -> Contents:
     )
     cells = Cells(corners, degree)
     check(V, cells, lambda i: f"{path}, vertex {i} (counted from 0)", face_at, base=0)
+    if not header.order:
+        warn_if_cut(path, data, cells, int(cells.corners[-1]), len(V))
     return Contents(V, cells, _gathered(others, header.vectors))
 
 

@@ -250,7 +250,7 @@ def parse(path: Path, data: bytes, needed: tuple[str, ...]) -> tuple[Header, Tab
         if not count.get(name) or sum(element.name == name for element in header.elements) > 1:
             remedy = " (triangle strips are not supported)" if "tristrips" in count else ""
             if name == "face" and not remedy and count.get("vertex"):
-                remedy = ": read_point_cloud reads points without faces"
+                remedy = ": read_point_cloud, or --points on the command line, reads points without faces"
             raise MeshError(f"{path}: the header announces no element '{name}', or announces it twice{remedy}")
     if header.order:
         found = _binary(path, data, header)

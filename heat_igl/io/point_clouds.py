@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -90,8 +89,8 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
         raise MeshError(f"{path}: {error}") from None
 
 
-def read_mesh_or_cloud(path: str | os.PathLike[str]) -> Mesh | PointCloud:
-    """Read a mesh by `read_mesh`, or a point cloud by `read_point_cloud` where the file holds no faces.
+def read_mesh_or_cloud(path: str | os.PathLike[str], points: bool = False) -> Mesh | PointCloud:
+    """Read .xyz, .npy and .pcd files, or with `points` all, by `read_point_cloud`, and others by `read_mesh`.
 
     Raises
     ------
@@ -101,20 +100,18 @@ def read_mesh_or_cloud(path: str | os.PathLike[str]) -> Mesh | PointCloud:
         As `read_mesh`.
     """
     path = checked_path(path, (*MESH_SUFFIXES, *POINT_SUFFIXES), (*MESH_SUFFIXES, *POINT_CLOUD_SUFFIXES))
-    suffix = form_suffix(path)
-    if suffix not in MESH_SUFFIXES:
-        return read_point_cloud(path)
-    if suffix in _FACES and not _FACES[suffix].search(file_bytes(path)):
-        return read_point_cloud(path)
-    return read_mesh(path)
+    return read_point_cloud(path) if points or form_suffix(path) in POINT_SUFFIXES else read_mesh(path)
 
 
 read_paths_with(read_mesh_or_cloud)
 
 
-def is_mesh_or_cloud_path(path: Path) -> bool:
-    """Whether the extension of `path` is that of a mesh or a point cloud, but for .npy, which may hold anything."""
-    return is_mesh_path(path) or form_suffix(path) in (".xyz", ".pcd")
+def is_mesh_or_cloud_path(path: Path, points: bool = False) -> bool:
+    """Whether `read_mesh_or_cloud` knows the extension of `path`, but for .npy, which may hold anything."""
+    suffix = form_suffix(path)
+    return suffix != ".npy" and (
+        suffix in POINT_CLOUD_SUFFIXES if points else is_mesh_path(path) or suffix in POINT_SUFFIXES
+    )
 
 
 def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud, /, **attributes: ArrayLike) -> None:
@@ -234,12 +231,6 @@ _FORMATS: dict[str, Callable[[Path, bytes], _Points]] = {
 }
 
 POINT_CLOUD_SUFFIXES = tuple(_FORMATS)
-
-# What a file of a format for meshes holds if it has faces.
-_FACES = {
-    ".ply": re.compile(rb"^element\s+face\s+0*[1-9]", re.MULTILINE),
-    ".obj": re.compile(rb"^\s*f\s", re.MULTILINE),
-}
 
 
 def _to_ply(path: Path, cloud: PointCloud, attributes: Mapping[str, FloatArray] | None = None) -> None:

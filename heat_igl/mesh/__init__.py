@@ -28,7 +28,6 @@ from heat_igl.mesh.surface_points import (
     flat_curves,
     named_entries,
 )
-from heat_igl.mesh.triangulation import triangulated
 
 __all__ = [
     "ClosestPoints",
@@ -71,7 +70,6 @@ __all__ = [
     "to_open3d",
     "to_pyvista",
     "to_trimesh",
-    "triangulated",
     "two_sided_cover",
     "usable_normals",
     "which_repeat_a_vertex",

@@ -5,6 +5,7 @@ libigl trusts the input: a face index out of range corrupts memory. So every arr
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -14,11 +15,13 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, refuse_masked
+from heat_igl.errors import AccuracyWarning, MeshError, refuse_masked
 from heat_igl.kernels import mesh_arrays
 from heat_igl.mesh import connectivity
 from heat_igl.mesh.quadrilaterals import first_quadrilateral
 from heat_igl.mesh.report import MeshReport, mesh_report
+from heat_igl.mesh.triangulation import triangulated
+from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["Mesh", "checked_faces", "checked_positions"]
@@ -28,7 +31,7 @@ _LARGEST_EXTENT = 1e60
 _SMALLEST_EXTENT = 1e-60
 
 # Cached properties of a mesh that do not depend on positions.
-_OF_THE_FACES = {"facets", "edges", "components", "referenced", "boundary"}
+_OF_THE_FACES = {"facets", "edges", "components", "referenced", "boundary", "crossed_polygons"}
 
 ArrayT = TypeVar("ArrayT", bound=AnyArray)
 
@@ -222,8 +225,8 @@ class Mesh:
         kind = "tetrahedra" if self.is_tetrahedral else "triangles"
         return f"Mesh({self.n_vertices} vertices, {self.n_faces} {kind})"
 
-    def __reduce__(self) -> tuple[type[Mesh], tuple[FloatArray, IntArray]]:
-        return Mesh, (self.V, self.F)
+    def __reduce__(self) -> tuple[type[Mesh], tuple[FloatArray, IntArray], dict[str, IntArray]]:
+        return Mesh, (self.V, self.F), {"crossed_polygons": self.crossed_polygons}
 
     @property
     def vertices(self) -> FloatArray:
@@ -249,6 +252,43 @@ class Mesh:
     def is_tetrahedral(self) -> bool:
         """Whether the faces are tetrahedra."""
         return bool(self.F.shape[1] == 4)
+
+    @classmethod
+    def of_polygons(cls, V: ArrayLike, corners: IntArray, degree: IntArray, shown: Callable[[int], str]) -> Mesh:
+        """The triangles of polygons, cut as by `triangulated`.
+
+        Parameters
+        ----------
+        V : (n, 3) array_like
+            Positions.
+        corners, degree : (sum of degree,) and (m,) int64
+            Vertices of the polygons, one polygon after the other, and the number of corners of each.
+        shown : callable
+            The name of the i-th polygon, for the warning.
+
+        Warns
+        -----
+        AccuracyWarning
+            If sides of a polygon cross each other; `crossed_polygons` are all of them.
+        """
+        positions = np.asarray(V, np.float64)
+        with np.errstate(over="ignore", invalid="ignore"):  # `Mesh` refuses such positions by name
+            F, crossed = triangulated(positions, corners, degree)
+        mesh = cls(positions, F)
+        mesh.__dict__["crossed_polygons"] = _frozen(crossed)
+        if len(crossed):
+            warn_caller(
+                f"{shown(int(crossed[0]))}: sides of this polygon cross each other ({len(crossed)} of {len(degree)} "
+                "polygons are like this), so it has no inside, and distance is measured on the triangles around its "
+                "first corner: give its corners in order around it, or split it",
+                AccuracyWarning,
+            )
+        return mesh
+
+    @cached_property
+    def crossed_polygons(self) -> IntArray:
+        """Polygons (k,) that the triangles were cut from and whose sides cross each other; see `PolygonMesh`."""
+        return _frozen(np.empty(0, np.int64))
 
     @cached_property
     def facets(self) -> connectivity.Facets:

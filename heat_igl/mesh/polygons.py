@@ -11,7 +11,6 @@ import numpy as np
 from heat_igl.errors import MeshError, shown
 from heat_igl.mesh.grouping import next_in_run
 from heat_igl.mesh.mesh import Mesh, checked_positions
-from heat_igl.mesh.triangulation import triangulated
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["PolygonMesh", "which_repeat_a_vertex"]
@@ -43,8 +42,13 @@ class PolygonMesh:
     Raises
     ------
     MeshError
-        As for `Mesh`; also if a polygon has fewer than three corners, or the sides of one cross each other. The message
-        names the first offender.
+        As for `Mesh`; also if a polygon has fewer than three corners. The message names the first offender.
+
+    Warns
+    -----
+    AccuracyWarning
+        If sides of a polygon cross each other: it has no inside, and is measured on the fan. The message names the
+        first; `triangles.crossed_polygons` are all of them.
 
     Notes
     -----
@@ -74,9 +78,7 @@ class PolygonMesh:
         _check(corners, degree, len(positions))
         for array in (corners, degree):
             array.setflags(write=False)
-        with np.errstate(over="ignore", invalid="ignore"):  # `Mesh` refuses such positions by name
-            F = triangulated(positions, corners, degree, partial(_named, corners, degree))
-        triangles = Mesh(positions, F)
+        triangles = Mesh.of_polygons(positions, corners, degree, partial(_named, corners, degree))
         object.__setattr__(self, "V", triangles.V)
         object.__setattr__(self, "corners", corners)
         object.__setattr__(self, "degree", degree)

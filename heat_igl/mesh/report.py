@@ -53,6 +53,8 @@ class MeshReport:
         Faces with the same vertices as an earlier face.
     unreferenced_vertices : (k,) int64
         Vertices that no face uses; every distance there is ``inf``.
+    crossed_polygons : (k,) int64
+        Polygons that the triangles were cut from and whose sides cross each other, counted as in the file.
     shortest_edge, mean_edge, longest_edge : float
         Over the distinct edges.
     smallest_angle, largest_angle : float
@@ -87,6 +89,7 @@ class MeshReport:
     degenerate_faces: IntArray
     duplicate_faces: IntArray
     unreferenced_vertices: IntArray
+    crossed_polygons: IntArray
     shortest_edge: float
     mean_edge: float
     longest_edge: float
@@ -142,6 +145,7 @@ def mesh_report(mesh: Mesh) -> MeshReport:
         degenerate_faces=np.flatnonzero(mesh.measures <= _DEGENERATE * longest ** (F.shape[1] - 1)),
         duplicate_faces=connectivity.duplicate_faces(F, n),
         unreferenced_vertices=np.flatnonzero(~mesh.referenced),
+        crossed_polygons=mesh.crossed_polygons,
         shortest_edge=float(mesh.edge_lengths.min()),
         mean_edge=mean_edge,
         longest_edge=float(mesh.edge_lengths.max()),

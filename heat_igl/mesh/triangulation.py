@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from heat_igl.errors import MeshError
 from heat_igl.mesh.grouping import enumerate_runs, next_in_run
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -15,8 +12,8 @@ __all__ = ["triangulated", "triangle_fans"]
 # Twice the area of a triangle is rounded by some 1e-16 of the square of the polygon's extent; below this share of it a
 # triangle has no orientation.
 _ROUNDING = 1e-12
-# Distance from a plane, as a share of the extent, up to which a polygon that crosses itself in the plane is refused. A
-# polygon with a vector area below this share of its squared extent is laid into its best plane.
+# Distance from a plane, as a share of the extent, up to which a polygon that crosses itself in the plane does so in
+# space. A polygon with a vector area below this share of its squared extent is laid into its best plane.
 _NEARLY_PLANAR = 1e-2
 
 
@@ -30,7 +27,7 @@ def triangle_fans(corners: IntArray, degree: IntArray) -> IntArray:
     return np.stack([corners[begin[second]], corners[second], corners[second + 1]], axis=1)
 
 
-def triangulated(V: FloatArray, corners: IntArray, degree: IntArray, shown: Callable[[int], str]) -> IntArray:
+def triangulated(V: FloatArray, corners: IntArray, degree: IntArray) -> tuple[IntArray, IntArray]:
     """Triangles of polygons, in the order of the polygons.
 
     Parameters
@@ -41,40 +38,31 @@ def triangulated(V: FloatArray, corners: IntArray, degree: IntArray, shown: Call
         Vertices of the polygons, one polygon after the other.
     degree : (m,) int64
         Number of corners of each polygon, at least three.
-    shown : callable
-        The name of the i-th polygon, for errors.
 
     Returns
     -------
-    (sum of (degree - 2), 3) int64
+    F : (sum of (degree - 2), 3) int64
         The fan of each polygon around the first corner. If a triangle of the fan is turned over, or the fan goes
         around that corner more than once, the polygon is concave, and ears are clipped instead (Meisters 1975), in
-        the plane that its vector area is normal to. A polygon that is far from planar and crosses itself there keeps
-        the fan.
-
-    Raises
-    ------
-    MeshError
-        If two sides of a nearly planar polygon cross each other; the message names the first.
+        the plane that its vector area is normal to. A polygon that crosses itself there keeps the fan.
+    crossed : (k,) int64
+        The nearly planar polygons of which two sides cross each other: they have no inside that triangles could fill.
     """
     F = triangle_fans(corners, degree)
     if (degree == 3).all():
-        return F
+        return F, np.empty(0, np.int64)
     wrong = _without_fan(V, F, corners, degree)
     end, end_of_fan = np.cumsum(degree), np.cumsum(degree - 2)
+    crossed = []
     for i in np.flatnonzero(wrong).tolist():
         polygon = corners[end[i] - degree[i] : end[i]]
         flat, height = _flattened(V[polygon])
         found = _ears(flat)
-        if found is None and height > _NEARLY_PLANAR:
-            continue  # sides that cross in one projection may not do so in space
-        if found is None:
-            raise MeshError(
-                f"{shown(i)}: sides of this polygon cross each other, so it has no inside: give its corners in order "
-                "around it, or split it"
-            )
-        F[end_of_fan[i] - degree[i] + 2 : end_of_fan[i]] = polygon[found]
-    return F
+        if found is not None:
+            F[end_of_fan[i] - degree[i] + 2 : end_of_fan[i]] = polygon[found]
+        elif height <= _NEARLY_PLANAR:  # sides that cross in one projection may not do so in space
+            crossed.append(i)
+    return F, np.array(crossed, np.int64)
 
 
 def _vector_areas(V: FloatArray, corners: IntArray, degree: IntArray) -> tuple[FloatArray, FloatArray]:
