@@ -164,7 +164,6 @@ def test_only_what_is_missing_is_computed_again(client, tmp_path):
     store = tmp_path / "store"
     before = cluster.distances({"ball": mesh}, "all", store, client=client)
     first = zarr.open_group(store / "ball", mode="r")["distance"][:]
-    group = zarr.open_group(store / "ball", mode="r+")
     chunk = [store / "ball" / "distance" / "c" / str(block) / "0" for block in range(11)]
     chunk[3].rename(chunk[3].with_suffix(".partial"))  # not finished
     chunk[5].write_bytes(b"half of it")  # damaged
@@ -172,10 +171,10 @@ def test_only_what_is_missing_is_computed_again(client, tmp_path):
     bits[1000] ^= 1
     chunk[6].write_bytes(bits)
     chunk[7].unlink()  # lost
-    group.update_attributes({"status": "running"})
     times = chunk_times(store)
     after = cluster.distances({"ball": mesh}, "all", store, client=client)
     changed = {path for path, written in chunk_times(store).items() if times.get(path) != written}
+    # Of the turned bit only the codec knows; a lost or cut chunk is seen at once.
     assert {Path(path).parent.name for path in changed} == {"3", "5", "6", "7"}
     np.testing.assert_array_equal(zarr.open_group(store / "ball", mode="r")["distance"][:], first)
     assert after == before
@@ -190,7 +189,6 @@ def test_long_rows_lie_in_several_chunks(client, tmp_path, monkeypatch):
     assert len(chunk_times(store)) == 6
     (store / "ball" / "distance" / "c" / "1" / "2").unlink()
     assert Store(store).group("ball").missing() == [1]
-    Store(store).update("ball", {"status": "running"})
     assert cluster.distances({"ball": mesh}, range(70), store, client=client) == before
     np.testing.assert_array_equal(zarr.open_group(store / "ball", mode="r")["distance"][:], expected(mesh, range(70)))
 
@@ -276,14 +274,12 @@ def test_a_group_that_cannot_be_read_is_made_anew(client, tmp_path, file, is_los
 
 def test_the_format_of_a_store_is_one_that_can_be_read(client, tmp_path):
     store = tmp_path / "store"
-    whole = cluster.distances({"fan": FAN}, [0, 4], store, client=client)
+    cluster.distances({"fan": FAN}, [0, 4], store, client=client)
     root = zarr.open_group(store, mode="r+")
     begun = root.attrs["heat_igl"]
-    assert begun["format"] == 3
-    root.update_attributes({"heat_igl": {**begun, "format": 2}})  # the last one, which differs in details only
-    assert cluster.distances({"fan": FAN}, [0, 4], store, client=client) == whole
-    root.update_attributes({"heat_igl": {**begun, "format": 1}})
-    message = r"has format 1, and this version of heat_igl reads 2 and 3: name a new store, or continue it with"
+    assert begun["format"] == 4
+    root.update_attributes({"heat_igl": {**begun, "format": 3}})
+    message = r"has format 3, and this version of heat_igl reads 4: name a new store, or continue it with"
     with pytest.raises(ValueError, match=message):
         cluster.distances({"fan": FAN}, [0, 4], store, client=client)
     with pytest.raises(ValueError, match=message):

@@ -14,6 +14,15 @@ Examples
 from heat_igl.cluster.batch import distances
 from heat_igl.cluster.collection import folder, read_source_sets
 from heat_igl.cluster.connection import connected
-from heat_igl.cluster.report import BatchReport, BatchRow, report
+from heat_igl.cluster.report import BatchReport, BatchRow, read_distances, report
 
-__all__ = ["BatchReport", "BatchRow", "connected", "distances", "folder", "read_source_sets", "report"]
+__all__ = [
+    "BatchReport",
+    "BatchRow",
+    "connected",
+    "distances",
+    "folder",
+    "read_distances",
+    "read_source_sets",
+    "report",
+]

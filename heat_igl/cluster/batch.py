@@ -8,13 +8,14 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from heat_igl.cluster.collection import SourcePlan, items
 from heat_igl.cluster.connection import connected, dask_modules
 from heat_igl.cluster.progress import Watch, watched
 from heat_igl.cluster.report import BatchReport, rows
-from heat_igl.cluster.store import Store
+from heat_igl.cluster.store import Store, locked
 from heat_igl.cluster.worker import Outcome, Task, begin, release, resume
 from heat_igl.errors import BatchError
 from heat_igl.heat_method import Refine, SolverOptions
@@ -77,7 +78,8 @@ def distances(
     Raises
     ------
     BatchError
-        If the store cannot be written or the cluster is lost. Finished blocks stay: the same call goes on from there.
+        If the store cannot be written, another batch writes to it, or the cluster is lost. Finished blocks stay: the
+        same call goes on from there.
     ValueError
         If an argument has no meaning, two meshes have one name, or `store` holds anything else.
     MissingExtraError
@@ -93,13 +95,14 @@ def distances(
         raise ValueError(f"dtype must be 'float32' or 'float64', not {dtype!r}")
     plan = SourcePlan.of(sources)
     solver_options = SolverOptions(refine=refine, **options)
-    opened = Store(store, {"sources": str(plan), "dtype": dtype, "solver": {"refine": refine, **options}})
-    tasks = [Task(item, opened.path.resolve(), plan, dtype, solver_options) for item in items(meshes, points)]
-    with ExitStack() as stack:
-        client = stack.enter_context(connected()) if client is None else client
-        watch = stack.enter_context(watched(client, len(tasks), progress))
-        _Run(client, opened, watch).all(tasks)
-    return BatchReport(os.fspath(store), rows(opened, [task.item.name for task in tasks]))
+    with locked(Path(store)):
+        opened = Store(store, {"sources": str(plan), "dtype": dtype, "solver": {"refine": refine, **options}})
+        tasks = [Task(item, opened.path.resolve(), plan, dtype, solver_options) for item in items(meshes, points)]
+        with ExitStack() as stack:
+            client = stack.enter_context(connected()) if client is None else client
+            watch = stack.enter_context(watched(client, len(tasks), progress))
+            _Run(client, opened, watch).all(tasks)
+        return BatchReport(os.fspath(store), rows(opened, [task.item.name for task in tasks]))
 
 
 class TaskBundle(NamedTuple):

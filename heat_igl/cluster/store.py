@@ -1,7 +1,8 @@
 """The zarr store of a batch: one group for each mesh, with distances in blocks of rows.
 
 zarr writes all metadata, chunks and checksums. This module defines what a group holds, which blocks are finished, and
-in which order things are written, so that a crash at any moment leaves nothing wrong.
+in which order things are written, so that a crash at any moment leaves nothing wrong. The attributes of a group hold
+checksums of what lies beside them, and one of themselves, so that damage to any file is found.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ import contextlib
 import errno
 import os
 import shutil
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,18 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import BatchError, MissingExtraError
+from heat_igl.io.chunks import (
+    checked_layout,
+    checksum,
+    chunk_checksums,
+    damaged_chunk,
+    file_checksum,
+    read_rows,
+    zarr_module,
+)
 from heat_igl.typing import AnyArray, IntArray
 
-__all__ = ["MeshGroup", "Store", "rows_per_block"]
+__all__ = ["MeshGroup", "Store", "locked", "rows_per_block"]
 
 # Rows of a block: a multiple of the solver's blocks of right-hand sides, so that a row's bits depend on no other block.
 _ROWS = 8
@@ -28,11 +37,11 @@ _MOST_ROWS = 64
 _ENTRIES = 2**22
 # Longest row of one chunk.
 _COLUMNS = 2**20
-# Format 2 differs in two points: no checksum on the sources, and zeros instead of NaN as padding of the last chunks.
-_FORMAT = 3
-_READABLE_FORMATS = (2, 3)
-# The crc32c codec appends the checksum to the chunk (zarr specification, version 3).
-_CHECKSUM_BYTES = 4
+# Formats 1 to 3 have no checksums of metadata.
+_FORMAT = 4
+# The files of a group. The small ones, which `begin` writes, are under the checksum of the attributes.
+_ARRAYS = ("distance", "source_vertex", "source_row")
+_SMALL_FILES = (*(f"{name}/zarr.json" for name in _ARRAYS), "source_vertex/c/0", "source_row/c/0")
 # Zarr writes a file under a name that ends like this, and renames it when it is complete.
 _PARTIAL = ".partial"
 
@@ -63,32 +72,37 @@ class Store:
     """
 
     def __init__(self, path: str | os.PathLike[str], options: Mapping[str, Any] | None = None) -> None:
-        zarr = _zarr()
+        zarr = zarr_module()
         self.path = Path(path)
         try:
             self._root = zarr.open_group(self.path, mode="r+", zarr_format=3, use_consolidated=False)
-        except (FileNotFoundError, FileExistsError, NotADirectoryError, ValueError):
-            self._root = None
-        begun = None if self._root is None else self._root.attrs.get("heat_igl")
+            begun = self._root.attrs.get("heat_igl")
+        except Exception:  # zarr has many for metadata that are missing or damaged, or another's
+            self._root = begun = None
         if begun is not None:
             self._require_same(begun, options)
             return
         if options is None:
-            raise ValueError(f"store {self.path} is not a zarr group of distances")
+            raise ValueError(f"store {self.path} is not a zarr group of distances, or its zarr.json is damaged")
         self._require_empty()
         with _writing(self.path):
             if self._root is None:
                 self._root = zarr.create_group(self.path, zarr_format=3)
-            self._root.update_attributes({"heat_igl": {"format": _FORMAT, **options}})
+            begun = {"format": _FORMAT, **options}
+            # As JSON gives it back, with lists for tuples.
+            self._root.update_attributes({"heat_igl": {**begun, "checksum": checksum(begun)}})
 
     def _require_same(self, begun: Mapping[str, Any], options: Mapping[str, Any] | None) -> None:
         """Refuse a store whose format cannot be read, or that was begun with other options."""
-        if begun.get("format") not in _READABLE_FORMATS:
+        begun = dict(begun)
+        seal = begun.pop("checksum", None)
+        if begun.get("format") != _FORMAT:
             raise ValueError(
-                f"store {self.path} has format {begun.get('format')!r}, and this version of heat_igl reads "
-                f"{' and '.join(map(str, _READABLE_FORMATS))}: name a new store, or continue it with the version that "
-                "began it"
+                f"store {self.path} has format {begun.get('format')!r}, and this version of heat_igl reads {_FORMAT}: "
+                f"name a new store, or continue it with the version that began it"
             )
+        if seal != checksum(begun):
+            raise ValueError(f"store {self.path}: zarr.json is damaged: restore it from a copy, or name a new store")
         if options is None:
             return
         for name in [*options, *begun]:
@@ -106,30 +120,61 @@ class Store:
         elif self.path.exists() and not (
             self.path.is_dir() and all(entry.suffix == _PARTIAL for entry in self.path.iterdir())
         ):
-            raise ValueError(f"store {self.path} is not a zarr group of distances: name a new or an empty directory")
+            raise ValueError(
+                f"store {self.path} is not a zarr group of distances, or its zarr.json is damaged: name a new or an "
+                "empty directory"
+            )
 
     def names(self) -> list[str]:
-        """Names of the meshes that the store holds, sorted."""
-        folders = (entry.name for entry in self.path.iterdir() if entry.is_dir())
-        return sorted(name for name in folders if self._group(name) is not None)
+        """Names of the meshes that the store holds, damaged ones included, sorted."""
+        known = ("zarr.json", *_ARRAYS)
+        return sorted(entry.name for entry in self.path.iterdir() if any((entry / name).exists() for name in known))
 
     def attributes(self, name: str) -> dict[str, Any]:
-        """The attributes of a mesh: status, t, versions, checksum, report; empty if the mesh was not begun."""
-        group = self._group(name)
-        return {} if group is None else dict(group.attrs)
+        """The attributes of a mesh: status, t, versions, checksum, report; empty if the mesh was not begun.
+
+        Raises
+        ------
+        ValueError
+            If the group is damaged; the message names the place.
+        """
+        folder = self.path / name
+        if not any((folder / part).exists() for part in ("zarr.json", *_ARRAYS)):
+            return {}
+        if not (folder / "zarr.json").exists():
+            raise ValueError(f"{folder / 'zarr.json'} is missing")
+        try:
+            found = dict(self._root[name].attrs)
+        except Exception as error:  # zarr has many for metadata that are damaged
+            raise ValueError(f"{folder / 'zarr.json'} is damaged: {error}") from None
+        if found.pop("seal", None) != self._seal(name, found):
+            files = ", ".join(file for file in ("zarr.json", *_SMALL_FILES))
+            raise ValueError(f"{folder}: one of {files} is missing or damaged")
+        return found
+
+    def _seal(self, name: str, attributes: Mapping[str, Any]) -> str:
+        """A checksum of the attributes of a mesh and of the small files beside them."""
+        return checksum([dict(attributes), [file_checksum(self.path / name / file) for file in _SMALL_FILES]])
 
     def update(self, name: str, attributes: Mapping[str, Any]) -> None:
         """Change some attributes of a mesh that was begun."""
+        now = {**self.attributes(name), **attributes}
         with _writing(self.path):
-            self._root[name].update_attributes(dict(attributes))
+            self._root[name].attrs.put({**now, "seal": self._seal(name, now)})
 
     def fail(self, name: str, mesh: str, reason: str) -> None:
         """Record that a mesh has no distances, or not all, and why. Finished blocks stay."""
         with _writing(self.path):
-            group = self._group(name)
-            if group is None:
-                group = self._root.create_group(name, overwrite=True)
-            group.update_attributes({"mesh": mesh, "status": "failed", "reason": reason})
+            metadata = self.path / name / "zarr.json"
+            try:
+                found = self.attributes(name)
+            except ValueError:
+                metadata.unlink(missing_ok=True)
+                found = {}
+            if not metadata.exists():
+                self._root.create_group(name)
+            now = {**found, "mesh": mesh, "status": "failed", "reason": reason}
+            self._root[name].attrs.put({**now, "seal": self._seal(name, now)})
 
     def begin(
         self, name: str, source_sets: Sequence[IntArray], n: int, dtype: str, attributes: Mapping[str, Any]
@@ -141,15 +186,15 @@ class Store:
             "source_vertex": np.concatenate(source_sets),
             "source_row": np.repeat(np.arange(k), [len(one) for one in source_sets]),
         }
-        zarr, path = _zarr(), self.path / name
-        # Not compressed: zstd saves an eighth of the space and doubles the time to write.
-        settings = {"zarr_format": 3, "compressors": [zarr.codecs.Crc32cCodec()], "overwrite": True}
+        zarr, path = zarr_module(), self.path / name
         with _writing(self.path):
-            earlier = self._group(name)
-            if earlier is not None:
-                # A crash while the files are deleted must not leave a group that calls itself done.
-                earlier.attrs.put({})
-            shutil.rmtree(path, ignore_errors=True)
+            if path.is_dir():
+                foreign = {entry.name for entry in path.iterdir()} - {"zarr.json", *_ARRAYS}
+                if any(not entry.endswith(_PARTIAL) for entry in foreign):
+                    raise ValueError(f"{path} holds {min(foreign)}, which no batch has written: move it elsewhere")
+                # First, since a crash while the files are deleted must not leave a group that calls itself done.
+                (path / "zarr.json").unlink(missing_ok=True)
+                shutil.rmtree(path)
             for label, entries in sources.items():
                 # By the path: through the group, zarr would look at the metadata of all groups above it.
                 array = zarr.create_array(
@@ -159,7 +204,7 @@ class Store:
                     dtype="int64",
                     fill_value=-1,
                     dimension_names=("source_entry",),
-                    **settings,
+                    **checked_layout(),
                 )
                 array[:] = entries
             distance = zarr.create_array(
@@ -169,23 +214,17 @@ class Store:
                 dtype=dtype,
                 fill_value=np.nan,
                 dimension_names=("source", "vertex"),
-                **settings,
+                **checked_layout(),
             )
+            now = {**attributes, "status": "running"}
             # Last, since without it the mesh counts as not begun.
-            group = zarr.create_group(path, zarr_format=3, attributes={**attributes, "status": "running"})
+            group = zarr.create_group(path, zarr_format=3, attributes={**now, "seal": self._seal(name, now)})
         return MeshGroup(self, name, group, distance)
 
     def group(self, name: str) -> MeshGroup:
         """The group of a mesh that was begun."""
         group = self._root[name]
         return MeshGroup(self, name, group, group["distance"])
-
-    def _group(self, name: str) -> Any:
-        """The zarr group of a mesh; None if there is none, or the metadata are damaged."""
-        try:
-            return self._root[name]
-        except (KeyError, ValueError):
-            return None
 
 
 class MeshGroup:
@@ -206,7 +245,10 @@ class MeshGroup:
         self._group = group
         self._distance = distance
         self.n_rows, self.n_columns = self._distance.shape
-        self._height, self._width = self._distance.chunks
+        self._height, _ = self._distance.chunks
+        self._folder = store.path / name / "distance"
+        # Known when the mesh has been done.
+        self._checksums: list[str] = group.attrs.get("chunks", [])
         self._n_blocks = -(-self.n_rows // self._height)
 
     def source_sets(self) -> list[IntArray]:
@@ -227,25 +269,36 @@ class MeshGroup:
         return slice(block * self._height, min((block + 1) * self._height, self.n_rows))
 
     def missing(self) -> list[int]:
-        """Blocks with a chunk that is missing, incomplete or damaged."""
-        return [block for block in range(self._n_blocks) if not self._is_finished(block)]
+        """Blocks with a chunk that is missing, incomplete or damaged, or that of another place."""
+        sources = self.source_sets()
+        checksums = self._checksums or chunk_checksums(self._folder, self._distance)
+        return [block for block in range(self._n_blocks) if not self._is_finished(block, sources, checksums)]
 
-    def _is_finished(self, block: int) -> bool:
-        # Zarr reads a missing chunk as fill values, without an error.
-        if not all(chunk.is_file() for chunk in self._chunks(block)):
-            return False
+    def _is_finished(self, block: int, sources: Sequence[IntArray], checksums: Sequence[str]) -> bool:
+        rows = self.rows(block)
         try:
-            self._distance[self.rows(block)]
-        except Exception:
-            # Each of zarr's codecs has an exception of its own for bytes that it cannot decode.
+            distances = read_rows(self._folder, self._distance, checksums, rows)
+        except ValueError:
             return False
-        return True
+        # Nothing but the distances themselves tells rows apart until the mesh is done: a source has distance 0.
+        return all((row[vertices] == 0).all() for row, vertices in zip(distances, sources[rows], strict=True))
 
-    def _chunks(self, block: int) -> list[Path]:
-        """The files of a block."""
-        folder = self._store.path / self._name / "distance"
-        columns = range(-(-self.n_columns // self._width))
-        return [folder / self._distance.metadata.encode_chunk_key((block, column)) for column in columns]
+    def read(self, rows: slice) -> AnyArray:
+        """Rows of the distances of a mesh that is done.
+
+        Raises
+        ------
+        ValueError
+            If a chunk is missing or damaged, or is that of another place; the message names the file.
+        """
+        return read_rows(self._folder, self._distance, self._checksums, rows)
+
+    def damaged_chunk(self) -> str:
+        """What is wrong with the first chunk of a mesh that is done; empty if nothing is.
+
+        Of each chunk, only the checksum at its end is read.
+        """
+        return damaged_chunk(self._folder, self._distance, self._checksums)
 
     def write(self, block: int, distances: AnyArray) -> None:
         """Write one block, whole chunks only, so that nothing is read and several writers of the same rows agree."""
@@ -253,16 +306,40 @@ class MeshGroup:
             self._distance[self.rows(block)] = distances
 
     def finish(self) -> None:
-        """Mark a mesh whose blocks are all written as done, with one checksum over the checksums of the chunks."""
-        whole = 0
-        for block in range(self._n_blocks):
-            for path in self._chunks(block):
-                with path.open("rb") as chunk:
-                    chunk.seek(-_CHECKSUM_BYTES, os.SEEK_END)
-                    whole = zlib.crc32(chunk.read(), whole)
-        self._store.update(self._name, {"checksum": f"{whole:08x}", "status": "done"})
+        """Mark a mesh whose blocks are all written as done, with the checksums of the chunks, and one over them."""
+        chunks = chunk_checksums(self._folder, self._distance)
+        self._store.update(self._name, {"chunks": chunks, "checksum": checksum(chunks), "status": "done", "reason": ""})
         for partial in (self._store.path / self._name).rglob(f"*{_PARTIAL}"):  # of writers that were killed
             partial.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """A context that only one process at a time can be in, for a store at `path`.
+
+    The lock is one of the operating system, on the file ``NAME.lock`` beside the store: it ends with the process,
+    and the empty file stays.
+
+    Raises
+    ------
+    BatchError
+        If another process is in it, or the file cannot be written.
+    """
+    lock = Path(os.path.realpath(path.with_name(f"{path.name}.lock")))
+    with contextlib.ExitStack() as stack:
+        try:
+            import locket
+        except ImportError:
+            raise MissingExtraError.of("a batch", "distributed", "cluster") from None
+        with _writing(path):
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                stack.enter_context(locket.lock_file(str(lock), timeout=0))
+            except locket.LockError:
+                raise BatchError(
+                    f"another batch writes to store {path} (it holds {lock}): wait until it ends, or name a new store"
+                ) from None
+        yield
 
 
 @contextlib.contextmanager
@@ -276,12 +353,3 @@ def _writing(path: Path) -> Iterator[None]:
         raise BatchError(
             f"store {path} cannot be written: {reason}. What is finished stays; {remedy} and run the same again"
         ) from None
-
-
-def _zarr() -> Any:
-    try:
-        import zarr
-        import zarr.codecs
-    except ImportError:
-        raise MissingExtraError.of("a store of distances", "zarr", "cluster") from None
-    return zarr

@@ -117,8 +117,12 @@ def _begin(task: Task, store: Store) -> Outcome:
     name = task.item.name
     mesh = _loaded(task.item)
     fingerprint = _fingerprint(mesh)
-    known = store.attributes(name)
-    if known.get("status") == "done" and known["fingerprint"] == fingerprint:
+    try:
+        known = store.attributes(name)
+    except ValueError:  # damaged, and made anew
+        known = {}
+    is_done = known.get("status") == "done" and known["fingerprint"] == fingerprint
+    if is_done and not store.group(name).damaged_chunk():
         return Outcome(name)
     with _SOLVERS.solver(mesh, fingerprint, task.solver_options) as solver:
         identity = {"fingerprint": fingerprint, "t": solver.t, "backend": solver.diagnostics.backend}

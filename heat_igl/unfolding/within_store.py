@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +12,19 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MissingExtraError, shown
+from heat_igl.io.chunks import checksum, chunk_checksums, file_checksum, read_rows, zarr_module
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.sources import Sources
+from heat_igl.typing import AnyArray
 from heat_igl.unfolding.local import blocks_within
 
 __all__ = ["read_distances_within", "write_distances_within"]
 
-_FORMAT = "heat_igl distances within a radius, compressed sparse rows, 1"
+_FORMAT = "heat_igl distances within a radius, compressed sparse rows, 2"
+_ARRAYS = {"indptr": "int64", "indices": "int32", "data": "float64"}
 # Entries of a chunk of the store, 16 MiB of distances, and of the rows that are in memory at a time.
 _CHUNK, _IN_MEMORY = 2**21, 2**22
+_REMEDY = "restore it from a copy, or write the distances again"
 
 
 def write_distances_within(
@@ -37,7 +42,10 @@ def write_distances_within(
     Raises
     ------
     FileExistsError
-        If there is something at `path`.
+        If there is something at `path`, or at `path` with ".partial" behind it: another process writes there, or was
+        stopped. Nothing is deleted that this call did not make.
+    OSError
+        If the store cannot be written; nothing is left of it then.
     MissingExtraError
         If zarr is not installed.
     ValueError, MeshError, SourceError
@@ -46,7 +54,8 @@ def write_distances_within(
     Notes
     -----
     The store is a group with the arrays ``indptr`` (k + 1,), ``indices`` and ``data`` (entries,) of a matrix in
-    compressed sparse rows, and the attribute ``shape``.
+    compressed sparse rows, and the attribute ``shape``. Each chunk ends with a checksum; the attributes hold the
+    checksums of all chunks and of the arrays' metadata, and one of themselves.
 
     Examples
     --------
@@ -57,32 +66,50 @@ def write_distances_within(
     >>> abs(stored - heat_igl.distances_within(mesh, 2.5)).nnz
     0
     """
-    zarr, target = _zarr(), _path(path)
+    zarr, target = zarr_module(), _path(path)
     if target.exists():
         raise FileExistsError(f"{target} exists: name a new directory for the distances")
     triangles = as_simplices(mesh)
     blocks = blocks_within(triangles, radius, sources, _IN_MEMORY)
-    block = next(blocks)  # before anything is written, so that wrong arguments leave nothing behind
     partial = target.with_name(f"{target.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
+    try:
+        # Only one process can make it, so it is the lock as well.
+        partial.mkdir(parents=True)
+    except FileExistsError:
+        raise FileExistsError(
+            f"{partial} exists: another process writes {target}, or was stopped, or the folder serves another purpose: "
+            "wait for the process, or remove the folder, or name another path"
+        ) from None
     try:
         group = zarr.create_group(partial, zarr_format=3)
         arrays = {
-            name: group.create_array(name, shape=(0,), chunks=(_CHUNK,), dtype=dtype, compressors=None)
-            for name, dtype in (("indptr", "int64"), ("indices", "int32"), ("data", "float64"))
+            name: group.create_array(
+                name, shape=(0,), chunks=(_CHUNK,), dtype=dtype, compressors=[zarr.codecs.Crc32cCodec()]
+            )
+            for name, dtype in _ARRAYS.items()
         }
         arrays["indptr"].append(np.zeros(1, np.int64))
         n_entries, n_rows = 0, 0
-        while block is not None:
+        for block in blocks:
             arrays["indptr"].append(n_entries + block.indptr[1:].astype(np.int64))
             arrays["indices"].append(block.indices.astype(np.int32))
             arrays["data"].append(block.data)
             n_entries, n_rows = n_entries + block.nnz, n_rows + block.shape[0]
-            block = next(blocks, None)
-        group.update_attributes({"format": _FORMAT, "shape": [n_rows, triangles.n_vertices], "radius": float(radius)})
+        attributes = {
+            "format": _FORMAT,
+            "shape": [n_rows, triangles.n_vertices],
+            "radius": float(radius),
+            "metadata": {name: file_checksum(partial / name / "zarr.json") for name in _ARRAYS},
+            "chunks": {name: chunk_checksums(partial / name, arrays[name]) for name in _ARRAYS},
+        }
+        group.update_attributes({**attributes, "checksum": checksum(attributes)})
+        if target.exists():
+            raise FileExistsError(f"{target} was made by somebody else meanwhile: name a new directory")
         partial.rename(target)
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
+    except BaseException as error:
+        _remove(partial)
+        if isinstance(error, OSError) and not isinstance(error, FileExistsError):
+            raise OSError(error.errno, f"{target} cannot be written: {error.strerror or error}") from error
         raise
 
 
@@ -104,7 +131,8 @@ def read_distances_within(path: str | os.PathLike[str], rows: slice | None = Non
     Raises
     ------
     ValueError
-        If `path` is no such store, or `rows` has a step.
+        If `path` is no such store, `rows` has a step, or a file that holds the rows is missing or damaged; the message
+        names the file.
     MissingExtraError
         If zarr is not installed.
 
@@ -115,32 +143,59 @@ def read_distances_within(path: str | os.PathLike[str], rows: slice | None = Non
     >>> heat_igl.read_distances_within("rows.zarr", slice(5, 6)).indices.tolist()  # the neighbours of vertex 5
     [4, 5, 6, 26]
     """
-    zarr = _zarr()
-    try:
-        group = zarr.open_group(_path(path), mode="r")
-    except (FileNotFoundError, FileExistsError, NotADirectoryError, ValueError):
-        group = None
-    if group is None or group.attrs.get("format") != _FORMAT:
-        raise ValueError(f"{path} holds no distances of write_distances_within")
-    k, n = group.attrs["shape"]
+    target = _path(path)
+    group, attributes = _opened(target)
+    k, n = attributes["shape"]
     if rows is not None and not (isinstance(rows, slice) and rows.step in (None, 1)):
         raise ValueError(f"rows must be a slice of consecutive rows, not {shown(rows)}: read them all, and select")
     start, stop, _ = (slice(None) if rows is None else rows).indices(k)
     stop = max(start, stop)
-    indptr = np.asarray(group["indptr"][start : stop + 1])
-    entries = slice(int(indptr[0]), int(indptr[-1]))
+
+    def entries(name: str, among: slice) -> AnyArray:
+        metadata = target / name / "zarr.json"
+        if file_checksum(metadata) != attributes["metadata"][name]:
+            raise ValueError(f"{metadata} is {'damaged' if metadata.exists() else 'missing'}: {_REMEDY}")
+        try:
+            return read_rows(target / name, group[name], attributes["chunks"][name], among)
+        except ValueError as error:
+            raise ValueError(f"{error}: {_REMEDY}") from None
+
+    indptr = entries("indptr", slice(start, stop + 1))
+    among = slice(int(indptr[0]), int(indptr[-1]))
     return sp.csr_array(
-        (group["data"][entries], group["indices"][entries], indptr - indptr[0]), shape=(stop - start, n)
+        (entries("data", among), entries("indices", among), indptr - indptr[0]), shape=(stop - start, n)
     )
+
+
+def _opened(path: Path) -> tuple[Any, dict[str, Any]]:
+    """The group of a store, and its attributes, which are as they were written."""
+    file = path / "zarr.json"
+    try:
+        group = zarr_module().open_group(path, mode="r", zarr_format=3, use_consolidated=False)
+        attributes = dict(group.attrs)
+    except MissingExtraError:
+        raise
+    except Exception as error:  # zarr has many for metadata that are missing, of another format or damaged
+        reason = f" ({error})" if file.exists() else ""
+        raise ValueError(f"{path} holds no distances of write_distances_within, or {file} is damaged{reason}") from None
+    seal = attributes.pop("checksum", None)
+    if attributes.get("format") != _FORMAT:
+        raise ValueError(f"{path} holds no distances of this version of write_distances_within, or {file} is damaged")
+    if seal != checksum(attributes):
+        raise ValueError(f"{file} is damaged: {_REMEDY}")
+    return group, attributes
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder into which zarr's threads may still write for a moment after one of them has failed."""
+    for _ in range(100):
+        shutil.rmtree(folder, ignore_errors=True)
+        if not folder.exists():
+            return
+        time.sleep(0.02)
 
 
 def _path(path: str | os.PathLike[str]) -> Path:
     if not isinstance(path, (str, os.PathLike)):
         raise TypeError(f"path must be a string or a path, not {shown(path)}")
     return Path(path)
-
-
-def _zarr() -> Any:
-    with MissingExtraError.guard("a store of distances", "zarr", "cluster"):
-        import zarr
-    return zarr
