@@ -15,7 +15,7 @@ import numpy as np
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.demo import sample_mesh
+from heat_igl.cli.demo import sample_mesh
 from heat_igl.drawing import Page, Picture, page, plot, plot_field, plot_labels
 
 

@@ -3,8 +3,6 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from heat_igl.runtime.aliases import alias_modules
-
 if TYPE_CHECKING:
     from heat_igl import cluster, reference, sampling
     from heat_igl.applications import geodesic_errors, parcel_distances, smooth
@@ -41,6 +39,7 @@ if TYPE_CHECKING:
         ReferenceSolverError,
         SourceError,
     )
+    from heat_igl.geodesic import GeodesicSolver, geodesic_distance
     from heat_igl.heat_method import (
         Diagnostics,
         Directions,
@@ -50,7 +49,6 @@ if TYPE_CHECKING:
         SignedHeatSolver,
         VectorHeatSolver,
         VoxelBox,
-        geodesic_distance,
         heat_method_distance,
         volume_signed_distance,
     )
@@ -108,12 +106,10 @@ if TYPE_CHECKING:
     )
     from heat_igl.sources import OffsetSources, OrientedPoints
     from heat_igl.unfolding import (
-        Refinement,
         distances_within,
         nearest_vertices,
         pair_distances,
         read_distances_within,
-        unfolded_distance,
         write_distances_within,
     )
     from heat_igl.validation import ValidationReport, ValidationRow, closed_forms, metrics, shapes, validate
@@ -137,6 +133,7 @@ __all__ = [
     "DomainRow",
     "FactorizationError",
     "GeodesicPathSolver",
+    "GeodesicSolver",
     "HeatMethodSolver",
     "HeatSolution",
     "ImageDomain",
@@ -151,7 +148,6 @@ __all__ = [
     "PointCloud",
     "PolygonMesh",
     "ReferenceSolverError",
-    "Refinement",
     "SignedHeatSolver",
     "SourceError",
     "SurfaceCurve",
@@ -222,7 +218,6 @@ __all__ = [
     "tangent_frames",
     "terrain",
     "trace_geodesic",
-    "unfolded_distance",
     "validate",
     "validate_domains",
     "volume_signed_distance",
@@ -253,6 +248,7 @@ _LAZY = {
     "DomainRow": "validation.domains",
     "FactorizationError": "errors",
     "GeodesicPathSolver": "curves",
+    "GeodesicSolver": "geodesic",
     "HeatMethodSolver": "heat_method",
     "HeatSolution": "heat_method",
     "ImageDomain": "mesh",
@@ -267,7 +263,6 @@ _LAZY = {
     "PointCloud": "mesh",
     "PolygonMesh": "mesh",
     "ReferenceSolverError": "errors",
-    "Refinement": "unfolding",
     "SignedHeatSolver": "heat_method",
     "SourceError": "errors",
     "SurfaceCurve": "mesh",
@@ -303,7 +298,8 @@ _LAZY = {
     "fibre_metric": "operators",
     "geodesic_bezier": "curves",
     "geodesic_centre": "sampling",
-    "geodesic_distance": "heat_method",
+    "geodesic": "geodesic",
+    "geodesic_distance": "geodesic",
     "geodesic_errors": "applications",
     "geodesic_path": "curves",
     "handle_loops": "curves",
@@ -352,7 +348,6 @@ _LAZY = {
     "terrain": "mesh",
     "trace_geodesic": "curves",
     "typing": "typing",
-    "unfolded_distance": "unfolding",
     "unfolding": "unfolding",
     "validate": "validation",
     "validate_domains": "validation.domains",
@@ -363,37 +358,14 @@ _LAZY = {
     "write_point_cloud": "io",
 }
 
-# Modules that users import by these names, most of them earlier ones: name -> the module in its room.
-_EARLIER_NAMES = {
-    "baselines": "reference.baselines",
-    "closed_forms": "validation.closed_forms",
-    "demo": "cli.demo",
-    "factorization": "linear",
-    "jax": "applications.jax",
-    "metrics": "validation.metrics",
-    "paths": "curves.paths",
-    "plots": "drawing.plots",
-    "polygons": "mesh.polygons",
-    "projection": "mesh.projection",
-    "refine": "unfolding",
-    "shapes": "validation.shapes",
-    "solution": "heat_method.solution",
-    "speed": "operators.speed",
-    "subdivision": "mesh.subdivision",
-    "surface_points": "mesh.surface_points",
-    "torch": "applications.torch",
-    "viewer": "drawing.viewer",
-}
-alias_modules({f"{__name__}.{name}": f"{__name__}.{target}" for name, target in _EARLIER_NAMES.items()})
-
 if not TYPE_CHECKING:  # type checkers would otherwise accept any misspelt attribute
 
     def __getattr__(name: str) -> Any:
-        place = _LAZY.get(name) or _EARLIER_NAMES.get(name)
+        place = _LAZY.get(name)
         if place is None:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         module = import_module(f"{__name__}.{place}")
-        is_module = place.rpartition(".")[2] == name or name in _EARLIER_NAMES
+        is_module = place.rpartition(".")[2] == name
         found = globals()[name] = module if is_module else getattr(module, name)
         return found
 

@@ -94,3 +94,12 @@ def bent_pages() -> Mesh:
     F = np.concatenate([page.F + k * page.n_vertices for k in range(3)])
     _, first, inverse = np.unique(np.round(stacked, 9), axis=0, return_index=True, return_inverse=True)
     return Mesh(stacked[first], inverse.ravel()[F])
+
+
+# Places in a face, for points as sources and targets.
+COORDINATES = {
+    "inside": (0.2, 0.5, 0.3),
+    "on a side": (0.3, 0.0, 0.7),
+    "nearly on a side": (1e-13, 0.4, 0.6 - 1e-13),
+    "at a corner": (0.0, 1.0, 0.0),
+}

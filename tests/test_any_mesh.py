@@ -69,7 +69,6 @@ CALLS: dict[str, Call] = {
     "sublevel_areas": lambda mesh: heat_igl.sublevel_areas(mesh, PHI, [0.1, 0.3]),
     "tangent_frames": lambda mesh: heat_igl.tangent_frames(mesh).x,
     "trace_geodesic": lambda mesh: heat_igl.trace_geodesic(mesh, 0, [0, 0, 1], 0.3).positions(MESH),
-    "unfolded_distance": lambda mesh: heat_igl.unfolded_distance(mesh, sources=0),
     "validate": lambda mesh: heat_igl.validate(mesh, [0], methods=("heat",)).distances["heat"],
     "volume_signed_distance": lambda mesh: heat_igl.volume_signed_distance(BOX, mesh),
     "voronoi_cells": lambda mesh: heat_igl.voronoi_cells(mesh, [0, 40]).labels,

@@ -39,7 +39,7 @@ def test_search_expands_few_and_finds_the_same_lengths(bunny, pairs, by_dijkstra
     if landmark_distance == "along edges":
         rows = np.stack([graph_distance(bunny, v) for v in vertices])
     elif landmark_distance == "geodesic":
-        rows = heat_igl.HeatMethodSolver(bunny, refine="unfold").distances(vertices)
+        rows = heat_igl.GeodesicSolver(bunny, method="exact").distances(vertices)
     else:
         rows = solver.distances(vertices)
     search = EdgeSearch(bunny, rows)
@@ -123,7 +123,7 @@ def test_reconstruction_within_a_radius_stays_inside_the_particle():
     mask[2:5], mask[7:10], mask[2:10, 26:] = True, True, True
     marker = np.zeros_like(mask)
     marker[3, 2] = True
-    near = reconstruct(mask, marker, radius=20.5, refine="sweep")
+    near = reconstruct(mask, marker, radius=20.5, method="sweep")
     assert near[3, 22]
     assert not near[3, 23]
     assert not near[7:10, :20].any()
@@ -157,13 +157,13 @@ def test_zones_of_influence_cut_touching_disks_apart():
 def test_length_of_a_hook_and_of_a_bar():
     bar = np.zeros((5, 40), bool)
     bar[2, 3:33] = True
-    length, first, second = particle_length(bar, refine="sweep")
+    length, first, second = particle_length(bar, method="sweep")
     assert length == pytest.approx(np.hypot(30, 1))
     assert {first, second} == {(2, 3), (2, 32)}
     hook = np.zeros((12, 30), bool)
     hook[2:4], hook[8:10], hook[2:10, 28:] = True, True, True
     # From a far corner to the next inner corner, down, and back: the band is two wide.
-    length, first, second = particle_length(hook, refine="unfold")
+    length, first, second = particle_length(hook, method="exact")
     assert length == pytest.approx(2 * np.hypot(28, 2) + 4, rel=1e-4)
     assert {first, second} == {(2, 0), (9, 0)}
     with pytest.raises(heat_igl.MeshError, match="mask holds 2 particles"):

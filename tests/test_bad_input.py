@@ -176,11 +176,11 @@ def number_cases() -> Iterator[Case]:
 def choice_cases() -> Iterator[Case]:
     ways: dict[str, Callable[[heat_igl.Mesh, Any], Any]] = {
         name: lambda mesh, value, name=name: heat_igl.HeatMethodSolver(mesh, **{name: value})
-        for name in ("laplacian", "boundary", "magnitude", "refine", "backend")
+        for name in ("laplacian", "boundary", "magnitude", "backend")
     }
     ways["method"] = lambda mesh, value: heat_igl.geodesic_distance(mesh, 0, method=value)
     for name, ask in ways.items():
-        for bad in ("guess", 1, np.ones(50), ["unfold"]):
+        for bad in ("guess", 1, np.ones(50), ["windows"]):
             refused = f"{name} must be one of .*, not "
             yield argument_case(f"{name} = {bad!r:.20}", lambda mesh, ask=ask, bad=bad: ask(mesh, bad), refused)
 
@@ -245,7 +245,7 @@ def argument_cases() -> Iterator[Case]:
         "values": lambda mesh: heat_igl.VectorHeatSolver(mesh).extend([0, 1], ragged),
         "values of isolines": lambda mesh: heat_igl.isolines(mesh, ragged, [0.5]),
         "weights": lambda mesh: heat_igl.geodesic_centre(mesh, mesh, [0, 1], ragged),
-        "g": lambda mesh: heat_igl.HeatMethodSolver(mesh, refine="unfold").distance_vjp(0)[1](ragged),
+        "g": lambda mesh: heat_igl.GeodesicSolver(mesh, method="exact").distance_vjp(0)[1](ragged),
         "reference": lambda mesh: heat_igl.validate(mesh, 0, methods=["heat"], reference=ragged),
         "origin": lambda _: heat_igl.VoxelBox(ragged, 1.0, (2, 2, 2)),
     }.items():
@@ -253,7 +253,7 @@ def argument_cases() -> Iterator[Case]:
         yield argument_case(f"{name}, ragged", ask, f"^{argument} must be real numbers.*, not ")
     yield argument_case(
         "g, masked",
-        lambda mesh: heat_igl.HeatMethodSolver(mesh, refine="unfold").distance_vjp(0)[1](
+        lambda mesh: heat_igl.GeodesicSolver(mesh, method="exact").distance_vjp(0)[1](
             np.ma.masked_less(mesh.V[:, 0], 0)
         ),
         r"g has \d+ masked entries: fill or remove them",

@@ -9,6 +9,7 @@ import pytest
 from conftest import perturbed
 
 from heat_igl import HeatMethodSolver, Mesh, MeshError, MissingExtraError, SourceError, shapes
+from heat_igl.geodesic import SolverChoice
 from heat_igl.operators import operators
 from heat_igl.runtime import PeakMemory, blocks, over_rows
 
@@ -140,9 +141,9 @@ def test_types_of_the_result(solver):
         solver.iter_distances([4], dtype=np.float16)
 
 
-@pytest.mark.parametrize("refine", [None, "sweep"])
-def test_rows_do_not_depend_on_blocks_or_threads(sphere, refine, monkeypatch):
-    solver = HeatMethodSolver(sphere, refine=refine)
+@pytest.mark.parametrize("method", [None, "sweep"])
+def test_rows_do_not_depend_on_blocks_or_threads(sphere, method, monkeypatch):
+    solver = SolverChoice(method).on(sphere)
     sets = [[int(i)] for i in np.random.default_rng(0).choice(sphere.n_vertices, 19, replace=False)]
     one_by_one = np.stack([solver.distance(sources) for sources in sets])
     for n_threads in ("1", "2"):

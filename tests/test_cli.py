@@ -94,15 +94,15 @@ def test_distance_from_positions_in_space(sphere: Path) -> None:
 
 
 def test_refined_distance_is_that_of_the_library(sphere: Path) -> None:
-    done = command("distance", sphere, "--source", 12, "--refine", "unfold", "--output", "out.ply", cwd=sphere.parent)
+    done = command("distance", sphere, "--source", 12, "--method", "windows", "--output", "out.ply", cwd=sphere.parent)
     assert done.returncode == 0, done.stderr
     written = io.read_attributes(sphere.parent / "out.ply")["distance"]
-    expected = heat_igl.HeatMethodSolver(shapes.icosphere(2), refine="unfold").distance(12)
+    expected = heat_igl.GeodesicSolver(shapes.icosphere(2), method="exact").distance(12)
     np.testing.assert_array_equal(written, expected)
     assert np.abs(expected - heat_igl.HeatMethodSolver(shapes.icosphere(2)).distance(12)).max() > 0.01
-    refused = command("distance", sphere, "--source", 12, "--refine", "best", cwd=sphere.parent)
+    refused = command("distance", sphere, "--source", 12, "--method", "best", cwd=sphere.parent)
     assert refused.returncode == 2
-    assert_one_line(refused.stderr, "--refine", "'best' is not one of sweep, unfold")
+    assert_one_line(refused.stderr, "--method", "'best' is not one of auto, windows")
 
 
 def test_paths_and_traces_are_those_of_the_library(
@@ -287,15 +287,16 @@ def test_vertices_beyond_the_cutoff_are_said_to_be(sphere: Path, capsys: pytest.
     assert re.search(rf"unreachable +{n_beyond} vertices, or beyond the cutoff", capsys.readouterr().out)
 
 
-@pytest.mark.parametrize("method", ["unfold", "sweep", "heat"])
+@pytest.mark.parametrize("method", ["windows", "sweep", "heat"])
 def test_the_method_is_that_of_the_front_door(
-    sphere: Path, capsys: pytest.CaptureFixture[str], method: heat_igl.heat_method.DistanceMethod
+    sphere: Path, capsys: pytest.CaptureFixture[str], method: heat_igl.geodesic.DistanceMethod
 ) -> None:
     output = sphere.with_name("out.ply")
     assert cli.run(["distance", str(sphere), "--source=3", f"--output={output}", f"--method={method}"]) == 0
     expected = heat_igl.geodesic_distance(sphere, 3, method=method)
     np.testing.assert_array_equal(io.read_attributes(output)["distance"], expected)
-    assert ["method", method] in [line.split() for line in capsys.readouterr().out.splitlines()]
+    engine = heat_igl.geodesic.SolverChoice(method).on(heat_igl.read_mesh(sphere)).plan.engine
+    assert re.search(rf"^plan +{engine}\b", capsys.readouterr().out, re.MULTILINE)
 
 
 def test_options_reach_the_solver(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -323,8 +324,8 @@ def test_a_warning_of_the_package_is_one_line(sphere: Path, capsys: pytest.Captu
         (["--laplacian=graph"], 2, ("graph", "auto, intrinsic-delaunay, intrinsic-delaunay-refined, cotan")),
         (["--boundary=hot"], 2, ("hot", "neumann, dirichlet, average")),
         (["--magnitude=long"], 2, ("long", "auto, unit, damped")),
-        (["--method=guess"], 2, ("--method", "'guess' is not one of unfold, sweep, heat, exact")),
-        (["--method=unfold", "--t-coef=2"], 1, ("--t-coef is an option of the heat method", "--method is unfold")),
+        (["--method=guess"], 2, ("--method", "'guess' is not one of auto, windows, exact, sweep, heat")),
+        (["--method=windows", "--t-coef=2"], 1, ("--t-coef is an option of the heat method", "--method is windows")),
         (["--backend=abacus"], 2, ("abacus", "auto, scipy, multifrontal")),
         (["--output=out.obj"], 1, ("out.obj", ".ply, .vtu, .vtp, .gii, .npy or .csv")),
         (["--picture=out.gif"], 1, ("out.gif", ".png, .pdf, .svg")),

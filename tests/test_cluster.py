@@ -46,7 +46,7 @@ def expected(mesh: Mesh, source_sets, dtype="float32", **options):
     return heat_igl.HeatMethodSolver(mesh, **options).distances(source_sets).astype(dtype)
 
 
-@pytest.mark.parametrize("options", [{}, {"refine": "sweep"}, {"dtype": "float64", "boundary": "average"}])
+@pytest.mark.parametrize("options", [{}, {"method": "sweep"}, {"dtype": "float64", "boundary": "average"}])
 def test_the_bits_are_those_of_a_solver(client, tmp_path, options):
     meshes = {"ball": heat_igl.shapes.icosphere(3), "fan": FAN, "tile": heat_igl.shapes.grid(12)}
     report = cluster.distances(meshes, "all", tmp_path / "store", client=client, **options)
@@ -218,7 +218,7 @@ def killed_at(crash: int):
 
 
 def begin_fan(store: Path, attributes) -> None:
-    made = Store(store, {"sources": "0 4", "dtype": "float32", "solver": {"refine": None}})
+    made = Store(store, {"sources": "0 4", "dtype": "float32", "solver": {"method": "auto", "tolerance": 1e-05}})
     made.begin("fan", [np.array([0]), np.array([4])], 7, "float32", attributes)
 
 

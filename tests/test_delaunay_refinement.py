@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heat_igl import HeatMethodSolver, Mesh, OffsetSources, SurfacePoints, shapes, unfolded_distance
+from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, OffsetSources, SurfacePoints, geodesic_distance, shapes
 from heat_igl.intrinsic import (
     Flipped,
     IntrinsicTriangulation,
@@ -175,7 +175,7 @@ def mean_error(distance: FloatArray, truth: FloatArray) -> float:
 def test_answers_are_at_the_vertices_of_the_mesh(solver: HeatMethodSolver) -> None:
     mesh = stretched()
     assert solver.operators.n > mesh.n_vertices == solver.n_vertices
-    truth = unfolded_distance(mesh.V, mesh.F, 5)
+    truth = geodesic_distance(mesh, 5)
     distance = solver.distance(5)
     assert distance.shape == (mesh.n_vertices,)
     plain = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay")
@@ -220,7 +220,7 @@ def test_sources_in_faces(solver: HeatMethodSolver) -> None:
     corner = SurfacePoints([17], [[1.0, 0, 0]])
     assert np.array_equal(solver.distance(corner), solver.distance(int(mesh.F[17, 0])))
     inside = SurfacePoints([17], [[0.4, 0.35, 0.25]])
-    truth = HeatMethodSolver(mesh, refine="unfold").distance(inside)
+    truth = GeodesicSolver(mesh, method="exact").distance(inside)
     assert mean_error(solver.distance(inside), truth) < 0.02
 
 
@@ -246,18 +246,13 @@ def test_a_surface_with_a_boundary(boundary: str) -> None:
         assert mean_error(solver.distance(source), truth) < 0.06
 
 
-def test_refine_unfolds_the_triangles_of_the_mesh() -> None:
+def test_paths_are_those_on_the_triangles_of_the_mesh() -> None:
     mesh = stretched()
-    assert HeatMethodSolver(mesh, refine="sweep").operators.n == mesh.n_vertices
-    with pytest.raises(ValueError, match="leave laplacian='intrinsic-delaunay-refined' away"):
-        HeatMethodSolver(mesh, refine="unfold", laplacian="intrinsic-delaunay-refined")
     refined = operators(mesh, "intrinsic-delaunay-refined")
     assert refined.n > mesh.n_vertices
-    for refine in ("sweep", "unfold", "exact"):
-        solver = HeatMethodSolver.from_operators(refined, refine=refine)
-        assert solver.operators.n == mesh.n_vertices
-        expected = HeatMethodSolver(mesh, refine=refine).distance(0)
-        np.testing.assert_allclose(solver.distance(0), expected, rtol=1e-9, atol=1e-12)
+    for method in ("sweep", "exact"):
+        found = GeodesicSolver(refined, method=method).distance(0)
+        np.testing.assert_allclose(found, GeodesicSolver(mesh, method=method).distance(0), rtol=1e-9, atol=1e-12)
 
 
 def test_even_meshes_stay_as_they_are() -> None:
@@ -281,7 +276,7 @@ def test_an_uneven_part_is_refined_beside_an_even_one() -> None:
     assert mesh.n_vertices < solver.operators.n
     alone = HeatMethodSolver(part)
     assert solver.operators.n - mesh.n_vertices < 1.1 * (alone.operators.n - alone.n_vertices)
-    truth = unfolded_distance(part, 7)
+    truth = geodesic_distance(part, 7)
     error = mean_error(solver.distance(sphere.n_vertices + 7)[sphere.n_vertices :], truth)
     assert error < 1.5 * mean_error(alone.distance(7), truth)
     # The sphere is as it was.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,10 @@ from conftest import perturbed
 from surfaces import moebius_strip
 
 import heat_igl
-from heat_igl import HeatMethodSolver, Mesh, MeshError, OffsetSources, SurfacePoints, shapes
+from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, OffsetSources, SurfacePoints, shapes
+from heat_igl.geodesic import SolverChoice
 
-BY_PATHS = [{"refine": "exact"}, {"refine": "unfold"}]
+BY_PATHS = [{"method": "exact"}]
 HEAT = [
     {"magnitude": "unit", "laplacian": "cotan"},
     {"magnitude": "unit", "laplacian": "intrinsic-delaunay"},
@@ -52,7 +54,7 @@ def differences(
 @pytest.mark.parametrize("name", MESHES)
 def test_paths_against_central_differences(name: str, options: dict[str, Any]) -> None:
     mesh, rng = MESHES[name](), np.random.default_rng(1)
-    solver, sources = HeatMethodSolver(mesh, **options), [5, mesh.n_vertices // 2]
+    solver, sources = SolverChoice.of(**options).on(mesh), [5, mesh.n_vertices // 2]
     distance, pull_back = solver.distance_vjp(sources)
     np.testing.assert_array_equal(distance, solver.distance(sources))
     assert len(pull_back.inexact) <= 0.01 * mesh.n_vertices
@@ -78,7 +80,7 @@ def test_paths_against_central_differences(name: str, options: dict[str, Any]) -
 @pytest.mark.parametrize("name", ["sphere", "grid", "moebius", "book"])
 def test_heat_against_central_differences(name: str, options: dict[str, Any]) -> None:
     mesh, rng = MESHES[name](), np.random.default_rng(2)
-    solver, sources = HeatMethodSolver(mesh, **options), 150
+    solver, sources = SolverChoice.of(**options).on(mesh), 150
     distance, pull_back = solver.distance_vjp(sources)
     np.testing.assert_array_equal(distance, solver.distance(sources))
     g = rng.standard_normal(mesh.n_vertices)
@@ -95,7 +97,7 @@ def test_heat_against_central_differences(name: str, options: dict[str, Any]) ->
 @pytest.mark.parametrize("options", HEAT[::2], ids=str)
 def test_heat_from_several_sources(sources: list[int], options: dict[str, Any]) -> None:
     mesh, rng = MESHES["grid"](), np.random.default_rng(3)
-    solver = HeatMethodSolver(mesh, **options)
+    solver = SolverChoice.of(**options).on(mesh)
     _, pull_back = solver.distance_vjp(sources)
     g = rng.standard_normal(mesh.n_vertices)
     g[pull_back.inexact] = 0  # raised to straight lines
@@ -110,7 +112,7 @@ def test_heat_on_components_with_time_steps_of_their_own(options: dict[str, Any]
     one, other = MESHES["grid"](), MESHES["sphere"]()
     n = one.n_vertices
     mesh = Mesh(np.concatenate([one.V, 3 + 5 * other.V]), np.concatenate([one.F, n + other.F]))
-    solver, sources, rng = HeatMethodSolver(mesh, **options), [150, n + 5], np.random.default_rng(11)
+    solver, sources, rng = SolverChoice.of(**options).on(mesh), [150, n + 5], np.random.default_rng(11)
     _, pull_back = solver.distance_vjp(sources)
     g = rng.standard_normal(mesh.n_vertices)
     g[pull_back.inexact] = 0
@@ -123,7 +125,7 @@ def test_heat_on_components_with_time_steps_of_their_own(options: dict[str, Any]
 @pytest.mark.parametrize("name", ["sphere", "grid", "moebius"])
 def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name: str, options: dict[str, Any]) -> None:
     mesh, rng = MESHES[name](), np.random.default_rng(4)
-    distance, pull_back = HeatMethodSolver(mesh, **options).distance_vjp(5)
+    distance, pull_back = SolverChoice.of(**options).on(mesh).distance_vjp(5)
     g = rng.standard_normal(mesh.n_vertices)
     g[pull_back.inexact] = 0
     dV = pull_back(g)
@@ -150,7 +152,7 @@ def test_with_a_given_time_step_scaling_takes_its_derivative_too() -> None:
 def test_on_a_flat_convex_mesh_the_ends_move_along_the_line(options: dict[str, Any]) -> None:
     flat = perturbed(shapes.grid(20))
     mesh = Mesh(flat.V * [1, 1, 0], flat.F)
-    distance, pull_back = HeatMethodSolver(mesh, **options).distance_vjp(110)
+    distance, pull_back = SolverChoice.of(**options).on(mesh).distance_vjp(110)
     others = [3, 50, 217, 399]
     assert HeatMethodSolver(mesh).diagnostics.n_flips > 0
     rows = pull_back(np.eye(mesh.n_vertices)[others])
@@ -169,7 +171,7 @@ def test_a_bend_moves_with_its_vertex(options: dict[str, Any]) -> None:
     start, end, bend = (
         int(np.argmin(np.linalg.norm(mesh.V - place, axis=1))) for place in ([1, 0.25, 0], [0.25, 1, 0], [0.5, 0.5, 0])
     )
-    solver = HeatMethodSolver(mesh, **options)
+    solver = SolverChoice.of(**options).on(mesh)
     _, pull_back = solver.distance_vjp(start)
     dV = pull_back(np.eye(mesh.n_vertices)[end])
     to_bend, from_bend = mesh.V[bend] - mesh.V[start], mesh.V[end] - mesh.V[bend]
@@ -183,16 +185,16 @@ def test_by_edge_lengths_without_positions(options: dict[str, Any]) -> None:
     mesh, rng = MESHES["sphere"](), np.random.default_rng(6)
     corners = mesh.V[mesh.F]
     lengths = np.stack([np.linalg.norm(corners[:, (c + 1) % 3] - corners[:, (c + 2) % 3], axis=1) for c in range(3)], 1)
-    solver = HeatMethodSolver.from_edge_lengths(mesh.F, lengths, **options)
+    cls = GeodesicSolver if "method" in options else HeatMethodSolver
+    made = partial(cls.from_edge_lengths, **options)
+    solver = made(mesh.F, lengths)
     distance, pull_back = solver.distance_vjp(9)
     g = rng.standard_normal(len(distance))
     g[pull_back.inexact] = 0
     by_lengths = pull_back.by_lengths(g)
     edge = np.sort(np.stack([mesh.F[:, [1, 2, 0]], mesh.F[:, [2, 0, 1]]], axis=-1), axis=-1)
     rate = rng.standard_normal(mesh.n_vertices)[edge].prod(axis=-1) * lengths  # the same on both sides of an edge
-    ahead, behind = (
-        HeatMethodSolver.from_edge_lengths(mesh.F, lengths + e * rate, **options).distance(9) for e in (1e-7, -1e-7)
-    )
+    ahead, behind = (made(mesh.F, lengths + e * rate).distance(9) for e in (1e-7, -1e-7))
     assert (by_lengths * rate).sum() == pytest.approx((g * (ahead - behind)).sum() / 2e-7, rel=1e-4)
     with pytest.raises(MeshError, match="no vertices to move: use by_lengths"):
         pull_back(g)
@@ -202,8 +204,8 @@ def test_by_edge_lengths_without_positions(options: dict[str, Any]) -> None:
 def test_points_in_faces_as_sources(options: dict[str, Any]) -> None:
     mesh, rng = moved(shapes.torus(50, 25), 0.3), np.random.default_rng(8)
     faces, barycentric = rng.integers(mesh.n_faces, size=4), rng.dirichlet([2, 2, 2], 4)
-    solver = HeatMethodSolver(mesh, **options)
-    triangulation = solver.operators.surface.unfolding
+    solver = SolverChoice.of(**options).on(mesh)
+    triangulation = solver.distance_vjp(0)[1]._answer.triangulation
     carried = triangulation.locate(faces, barycentric)[1]
     assert (carried != barycentric).any(), "no point lies beside a flipped edge"
 
@@ -231,7 +233,7 @@ def test_points_in_faces_as_sources(options: dict[str, Any]) -> None:
 
 def test_one_distance_changes_at_rate_1_with_its_source_point() -> None:
     mesh = MESHES["sphere"]()
-    _, pull_back = HeatMethodSolver(mesh, refine="exact").distance_vjp(SurfacePoints([17], [[0.2, 0.3, 0.5]]))
+    _, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(SurfacePoints([17], [[0.2, 0.3, 0.5]]))
     for vertex in (0, 100, 300):
         (by_point,) = pull_back.by_points(np.eye(mesh.n_vertices)[vertex])
         assert np.linalg.norm(by_point) == pytest.approx(1, rel=1e-9)
@@ -239,7 +241,7 @@ def test_one_distance_changes_at_rate_1_with_its_source_point() -> None:
 
 def test_sources_that_start_later() -> None:
     mesh, rng = MESHES["grid"](), np.random.default_rng(9)
-    solver, sources = HeatMethodSolver(mesh, refine="exact"), OffsetSources([3, 200], [0.1, 0.3])
+    solver, sources = GeodesicSolver(mesh, method="exact"), OffsetSources([3, 200], [0.1, 0.3])
     _, pull_back = solver.distance_vjp(sources)
     assert not len(pull_back.inexact)
     direction, g = rng.standard_normal(mesh.V.shape), rng.standard_normal(mesh.n_vertices)
@@ -253,19 +255,19 @@ def test_unreachable_vertices_have_no_derivative(options: dict[str, Any]) -> Non
     one = MESHES["grid"]()
     n = one.n_vertices
     mesh = Mesh(np.concatenate([one.V, one.V + 3.0]), np.concatenate([one.F, one.F + n]))
-    distance, pull_back = HeatMethodSolver(mesh, **options).distance_vjp(5)
+    distance, pull_back = SolverChoice.of(**options).on(mesh).distance_vjp(5)
     np.testing.assert_array_equal(pull_back.unreachable, np.arange(n, 2 * n))
     g = np.where(np.isinf(distance), np.nan, 1.0)
     dV = pull_back(g)
     assert not dV[n:].any()
-    np.testing.assert_array_equal(dV[:n], HeatMethodSolver(mesh, **options).distance_vjp(5)[1](np.ones(2 * n))[:n])
+    np.testing.assert_array_equal(dV[:n], SolverChoice.of(**options).on(mesh).distance_vjp(5)[1](np.ones(2 * n))[:n])
     assert np.abs(dV[:n]).max() > 0.1
 
 
 def test_a_step_down_the_gradient_recovers_a_source() -> None:
     """Gauss-Newton on the squares of what distances to landmarks miss, with the products of both directions."""
     mesh = MESHES["sphere"]()
-    solver = HeatMethodSolver(mesh, refine="exact")
+    solver = GeodesicSolver(mesh, method="exact")
     landmarks, hidden = [10, 200, 350, 600], SurfacePoints([1234], [[0.1, 0.6, 0.3]])
     measured = solver.distance(hidden)[landmarks]
     guess = SurfacePoints([1200], [[0.3, 0.3, 0.4]])
@@ -288,7 +290,7 @@ BAD_GRADIENTS = [
 @pytest.mark.parametrize(("g", "message"), BAD_GRADIENTS, ids=["length", "dimensions", "nan"])
 def test_gradients_that_cannot_be_used(g: np.ndarray, message: str) -> None:
     mesh = MESHES["grid"]()
-    _, pull_back = HeatMethodSolver(mesh, refine="unfold").distance_vjp(0)
+    _, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(0)
     with pytest.raises(ValueError, match=message):
         pull_back(g)
     assert pull_back(np.ones((2, mesh.n_vertices))).shape == (2, mesh.n_vertices, 3)
@@ -296,10 +298,10 @@ def test_gradients_that_cannot_be_used(g: np.ndarray, message: str) -> None:
 
 def test_velocities_that_cannot_be_used() -> None:
     mesh = MESHES["grid"]()
-    _, pull_back = HeatMethodSolver(mesh, refine="unfold").distance_vjp(0)
+    _, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(0)
     with pytest.raises(ValueError, match=r"dV must be \(289, 3\) finite numbers"):
         pull_back.push_forward(np.ones(3))
-    _, of_point = HeatMethodSolver(mesh, refine="unfold").distance_vjp(SurfacePoints([3], [[0.2, 0.3, 0.5]]))
+    _, of_point = GeodesicSolver(mesh, method="exact").distance_vjp(SurfacePoints([3], [[0.2, 0.3, 0.5]]))
     with pytest.raises(ValueError, match=r"points must be \(1, 3\) finite numbers, one velocity per source point"):
         of_point.push_forward(mesh.V, [np.nan, 0, 0])
     assert of_point.push_forward(mesh.V, np.zeros((1, 3))).shape == (289,)
@@ -308,8 +310,8 @@ def test_velocities_that_cannot_be_used() -> None:
 def refused() -> list[Any]:
     curve = heat_igl.SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]])
     return [
-        pytest.param({"refine": "exact"}, curve, "a curve is among the sources: place points on it", id="curve"),
-        pytest.param({"refine": "sweep"}, 0, "finds no paths to differentiate", id="sweep"),
+        pytest.param({"method": "exact"}, curve, "a curve is among the sources: place points on it", id="curve"),
+        pytest.param({"method": "sweep"}, 0, "derivatives are those of paths, which a sweep does not find", id="sweep"),
         pytest.param({"laplacian": "cotan", "backend": "iterative"}, 0, "cannot solve the adjoint", id="backend"),
         pytest.param({"laplacian": "intrinsic-delaunay-refined"}, 0, "more vertices than the mesh", id="refined"),
     ]
@@ -318,9 +320,9 @@ def refused() -> list[Any]:
 @pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
 @pytest.mark.parametrize(("options", "sources", "message"), refused())
 def test_what_has_no_derivative_is_refused(options: dict[str, Any], sources: Any, message: str) -> None:
-    mesh = moved(shapes.grid(40)) if options.get("refine") == "sweep" else MESHES["grid"]()
+    mesh = moved(shapes.grid(40)) if options.get("method") == "sweep" else MESHES["grid"]()
     with pytest.raises(ValueError, match=message):
-        HeatMethodSolver(mesh, **options).distance_vjp(sources)
+        SolverChoice.of(**options).on(mesh).distance_vjp(sources)
 
 
 @pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")

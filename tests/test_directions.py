@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 import heat_igl
 from heat_igl import (
-    HeatMethodSolver,
+    GeodesicSolver,
     Mesh,
     SurfacePoints,
     exp_map,
@@ -22,20 +22,9 @@ from heat_igl import (
 )
 from heat_igl.unfolding import ExactSurface, vectors_from
 
-REFINES = ["unfold", "exact"]
-
 
 def angle_between(a: np.ndarray, b: np.ndarray | float) -> np.ndarray:
     return np.abs(np.angle(np.exp(1j * (a - b))))
-
-
-def walking(mesh: Mesh, refine: str) -> HeatMethodSolver:
-    """A solver that does not take exact windows because the mesh is small."""
-    solver = HeatMethodSolver(mesh, refine=refine)
-    if refine == "unfold":
-        solver._parts.last_steps._takes_windows = lambda _: False
-        solver._parts.last_steps._follows_curves = lambda *_: False
-    return solver
 
 
 def convex_hull(P: np.ndarray) -> Mesh:
@@ -53,11 +42,10 @@ def straight(mesh: Mesh, source: int | SurfacePoints) -> np.ndarray:
     return surface.solve(np.array([source])).origin.root == source
 
 
-@pytest.mark.parametrize("refine", REFINES)
 @pytest.mark.parametrize("source", [0, 7, 60])
-def test_directions_in_the_plane_are_those_of_straight_lines(refine, source):
+def test_directions_in_the_plane_are_those_of_straight_lines(source):
     mesh = flat_perturbed(shapes.grid(8))
-    solver = walking(mesh, refine)
+    solver = GeodesicSolver(mesh)
     found, frames = solver.directions(source), tangent_frames(mesh)
     line = mesh.V - mesh.V[source]
     length = np.linalg.norm(line, axis=1)
@@ -73,12 +61,11 @@ def test_directions_in_the_plane_are_those_of_straight_lines(refine, source):
     assert found.labels[source] == 0
 
 
-@pytest.mark.parametrize("refine", REFINES)
 @pytest.mark.parametrize("barycentric", [[0.2, 0.3, 0.5], [0.4, 0.6, 0.0], [0.0, 0.25, 0.75]])
-def test_directions_from_a_point_count_from_the_first_side_of_the_face(refine, barycentric):
+def test_directions_from_a_point_count_from_the_first_side_of_the_face(barycentric):
     mesh = flat_perturbed(shapes.grid(8))
     point = SurfacePoints([61], [barycentric])
-    log = log_map(walking(mesh, refine), point)
+    log = log_map(GeodesicSolver(mesh), point)
     a, b, _ = mesh.V[mesh.F[61]]
     x = (b - a) / np.linalg.norm(b - a)
     line = mesh.V - point.positions(mesh)
@@ -86,8 +73,7 @@ def test_directions_from_a_point_count_from_the_first_side_of_the_face(refine, b
     np.testing.assert_allclose(exp_map(mesh, point, log).positions(mesh), mesh.V, atol=1e-12)
 
 
-@pytest.mark.parametrize("refine", REFINES)
-def test_a_path_around_a_corner_departs_towards_the_corner_and_turns_there(refine):
+def test_a_path_around_a_corner_departs_towards_the_corner_and_turns_there():
     mesh = shapes.grid(8)
     corner = mesh.V[mesh.F].mean(axis=1)[:, :2]
     kept = mesh.F[~(corner > 0.5).all(axis=1)]
@@ -96,7 +82,7 @@ def test_a_path_around_a_corner_departs_towards_the_corner_and_turns_there(refin
     tip = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1)))
     source = int(np.argmin(np.linalg.norm(mesh.V - [1, 0.25, 0], axis=1)))
     behind = (mesh.V[:, 1] > 0.5) & (mesh.V[:, 0] > 0.125)
-    solver = walking(mesh, refine)
+    solver = GeodesicSolver(mesh)
     found = solver.directions(source)
     line = mesh.V - mesh.V[tip]
     length = np.linalg.norm(line, axis=1)
@@ -110,15 +96,12 @@ def test_a_path_around_a_corner_departs_towards_the_corner_and_turns_there(refin
     np.testing.assert_allclose(found.gradient[behind], line[behind] / length[behind, None], atol=1e-7)
 
 
-@pytest.mark.parametrize("way", ["unfold", "exact", "solver", "point"])
+@pytest.mark.parametrize("way", ["exact", "solver", "point"])
 def test_the_exponential_map_undoes_the_log_map_along_straight_paths(way, bunny):
     source = 17
     face = int(np.argmax((source == bunny.F).any(axis=1)))
     start = SurfacePoints([face], [[0.2, 0.3, 0.5]]) if way == "point" else source
-    if way == "solver":
-        log = log_map(HeatMethodSolver(bunny, refine="unfold"), start)
-    else:
-        log = log_map(bunny, start, method="exact" if way == "exact" else "unfold")
+    log = log_map(GeodesicSolver(bunny) if way == "solver" else bunny, start)
     is_straight = straight(bunny, start)
     assert 0.1 < is_straight.mean() < 0.9
     gap = np.linalg.norm(exp_map(bunny, start, log).positions(bunny) - bunny.V, axis=1)
@@ -151,7 +134,7 @@ def test_exp_map_undoes_the_log_map_from_edges_that_were_flipped(seed, place):
 )
 def test_the_log_map_of_a_mesh_is_that_of_a_solver(mesh):
     """One knows the polar angles of the source alone, and those of its edges that are Delaunay; the other all."""
-    solver = HeatMethodSolver(mesh, refine="exact")
+    solver = GeodesicSolver(mesh, method="exact")
     sources = np.arange(0, mesh.n_vertices, mesh.n_vertices // 12)
     known = [vectors_from(mesh, int(source)) for source in sources]
     assert sum(vectors is not None for vectors in known) > 6
@@ -230,16 +213,6 @@ def test_the_script_of_directions_measures_against_paths(mesh):
     assert script.errors(turned, truth, away)["median angle"] == pytest.approx(np.degrees(0.1))
 
 
-@pytest.mark.parametrize("source", [5, SurfacePoints([40], [[0.3, 0.3, 0.4]])])
-def test_walks_and_windows_depart_and_arrive_alike(sphere, source):
-    walk, exact = (walking(sphere, refine).directions(source, tolerance=0) for refine in REFINES)
-    near = exact.distance < 2.5
-    for angle in ("departure", "arrival", "turning"):
-        off = angle_between(getattr(walk, angle), getattr(exact, angle))[near]
-        assert (off < 1e-7).mean() > 0.9
-        assert off.mean() < 3e-3
-
-
 def test_log_map_converges_on_the_sphere():
     errors = []
     for level in (3, 4):
@@ -255,11 +228,11 @@ def test_log_map_converges_on_the_sphere():
     assert errors[1] < 0.01
 
 
-@pytest.mark.parametrize("method", ["unfold", "solver"])
+@pytest.mark.parametrize("method", ["exact", "solver"])
 def test_log_map_on_a_long_strip_is_that_of_the_plane(method):
     mesh = shapes.strip(1500, 3)
     source = 1
-    log = log_map(HeatMethodSolver(mesh, refine="unfold") if method == "solver" else mesh, source)
+    log = log_map(GeodesicSolver(mesh, method="exact") if method == "solver" else mesh, source)
     frames, line = tangent_frames(mesh), mesh.V - mesh.V[source]
     flat = frames.from_world(line, np.full(mesh.n_vertices, source))
     # Polar angles on the boundary are those of the half plane here: the scale is 1.
@@ -270,12 +243,12 @@ def test_log_map_on_a_long_strip_is_that_of_the_plane(method):
 def test_directions_and_transport_on_a_large_sphere_are_finite_and_right():
     mesh = shapes.icosphere(8)
     p = mesh.V[0]
-    solver = heat_igl.VectorHeatSolver(mesh, refine="unfold")
+    solver = heat_igl.VectorHeatSolver(mesh, method="windows")
     frames = solver.frames
     near = np.flatnonzero((mesh.V @ p > -0.9) & (mesh.V @ p < 1))
     w = frames.to_world([[1.0, 0]], [0])[0]
     carried = solver.transport(0, [1, 0])
-    found = HeatMethodSolver(mesh, refine="unfold").directions(0)
+    found = GeodesicSolver(mesh, method="exact").directions(0)
     for values in (carried, found.departure, found.arrival, found.gradient, found.distance):
         assert np.isfinite(values).all()
     # Along great circles.
@@ -293,7 +266,7 @@ def test_directions_and_transport_on_a_large_sphere_are_finite_and_right():
 @pytest.mark.parametrize("mesh", [perturbed(shapes.icosphere(3), 0.1), perturbed(shapes.torus(20, 40), 0.2)])
 def test_transport_around_a_triangle_of_paths_turns_by_the_excess_of_its_angles(mesh):
     """The theorem of Gauss and Bonnet, for paths that do not bend."""
-    solver = heat_igl.VectorHeatSolver(mesh, refine="exact")
+    solver = heat_igl.VectorHeatSolver(mesh, method="windows")
     rng, found = np.random.default_rng(0), 0
     while found < 4:
         corners = rng.choice(mesh.n_vertices, 3, replace=False)
@@ -315,26 +288,23 @@ def test_transport_around_a_triangle_of_paths_turns_by_the_excess_of_its_angles(
 
 def test_labels_and_departures_of_several_sources(sphere):
     sources = [3, 900, 2000]
-    for refine in REFINES:
-        solver = HeatMethodSolver(sphere, refine=refine)
+    for tolerance in (0, 1e-3):
+        solver = GeodesicSolver(sphere, tolerance=tolerance)
         together, alone = solver.directions(sources), [solver.directions(source) for source in sources]
         np.testing.assert_array_equal(together.labels, solver.voronoi(sources).labels)
         departure = np.choose(together.labels, [found.departure for found in alone])
         assert np.quantile(angle_between(together.departure, departure), 0.9) < 1e-3
 
 
-@pytest.mark.parametrize("refine", REFINES)
-def test_paths_from_a_curve_start_at_the_nearest_place_on_it(refine):
+def test_paths_from_a_curve_start_at_the_nearest_place_on_it():
     mesh = flat_perturbed(shapes.grid(8))
     curve = heat_igl.curve_on(mesh, [[0.2, 0.33, 0], [0.8, 0.33, 0]])
-    found = walking(mesh, refine).directions([curve, 0])
+    found = GeodesicSolver(mesh).directions([curve, 0])
     assert set(found.labels) == {0, 1}
     place = found.start.positions(mesh)
     of_curve = found.labels == 0
     nearest = np.stack([np.clip(mesh.V[:, 0], 0.2, 0.8), np.full(mesh.n_vertices, 0.33), mesh.V[:, 2]], axis=1)
-    # Walks within the tolerance of the shortest may start some points beside it.
-    beside = 1e-12 if refine == "exact" else 0.4 * mesh.edge_lengths.mean()
-    np.testing.assert_allclose(place[of_curve], nearest[of_curve], atol=beside)
+    np.testing.assert_allclose(place[of_curve], nearest[of_curve], atol=1e-12)
     np.testing.assert_array_equal(place[~of_curve], np.broadcast_to(mesh.V[0], place[~of_curve].shape))
     # The departure counts from the first side of the face of the start.
     a, b = (mesh.V[mesh.F[found.start.faces, k]] for k in (0, 1))
@@ -347,7 +317,7 @@ def test_paths_from_a_curve_start_at_the_nearest_place_on_it(refine):
 def test_exact_paths_from_curves_lead_back_to_the_vertices(sphere):
     level, through_vertices = isolines(sphere, sphere.V[:, 2], 0.3)[0], geodesic_path(sphere, [5, 900])
     for sources in (level, through_vertices, [level, SurfacePoints([7], [[0.2, 0.3, 0.5]]), 100]):
-        solver = HeatMethodSolver(sphere, refine="exact")
+        solver = GeodesicSolver(sphere, method="exact")
         found = solver.directions(sources)
         np.testing.assert_array_equal(found.distance, solver.distance(sources))
         np.testing.assert_array_equal(found.labels, solver.voronoi(sources).labels)
@@ -360,7 +330,7 @@ def test_exact_paths_from_curves_lead_back_to_the_vertices(sphere):
 def test_exact_paths_from_curves_along_edges_lead_back_to_the_vertices():
     mesh = shapes.cylinder(12, 30)
     ring = region_boundary(mesh, faces=mesh.V[mesh.F].mean(axis=1)[:, 2] < np.median(mesh.V[:, 2]))
-    found = HeatMethodSolver(mesh, refine="exact").directions(ring)
+    found = GeodesicSolver(mesh, method="exact").directions(ring)
     # Paths that start at an end of a segment count their departure around the vertex there.
     ends = np.array([followed(mesh, found, v) for v in np.flatnonzero(found.distance > 0)])
     np.testing.assert_allclose(ends, mesh.V[found.distance > 0], atol=1e-12)
@@ -374,18 +344,10 @@ def followed(mesh: Mesh, found: heat_igl.Directions, v: int) -> np.ndarray:
     return exp_map(mesh, start, [way]).positions(mesh)[0]
 
 
-def test_walks_leave_curves_to_windows_on_small_meshes():
-    mesh = perturbed(shapes.icosphere(4), 0.05)
-    curve = isolines(mesh, mesh.V[:, 2], 0.3)[0]
-    walks, exact = (HeatMethodSolver(mesh, refine=refine).directions(curve) for refine in REFINES)
-    np.testing.assert_allclose(walks.departure, exact.departure, atol=1e-9)
-    np.testing.assert_allclose(walks.distance, exact.distance, atol=1e-12)
-
-
 def test_unreachable_vertices_have_no_direction():
     one = shapes.icosphere(1)
     mesh = Mesh(np.concatenate([one.V, one.V + 5]), np.concatenate([one.F, one.F + one.n_vertices]))
-    found = HeatMethodSolver(mesh, refine="unfold").directions(2)
+    found = GeodesicSolver(mesh, method="exact").directions(2)
     far = slice(one.n_vertices, None)
     assert np.isinf(found.distance[far]).all()
     assert (found.labels[far] == -1).all()
@@ -395,36 +357,31 @@ def test_unreachable_vertices_have_no_direction():
 
 def test_log_map_takes_solvers_and_other_meshes(sphere):
     pair = log_map((sphere.V, sphere.F), 4, method="exact")
-    np.testing.assert_allclose(log_map(HeatMethodSolver(sphere, refine="exact"), 4), pair, atol=1e-12)
+    np.testing.assert_allclose(log_map(GeodesicSolver(sphere, method="exact"), 4), pair, atol=1e-12)
     vector = heat_igl.VectorHeatSolver(sphere)
     np.testing.assert_array_equal(log_map(vector, 4), vector.log_map(4))
     np.testing.assert_allclose(log_map(sphere, 4, method="vector-heat"), vector.log_map(4), atol=1e-9)
 
 
 def test_bad_arguments_are_one_clear_error(sphere):
-    exact = HeatMethodSolver(sphere, refine="exact")
-    with pytest.raises(ValueError, match='directions follow paths: make the solver with refine="unfold"'):
-        HeatMethodSolver(sphere).directions(0)
-    with pytest.raises(ValueError, match='directions follow paths: make the solver with refine="unfold"'):
-        HeatMethodSolver(sphere, refine="sweep").directions(0)
-    with pytest.raises(ValueError, match="tolerance must lie between 0 and 1, not -1"):
-        exact.directions(0, tolerance=-1)
+    with pytest.raises(ValueError, match="directions follow paths, which a sweep does not find"):
+        GeodesicSolver(sphere, method="sweep").directions(0)
     with pytest.raises(heat_igl.SourceError, match="source must be one vertex or point, not 2"):
         log_map(sphere, [1, 2])
     with pytest.raises(heat_igl.SourceError, match="source must be one vertex or point, not 2"):
-        log_map(exact, SurfacePoints([0, 1], [[0.2, 0.4, 0.4]] * 2))
+        log_map(GeodesicSolver(sphere), SurfacePoints([0, 1], [[0.2, 0.4, 0.4]] * 2))
     with pytest.raises(heat_igl.SourceError, match="the vector heat method starts at vertices"):
         log_map(sphere, SurfacePoints([0], [[0.2, 0.4, 0.4]]), method="vector-heat")
-    with pytest.raises(ValueError, match="method must be one of 'unfold', 'exact', 'vector-heat', not 'heat'"):
+    with pytest.raises(ValueError, match="method must be one of 'exact', 'vector-heat', not 'heat'"):
         log_map(sphere, 0, method="heat")
-    with pytest.raises(heat_igl.MeshError, match="directions need triangles, and the mesh holds tetrahedra"):
+    with pytest.raises(heat_igl.MeshError, match="directions follow paths on triangles that fit together"):
         log_map((np.eye(4, 3), [[0, 1, 2, 3]]), 0)
-    solid = HeatMethodSolver(shapes.box(2))
-    with pytest.raises(heat_igl.MeshError, match="directions need triangles that fit together"):
+    solid = GeodesicSolver(shapes.box(2))
+    with pytest.raises(heat_igl.MeshError, match="directions follow paths on triangles that fit together"):
         solid.directions(0)
     fan = Mesh(np.random.default_rng(0).random((5, 3)), [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     with pytest.raises(heat_igl.MeshError, match="is one of more than two faces"):
-        HeatMethodSolver(fan, refine="exact").directions(0)
+        GeodesicSolver(fan, method="exact").directions(0)
 
 
 def test_pairs_and_polygons_are_meshes_too(sphere):

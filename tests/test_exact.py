@@ -17,6 +17,7 @@ from conftest import (
     wheel_path,
 )
 from surfaces import (
+    COORDINATES,
     bumpy,
     cube,
     moebius_strip,
@@ -27,14 +28,12 @@ from surfaces import (
     two_arms,
     with_point,
 )
-from test_unfolding_sources import COORDINATES
 
-from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
+from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.kernels import flipping, gluing
 from heat_igl.reference.steiner import graph_distance
-from heat_igl.unfolding.distance import distance_to_targets
 from heat_igl.unfolding.exact import ExactSurface, exact_distance
 from heat_igl.unfolding.half_edges import from_mesh
 
@@ -369,7 +368,7 @@ def test_paths_across_needles_are_no_longer_than_in_the_plane():
     height = 1e-6
     V = np.array([[0, 0, 0], [1, 0, 0], [0.5, height, 0], [0.5, 2 * height, 0], [0.5, 1, 0], [0.4, -1, 0]])
     F = np.array([[0, 1, 2], [0, 2, 3], [2, 1, 3], [0, 3, 4], [3, 1, 4], [1, 0, 5]])
-    solver = HeatMethodSolver(V, F, refine="exact")
+    solver = GeodesicSolver((V, F), method="exact")
     for source in (4, 5):
         truth = np.linalg.norm(V - V[source], axis=1)
         np.testing.assert_allclose(exact_distance(V, F, source), truth, rtol=1e-10)
@@ -442,9 +441,11 @@ def test_faces_that_are_there_twice_count_once():
 def test_targets_where_faces_are_there_twice():
     square = shapes.grid(20)
     twice = Mesh(square.V, np.concatenate([square.F, square.F[::2]]))
-    assert distance_to_targets(twice, 0, [20])[0] == pytest.approx(np.linalg.norm(square.V[20] - square.V[0]))
-    with pytest.raises(MeshError, match=r"face 800 is there twice \(400 are\)"):
-        distance_to_targets(twice, 0, SurfacePoints([0], [[0.2, 0.3, 0.5]]))
+    at_vertex = geodesic_distance(twice, 0, targets=[20])
+    assert at_vertex[0] == pytest.approx(np.linalg.norm(square.V[20] - square.V[0]))
+    places = SurfacePoints([100, 850], [[0.2, 0.3, 0.5], [0.1, 0.1, 0.8]])
+    expected = np.linalg.norm(places.positions(twice) - square.V[0], axis=1)
+    np.testing.assert_allclose(geodesic_distance(twice, 0, targets=places), expected, rtol=1e-12)
 
 
 def test_straight_past_a_flat_vertex_next_to_the_source():

@@ -13,7 +13,7 @@ from test_exact_paths import MESHES
 from test_paths import assert_on_surface, lengths
 
 from heat_igl import (
-    HeatMethodSolver,
+    GeodesicSolver,
     Mesh,
     OffsetSources,
     SurfaceCurve,
@@ -24,6 +24,7 @@ from heat_igl import (
     shapes,
     shortest_paths,
 )
+from heat_igl.geodesic import SolverChoice
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
@@ -51,7 +52,7 @@ def test_curves_in_the_plane(mesh):
         truth = to_polyline(mesh.V, curve.positions(mesh))
         for distance in (
             geodesic_distance(mesh, curve, method="exact"),
-            HeatMethodSolver(mesh, refine="exact").distance(curve),
+            GeodesicSolver(mesh, method="exact").distance(curve),
         ):
             np.testing.assert_allclose(distance, truth, rtol=1e-12, atol=1e-14)
 
@@ -128,7 +129,7 @@ def test_exact_paths_end_on_curves(name):
 def test_labels_offsets_and_targets():
     mesh = flat_perturbed(shapes.grid(16))
     curve = isolines(mesh, mesh.V[:, 0], 0.43)[0][0]
-    solver = HeatMethodSolver(mesh, refine="exact")
+    solver = GeodesicSolver(mesh, method="exact")
     cells = solver.voronoi([curve, OffsetSources([0], 0.05)])
     each = np.array([np.abs(mesh.V[:, 0] - 0.43), np.linalg.norm(mesh.V - mesh.V[0], axis=1) + 0.05])
     np.testing.assert_allclose(cells.distance, each.min(axis=0), rtol=1e-12, atol=1e-14)
@@ -148,9 +149,9 @@ def test_segments_need_the_faces_of_the_mesh():
         delaunay(sheared).solve(segments=segments)
 
 
-@pytest.mark.parametrize("refine", ["sweep", "unfold"])
+@pytest.mark.parametrize("method", ["sweep"])
 @pytest.mark.parametrize("source", ["curve", "points", "both, later"])
-def test_refined_distance_is_exact_near_points_and_curves(refine, source):
+def test_refined_distance_is_exact_near_points_and_curves(method, source):
     mesh = shapes.blob(4)
     curve = isolines(mesh, mesh.V @ [0.3, 0.5, 0.8], 0.4)[0][0]
     points = closest_points(mesh, mesh.V[[40, 900]] + 0.02).points
@@ -159,8 +160,8 @@ def test_refined_distance_is_exact_near_points_and_curves(refine, source):
     later = [OffsetSources(curve, 3 + 2 * h), OffsetSources(points, 3)]
     given = {"curve": curve, "points": points, "both, later": later}
     sources = given[source]
-    exact = HeatMethodSolver(mesh, refine="exact").voronoi(sources)
-    found = HeatMethodSolver(mesh, refine=refine).voronoi(sources)
+    exact = GeodesicSolver(mesh, method="exact").voronoi(sources)
+    found = SolverChoice(method).on(mesh).voronoi(sources)
     near = exact.distance - exact.distance.min() < 5 * h
     assert 50 < near.sum() < mesh.n_vertices / 2
     np.testing.assert_allclose(found.distance[near], exact.distance[near], rtol=1e-12)
@@ -171,7 +172,7 @@ def test_curves_are_exact_in_small_components():
     large, small = shapes.blob(4), shapes.icosphere(2)
     curve = isolines(small, small.V @ [0.3, 0.5, 0.8], 0.2)[0][0]
     both = Mesh(np.concatenate([small.V, large.V + 9]), np.concatenate([small.F, large.F + small.n_vertices]))
-    found = HeatMethodSolver(both, refine="unfold").distance(curve)
-    exact = HeatMethodSolver(small, refine="exact").distance(curve)
+    found = GeodesicSolver(both, method="exact").distance(curve)
+    exact = GeodesicSolver(small, method="exact").distance(curve)
     np.testing.assert_allclose(found[: small.n_vertices], exact, rtol=1e-12)
     assert np.isinf(found[small.n_vertices :]).all()

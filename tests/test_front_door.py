@@ -13,6 +13,7 @@ from conftest import flat_perturbed, load_script, perturbed
 import heat_igl
 from heat_igl import (
     AccuracyWarning,
+    GeodesicSolver,
     HeatMethodSolver,
     Mesh,
     MeshError,
@@ -25,9 +26,8 @@ from heat_igl import (
     geodesic_distance,
     reference,
     shapes,
-    unfolded_distance,
 )
-from heat_igl.unfolding import distance
+from heat_igl.unfolding import engine
 from heat_igl.unfolding.half_edges import from_mesh
 
 SQUARE = flat_perturbed(shapes.grid(12))
@@ -59,23 +59,20 @@ def in_the_plane() -> dict[str, tuple[Any, np.ndarray]]:
 
 
 @pytest.mark.parametrize("name", in_the_plane())
-@pytest.mark.parametrize("method", ["unfold", "sweep", "heat", "exact"])
+@pytest.mark.parametrize("method", ["windows", "sweep", "heat", "exact"])
 def test_distance_in_the_plane(name: str, method: Any) -> None:
     sources, truth = in_the_plane()[name]
     found = geodesic_distance(SQUARE, sources, method=method)
     assert found.dtype == np.float64
-    allowed = {"unfold": 2e-3, "sweep": 0.02, "heat": 0.1, "exact": 1e-9}[method]
+    allowed = {"windows": 1e-5, "sweep": 0.02, "heat": 0.1, "exact": 1e-9}[method]
     assert np.abs(found - truth).max() < allowed * truth.max()
-    if method == "unfold":
-        assert (found - truth).min() > -1e-9
 
 
 def test_methods_are_the_solvers() -> None:
     np.testing.assert_array_equal(geodesic_distance(TORUS, 5, method="heat"), HeatMethodSolver(TORUS).distance(5))
-    np.testing.assert_array_equal(geodesic_distance(TORUS, 5), unfolded_distance(TORUS.V, TORUS.F, 5))
-    np.testing.assert_array_equal(geodesic_distance(TORUS, 5), geodesic_distance(TORUS, 5, method="unfold"))
-    by_heat = HeatMethodSolver(TORUS, refine="unfold").distance(5)
-    np.testing.assert_allclose(geodesic_distance(TORUS, 5), by_heat, atol=1e-3 * by_heat.max())
+    for method in ("auto", "windows", "exact", "sweep"):
+        expected = GeodesicSolver(TORUS, method=method).distance(5)
+        np.testing.assert_array_equal(geodesic_distance(TORUS, 5, method=method), expected)
 
 
 def test_near_exact_by_default() -> None:
@@ -89,7 +86,7 @@ def test_near_exact_by_default() -> None:
 
 def test_beyond_the_cutoff_is_infinity() -> None:
     whole = geodesic_distance(TORUS, 5)
-    for method in ("unfold", "sweep", "heat", "exact"):
+    for method in ("windows", "sweep", "heat", "exact"):
         whole = geodesic_distance(TORUS, 5, method=method)
         near = geodesic_distance(TORUS, 5, method=method, cutoff=1)
         # Near-exact and exact distances are found on the part of the mesh within the cutoff: equal up to rounding.
@@ -101,12 +98,12 @@ def test_beyond_the_cutoff_is_infinity() -> None:
 
 def test_components_that_no_source_reaches() -> None:
     two = Mesh(np.concatenate([SQUARE.V, SQUARE.V + 3]), np.concatenate([SQUARE.F, SQUARE.F + SQUARE.n_vertices]))
-    for sources, method in ((0, "unfold"), (INSIDE, "unfold"), (0, "exact"), (INSIDE, "exact")):
+    for sources, method in ((0, "windows"), (INSIDE, "windows"), (0, "exact"), (INSIDE, "exact")):
         found = geodesic_distance(two, sources, method=method)
         np.testing.assert_array_equal(np.isinf(found), np.arange(two.n_vertices) >= SQUARE.n_vertices)
 
 
-@pytest.mark.parametrize("method", ["unfold", "sweep", "heat", "exact"])
+@pytest.mark.parametrize("method", ["windows", "sweep", "heat", "exact"])
 def test_sources_that_no_face_uses(method: Any) -> None:
     n = SQUARE.n_vertices
     mesh = Mesh(np.concatenate([SQUARE.V, [[9, 9, 9]]]), SQUARE.F)
@@ -140,7 +137,7 @@ def test_polygons_and_tetrahedra() -> None:
     mesh = PolygonMesh(V, quads)
     truth = np.hypot(*V[:, :2].T)
     np.testing.assert_allclose(geodesic_distance(mesh, 0), truth, atol=1e-9)
-    np.testing.assert_allclose(HeatMethodSolver(mesh, refine="unfold").distance(0), truth, atol=1e-9)
+    np.testing.assert_allclose(GeodesicSolver(mesh, method="exact").distance(0), truth, atol=1e-9)
     by_heat = heat_igl.HeatMethodSolver(mesh).distance(0)
     np.testing.assert_array_equal(geodesic_distance(mesh, 0, method="heat"), by_heat)
     np.testing.assert_allclose(by_heat, truth, rtol=0.07)
@@ -148,7 +145,7 @@ def test_polygons_and_tetrahedra() -> None:
 
     box = shapes.box(2)
     np.testing.assert_array_equal(geodesic_distance(box, 0, method="heat"), HeatMethodSolver(box).distance(0))
-    for method in ("unfold", "sweep"):
+    for method in ("auto", "sweep"):
         np.testing.assert_allclose(geodesic_distance(box, 0, method=method), np.linalg.norm(box.V, axis=1), atol=1e-12)
     with pytest.raises(MeshError, match=r"method='exact' needs triangles, .* tetrahedra: leave it away"):
         geodesic_distance(box, 0, method="exact")
@@ -182,11 +179,11 @@ def test_a_cutoff_looks_at_what_is_near_alone(sources: Any, monkeypatch: pytest.
     mesh = shapes.torus(60, 40)
     exact = geodesic_distance(mesh, sources, method="exact")
     sizes = []
-    monkeypatch.setattr(distance, "from_mesh", lambda part, start: sizes.append(part.n_faces) or from_mesh(part, start))
+    monkeypatch.setattr(engine, "from_mesh", lambda part, start: sizes.append(part.n_faces) or from_mesh(part, start))
     for cutoff in (0.02, 0.2, 0.6):
         near = np.where(exact <= cutoff, exact, np.inf)
-        np.testing.assert_allclose(geodesic_distance(mesh, sources, cutoff=cutoff), near, rtol=1e-12)
-        np.testing.assert_allclose(unfolded_distance(mesh, sources, cutoff=cutoff), near, rtol=1e-12)
+        found = geodesic_distance(mesh, sources, cutoff=cutoff, method="exact")
+        np.testing.assert_allclose(found, near, rtol=1e-12)
     assert sizes == sorted(sizes)
     assert sizes[0] < 0.02 * mesh.n_faces
 
@@ -197,12 +194,12 @@ def test_targets_alone() -> None:
     curve = edge_curve(mesh, mesh.F[0, :2])
     for sources in (5, [5, SurfacePoints([40], [[0.2, 0.5, 0.3]])], curve):
         whole = geodesic_distance(mesh, sources, method="exact")
-        for method in ("unfold", "exact"):
+        for method, allowed in (("windows", 1e-5), ("exact", 1e-12), ("sweep", 0.05), ("heat", 0.2)):
             some = geodesic_distance(mesh, sources, method=method, targets=[40, 3, 40])
-            np.testing.assert_allclose(some, whole[[40, 3, 40]], rtol=1e-12)
+            np.testing.assert_allclose(some, whole[[40, 3, 40]], rtol=allowed)
         near = geodesic_distance(mesh, sources, targets=[40, 3], cutoff=1e-3)
         assert np.isinf(near).all()
-        at_places = geodesic_distance(mesh, sources, targets=places)
+        at_places = geodesic_distance(mesh, sources, targets=places, method="exact")
         np.testing.assert_allclose(at_places[1], whole[mesh.F[300, 1]], rtol=1e-12)
         back = geodesic_distance(mesh, places, method="exact", targets=[5])
         if sources == 5:
@@ -212,8 +209,13 @@ def test_targets_alone() -> None:
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ({"method": "guess"}, ValueError, "method must be one of 'unfold', 'sweep', 'heat', 'exact', not 'guess'"),
-        ({"targets": 3, "method": "heat"}, ValueError, "targets need method='unfold' or 'exact', .* not 'heat'"),
+        (
+            {"method": "guess"},
+            ValueError,
+            "method must be one of 'auto', 'windows', 'exact', 'sweep', 'heat', not 'guess'",
+        ),
+        ({"targets": INSIDE, "method": "sweep", "mesh": shapes.icosphere(4)}, ValueError, "targets inside faces need"),
+        ({"tolerance": -1}, ValueError, "tolerance must be at least 0 and less than 1, not -1"),
         ({"targets": 10**6}, SourceError, r"targets\[0\] = 1000000 is no vertex"),
         ({"cutoff": -1}, ValueError, "cutoff must be a positive number, not -1"),
         ({"cutoff": "1"}, ValueError, "cutoff must be a positive number, not '1'"),
@@ -231,21 +233,13 @@ def test_what_cannot_be_asked(arguments: dict[str, Any], error: type[Exception],
         geodesic_distance(**{"mesh": TORUS, "sources": 0, **arguments})
 
 
-def test_unfolded_distance_takes_a_mesh_or_arrays() -> None:
-    expected = unfolded_distance(TORUS.V, TORUS.F, [2, 9])
-    for arguments in ((TORUS, [2, 9]), (TORUS, None, [2, 9]), ((TORUS.V, TORUS.F), [2, 9])):
-        np.testing.assert_array_equal(unfolded_distance(*arguments), expected)
-    np.testing.assert_array_equal(unfolded_distance(TORUS, sources=[2, 9]), expected)
-    np.testing.assert_array_equal(unfolded_distance(V=TORUS.V, F=TORUS.F, sources=[2, 9]), expected)
-
-
 def test_faces_that_are_there_twice_count_once() -> None:
     twice = Mesh(TORUS.V, np.concatenate([TORUS.F, TORUS.F[100:400, [1, 2, 0]]]))
-    for method in ("unfold", "sweep", "exact"):
+    for method in ("windows", "sweep", "exact"):
         expected = geodesic_distance(TORUS, 5, method=method)
         np.testing.assert_allclose(geodesic_distance(twice, 5, method=method), expected, atol=1e-9)
-    solver = HeatMethodSolver(twice, refine="unfold")
-    np.testing.assert_allclose(unfolded_distance(twice, 5), solver.distance(5), atol=1e-3 * expected.max())
+    solver = GeodesicSolver(twice, method="exact")
+    np.testing.assert_allclose(geodesic_distance(twice, 5), solver.distance(5), atol=1e-3 * expected.max())
     # Faces of points are counted in the mesh as it is given.
     there = SurfacePoints([TORUS.n_faces + 3], [[0.2, 0.3, 0.5]])
     here = SurfacePoints([103], [[0.5, 0.2, 0.3]])
@@ -262,7 +256,6 @@ PHI = TORUS.V[:, 0] + 3
     [
         lambda mesh: HeatMethodSolver(mesh).distance(3),
         lambda mesh: geodesic_distance(mesh, 3),
-        lambda mesh: unfolded_distance(mesh, 3),
         lambda mesh: heat_igl.farthest_points(mesh, 4),
         lambda mesh: heat_igl.farthest_cells(mesh, 4).labels,
         lambda mesh: heat_igl.voronoi_cells(mesh, [3, 9]).distance,

@@ -10,7 +10,8 @@ from conftest import load_script
 from test_derivatives import HEAT, MESHES, differences
 
 import heat_igl
-from heat_igl import HeatMethodSolver, Mesh, OffsetSources, SurfacePoints
+from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, OffsetSources, SurfacePoints
+from heat_igl.geodesic import SolverChoice
 
 DELAUNAY = {"laplacian": "intrinsic-delaunay"}
 POINTS = SurfacePoints([30, 151], [[0.2, 0.3, 0.5], [0.6, 0.15, 0.25]])
@@ -50,7 +51,7 @@ def assert_differentiated(solver: HeatMethodSolver, V: np.ndarray, sources: Any,
 @pytest.mark.parametrize("name", ["grid", "moebius", "sphere"])
 def test_all_kinds_of_sources(name: str, sources: str, options: dict[str, Any]) -> None:
     mesh = MESHES[name]()
-    assert_differentiated(HeatMethodSolver(mesh, **options), mesh.V, SOURCES[sources])
+    assert_differentiated(SolverChoice.of(**options).on(mesh), mesh.V, SOURCES[sources])
 
 
 @pytest.mark.parametrize("sources", ["vertex", "three", "offsets"])
@@ -68,7 +69,7 @@ def test_sources_where_three_sheets_meet(sources: str) -> None:
 def test_boundary_conditions(boundary: Any, sources: Any, options: dict[str, Any]) -> None:
     mesh = MESHES["grid"]()
     solver = HeatMethodSolver(mesh, boundary=boundary, **options)
-    assert (solver.solve(sources).distance != HeatMethodSolver(mesh, **options).distance(sources)).any()
+    assert (solver.solve(sources).distance != SolverChoice.of(**options).on(mesh).distance(sources)).any()
     assert_differentiated(solver, mesh.V, sources)
 
 
@@ -128,15 +129,14 @@ def metric_of(mesh: Mesh, kind: str) -> np.ndarray:
     return np.asarray((1 + 0.1 * x**2)[:, None, None] * constant)
 
 
-def solver_in(mesh: Mesh, kind: str, values: np.ndarray, options: dict[str, Any]) -> HeatMethodSolver:
+def solver_in(mesh: Mesh, kind: str, values: np.ndarray, options: dict[str, Any]) -> Any:
+    choice = SolverChoice.of(**options)
     if kind == "speed":
-        return HeatMethodSolver.from_operators(heat_igl.speed_operators(mesh, values), **options)
-    return HeatMethodSolver.from_operators(
-        heat_igl.metric_operators(mesh, values, laplacian="intrinsic-delaunay"), **options
-    )
+        return choice.on(heat_igl.speed_operators(mesh, values))
+    return choice.on(heat_igl.metric_operators(mesh, values, laplacian="intrinsic-delaunay"))
 
 
-@pytest.mark.parametrize("options", [{"refine": "exact"}, {"refine": "unfold"}, {}], ids=str)
+@pytest.mark.parametrize("options", [{"method": "exact"}, {"method": "heat"}], ids=str)
 @pytest.mark.parametrize("kind", ["speed", "in space", "in planes"])
 def test_speeds_and_metrics(kind: str, options: dict[str, Any]) -> None:
     mesh, rng = MESHES["grid"](), np.random.default_rng(5)
@@ -173,37 +173,37 @@ def test_speeds_and_metrics(kind: str, options: dict[str, Any]) -> None:
 def test_what_has_no_metric_to_change() -> None:
     mesh = MESHES["grid"]()
     _, pull_back = HeatMethodSolver(mesh, **DELAUNAY).distance_vjp(0)
-    with pytest.raises(ValueError, match=r"no metric to change: make it with from_operators\(speed_operators"):
+    with pytest.raises(ValueError, match=r"no metric to change: make it on speed_operators"):
         pull_back.by_speed(np.ones(mesh.n_vertices))
-    with pytest.raises(ValueError, match=r"no metric to change: make it with from_operators\(metric_operators"):
+    with pytest.raises(ValueError, match=r"no metric to change: make it on metric_operators"):
         pull_back.by_metric(np.ones(mesh.n_vertices))
     jumping = heat_igl.speed_operators(mesh, np.where(mesh.V[mesh.F, 0].mean(axis=1) > 0.5, 2.0, 1.0))
-    with pytest.raises(ValueError, match="speed change by less than 10 % from face to face"):
-        HeatMethodSolver.from_operators(jumping).distance_vjp(0)
+    with pytest.raises(heat_igl.MeshError, match="derivatives are those of paths on triangles that fit together"):
+        GeodesicSolver(jumping).distance_vjp(0)
 
 
 def test_faces_that_are_there_twice_count_once() -> None:
     mesh = MESHES["grid"]()
     doubled = Mesh(mesh.V, np.concatenate([mesh.F, mesh.F[40:60, [1, 2, 0]], mesh.F[7:9, [1, 0, 2]]]))
     g, direction = np.random.default_rng(6).standard_normal((2, mesh.n_vertices, 1)) * [1, 0.5, 0.3]
-    for options in ({"refine": "exact"}, DELAUNAY):
-        _, once = HeatMethodSolver(mesh, **options).distance_vjp(150)
-        _, twice = HeatMethodSolver(doubled, **options).distance_vjp(150)
+    for options in ({"method": "exact"}, DELAUNAY):
+        _, once = SolverChoice.of(**options).on(mesh).distance_vjp(150)
+        _, twice = SolverChoice.of(**options).on(doubled).distance_vjp(150)
         np.testing.assert_allclose(twice(g[:, 0]), once(g[:, 0]), atol=1e-9)
         np.testing.assert_allclose(twice.push_forward(direction), once.push_forward(direction), atol=1e-9)
 
 
 def test_points_on_a_cover_are_refused() -> None:
     solver = HeatMethodSolver(MESHES["book"](), **DELAUNAY)
-    with pytest.raises(ValueError, match="the triangles are a cover of the surface: take refine="):
+    with pytest.raises(ValueError, match="the triangles are a cover of the surface: take a GeodesicSolver"):
         solver.distance_vjp(POINTS)
-    assert HeatMethodSolver(MESHES["book"](), refine="exact").distance_vjp(POINTS)[1](np.ones(solver.n_vertices)).any()
+    assert GeodesicSolver(MESHES["book"](), method="exact").distance_vjp(POINTS)[1](np.ones(solver.n_vertices)).any()
 
 
 def test_the_table_of_derivatives(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     script = load_script("derivatives_table")
     row = script.measured(script.roughened(heat_igl.shapes.icosphere(3)), n_directions=1, seed=0)
-    for method, bound in (("exact", 1e-5), ("unfold", 1e-5), ("heat", 1e-4)):
+    for method, bound in (("exact", 1e-5), ("heat", 1e-4)):
         found = row[method]
         assert max(found["sums"], found["norms"]) < bound
         assert max(found[key] for key in script.IDENTITIES) < 1e-10

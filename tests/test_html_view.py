@@ -334,7 +334,7 @@ def test_a_click_moves_the_source_and_the_distance_follows(browser: Browser, bun
     assert browser.text("readout").endswith("): 0")
     assert "sweep" in browser.text("method")
     assert (np.abs(browser.image() - image).max(axis=2) > 0.1).mean() > 0.1
-    sweep = heat_igl.HeatMethodSolver(bunny, refine="sweep")
+    sweep = heat_igl.GeodesicSolver(bunny, method="sweep")
     assert_agree(browser.distance(), sweep.distance(source))
 
     browser.click(np.array([0.4 * width, 0.5 * height]), modifiers=8)
@@ -366,7 +366,7 @@ def test_bad_meshes_agree_with_python_too(browser: Browser, name: str) -> None:
     mesh = heat_igl.read_mesh(shared_path(name))
     browser.open(page(mesh, np.zeros(mesh.n_vertices)))
     browser.run("window.heatIgl.setSources([7])")
-    assert_agree(browser.distance(), heat_igl.HeatMethodSolver(mesh, refine="sweep").distance(7))
+    assert_agree(browser.distance(), heat_igl.GeodesicSolver(mesh, method="sweep").distance(7))
 
 
 def test_what_is_behind_is_not_picked(browser: Browser) -> None:
@@ -590,7 +590,7 @@ def test_points_are_drawn_as_discs(browser: Browser) -> None:
     assert (np.abs(image - surface).max(axis=2) > 0.02).mean() > 0.02  # discs have one colour each
     browser.click(browser.on_canvas(front) + np.array([60, 0, 0]))
     (source,) = browser.sources()
-    assert_agree(browser.distance(), heat_igl.HeatMethodSolver(cloud.triangles, refine="sweep").distance(source))
+    assert_agree(browser.distance(), heat_igl.GeodesicSolver(cloud.triangles, method="sweep").distance(source))
 
 
 def test_a_saved_scene_opens_as_it_was(browser: Browser) -> None:

@@ -6,7 +6,7 @@ import pytest
 from conftest import perturbed, shared_path
 
 import heat_igl
-from heat_igl import HeatMethodSolver, Mesh, MeshError, shapes
+from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, shapes
 from heat_igl.intrinsic import (
     Adjacency,
     apex,
@@ -309,8 +309,8 @@ def test_edge_lengths_and_gluing_of_triangles_that_meet_themselves():
     assert (flipped.tail(np.arange(flipped.F.size)) == flipped.head(np.arange(flipped.F.size))).any()
     given = {"F": flipped.F, "lengths": flipped.l, "twin": flipped.twin.reshape(-1, 3)}
     truth = exact_distance(mesh.V, mesh.F, 7)
-    for refine, bound in (("exact", 1e-10), ("unfold", 1e-10), (None, 0.1)):
-        found = HeatMethodSolver.from_edge_lengths(**given, refine=refine).distance(7)
+    for made, bound in ((GeodesicSolver, 1e-10), (HeatMethodSolver, 0.1)):
+        found = made.from_edge_lengths(**given).distance(7)
         assert np.abs(found - truth).max() < bound * truth.max()
 
 
@@ -319,7 +319,7 @@ def test_a_triangle_rolled_up_to_a_cone():
     solver = HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]])
     assert solver.distance(0) == pytest.approx([0, 3])
     assert solver.operators.M.diagonal().sum() == pytest.approx(0.5 * np.sqrt(9 - 0.25))
-    exact = HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]], refine="exact")
+    exact = GeodesicSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]], method="exact")
     assert exact.distance(1) == pytest.approx([3, 0])
 
 

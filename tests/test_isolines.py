@@ -14,6 +14,7 @@ from conftest import flat_perturbed, shared_path
 
 import heat_igl
 from heat_igl import (
+    GeodesicSolver,
     HeatMethodSolver,
     Mesh,
     MeshError,
@@ -24,6 +25,7 @@ from heat_igl import (
     sublevel_areas,
     write_curves,
 )
+from heat_igl.geodesic import SolverChoice
 
 SQUARE = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
 
@@ -44,12 +46,12 @@ def assert_connected(mesh, curve):
         np.testing.assert_allclose(curve.positions(mesh)[-1], curve.positions(mesh)[0], atol=1e-13)
 
 
-@pytest.mark.parametrize("refine", [None, "unfold"])
-def test_isolines_of_distance_on_a_plane_are_circles(refine):
+@pytest.mark.parametrize("method", ["heat", "exact"])
+def test_isolines_of_distance_on_a_plane_are_circles(method):
     mesh = flat_perturbed(shapes.grid(160))  # 51 200 triangles
     source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1)))
     radii = np.array([0.1, 0.25, 0.4])
-    phi = HeatMethodSolver(mesh, refine=refine).distance(source)
+    phi = SolverChoice(method).on(mesh).distance(source)
     for r, curves, area in zip(radii, isolines(mesh, phi, radii), sublevel_areas(mesh, phi, radii), strict=True):
         assert [curve.is_closed for curve in curves] == [True]
         assert_connected(mesh, curves[0])
@@ -190,7 +192,7 @@ def test_crossings_are_those_of_libigl(bunny):
 
 def test_an_offset_curve_on_a_part():
     mesh = heat_igl.read_mesh(shared_path("fandisk.off"))
-    solver = HeatMethodSolver(mesh, refine="unfold")
+    solver = GeodesicSolver(mesh, method="exact")
     radius = 0.05 * np.ptp(mesh.V, axis=0).max()
     curves = offset_curves(mesh, solver, [100, 200], radius)
     assert curves

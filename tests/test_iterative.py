@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from conftest import perturbed, shared_path
 
 import heat_igl
-from heat_igl import FactorizationError, HeatMethodSolver, Mesh, shapes
+from heat_igl import FactorizationError, GeodesicSolver, HeatMethodSolver, Mesh, shapes
 from heat_igl.linear import backends, factor_memory, iterative
 from heat_igl.operators import operators
 
@@ -129,7 +129,7 @@ def test_chosen_where_factors_would_not_fit(monkeypatch):
     monkeypatch.setattr(factor_memory, "available_memory", lambda: 0.99 * estimate)
     assert HeatMethodSolver(mesh).diagnostics.backend == "iterative"
     # A refinement factors one matrix.
-    assert HeatMethodSolver(mesh, refine="sweep").diagnostics.backend != "iterative"
+    assert GeodesicSolver(mesh, method="sweep").diagnostics.backend != "iterative"
     monkeypatch.setattr(backends, "has_iterative", lambda: False)
     assert HeatMethodSolver(mesh).diagnostics.backend != "iterative"
 

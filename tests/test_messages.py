@@ -12,6 +12,7 @@ import tomllib
 
 import heat_igl
 from heat_igl import (
+    GeodesicSolver,
     HeatMethodSolver,
     MissingExtraError,
     SourceError,
@@ -134,21 +135,21 @@ def test_what_results_are_fits_a_line():
     ):
         assert repr(found) == text
         assert len(text) < 100
-    assert "refine='unfold'" in repr(HeatMethodSolver(MESH, refine="unfold"))
+    assert repr(GeodesicSolver(MESH)) == "GeodesicSolver(162 vertices, windows, tolerance=1e-05)"
     lost = voronoi_cells(HeatMethodSolver(heat_igl.Mesh(np.concatenate([MESH.V, [[9, 9, 9]]]), MESH.F)), [1])
     assert repr(lost) == "VoronoiCells(1 cells, 163 vertices, 1 unreached)"
 
 
 def test_solvers_and_results_fit_a_line():
-    vectors, signed = heat_igl.VectorHeatSolver(MESH), heat_igl.SignedHeatSolver(MESH, refine="unfold")
-    near_exact = HeatMethodSolver(MESH, refine="unfold")
+    vectors, signed = heat_igl.VectorHeatSolver(MESH), heat_igl.SignedHeatSolver(MESH, method="windows")
+    near_exact = GeodesicSolver(MESH, method="exact")
     loop = heat_igl.isolines(MESH, PHI, 1.0)[0]
     pieces = heat_igl.cut(MESH, loop)
     image = heat_igl.image_domain(np.ones((3, 4), bool))
     for found, text in (
         (vectors, f"VectorHeatSolver(162 vertices, t={vectors.t:.4g}, backend="),
-        (heat_igl.VectorHeatSolver(MESH, refine="unfold"), "VectorHeatSolver(162 vertices, t="),
-        (signed, f"SignedHeatSolver(162 vertices, t={signed.t:.4g}, refine='unfold', backend="),
+        (heat_igl.VectorHeatSolver(MESH, method="windows"), "VectorHeatSolver(162 vertices, t="),
+        (signed, f"SignedHeatSolver(162 vertices, t={signed.t:.4g}, backend="),
         (heat_igl.GeodesicPathSolver(MESH), "GeodesicPathSolver(162 vertices)"),
         (SOLVER.solve(0), f"HeatSolution(162 vertices, t={SOLVER.t:.4g})"),
         (near_exact.directions(0), "Directions(162 vertices)"),

@@ -91,7 +91,9 @@ def test_the_same_after_scaling_renumbering_and_copies():
     order = rng.permutation(mesh.n_vertices)
     shuffled = Mesh(mesh.V[order], np.argsort(order)[mesh.F])
     # Ties are broken by the numbers of vertices, and passes end before the last digit.
-    assert solver(shuffled, g).distance(int(np.argsort(order)[0])) == pytest.approx(distance[order], rel=5e-3, abs=1e-12)
+    assert solver(shuffled, g).distance(int(np.argsort(order)[0])) == pytest.approx(
+        distance[order], rel=5e-3, abs=1e-12
+    )
     assert (pickle.loads(pickle.dumps(one)).distance(0) == distance).all()
     with ThreadPoolExecutor(4) as pool:
         assert all((other == one.distance(v)).all() for v, other in enumerate(pool.map(one.distance, range(8))))

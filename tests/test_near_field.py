@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 from conftest import perturbed
 
-from heat_igl import HeatMethodSolver, Mesh, SurfaceCurve, SurfacePoints, curve_on, isolines, reference, shapes
+from heat_igl import (
+    GeodesicSolver,
+    Mesh,
+    SurfaceCurve,
+    SurfacePoints,
+    curve_on,
+    isolines,
+    reference,
+    shapes,
+)
 from heat_igl.intrinsic import Adjacency, intrinsic_triangulation
 from heat_igl.sources import NearField, Seeds, Sources, source_set, windows
 from heat_igl.sources.own_faces import seen_from_points
@@ -160,7 +169,7 @@ def test_dropped_lines_are_no_shortest_ones(monkeypatch):
     found = seeds(mesh, curve, 1.0)
     monkeypatch.setattr(windows, "_DETOUR", 1e9)
     every = seeds(mesh, curve, 1.0)
-    exact = HeatMethodSolver(mesh, refine="exact").distance(curve)
+    exact = GeodesicSolver(mesh, method="exact").distance(curve)
     shortest = every.at(every.value < exact[every.vertex] * (1 + 1e-9))
     assert len(shortest.vertex) > 400
     value = np.full(mesh.n_vertices, np.nan)

@@ -45,7 +45,6 @@ def test_options_have_the_same_names_and_defaults_everywhere(make, others):
         ),
         ("boundary", "robin", "boundary must be one of 'neumann', 'dirichlet', 'average', not 'robin'"),
         ("magnitude", "log", "magnitude must be one of 'auto', 'unit', 'damped', not 'log'"),
-        ("refine", "fold", "refine must be one of None, 'sweep', 'unfold', 'exact', not 'fold'"),
         ("backend", "magma", "backend must be one of 'auto', .*, not 'magma'"),
     ],
 )

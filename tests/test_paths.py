@@ -16,6 +16,7 @@ from scipy.spatial import ConvexHull
 
 import heat_igl
 from heat_igl import (
+    GeodesicSolver,
     HeatMethodSolver,
     Mesh,
     MeshError,
@@ -28,6 +29,7 @@ from heat_igl import (
     shapes,
     shortest_paths,
 )
+from heat_igl.geodesic import SolverChoice
 from heat_igl.reference.steiner import graph_distance
 
 
@@ -76,11 +78,11 @@ def sample(name):
     return mesh, int(source), reference.exact(mesh, int(source)), np.array(targets)
 
 
-@pytest.mark.parametrize("refine", ["unfold", None])
+@pytest.mark.parametrize("method", ["exact", "heat"])
 @pytest.mark.parametrize("name", ["cow.obj", "bunny.obj"])
-def test_lengths_agree_with_exact(name, refine):
+def test_lengths_agree_with_exact(name, method):
     mesh, source, exact, targets = sample(name)
-    paths = shortest_paths(mesh, HeatMethodSolver(mesh, refine=refine), targets, source)
+    paths = shortest_paths(mesh, SolverChoice(method).on(mesh), targets, source)
     error = lengths(mesh, paths) / exact[targets] - 1
     assert error.min() > -1e-9
     assert np.median(error) < 1e-3
@@ -118,7 +120,7 @@ def test_an_edge_of_four_faces_in_a_head():
     mesh = heat_igl.read_mesh(shared_path("suzanne.obj"))
     assert mesh.facets.n_faces.max() == 4
     ends = mesh.facets.vertices[mesh.facets.n_faces.argmax()]
-    solver = HeatMethodSolver(mesh, refine="unfold")
+    solver = GeodesicSolver(mesh, method="exact")
     among = np.flatnonzero(mesh.components == mesh.components[ends[0]])
     sources = [*ends, *np.random.default_rng(5).choice(among, 3, replace=False)]
     # From above, as every path on the surface is, and too long by some tenths of a percent at worst.
@@ -216,8 +218,8 @@ def test_around_a_reentrant_corner():
     L = Mesh(square.V, square.F[(centre[:, 0] < 0.5) | (centre[:, 1] < 0.5)])
     source, target = (int(np.argmin(np.linalg.norm(L.V - p, axis=1))) for p in ([1, 0.25, 0], [0.25, 1, 0]))
     expected = 2 * np.hypot(0.5, 0.25)
-    for refine in ("unfold", None):
-        (path,) = shortest_paths(L, HeatMethodSolver(L, refine=refine), target, source)
+    for method in ("exact", "heat"):
+        (path,) = shortest_paths(L, SolverChoice(method).on(L), target, source)
         assert path.lengths(L).sum() == pytest.approx(expected, rel=1e-12)
         assert np.abs(path.positions(L) - [0.5, 0.5, 0]).sum(axis=1).min() < 1e-12
 

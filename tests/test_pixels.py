@@ -7,6 +7,7 @@ import pytest
 
 import heat_igl
 from heat_igl import image_domain
+from heat_igl.geodesic import SolverChoice
 from heat_igl.validation import relative_error
 
 
@@ -32,21 +33,21 @@ def test_components_are_those_of_skimage():
     assert len(pairs) == len(set(expected.tolist())) == len(set(found.tolist()))
 
 
-@pytest.mark.parametrize("refine", [None, "sweep", "unfold"])
-def test_a_stroke_one_pixel_wide_is_as_long_as_it_is(refine):
+@pytest.mark.parametrize("method", ["heat", "sweep", "exact"])
+def test_a_stroke_one_pixel_wide_is_as_long_as_it_is(method):
     """Straight, then diagonal from corner to corner of the pixels."""
     mask = np.zeros((20, 40), bool)
     mask[2, :21] = True
     steps = np.arange(1, 16)
     mask[2 + steps, 20 + steps] = True
     domain = image_domain(mask)
-    solver = heat_igl.HeatMethodSolver(domain.mesh, refine=refine)
+    solver = SolverChoice(method).on(domain.mesh)
     distance = domain.image(solver.distance(domain.index[2, 0]))
-    exact = 15 + np.hypot(5.5, 0.5) + np.sqrt(0.5) + 14 * np.sqrt(2) if refine else None
+    exact = 15 + np.hypot(5.5, 0.5) + np.sqrt(0.5) + 14 * np.sqrt(2) if method != "heat" else None
     straight = np.hypot(20.5, 0.5) + np.sqrt(0.5) + 14 * np.sqrt(2)
     assert np.isinf(distance[~mask]).all()
     assert np.isfinite(distance[mask]).all()
-    assert distance[17, 35] == pytest.approx(straight, rel=0.02 if refine is None else 1e-9)
+    assert distance[17, 35] == pytest.approx(straight, rel=0.02 if method == "heat" else 1e-9)
     assert exact is None or exact > straight
 
 
@@ -65,7 +66,7 @@ def test_distance_goes_around_a_wall():
     mask = np.ones((21, 21), bool)
     mask[:16, 10] = False
     domain = image_domain(mask)
-    distance = domain.image(heat_igl.HeatMethodSolver(domain.mesh, refine="unfold").distance(domain.index[3, 4]))
+    distance = domain.image(heat_igl.GeodesicSolver(domain.mesh, method="exact").distance(domain.index[3, 4]))
     corners = np.array([[9.5, 15.5], [10.5, 15.5]])
     expected = np.linalg.norm(corners[0] - [4, 3]) + 1 + np.linalg.norm(corners[1] - [16, 3])
     assert distance[3, 16] == pytest.approx(expected, rel=1e-4)
@@ -94,7 +95,7 @@ def test_a_metric_per_pixel_is_a_linear_map():
     g = np.zeros((7, 9, 3, 3))
     g[..., :2, :2] = [[3.0, 1.0], [1.0, 0.5]]
     metric = heat_igl.metric_operators(domain.mesh, domain.per_face(g))
-    distance = heat_igl.HeatMethodSolver.from_operators(metric, refine="exact").distance(domain.index[0, 0])
+    distance = heat_igl.GeodesicSolver(metric, method="exact").distance(domain.index[0, 0])
     x, y, _ = domain.mesh.V.T
     np.testing.assert_allclose(distance, np.sqrt(3 * x**2 + 2 * x * y + 0.5 * y**2), atol=1e-12)
     with pytest.raises(ValueError, match=r"image must have shape \(7, 9\), with further axes .* not \(9, 7, 3, 3\)"):

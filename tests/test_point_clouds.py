@@ -11,6 +11,7 @@ import pytest
 import heat_igl
 from heat_igl import (
     AccuracyWarning,
+    GeodesicSolver,
     HeatMethodSolver,
     MeshError,
     PointCloud,
@@ -20,6 +21,7 @@ from heat_igl import (
     shapes,
 )
 from heat_igl.drawing.discs import discs
+from heat_igl.geodesic import SolverChoice
 from heat_igl.io import ply
 from heat_igl.kernels.local_delaunay import delaunay_stars
 from heat_igl.kernels.local_planes import principal_axes
@@ -95,8 +97,8 @@ def test_nothing_depends_on_where_how_large_or_in_which_order() -> None:
     assert triangles(1e20 * P) == expected
     assert triangles(P @ turn.T + 1000) == expected
     assert {tuple(sorted(order[list(row)])) for row in triangles(P[order])} == expected
-    distance = HeatMethodSolver(PointCloud(P)).distance(0)
-    np.testing.assert_allclose(HeatMethodSolver(PointCloud(P + 1e6)).distance(0), distance, atol=1e-8)
+    distance = GeodesicSolver(PointCloud(P)).distance(0)
+    np.testing.assert_allclose(GeodesicSolver(PointCloud(P + 1e6)).distance(0), distance, atol=1e-8)
 
 
 def test_a_grid_of_cocircular_points_has_no_gap() -> None:
@@ -109,37 +111,35 @@ def test_a_grid_of_cocircular_points_has_no_gap() -> None:
 # Distance.
 
 
-@pytest.mark.parametrize(("options", "most"), [(HEAT, 0.012), ({}, 0.003), ({"refine": "unfold"}, 0.002)])
+@pytest.mark.parametrize(("options", "most"), [(HEAT, 0.012), ({}, 0.003), ({"method": "exact"}, 0.002)])
 def test_distance_on_a_sphere(options: dict[str, str], most: float) -> None:
     P = sphere(4000)
-    distances = HeatMethodSolver(PointCloud(P), **options).distances([0, 1, 2])
+    distances = SolverChoice.of(**options).on(PointCloud(P)).distances([0, 1, 2])
     assert mean_error(distances, np.stack([on_sphere(P, i) for i in range(3)])) < most
 
 
-@pytest.mark.parametrize(("options", "most"), [(HEAT, 0.012), ({}, 0.002), ({"refine": "unfold"}, 0.001)])
+@pytest.mark.parametrize(("options", "most"), [(HEAT, 0.012), ({}, 0.002), ({"method": "exact"}, 0.001)])
 def test_distance_on_a_cylinder_with_two_boundaries(options: dict[str, str], most: float) -> None:
     P, at = cylinder(4000)
     difference = np.abs(at - at[0])
     difference[:, 0] = np.minimum(difference[:, 0], 2 * np.pi - difference[:, 0])
-    distance = HeatMethodSolver(PointCloud(P), **options).distance(0)
+    distance = SolverChoice.of(**options).on(PointCloud(P)).distance(0)
     assert mean_error(distance, np.linalg.norm(difference, axis=1)) < most
 
 
-def test_points_are_swept_unless_heat_is_asked_for() -> None:
+def test_points_are_swept() -> None:
     cloud = PointCloud(sphere(1500))
-    sweep = HeatMethodSolver(cloud, refine="sweep").distance(0)
-    default = HeatMethodSolver(cloud)
+    sweep = GeodesicSolver(cloud, method="sweep").distance(0)
+    default = GeodesicSolver(cloud)
+    assert default.plan.engine == "sweep"
     np.testing.assert_array_equal(default.distance(0), sweep)
-    # What was left open is chosen anew for other points.
     np.testing.assert_array_equal(default.with_vertices(2 * cloud.P).distance(0), 2 * sweep)
-    for named in (HEAT, {"t_coef": 1.0}, {"boundary": "dirichlet"}, {"laplacian": "intrinsic-delaunay-refined"}):
-        assert not np.array_equal(HeatMethodSolver(cloud, **named).distance(0), sweep)
 
 
 def test_unfolding_is_exact_in_a_plane_where_straight_lines_stay_inside() -> None:
     P = plane(3000)
     source = int(np.argmin(np.linalg.norm(P - [0.5, 0.5, 0], axis=1)))
-    distance = HeatMethodSolver(PointCloud(P), refine="unfold").distance(source)
+    distance = GeodesicSolver(PointCloud(P), method="exact").distance(source)
     truth = np.linalg.norm(P - P[source], axis=1)
     inner = ~PointCloud(P).boundary
     np.testing.assert_allclose(distance[inner], truth[inner], rtol=1e-3, atol=1e-12)
@@ -157,7 +157,7 @@ def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary() -> None:
 def test_even_points_are_solved_on_as_their_mesh_is() -> None:
     """Random points take a larger time step than the vertices of a mesh."""
     mesh = shapes.icosphere(4)
-    of_cloud, of_mesh = HeatMethodSolver(PointCloud(mesh.V), magnitude="damped"), HeatMethodSolver(mesh)
+    of_cloud, of_mesh = HeatMethodSolver(PointCloud(mesh.V)), HeatMethodSolver(mesh)
     assert of_cloud.t == pytest.approx(of_mesh.t, rel=1e-6)
     np.testing.assert_allclose(of_cloud.distance(0), of_mesh.distance(0), rtol=1e-6)
     solver = HeatMethodSolver(PointCloud(sphere(1000)), **HEAT)
@@ -168,7 +168,7 @@ def test_uneven_density() -> None:
     P = sphere(6000)
     kept = np.random.default_rng(1).random(len(P)) < np.where(P[:, 2] > 0, 1.0, 0.2)
     P = P[kept]
-    distance = HeatMethodSolver(PointCloud(P), refine="unfold").distance(0)
+    distance = GeodesicSolver(PointCloud(P), method="exact").distance(0)
     assert mean_error(distance, on_sphere(P, 0)) < 0.005
 
 
@@ -177,7 +177,7 @@ def test_noise_is_taken_away_and_clean_points_stay() -> None:
     noisy = P + 0.01 * np.random.default_rng(1).standard_normal(P.shape)
     radius = np.linalg.norm(without_noise(point_tree(noisy)).P, axis=1)
     assert radius.std() < 0.3 * np.linalg.norm(noisy, axis=1).std()
-    assert mean_error(HeatMethodSolver(PointCloud(noisy)).distance(0), on_sphere(P, 0)) < 0.03
+    assert mean_error(GeodesicSolver(PointCloud(noisy)).distance(0), on_sphere(P, 0)) < 0.03
     clean = point_tree(P)
     assert without_noise(clean) is clean
     # Ridges and bumps of a few spacings are detail.
@@ -214,7 +214,7 @@ def test_more_neighbours_are_not_taken_where_the_surface_bends() -> None:
 def test_an_outlier_is_unreachable_and_changes_nothing_else() -> None:
     P = sphere(2000)
     cloud = PointCloud(np.append(P, [[0, 0, 5.0]], axis=0))
-    distance = HeatMethodSolver(cloud).distance(0)
+    distance = GeodesicSolver(cloud).distance(0)
     assert np.isinf(distance[-1])
     assert np.isfinite(distance[:-1]).all()
     assert mean_error(distance[:-1], on_sphere(P, 0)) < 0.015
@@ -224,7 +224,7 @@ def test_an_outlier_is_unreachable_and_changes_nothing_else() -> None:
 def test_one_point_in_a_hundred_is_an_outlier() -> None:
     P = sphere(3000)
     strays = np.random.default_rng(3).uniform(-2, 2, (30, 3))
-    found = HeatMethodSolver(PointCloud(np.concatenate([P, strays]))).distance(0)
+    found = GeodesicSolver(PointCloud(np.concatenate([P, strays]))).distance(0)
     assert (np.isinf(found[3000:]) | (np.abs(np.linalg.norm(strays, axis=1) - 1) < 0.2)).all()
     assert mean_error(found[:3000], on_sphere(P, 0)) < 0.003
 
@@ -233,7 +233,7 @@ def test_density_that_grows_a_hundredfold() -> None:
     x, y = np.random.default_rng(0).random((2, 20_000))
     for across in ((100**x - 1) / 99, np.where(x < 0.5, x / 50, 2 * x - 1)):
         P = np.stack([across, y, np.zeros(len(x))], axis=1)
-        found = HeatMethodSolver(PointCloud(P)).distance(0)
+        found = GeodesicSolver(PointCloud(P)).distance(0)
         assert mean_error(found, np.linalg.norm(P - P[0], axis=1)) < 0.005
 
 
@@ -241,7 +241,7 @@ def test_rows_ten_times_as_far_apart_as_their_points() -> None:
     x, y = np.meshgrid(np.linspace(0, 1, 200), np.linspace(0, 1, 20))
     P = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
     P[:, 0] += np.random.default_rng(0).normal(0, 1e-3, len(P))
-    found = HeatMethodSolver(PointCloud(P)).distance(0)
+    found = GeodesicSolver(PointCloud(P)).distance(0)
     assert mean_error(found, np.linalg.norm(P - P[0], axis=1)) < 0.01
 
 
@@ -250,21 +250,21 @@ def test_few_points_in_a_plane(n: int) -> None:
     """Distance is no shorter than a straight line, and equal to it if the way stays inside, as from most points."""
     P = plane(n, seed=n)
     cloud = PointCloud(P)
-    found = HeatMethodSolver(cloud).distance(0)
+    found = GeodesicSolver(cloud).distance(0)
     straight = np.linalg.norm(P - P[0], axis=1)
     assert (found >= straight - 1e-12).all()
     assert np.median(found - straight) < 1e-9
-    vectors = heat_igl.VectorHeatSolver(cloud, refine="unfold").log_map(0)
+    vectors = heat_igl.VectorHeatSolver(cloud, method="windows").log_map(0)
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), found, atol=1e-9)
 
 
 def test_copies_of_a_point_are_at_distance_0_of_each_other() -> None:
     P = sphere(1000)
     P = np.append(P, P[[3, 3, 700]], axis=0)
-    distance = HeatMethodSolver(PointCloud(P), refine="unfold").distance(3)
+    distance = GeodesicSolver(PointCloud(P), method="exact").distance(3)
     np.testing.assert_allclose(distance[[1000, 1001]], 0, atol=1e-6)
     np.testing.assert_allclose(distance[1002], distance[700], atol=1e-6)
-    assert np.isfinite(HeatMethodSolver(PointCloud(P)).distance(3)).all()
+    assert np.isfinite(GeodesicSolver(PointCloud(P)).distance(3)).all()
 
 
 @pytest.mark.parametrize("copies", ["at random", "six of each", "a thousand of one"])
@@ -280,24 +280,21 @@ def test_copies_have_the_distance_of_the_point(copies: str) -> None:
     cloud, alone = PointCloud(distinct[of]), PointCloud(distinct)
     np.testing.assert_array_equal(cloud.originals, of)
     source = len(of) - 1
-    for refine in ("sweep", "unfold", "exact"):
-        solver, other = HeatMethodSolver(cloud, refine=refine), HeatMethodSolver(alone, refine=refine)
+    for method in ("sweep", "exact"):
+        solver, other = SolverChoice(method).on(cloud), SolverChoice(method).on(alone)
         found, expected = solver.distance(source), other.distance(int(of[source]))
         np.testing.assert_array_equal(found, found[of])
         assert found[source] == 0
-        assert mean_error(found, expected[of]) < (0.002 if refine == "sweep" else 1e-5)
+        assert mean_error(found, expected[of]) < (0.002 if method == "sweep" else 1e-5)
         cells = solver.voronoi([0, 1])
         np.testing.assert_array_equal(cells.labels, cells.labels[of])
-    np.testing.assert_array_equal(
-        HeatMethodSolver(cloud).distance(0), HeatMethodSolver(cloud, refine="sweep").distance(0)
-    )
     front_door = heat_igl.geodesic_distance(cloud, source)
     np.testing.assert_allclose(front_door, heat_igl.geodesic_distance(alone, int(of[source]))[of], atol=1e-5)
 
 
 def test_copies_of_an_outlier_are_outliers() -> None:
     cloud = PointCloud(np.append(sphere(500), [[0, 0, 5.0]] * 3, axis=0))
-    assert np.isinf(HeatMethodSolver(cloud).distance(0)[500:]).all()
+    assert np.isinf(GeodesicSolver(cloud).distance(0)[500:]).all()
     assert cloud.report().unreferenced_vertices.tolist() == [500, 501, 502]
 
 
@@ -308,7 +305,7 @@ def test_heat_by_name_is_the_heat_method(domain: str) -> None:
     cloud = PointCloud(P if domain == "points" else np.append(P, P[:40], axis=0))
     by_heat = HeatMethodSolver(cloud, magnitude="damped").distance(3)
     np.testing.assert_array_equal(heat_igl.geodesic_distance(cloud, 3, method="heat"), by_heat)
-    assert not np.array_equal(by_heat, HeatMethodSolver(cloud).distance(3))
+    assert not np.array_equal(by_heat, GeodesicSolver(cloud).distance(3))
 
 
 def two_sheets(n: int, gap: float) -> tuple[np.ndarray, np.ndarray]:
@@ -321,7 +318,7 @@ def test_normals_keep_sheets_apart_that_nearly_touch() -> None:
     cloud = PointCloud(P, normals)
     assert (cloud.components[:2000] == cloud.components[0]).all()
     assert (cloud.components[2000:] != cloud.components[0]).all()
-    distance = HeatMethodSolver(cloud).distance(0)
+    distance = GeodesicSolver(cloud).distance(0)
     assert np.isinf(distance[2000:]).all()
     assert np.isfinite(distance[:2000]).all()
 
@@ -368,7 +365,7 @@ def test_sheets_further_apart_than_the_spacing_need_no_normals() -> None:
 
 def test_batches_voronoi_and_farthest_points_as_on_a_mesh() -> None:
     P = sphere(1500)
-    solver = HeatMethodSolver(PointCloud(P))
+    solver = GeodesicSolver(PointCloud(P))
     one_by_one = np.stack([solver.distance(i) for i in range(5)])
     np.testing.assert_allclose(solver.distances(range(5)), one_by_one, atol=1e-9)
     cells = solver.voronoi([0, 1, 2])
@@ -385,13 +382,13 @@ def test_a_cloud_and_its_solver_are_pickled() -> None:
     copy = pickle.loads(pickle.dumps(cloud))
     for name in ("P", "F", "normals"):
         np.testing.assert_array_equal(getattr(copy, name), getattr(cloud, name))
-    solver = HeatMethodSolver(cloud)
+    solver = GeodesicSolver(cloud)
     assert (pickle.loads(pickle.dumps(solver)).distance(0) == solver.distance(0)).all()
 
 
 def test_points_move() -> None:
     P = sphere(800)
-    solver = HeatMethodSolver(PointCloud(P))
+    solver = GeodesicSolver(PointCloud(P))
     np.testing.assert_allclose(solver.with_vertices(2 * P).distance(0), 2 * solver.distance(0), rtol=1e-9)
     with pytest.raises(MeshError, match="P has 799 rows, but the cloud has 800 points"):
         solver.with_vertices(P[:-1])
@@ -412,7 +409,7 @@ def test_a_batch_on_dask_takes_clouds(tmp_path) -> None:
     for name, cloud in clouds.items():
         group = zarr.open_group(tmp_path / "store", mode="r")[name]
         stored = [array for _, array in group.arrays() if array.ndim == 2]
-        expected = HeatMethodSolver(cloud).distances([0, 1])
+        expected = GeodesicSolver(cloud).distances([0, 1])
         assert any(a.shape == expected.shape and np.allclose(a[:], expected, atol=1e-9) for a in stored)
 
 
@@ -460,7 +457,7 @@ def test_four_points_are_enough_and_arrays_are_read_only() -> None:
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
     np.testing.assert_allclose(
-        HeatMethodSolver(PointCloud(cloud.P), refine="unfold").distance(0), [0, 1, 1, np.sqrt(2)], atol=1e-12
+        GeodesicSolver(PointCloud(cloud.P), method="exact").distance(0), [0, 1, 1, np.sqrt(2)], atol=1e-12
     )
 
 
@@ -469,7 +466,7 @@ def test_points_without_triangles_are_an_error() -> None:
     P = plane(4)
     normals = np.array([[0, 0, 1.0], [0, 0, -1], [0, 0, 1], [0, 0, -1]])
     with pytest.raises(MeshError, match="no three points of P are neighbours on a surface"):
-        HeatMethodSolver(PointCloud(P, normals))
+        GeodesicSolver(PointCloud(P, normals))
 
 
 # Files.
@@ -670,10 +667,10 @@ def test_discs_lie_in_the_tangent_planes_and_continue_the_values() -> None:
 def test_a_picture_of_a_cloud_with_an_outlier_and_labels(tmp_path) -> None:
     pytest.importorskip("matplotlib")
     cloud = PointCloud(np.append(sphere(300), [[0, 0, 2.0]], axis=0))
-    distance = HeatMethodSolver(cloud, refine="unfold").distance([3, 9])
+    distance = GeodesicSolver(cloud, method="exact").distance([3, 9])
     assert np.isinf(distance[-1])
     heat_igl.plots.plot(cloud, distance, sources=[3, 9]).save(tmp_path / "a.png")
-    labels = HeatMethodSolver(cloud).voronoi([3, 9]).labels
+    labels = GeodesicSolver(cloud).voronoi([3, 9]).labels
     heat_igl.plots.plot_labels(cloud, labels, sources=[3, 9]).save(tmp_path / "b.png")
     for name in ("a.png", "b.png"):
         assert (tmp_path / name).stat().st_size > 5000
@@ -711,7 +708,7 @@ def test_triangles_are_oriented_like_the_normals(side):
 def test_vectors_on_a_cloud():
     """The log map of a sphere: as long as the great circles."""
     P = heat_igl.shapes.icosphere(3).V
-    vectors = heat_igl.VectorHeatSolver(heat_igl.PointCloud(P), refine="exact").log_map(0)
+    vectors = heat_igl.VectorHeatSolver(heat_igl.PointCloud(P), method="windows").log_map(0)
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), np.arccos(np.clip(P @ P[0], -1, 1)), atol=0.01)
 
 
@@ -771,8 +768,8 @@ def test_points_of_a_regular_torus_make_a_closed_surface(around_tube: int, aroun
     side = heat_igl.SignedHeatSolver(cloud).distance(upper)
     assert (side[mesh.V[:, 2] > 0.3] < 0).all()
     assert (side[mesh.V[:, 2] < -0.1] > 0).all()
-    found = HeatMethodSolver(cloud, refine="unfold").directions(0)
-    on_mesh = HeatMethodSolver(mesh, refine="unfold").directions(0)
+    found = GeodesicSolver(cloud, method="exact").directions(0)
+    on_mesh = GeodesicSolver(mesh, method="exact").directions(0)
     np.testing.assert_allclose(found.distance, on_mesh.distance, atol=0.03 * on_mesh.distance.max())
     np.testing.assert_allclose(np.linalg.norm(found.gradient[1:], axis=1), 1, atol=1e-6)
 
@@ -868,7 +865,7 @@ def test_the_two_sides_of_a_thin_disc() -> None:
     out = 1 + thickness / 2 * np.cos(turn)
     rim = np.stack([out * np.cos(around), out * np.sin(around), thickness / 2 * np.sin(turn)], axis=1)
     P = np.concatenate([np.append(flat, side[:, None], axis=1), rim])
-    distance = HeatMethodSolver(PointCloud(P), refine="exact").distance(0)
+    distance = GeodesicSolver(PointCloud(P), method="exact").distance(0)
     assert distance[1] == pytest.approx(2 + np.pi * thickness / 2, rel=0.03)
 
 
@@ -911,7 +908,7 @@ def test_directions_on_a_surface_that_cannot_be_oriented_are_an_error() -> None:
     number = np.append(number, number[:, :1], axis=1)
     p, q, r, s = (each.ravel() for each in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
     F = np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
-    solver = HeatMethodSolver(heat_igl.Mesh(P, F), refine="unfold")
+    solver = GeodesicSolver(heat_igl.Mesh(P, F), method="exact")
     with pytest.raises(MeshError, match="oriented differently"):
         solver.directions(0)
 
@@ -976,11 +973,11 @@ def test_vectors_on_both_sides_are_those_on_one(monkeypatch: pytest.MonkeyPatch)
     """On a surface that can be oriented, the sides are two parts, and the second must change nothing."""
     cloud = PointCloud(sphere(800))
     given = [[1.0, 0.3], [-0.2, 0.5]]
-    for refine in (None, "unfold"):
+    for method in ("heat", "windows"):
         with monkeypatch.context() as patch:
-            one = heat_igl.VectorHeatSolver(cloud, refine=refine)
+            one = heat_igl.VectorHeatSolver(cloud, method=method)
             patch.setattr("heat_igl.heat_method.vector_heat.is_oriented_manifold", lambda _: False)
-            both = heat_igl.VectorHeatSolver(cloud, refine=refine)
+            both = heat_igl.VectorHeatSolver(cloud, method=method)
         assert both.operators.n == 2 * one.operators.n
         for name in ("x", "y", "normal"):
             np.testing.assert_allclose(getattr(both.frames, name), getattr(one.frames, name), atol=1e-12)
@@ -1004,10 +1001,10 @@ def test_vectors_pass_the_line_along_which_a_surface_with_one_side_changes_orien
     piece = PointCloud(strip.P[of_piece])
     start = int(np.flatnonzero(of_piece == source)[0])
     compared = away[of_piece] < 1
-    for refine, most in (("unfold", 1e-3), (None, 0.02)):
+    for method, most in (("windows", 1e-3), ("heat", 0.02)):
         found = []
         for cloud, at in ((strip, source), (piece, start)):
-            solver = heat_igl.VectorHeatSolver(cloud, refine=refine)
+            solver = heat_igl.VectorHeatSolver(cloud, method=method)
             assert solver.reaches(at).all()
             frames = solver.frames
             vectors = frames.to_world(solver.transport(at, frames.from_world([[1, 2, 3]], [at])))
@@ -1015,5 +1012,5 @@ def test_vectors_pass_the_line_along_which_a_surface_with_one_side_changes_orien
             found.append([a if cloud is piece else a[of_piece] for a in (vectors, logarithms)])
         for on_strip, on_piece in zip(*found, strict=True):
             assert np.linalg.norm(on_strip - on_piece, axis=1)[compared].mean() < most
-    distance = HeatMethodSolver(strip, refine="exact").distance(source)
+    distance = GeodesicSolver(strip, method="exact").distance(source)
     np.testing.assert_allclose(np.linalg.norm(heat_igl.log_map(strip, source), axis=1), distance, rtol=1e-6)

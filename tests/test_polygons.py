@@ -313,10 +313,8 @@ def test_quads_against_their_triangulation():
 
 
 def test_refinement_is_refused():
-    with pytest.raises(
-        ValueError, match="refine='sweep' unfolds triangles by their edge lengths, and this domain has none"
-    ):
-        heat_igl.HeatMethodSolver.from_operators(polygon_operators(MIXED), refine="sweep")
+    with pytest.raises(heat_igl.MeshError, match="these operators know none: give the mesh"):
+        heat_igl.GeodesicSolver(polygon_operators(MIXED), method="sweep")
 
 
 def test_fans_and_pickles():

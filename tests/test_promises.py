@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heat_igl import HeatMethodSolver, Mesh, Refinement, SurfacePoints, shapes, shortest_paths
+from heat_igl import GeodesicSolver, Mesh, SurfacePoints, shapes, shortest_paths
+from heat_igl.geodesic import SolverChoice
 from heat_igl.mesh import connectivity
 from heat_igl.operators import unfolding_surface
 from heat_igl.sources import source_set
+from heat_igl.unfolding import MeshTriangles, SweepEngine
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.exact import exact_distance
 from heat_igl.validation import zoo
@@ -25,24 +27,18 @@ def relative(d: np.ndarray, truth: np.ndarray) -> np.ndarray:
     return (d - truth) / truth.max()
 
 
-def test_two_paths_around_a_hole_prove_no_flatness():
-    mesh = shape("sponge")
-    surface = Refinement(unfolding_surface(mesh).unfolding)
-    assert surface.has_holes
-    for without in (shapes.grid(5), shapes.icosphere(2), shape("two spheres 1 to 10")):
-        assert not Refinement(unfolding_surface(without).unfolding).has_holes
-    assert Refinement(unfolding_surface(TORUS).unfolding).has_holes
-    for source in range(0, mesh.n_vertices, 9):
-        truth = exact_distance(mesh.V, mesh.F, source)
-        d = surface.unfold(connectivity.edge_distance(mesh.edge_graph, np.array([source])), np.array([source]))
-        assert relative(d, truth).min() > -1e-9
+def test_surfaces_with_holes_are_told_from_disks_and_spheres():
+    for mesh in (shape("sponge"), TORUS):
+        assert SweepEngine(MeshTriangles(mesh)).measures.has_holes
+    for mesh in (shapes.grid(5), shapes.icosphere(2), shape("two spheres 1 to 10")):
+        assert not SweepEngine(MeshTriangles(mesh)).measures.has_holes
 
 
 @pytest.mark.parametrize("name", ROUGH)
-@pytest.mark.parametrize("refine", ["unfold", "sweep"])
-def test_small_and_rough_meshes_are_exact(name, refine):
+@pytest.mark.parametrize("method", ["sweep"])
+def test_small_and_rough_meshes_are_exact(name, method):
     mesh = shape(name)
-    solver = HeatMethodSolver(mesh, refine=refine)
+    solver = SolverChoice(method).on(mesh)
     for source in (0, mesh.n_vertices // 2):
         np.testing.assert_allclose(
             relative(solver.distance(source), exact_distance(mesh.V, mesh.F, source)), 0, atol=1e-10
@@ -50,17 +46,17 @@ def test_small_and_rough_meshes_are_exact(name, refine):
 
 
 @pytest.mark.parametrize("name", ["height field 5000", "pill", "bumpy sphere", "lantern 40 by 400"])
-@pytest.mark.parametrize("refine", ["unfold", "sweep"])
-def test_distances_keep_to_both_bounds(name, refine):
+@pytest.mark.parametrize("method", ["sweep"])
+def test_distances_keep_to_both_bounds(name, method):
     mesh = shape(name)
-    solver = HeatMethodSolver(mesh, refine=refine)
+    solver = SolverChoice(method).on(mesh)
     for source in (0, mesh.n_vertices // 3):
         d = solver.distance(source)
         assert (d <= connectivity.edge_distance(mesh.edge_graph, np.array([source])) * (1 + 1e-9)).all()
         assert (d >= np.linalg.norm(mesh.V - mesh.V[source], axis=1) * (1 - 1e-9)).all()
         truth = exact_distance(mesh.V, mesh.F, source)
-        assert np.abs(relative(d, truth)).max() < (0.05 if refine == "sweep" else 0.003)
-        if refine == "unfold":
+        assert np.abs(relative(d, truth)).max() < (0.05 if method == "sweep" else 0.003)
+        if method == "unfold":
             assert relative(d, truth).min() > -1e-9
 
 
@@ -71,14 +67,14 @@ def test_a_sweep_from_vertices_is_no_sweep_from_the_edges_between_them(count):
     if count == 4:
         sources = np.array([820, 821, 861, 862])  # the corners of a cell
     truth = np.linalg.norm(mesh.V[:, None] - mesh.V[sources], axis=2).min(axis=1)
-    d = HeatMethodSolver(mesh, refine="sweep").distance(sources)
+    d = GeodesicSolver(mesh, method="sweep").distance(sources)
     assert np.abs(d - truth)[truth > 0].mean() < 0.002 * truth.mean()
     assert np.abs(d - truth).max() < 0.05 * truth.max()
 
 
 @pytest.mark.parametrize("mesh", [TORUS, shape("book"), shape("moebius band")], ids=["torus", "book", "moebius"])
 def test_exact_takes_all_kinds_of_sources(mesh):
-    solver = HeatMethodSolver(mesh, refine="exact")
+    solver = GeodesicSolver(mesh, method="exact")
     point = SurfacePoints([7], [[0.2, 0.5, 0.3]])
     d = solver.distances([[3], [200], point])
     np.testing.assert_array_equal(d[0], solver.distance(3))
@@ -89,20 +85,9 @@ def test_exact_takes_all_kinds_of_sources(mesh):
     np.testing.assert_allclose(nearest, d.min(axis=0), atol=1e-12)
 
 
-def test_exact_factors_nothing_until_heat_is_asked_for():
-    solver = HeatMethodSolver(TORUS, refine="exact")
-    assert solver.diagnostics.backend == "none"
-    assert solver.diagnostics.factor_bytes == 0
-    d = solver.distance(5)
-    assert "heat_flow" not in vars(solver._parts)
-    solution = solver.solve(5)
-    np.testing.assert_array_equal(solution.distance, d)
-    np.testing.assert_allclose(solution.heat, HeatMethodSolver(TORUS, refine="unfold").solve(5).heat, rtol=1e-9)
-
-
 def test_paths_down_an_exact_distance_are_as_long_as_it():
     mesh = TORUS
-    solver = HeatMethodSolver(mesh, refine="exact")
+    solver = GeodesicSolver(mesh, method="exact")
     d = solver.distance(5)
     targets = np.arange(0, mesh.n_vertices, 97)
     length = np.array([path.lengths(mesh).sum() for path in shortest_paths(mesh, solver, targets, 5)])
@@ -122,17 +107,3 @@ def test_what_leaves_the_bounds_is_brought_back():
     d = straight / 2
     Bounds(surface).lengthen(d, sources, sources.points)
     np.testing.assert_allclose(d, straight, rtol=1e-9)
-
-
-@pytest.mark.parametrize("refine", ["unfold", "sweep"])
-def test_small_components_are_exact_beside_large_ones(refine):
-    rough, ball = shape("height field coarse"), shapes.icosphere(4)
-    V, F = np.concatenate([rough.V + 9, ball.V]), np.concatenate([rough.F, ball.F + rough.n_vertices])
-    solver = HeatMethodSolver(Mesh(V, F), refine=refine)
-    for source in (0, 20, 40):
-        found = solver.distance(source)
-        np.testing.assert_allclose(found[: rough.n_vertices], exact_distance(rough.V, rough.F, source), atol=1e-10)
-        assert np.isinf(found[rough.n_vertices :]).all()
-    np.testing.assert_allclose(
-        solver.distance(rough.n_vertices + 5)[rough.n_vertices :], HeatMethodSolver(ball, refine=refine).distance(5)
-    )

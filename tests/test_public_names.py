@@ -17,7 +17,7 @@ import heat_igl
 EXPORTED = """
 AccuracyWarning BatchError ClosestPoints Diagnostics FactorizationError HeatMethodSolver HeatSolution ImageDomain
 LabelledDistance Mesh MeshError MeshReport MissingExtraError OffsetSources Operators PointCloud PolygonMesh
-ReferenceSolverError Refinement SourceError SurfaceCurve SurfacePoints TangentFrames ValidationReport ValidationRow
+ReferenceSolverError SourceError SurfaceCurve SurfacePoints TangentFrames ValidationReport ValidationRow
 VectorHeatSolver VoronoiCells as_mesh baselines closed_forms closest_points cluster connection_laplacian curve_on
 diameter distance_matrix distances_within dual_triangulation edge_curve enclosed_areas exp_map farthest_cells
 farthest_points geodesic_centre geodesic_distance heat_method_distance image_domain isolines metrics nearest_vertices
@@ -27,7 +27,7 @@ read_polygon_mesh reference sample_mesh sampling shapes shortest_paths speed_ope
 tangent_frames trace_geodesic CentroidalSites GeodesicPathSolver centroidal_voronoi
 geodesic_bezier geodesic_path handle_loops karcher_mean straighten
 Directions log_map
-unfolded_distance validate voronoi_cells write_curves write_distances_within write_mesh write_point_cloud
+GeodesicSolver validate voronoi_cells write_curves write_distances_within write_mesh write_point_cloud
 fibre_metric metric_operators
 DomainReport DomainRow validate_domains
 CutMesh OrientedPoints SignedHeatSolver VoxelBox cut region_boundary volume_signed_distance
@@ -43,7 +43,6 @@ PointCloud(P, normals=None)
 SurfacePoints(faces, barycentric)
 SurfaceCurve(faces, start, end, is_closed=False)
 OffsetSources(sources, offsets)
-Refinement(triangulation)
 read_mesh(path)
 read_attributes(path)
 read_polygon_mesh(path)
@@ -52,20 +51,25 @@ write_mesh(path, mesh)
 write_curves(path, mesh, curves, *, projection=None)
 write_point_cloud(path, cloud)
 heat_method_distance(V, F, sources)
-unfolded_distance(V, F=None, sources=None, *, tolerance=4e-05, cutoff=None)
-geodesic_distance(mesh, sources, *, method='unfold', cutoff=None, targets=None)
+geodesic_distance(mesh, sources, *, method='auto', tolerance=1e-05, cutoff=None, targets=None, region=None)
+GeodesicSolver(mesh, *, method='auto', tolerance=1e-05, region=None)
+GeodesicSolver.with_vertices(self, V)
+GeodesicSolver.distance(self, sources, cutoff=None)
+GeodesicSolver.distances(self, source_sets, out=None, progress=False, dtype=None, *, cutoff=None)
+GeodesicSolver.voronoi(self, sources, *, cutoff=None)
+GeodesicSolver.directions(self, sources)
+GeodesicSolver.distance_vjp(self, sources)
 as_mesh(mesh, F=None)
 sample_mesh()
 HeatMethodSolver(mesh, F=None, *, t_coef=None, t=None, laplacian='auto', boundary='neumann',\
- magnitude='auto', refine=None, backend='auto')
-HeatMethodSolver.from_operators(domain, *, t_coef=None, t=None, boundary='neumann', magnitude='auto', refine=None,\
+ magnitude='auto', backend='auto')
+HeatMethodSolver.from_operators(domain, *, t_coef=None, t=None, boundary='neumann', magnitude='auto',\
  backend='auto')
 HeatMethodSolver.with_vertices(self, V)
 HeatMethodSolver.distance(self, sources, cutoff=None)
 HeatMethodSolver.distances(self, source_sets, out=None, progress=False, dtype=None, *, cutoff=None)
 HeatMethodSolver.voronoi(self, sources, *, cutoff=None)
 HeatMethodSolver.solve(self, sources)
-HeatMethodSolver.directions(self, sources, *, tolerance=None)
 HeatMethodSolver.distance_vjp(self, sources)
 isolines(mesh, values, levels)
 offset_curves(mesh, solver, sources, radius)
@@ -75,14 +79,14 @@ shortest_paths(mesh, distance, targets, sources=None)
 tangent_frames(mesh)
 trace_geodesic(mesh, start, direction, length)
 exp_map(mesh, source, vectors)
-log_map(mesh, source, *, method='unfold')
+log_map(mesh, source, *, method='exact')
 connection_laplacian(mesh, laplacian='intrinsic-delaunay')
-VectorHeatSolver(mesh, *, t_coef=None, t=None, refine=None, backend='auto')
+VectorHeatSolver(mesh, *, t_coef=None, t=None, method='heat', backend='auto')
 VectorHeatSolver.extend(self, sources, values)
 VectorHeatSolver.transport(self, sources, vectors)
 VectorHeatSolver.log_map(self, source)
 OrientedPoints(points, normals)
-SignedHeatSolver(mesh, *, refine=None, t_coef=None, t=None, backend='auto')
+SignedHeatSolver(mesh, *, method=None, t_coef=None, t=None, backend='auto')
 SignedHeatSolver.distance(self, curves, *, unsigned=None, level=None)
 cut(mesh, curves)
 region_boundary(mesh, *, faces=None, vertices=None)
@@ -110,13 +114,13 @@ nearest_vertices(mesh, k, sources=None)
 pair_distances(mesh, pairs)
 write_distances_within(path, mesh, radius, sources=None)
 read_distances_within(path, rows=None)
-validate(mesh, sources, methods=('heat', 'sweep', 'unfold', 'meshlab', 'igl'), reference='exact', *, name='mesh',\
+validate(mesh, sources, methods=('heat', 'sweep', 'windows', 'meshlab', 'igl'), reference='exact', *, name='mesh',\
  progress=None)
 validation.draw_sources(mesh, count, seed=0)
 validate_domains(domains=None, *, seed=0, progress=None)
 closed_forms.sphere(mesh, sources, *, center=(0.0, 0.0, 0.0))
 metrics.relative_error(distance, truth)
-cluster.distances(meshes, sources, store, *, client=None, refine=None, dtype='float32', progress=False)
+cluster.distances(meshes, sources, store, *, client=None, method=None, tolerance=1e-05, dtype='float32', progress=False)
 cluster.connected(scheduler=None, n_workers=None, dashboard=False)
 cluster.folder(path)
 cluster.read_source_sets(path)
@@ -143,14 +147,10 @@ plots.picture(path, mesh, distance)
 # The statements of README, guide and notebooks.
 STATEMENTS = [
     "from heat_igl.applications import EdgeSearch, particle_length, reconstruct, skeleton, zones_of_influence",
-    "from heat_igl.baselines import graph_distance",
-    "from heat_igl.demo import sample_mesh",
-    "from heat_igl.factorization import factorize",
     "from heat_igl.heat_method import HeatMethodSolver",
     "from heat_igl.io import read_mesh",
     "from heat_igl.mesh import Mesh",
     "from heat_igl.operators import Operators, operators",
-    "from heat_igl.plots import Page, Picture, page, plot, plot_field",
     "from heat_igl.steps import damping, diffuse, fitted_laplacian, integrate, normalize",
     "from heat_igl.validation import draw_sources",
 ]

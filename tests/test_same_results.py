@@ -49,6 +49,6 @@ def test_every_quantity_is_computed_on_a_small_mesh() -> None:
     """The same twice: the sources are drawn with a seed."""
     mesh = same_results.meshes(None, 1000, 0)["five pages"]
     first, second = same_results.computed(mesh, 0), same_results.computed(mesh, 0)
-    assert {"heat", "sweep", "unfold", "voronoi", "paths", "isolines", "batch"} <= set(first)
+    assert {"heat", "sweep", "windows", "voronoi", "paths", "isolines", "batch"} <= set(first)
     assert [name for name, value in first.items() if isinstance(value, str) or not any(a.size for a in value)] == []
     assert {same_results.difference(first[name], second[name]) for name in first} == {0.0}

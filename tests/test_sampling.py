@@ -18,7 +18,7 @@ from heat_igl.sampling.centre import _least_in_faces
 def square() -> tuple[Mesh, heat_igl.HeatMethodSolver]:
     """A flat square, where the sweep is exact."""
     mesh = shapes.grid(20)
-    return mesh, heat_igl.HeatMethodSolver(mesh, refine="sweep")
+    return mesh, heat_igl.GeodesicSolver(mesh, method="sweep")
 
 
 def two_spheres() -> Mesh:
@@ -267,7 +267,7 @@ def test_centre_of_an_arc_of_a_sphere():
         tangent = (np.arccos(cosine) / np.sqrt(1 - cosine**2))[:, None] * (mesh.V[points] - cosine[:, None] * mean)
         mean += tangent.mean(axis=0)
         mean /= np.linalg.norm(mean)
-    solver = heat_igl.HeatMethodSolver(mesh, refine="unfold")
+    solver = heat_igl.GeodesicSolver(mesh, method="exact")
     found = heat_igl.geodesic_centre(mesh, solver, points).positions(mesh)[0]
     h = mesh.edge_lengths.mean()
     assert np.linalg.norm(found / np.linalg.norm(found) - mean) < 0.1 * h
@@ -292,7 +292,7 @@ def test_diameter_of_a_square_and_a_sphere(square):
     assert distance == pytest.approx(np.sqrt(2))
     assert np.linalg.norm(square[0].V[first] - square[0].V[second]) == pytest.approx(np.sqrt(2))
     sphere = shapes.icosphere(4)
-    distance, first, second = heat_igl.diameter(heat_igl.HeatMethodSolver(sphere, refine="unfold"))
+    distance, first, second = heat_igl.diameter(heat_igl.GeodesicSolver(sphere, method="exact"))
     assert distance == pytest.approx(np.pi, rel=5e-3)
     with pytest.raises(ValueError, match="rounds must be a positive integer"):
         heat_igl.diameter(square[1], rounds=0)

@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 from conftest import flat_perturbed
 from scipy.sparse.linalg import spsolve
-from test_unfolding import moebius_strip
+from surfaces import moebius_strip
 
 from heat_igl import (
     HeatMethodSolver,
@@ -25,7 +25,6 @@ from heat_igl import (
     isolines,
     region_boundary,
     shapes,
-    unfolded_distance,
 )
 from heat_igl.heat_method import curve_levels
 from heat_igl.sources import oriented_set
@@ -83,7 +82,7 @@ def test_circles_converge_and_are_near_exact_when_refined(surface):
         mesh, circle, truth = surface(n)
         # The time step in proportion to h: in proportion to h^2, the directions of a grid stay in the normals.
         errors.append(mean_error(SignedHeatSolver(mesh, t_coef=n / 80).distance(circle), truth))
-        refined = SignedHeatSolver(mesh, refine="unfold").distance(circle)
+        refined = SignedHeatSolver(mesh, method="windows").distance(circle)
         polyhedral = np.copysign(geodesic_distance(mesh, circle, method="exact"), truth)
         assert mean_error(refined, polyhedral) < 2e-4
         of_mesh.append(mean_error(polyhedral, truth))
@@ -121,7 +120,7 @@ def test_signs_are_those_of_the_pieces(name, kind):
         "torus": lambda: shapes.torus(50, 24),
         "square": lambda: plane(34)[0],
     }[name]()
-    solvers = [SignedHeatSolver(mesh), SignedHeatSolver(mesh, refine="unfold")]
+    solvers = [SignedHeatSolver(mesh), SignedHeatSolver(mesh, method="windows")]
     rng = np.random.default_rng(7)
     for seed in range(3):
         waves = rng.normal(size=(3, 5)) * 2.5
@@ -132,7 +131,7 @@ def test_signs_are_those_of_the_pieces(name, kind):
         assert not left & right
         is_left = np.zeros(pieces.mesh.n_vertices, bool)
         is_left[pieces.mesh.F[np.isin(pieces.pieces, sorted(left))]] = True
-        far = unfolded_distance(mesh, curves) > mesh.edge_lengths.mean() / 2
+        far = geodesic_distance(mesh, curves) > mesh.edge_lengths.mean() / 2
         for solver in solvers:
             distance = solver.distance(curves)
             np.testing.assert_array_equal(distance[far] < 0, is_left[: mesh.n_vertices][far])
@@ -140,8 +139,8 @@ def test_signs_are_those_of_the_pieces(name, kind):
 
 def test_reversed_curves_change_the_sign_alone():
     mesh, circle, _ = plane(20)
-    for refine in (None, "unfold"):
-        solver = SignedHeatSolver(mesh, refine=refine)
+    for method in (None, "windows"):
+        solver = SignedHeatSolver(mesh, method=method)
         forward, backward = solver.distance(circle), solver.distance(reversed_curve(circle))
         np.testing.assert_allclose(backward, -forward, atol=1e-12)
 
@@ -177,8 +176,8 @@ def test_broken_circles(removed):
     width = 2 * np.pi / n_arcs
     arcs = [ring(mesh, start=i * width, end=(i + 1 - removed) * width) for i in range(n_arcs)]
     far = np.abs(truth) > 0.05
-    for refine, bound in ((None, 0.06), ("unfold", 0.04)):
-        distance = SignedHeatSolver(mesh, refine=refine).distance(arcs)
+    for method, bound in ((None, 0.06), ("windows", 0.04)):
+        distance = SignedHeatSolver(mesh, method=method).distance(arcs)
         assert mean_error(distance, truth) < bound
         np.testing.assert_array_equal(distance[far] < 0, truth[far] < 0)
 
@@ -190,8 +189,8 @@ def test_points_with_normals():
     places = closest_points(mesh, [0.5, 0.5, 0] + 0.3 * normals * [1, 1, 0]).points
     samples = OrientedPoints(places, normals)
     far = np.abs(truth) > 0.05
-    for refine in (None, "unfold"):
-        distance = SignedHeatSolver(mesh, refine=refine).distance(samples)
+    for method in (None, "windows"):
+        distance = SignedHeatSolver(mesh, method=method).distance(samples)
         assert mean_error(distance, truth) < 0.06
         np.testing.assert_array_equal(distance[far] < 0, truth[far] < 0)
     in_plane = OrientedPoints(places, normals[:, :2])
@@ -203,9 +202,9 @@ def test_points_with_normals():
 def test_unsigned_sources_among_the_curves():
     mesh, circle, truth = plane(34)
     points = [int(np.argmin(np.linalg.norm(mesh.V - p, axis=1))) for p in ([0.5, 0.5, 0], [0.05, 0.05, 0])]
-    solver = SignedHeatSolver(mesh, refine="unfold")
+    solver = SignedHeatSolver(mesh, method="windows")
     distance = solver.distance(circle, unsigned=points)
-    nearest = np.minimum(np.abs(solver.distance(circle)), unfolded_distance(mesh, points))
+    nearest = np.minimum(np.abs(solver.distance(circle)), geodesic_distance(mesh, points))
     np.testing.assert_allclose(np.abs(distance), nearest, atol=1e-12)
     np.testing.assert_array_equal(distance[points], 0)
     far = nearest > 1e-3
@@ -337,7 +336,7 @@ def test_vertices_on_curves_that_were_cut_are_exactly_zero():
     mesh, circle, _ = sphere(20)
     found = cut(mesh, circle)
     curve = [edge_curve(found.mesh, edge) for edge in found.edges]
-    distance = SignedHeatSolver(found.mesh, refine="unfold").distance(curve)
+    distance = SignedHeatSolver(found.mesh, method="windows").distance(curve)
     np.testing.assert_array_equal(distance[np.unique(found.edges)], 0)
 
 
@@ -345,8 +344,8 @@ def test_curves_come_in_lists_of_any_depth():
     mesh, _, _ = plane(20)
     nested = isolines(mesh, np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1), [0.2, 9, 0.4])
     flat = [curve for level in nested for curve in level]
-    for refine in (None, "unfold"):
-        solver = SignedHeatSolver(mesh, refine=refine)
+    for method in (None, "windows"):
+        solver = SignedHeatSolver(mesh, method=method)
         for level in ("zero", "constant"):
             np.testing.assert_array_equal(solver.distance(nested, level=level), solver.distance(flat, level=level))
     is_inside = mesh.V[:, 0] < 0.3
@@ -377,10 +376,10 @@ def test_components_without_a_curve_are_not_reached():
     one, circle, _ = plane(12)
     n = one.n_vertices
     both = Mesh(np.vstack([one.V, one.V + np.array([5, 0, 0]), [[9, 9, 9]]]), np.vstack([one.F, one.F + n]))
-    for refine in (None, "unfold"):
-        alone = SignedHeatSolver(one, refine=refine).distance(circle)
-        distance = SignedHeatSolver(both, refine=refine).distance(circle, unsigned=0 if refine else None)
-        if refine is None:
+    for method in (None, "windows"):
+        alone = SignedHeatSolver(one, method=method).distance(circle)
+        distance = SignedHeatSolver(both, method=method).distance(circle, unsigned=0 if method is not None else None)
+        if method is None:
             np.testing.assert_allclose(distance[:n], alone, atol=1e-9)
         np.testing.assert_array_equal(distance[n:], np.inf)
     # A small component keeps the time step of its own.
@@ -452,10 +451,10 @@ def test_bad_curves():
     assert np.isfinite(solver.distance(circle)).all()
 
 
-@pytest.mark.parametrize("refine", [None, "unfold"])
-def test_curves_that_contradict_each_other(refine):
+@pytest.mark.parametrize("method", [None, "windows"])
+def test_curves_that_contradict_each_other(method):
     mesh, circle, truth = plane(34)
-    solver = SignedHeatSolver(mesh, refine=refine)
+    solver = SignedHeatSolver(mesh, method=method)
     backward = reversed_curve(circle)
     with pytest.raises(SourceError, match="the normals of the curves cancel"):
         solver.distance([circle, backward])
@@ -470,27 +469,27 @@ def test_curves_that_contradict_each_other(refine):
     np.testing.assert_array_equal(solver.distance(arcs)[away] < 0, truth[away] < 0)
 
 
-@pytest.mark.parametrize("refine", [None, "unfold"])
-def test_regions_that_share_a_border(refine):
+@pytest.mark.parametrize("method", [None, "windows"])
+def test_regions_that_share_a_border(method):
     mesh, _, _ = plane(34)
     # Their loops run along each other, in opposite directions: both sides are inside.
     x, y, _ = mesh.V[mesh.F].mean(axis=1).T
     middle = np.maximum(np.abs(x - 0.5), np.abs(y - 0.5)) < 0.3
     loops = [region_boundary(mesh, faces=middle & half) for half in (x < 0.45, x >= 0.45)]
-    distance = SignedHeatSolver(mesh, refine=refine).distance(loops)
+    distance = SignedHeatSolver(mesh, method=method).distance(loops)
     from_rim = np.abs(mesh.V[:, :2] - 0.5).max(axis=1) - 0.3
     far = (np.abs(from_rim) > 0.05) & (np.abs(mesh.V[:, 0] - 0.45) > 0.05)
     assert far.sum() > 500
     np.testing.assert_array_equal(distance[far] < 0, from_rim[far] < 0)
 
 
-@pytest.mark.parametrize("refine", [None, "unfold"])
-def test_an_open_curve_has_a_left_and_a_right_beside_it(refine):
+@pytest.mark.parametrize("method", [None, "windows"])
+def test_an_open_curve_has_a_left_and_a_right_beside_it(method):
     mesh, _, truth = plane(34)
     arc = ring(mesh, end=np.pi)
     # A curve that only claims to be closed is open: the ends decide.
     claims = SurfaceCurve(arc.faces, arc.start, arc.end, is_closed=True)
-    solver = SignedHeatSolver(mesh, refine=refine)
+    solver = SignedHeatSolver(mesh, method=method)
     distance = solver.distance(arc)
     np.testing.assert_allclose(solver.distance(claims), distance, atol=1e-12)
     assert np.isfinite(distance).all()
@@ -515,7 +514,7 @@ def test_sides_come_from_the_cut_on_meshes_with_edges_of_more_than_two_faces():
 
 def test_an_open_path_along_edges_has_two_sides():
     mesh = shapes.grid(8)
-    distance = SignedHeatSolver(mesh, refine="unfold").distance(edge_curve(mesh, np.arange(36, 45)))
+    distance = SignedHeatSolver(mesh, method="windows").distance(edge_curve(mesh, np.arange(36, 45)))
     # Along y = 0.5 or x = 0.5, whichever way the grid counts: half of the square is on each side.
     assert (distance < 0).sum() == (distance > 0).sum() == 36
     assert np.abs(distance).max() == pytest.approx(0.5)

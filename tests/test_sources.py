@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from heat_igl import (
-    HeatMethodSolver,
+    GeodesicSolver,
     OffsetSources,
     SourceError,
     SurfaceCurve,
@@ -13,6 +13,7 @@ from heat_igl import (
     shapes,
     shortest_paths,
 )
+from heat_igl.geodesic import SolverChoice
 from heat_igl.sources import source_set, vertex_sources
 
 
@@ -140,11 +141,11 @@ def test_only_triangles_hold_points():
         vertex_sources(SurfacePoints([0], CENTRE), 5)
 
 
-@pytest.mark.parametrize("refine", [None, "sweep", "unfold", "exact"])
-def test_a_curve_without_length_is_a_point(refine):
+@pytest.mark.parametrize("method", ["heat", "sweep", "exact"])
+def test_a_curve_without_length_is_a_point(method):
     """The path from a vertex to itself emits no heat."""
     mesh = shapes.icosphere(2)
-    solver = HeatMethodSolver(mesh, refine=refine)
+    solver = SolverChoice(method).on(mesh)
     (path,) = shortest_paths(mesh, None, targets=3, sources=3)
     np.testing.assert_array_equal(solver.distance(path), solver.distance(3))
     inside = [[0.2, 0.5, 0.3]]
@@ -160,6 +161,6 @@ def test_lists_of_curves_may_be_nested():
     mesh = shapes.icosphere(2)
     lines = isolines(mesh, mesh.V[:, 2], [-0.3, 0.4])
     flat = [curve for level in lines for curve in level]
-    solver = HeatMethodSolver(mesh, refine="sweep")
+    solver = GeodesicSolver(mesh, method="sweep")
     np.testing.assert_array_equal(solver.distance(lines), solver.distance(flat))
     np.testing.assert_array_equal(solver.distance([lines, [3, 4]]), solver.distance([*flat, 3, 4]))

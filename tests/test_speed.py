@@ -23,8 +23,11 @@ def flat(mesh: Mesh, seed: int = 0) -> Mesh:
     return Mesh(V, mesh.F)
 
 
-def solver(mesh: Mesh, speed: FloatArray, **options: Any) -> heat_igl.HeatMethodSolver:
-    return heat_igl.HeatMethodSolver.from_operators(speed_operators(mesh, speed), **options)
+def solver(mesh: Mesh, speed: FloatArray, method: str | None = None, **options: Any) -> Any:
+    domain = speed_operators(mesh, speed)
+    if method in ("auto", "windows", "sweep", "exact"):
+        return heat_igl.GeodesicSolver(domain, method=method)
+    return heat_igl.HeatMethodSolver.from_operators(domain, **options)
 
 
 @pytest.mark.parametrize("mesh", [perturbed(shapes.torus(12, 30)), perturbed(shapes.box(4))], ids=["torus", "box"])
@@ -82,7 +85,7 @@ def test_stereographic_projection_of_a_hemisphere():
         source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0, 0], axis=1)))
         exact = np.arccos(np.clip(on_sphere @ on_sphere[source], -1, 1))
         speed = (1 + (mesh.V[mesh.F].mean(axis=1) ** 2).sum(axis=1)) / 2
-        by_heat, unfolded = (solver(mesh, speed, refine=refine).distance(source) for refine in (None, "unfold"))
+        by_heat, unfolded = (solver(mesh, speed, method=method).distance(source) for method in ("heat", "exact"))
         errors.append([np.abs(time - exact).mean() / exact.mean() for time in (by_heat, unfolded)])
     assert (np.array(errors[1]) < 0.65 * np.array(errors[0])).all()
     assert (np.array(errors[2]) < 0.65 * np.array(errors[1])).all()
@@ -146,15 +149,12 @@ def test_refraction_at_a_straight_border(speeds):
 def test_what_needs_triangles_that_fit_is_refused_at_jumps():
     mesh = shapes.grid(3)
     jump = speed_operators(mesh, np.where(np.arange(18) < 9, 1.0, 5.0))
-    for refine in ("unfold", "exact"):
-        with pytest.raises(ValueError, match="unfolds triangles by their edge lengths, and this domain has none"):
-            heat_igl.HeatMethodSolver.from_operators(jump, refine=refine)
-    np.testing.assert_array_equal(
-        heat_igl.HeatMethodSolver.from_operators(jump, refine="sweep").distance(0),
-        heat_igl.HeatMethodSolver.from_operators(jump).distance(0),
-    )
+    for method in ("windows", "exact"):
+        with pytest.raises(heat_igl.MeshError, match="needs triangles that fit together, and those of this metric"):
+            heat_igl.GeodesicSolver(jump, method=method)
+    assert heat_igl.GeodesicSolver(jump, method="sweep").plan.engine == "fronts"
     smooth = speed_operators(mesh, np.linspace(1, 1.05, 18))
-    assert heat_igl.HeatMethodSolver.from_operators(smooth, refine="exact").distance(0)[0] == 0
+    assert heat_igl.GeodesicSolver(smooth, method="exact").distance(0)[0] == 0
 
 
 @pytest.mark.parametrize(
@@ -184,9 +184,9 @@ def test_speed_that_grows_exponentially():
     speed = np.exp(k * mesh.V[mesh.F][:, :, 0].mean(axis=1))
     domain = speed_operators(mesh, speed)
     assert domain.contrast > 9e5
-    found = {refine: solver(mesh, speed, refine=refine).distance(source) for refine in (None, "sweep", "unfold")}
-    for refine, time in found.items():
-        assert np.nanmean(relative_error(time, exact)) < 0.003, refine
+    found = {method: solver(mesh, speed, method=method).distance(source) for method in ("heat", "sweep", "exact")}
+    for method, time in found.items():
+        assert np.nanmean(relative_error(time, exact)) < 0.003, method
 
 
 def test_faces_without_area_at_a_jump():

@@ -11,7 +11,7 @@ from conftest import shared_path
 from scipy.spatial import Delaunay, cKDTree
 
 import heat_igl
-from heat_igl import HeatMethodSolver, OffsetSources, SourceError, shapes
+from heat_igl import GeodesicSolver, HeatMethodSolver, MeshError, OffsetSources, SourceError, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.typing import BoolArray, FloatArray
@@ -58,7 +58,7 @@ def around_the_edge(V: FloatArray, source: int) -> FloatArray:
 @pytest.mark.parametrize("body", ["cube", "ball"])
 def test_straight_lines_in_convex_bodies(body):
     mesh = scattered(2500, body)
-    solver = HeatMethodSolver(mesh)
+    solver = GeodesicSolver(mesh)
     for source in (0, 700):
         exact = np.linalg.norm(mesh.V - mesh.V[source], axis=1)
         np.testing.assert_allclose(solver.distance(source), exact, rtol=2e-5, atol=1e-12)
@@ -70,7 +70,7 @@ def test_ways_around_an_edge(n, jitter):
     for corner in ([1, 0, 0], [2 / 3, 1 / 2, 5 / 6]):
         source = int(np.argmin(np.linalg.norm(mesh.V - corner, axis=1)))
         exact = around_the_edge(mesh.V, source)
-        found = HeatMethodSolver(mesh).distance(source)
+        found = GeodesicSolver(mesh).distance(source)
         assert (found >= exact * (1 - 1e-9)).all()
         assert (found <= exact * 1.005).all()
         assert np.abs(found - exact).mean() < 2e-5 * exact.mean()
@@ -83,7 +83,7 @@ def test_ways_around_two_edges():
     beyond = (mesh.V[:, 0] >= 2 / 3) & (mesh.V[:, 1] > 1 / 3)
     x, y, z = mesh.V[beyond].T
     flat = np.hypot(1 / 3, 2 / 3) + 1 / 3 + np.hypot(x - 2 / 3, y - 1 / 3)
-    found = HeatMethodSolver(mesh).distance(source)[beyond]
+    found = GeodesicSolver(mesh).distance(source)[beyond]
     np.testing.assert_allclose(found, np.hypot(flat, z), rtol=1e-9)
 
 
@@ -120,7 +120,7 @@ def test_ways_around_edges_that_are_not_parallel(n):
     mesh = without(n, lambda centre: (centre > 0.5).all(axis=1))
     source = int(np.argmin(np.linalg.norm(mesh.V - [1, 1, 0], axis=1)))
     exact = around_the_corner(mesh.V, source)
-    found = HeatMethodSolver(mesh).distance(source)
+    found = GeodesicSolver(mesh).distance(source)
     assert (exact > np.linalg.norm(mesh.V - mesh.V[source], axis=1) * (1 + 1e-6)).sum() > 4
     np.testing.assert_allclose(found, exact, rtol=2e-3)
 
@@ -133,14 +133,14 @@ def test_beyond_an_edge_at_which_two_bodies_touch():
     middle = np.hypot(0.5, 0.5)
     x, y, z = mesh.V.T
     exact = np.where(np.maximum(x, y) > 0.5, np.hypot(middle + np.hypot(x - 0.5, y - 0.5), z), exact)
-    found = HeatMethodSolver(mesh).distance(source)
+    found = GeodesicSolver(mesh).distance(source)
     np.testing.assert_allclose(found, exact, rtol=1e-9)
 
 
 def test_where_two_bodies_share_a_vertex():
     mesh = without(2, lambda centre: np.isin((centre > 0.5).sum(axis=1), [1, 2]), 0.0)
     middle = int(np.argmin(np.linalg.norm(mesh.V - 0.5, axis=1)))
-    found = HeatMethodSolver(mesh).distance(int(np.argmin(np.linalg.norm(mesh.V, axis=1))))
+    found = GeodesicSolver(mesh).distance(int(np.argmin(np.linalg.norm(mesh.V, axis=1))))
     beyond = mesh.V.max(axis=1) > 0.5
     through = np.sqrt(0.75) + np.linalg.norm(mesh.V - mesh.V[middle], axis=1)
     np.testing.assert_allclose(found[beyond], through[beyond], rtol=1e-9)
@@ -151,12 +151,12 @@ def test_nearest_of_many_sources(k):
     mesh = scattered(2500, "cube", 1)
     sources = np.random.default_rng(2).choice(mesh.n_vertices, k, replace=False)
     exact, nearest = cKDTree(mesh.V[sources]).query(mesh.V)
-    found = HeatMethodSolver(mesh).voronoi(sources)
+    found = GeodesicSolver(mesh).voronoi(sources)
     assert (found.distance >= exact - 1e-12).all()
     assert np.abs(found.distance - exact).mean() < 1e-5 * exact.mean()
     assert (found.distance <= 1.01 * exact).all()
     assert (found.labels == nearest).mean() > 0.999
-    rows = HeatMethodSolver(mesh).distances([sources, [5]])
+    rows = GeodesicSolver(mesh).distances([sources, [5]])
     np.testing.assert_array_equal(rows[0], found.distance)
 
 
@@ -165,7 +165,7 @@ def test_a_source_that_no_neighbour_belongs_to():
     mesh = scattered(2500, "cube", 2)
     sources = np.random.default_rng(2).choice(mesh.n_vertices, 400, replace=False)
     exact, nearest = cKDTree(mesh.V[sources]).query(mesh.V)
-    found = HeatMethodSolver(mesh).voronoi(sources)
+    found = GeodesicSolver(mesh).voronoi(sources)
     np.testing.assert_allclose(found.distance, exact, rtol=1e-9)
     np.testing.assert_array_equal(found.labels, nearest)
 
@@ -186,7 +186,7 @@ def test_walls_behind_a_sharp_edge():
         is_seen = np.abs(angle - angle[source]) <= np.pi + 1e-9
         around = np.hypot(radius + radius[source], z - z[source])
         exact = np.where(is_seen, np.linalg.norm(mesh.V - mesh.V[source], axis=1), around)
-        np.testing.assert_allclose(HeatMethodSolver(mesh).distance(int(source)), exact, rtol=2e-3, atol=1e-12)
+        np.testing.assert_allclose(GeodesicSolver(mesh).distance(int(source)), exact, rtol=2e-3, atol=1e-12)
 
 
 @pytest.mark.parametrize("k", [2, 5, 40])
@@ -195,7 +195,7 @@ def test_many_sources_around_an_edge(k):
     mesh = l_shape(12, 0.25)
     sources = np.random.default_rng(k).choice(mesh.n_vertices, k, replace=False)
     exact = np.min([around_the_edge(mesh.V, int(i)) for i in sources], axis=0)
-    found = HeatMethodSolver(mesh).distance(sources)
+    found = GeodesicSolver(mesh).distance(sources)
     assert (found >= exact * (1 - 1e-9)).all()
     assert np.abs(found - exact).mean() < 2e-5 * exact.mean()
     assert (found <= 1.01 * exact).all()
@@ -204,7 +204,7 @@ def test_many_sources_around_an_edge(k):
 def test_a_source_that_no_vertex_around_sees():
     """The line is found once a path that bends has told the vertex of the source."""
     octopus = heat_igl.read_mesh(shared_path("octopus_tets.mesh"))
-    found = HeatMethodSolver(octopus).distance(18)
+    found = GeodesicSolver(octopus).distance(18)
     assert found[284] == pytest.approx(np.linalg.norm(octopus.V[284] - octopus.V[18]), rel=1e-9)
     assert (found >= np.linalg.norm(octopus.V - octopus.V[18], axis=1) * (1 - 1e-9)).all()
 
@@ -227,8 +227,8 @@ def test_coarse_bodies_with_many_bends():
     octopus = heat_igl.read_mesh(shared_path("octopus_tets.mesh"))
     fine = MetricSimplices.in_space(octopus).halved().halved()
     for source in (375, 136):
-        exact = HeatMethodSolver(Mesh(fine.V, fine.corners)).distance(source)[: octopus.n_vertices]
-        solver = HeatMethodSolver(octopus)
+        exact = GeodesicSolver(Mesh(fine.V, fine.corners)).distance(source)[: octopus.n_vertices]
+        solver = GeodesicSolver(octopus)
         found = solver.distance(source)
         error = np.delete(found / np.where(exact > 0, exact, 1) - 1, source)
         assert np.abs(error).mean() < 5e-4
@@ -248,7 +248,7 @@ def test_a_line_is_not_followed_across_a_gap():
     F = np.where((centre[:, 0] > 0.5)[:, None], copies[box.F], box.F)
     mesh = Mesh(np.concatenate([box.V, box.V[on_slit]]), F)
     left, right = (int(np.argmin(np.linalg.norm(mesh.V - [x, 1, 0.5], axis=1))) for x in (0.25, 0.75))
-    found = HeatMethodSolver(mesh).distance([left, 0])
+    found = GeodesicSolver(mesh).distance([left, 0])
     assert found[right] == pytest.approx(2 * np.hypot(0.25, 0.5), rel=0.02)
 
 
@@ -259,7 +259,7 @@ def test_offsets_and_components():
     )
     corner, opposite = 0, cube.n_vertices - 1
     each = np.linalg.norm(cube.V[:, None] - cube.V[[corner, opposite]], axis=2) + np.array([0, 0.5])
-    found = HeatMethodSolver(two).voronoi(OffsetSources([corner, opposite], [0, 0.5]))
+    found = GeodesicSolver(two).voronoi(OffsetSources([corner, opposite], [0, 0.5]))
     np.testing.assert_allclose(found.distance[: cube.n_vertices], each.min(axis=1), atol=1e-9)
     assert np.isinf(found.distance[cube.n_vertices :]).all()
     assert (found.labels[cube.n_vertices :] == -1).all()
@@ -270,30 +270,26 @@ def test_vertices_of_no_tetrahedron():
     box = shapes.box(3)
     mesh = Mesh(np.concatenate([box.V, [[0.5, 0.5, 3.0]]]), box.F)
     exact = np.linalg.norm(box.V - box.V[5], axis=1)
-    solver = HeatMethodSolver(mesh)
+    solver = GeodesicSolver(mesh)
     for sources in (5, [5, box.n_vertices]):
         np.testing.assert_allclose(solver.distance(sources)[:-1], exact, rtol=1e-9)
     assert np.isinf(solver.distance(5)[-1])
     assert np.isinf(solver.distance(box.n_vertices)[:-1]).all()
 
 
-def test_the_method_of_the_paper_on_request():
-    """A magnitude, a time step, a boundary condition and the cotangent Laplacian ask for heat."""
+def test_fronts_are_what_all_methods_but_heat_and_windows_take():
     box = shapes.box(5)
-    solver = HeatMethodSolver(box)
-    assert solver.diagnostics.factor_nonzeros == 0
-    for options in ({"magnitude": "unit"}, {"t_coef": 1.0}, {"boundary": "average"}, {"laplacian": "cotan"}):
-        by_heat = HeatMethodSolver(box, **options)
-        assert by_heat.diagnostics.factor_nonzeros > 0
-        assert np.abs(by_heat.distance(0) - solver.distance(0)).max() > 0.01
-    np.testing.assert_array_equal(HeatMethodSolver(box, refine="sweep").distance(0), solver.distance(0))
-    # Heat is there for who looks at the steps.
-    np.testing.assert_allclose(solver.solve(0).heat, HeatMethodSolver(box, magnitude="unit").solve(0).heat, rtol=1e-9)
+    solver = GeodesicSolver(box)
+    assert (solver.plan.engine, solver.plan.tolerance) == ("fronts", None)
+    np.testing.assert_array_equal(GeodesicSolver(box, method="sweep").distance(0), solver.distance(0))
     again = pickle.loads(pickle.dumps(solver))
     np.testing.assert_array_equal(again.distance(7), solver.distance(7))
-    for refine in ("unfold", "exact"):
-        with pytest.raises(ValueError, match="unfolds triangles by their edge lengths, and this domain has none"):
-            HeatMethodSolver(box, refine=refine)
+    by_heat = HeatMethodSolver(box)
+    assert by_heat.plan.engine == "heat"
+    assert np.abs(by_heat.distance(0) - solver.distance(0)).max() > 0.01
+    for method in ("windows", "exact"):
+        with pytest.raises(MeshError, match=f"method='{method}' needs triangles .*, and the mesh holds tetrahedra"):
+            GeodesicSolver(box, method=method)
 
 
 def test_depth_below_a_surface():
@@ -301,7 +297,7 @@ def test_depth_below_a_surface():
     mesh = scattered(4000, "cube", 3)
     sources = np.flatnonzero(mesh.boundary)
     exact = cKDTree(mesh.V[sources]).query(mesh.V)[0]
-    found = HeatMethodSolver(mesh).distance(mesh.boundary)
+    found = GeodesicSolver(mesh).distance(mesh.boundary)
     inner = exact > 0
     assert (found >= exact - 1e-12).all()
     assert np.mean(found[inner] / exact[inner] - 1) < 1e-4
@@ -319,16 +315,16 @@ def test_depth_below_boundary_faces():
     walls = Mesh(mesh.V, mesh.facets.vertices[mesh.facets.n_faces == 1])
     depth = heat_igl.closest_points(walls, mesh.V).gap
     np.testing.assert_allclose(depth, np.minimum(mesh.V, 1 - mesh.V).min(axis=1), atol=1e-15)
-    assert (HeatMethodSolver(mesh).distance(mesh.boundary) >= depth - 1e-15).all()
+    assert (GeodesicSolver(mesh).distance(mesh.boundary) >= depth - 1e-15).all()
     with pytest.raises(
         SourceError, match="points and curves lie on triangles, and this domain has none: name vertices"
     ):
-        HeatMethodSolver(mesh).distance(heat_igl.SurfacePoints([3], [[0.2, 0.3, 0.5]]))
+        GeodesicSolver(mesh).distance(heat_igl.SurfacePoints([3], [[0.2, 0.3, 0.5]]))
 
 
 def test_units_and_places_play_no_part():
     mesh = scattered(600, "ball", 4)
-    distance = HeatMethodSolver(mesh).distance(3)
+    distance = GeodesicSolver(mesh).distance(3)
     for unit in (1e-12, 1e12):
         moved = Mesh(unit * (mesh.V + 7), mesh.F)
         np.testing.assert_allclose(heat_igl.geodesic_distance(moved, 3, method="sweep") / unit, distance, rtol=1e-4)

@@ -133,7 +133,7 @@ def test_zero_leads_to_the_source(sphere):
 
 def test_geodesics_along_shortest_paths_reach_their_targets(sphere):
     frames = tangent_frames(sphere)
-    solver = heat_igl.HeatMethodSolver(sphere, refine="unfold")
+    solver = heat_igl.GeodesicSolver(sphere, method="exact")
     source, targets = 11, np.arange(100, 2500, 40)
     for target, path in zip(targets, heat_igl.shortest_paths(sphere, solver, targets, source), strict=True):
         face, at = int(path.faces[-1]), path.end[-1]

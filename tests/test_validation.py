@@ -220,7 +220,7 @@ def test_without_a_reference_the_rest_of_the_report_stands(monkeypatch: pytest.M
         raise heat_igl.ReferenceSolverError("at 1 vertices connected with the sources two surfaces touch in a point")
 
     monkeypatch.setattr(reference, "measured", refusing)
-    report = validate(TOUCHING, 1, ["heat", "unfold", "exact"])
+    report = validate(TOUCHING, 1, ["heat", "windows", "exact"])
     assert report.failure is not None
     assert "two surfaces touch in a point" in report.failure
     assert (report.reference, report.truths) == ("exact", None)
@@ -262,7 +262,7 @@ def test_references_of_ones_own() -> None:
     assert by_array.rows[0].errors == by_function.rows[0].errors
     assert by_array.rows[0].errors.mean == pytest.approx(by_exact.rows[0].errors.mean, rel=1e-9)  # type: ignore[union-attr]
     box = shapes.box(4)
-    report = validate(box, 0, ["heat", "exact", "unfold"], closed_forms.convex_solid)
+    report = validate(box, 0, ["heat", "exact", "windows"], closed_forms.convex_solid)
     assert report.rows[0].errors is not None
     assert "works on triangles" in str(report.rows[1].failure)
     assert report.rows[2].failure is not None
@@ -275,7 +275,7 @@ def test_rows_of_other_domains() -> None:
     """Methods of this package take the points of a cloud, not its triangles; fronts are right in a solid."""
     P = np.random.default_rng(0).standard_normal((1500, 3))
     cloud = heat_igl.PointCloud(P / np.linalg.norm(P, axis=1, keepdims=True))
-    report = validate(cloud, [[0], [9]], ["heat", "unfold"], closed_forms.sphere)
+    report = validate(cloud, [[0], [9]], ["heat", "windows"], closed_forms.sphere)
     by_heat = HeatMethodSolver(cloud, magnitude="damped")
     assert report.rows[0].parameters["t"] == by_heat.t
     np.testing.assert_array_equal(report.distances["heat"], by_heat.distances([0, 9]))
@@ -292,7 +292,7 @@ def test_methods_take_polygons() -> None:
     V = shapes.grid(6).V
     first = (np.arange(6)[:, None] * 7 + np.arange(6)).ravel()
     quads = heat_igl.PolygonMesh(V, np.stack([first, first + 1, first + 8, first + 7], axis=1))
-    report = validate(quads, 0, ["heat", "unfold"], closed_forms.plane)
+    report = validate(quads, 0, ["heat", "windows"], closed_forms.plane)
     np.testing.assert_array_equal(report.distances["heat"][0], HeatMethodSolver(quads).distance(0))
     assert (report.distances["heat"][0] != HeatMethodSolver(quads.triangles).distance(0)).any()
     assert report.rows[1].errors is not None
@@ -320,7 +320,7 @@ def test_several_sources_have_no_asymmetry() -> None:
 
 def test_unknown_repeated_and_no_methods_are_refused() -> None:
     mesh = shapes.grid(3)
-    with pytest.raises(ValueError, match="'magic' is unknown: choose from heat, sweep, unfold, meshlab"):
+    with pytest.raises(ValueError, match="'magic' is unknown: choose from heat, sweep, windows, meshlab"):
         validate(mesh, 0, ["magic"])
     with pytest.raises(ValueError, match="'magic' is unknown"):
         validate(mesh, 0, ["heat"], "magic")
@@ -330,7 +330,7 @@ def test_unknown_repeated_and_no_methods_are_refused() -> None:
         validate(mesh, 0, ["heat", "heat"])
     with pytest.raises(ValueError, match="'heat' names a method of the package"):
         validate(mesh, 0, [("heat", HeatMethodSolver)])
-    assert set(validation.METHODS) >= {"heat", "sweep", "unfold", "meshlab", "igl", "potpourri3d", "exact"}
+    assert set(validation.METHODS) >= {"heat", "sweep", "windows", "meshlab", "igl", "potpourri3d", "exact"}
 
 
 def test_drawn_sources_are_on_the_largest_component_and_repeat_with_the_seed() -> None:

@@ -249,8 +249,7 @@ def test_a_large_sphere_is_finite_and_right():
     assert error.max() < np.radians(1.3)
 
 
-@pytest.mark.parametrize("refine", ["unfold", "exact"])
-def test_transport_around_the_corner_of_a_box_turns_by_a_right_angle(refine):
+def test_transport_around_the_corner_of_a_box_turns_by_a_right_angle():
     """The holonomy of a triangle of geodesics is the curvature inside: pi / 2 around a corner, else 0."""
     solid = shapes.box(8)
     faces = igl.boundary_facets(solid.F)[0]
@@ -262,7 +261,7 @@ def test_transport_around_the_corner_of_a_box_turns_by_a_right_angle(refine):
     def vertex(*place: float) -> int:
         return int(np.argmin(np.linalg.norm(at - place, axis=1)))
 
-    solver = VectorHeatSolver(mesh, refine=refine)
+    solver = VectorHeatSolver(mesh, method="windows")
 
     def holonomy(*loop: int) -> complex:
         turned = 1.0 + 0j
@@ -277,10 +276,9 @@ def test_transport_around_the_corner_of_a_box_turns_by_a_right_angle(refine):
     )
 
 
-@pytest.mark.parametrize("refine", ["unfold", "exact"])
 @pytest.mark.parametrize("mesh", [shapes.strip(1500, 3), flat_perturbed(shapes.grid(15))])
-def test_transport_along_paths_in_the_plane_changes_nothing(mesh, refine):
-    solver = VectorHeatSolver(mesh, refine=refine)
+def test_transport_along_paths_in_the_plane_changes_nothing(mesh):
+    solver = VectorHeatSolver(mesh, method="windows")
     frames, source = solver.frames, mesh.n_vertices // 3
     transported = frames.to_world(solver.transport(source, frames.from_world([[0.6, -0.8, 0]], [source])))
     np.testing.assert_allclose(transported, np.broadcast_to([0.6, -0.8, 0], transported.shape), atol=1e-8)
@@ -290,7 +288,7 @@ def test_transport_along_paths_converges_on_the_sphere():
     errors = []
     for level in (3, 4, 5):
         mesh = shapes.icosphere(level)
-        solver = VectorHeatSolver(mesh, refine="unfold")
+        solver = VectorHeatSolver(mesh, method="windows")
         frames, p = solver.frames, mesh.V[0]
         near = np.flatnonzero((mesh.V @ p > -0.5) & (mesh.V @ p < 1))
         expected = frames.from_world(sphere_transport(p, mesh.V, frames.to_world([[1.0, 0]], [0])[0]))
@@ -300,9 +298,9 @@ def test_transport_along_paths_converges_on_the_sphere():
 
 
 def test_along_paths_the_nearest_source_alone_counts(sphere):
-    solver = VectorHeatSolver(sphere, refine="exact")
+    solver = VectorHeatSolver(sphere, method="windows")
     sources = [40, 7, 40]
-    labels = heat_igl.HeatMethodSolver(sphere, refine="exact").voronoi([40, 7]).labels
+    labels = heat_igl.GeodesicSolver(sphere, method="exact").voronoi([40, 7]).labels
     np.testing.assert_allclose(solver.extend(sources, [1.0, 5.0, 2.0]), np.where(labels == 0, 1.5, 5.0))
     length = np.hypot(*solver.transport(sources, [[1, 0], [3, 4], [0, 1]]).T)
     np.testing.assert_allclose(length, np.where(labels == 0, np.sqrt(0.5), 5.0))

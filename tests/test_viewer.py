@@ -17,6 +17,7 @@ import heat_igl
 from heat_igl import shapes
 from heat_igl.drawing import exploration, viewer
 from heat_igl.drawing.viewer import Exploration
+from heat_igl.geodesic import SolverChoice
 from heat_igl.heat_method import SolverOptions
 
 
@@ -47,16 +48,14 @@ def test_options_change_the_distance_as_they_change_the_solver(sphere: heat_igl.
     half = heat_igl.Mesh(sphere.V, sphere.F[sphere.V[sphere.F].mean(axis=1)[:, 2] > 0])
     source = int(half.F[0, 0])
     now = Exploration(half, source)
-    for options in ({"t_coef": 4.0}, {"boundary": "dirichlet"}, {"refine": "sweep"}):
+    for options in ({"method": "heat"}, {"t_coef": 4.0}, {"boundary": "dirichlet"}, {"method": "sweep"}):
         now.change(**options)
-        expected = heat_igl.HeatMethodSolver(
-            half, t_coef=now.options.t_coef, boundary=now.options.boundary, refine=now.options.refine
-        ).distance(source)
+        expected = now.options.on(half).distance(source)
         np.testing.assert_array_equal(now.distance, expected)
-        assert "factored anew" in now.message
-    assert now.options == SolverOptions(4.0, boundary="dirichlet", refine="sweep")
-    now.change(refine=None)
-    assert "factored anew" not in now.message
+        assert "prepared anew" in now.message
+    assert now.options == SolverChoice("sweep", heat=SolverOptions(4.0, boundary="dirichlet"))
+    now.change(method="heat")
+    assert "prepared anew" not in now.message
     assert "out of reach" in now.message
 
 
@@ -114,7 +113,7 @@ def test_directions_and_log_maps_follow_the_source(sphere: heat_igl.Mesh) -> Non
         now.choose(source)
         found = now.directions()
         assert found is not None
-        expected = heat_igl.HeatMethodSolver(sphere, refine="unfold").directions(source)
+        expected = heat_igl.GeodesicSolver(sphere, method="exact").directions(source)
         np.testing.assert_array_equal(found.gradient, expected.gradient)
         np.testing.assert_allclose(now.log_map(), heat_igl.log_map(sphere, source), atol=0.02)
     tetrahedra = Exploration(shapes.box(2), 0)
@@ -234,7 +233,7 @@ def middle(label, across=0.2):
 click(*middle("error against exact (takes seconds)"))
 out["error"] = now.message
 click(*middle("t / h^2", 0.6))
-out["t_coef"] = now.options.t_coef
+out["t_coef"] = now.options.heat.t_coef
 out["error_gone"] = now.error is None
 def pick(label, steps):
     click(*middle(label))
@@ -242,9 +241,9 @@ def pick(label, steps):
     # The list opens below: its items are lines of text, with the usual distance between them.
     line, below = gui.GetTextLineHeightWithSpacing(), places[label][1][1] + gui.GetStyle().WindowPadding[1]
     click(x, int(below + (steps + 0.4) * line))
-for label, steps in (("boundary", 1), ("refine", 2)):
+for label, steps in (("boundary", 1), ("method", 3)):
     pick(label, steps)
-out["boundary"], out["refine"] = now.options.boundary, now.options.refine
+out["boundary"], out["method"] = now.options.heat.boundary, now.options.method
 out["sources_at_end"] = now.sources.tolist()
 click(3 * width // 4, height - 5)
 out["beside"] = now.sources.tolist()
@@ -323,7 +322,7 @@ def test_a_click_in_the_window_picks_a_vertex(tmp_path: Path) -> None:
     assert out["error"].startswith(("error ", "no exact distance"))
     assert out["t_coef"] > 1.5
     assert out["error_gone"]
-    assert (out["boundary"], out["refine"]) == ("dirichlet", "unfold")
+    assert (out["boundary"], out["method"]) == ("dirichlet", "sweep")
     assert out["shown"] == ["log map", "height", "distance"]
     assert out["directions"]
     np.testing.assert_allclose(out["exact"], heat_igl.geodesic_distance(mesh, out["both"], method="exact"), atol=1e-9)

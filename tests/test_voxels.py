@@ -7,6 +7,7 @@ import pytest
 
 import heat_igl
 from heat_igl import (
+    GeodesicSolver,
     HeatMethodSolver,
     Mesh,
     MeshError,
@@ -87,7 +88,7 @@ def test_planar_positions():
     V = np.array([[0, 0], [3, 0], [3, 4], [0, 4]])
     mesh = Mesh(V, [[0, 1, 2], [0, 2, 3]])
     np.testing.assert_array_equal(mesh.V, np.append(V, np.zeros((4, 1)), axis=1))
-    assert HeatMethodSolver(V, [[0, 1, 3], [1, 2, 3]], refine="exact").distance(0).tolist() == [0, 3, 5, 4]
+    assert GeodesicSolver(V, [[0, 1, 3], [1, 2, 3]], method="exact").distance(0).tolist() == [0, 3, 5, 4]
     np.testing.assert_array_equal(mesh.with_vertices(2 * V).V, 2 * mesh.V)
     assert PolygonMesh(V, [[0, 1, 2, 3]]).V.shape == (4, 3)
     assert PointCloud(V).P.shape == (4, 3)
@@ -109,7 +110,6 @@ FLAT = shapes.disk(6)
 TAKE_POSITIONS = {
     "HeatMethodSolver": lambda V: HeatMethodSolver(V, FLAT.F).distance(3),
     "heat_method_distance": lambda V: heat_igl.heat_method_distance(V, FLAT.F, 3),
-    "unfolded_distance": lambda V: heat_igl.unfolded_distance(V, FLAT.F, 3),
     "geodesic_distance": lambda V: heat_igl.geodesic_distance((V, FLAT.F), 3),
     "closest_points": lambda V: heat_igl.closest_points(FLAT, V[:5] / 2).points.barycentric,
     "curve_on": lambda V: heat_igl.curve_on(FLAT, V[[0, 4, 9]]).start,

@@ -1,7 +1,7 @@
 """Applications of geodesic distance: maps on a cortex, errors of matches, search on edges, particles in images.
 
-notebooks/10_applications.ipynb shows them. `heat_igl.torch` and `heat_igl.jax`, distance as a function that PyTorch and
-JAX differentiate, are imported by these names alone.
+notebooks/10_applications.ipynb shows them. `heat_igl.applications.torch` and `heat_igl.applications.jax`, distance as a
+function that PyTorch and JAX differentiate, are imported by these names alone.
 """
 
 from __future__ import annotations

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.geodesic import Solver, SolverChoice
+from heat_igl.mesh import Mesh
 
-__all__ = ["check_positions", "solver_on"]
+__all__ = ["Solver", "check_positions", "solver_on"]
 
 
 def check_positions(shape: tuple[int, ...], is_floating: bool, kind: str) -> None:
@@ -19,11 +20,11 @@ def check_positions(shape: tuple[int, ...], is_floating: bool, kind: str) -> Non
         raise ValueError(f"V must have shape (n, 3), but it has shape {tuple(shape)}")
 
 
-def solver_on(V: Any, F: Any, solver: HeatMethodSolver | None, options: dict[str, Any]) -> HeatMethodSolver:
+def solver_on(V: Any, F: Any, solver: Solver | None, options: dict[str, Any]) -> Solver:
     """A solver on positions V (n, 3) and faces F, made from `solver` by moving its vertices if it is given."""
     positions = np.asarray(V, np.float64)
     if solver is None:
-        return HeatMethodSolver(positions, F, **options)
+        return SolverChoice.of(**options).on(Mesh(positions, F))
     if options:
         raise ValueError(f"{', '.join(options)} cannot be changed: the solver that was passed has its options")
     return solver.with_vertices(positions)

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.applications.differentiable import check_positions, solver_on
+from heat_igl.applications.differentiable import Solver, check_positions, solver_on
 from heat_igl.errors import MissingExtraError
-from heat_igl.heat_method import HeatMethodSolver
 
-with MissingExtraError.guard("heat_igl.jax", "jax", "jax"):
+with MissingExtraError.guard("heat_igl.applications.jax", "jax", "jax"):
     import jax
     import jax.numpy as jnp
 
@@ -23,8 +22,8 @@ def geodesic_distance(
     F: Any,
     sources: Any,
     *,
-    refine: str | None = "unfold",
-    solver: HeatMethodSolver | None = None,
+    method: str | None = None,
+    solver: Solver | None = None,
     **options: Any,
 ) -> Any:
     """Distance from `sources`, differentiable by `V` in reverse mode, also under ``jax.jit``.
@@ -33,8 +32,8 @@ def geodesic_distance(
     ----------
     V : (n, 3) array of float32 or float64
         Positions of the vertices; may be traced.
-    F, sources, refine, solver, options
-        As for `heat_igl.torch.geodesic_distance`; not traced.
+    F, sources, method, solver, options
+        As for `heat_igl.applications.torch.geodesic_distance`; not traced.
 
     Returns
     -------
@@ -47,19 +46,19 @@ def geodesic_distance(
     TypeError
         If V does not hold floating-point numbers.
     ValueError
-        If V has another shape, and as `HeatMethodSolver.distance_vjp`; under ``jit`` JAX wraps errors of the callback.
+        If V has another shape, and as `GeodesicSolver.distance_vjp`; under ``jit`` JAX wraps errors of the callback.
     """
     positions = jnp.asarray(V)
     check_positions(positions.shape, bool(jnp.issubdtype(positions.dtype, jnp.floating)), str(positions.dtype))
     if solver is None:
-        options = {"refine": refine, **options}
+        options = {"method": method, **options}
     return _Host(F, sources, solver, options).distance()(positions)
 
 
 class _Host:
     """The calls that run outside of JAX."""
 
-    def __init__(self, F: Any, sources: Any, solver: HeatMethodSolver | None, options: dict[str, Any]) -> None:
+    def __init__(self, F: Any, sources: Any, solver: Solver | None, options: dict[str, Any]) -> None:
         self._F = None if F is None else np.asarray(F)
         self._sources, self._solver, self._options = sources, solver, options
 

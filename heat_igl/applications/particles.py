@@ -12,7 +12,7 @@ import numpy as np
 from scipy import ndimage
 
 from heat_igl.errors import MeshError, MissingExtraError, SourceError
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.geodesic import Solver, SolverChoice
 from heat_igl.mesh import ImageDomain, image_domain
 from heat_igl.sampling import diameter
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, IntArray
@@ -35,7 +35,7 @@ def reconstruct(mask: ArrayLike, markers: ArrayLike, radius: float = np.inf, **o
     radius : float
         Largest geodesic distance from a marker, in pixels; a finite radius gives a geodesic dilation.
     **options
-        As for `HeatMethodSolver`.
+        `method` and `tolerance`, as for `geodesic_distance`, or options of `HeatMethodSolver`.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def zones_of_influence(mask: ArrayLike, markers: ArrayLike, **options: Any) -> I
     markers : (rows, columns) array_like of int
         The number of the marker at each pixel, 0 for no marker.
     **options
-        As for `HeatMethodSolver`.
+        `method` and `tolerance`, as for `geodesic_distance`, or options of `HeatMethodSolver`.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def particle_length(mask: ArrayLike, **options: Any) -> tuple[float, tuple[int, 
     mask : (rows, columns) array_like of bool
         One particle.
     **options
-        As for `HeatMethodSolver`.
+        `method` and `tolerance`, as for `geodesic_distance`, or options of `HeatMethodSolver`.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def skeleton(mask: ArrayLike, shortest_branch: float, **options: Any) -> BoolArr
     shortest_branch : float
         Smallest length of a branch, in pixels.
     **options
-        As for `HeatMethodSolver`.
+        `method` and `tolerance`, as for `geodesic_distance`, or options of `HeatMethodSolver`.
 
     Returns
     -------
@@ -181,9 +181,9 @@ def skeleton(mask: ArrayLike, shortest_branch: float, **options: Any) -> BoolArr
     return np.asarray(thin & ~is_short[branch])
 
 
-def _solver(mask: ArrayLike, options: dict[str, Any]) -> tuple[ImageDomain, HeatMethodSolver]:
+def _solver(mask: ArrayLike, options: dict[str, Any]) -> tuple[ImageDomain, Solver]:
     domain = image_domain(mask)
-    return domain, HeatMethodSolver(domain.mesh, **options)
+    return domain, SolverChoice.of(**options).on(domain.mesh)
 
 
 def _pixel(domain: ImageDomain, vertex: int) -> tuple[int, int]:

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.applications.differentiable import check_positions, solver_on
+from heat_igl.applications.differentiable import Solver, check_positions, solver_on
 from heat_igl.errors import MissingExtraError
-from heat_igl.heat_method import HeatMethodSolver
 
-with MissingExtraError.guard("heat_igl.torch", "torch", "torch"):
+with MissingExtraError.guard("heat_igl.applications.torch", "torch", "torch"):
     import torch
     from torch.autograd.function import once_differentiable
 
@@ -22,8 +21,8 @@ def geodesic_distance(
     F: Any,
     sources: Any,
     *,
-    refine: str | None = "unfold",
-    solver: HeatMethodSolver | None = None,
+    method: str | None = None,
+    solver: Solver | None = None,
     **options: Any,
 ) -> torch.Tensor:
     """Distance from `sources`, differentiable by `V`.
@@ -35,14 +34,14 @@ def geodesic_distance(
     F : (m, 3) tensor or array_like of int
         Triangles.
     sources : sources
-        As for `HeatMethodSolver.distance`; a tensor of vertices too.
-    refine : {"unfold", "exact", None}
-        As for `HeatMethodSolver`; None is the heat method.
-    solver : HeatMethodSolver, optional
-        A solver on the same faces, with its own options: what the faces alone say is not found again. `F` and `refine`
+        As for `GeodesicSolver.distance`; a tensor of vertices too.
+    method : {"auto", "windows", "exact", "heat"}, optional
+        As for `heat_igl.geodesic_distance`.
+    solver : GeodesicSolver or HeatMethodSolver, optional
+        A solver on the same faces, with its own options: what the faces alone say is not found again. `F` and `method`
         are not read then.
     **options
-        As for `HeatMethodSolver`.
+        `tolerance`, and those of `HeatMethodSolver`.
 
     Returns
     -------
@@ -54,15 +53,15 @@ def geodesic_distance(
     TypeError
         If V is no tensor of floating-point numbers.
     ValueError
-        If V is on another device or has another shape, and as `HeatMethodSolver.distance_vjp`.
+        If V is on another device or has another shape, and as `GeodesicSolver.distance_vjp`.
     """
     if not isinstance(V, torch.Tensor):
-        raise TypeError(f"V must be a tensor, not {type(V).__name__}: use HeatMethodSolver.distance_vjp for arrays")
+        raise TypeError(f"V must be a tensor, not {type(V).__name__}: use GeodesicSolver.distance_vjp for arrays")
     if V.device.type != "cpu":
         raise ValueError(f"V is on the device {V.device}, and distance is found on the processor: pass V.cpu()")
     check_positions(tuple(V.shape), V.is_floating_point(), str(V.dtype))
     if solver is None:
-        options = {"refine": refine, **options}
+        options = {"method": method, **options}
     result: torch.Tensor = _Distance.apply(V, _as_array(F), _as_array(sources), solver, options)
     return result
 
@@ -76,9 +75,7 @@ class _Distance(torch.autograd.Function):
     """Keeps the derivative of the answer between the two passes."""
 
     @staticmethod
-    def forward(
-        ctx: Any, V: Any, F: Any, sources: Any, solver: HeatMethodSolver | None, options: dict[str, Any]
-    ) -> Any:
+    def forward(ctx: Any, V: Any, F: Any, sources: Any, solver: Solver | None, options: dict[str, Any]) -> Any:
         on_V = solver_on(V.detach().numpy(), F, solver, options)
         distance, ctx.pull_back = on_V.distance_vjp(sources)
         return torch.from_numpy(distance).to(V.dtype)

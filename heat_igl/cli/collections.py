@@ -11,9 +11,8 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from heat_igl.cli.options import JsonOption, PointsOption, choice, one_of
+from heat_igl.cli.options import JsonOption, MethodOption, PointsOption, ToleranceOption, one_of
 from heat_igl.cli.output import check_json, print_json, prints_json, say
-from heat_igl.heat_method import Refine
 
 __all__ = ["batch"]
 
@@ -26,7 +25,8 @@ def batch(
     ] = "all",
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler; else this machine.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; one a processor.")] = None,
-    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
+    method: MethodOption = None,
+    tolerance: ToleranceOption = 1e-5,
     dtype: Annotated[str, typer.Option(help="Of the distances.", callback=one_of(("float32", "float64")))] = "float32",
     points: PointsOption = False,
     log: Annotated[Path | None, typer.Option(help="File for a log of meshes and blocks.")] = None,
@@ -40,7 +40,8 @@ def batch(
     meshes = cluster.folder(folder, points)
     plan = sources if sources == "all" or sources.startswith("farthest:") else cluster.read_source_sets(sources)
     options: dict[str, Any] = {
-        "refine": refine,
+        "method": method,
+        "tolerance": tolerance,
         "dtype": dtype,
         "points": points,
         "progress": Console(stderr=True).is_terminal,

@@ -9,6 +9,7 @@ import numpy as np
 
 from heat_igl import reference
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
+from heat_igl.geodesic import GeodesicSolver
 from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
@@ -53,20 +54,18 @@ def demonstrate(out: Path) -> _Rows:
     rows.append((name, f"{mesh.n_vertices} vertices, {mesh.n_faces} triangles ({_since(start)} to read or make)"))
 
     start = time.perf_counter()
-    solver = HeatMethodSolver(mesh)
-    rows.append(("precomputation", f"{_since(start)} ({solver.diagnostics.backend})"))
+    solver = GeodesicSolver(mesh)
+    rows.append(("preparation", f"{_since(start)} ({solver.plan})"))
     start = time.perf_counter()
     phi = solver.distance(_SOURCE)
     rows.append(("one distance", f"{_since(start)} from vertex {_SOURCE}, farthest {phi.max():.4f}"))
-    unfolded = None
-    try:
-        refined = HeatMethodSolver(mesh, refine="unfold")
-        start = time.perf_counter()
-        unfolded = refined.distance(_SOURCE)
-        rows.append(("one unfolded", f'{_since(start)} with refine="unfold"'))
-    except MissingExtraError as error:
-        rows.append(("unfolding", f"left out: {error}"))
-    rows += _compared(mesh, phi, unfolded)
+    start = time.perf_counter()
+    heat = HeatMethodSolver(mesh)
+    rows.append(("preparation of heat", f"{_since(start)} ({heat.diagnostics.backend})"))
+    start = time.perf_counter()
+    by_heat = heat.distance(_SOURCE)
+    rows.append(("one distance by heat", _since(start)))
+    rows += _compared(mesh, phi, by_heat)
 
     write_mesh(ply, mesh, distance=phi)
     rows.append(("wrote", f"{ply} (distance as vertex attribute)"))
@@ -78,16 +77,18 @@ def _since(start: float) -> str:
     return f"{time.perf_counter() - start:.3f} s"
 
 
-def _compared(mesh: Mesh, phi: FloatArray, unfolded: FloatArray | None) -> _Rows:
-    """Rows with the errors of the heat method, the unfolding and MeshLab, or the reason for leaving them out."""
+def _compared(mesh: Mesh, phi: FloatArray, by_heat: FloatArray) -> _Rows:
+    """Rows with the errors of windows, the heat method and MeshLab, or the reason for leaving them out."""
     try:
         start = time.perf_counter()
         exact = reference.exact(mesh, _SOURCE)
     except (MissingExtraError, ReferenceSolverError) as error:
         return [("exact", f"left out: {error}")]
-    rows = [("exact polyhedral", f"{_since(start)}"), ("error of heat", _error(phi, exact))]
-    if unfolded is not None:
-        rows.append(("error of unfolding", _error(unfolded, exact)))
+    rows = [
+        ("exact polyhedral", f"{_since(start)}"),
+        ("error of windows", _error(phi, exact)),
+        ("error of heat", _error(by_heat, exact)),
+    ]
     try:
         rows.append(("error of MeshLab", _error(reference.meshlab(mesh, _SOURCE), exact)))
     except (MissingExtraError, ReferenceSolverError) as error:

@@ -4,29 +4,28 @@ from __future__ import annotations
 
 import time
 import warnings
-from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from rich.console import Console
 
 import heat_igl
-from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, choice, position, positive
+from heat_igl.cli.options import (
+    JsonOption,
+    MeshArgument,
+    MethodOption,
+    PointsOption,
+    ToleranceOption,
+    choice,
+    position,
+    positive,
+)
 from heat_igl.cli.output import Row, check_curves, check_json, check_outputs, described, print_rows, write_distance
 from heat_igl.errors import SourceError
-from heat_igl.heat_method import (
-    Backend,
-    Boundary,
-    DistanceMethod,
-    HeatMethodSolver,
-    Laplacian,
-    Magnitude,
-    Refine,
-    SolverOptions,
-    geodesic_distance,
-)
+from heat_igl.geodesic import SolverChoice
+from heat_igl.heat_method import Backend, Boundary, HeatMethodSolver, Laplacian, Magnitude
 from heat_igl.io import is_flat, read_mesh_or_cloud
 from heat_igl.mesh import Mesh, PointCloud, as_simplices, closest_points
 from heat_igl.sources import vertex_sources
@@ -50,10 +49,8 @@ def distance(
     at: Annotated[
         list[str] | None, typer.Option(metavar="X,Y,Z", help="Source at the closest point of the surface; repeatable.")
     ] = None,
-    method: Annotated[
-        str | None,
-        choice(DistanceMethod, "Default: unfold, near-exact; heat with one of the options of heat."),
-    ] = None,
+    method: MethodOption = None,
+    tolerance: ToleranceOption = 1e-5,
     cutoff: Annotated[float | None, typer.Option(help="Distances beyond this are inf.", callback=positive)] = None,
     output: Annotated[
         Path | None, typer.Option(help="PLY, VTU, VTP or GIFTI file for mesh and distance, or NPY or CSV file for it.")
@@ -66,7 +63,6 @@ def distance(
     laplacian: Annotated[str, choice(Laplacian, "Heat: triangulation to solve on.")] = "auto",
     boundary: Annotated[str, choice(Boundary, "Heat: what heat does at the boundary.")] = "neumann",
     magnitude: Annotated[str, choice(Magnitude, "Heat: length of the field that is integrated.")] = "auto",
-    refine: Annotated[str | None, choice(Refine, "Heat: unfold triangles in its order, near-exact; or exact.")] = None,
     backend: Annotated[str, choice(Backend, "Heat: linear solver.")] = "auto",
     points: PointsOption = False,
     json_file: JsonOption = None,
@@ -84,70 +80,61 @@ def distance(
         gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap), gap.tolist())]
     check_outputs(loaded, output, picture)
     check_json(json_file)
-    options = SolverOptions(
-        t_coef,
-        t,
-        cast(Laplacian, laplacian),
-        cast(Boundary, boundary),
-        cast(Magnitude, magnitude),
-        cast(Refine | None, refine),
-        cast(Backend, backend),
+    chosen = _choice(
+        method,
+        tolerance,
+        t_coef=t_coef,
+        t=t,
+        laplacian=laplacian,
+        boundary=boundary,
+        magnitude=magnitude,
+        backend=backend,
     )
-    chosen = _method(method, options)
     with Console(stderr=True).status("measuring"):
-        _warm_up(loaded, chosen, options)
-        phi, about = _measured(loaded, sources, chosen, options, cutoff)
+        _warm_up(loaded, chosen)
+        phi, about = _measured(loaded, sources, chosen, cutoff)
     written = _write(loaded, phi, vertices, output, picture)
-    rows = [*_summary(mesh, loaded, phi, cutoff), ("method", chosen), *about, *gaps]
+    rows = [*_summary(mesh, loaded, phi, cutoff), *about, *gaps]
     print_rows([*rows, *(("wrote", str(path)) for path in written)], json_file)
 
 
-def _method(method: str | None, options: SolverOptions) -> DistanceMethod:
-    """The method that is meant: options of the heat method ask for it."""
-    given = [field.name for field in fields(options) if getattr(options, field.name) != field.default]
-    if method not in (None, "heat") and given:
-        raise ValueError(
-            f"--{given[0].replace('_', '-')} is an option of the heat method, but --method is {method}: leave one of "
-            "them away"
-        )
-    if method is None:
-        method = "heat" if given else "unfold"
-    return cast(DistanceMethod, method)
-
-
-def _is_tetrahedral(mesh: Mesh | PointCloud) -> bool:
-    return isinstance(mesh, Mesh) and mesh.is_tetrahedral
+def _choice(method: str | None, tolerance: float, **options: Any) -> SolverChoice:
+    """The solver that is meant: options of the heat method ask for it."""
+    try:
+        return SolverChoice.of(method, tolerance, **options)
+    except ValueError as error:
+        raise ValueError(str(error).replace("t_coef", "--t-coef").replace("the method is", "--method is")) from None
 
 
 def _measured(
-    mesh: Mesh | PointCloud, sources: Any, method: DistanceMethod, options: SolverOptions, cutoff: float | None
+    mesh: Mesh | PointCloud, sources: Any, choice: SolverChoice, cutoff: float | None
 ) -> tuple[FloatArray, list[Row]]:
     """The distance, and remarks on how it was found."""
     start = time.perf_counter()
-    if method != "heat":
-        phi = geodesic_distance(mesh, sources, method=method, cutoff=cutoff)
-        seconds = time.perf_counter() - start
-        return phi, [("seconds", f"{seconds:.3f}", seconds)]
-    solver = HeatMethodSolver.from_options(mesh, options.by_heat_on(mesh))
+    solver = choice.on(mesh)
+    once = time.perf_counter() - start
     start = time.perf_counter()
     phi = solver.distance(sources, cutoff)
     seconds = time.perf_counter() - start
-    found = solver.diagnostics
-    raised = " (raised, so that heat crosses the mesh in double precision)" if found.t_raised else ""
-    once = found.seconds_operators + found.seconds_factorization
-    return phi, [
-        ("time step", f"{found.t:.6g}{raised}", found.t),
-        ("flipped edges", str(found.n_flips), found.n_flips),
-        ("seconds", f"{once:.3f} once, {seconds:.3f} per distance", {"once": once, "per_distance": seconds}),
+    plan = solver.plan
+    rows: list[Row] = [
+        ("plan", str(plan), {"engine": plan.engine, "tolerance": plan.tolerance, "reason": plan.reason}),
     ]
+    if isinstance(solver, HeatMethodSolver):
+        found = solver.diagnostics
+        raised = " (raised, so that heat crosses the mesh in double precision)" if found.t_raised else ""
+        rows.append(("time step", f"{found.t:.6g}{raised}", found.t))
+        rows.append(("flipped edges", str(found.n_flips), found.n_flips))
+    per_distance = {"once": once, "per_distance": seconds}
+    return phi, [*rows, ("seconds", f"{once:.3f} once, {seconds:.3f} per distance", per_distance)]
 
 
-def _warm_up(mesh: Mesh | PointCloud, method: DistanceMethod, options: SolverOptions) -> None:
+def _warm_up(mesh: Mesh | PointCloud, choice: SolverChoice) -> None:
     """Measure on a small mesh, so that times are of the work alone, without loading libraries for the first time."""
-    small = Mesh(*_CORNER) if _is_tetrahedral(mesh) else Mesh(*_PYRAMID)
+    is_tetrahedral = isinstance(mesh, Mesh) and mesh.is_tetrahedral
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        _measured(small, 0, method, options, None)
+        _measured(Mesh(*_CORNER) if is_tetrahedral else Mesh(*_PYRAMID), 0, choice, None)
 
 
 def isolines(
@@ -157,8 +144,8 @@ def isolines(
     ],
     spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=positive)],
     output: Annotated[Path, typer.Option(help="OBJ, SVG or DXF file for the lines; dotted behind, in SVG.")],
-    method: Annotated[str | None, choice(DistanceMethod, "Default: unfold, near-exact.")] = None,
-    refine: Annotated[str | None, choice(Refine, "Heat: unfold triangles in its order, near-exact; or exact.")] = None,
+    method: MethodOption = None,
+    tolerance: ToleranceOption = 1e-5,
     points: PointsOption = False,
     json_file: JsonOption = None,
 ) -> None:
@@ -167,8 +154,7 @@ def isolines(
     sources = vertex_sources(np.array(source), loaded.n_vertices)
     check_curves(output)
     check_json(json_file)
-    options = SolverOptions(refine=cast(Refine | None, refine))
-    phi, _ = _measured(loaded, sources, _method(method, options), options, None)
+    phi, _ = _measured(loaded, sources, _choice(method, tolerance), None)
     farthest = float(phi[np.isfinite(phi)].max())
     if farthest < spacing:
         raise ValueError(f"--spacing {spacing:g} makes no line: the farthest vertex is at {farthest:.3g}")

@@ -10,8 +10,19 @@ import numpy as np
 import typer
 
 from heat_igl.errors import SourceError
+from heat_igl.geodesic import DistanceMethod
 
-__all__ = ["JsonOption", "MeshArgument", "PointsOption", "choice", "one_of", "position", "positive"]
+__all__ = [
+    "JsonOption",
+    "MeshArgument",
+    "MethodOption",
+    "PointsOption",
+    "ToleranceOption",
+    "choice",
+    "one_of",
+    "position",
+    "positive",
+]
 
 MeshArgument = Annotated[
     Path,
@@ -61,3 +72,10 @@ def position(text: str, name: str = "--at") -> list[float]:
             f"{name} {text}: three numbers separated by commas are expected, such as 0.5,0,1.25"
         ) from None
     return [x, y, z]
+
+
+MethodOption = Annotated[
+    str | None,
+    choice(DistanceMethod, "Default: auto, windows on triangles; heat with one of the options of heat."),
+]
+ToleranceOption = Annotated[float, typer.Option(help="Largest error over the distance, of windows; 0 is exact.")]

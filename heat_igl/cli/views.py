@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, cast
+from typing import Annotated
 
 import numpy as np
 import typer
 from rich.console import Console
 
 from heat_igl.cli.demo import demonstrate
-from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, choice, positive
+from heat_igl.cli.options import JsonOption, MeshArgument, MethodOption, PointsOption, ToleranceOption, choice, positive
 from heat_igl.cli.output import check_json, check_page, check_writable, described, print_rows, say
 from heat_igl.cli.regions import projected
 from heat_igl.errors import ReferenceSolverError
-from heat_igl.heat_method import Boundary, Refine, SignedHeatSolver, SolverOptions
+from heat_igl.geodesic import SolverChoice
+from heat_igl.heat_method import Boundary, SignedHeatSolver
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.sources import vertex_sources
@@ -32,7 +33,8 @@ def view(
         float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=positive)
     ] = None,
     boundary: Annotated[str, choice(Boundary, "What heat does at the boundary.")] = "neumann",
-    refine: Annotated[str | None, choice(Refine, "Unfold triangles in heat order, near-exact; or exact.")] = None,
+    method: MethodOption = None,
+    tolerance: ToleranceOption = 1e-5,
     exact: Annotated[bool, typer.Option("--exact", help="Show the exact distance beside it; takes seconds.")] = False,
     curves: Annotated[
         Path | None, typer.Option(metavar="OBJ", help="Show the signed distance from these polylines, too.")
@@ -47,13 +49,13 @@ def view(
     check_json(json_file)
     loaded = read_mesh_or_cloud(mesh, points)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
-    options = SolverOptions(t_coef, boundary=cast(Boundary, boundary), refine=cast(Refine | None, refine))
+    solver_choice = SolverChoice.of(method, tolerance, t_coef=t_coef, boundary=boundary)
     target = html or Path(f"{mesh.stem}-view.html")
     problem = None if html else display_problem()
     if html or problem:
         check_page(target)
-    with Console(stderr=True).status("factoring"):
-        shown = Exploration(loaded, sources, options, fields={} if curves is None else _signed(loaded, curves))
+    with Console(stderr=True).status("measuring"):
+        shown = Exploration(loaded, sources, solver_choice, fields={} if curves is None else _signed(loaded, curves))
         if exact:
             shown.compare()
             if shown.exact is None:
@@ -67,9 +69,7 @@ def view(
         else:
             window.run()
             return
-    kind = f"unfolded in heat order (refine = {refine})" if refine else "the heat method"
-    method = f"Distance by {kind}, t = {shown.t_coef:.3g} h^2, boundary {boundary}."
-    shown.page(mesh.name, method).save(target)
+    shown.page(mesh.name, f"Distance by {shown.plan}.").save(target)
     if problem:
         say(f"no window: {problem}")
     written = ("wrote", f"{target} (open it in a browser)", str(target))

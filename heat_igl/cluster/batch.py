@@ -18,7 +18,7 @@ from heat_igl.cluster.report import BatchReport, rows
 from heat_igl.cluster.store import Store, locked
 from heat_igl.cluster.worker import Outcome, Task, begin, release, resume
 from heat_igl.errors import BatchError
-from heat_igl.heat_method import Refine, SolverOptions
+from heat_igl.geodesic import DistanceMethod, SolverChoice
 from heat_igl.mesh import MeshLike
 from heat_igl.sources import Sources
 
@@ -38,7 +38,8 @@ def distances(
     store: str | os.PathLike[str],
     *,
     client: Any = None,
-    refine: Refine | None = None,
+    method: DistanceMethod | None = None,
+    tolerance: float = 1e-5,
     dtype: str = "float32",
     points: bool = False,
     progress: bool = False,
@@ -58,8 +59,10 @@ def distances(
         others are found.
     client : distributed.Client, optional
         Client of a cluster. By default one on this machine, with a process of one thread for every processor.
-    refine : {"sweep", "unfold", "exact"}, optional
-        See `HeatMethodSolver`.
+    method : {"auto", "windows", "exact", "sweep", "heat"}, optional
+        As for `geodesic_distance`; "auto" by default, and "heat" with an option of heat.
+    tolerance : float
+        Largest error over the distance, for windows; 0 is exact.
     dtype : {"float32", "float64"}
         Type to which the distances are rounded.
     points : bool
@@ -68,7 +71,7 @@ def distances(
     progress : bool
         Show on standard error how many meshes and blocks are done (extra ``cli``).
     **options
-        Further options of `HeatMethodSolver`: t_coef, t, laplacian, boundary, magnitude, backend.
+        Options of `HeatMethodSolver`: t_coef, t, laplacian, boundary, magnitude, backend.
 
     Returns
     -------
@@ -94,10 +97,11 @@ def distances(
     if dtype not in ("float32", "float64"):
         raise ValueError(f"dtype must be 'float32' or 'float64', not {dtype!r}")
     plan = SourcePlan.of(sources)
-    solver_options = SolverOptions(refine=refine, **options)
+    choice = SolverChoice.of(method, tolerance, **options)
+    solver = {"method": choice.method, "tolerance": tolerance, **options}
     with locked(Path(store)):
-        opened = Store(store, {"sources": str(plan), "dtype": dtype, "solver": {"refine": refine, **options}})
-        tasks = [Task(item, opened.path.resolve(), plan, dtype, solver_options) for item in items(meshes, points)]
+        opened = Store(store, {"sources": str(plan), "dtype": dtype, "solver": solver})
+        tasks = [Task(item, opened.path.resolve(), plan, dtype, choice) for item in items(meshes, points)]
         with ExitStack() as stack:
             client = stack.enter_context(connected()) if client is None else client
             watch = stack.enter_context(watched(client, len(tasks), progress))

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from heat_igl.cluster.memory import memory_for_solvers, solver_memory
-from heat_igl.heat_method import HeatMethodSolver, SolverOptions
+from heat_igl.geodesic import Solver, SolverChoice
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.runtime import release_free_memory
 
@@ -21,7 +21,7 @@ class CacheEntry:
 
     bytes: int
     n_users: int = 0
-    solver: HeatMethodSolver | None = None
+    solver: Solver | None = None
     lock: threading.Lock = field(default_factory=threading.Lock)
 
 
@@ -37,7 +37,7 @@ class SolverCache:
         self._highest = 0
 
     @contextmanager
-    def solver(self, mesh: Mesh | PointCloud, fingerprint: str, options: SolverOptions) -> Iterator[HeatMethodSolver]:
+    def solver(self, mesh: Mesh | PointCloud, fingerprint: str, choice: SolverChoice) -> Iterator[Solver]:
         """The solver of `mesh`, whose arrays have this fingerprint; made if it is not there.
 
         Waits until the memory that it is estimated to take is free.
@@ -47,12 +47,12 @@ class SolverCache:
         MemoryError
             If that is more than the worker has.
         """
-        key = f"{fingerprint} {options}"
+        key = f"{fingerprint} {choice}"
         entry = self._reserve(key, solver_memory(mesh), memory_for_solvers())
         try:
             with entry.lock:
                 if entry.solver is None:
-                    entry.solver = HeatMethodSolver.from_options(mesh, options)
+                    entry.solver = choice.on(mesh)
             yield entry.solver
         finally:
             with self._changed:

@@ -23,7 +23,8 @@ from heat_igl.cluster.collection import Item, SourcePlan
 from heat_igl.cluster.solver_cache import SolverCache
 from heat_igl.cluster.store import MeshGroup, Store
 from heat_igl.errors import AccuracyWarning, BatchError
-from heat_igl.heat_method import HeatMethodSolver, SolverOptions
+from heat_igl.geodesic import Solver, SolverChoice
+from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.sampling import farthest_points
@@ -50,7 +51,7 @@ class Task:
     store: Path
     plan: SourcePlan
     dtype: str
-    solver_options: SolverOptions
+    choice: SolverChoice
     blocks: tuple[int, ...] = ()
 
 
@@ -124,8 +125,8 @@ def _begin(task: Task, store: Store) -> Outcome:
     is_done = known.get("status") == "done" and known["fingerprint"] == fingerprint
     if is_done and not store.group(name).damaged_chunk():
         return Outcome(name)
-    with _SOLVERS.solver(mesh, fingerprint, task.solver_options) as solver:
-        identity = {"fingerprint": fingerprint, "t": solver.t, "backend": solver.diagnostics.backend}
+    with _SOLVERS.solver(mesh, fingerprint, task.choice) as solver:
+        identity = {"fingerprint": fingerprint, **_described(solver)}
         group, source_sets = _continued(name, store, known, identity) or _new(task, store, mesh, solver, identity)
         spans = _spans(group)
         _send("begun", task, blocks=sum(map(len, spans)))
@@ -141,7 +142,7 @@ def _resume(task: Task, store: Store) -> Outcome:
     if store.attributes(task.item.name)["fingerprint"] != fingerprint:
         raise ValueError("the file changed during the batch: run the same again")
     group = store.group(task.item.name)
-    with _SOLVERS.solver(mesh, fingerprint, task.solver_options) as solver:
+    with _SOLVERS.solver(mesh, fingerprint, task.choice) as solver:
         _solve(task, group, group.source_sets(), solver, task.blocks)
     return Outcome(task.item.name)
 
@@ -162,7 +163,11 @@ def _continued(
 
 
 def _new(
-    task: Task, store: Store, mesh: Mesh | PointCloud, solver: HeatMethodSolver, identity: Mapping[str, Any]
+    task: Task,
+    store: Store,
+    mesh: Mesh | PointCloud,
+    solver: Solver,
+    identity: Mapping[str, Any],
 ) -> tuple[MeshGroup, list[IntArray]]:
     """A new group for a mesh, with the sources."""
     source_sets = _source_sets(task.plan, mesh, solver)
@@ -189,7 +194,15 @@ def _versions() -> dict[str, str]:
     return {"heat_igl": heat_igl.__version__} | {name: version(name) for name in ("libigl", "numpy", "scipy")}
 
 
-def _source_sets(plan: SourcePlan, mesh: Mesh | PointCloud, solver: HeatMethodSolver) -> list[IntArray]:
+def _described(solver: Solver) -> dict[str, Any]:
+    """The engine, and of heat the time step and the linear solver."""
+    described: dict[str, Any] = {"engine": solver.plan.engine, "tolerance": solver.plan.tolerance}
+    if isinstance(solver, HeatMethodSolver):
+        described |= {"t": solver.t, "backend": solver.diagnostics.backend}
+    return described
+
+
+def _source_sets(plan: SourcePlan, mesh: Mesh | PointCloud, solver: Solver) -> list[IntArray]:
     n = mesh.n_vertices
     if plan.source_sets is not None:
         # A set is sorted, so the last vertex tells whether the mesh has all of them.
@@ -219,7 +232,11 @@ def _spans(group: MeshGroup) -> list[tuple[int, ...]]:
 
 
 def _solve(
-    task: Task, group: MeshGroup, source_sets: Sequence[IntArray], solver: HeatMethodSolver, blocks: Sequence[int]
+    task: Task,
+    group: MeshGroup,
+    source_sets: Sequence[IntArray],
+    solver: Solver,
+    blocks: Sequence[int],
 ) -> None:
     for block in blocks:
         start = time.perf_counter()

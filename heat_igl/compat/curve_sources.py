@@ -11,7 +11,8 @@ import igl
 import numpy as np
 
 from heat_igl.curves import geodesic_path
-from heat_igl.heat_method import HeatMethodSolver, SignedHeatSolver, geodesic_distance
+from heat_igl.geodesic import geodesic_distance
+from heat_igl.heat_method import HeatMethodSolver, SignedHeatSolver
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints
 from heat_igl.sources import OffsetSources
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -216,7 +217,7 @@ class MeshFastMarchingDistanceSolver:
 
     @cached_property
     def _signed(self) -> SignedHeatSolver:
-        return SignedHeatSolver(self._mesh, refine="unfold")
+        return SignedHeatSolver(self._mesh, method="windows")
 
     def compute_distance(
         self,

@@ -10,7 +10,7 @@ import numpy as np
 
 from heat_igl.compat.triangles import proper
 from heat_igl.curves import geodesic_path, isolines, shortest_paths, straighten, trace_geodesic
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints
 from heat_igl.typing import ArrayLike, FloatArray
 
@@ -31,8 +31,8 @@ class EdgeFlipGeodesicSolver:
         self._mesh = Mesh(V, F)
 
     @cached_property
-    def _solver(self) -> HeatMethodSolver:
-        return HeatMethodSolver(self._mesh, refine="unfold")
+    def _solver(self) -> GeodesicSolver:
+        return GeodesicSolver(self._mesh)
 
     def find_geodesic_path(
         self,

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import as_array, positive, truth
-from heat_igl.heat_method import geodesic_distance
+from heat_igl.geodesic import geodesic_distance
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import ArrayLike, FloatArray

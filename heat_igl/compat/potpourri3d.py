@@ -171,7 +171,7 @@ class MeshVectorHeatSolver(_OnVertices):
 
     @cached_property
     def _paths(self) -> VectorHeatSolver:
-        return VectorHeatSolver(self._mesh, refine="unfold")
+        return VectorHeatSolver(self._mesh, method="windows")
 
 
 class PointCloudHeatSolver(_Framed):
@@ -214,7 +214,7 @@ class PointCloudHeatSolver(_Framed):
 
     def compute_log_map(self, p_ind: int) -> FloatArray:
         """The logarithmic map (n, 2) at a point, along the shortest paths on the triangles."""
-        return VectorHeatSolver(self._cloud, refine="unfold").log_map(p_ind)
+        return VectorHeatSolver(self._cloud, method="windows").log_map(p_ind)
 
     def compute_signed_distance(
         self,

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
 from heat_igl.errors import MeshError, positive, refuse_masked, shown
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.geodesic import Solver
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices, crossings, joined_segments, level_segments
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
@@ -75,15 +75,15 @@ def isolines(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> list[list[
     return [_curves(mesh, checked, level) for level in wanted]
 
 
-def offset_curves(mesh: MeshLike, solver: HeatMethodSolver, sources: Sources, radius: float) -> list[SurfaceCurve]:
+def offset_curves(mesh: MeshLike, solver: Solver, sources: Sources, radius: float) -> list[SurfaceCurve]:
     """The curves at distance `radius` from `sources` on the surface.
 
     Parameters
     ----------
     mesh : mesh
         The triangles that `solver` was made for.
-    solver : HeatMethodSolver
-        With ``refine="unfold"`` the only error left is that of linear interpolation in each triangle.
+    solver : GeodesicSolver or HeatMethodSolver
+        With a `GeodesicSolver` the only error left is that of linear interpolation in each triangle.
     sources
         As ``solver.distance`` takes them.
     radius : float
@@ -104,15 +104,15 @@ def offset_curves(mesh: MeshLike, solver: HeatMethodSolver, sources: Sources, ra
     >>> import heat_igl
     >>> import numpy as np
     >>> mesh = heat_igl.shapes.disk(40)
-    >>> solver = heat_igl.HeatMethodSolver(mesh, refine="unfold")
+    >>> solver = heat_igl.GeodesicSolver(mesh)
     >>> (curve,) = heat_igl.offset_curves(mesh, solver, 0, radius=0.5)
     >>> round(float(curve.lengths(mesh).sum() / np.pi), 2)  # a circle of radius 1/2
     1.0
     """
     mesh = as_simplices(mesh)
     radius = positive("radius", radius)
-    if not isinstance(solver, HeatMethodSolver):
-        raise ValueError(f"solver must be a HeatMethodSolver of the mesh, not {shown(solver)}")
+    if not isinstance(solver, Solver):
+        raise ValueError(f"solver must be a GeodesicSolver or HeatMethodSolver of the mesh, not {shown(solver)}")
     if solver.n_vertices != mesh.n_vertices:
         raise ValueError(
             f"solver was made for {solver.n_vertices} vertices, but mesh has {mesh.n_vertices}: pass the mesh it is for"

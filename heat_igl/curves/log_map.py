@@ -7,40 +7,34 @@ from typing import Literal, get_args
 import numpy as np
 
 from heat_igl.errors import SourceError, require_choice
-from heat_igl.heat_method import HeatMethodSolver, VectorHeatSolver
+from heat_igl.geodesic import GeodesicSolver
+from heat_igl.heat_method import VectorHeatSolver
 from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices, is_oriented_manifold
 from heat_igl.sources import Sources, ordered_vertices
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import directed_from_scratch, vectors_from
+from heat_igl.unfolding import vectors_from
 
 __all__ = ["LogMapMethod", "log_map"]
 
-LogMapMethod = Literal["unfold", "exact", "vector-heat"]
-
-# With the tolerance for distances the departure is wrong by 0.1 to 0.2 degrees in the mean.
-_TOLERANCE = 1e-6
-# Up to so many vertices exact windows take no longer than walks, from scratch.
-_FEW = 200_000
+LogMapMethod = Literal["exact", "vector-heat"]
 
 
 def log_map(
-    mesh: MeshLike | HeatMethodSolver | VectorHeatSolver, source: Sources, *, method: LogMapMethod = "unfold"
+    mesh: MeshLike | GeodesicSolver | VectorHeatSolver, source: Sources, *, method: LogMapMethod = "exact"
 ) -> FloatArray:
     """The logarithmic map of a vertex or a point: polar coordinates around it, as vectors.
 
     Parameters
     ----------
-    mesh : mesh, HeatMethodSolver or VectorHeatSolver
+    mesh : mesh, GeodesicSolver or VectorHeatSolver
         Whatever `as_mesh` takes, with triangles that are a manifold and oriented alike, which those of a `PointCloud`
         need not be for paths from a vertex; or a solver on such a mesh. A solver keeps the tables that a mesh needs for
         each source.
     source : int or SurfacePoints
         A vertex, or one point in a face.
-    method : {"unfold", "exact", "vector-heat"}
-        "unfold" takes exact windows on up to 200 000 vertices, and follows paths through strips of triangles beyond,
-        which is faster there. "exact" takes windows on all meshes. "vector-heat" is `VectorHeatSolver.log_map`, from
-        vertices only. A solver has a method of its own, and this is not read: `HeatMethodSolver` that of its `refine`.
-        With "unfold" it takes windows on up to 50 000 vertices.
+    method : {"exact", "vector-heat"}
+        "exact" follows exact shortest paths, "vector-heat" is `VectorHeatSolver.log_map`, from vertices only. A solver
+        has a method of its own, and this is not read.
 
     Returns
     -------
@@ -56,15 +50,14 @@ def log_map(
     SourceError
         If `source` is not one vertex or one point of the mesh.
     ValueError
-        If there is no such `method`, or if a `HeatMethodSolver` has no `refine` that follows paths.
+        If there is no such `method`, or if the engine of a `GeodesicSolver` finds no paths.
 
     Notes
     -----
-    If the shortest path to a vertex is straight, `exp_map` of the vector leads back to the vertex: to 1e-14 of the
-    largest distance with windows. Paths through strips may pass a hill on the other side, and be longer. Where a path
-    bends, at a vertex of negative curvature or on the boundary, the vector has the whole length, and the
-    direction in which the path leaves the source: no straightest geodesic from the source need lead there. At the cut
-    locus there are several shortest paths, and the vector is that of one of them.
+    If the shortest path to a vertex is straight, `exp_map` of the vector leads back to the vertex, to 1e-14 of the
+    largest distance. Where a path bends, at a vertex of negative curvature or on the boundary, the vector has the whole
+    length, and the direction in which the path leaves the source: no straightest geodesic from the source need lead
+    there. At the cut locus there are several shortest paths, and the vector is that of one of them.
 
     Examples
     --------
@@ -77,9 +70,9 @@ def log_map(
     """
     if isinstance(mesh, VectorHeatSolver):
         return mesh.log_map(_one_vertex(source, mesh.n_vertices))
-    if isinstance(mesh, HeatMethodSolver):
+    if isinstance(mesh, GeodesicSolver):
         _require_one(source, mesh.n_vertices)
-        found = mesh.directions(source, tolerance=_TOLERANCE)
+        found = mesh.directions(source)
         return _vectors(found.distance, found.departure)
     require_choice("method", method, get_args(LogMapMethod))
     mesh = as_mesh(mesh)
@@ -87,15 +80,14 @@ def log_map(
     if method == "vector-heat":
         return VectorHeatSolver(mesh).log_map(_one_vertex(source, triangles.n_vertices))
     if isinstance(mesh, PointCloud) and not is_oriented_manifold(triangles):
-        return VectorHeatSolver(mesh, refine=method).log_map(_one_vertex(source, triangles.n_vertices))
+        return VectorHeatSolver(mesh, method="windows").log_map(_one_vertex(source, triangles.n_vertices))
     _require_one(source, triangles.n_vertices)
-    by_windows = method == "exact" or triangles.n_vertices <= _FEW
-    if by_windows and not triangles.is_tetrahedral and not isinstance(source, SurfacePoints):
+    if not triangles.is_tetrahedral and not isinstance(source, SurfacePoints):
         vectors = vectors_from(triangles, int(ordered_vertices(source, triangles.n_vertices, "source")[0]))
         if vectors is not None:
             return vectors
-    distance, _, angles, _ = directed_from_scratch(triangles, source, "exact" if by_windows else method, _TOLERANCE)
-    return _vectors(distance, np.nan_to_num(angles.departure))
+    found = GeodesicSolver(triangles).directions(source)
+    return _vectors(found.distance, found.departure)
 
 
 def _vectors(distance: FloatArray, departure: FloatArray) -> FloatArray:

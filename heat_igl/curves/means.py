@@ -10,7 +10,7 @@ from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.curves.places import Waypoints, mixed_places
 from heat_igl.curves.straightest import Tracer
 from heat_igl.errors import AccuracyWarning, SourceError, is_number, real_numbers, shown
-from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
+from heat_igl.geodesic import GeodesicSolver, geodesic_distance
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -140,7 +140,7 @@ class _Search:
         places = [SurfacePoints(np.array([f]), b[None]) for f, b in zip(self._faces, self._barycentric, strict=True)]
         if len(places) < _MANY:
             return np.stack([geodesic_distance(self._mesh, place) for place in places])
-        return np.asarray(HeatMethodSolver(self._mesh, refine="unfold").distances(places))
+        return np.asarray(GeodesicSolver(self._mesh).distances(places))
 
     def _state(self, face: int, barycentric: FloatArray) -> _State:
         inside = np.maximum(barycentric, _INSIDE)

@@ -9,7 +9,7 @@ import scipy.sparse.csgraph as csgraph
 from heat_igl.curves import tracing
 from heat_igl.curves.places import places, snapped
 from heat_igl.errors import MeshError, SourceError, as_array
-from heat_igl.heat_method import HeatMethodSolver, geodesic_distance
+from heat_igl.geodesic import Solver, geodesic_distance
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
@@ -27,7 +27,7 @@ _EXCESS = 0.01
 
 def shortest_paths(
     mesh: MeshLike,
-    distance: ArrayLike | HeatMethodSolver | None,
+    distance: ArrayLike | Solver | None,
     targets: Sources,
     sources: Sources | None = None,
 ) -> list[SurfaceCurve]:
@@ -37,8 +37,8 @@ def shortest_paths(
     ----------
     mesh : mesh
         Triangles.
-    distance : (n,) array_like, HeatMethodSolver or None
-        None, or a solver with exact distances (``refine="exact"``), for exact shortest paths. Otherwise a distance from
+    distance : (n,) array_like, GeodesicSolver, HeatMethodSolver or None
+        None, or a `GeodesicSolver` whose engine is windows, for exact shortest paths. Otherwise a distance from
         the sources, or a solver to compute it. It decides which way around the surface a path takes: the more accurate
         the distance, the more often this is the shortest way.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints
@@ -92,13 +92,13 @@ def shortest_paths(
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")
     face, barycentric = places("targets", mesh, targets)
-    solver = distance if isinstance(distance, HeatMethodSolver) else None
-    if distance is None or (solver is not None and solver.is_exact):
+    solver = distance if isinstance(distance, Solver) else None
+    if distance is None or (solver is not None and solver.plan.engine == "windows"):
         named = _required(solver, sources)
         paths = _exact(mesh, _source_set(mesh, named), face, barycentric, np.arange(len(face)))
         lost = np.setdiff1d(np.arange(len(face)), list(paths))
         if len(lost):
-            paths |= _straightened(mesh, geodesic_distance(mesh, named), named, face, barycentric, lost)
+            paths |= _straightened(mesh, geodesic_distance(mesh, named, tolerance=0), named, face, barycentric, lost)
     else:
         values = _values(mesh, distance, sources)
         paths = _straightened(mesh, values, sources, face, barycentric, np.arange(len(face)))
@@ -160,7 +160,7 @@ def _too_long(
     return np.flatnonzero(length > (1 + _EXCESS) * at_target)
 
 
-def _required(solver: HeatMethodSolver | None, sources: Sources | None) -> Sources:
+def _required(solver: Solver | None, sources: Sources | None) -> Sources:
     if sources is not None:
         return sources
     if solver is None:
@@ -172,8 +172,8 @@ def _source_set(mesh: Mesh, sources: Sources) -> SourceSet:
     return source_set(sources, mesh.n_vertices, mesh.F)
 
 
-def _values(mesh: Mesh, distance: ArrayLike | HeatMethodSolver, sources: Sources | None) -> FloatArray:
-    if isinstance(distance, HeatMethodSolver):
+def _values(mesh: Mesh, distance: ArrayLike | Solver, sources: Sources | None) -> FloatArray:
+    if isinstance(distance, Solver):
         distance = distance.distance(_required(distance, sources))
     given = as_array("distance", distance)
     if given.dtype.kind not in "iuf" or given.shape != (mesh.n_vertices,):

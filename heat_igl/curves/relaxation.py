@@ -9,7 +9,7 @@ import numpy as np
 
 from heat_igl.curves.straightest import Tracer
 from heat_igl.errors import SourceError
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, named_vertices
@@ -85,8 +85,7 @@ def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> C
     sum of a_v d(v, nearest site)^2. The mean of a cell is the end of the mean of its log map at the site, at the
     nearest corner. The site moves there if this lowers the energy of its cell, or else the same way in shorter steps.
     So the energy falls in every round, and the last round is one in which no site moves. Distances and directions
-    are near-exact, see `HeatMethodSolver.directions` with ``refine="unfold"``: a round asks once for each site, and
-    again for shorter steps.
+    are exact, see `GeodesicSolver.directions`: a round asks once for each site, and again for shorter steps.
 
     Examples
     --------
@@ -114,7 +113,7 @@ class _Relaxation:
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
-        self._solver = HeatMethodSolver(mesh, refine="unfold")
+        self._solver = GeodesicSolver(mesh, tolerance=0)
         self._tracer = Tracer(mesh)
         self._areas = np.bincount(mesh.F.ravel(), np.repeat(mesh.measures / 3, 3), mesh.n_vertices)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,14 +11,15 @@ import numpy as np
 from heat_igl import reference
 from heat_igl.drawing.html_view import Page, page
 from heat_igl.errors import FactorizationError, MeshError, MissingExtraError, ReferenceSolverError
-from heat_igl.heat_method import Directions, HeatMethodSolver, SolverOptions
+from heat_igl.geodesic import GeodesicSolver, Solver, SolverChoice
+from heat_igl.heat_method import Directions, HeatMethodSolver
 from heat_igl.mesh import MeshLike, PointCloud, as_mesh, as_simplices
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = ["Exploration"]
 
-# Number of factored solvers to keep, since users alternate between a few settings.
+# Number of solvers to keep, since users alternate between a few settings.
 _KEPT_SOLVERS = 4
 
 
@@ -32,8 +32,8 @@ class Exploration:
         Triangles or tetrahedra, as `as_mesh` takes them, or a `PointCloud`.
     sources : int, sequence of int, or (n,) mask of bool
         Initial source vertices.
-    options : SolverOptions
-        Initial options.
+    options : SolverChoice
+        Initial method and options.
     fields : dict of str to (n,) array_like, optional
         More values to show, such as a signed distance; they do not change.
 
@@ -49,8 +49,10 @@ class Exploration:
         The current source vertices (see `choose`).
     distance : (n,) float64
         Distance from `sources` with `options`.
-    t_coef : float
-        The time step in use, in squared mean edge lengths.
+    plan : Plan
+        The engine in use.
+    t_coef : float or None
+        The time step of heat, in squared mean edge lengths; None with other engines.
     error : (n,) float64 or None
         Error of `distance` in percent of the exact distance, 0 at the sources and ``inf`` at unreachable vertices.
         `compare` computes it; any change resets it to None.
@@ -69,22 +71,22 @@ class Exploration:
         self,
         mesh: MeshLike,
         sources: Sources = 0,
-        options: SolverOptions | None = None,
+        options: SolverChoice | None = None,
         fields: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         given = as_mesh(mesh)
         self.is_cloud = isinstance(given, PointCloud)
         self.mesh = as_simplices(given)
-        # The heat method knows more about points than about their triangles.
+        # A solver knows more about points than about their triangles.
         self._domain = given if self.is_cloud else self.mesh
         self.fields = {name: np.asarray(values, np.float64) for name, values in (fields or {}).items()}
-        self._near_exact: HeatMethodSolver | None = None
+        self._paths: GeodesicSolver | None = None
         self._directions: Directions | None = None
-        self.options = options or SolverOptions()
+        self.options = options or SolverChoice()
         self.sources: IntArray = vertex_sources(sources, self.mesh.n_vertices)
         self.error: FloatArray | None = None
         self.exact: FloatArray | None = None
-        self._solvers: dict[SolverOptions, HeatMethodSolver] = {}
+        self._solvers: dict[SolverChoice, Solver] = {}
         self._solve(self.sources, self.options)
 
     def choose(self, vertex: int, add: bool = False) -> None:
@@ -97,7 +99,7 @@ class Exploration:
     def change(self, **options: Any) -> None:
         """Change options. If the solver fails, nothing changes, and `message` gives the reason."""
         try:
-            self._solve(self.sources, replace(self.options, **options))
+            self._solve(self.sources, self.options.changed(**options))
         except (ValueError, FactorizationError, MissingExtraError) as error:
             self.message = str(error)
 
@@ -119,9 +121,9 @@ class Exploration:
         """Distance and directions of the shortest paths from `sources`; None, with a `message`, if there are none."""
         if self._directions is None:
             try:
-                if self._near_exact is None:
-                    self._near_exact = HeatMethodSolver(self.mesh, refine="unfold")
-                self._directions = self._near_exact.directions(self.sources)
+                if self._paths is None:
+                    self._paths = GeodesicSolver(self.mesh)
+                self._directions = self._paths.directions(self.sources)
             except (MeshError, ValueError) as problem:
                 self.message = f"no directions: {problem}"
         return self._directions
@@ -151,22 +153,25 @@ class Exploration:
             fields={**exact, **self.fields}, beside=next(iter({**exact, **self.fields}), None),
         )  # fmt: skip
 
-    def _solve(self, sources: IntArray, options: SolverOptions) -> None:
+    def _solve(self, sources: IntArray, options: SolverChoice) -> None:
         start = time.perf_counter()
         solver = self._solvers.pop(options, None)
         is_new = solver is None
         if solver is None:
-            solver = HeatMethodSolver.from_options(self._domain, options)
+            solver = options.on(self._domain)
         self._solvers[options] = solver  # the dictionary is ordered by last use
         while len(self._solvers) > _KEPT_SOLVERS:
             del self._solvers[next(iter(self._solvers))]
         self.distance = solver.distance(sources)
-        self.t_coef = solver.t / solver.diagnostics.mean_edge_length**2
+        self.plan = solver.plan
+        self.t_coef: float | None = None
+        if isinstance(solver, HeatMethodSolver):
+            self.t_coef = solver.t / solver.diagnostics.mean_edge_length**2
         self.sources, self.options, self.error, self.exact = sources, options, None, None
         self._directions = None
         finite = np.where(np.isfinite(self.distance), self.distance, -1.0)
         self.message = (
-            f"{1000 * (time.perf_counter() - start):.0f} ms{', factored anew' if is_new else ''}; farthest "
+            f"{1000 * (time.perf_counter() - start):.0f} ms{', prepared anew' if is_new else ''}; farthest "
             f"{finite.max():.6g} at vertex {int(finite.argmax())}"
         )
         lost = int((finite < 0).sum())

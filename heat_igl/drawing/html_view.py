@@ -116,7 +116,7 @@ def page(
 
     Dragging rotates the surface, the wheel or a pinch zooms, and dragging with Shift translates. The page displays
     vertex, position and distance under the pointer. A click makes the vertex the source; the page then computes the
-    distance by planar unfolding on the intrinsic Delaunay triangulation. The result agrees with ``refine="sweep"`` to
+    distance by planar unfolding on the intrinsic Delaunay triangulation. The result agrees with ``method="sweep"`` to
     1e-3, on average to 1e-5. The logarithmic map of the source is drawn as a checkerboard; it is computed in the page,
     too. "directions" draws needles along the gradient, and "points" draws vertices as discs, as the points of a cloud
     are from the beginning. "save" downloads the page with the sources and the view as they are. For tetrahedra the page

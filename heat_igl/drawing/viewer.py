@@ -16,12 +16,13 @@ from heat_igl.drawing.exploration import Exploration
 from heat_igl.drawing.scene import DISTANCE_COLOURS, colours
 from heat_igl.drawing.shading import isoline_spacing
 from heat_igl.errors import MissingExtraError
-from heat_igl.heat_method import Boundary, Refine
+from heat_igl.geodesic import DistanceMethod
+from heat_igl.heat_method import Boundary
 from heat_igl.typing import FloatArray
 
 __all__ = ["Exploration", "Window", "display_problem"]
 
-_REFINEMENTS = ("none", *get_args(Refine))
+_METHODS = get_args(DistanceMethod)
 
 _T_COEF = (0.1, 100.0)
 
@@ -116,19 +117,19 @@ class Window:
         """Draw the controls and handle clicks; polyscope calls this once per frame."""
         gui, now = self._gui, self.exploration
         gui.TextUnformatted("Click: source here. Shift and click: one more, or one less.")
-        moved, t_coef = gui.SliderFloat("t / h^2", now.t_coef, *_T_COEF, flags=gui.ImGuiSliderFlags_Logarithmic)
-        # The new time step is applied when the slider is released.
-        self._t_coef = t_coef if moved else getattr(self, "_t_coef", now.t_coef)
         changes: dict[str, Any] = {}
-        if gui.IsItemDeactivatedAfterEdit():
-            changes["t_coef"] = float(self._t_coef)
-        boundary = self._pick_one("boundary", get_args(Boundary), now.options.boundary)
-        if boundary != now.options.boundary:
-            changes["boundary"] = boundary
-        if not now.mesh.is_tetrahedral:
-            refine = self._pick_one("refine", _REFINEMENTS, now.options.refine or "none")
-            if refine != (now.options.refine or "none"):
-                changes["refine"] = None if refine == "none" else refine
+        method = self._pick_one("method", _METHODS, now.options.method)
+        if method != now.options.method:
+            changes["method"] = method
+        if now.t_coef is not None:
+            moved, t_coef = gui.SliderFloat("t / h^2", now.t_coef, *_T_COEF, flags=gui.ImGuiSliderFlags_Logarithmic)
+            # The new time step is applied when the slider is released.
+            self._t_coef = t_coef if moved else getattr(self, "_t_coef", now.t_coef)
+            if gui.IsItemDeactivatedAfterEdit():
+                changes["t_coef"] = float(self._t_coef)
+            boundary = self._pick_one("boundary", get_args(Boundary), now.options.heat.boundary)
+            if boundary != now.options.heat.boundary:
+                changes["boundary"] = boundary
         if changes:
             now.change(**changes)
             self._shows_error = False

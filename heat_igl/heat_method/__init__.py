@@ -2,13 +2,12 @@
 
 from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.directions import Directions
-from heat_igl.heat_method.front_door import DistanceMethod, geodesic_distance
-from heat_igl.heat_method.options import Backend, Boundary, Laplacian, Magnitude, Refine, SolverOptions
-from heat_igl.heat_method.signed_heat import Level, SignedHeatSolver
+from heat_igl.heat_method.options import Backend, Boundary, Laplacian, Magnitude, SolverOptions
+from heat_igl.heat_method.signed_heat import Level, SignedHeatSolver, SignedMethod
 from heat_igl.heat_method.signed_volumes import VoxelBox, volume_signed_distance
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.heat_method.solver import HeatMethodSolver, heat_method_distance
-from heat_igl.heat_method.vector_heat import VectorHeatSolver
+from heat_igl.heat_method.vector_heat import VectorHeatSolver, VectorMethod
 
 __all__ = [
     "AnswerCheck",
@@ -16,18 +15,17 @@ __all__ = [
     "Boundary",
     "Diagnostics",
     "Directions",
-    "DistanceMethod",
     "HeatMethodSolver",
     "HeatSolution",
     "LabelledDistance",
     "Laplacian",
     "Level",
     "Magnitude",
-    "Refine",
     "SignedHeatSolver",
+    "SignedMethod",
     "SolverOptions",
-    "geodesic_distance",
     "VectorHeatSolver",
+    "VectorMethod",
     "VoxelBox",
     "heat_method_distance",
     "volume_signed_distance",

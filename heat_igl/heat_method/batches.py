@@ -43,13 +43,12 @@ class BatchedSolver(ABC):
     def _source_set(self, sources: Sources) -> SourceSet:
         """`sources`, checked."""
 
-    def _answers(self, source_sets: list[SourceSet]) -> tuple[FloatArray, list[str | None]]:
-        """Distances (k, n) from k sets of sources, and for each the text of a warning, if one is due."""
-        return self._distances(source_sets), [None] * len(source_sets)
-
     @abstractmethod
-    def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
-        """Distances (k, n) from k sets of sources; on any thread."""
+    def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[str | None]]:
+        """Distances (k, n) from k sets of sources, and for each the text of a warning, if one is due; on any thread.
+
+        What is beyond the cutoff may be left ``inf``.
+        """
 
     def distances(
         self,
@@ -109,7 +108,7 @@ class BatchedSolver(ABC):
             _check_destination(out, shape, dtype)
         write = row_writer(out)
         with progress_bar("distances", len(chosen), truth("progress", progress)) as advance:
-            for rows in self._blocks(chosen, len(chosen)):
+            for rows in self._blocks(chosen, len(chosen), np.inf if beyond is None else beyond):
                 write(cut_off(rows, beyond).astype(out.dtype, copy=False))
                 advance(len(rows))
         return out
@@ -158,12 +157,14 @@ class BatchedSolver(ABC):
             except SourceError as error:
                 raise SourceError(f"source_sets[{i}]: {error}") from None
 
-    def _blocks(self, source_sets: Iterable[SourceSet], n_sets: int | None) -> Iterator[FloatArray]:
+    def _blocks(
+        self, source_sets: Iterable[SourceSet], n_sets: int | None, cutoff: float = np.inf
+    ) -> Iterator[FloatArray]:
         """Distances of a block of sets after the other."""
 
         def solved(block: list[SourceSet]) -> tuple[FloatArray, list[tuple[str, type[Warning]]], list[str | None]]:
             with held_warnings() as held:
-                rows, complaints = self._answers(block)
+                rows, complaints = self._answers(block, cutoff)
                 return rows, held, complaints
 
         size, threads = block_size(self._n_faces, n_sets, n_threads())

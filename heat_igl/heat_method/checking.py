@@ -64,7 +64,7 @@ class AnswerCheck(NamedTuple):
         """The text of a warning, None if none is due: the size of the violation, the place, and a remedy."""
         if is_surface:
             problem = self._problem(_SHORT_ON_AVERAGE, _SHORT_AT_WORST)
-            remedy = "use refine='unfold', or heat_igl.geodesic_distance"
+            remedy = "use GeodesicSolver, or heat_igl.geodesic_distance"
         else:
             problem = self._problem(_SHORT_IN_VOLUMES, _WORST_IN_VOLUMES)
             remedy = "take smaller or rounder tetrahedra"

@@ -9,14 +9,13 @@ from heat_igl.errors import shown
 from heat_igl.heat_method.batches import BatchedSolver
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
-from heat_igl.heat_method.point_parts import prepare_points
 from heat_igl.heat_method.solution import Diagnostics
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, PolygonMesh, as_mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators
+from heat_igl.plan import Plan
 from heat_igl.steps import Boundary
-from heat_igl.typing import ArrayLike, FloatArray
-from heat_igl.unfolding import OrderedSolver, Refine
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 
 __all__ = ["PreparedSolver"]
 
@@ -45,7 +44,6 @@ class PreparedSolver(BatchedSolver):
         t: float | None = None,
         boundary: Boundary = "neumann",
         magnitude: Magnitude = "auto",
-        refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> Solver:
         """A solver on any domain that has operators; parameters as for the class."""
@@ -54,7 +52,7 @@ class PreparedSolver(BatchedSolver):
                 f"domain must be Operators, as metric_operators returns them, not {shown(domain)}: "
                 "HeatMethodSolver(mesh) takes meshes"
             )
-        options = SolverOptions(t_coef, t, "intrinsic-delaunay", boundary, magnitude, refine, backend)
+        options = SolverOptions(t_coef, t, "intrinsic-delaunay", boundary, magnitude, backend)
         return cls._of(prepare(domain, options))
 
     @classmethod
@@ -70,7 +68,6 @@ class PreparedSolver(BatchedSolver):
         laplacian: Laplacian = "auto",
         boundary: Boundary = "neumann",
         magnitude: Magnitude = "auto",
-        refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> Solver:
         """A solver on triangles that are known by their edge lengths alone; positions are not needed.
@@ -97,9 +94,9 @@ class PreparedSolver(BatchedSolver):
         MeshError
             If `F`, `lengths` or `twin` cannot be used; the message names the first offender.
         """
-        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, refine, backend)
+        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
         start = time.perf_counter()
-        domain = edge_length_operators(F, lengths, n, options.triangulation, twin)
+        domain = edge_length_operators(F, lengths, n, options.laplacian, twin)
         return cls._of(prepare(domain, options, seconds_operators=time.perf_counter() - start))
 
     def with_vertices(self: Solver, V: ArrayLike) -> Solver:
@@ -134,19 +131,13 @@ class PreparedSolver(BatchedSolver):
             return self._of(prepare_polygons(PolygonMesh(positions, fans.polygons.polygons), self._parts.options))
         moved = self._mesh.with_vertices(V)
         options, known = self._parts.options, self._parts.analysis
-        if isinstance(moved, PointCloud):
-            return self._of(prepare_points(moved, options, known), moved)
         return self._of(prepare_mesh(moved, options, known), moved)
 
     def _set_up(self, mesh: Mesh | PolygonMesh | PointCloud, options: SolverOptions) -> None:
-        if isinstance(mesh, PointCloud):
-            self._mesh, self._parts = mesh, prepare_points(mesh, options)
-        elif not isinstance(mesh, PolygonMesh):
-            self._mesh, self._parts = mesh, prepare_mesh(mesh, options)
-        elif options.refine is not None:
-            self._mesh, self._parts = mesh.triangles, prepare_mesh(mesh.triangles, options)
-        else:
+        if isinstance(mesh, PolygonMesh):
             self._mesh, self._parts = None, prepare_polygons(mesh, options)
+        else:
+            self._mesh, self._parts = mesh, prepare_mesh(mesh, options)
 
     @classmethod
     def _of(cls: type[Solver], parts: SolverParts, mesh: Mesh | PointCloud | None = None) -> Solver:
@@ -155,16 +146,13 @@ class PreparedSolver(BatchedSolver):
         return solver
 
     def __repr__(self) -> str:
-        options = self._parts.options
-        refined = "" if options.refine is None else f", refine={options.refine!r}"
         backend = self.diagnostics.backend
-        return f"{type(self).__name__}({self.n_vertices} vertices, t={self.t:.4g}{refined}, backend={backend!r})"
+        return f"{type(self).__name__}({self.n_vertices} vertices, t={self.t:.4g}, backend={backend!r})"
 
     @property
-    def is_exact(self) -> bool:
-        """Whether distances are exact: with ``refine="exact"``, and on small or rough meshes with another `refine`."""
-        last_steps = self._parts.last_steps
-        return isinstance(last_steps, OrderedSolver) and last_steps.is_exact
+    def plan(self) -> Plan:
+        """The engine, which is heat, and what it runs on."""
+        return self._parts.plan
 
     @property
     def operators(self) -> Operators:
@@ -190,6 +178,11 @@ class PreparedSolver(BatchedSolver):
     def n_vertices(self) -> int:
         """Length of a distance array: the vertices of the mesh. The operators may have more."""
         return self._parts.n_vertices
+
+    @property
+    def referenced(self) -> BoolArray:
+        """Mask (n,) of the vertices that a face uses."""
+        return self.operators.referenced[: self.n_vertices]
 
     @property
     def _n_faces(self) -> int:

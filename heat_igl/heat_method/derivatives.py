@@ -19,12 +19,13 @@ from heat_igl.heat_method.side_lengths import SidesOfMesh
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
 from heat_igl.intrinsic.length_derivatives import carry_lengths, carry_lengths_back, check_carried
 from heat_igl.intrinsic.place_derivatives import PlaceSlopes
+from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.operators import MetricSides, Surface
 from heat_igl.sources import SourceSet
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.unfolding import Change, SideChange
 
-__all__ = ["DistanceDerivative", "SidesDerivative"]
+__all__ = ["DistanceDerivative", "SidesDerivative", "differentiable_surface"]
 
 # A distance that differs from the length of the path by more than this fraction is not the length of that path.
 # Rounding is below 1e-14; in flat parts other paths are longer by 1e-13 to 1e-9, with derivatives that differ by 1e-3.
@@ -141,7 +142,7 @@ class DistanceDerivative:
         return np.zeros((0, 3)) if by_place is None else np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
 
     def by_time_step(self, g: ArrayLike) -> float:
-        """The derivative by the time step t, all else fixed; 0 with ``refine``, which takes an order from the heat."""
+        """The derivative by the time step t, all else fixed; 0 of a distance that is not heat's."""
         (row,) = self._rows(g, 1)
         return self._answer.pull_back(row).by_t
 
@@ -162,7 +163,7 @@ class DistanceDerivative:
 
     def _metric(self, function: str) -> MetricSides:
         if not isinstance(self._sides, MetricSides):
-            raise ValueError(f"the solver knows no metric to change: make it with from_operators({function})")
+            raise ValueError(f"the solver knows no metric to change: make it on {function}")
         return self._sides
 
     def push_forward(self, dV: ArrayLike, points: ArrayLike | None = None) -> FloatArray:
@@ -223,8 +224,8 @@ class DistanceDerivative:
     def inexact(self) -> IntArray:
         """Vertices whose distance is not the length of the path that is differentiated.
 
-        With ``refine="unfold"`` a few paths became shorter after others had been measured by them, by some 1e-5, and
-        some distances are set by bounds instead. The derivative is that of the path as it is.
+        Bounds set some distances by heat, and a tolerance changes those by windows. The derivative is that of the path
+        as it is.
         """
         reached = np.flatnonzero(np.isfinite(self.distance))
         distance = self.distance[reached]
@@ -299,3 +300,20 @@ def _velocities(name: str, given: ArrayLike, shape: tuple[int, ...], of: str) ->
     if array.shape != shape or not np.isfinite(array).all():
         raise ValueError(f"{name} must be {shape} finite numbers, one velocity per {of}; it has shape {array.shape}")
     return array
+
+
+def differentiable_surface(surface: Surface | None, sources: SourceSet, mesh: Mesh | PointCloud | None) -> Surface:
+    """The surface, if a distance from `sources` on it has a derivative.
+
+    Raises
+    ------
+    ValueError
+        If there is none, if it is that of a point cloud, or if a curve is among the sources.
+    """
+    if surface is None or isinstance(mesh, PointCloud):
+        raise ValueError("derivatives need a surface of triangles: this domain has none, or is a point cloud")
+    if len(sources.segments.faces):
+        raise ValueError(
+            "derivatives are there for vertices and points, and a curve is among the sources: place points on it"
+        )
+    return surface

@@ -49,7 +49,7 @@ class Directions:
     Examples
     --------
     >>> import heat_igl
-    >>> solver = heat_igl.HeatMethodSolver(heat_igl.shapes.strip(4, 3), refine="unfold")
+    >>> solver = heat_igl.GeodesicSolver(heat_igl.shapes.strip(4, 3))
     >>> found = solver.directions(0)
     >>> found.gradient[19, :2].round(6).tolist(), round(float(found.distance[19]), 6)  # the corner at (4, 3)
     ([0.8, 0.6], 5.0)

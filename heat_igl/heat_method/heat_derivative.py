@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.heat_method.field_derivative import FieldDerivative
-from heat_igl.heat_method.integration import Integration, imposed_faces
+from heat_igl.heat_method.integration import imposed_faces
 from heat_igl.heat_method.known_values import KnownValues
 from heat_igl.heat_method.levels import FlowChange, LevelSlopes, PinnedLevels
 from heat_igl.heat_method.parts import SolverParts
@@ -28,7 +28,7 @@ from heat_igl.unfolding import Change, SideChange
 
 __all__ = ["HeatDerivative"]
 
-_REMEDY = ": take refine='unfold' or 'exact', which differentiate paths"
+_REMEDY = ": take a GeodesicSolver, which differentiates paths"
 
 
 class HeatDerivative:
@@ -37,7 +37,7 @@ class HeatDerivative:
     Parameters
     ----------
     parts : SolverParts
-        Of the solver, without ``refine``.
+        Of the solver.
     sources : SourceSet
         Vertices and points in faces.
 
@@ -56,7 +56,7 @@ class HeatDerivative:
 
     def __init__(self, parts: SolverParts, sources: SourceSet) -> None:
         domain, surface, last_steps = parts.operators, parts.operators.surface, parts.last_steps
-        if surface is None or not isinstance(last_steps, Integration):
+        if surface is None:
             raise ValueError("the heat method is differentiated on triangles")
         self.triangulation: IntrinsicTriangulation = surface.triangulation
         _check(parts, sources, self.triangulation)

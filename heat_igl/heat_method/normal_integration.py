@@ -10,14 +10,13 @@ import numpy as np
 
 from heat_igl.errors import SourceError
 from heat_igl.heat_method.curve_levels import CurveLevels, Level, Pieces
-from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.parts import SolverParts
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_gradient, lay_out
 from heat_igl.mesh import Mesh
 from heat_igl.operators import divergence_matrix, edge_rotations, face_rotations
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, both
 from heat_igl.sources import OrientedSet
-from heat_igl.steps import PoissonProblem, VectorHeatFlow
+from heat_igl.steps import VectorHeatFlow
 from heat_igl.typing import AnyArray, FloatArray
 
 __all__ = ["NormalIntegration"]
@@ -40,7 +39,7 @@ class NormalIntegration:
     triangulation : IntrinsicTriangulation
         The triangles that are solved on.
     parts : SolverParts
-        The heat flow on these, the options, and the Poisson problem if it is factored.
+        The heat flow on these, the options, and the Poisson problem.
     """
 
     def __init__(
@@ -50,11 +49,7 @@ class NormalIntegration:
         self._V, self._F, self._n = mesh.V, mesh.F, mesh.n_vertices
         self._faces, self._triangulation = faces, triangulation
         self._mean_edge_length = domain.mean_edge_length
-        last_steps = parts.last_steps
-        if isinstance(last_steps, Integration):
-            self._poisson = last_steps.poisson
-        else:
-            self._poisson = PoissonProblem(domain, backend, parts.analysis)
+        self._poisson = parts.last_steps.poisson
         self._vector_flow = VectorHeatFlow(
             domain, edge_rotations(domain), _one_or_all(parts.time_steps), backend, parts.fitted
         )

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import igl
 import numpy as np
 import scipy.sparse as sp
 
@@ -25,18 +26,14 @@ from heat_igl.operators import (
     fan_operators,
     operators,
     point_cloud_operators,
-    without_refinement,
 )
+from heat_igl.plan import RANDOM_SIDES, T_COEF_EVEN_POINTS, T_COEF_RANDOM_POINTS, Plan, heat_plan
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.unfolding import FrontSolver, OrderedSolver, UnfoldingSolver
 
 __all__ = ["SolverParts", "prepare", "prepare_mesh", "prepare_polygons"]
-
-# Ratio of speeds from which on heat, with one time step for all, is worse than 2 %: docs/metrics.md.
-_LARGEST_CONTRAST = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +46,14 @@ class SolverParts:
         As the user gave them.
     operators : Operators
         The domain.
-    analysis : Analysis or None
-        The order of elimination that all matrices share; None if nothing was factored.
+    analysis : Analysis
+        The order of elimination that all matrices share.
     assembler : SourceAssembler
         From sources to right-hand sides.
-    factored : HeatFlow or None
-        Step 1; None with ``refine="exact"``, for fronts and for swept points, which take no heat: `heat_flow` factors
-        it on request.
-    last_steps : Integration or OrderedSolver
-        Steps 2 and 3, or what takes their place: unfolding with ``refine``, or fronts.
+    heat_flow : HeatFlow
+        Step 1, factored.
+    last_steps : Integration
+        Steps 2 and 3.
     time_steps : (n_components,) float64
         Time step of each component.
     step_raised : (n_components,) bool
@@ -66,35 +62,27 @@ class SolverParts:
         Time step for `damping`; None for a field of length 1.
     fitted : bool
         Whether the heat flow is fitted to the lengths of edges.
-    originals : (n,) int64 or None
-        The vertex whose distance each takes, where copies of points are left out of the triangles.
-    checker : Checker or None
-        Checks answers against bounds that need no reference; None if they need no check.
+    checker : Checker
+        Checks answers against bounds that need no reference.
+    plan : Plan
+        For the user.
     diagnostics : Diagnostics
         For the user.
     """
 
     options: SolverOptions
     operators: Operators
-    analysis: Analysis | None
+    analysis: Analysis
     assembler: SourceAssembler
-    factored: HeatFlow | None
-    last_steps: Integration | OrderedSolver
+    heat_flow: HeatFlow
+    last_steps: Integration
     time_steps: FloatArray
     step_raised: BoolArray
     t_damping: float | FloatArray | None
     fitted: bool
-    originals: IntArray | None
-    checker: Checker | None
+    checker: Checker
+    plan: Plan
     diagnostics: Diagnostics
-
-    @cached_property
-    def heat_flow(self) -> HeatFlow:
-        """Step 1, factored."""
-        if self.factored is not None:
-            return self.factored
-        options = self.options
-        return HeatFlow(self.operators, self.time_steps, options.boundary, options.backend, self.analysis, self.fitted)
 
     @cached_property
     def slopes(self) -> ElementSlopes:
@@ -127,26 +115,27 @@ def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysi
     """The parts of a solver on `mesh`; a `known` order of elimination is taken if it fits."""
     start = time.perf_counter()
     begun: list[Future[Analysis]] = []
-    originals: IntArray | None = None
     with pool(1) as beside:
 
         def analyse(L: sp.csc_matrix) -> None:
-            begun.append(beside.submit(analysis, L, options.backend, None, options.n_factors))
+            begun.append(beside.submit(analysis, L, options.backend, None))
 
         # The order of elimination takes a third of the time and needs no more than the pattern of L.
-        follows_fronts = isinstance(mesh, Mesh) and mesh.is_tetrahedral and options.leaves_heat
-        is_factored = options.refine != "exact" and not follows_fronts
-        on_laplacian = analyse if known is None and is_factored and n_threads() > 1 else None
-        if not isinstance(mesh, PointCloud):
-            domain = operators(mesh, options.triangulation, on_laplacian)
-        elif options.refine is None:
-            domain = point_cloud_operators(mesh, options.triangulation, on_laplacian)
+        on_laplacian = analyse if known is None and n_threads() > 1 else None
+        if isinstance(mesh, PointCloud):
+            domain = point_cloud_operators(mesh, options.laplacian, on_laplacian)
+            if options.default_time_step:
+                options = replace(options, t_coef=_t_coef_of_points(mesh.triangles))
         else:
-            # For an order, slivers at the boundary do no harm.
-            domain = operators(mesh.distinct_triangles, options.triangulation, on_laplacian)
-            originals = mesh.originals if mesh.has_copies else None
+            domain = operators(mesh, options.laplacian, on_laplacian)
         seconds = time.perf_counter() - start
-        return prepare(domain, options, begun[0].result if begun else lambda: known, seconds, mesh.V, originals)
+        return prepare(domain, options, begun[0].result if begun else lambda: known, seconds, mesh.V)
+
+
+def _t_coef_of_points(triangles: Mesh) -> float:
+    sides = np.sort(igl.edge_lengths(triangles.V, triangles.F), axis=1)
+    ratio = np.median(sides[:, 2] / np.maximum(sides[:, 0], np.finfo(float).tiny))
+    return T_COEF_RANDOM_POINTS if ratio > RANDOM_SIDES else T_COEF_EVEN_POINTS
 
 
 def prepare_polygons(mesh: PolygonMesh, options: SolverOptions) -> SolverParts:
@@ -162,8 +151,6 @@ def prepare(
     known: Callable[[], Analysis | None] = lambda: None,
     seconds_operators: float = 0.0,
     V: FloatArray | None = None,
-    originals: IntArray | None = None,
-    unfolding: OrderedSolver | None = None,
 ) -> SolverParts:
     """The parts of a solver on `domain`: resolve the options, then factor the matrices.
 
@@ -179,39 +166,21 @@ def prepare(
         Time spent before, for the diagnostics.
     V : (n, 3) float64, optional
         Positions, to check answers against straight lines.
-    originals : (n,) int64, optional
-        With `refine`, the vertex whose distance each takes: see `PointCloud.originals`.
-    unfolding : OrderedSolver, optional
-        The last steps, if they are there before; nothing is factored for one that reads no heat.
     """
-    domain, options = _resolved(domain, options)
     damped = options.damps(domain)
     fitted = damped and domain.lengths is not None
     step, requested = time_step(options, domain, fitted)
     check_large_step(options, domain)
     t_damping = step if damped else None
-    if domain.simplices is not None and options.leaves_heat:
-        unfolding = FrontSolver(domain.simplices)
-    takes_heat = options.refine != "exact" and unfolding is None
-    if unfolding is None and options.refine is not None:
-        # Before there are factors: most memory is needed while the tables are made.
-        unfolding = UnfoldingSolver(domain, options.refine, originals=originals)
-    unfolded = time.perf_counter()
-    found = analysis(domain.L, options.backend, known(), options.n_factors) if takes_heat else None
+    begun = time.perf_counter()
+    found = analysis(domain.L, options.backend, known())
     analysed = time.perf_counter()
-    heat_flow, poisson, divergence = (
-        (None, None, None) if found is None else _factored(domain, options, step, found, t_damping, fitted)
-    )
+    heat_flow, poisson, divergence = _factored(domain, options, step, found, t_damping, fitted)
     factored = time.perf_counter()
-    mass_unit = domain.mean_mass if heat_flow is None else heat_flow.mean_mass
-    assembler = SourceAssembler(domain, step, mass_unit, plain=not damped, unfolds=unfolding is not None)
-    last_steps: Integration | OrderedSolver
-    if heat_flow is None or poisson is None or divergence is None:
-        last_steps = unfolding or UnfoldingSolver(domain, "exact")
-    else:
-        last_steps = Integration(domain, heat_flow, divergence, poisson, t_damping, fitted, assembler.edges)
+    assembler = SourceAssembler(domain, step, heat_flow.mean_mass, plain=not damped)
+    last_steps = Integration(domain, heat_flow, divergence, poisson, t_damping, fitted, assembler.edges)
     triangulation = None if domain.surface is None else domain.surface.triangulation
-    factors = ([] if heat_flow is None else heat_flow.factors) + ([] if poisson is None else [poisson.factor])
+    factors = [*heat_flow.factors, poisson.factor]
     diagnostics = Diagnostics(
         t=_of_largest(step, domain),
         t_requested=_of_largest(requested, domain),
@@ -220,11 +189,11 @@ def prepare(
         n_vertices=domain.n,
         n_flips=triangulation.n_flips if triangulation else 0,
         lengthening=triangulation.lengthening if triangulation else 0.0,
-        backend="none" if heat_flow is None else heat_flow.backend,
+        backend=heat_flow.backend,
         seconds_operators=seconds_operators,
         factor_nonzeros=sum(factor.nonzeros for factor in factors),
         factor_bytes=sum(factor.n_bytes for factor in factors),
-        seconds_analysis=analysed - unfolded,
+        seconds_analysis=analysed - begun,
         seconds_factorization=factored - analysed,
     )
     return SolverParts(
@@ -232,16 +201,14 @@ def prepare(
         operators=domain,
         analysis=found,
         assembler=assembler,
-        factored=heat_flow,
+        heat_flow=heat_flow,
         last_steps=last_steps,
         time_steps=np.broadcast_to(step, domain.n_components),
         step_raised=np.broadcast_to(np.asarray(step) > requested, domain.n_components),
         t_damping=t_damping,
         fitted=fitted,
-        originals=originals,
-        checker=None
-        if options.refine in ("unfold", "exact")
-        else Checker(domain.source_surface, domain.referenced[: domain.n_given], V),
+        checker=Checker(domain.source_surface, domain.referenced[: domain.n_given], V),
+        plan=heat_plan(domain.n_given, domain.n, domain.is_surface, diagnostics.t, domain.mean_edge_length),
         diagnostics=diagnostics,
     )
 
@@ -253,14 +220,12 @@ def _factored(
     found: Analysis,
     t_damping: float | FloatArray | None,
     fitted: bool,
-) -> tuple[HeatFlow, PoissonProblem | None, NormalizedDivergence | None]:
-    """The heat flow, the Poisson problem and the divergence; None for those that `refine` takes the place of."""
+) -> tuple[HeatFlow, PoissonProblem, NormalizedDivergence]:
+    """The heat flow, the Poisson problem and the divergence."""
 
     def flow() -> HeatFlow:
         return HeatFlow(domain, step, options.boundary, options.backend, found, fitted)
 
-    if options.refine is not None:
-        return flow(), None, None
     # Both matrices at once: the backends run without the interpreter's lock. The Poisson problem is done first, and
     # the divergence follows on that thread.
     makers: list[Callable[[], Any]] = [
@@ -272,15 +237,6 @@ def _factored(
     threads = 1 if found.backend == "scipy" else min(2, n_threads())
     poisson, heat_flow, divergence = in_order(lambda make: make(), makers, threads)
     return heat_flow, poisson, divergence
-
-
-def _resolved(domain: Operators, options: SolverOptions) -> tuple[Operators, SolverOptions]:
-    """Operators and options that suit each other: windows where speeds differ much, no added vertices to unfold."""
-    if options.leaves_heat and domain.contrast > _LARGEST_CONTRAST and domain.surface is not None:
-        options = replace(options, refine=options.refine or "exact")
-    if options.refine is not None and domain.n_given < domain.n:
-        domain = without_refinement(domain)
-    return domain, options
 
 
 def _of_largest(step: float | FloatArray, domain: Operators) -> float:

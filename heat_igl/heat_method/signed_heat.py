@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -26,9 +26,11 @@ from heat_igl.operators import Operators, operators
 from heat_igl.runtime import both
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, source_set
 from heat_igl.typing import BoolArray, FloatArray
-from heat_igl.unfolding import CurvedFronts, Front, Refine
+from heat_igl.unfolding import CurvedFronts, Front, MeshTriangles, WindowEngine
 
-__all__ = ["Level", "SignedHeatSolver"]
+__all__ = ["Level", "SignedHeatSolver", "SignedMethod"]
+
+SignedMethod = Literal["windows"]
 
 # Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
 # alike (docs/signed.md).
@@ -39,18 +41,18 @@ class SignedHeatSolver:
     """The signed heat method (Feng and Crane 2024): factor once, ask many times.
 
     Heat finds the sides of the curves and closes their gaps. From the closed curves distance is measured by fronts, or
-    as `refine` says; from points with normals, and if a time step is given, it is the integrated one of the paper.
+    as `method` says; from points with normals, and if a time step is given, it is the integrated one of the paper.
 
     Parameters
     ----------
     mesh : mesh
         Triangles, manifold and oriented alike; whatever `as_mesh` takes.
-    refine : {"unfold", "exact"}, optional
-        Take the size from `HeatMethodSolver` with the same `refine`, measured from the curves, and in gaps between them
-        from the zero curve of the integrated distance. By default fronts give it, see docs/signed.md.
+    method : {"windows"}, optional
+        Take the size from exact windows, measured from the curves, and in gaps between them from the zero curve of the
+        integrated distance. By default fronts give it, see docs/signed.md.
     t_coef : float, optional
         t = t_coef h^2, with h the mean edge length of the intrinsic Delaunay triangulation; 0.25 by default. Larger
-        values close wide gaps with rounder curves, and smooth noisy ones. If it is given, and no `refine`, the distance
+        values close wide gaps with rounder curves, and smooth noisy ones. If it is given, and no `method`, the distance
         is the integrated one.
     t : float, optional
         Time step as a squared length; overrides `t_coef`, and counts like it. It is raised if heat would not cross the
@@ -76,7 +78,7 @@ class SignedHeatSolver:
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.grid(20)
     >>> line = heat_igl.isolines(mesh, mesh.V[:, 0], 0.5)[0]  # x = 1/2
-    >>> phi = heat_igl.SignedHeatSolver(mesh, refine="unfold").distance(line)
+    >>> phi = heat_igl.SignedHeatSolver(mesh, method="windows").distance(line)
     >>> phi[:21:5].round(6).tolist()
     [-0.5, -0.25, 0.0, 0.25, 0.5]
     """
@@ -85,22 +87,23 @@ class SignedHeatSolver:
         self,
         mesh: MeshLike,
         *,
-        refine: Refine | None = None,
+        method: SignedMethod | None = None,
         t_coef: float | None = None,
         t: float | None = None,
         backend: Backend = "auto",
     ) -> None:
         is_default = t_coef is None and t is None
-        options = SolverOptions(_T_COEF if is_default else t_coef, t, refine=refine, backend=backend)
+        options = SolverOptions(_T_COEF if is_default else t_coef, t, backend=backend)
+        require_choice("method", method, (None, *get_args(SignedMethod)))
         self._mesh = as_simplices(mesh)
-        self._refines = refine is not None
         domain, self._faces, triangulation = _oriented_domain(self._mesh)
         parts = prepare(domain, options, V=self._mesh.V)
         self._domain = parts.operators
         self._integration = NormalIntegration(self._mesh, self._faces, triangulation, parts)
         self._unsigned = HeatMethodSolver._of(parts)
+        self._windows = WindowEngine(MeshTriangles(self._mesh)) if method == "windows" else None
         self._fronts: CurvedFronts | None = None
-        if refine is None and is_default:
+        if method is None and is_default:
             self._fronts = CurvedFronts(self._faces, triangulation, domain.mean_edge_length)
 
     def __repr__(self) -> str:
@@ -136,13 +139,13 @@ class SignedHeatSolver:
             More sources, as for `HeatMethodSolver.distance`, without a sign: near them the size of the distance is
             that from them, and the sign is the one that the curves give.
         level : {"zero", "constant", "none"}, optional
-            Asks for the integrated distance without `refine`, with this level. "zero" subtracts from each vertex the
+            Asks for the integrated distance without `method`, with this level. "zero" subtracts from each vertex the
             value at the place on the curves that its heat comes from, so that all curves are near 0: within 0.03 mean
             edge lengths (root mean square) on coarse meshes, and exactly at vertices on them, see docs/signed.md.
             "constant" makes the value nearly constant along each curve, with a different level for each, and 0 in the
-            mean over all. "none" only makes the mean 0. `refine` measures from the curves in any case, and takes the
-            sign from this if curves have gaps. Where the integrated distance is meant and no level is given, it is
-            "zero".
+            mean over all. "none" only makes the mean 0. ``method="windows"`` measures from the curves in any case, and
+            takes the sign from this if curves have gaps. Where the integrated distance is meant and no level is given,
+            it is "zero".
 
         Returns
         -------
@@ -160,20 +163,22 @@ class SignedHeatSolver:
         Notes
         -----
         If no curve has a gap, the regions between curves have one sign each. The levels "constant" and "none" keep the
-        sign of the integrated value instead, unless there is `refine`. The diffused normals of all curves are added: if
-        curves contradict each other, the longer pieces decide.
+        sign of the integrated value instead, unless there is a `method`. The diffused normals of all curves are added:
+        if curves contradict each other, the longer pieces decide.
         """
         if level is not None:
             require_choice("level", level, get_args(Level))
         chosen = oriented_set(curves, self._mesh)
         # Points are samples with noise, over which heat takes the mean.
         by_fronts = self._fronts is not None and level is None and not len(chosen.point_faces)
-        size, left = (self._measured if self._refines or by_fronts else self._from_heat)(chosen, level or "zero")
+        size, left = (self._measured if self._windows is not None or by_fronts else self._from_heat)(
+            chosen, level or "zero"
+        )
         reached = np.isfinite(size)
         if not reached.any():
             raise SourceError("curves reach no vertex: the components that they lie on have no area")
         if unsigned is not None:
-            size = np.minimum(size, self._unsigned.distance(unsigned), out=size, where=reached)
+            size = np.minimum(size, self._from(unsigned), out=size, where=reached)
         # Adding 0 makes 0 of -0.
         return np.where(left, -size, size) + 0.0
 
@@ -204,10 +209,19 @@ class SignedHeatSolver:
         return self._continued(near if closing is None else near.before(self._near([closing]))), left
 
     def _near(self, sources: list[SurfaceCurve | SurfacePoints]) -> Front:
-        """Distance from curves and points: near them, or with `refine` at all vertices."""
+        """Distance from curves and points: near them, or by windows at all vertices."""
+        chosen = source_set(sources, self.n_vertices, self._mesh.F)
+        if self._windows is not None:
+            return Front(self._windows.distance(chosen), np.full(self.n_vertices, np.nan))
         if self._fronts is None:
             return Front(self._unsigned.distance(sources), np.full(self.n_vertices, np.nan))
-        return self._fronts.near(source_set(sources, self.n_vertices, self._mesh.F))
+        return self._fronts.near(chosen)
+
+    def _from(self, sources: Sources) -> FloatArray:
+        """Distance (n,) from sources without a side."""
+        if self._windows is None:
+            return self._unsigned.distance(sources)
+        return self._windows.distance(source_set(sources, self.n_vertices, self._mesh.F))
 
     def _continued(self, front: Front) -> FloatArray:
         """Distance (n,) at all vertices, from that near the curves."""

@@ -32,7 +32,7 @@ class Diagnostics:
     lengthening : float
         The most that was added to an edge length because of degenerate triangles; 0 on other meshes.
     backend : str
-        Storage of the factors; "none" if nothing is factored, with ``refine="exact"`` and on swept points.
+        Storage of the factors.
     factor_nonzeros, factor_bytes : int
         Entries of all factors, and the memory that a query reads twice, indices included.
     seconds_operators, seconds_analysis, seconds_factorization : float

@@ -3,31 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import AccuracyWarning, MeshError
+from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method.batches import checked_cutoff, cut_off
 from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.construction import PreparedSolver
-from heat_igl.heat_method.derivatives import DistanceDerivative
-from heat_igl.heat_method.differentiation import differentiated
-from heat_igl.heat_method.directions import Directions, directions
+from heat_igl.heat_method.derivatives import DistanceDerivative, differentiable_surface
+from heat_igl.heat_method.heat_derivative import HeatDerivative
 from heat_igl.heat_method.integration import damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
+from heat_igl.heat_method.side_lengths import SideLengths
 from heat_igl.heat_method.solution import HeatSolution, LabelledDistance
-from heat_igl.intrinsic import TangentFrames, tangent_frames
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_mesh
+from heat_igl.mesh import Mesh, MeshLike, as_mesh
 from heat_igl.operators import Laplacian
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
 from heat_igl.steps import Boundary
-from heat_igl.typing import ArrayLike, FloatArray, IntArray
-from heat_igl.unfolding import FrontSolver, OrderedSolver, PathAngles, Refine, UnfoldingSolver
+from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["HeatMethodSolver", "heat_method_distance"]
 
@@ -39,10 +36,7 @@ class HeatMethodSolver(PreparedSolver):
     ----------
     mesh : mesh or (n, 3) array_like
         Whatever `as_mesh` takes, or the positions V of a mesh whose faces are `F`. Polygons are solved on with
-        `polygon_operators`, and with `refine` on their triangles. Tetrahedra take fronts instead of heat
-        (`FrontSolver`), unless `magnitude`, a time step, a `boundary` or ``laplacian="cotan"`` is named. Points without
-        faces take ``refine="sweep"``, unless one of these or any `laplacian` is named: ``magnitude="damped"`` is heat.
-        That sweep follows a front of its own, and operators and factors are made when something asks for them.
+        `polygon_operators`, points with those of the triangles between them.
     F : (m, 3) or (m, 4) array_like, optional
         Faces, when `mesh` is V.
     t_coef : float, optional
@@ -54,8 +48,7 @@ class HeatMethodSolver(PreparedSolver):
     laplacian : {"auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"}
         Triangulation to solve on, see `operators`; "cotan" is the paper's. "auto" is the intrinsic Delaunay one where
         triangles are even, and has more vertices where they are not: `operators` then has more rows than there are
-        answers, the first ones for the vertices of the mesh. With `refine`, "auto" adds no vertices. Tetrahedra always
-        keep their own.
+        answers, the first ones for the vertices of the mesh. Tetrahedra always keep their own.
     boundary : {"neumann", "dirichlet", "average"}
         What the heat does at the boundary, see `HeatFlow`.
     magnitude : {"auto", "unit", "damped"}
@@ -64,12 +57,6 @@ class HeatMethodSolver(PreparedSolver):
         negative and the paper's method is wanted. "unit" is the paper's method throughout: otherwise the heat flow is
         fitted to the lengths of edges (`fitted_laplacian`), X follows the gradient of log u, and the vertices next to a
         source vertex get the lengths of the edges.
-    refine : {"sweep", "unfold", "exact"}, optional
-        Integrate nothing, and find the distance in the order of the heat by unfolding triangles, two at a time or in
-        strips: 0.06 to 0.3 % and 0.0006 to 0.005 % mean error on common meshes, see `Refinement`. Both are exact on
-        meshes of up to 1000 vertices and on rough ones. "exact" is the polyhedral distance by windows, in 0.4 to 2.4
-        times the time of "unfold". Needs triangles; no Poisson problem is factored, and with "exact" nothing at all
-        until `solve` asks for heat.
     backend : {"auto", "scipy", "multifrontal", "iterative"}
         Linear solver, see `factorize`.
 
@@ -117,10 +104,9 @@ class HeatMethodSolver(PreparedSolver):
         laplacian: Laplacian = "auto",
         boundary: Boundary = "neumann",
         magnitude: Magnitude = "auto",
-        refine: Refine | None = None,
         backend: Backend = "auto",
     ) -> None:
-        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, refine, backend)
+        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
         self._set_up(as_mesh(mesh, F), options)
 
     def distance(self, sources: Sources, cutoff: float | None = None) -> FloatArray:
@@ -160,47 +146,32 @@ class HeatMethodSolver(PreparedSolver):
         return np.asarray(cut_off(distance, beyond))
 
     def _source_set(self, sources: Sources) -> SourceSet:
-        chosen, originals = source_set(sources, self.n_vertices, self._parts.given_faces), self._parts.originals
-        return chosen if originals is None else chosen.with_vertices_moved(originals)
+        return source_set(sources, self.n_vertices, self._parts.given_faces)
 
-    def _distances(self, source_sets: list[SourceSet]) -> FloatArray:
-        return self._answers(source_sets)[0]
-
-    def _answers(self, source_sets: list[SourceSet]) -> tuple[FloatArray, list[str | None]]:
+    def _answers(
+        self,
+        source_sets: list[SourceSet],
+        cutoff: float = np.inf,  # noqa: ARG002
+    ) -> tuple[FloatArray, list[str | None]]:
         """Distances (k, n) from k sets of sources, and what is wrong with them: the method from end to end."""
-        last_steps = self._parts.last_steps
-        if isinstance(last_steps, OrderedSolver):
-            distances = last_steps.distances(source_sets, self._order(source_sets))
-        else:
-            terms = self._source_terms(source_sets)
-            distances = self._distances_from_heat(terms, self._heat(terms))
+        terms = self._source_terms(source_sets)
+        distances = self._distances_from_heat(terms, self._heat(terms))
         checks = [self._check(*pair) for pair in zip(distances, source_sets, strict=True)]
-        return distances, [None if check is None else check.complaint(self._parts.is_surface) for check in checks]
+        return distances, [check.complaint(self._parts.is_surface) for check in checks]
 
-    def _check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck | None:
+    def _check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck:
         """Check one answer (n,), and raise it to straight lines where it is far below them.
 
         A field of length 1 is the paper's method, and a time step that was asked for may be meant to smooth: their
         answers are left as they are.
         """
-        if self._parts.checker is None:
-            return None
         check = self._parts.checker.check(distance, sources)
         if check.is_short and self._parts.t_damping is not None and self._parts.options.default_time_step:
             return check._replace(raised=self._parts.checker.raise_to_lines(distance, sources))
         return check
 
-    def _order(self, source_sets: list[SourceSet]) -> FloatArray:
-        """Heat (n, k) of k sets of sources, for the order in which to unfold; zeros where that is not read."""
-        last_steps = self._parts.last_steps
-        if isinstance(last_steps, OrderedSolver) and not last_steps.reads_heat:
-            return np.zeros((self.n_vertices, len(source_sets)))
-        return self._heat(self._source_terms(source_sets))
-
-    def _source_terms(self, source_sets: list[SourceSet], for_field: bool = False) -> list[SourceTerm]:
-        """Initial heat of each set, and what is known near it; unfolding reads that only `for_field`, in `solve`."""
-        if isinstance(self._parts.last_steps, OrderedSolver):
-            return [self._parts.assembler.term(sources, takes_lines=for_field) for sources in source_sets]
+    def _source_terms(self, source_sets: list[SourceSet]) -> list[SourceTerm]:
+        """Initial heat of each set, and what is known near it."""
         terms = [self._parts.assembler.term(sources) for sources in source_sets]
         return [drop_overtaken(term, self._parts.heat_flow, self.operators.n) for term in terms]
 
@@ -209,10 +180,8 @@ class HeatMethodSolver(PreparedSolver):
         return self._parts.heat_flow.solve(right_hand_side(self.operators.n, terms))
 
     def _distances_from_heat(self, terms: list[SourceTerm], u: FloatArray) -> FloatArray:
-        """Distances (k, n) from the heat of `_heat`: steps 2 and 3, or unfolding in the order of the heat."""
+        """Distances (k, n) from the heat of `_heat`: steps 2 and 3."""
         last_steps = self._parts.last_steps
-        if isinstance(last_steps, OrderedSolver):
-            return last_steps.distances([term.sources for term in terms], u)
         divergence = last_steps.divergence(terms, u)
         phi = last_steps.poisson.solve(divergence)
         return last_steps.pin_levels(terms, phi, u)[:, : self.n_vertices]
@@ -229,89 +198,42 @@ class HeatMethodSolver(PreparedSolver):
         Returns
         -------
         LabelledDistance
-            Without `refine`, labels say from which source most of the heat comes: a solve for each source, and right
-            but for vertices less than an edge from the border of two cells. With it, they come with the distance.
+            Labels say from which source most of the heat comes: a solve for each source, and right but for vertices
+            less than an edge from the border of two cells.
         """
         beyond = checked_cutoff(cutoff)
         chosen = self._source_set(sources)
-        if isinstance(self._parts.last_steps, OrderedSolver):
-            distance, labels = self._parts.last_steps.labelled(chosen, self._order([chosen])[:, 0])
-        else:
-            terms = self._source_terms([chosen])
-            distance = self._distances_from_heat(terms, self._heat(terms))[0]
-            labels = warmest_sources(terms[0], self._parts.heat_flow, self.operators.n)[: self.n_vertices]
-        check = self._check(distance, chosen)
-        _warn(check and check.complaint(self._parts.is_surface))
+        terms = self._source_terms([chosen])
+        distance = self._distances_from_heat(terms, self._heat(terms))[0]
+        labels = warmest_sources(terms[0], self._parts.heat_flow, self.operators.n)[: self.n_vertices]
+        _warn(self._check(distance, chosen).complaint(self._parts.is_surface))
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
 
-    def directions(self, sources: Sources, *, tolerance: float | None = None) -> Directions:
-        """Distance, and the directions in which the shortest paths leave the sources and arrive.
-
-        Parameters
-        ----------
-        sources : sources
-            As for `distance`, with its errors. With ``refine="unfold"``, paths from curves are found exactly, as by
-            ``refine="exact"``, up to 50 000 vertices from closed curves and up to 10 000 from open ones. Beyond, points
-            at most an eighth of a mean edge length apart stand for curves, and the paths start there.
-        tolerance : float, optional
-            For ``refine="unfold"``, see `Refinement.unfold`. With the default, departures are wrong by 0.1 to 0.2
-            degrees in the mean, and by less than 0.02 degrees in the median; with 1e-6 by half of that, and hardly at
-            all away from the cut locus. With 0, and with less than the default on up to 50 000 vertices, windows find
-            the paths, which are exact.
-
-        Returns
-        -------
-        Directions
-            Distances and labels as those of `voronoi` (those of ``refine="exact"`` where paths from curves are found
-            exactly), angles in the frames of `tangent_frames`, and the gradient.
-
-        Raises
-        ------
-        MeshError
-            If the mesh has no tangent frames.
-        ValueError
-            Without ``refine="unfold"`` or ``refine="exact"``, for a solver that was made from operators, and if
-            `tolerance` is not a number from 0 to 1.
-        """
-        found = self._paths(sources, tolerance)
-        return directions(*found, self._frames)
-
-    def _paths(
-        self, sources: Sources, tolerance: float | None
-    ) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
-        """Distance, labels, and angles and starts of the shortest paths."""
-        last_steps = self._parts.last_steps
-        if isinstance(last_steps, FrontSolver):
-            raise MeshError("directions need triangles that fit together: fronts through this domain follow no paths")
-        if not isinstance(last_steps, UnfoldingSolver) or self._parts.options.refine == "sweep":
-            raise ValueError('directions follow paths: make the solver with refine="unfold" or refine="exact"')
-        chosen = self._source_set(sources)
-        return last_steps.directed(chosen, self._order([chosen])[:, 0], tolerance)
-
-    @cached_property
-    def _frames(self) -> TangentFrames:
-        if self._mesh is None:
-            raise ValueError("directions need the positions of a mesh, which this solver does not have")
-        return tangent_frames(self._mesh if isinstance(self._mesh, Mesh) else self._mesh.triangles)
-
     def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
         """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
 
-        Arguments and errors as for `distance`; a ValueError also for what is not differentiated, see `differentiated`.
+        Arguments and errors as for `distance`; a ValueError also for what is not differentiated, see
+        `differentiable_surface` and `HeatDerivative`.
         """
-        return differentiated(self.distance(sources), self._source_set(sources), self._parts, self._mesh)
+        chosen = self._source_set(sources)
+        surface = differentiable_surface(self.operators.surface, chosen, self._mesh)
+        if self.operators.fans is not None:
+            raise ValueError("derivatives need a surface of triangles, and this is heat on polygons")
+        sides = SideLengths(self._mesh) if isinstance(self._mesh, Mesh) else self.operators.metric
+        distance, answer = self.distance(sources), HeatDerivative(self._parts, chosen)
+        return distance, DistanceDerivative(distance, chosen, surface, sides, answer)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
         chosen = self._source_set(sources)
-        terms = self._source_terms([chosen], for_field=True)
+        terms = self._source_terms([chosen])
         u = self._heat(terms)
         X, magnitude = damped_field(self.operators, terms, u, self._parts.t_damping, self._parts.fitted)
         distance = self._distances_from_heat(terms, u)[0]
         check = self._check(distance, chosen)
-        _warn(check and check.complaint(self.operators.is_surface))
+        _warn(check.complaint(self.operators.is_surface))
         with np.errstate(under="ignore"):
             heat = (u[:, 0] / terms[0].unit / self._parts.heat_flow.mean_mass)[: self.n_vertices]
         return HeatSolution(

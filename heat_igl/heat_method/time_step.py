@@ -7,22 +7,12 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.operators import Operators, is_rough_or_narrow
+from heat_igl.plan import FARTHEST_SPREAD, T_COEF, T_COEF_FITTED, T_COEF_ROUGH
 from heat_igl.runtime import warn_caller
 from heat_igl.steps import smallest_time_step, smallest_time_steps
 from heat_igl.typing import FloatArray
 
 __all__ = ["time_step", "check_large_step"]
-
-# Between two aims, see the tables of docs/heat_path.md: on scans the error falls further with t, on a regular grid of
-# squares, on which heat prefers diagonals, it grows.
-_T_COEF_FITTED = 0.5
-# On rough and on narrow surfaces fronts bend at every vertex, and the less heat spreads the less it cuts corners: on
-# voxels, noise and a maze the error at 0.15 is 0.2 to 0.8 of that at 0.5.
-_T_COEF_ROUGH = 0.15
-# The paper's: t = h^2.
-_T_COEF = 1.0
-# Heat that spreads over more than this many of the longest distances is level to 1e-10.
-_FARTHEST_SPREAD = 1e5
 
 
 def time_step(options: SolverOptions, domain: Operators, fitted: bool) -> tuple[float | FloatArray, float | FloatArray]:
@@ -45,9 +35,9 @@ def time_step(options: SolverOptions, domain: Operators, fitted: bool) -> tuple[
         return step, options.t
     t_coef = options.t_coef
     if t_coef is None:
-        t_coef = _T_COEF
+        t_coef = T_COEF
         if fitted:
-            t_coef = _T_COEF_ROUGH if is_rough_or_narrow(domain) else _T_COEF_FITTED
+            t_coef = T_COEF_ROUGH if is_rough_or_narrow(domain) else T_COEF_FITTED
     requested = t_coef * domain.mean_edge_lengths**2
     steps = np.maximum(requested, smallest_time_steps(domain, fitted))
     used = np.unique(domain.components[domain.referenced])
@@ -68,7 +58,7 @@ def check_large_step(options: SolverOptions, domain: Operators) -> None:
     if step is None and options.t_coef is not None:
         step = options.t_coef * domain.mean_edge_length**2
     name, value = ("t", options.t) if options.t is not None else ("t_coef", options.t_coef)
-    if step is not None and np.sqrt(step) > _FARTHEST_SPREAD * domain.longest_distance:
+    if step is not None and np.sqrt(step) > FARTHEST_SPREAD * domain.longest_distance:
         raise ValueError(
             f"{name} = {value:.4g} is too large: heat spreads over sqrt(t) = {np.sqrt(step):.4g}, and the longest "
             f"distance on the mesh is {domain.longest_distance:.4g}, so heat is level; t is a squared "

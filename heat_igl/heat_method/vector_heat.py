@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from typing import Literal, get_args
+
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, SourceError, real_numbers
+from heat_igl.errors import MeshError, SourceError, real_numbers, require_choice
 from heat_igl.heat_method.heat_transport import HeatTransport
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.outward_field import OutwardField
@@ -19,9 +22,11 @@ from heat_igl.mesh import MeshLike, PointCloud, as_mesh, as_simplices, is_orient
 from heat_igl.operators import Operators, edge_rotations, operators
 from heat_igl.sources import Sources, ordered_vertices
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
-from heat_igl.unfolding import Refine
+from heat_igl.unfolding import MeshTriangles, WindowEngine
 
-__all__ = ["VectorHeatSolver"]
+__all__ = ["VectorHeatSolver", "VectorMethod"]
+
+VectorMethod = Literal["heat", "windows"]
 
 
 class VectorHeatSolver:
@@ -38,10 +43,9 @@ class VectorHeatSolver:
         farther from transport along the shortest geodesic.
     t : float, optional
         Time step as a squared length; overrides `t_coef`. It is raised where heat would not cross the mesh.
-    refine : {"sweep", "unfold", "exact"}, optional
-        With "unfold" and "exact" nothing flows: every vertex takes the value or the vector of the nearest source, along
-        the shortest path, and `log_map` has the direction in which that path departs; see
-        `HeatMethodSolver.directions`. "sweep" is for the distance in `log_map` alone.
+    method : {"heat", "windows"}
+        With "windows" nothing flows: every vertex takes the value or the vector of the nearest source, along the exact
+        shortest path, and `log_map` has the direction in which that path departs; see `GeodesicSolver.directions`.
     backend : {"auto", "scipy", "multifrontal"}
         Linear solver, see `factorize`.
 
@@ -81,7 +85,7 @@ class VectorHeatSolver:
         *,
         t_coef: float | None = None,
         t: float | None = None,
-        refine: Refine | None = None,
+        method: VectorMethod = "heat",
         backend: Backend = "auto",
     ) -> None:
         mesh = as_mesh(mesh)
@@ -96,12 +100,12 @@ class VectorHeatSolver:
         domain = operators(triangles, "intrinsic-delaunay")
         if domain.surface is None:
             raise MeshError("tangent vectors need triangles, and the mesh holds tetrahedra")
-        options = SolverOptions(t_coef, t, refine=refine, backend=backend)
-        self._distance_solver = HeatMethodSolver._of(prepare(domain, options))
+        require_choice("method", method, get_args(VectorMethod))
+        self._domain, self._options = domain, SolverOptions(t_coef, t, backend=backend)
         #: How values and vectors travel from the sources: by diffusion, or along the shortest paths.
         self._transport: HeatTransport | PathTransport | TwoSidedTransport
-        if refine in ("unfold", "exact"):
-            self._transport = PathTransport(self._distance_solver, self._frames.angles)
+        if method == "windows":
+            self._transport = PathTransport(WindowEngine(MeshTriangles(triangles)), self._frames.angles)
         else:
             triangulation = domain.surface.triangulation
             # Thirds of the triangles: with Voronoi areas, transport on spheres is wrong by 5 to 10 % more.
@@ -144,12 +148,17 @@ class VectorHeatSolver:
             raise ValueError(f"rotations must have the shape of L, {domain.L.shape}, not {rotations.shape}")
         solver = cls.__new__(cls)
         solver._frames, solver.n_vertices = None, domain.n
-        solver._distance_solver = HeatMethodSolver._of(prepare(domain, SolverOptions(t_coef, t, backend=backend)))
+        solver._domain, solver._options = domain, SolverOptions(t_coef, t, backend=backend)
         solver._transport = HeatTransport(solver._distance_solver, rotations)
         return solver
 
+    @cached_property
+    def _distance_solver(self) -> HeatMethodSolver:
+        """Distance by heat, and its flow; nothing is factored if paths are followed."""
+        return HeatMethodSolver._of(prepare(self._domain, self._options))
+
     def __repr__(self) -> str:
-        return repr(self._distance_solver).replace("HeatMethodSolver", "VectorHeatSolver", 1)
+        return f"VectorHeatSolver({self.n_vertices} vertices, {type(self._transport).__name__})"
 
     @property
     def frames(self) -> TangentFrames:
@@ -161,7 +170,7 @@ class VectorHeatSolver:
     @property
     def operators(self) -> Operators:
         """L and M of the triangulation that is solved on; of both sides of a cloud without an orientation."""
-        return self._distance_solver.operators
+        return self._domain
 
     @property
     def t(self) -> float:
@@ -269,7 +278,7 @@ class VectorHeatSolver:
         Notes
         -----
         The angle between the radial field and a transported axis, which both come from vector heat flow, and the
-        distance of this solver's `refine`. The paper's radial field starts from a circle around the source, ours from
+        distance by heat. The paper's radial field starts from a circle around the source, ours from
         vectors with the sum 0, which irregular triangles there do not bias (`OutwardField.dipole`). The neighbours of
         the source get the directions of their edges. Near the cut locus the angle is least accurate: heat that arrives
         from both sides is blended.

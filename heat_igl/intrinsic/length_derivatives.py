@@ -111,7 +111,7 @@ def check_carried(triangulation: IntrinsicTriangulation) -> None:
     if any(isinstance(change, Refined) for change in triangulation.history):
         raise ValueError(
             "the triangulation that is solved on has more vertices than the mesh, and no derivative is carried through "
-            "them: take laplacian='intrinsic-delaunay', or refine='unfold'"
+            "them: take laplacian='intrinsic-delaunay', or a GeodesicSolver"
         )
 
 

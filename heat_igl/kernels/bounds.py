@@ -2,10 +2,9 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.half_edges import Spoke
 from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["glued_edges", "incident_edges", "is_longer", "lengthen", "shorten", "spoke_edges"]
+__all__ = ["glued_edges", "incident_edges", "is_longer", "lengthen", "shorten"]
 
 
 def is_longer(
@@ -74,28 +73,6 @@ def glued_edges(
                 if twin[3 * f + c] < 0 or 3 * f + c < twin[3 * f + c]:
                     ends[e, 0], ends[e, 1] = F[f, (c + 1) % 3], F[f, (c + 2) % 3]
                     length_of[e] = length[3 * f + c]
-                    e += 1
-    return pairs, lengths
-
-
-def spoke_edges(first: cython.const[cython.int][::1], spoke: cython.const[Spoke][::1]):
-    """Ends (e, 2) int32 and lengths (e,) of the edges of tables, each once."""
-    v: cython.int
-    k: cython.int
-    e: cython.Py_ssize_t = 0
-    with cython.nogil:
-        for v in range(first.shape[0] - 1):
-            for k in range(first[v], first[v + 1]):
-                e += v < spoke[k].neighbour
-    pairs, lengths = np.empty((e, 2), np.int32), np.empty(e)
-    ends: cython.int[:, ::1] = pairs
-    length: cython.double[::1] = lengths
-    e = 0
-    with cython.nogil:
-        for v in range(first.shape[0] - 1):
-            for k in range(first[v], first[v + 1]):
-                if v < spoke[k].neighbour:
-                    ends[e, 0], ends[e, 1], length[e] = v, spoke[k].neighbour, spoke[k].length
                     e += 1
     return pairs, lengths
 

@@ -1,26 +1,18 @@
-# The structures that walks over a triangulation read; what their fields mean stands in heat_igl/intrinsic/fans.py.
+# The structures that a sweep reads; what their fields mean stands in heat_igl/unfolding/spokes.py.
 
-# Spokes and steps are one line of the processor's cache, turns half of one.
+# One line of the processor's cache.
 cdef struct Spoke:
     double length, along, height, base, beyond_along, beyond_depth
     int neighbour, next_neighbour, beyond, next
 
-cdef struct Turn:
-    double here, there
-    int fan_here, fan_there, corner, across
-
-cdef struct Step:
-    double x, y, direction, angle
-    int vertex, fan, to_right, to_left
-    double spare[2]
+# A corner: the place of its vertex over the opposite side, in units of that side, and its angle.
+cdef struct Corner:
+    double x, y, angle
 
 
 cdef class HalfEdges:
     cdef const int[::1] first
     cdef const Spoke[::1] spoke
-    cdef const Turn[::1] turn
-    cdef const Step[::1] step
-    cdef const double[::1] total
 
 
 # The half-edges after and before `h` in its face.

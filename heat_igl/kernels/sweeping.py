@@ -1,4 +1,4 @@
-"""Kernel of the sweep: distance by unfolding two triangles at a time, in a given order or in that of a front.
+"""Kernel of the sweep: distance by unfolding two triangles at a time, in the order of a front.
 
 Seen from a vertex v, a source lies behind the side ab of a triangle at v, at the intersection of circles about a and b.
 The triangle beyond ab has the third corner w, which is nearer to the source and so places it more accurately:
@@ -26,22 +26,20 @@ __all__ = ["sweep"]
 
 
 def sweep(
-    order,
-    tables,
+    spokes,
     d: cython.double[::1],
     label,
     offset: cython.const[cython.double][::1],
     group: cython.const[cython.longlong][::1],
     is_stale: cython.uchar[::1],
-    width: cython.double = 0.0,
+    width: cython.double,
 ):
-    """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, in the given order.
+    """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, until nothing gives less.
 
-    `order` (n,) int32 may be None. Then a front finds it in bands of the given width, see `FrontOrder`.
-
-    If a vertex turns out to be nearer than one that came before it, the sweep goes back to that one at once, before
-    the error there spreads. Returns the number of visits per vertex. Vertices that are not in `is_stale` (n,) bool
-    are visited only if a value that they depend on changes.
+    A front finds the order of the vertices, in bands of distance of the given width, see `FrontOrder`. If a vertex
+    turns out to be nearer than one that came before it, the sweep goes back to that one at once, before the error there
+    spreads. Returns the number of visits per vertex. Vertices that are not in `is_stale` (n,) bool are visited only if
+    a value that they depend on changes.
 
     `label` (n,) int32, None unless there is more than one source, is handed on with the distance: the source that it is
     measured from, -1 if none is reached; ``offset[label]`` is the distance at which that source begins. Circles
@@ -51,19 +49,13 @@ def sweep(
     """
     n = d.shape[0]
     one = _Sweep()
-    one.t = HalfEdges(tables)
+    one.t = HalfEdges(spokes)
     one.is_large = one.t.spoke.shape[0] > CACHED
     one.d, one.is_stale, one.offset, one.group = d, is_stale, offset, group
-    if order is None:
-        one.n_ordered = 0
-        one.front = FrontOrder(one.t, d, width)
-        one.order, one.rank = one.front.order, one.front.rank
-    else:
-        one.n_ordered = n
-        rank = np.empty(n, np.int32)
-        rank[order] = np.arange(n, dtype=np.int32)
-        one.order, one.rank = order, rank
-    one.is_flat = tables.is_flat.view(np.uint8)
+    one.n_ordered = 0
+    one.front = FrontOrder(one.t, d, width)
+    one.order, one.rank = one.front.order, one.front.rank
+    one.is_flat = spokes.is_flat.view(np.uint8)
     one.has_labels = label is not None
     one.label = label if one.has_labels else np.empty(0, np.int32)
     with cython.nogil:

@@ -21,6 +21,7 @@ from heat_igl.linear.iterative import IterativeAnalysis, has_iterative
 from heat_igl.linear.multifrontal import MultifrontalAnalysis
 from heat_igl.linear.protocols import Analysis, Factorization
 from heat_igl.linear.superlu import SuperLUAnalysis
+from heat_igl.plan import SMALLEST_MULTIFRONTAL
 from heat_igl.typing import BoolArray
 
 __all__ = ["Backend", "analyse", "factorize"]
@@ -32,8 +33,6 @@ _ANALYSES: dict[str, Callable[[sp.csc_matrix], Analysis]] = {
     "multifrontal": MultifrontalAnalysis,
     "iterative": IterativeAnalysis,
 }
-# Below, SuperLU takes less time for both factors and ten queries.
-_SMALLEST_MULTIFRONTAL = 1000
 
 
 def analyse(pattern: sp.csc_matrix, backend: Backend = "auto", n_factors: int = 2) -> Analysis:
@@ -62,7 +61,7 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto", n_factors: int = 
 def _choice(pattern: sp.csc_matrix, n_factors: int) -> str:
     if has_iterative() and not factors_fit(pattern, n_factors):
         return "iterative"
-    return "multifrontal" if pattern.shape[0] >= _SMALLEST_MULTIFRONTAL else "scipy"
+    return "multifrontal" if pattern.shape[0] >= SMALLEST_MULTIFRONTAL else "scipy"
 
 
 def factorize(A: sp.csc_matrix, backend: Backend = "auto", free: BoolArray | None = None) -> Factorization:

@@ -55,13 +55,13 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
         For `HeatMethodSolver.from_operators`; all lengths are those of the metric.
 
         Triangles: where faces see their common edges at the same length, within 10 %, they are an intrinsic
-        triangulation with these lengths (the mean of both). Edges are flipped, and every `refine` works. If lengths are
+        triangulation with these lengths (the mean of both). Edges are flipped, and every method works. If lengths are
         30 times as long in one place as in another, `HeatMethodSolver` takes exact windows by default: one time step
         cannot suit both.
 
         Where faces differ by more anywhere, as at a jump of the speed, fronts are refracted, and no unfolding is
         straight: there is no `surface`, flips end at such edges, and `HeatMethodSolver` takes the fronts of
-        `FrontSolver` by default and with ``refine="sweep"``; other refinements are refused, and sources are vertices.
+        `GeodesicSolver` by fronts; its windows are refused, and sources are vertices.
 
         Tetrahedra: in one metric for all, distance is exact as in space. In any other, it is that of a scheme of first
         order, sharpened to second where the metric and the distance are smooth, see `FrontSolver`.
@@ -83,10 +83,10 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
     Twice as far in x as in y:
 
     >>> import numpy as np
-    >>> from heat_igl import HeatMethodSolver, metric_operators, shapes
+    >>> from heat_igl import GeodesicSolver, metric_operators, shapes
     >>> mesh = shapes.grid(8)
     >>> domain = metric_operators(mesh, np.tile(np.diag([4.0, 1.0, 1.0]), (mesh.n_faces, 1, 1)))
-    >>> distance = HeatMethodSolver.from_operators(domain, refine="exact").distance(0)
+    >>> distance = GeodesicSolver(domain).distance(0)
     >>> bool(np.allclose(distance, np.hypot(2 * mesh.V[:, 0], mesh.V[:, 1])))
     True
     """

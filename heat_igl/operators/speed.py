@@ -34,7 +34,7 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     Operators
         For `HeatMethodSolver.from_operators`, with every length a travel time. Where speeds of neighbours differ by at
         most 10 %, the mean is taken for the edge between them, and triangles with these travel times are an intrinsic
-        triangulation, on which every `refine` works. Where they jump, and on tetrahedra, `HeatMethodSolver` follows
+        triangulation, on which every method works. Where they jump, and on tetrahedra, `GeodesicSolver` follows
         fronts that are refracted at the jumps (`FrontSolver`), right at any contrast; then sources are vertices.
 
     Raises
@@ -54,7 +54,7 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.strip(10, 2)
     >>> domain = heat_igl.speed_operators(mesh, [2.0] * mesh.n_faces)
-    >>> time = heat_igl.HeatMethodSolver.from_operators(domain, refine="unfold").distance(0)
+    >>> time = heat_igl.GeodesicSolver(domain).distance(0)
     >>> round(float(time[10]), 6)  # the length 10 at the speed 2
     5.0
     """

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from heat_igl.errors import MeshError, SourceError, real_numbers
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.geodesic import Solver
 from heat_igl.mesh import MeshLike, SurfacePoints, as_simplices
 from heat_igl.sampling.queries import as_solver, checked_vertices, distance_rows
 from heat_igl.typing import ArrayLike, FloatArray
@@ -16,7 +16,10 @@ __all__ = ["geodesic_centre"]
 
 
 def geodesic_centre(
-    mesh: MeshLike, solver: HeatMethodSolver | MeshLike, points: ArrayLike, weights: ArrayLike | None = None
+    mesh: MeshLike,
+    solver: Solver | MeshLike,
+    points: ArrayLike,
+    weights: ArrayLike | None = None,
 ) -> SurfacePoints:
     """The point with the least sum of squared distances to `points`: their Frechet mean (a Karcher mean).
 
@@ -24,7 +27,7 @@ def geodesic_centre(
     ----------
     mesh : mesh
         Triangles.
-    solver : HeatMethodSolver or mesh
+    solver : GeodesicSolver, HeatMethodSolver or mesh
         Of the same mesh, or that mesh, for a near-exact solver.
     points : (k,) array_like of int, or (n,) mask of bool
         Vertices; one that comes twice counts twice.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.geodesic import Solver
 from heat_igl.mesh import MeshLike
 from heat_igl.sampling.queries import as_solver, checked_vertices, distance_rows
 from heat_igl.typing import ArrayLike, FloatArray
@@ -12,12 +12,12 @@ from heat_igl.typing import ArrayLike, FloatArray
 __all__ = ["diameter", "distance_matrix"]
 
 
-def diameter(solver: HeatMethodSolver | MeshLike, *, start: int = 0, rounds: int = 10) -> tuple[float, int, int]:
+def diameter(solver: Solver | MeshLike, *, start: int = 0, rounds: int = 10) -> tuple[float, int, int]:
     """Two vertices that are far apart, found by repeatedly moving to the farthest vertex.
 
     Parameters
     ----------
-    solver : HeatMethodSolver or mesh
+    solver : GeodesicSolver, HeatMethodSolver or mesh
         Of any domain, or whatever `as_mesh` takes, for a near-exact solver.
     start : int
         Vertex whose component is measured.
@@ -61,12 +61,12 @@ def diameter(solver: HeatMethodSolver | MeshLike, *, start: int = 0, rounds: int
     return best
 
 
-def distance_matrix(solver: HeatMethodSolver | MeshLike, indices: ArrayLike | None = None) -> FloatArray:
+def distance_matrix(solver: Solver | MeshLike, indices: ArrayLike | None = None) -> FloatArray:
     """Distances between all pairs of vertices, or of some.
 
     Parameters
     ----------
-    solver : HeatMethodSolver or mesh
+    solver : GeodesicSolver, HeatMethodSolver or mesh
         Of any domain, or whatever `as_mesh` takes, for a near-exact solver with n vertices; asked k times.
     indices : (k,) array_like of int, or (n,) mask of bool, optional
         Distinct vertices; all n if not given, which takes 8 n^2 bytes.

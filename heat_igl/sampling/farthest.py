@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 
 from heat_igl.errors import shown
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.geodesic import Solver
 from heat_igl.mesh import MeshLike
 from heat_igl.sampling.queries import as_solver
 from heat_igl.sampling.voronoi import VoronoiCells, claim_nearer
@@ -17,12 +17,12 @@ from heat_igl.typing import ArrayLike, IntArray
 __all__ = ["farthest_cells", "farthest_points"]
 
 
-def farthest_points(solver: HeatMethodSolver | MeshLike, k: int, *, start: ArrayLike = 0) -> IntArray:
+def farthest_points(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -> IntArray:
     """`k` vertices, each as far as possible from those before (Gonzalez 1985; Moenning and Dodgson 2003).
 
     Parameters
     ----------
-    solver : HeatMethodSolver or mesh
+    solver : GeodesicSolver, HeatMethodSolver or mesh
         Of any domain, or whatever `as_mesh` takes, for a near-exact solver; asked k times.
     k : int
         Number of vertices.
@@ -51,7 +51,7 @@ def farthest_points(solver: HeatMethodSolver | MeshLike, k: int, *, start: Array
     return farthest_cells(solver, k, start=start).sites
 
 
-def farthest_cells(solver: HeatMethodSolver | MeshLike, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
+def farthest_cells(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
     """The Voronoi cells of `farthest_points`, for the same queries; arguments and errors as there.
 
     Examples
@@ -63,7 +63,7 @@ def farthest_cells(solver: HeatMethodSolver | MeshLike, k: int, *, start: ArrayL
     """
     solver = as_solver(solver)
     first = vertex_sources(cast(Any, start), solver.n_vertices, "start")
-    referenced = solver.operators.referenced[: solver.n_vertices]
+    referenced = solver.referenced
     used = referenced.copy()
     used[first] = True
     _check_count(k, len(first), int(used.sum()))

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from heat_igl.errors import SourceError
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.geodesic import GeodesicSolver, Solver
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.sources import named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
@@ -45,15 +45,14 @@ def checked_vertices(name: str, vertices: ArrayLike, n: int, distinct: bool = Tr
     return named
 
 
-def as_solver(solver: HeatMethodSolver | MeshLike) -> HeatMethodSolver:
-    """The solver itself, or an object with the same methods; on a mesh a near-exact one, by heat on tetrahedra."""
+def as_solver(solver: Solver | MeshLike) -> Solver:
+    """The solver itself, or an object with the same methods; on a mesh a `GeodesicSolver`."""
     if hasattr(solver, "distance") and hasattr(solver, "n_vertices"):
-        return cast(HeatMethodSolver, solver)
-    mesh = as_simplices(solver)
-    return HeatMethodSolver(mesh, refine=None if mesh.is_tetrahedral else "unfold")
+        return cast(GeodesicSolver, solver)
+    return GeodesicSolver(as_simplices(cast(MeshLike, solver)))
 
 
-def distance_rows(solver: HeatMethodSolver, vertices: IntArray) -> Iterator[AnyArray]:
+def distance_rows(solver: Solver, vertices: IntArray) -> Iterator[AnyArray]:
     """Distances (n,) from each of `vertices`, solved in blocks."""
     for start in range(0, len(vertices), _BLOCK):
         yield from solver.distances([[int(v)] for v in vertices[start : start + _BLOCK]])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.geodesic import Solver
 from heat_igl.mesh import MeshLike
 from heat_igl.sampling.queries import as_solver, checked_vertices, distance_rows
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -47,12 +47,12 @@ class VoronoiCells:
         )
 
 
-def voronoi_cells(solver: HeatMethodSolver | MeshLike, sites: ArrayLike) -> VoronoiCells:
+def voronoi_cells(solver: Solver | MeshLike, sites: ArrayLike) -> VoronoiCells:
     """The geodesic Voronoi diagram of given vertices, by one query for each site.
 
     Parameters
     ----------
-    solver : HeatMethodSolver or mesh
+    solver : GeodesicSolver, HeatMethodSolver or mesh
         Of any domain, or whatever `as_mesh` takes, for a near-exact solver.
     sites : (k,) array_like of int
         Distinct vertices.

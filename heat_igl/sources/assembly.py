@@ -42,8 +42,6 @@ class SourceAssembler:
         The mean mass by which the heat flow divides.
     plain : bool
         Around source vertices take every distance from heat, as the paper does, and none from edges.
-    unfolds : bool
-        Distance will come by unfolding, which finds distances around source vertices by itself.
 
     Attributes
     ----------
@@ -57,10 +55,9 @@ class SourceAssembler:
         t: float | FloatArray,
         mass_unit: float | FloatArray,
         plain: bool = False,
-        unfolds: bool = False,
     ) -> None:
         self._domain, self._t = domain, t
-        self._plain, self._unfolds = plain, unfolds
+        self._plain = plain
         self._mass = domain.M.diagonal() / mass_unit
         # Of each component, if each has a time step.
         self._h = domain.mean_edge_lengths if np.ndim(t) else np.full(domain.n_components, domain.mean_edge_length)
@@ -84,12 +81,12 @@ class SourceAssembler:
         if surface is not None and surface.uncovered is not None and surface.uncovered is not surface.faces:
             self._straight.append(NearField(surface.uncovered))
 
-    def term(self, sources: SourceSet, takes_lines: bool = True) -> SourceTerm:
-        """Initial heat of `sources`, and the distances known around them; those of straight lines only if asked for."""
+    def term(self, sources: SourceSet) -> SourceTerm:
+        """Initial heat of `sources`, and the distances known around them."""
         sources = self._carried(sources)
         rim = self._rim(sources)
         ring = self._ring(sources, rim)
-        lines, far = self._straight_lines(sources, rim) if takes_lines else (_NONE, _NONE)
+        lines, far = self._straight_lines(sources, rim)
         near = Seeds.nearest(_joined(ring, lines))
         seen = np.zeros(len(near.vertex), bool)
         if len(lines.vertex):
@@ -150,7 +147,7 @@ class SourceAssembler:
     def _ring(self, sources: SourceSet, rim: BoolArray) -> Seeds:
         """Source vertices, and around those at the rim their neighbours at the lengths of edges."""
         itself = Seeds(sources.vertices, sources.vertex_offset, sources.vertex_label)
-        if self._plain or (self._unfolds and sources.on_vertices_alone):
+        if self._plain:
             return itself
         vertices, offset, label = sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim]
         found = [itself]
@@ -169,7 +166,7 @@ class SourceAssembler:
         if surface is None or self._faces is None or self._visible is None:
             return _NONE, _NONE
         if sources.on_vertices_alone:
-            is_covered = surface.uncovered is not None and not (self._plain or self._unfolds)
+            is_covered = surface.uncovered is not None and not self._plain
             if not (is_covered and self._faces.meets_shared_edge(sources.vertices[rim])):
                 return _NONE, _NONE
         return self._visible.seeds(*self._in_sight(sources, rim, self._visible))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +12,7 @@ from heat_igl.operators import Surface
 from heat_igl.sources import SourcePoints, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Bounds", "shorten_along"]
+__all__ = ["Bounds"]
 
 # Less than this fraction is rounding.
 _ROUNDING = 1e-12
@@ -73,14 +72,6 @@ class Bounds:
 
             straight = np.asarray(KDTree(places).query(V)[0])
             np.maximum(distance, straight * (1 - _ROUNDING), out=distance)
-
-
-def shorten_along(edges: Sequence[tuple[AnyArray, FloatArray]], distance: FloatArray) -> None:
-    """Lower distances (n,) to the paths along edges, ends (e, 2) int32 and lengths (e,) of several sets, in place."""
-    ends, length = (np.concatenate(parts) for parts in zip(*edges, strict=True))
-    if kernels.is_longer(ends, length, distance):
-        first, incident = kernels.incident_edges(ends, len(distance))
-        kernels.shorten(ends, length, first, incident, distance, _NO_LABELS)
 
 
 def _sides(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, FloatArray]:

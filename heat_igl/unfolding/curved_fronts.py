@@ -7,15 +7,15 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation, PolarAngles, carried_angles, polar_angles
-from heat_igl.intrinsic.fans import aligned
 from heat_igl.kernels.curved_fronts import advance
+from heat_igl.mesh import SurfacePoints
+from heat_igl.plan import FRONTS_EVERYWHERE_EXACT, ROUGH_FOR_FRONTS
 from heat_igl.runtime import both
 from heat_igl.sources import SourceSet
 from heat_igl.typing import BoolArray, FloatArray
-from heat_igl.unfolding.asked import asked_of
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 from heat_igl.unfolding.halves import first_half
-from heat_igl.unfolding.when_exact import FEW
+from heat_igl.unfolding.spokes import aligned
 
 __all__ = ["CurvedFronts", "Front"]
 
@@ -26,8 +26,6 @@ _TRIANGLE = np.dtype(
 # Distance is exact within so many mean edge lengths. With 6 the error is 0.4 to 1 of that with 3, a query takes a fifth
 # more time; with 2 it is 1 to 1.4.
 _RADIUS = 3.0
-# With more curvature at each vertex than this (radians, in the mean), windows are followed all over the surface.
-_ROUGH = 0.25
 
 
 class Front(NamedTuple):
@@ -92,19 +90,19 @@ class CurvedFronts:
             np.argsort(used, kind="stable").astype(np.int32),
         )
         curvature = np.abs(2 * np.pi - angles.sums[~angles.on_boundary])
-        is_rough = len(curvature) > 0 and curvature.mean() > _ROUGH
-        self._radius = np.inf if n <= FEW or is_rough else _RADIUS * h
+        is_rough = len(curvature) > 0 and curvature.mean() > ROUGH_FOR_FRONTS
+        self._radius = np.inf if n <= FRONTS_EVERYWHERE_EXACT or is_rough else _RADIUS * h
 
     def near(self, sources: SourceSet) -> Front:
         """The exact distance within three mean edge lengths of points and curves, and at the corners of their faces."""
-        asked = asked_of(sources, sources.points)
-        held = np.concatenate([sources.points.faces, sources.segments.faces])
+        points, segments = sources.points, sources.segments
+        held = np.concatenate([points.faces, segments.faces])
         found = self._exact.solve(
-            asked.vertices,
-            asked.offsets,
-            asked.points,
-            asked.point_offsets,
-            asked.segments,
+            sources.vertices,
+            sources.vertex_offset,
+            SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
+            points.offset if len(points.faces) else None,
+            segments if len(segments.faces) else None,
             cutoff=max(self._radius, float(self._faces.l[held].max(initial=0.0))),
         )
         return Front(found.distance, self._back(found))

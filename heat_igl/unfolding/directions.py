@@ -12,10 +12,8 @@ from heat_igl.intrinsic.history import Flipped
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Surface
-from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSolution
-from heat_igl.unfolding.located_points import side_direction
-from heat_igl.unfolding.refinement import Refinement
 
 __all__ = ["PathAngles", "PathDirections", "WindowWays", "in_circle"]
 
@@ -75,14 +73,12 @@ class WindowWays(NamedTuple):
 
 
 class PathDirections:
-    """Angles in the triangles, and in the fans of a `Refinement`, as polar angles of the mesh.
+    """Angles in the triangles as polar angles of the mesh.
 
     Parameters
     ----------
     surface : Surface
         An oriented manifold of triangles whose faces are known.
-    refinement : Refinement, optional
-        Its tables, for walks.
 
     Raises
     ------
@@ -90,62 +86,15 @@ class PathDirections:
         If the surface has no polar angles, see `polar_angles`.
     """
 
-    def __init__(self, surface: Surface, refinement: Refinement | None = None) -> None:
+    def __init__(self, surface: Surface) -> None:
         if surface.faces is None:
             raise MeshError("directions need the faces of the mesh, which this domain does not know")
         given = polar_angles(surface.faces)
-        self._leaving = given.leaving
         #: Around the vertices of the triangulation.
         self.angles: PolarAngles = (
             given if surface.faces is surface.unfolding else carried_angles(given, surface.unfolding)
         )
         self._faces, self._triangulation = surface.faces, surface.unfolding
-        if refinement is not None:
-            self._number, self._tables = refinement.number, refinement.tables
-            self._begin, self._scale, self._on_boundary = self._fans(refinement)
-
-    def _fans(self, refinement: Refinement) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """Of each row, the polar angle of the first spoke, from which angles in the fan count; scale, on_boundary."""
-        t, n = refinement.tables, len(refinement.number)
-        old_face = np.empty(len(refinement.face), np.int64)
-        old_face[refinement.face] = np.arange(len(refinement.face))
-        used = np.flatnonzero(np.diff(t.first))
-        corner = t.turn["corner"][t.first[used]].astype(np.int64)
-        first = previous_half_edge(3 * old_face[corner // 3] + corner % 3)
-        begin, scale, on_boundary = np.zeros(n), np.ones(n), np.zeros(n, bool)
-        begin[used] = self.angles.leaving[first]
-        scale[refinement.number] = self.angles.scale
-        on_boundary[refinement.number] = self.angles.on_boundary
-        return begin, scale, on_boundary
-
-    def in_fans(self, row: AnyArray, corner: IntArray, seen: FloatArray) -> tuple[FloatArray, AnyArray, FloatArray]:
-        """Directions at rows (k,) of the tables: angles in their fans, the fans, and the sums of angles in these.
-
-        They are turned by `seen` (k,) from the side to the next corner, of corners (k,) of the given faces.
-        """
-        t = self._tables
-        fan = t.turn["fan_here"][t.first[row]]
-        total = t.total[fan]
-        angle = (self._leaving[previous_half_edge(corner)] - self._begin[row]) / self._scale[row] + seen
-        whole = np.where(total > 0, total, np.inf)
-        return angle - np.where(total > 0, total, 0.0) * np.floor(angle / whole), fan, total
-
-    def of_walks(self, walk: AnyArray, points: SurfacePoints | None = None) -> PathAngles:
-        """The angles of walks (n + p,), with p sources at `points` in faces."""
-        n, scale, on_boundary = len(self._begin), self._scale, self._on_boundary
-        row = np.flatnonzero(np.isfinite(walk["distance"][:n]) & (walk["fan"][:n] >= 0))
-        root = walk["root"].astype(np.int64)
-        departure, back = np.full((2, n), np.nan)
-        departure[row] = walk["departure"][row]
-        at_vertex = row[root[row] < n]
-        source = root[at_vertex]
-        departure[at_vertex] = _polar(self._begin[source], departure[at_vertex], scale[source], on_boundary[source])
-        back[row] = _polar(self._begin[row], walk["angle"][row], scale[row], on_boundary[row])
-        if points is not None:
-            inside = row[root[row] >= n]
-            departure[inside] += self._turns(points)[root[inside] - n]
-        found = _handed_on(row, root, departure, back, np.where(on_boundary, scale, 1.0))
-        return PathAngles(*found[:, self._number])
 
     def of_windows(self, found: ExactSolution, points: SurfacePoints | None = None) -> PathAngles:
         """The angles of exact paths, of which `found` knows how they leave, with p sources at `points` in faces.
@@ -207,7 +156,9 @@ class PathDirections:
         return in_circle(self._at_corners(corner, seen - _WHOLE * np.rint(seen / _WHOLE)))
 
     def _direction(self, half_edge: IntArray) -> FloatArray:
-        return side_direction(half_edge, self.angles.corners.ravel())
+        """The angle (k,) of half-edges in their triangles, from the side of corners 0 and 1."""
+        first, angle = half_edge - half_edge % 3, self.angles.corners.ravel()
+        return np.choose(half_edge % 3, [np.pi - angle[first + 1], angle[first] - np.pi, np.zeros(len(half_edge))])
 
     def _turns(self, points: SurfacePoints) -> FloatArray:
         """The angle (p,) of corners 0 and 1 of the triangles that hold points, in the given faces: flips turn them."""

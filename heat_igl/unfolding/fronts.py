@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +19,7 @@ from heat_igl.mesh import connectivity
 from heat_igl.operators import MetricSimplices
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.unfolding.ordered import OrderedSolver
+from heat_igl.unfolding.engine import Engine
 from heat_igl.unfolding.reflex_edges import reflex_edges
 
 __all__ = ["FrontSolver"]
@@ -39,7 +40,7 @@ _BESIDE, _BESIDE_OF_FEW = 0.5, 2.0
 _STRAIGHT, _UNKNOWN = -1, -2
 
 
-class FrontSolver(OrderedSolver):
+class FrontSolver(Engine):
     """Distance by fronts that pass through simplices, each with edge lengths of its own; no heat is read.
 
     In space, distance follows straight lines from the sources, and lines that bend around edges of the body with more
@@ -64,7 +65,6 @@ class FrontSolver(OrderedSolver):
     """
 
     def __init__(self, simplices: MetricSimplices, is_halved: bool = False) -> None:
-        self.is_exact = True
         self._simplices = simplices
         self._corners = np.ascontiguousarray(simplices.corners, np.int32)
         used = simplices.corners.ravel()
@@ -127,8 +127,13 @@ class FrontSolver(OrderedSolver):
             far = connectivity.edge_distance(self._edge_graph, vertices)
         return np.argsort(far, kind="stable").astype(np.int32)
 
-    def _distance(self, sources: SourceSet, u: FloatArray, labels: IntArray | None = None) -> FloatArray:
-        del u  # the order is that of straight lines or of Dijkstra's algorithm
+    def labelled(
+        self,
+        sources: SourceSet,
+        cutoff: float = np.inf,  # noqa: ARG002
+        threads: int = 1,  # noqa: ARG002
+    ) -> tuple[FloatArray, IntArray]:
+        """Distance (n,), and the source (n,) that it is measured from."""
         n = self._simplices.n
         vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
         distance = np.full(n, np.inf)
@@ -139,30 +144,26 @@ class FrontSolver(OrderedSolver):
         if self._simplices.V is not None:
             self._follow_lines(vertices, offset, distance, begin, label)
         elif self._in_metric is not None:
-            HopfLax(self._corners, self._first, self._incident, *self._in_metric).distance(
-                distance, label, offset, True
-            )
+            scheme: Any = HopfLax
+            scheme(self._corners, self._first, self._incident, *self._in_metric).distance(distance, label, offset, True)
         else:
             mesh = self._corners, self._first, self._incident
             advance(self._order(vertices), *mesh, self._lengths, self._slowness, distance, begin, label)
         self._keep_bounds(vertices, offset, distance, label)
-        if labels is not None:
-            labels[:] = np.concatenate([sources.vertex_label, [-1]])[label]
+        labels = np.concatenate([sources.vertex_label, [-1]])[label]
         if self._finer is not None:
             self._take_shorter(self._finer, sources, distance, labels)
-        return distance
+        return distance, labels
 
     @staticmethod
-    def _take_shorter(finer: FrontSolver, sources: SourceSet, distance: FloatArray, labels: IntArray | None) -> None:
+    def _take_shorter(finer: FrontSolver, sources: SourceSet, distance: FloatArray, labels: IntArray) -> None:
         """Lower distance to that on halved tetrahedra."""
         n = len(distance)
-        other = np.full(finer._simplices.n, -1)
-        found = finer._distance(sources, distance, other)[:n]
+        found, other = (values[:n] for values in finer.labelled(sources))
         # Longer by rounding alone, a distance stays as it is.
         shorter = found < distance * (1 - _ROUNDING)
         distance[shorter] = found[shorter]
-        if labels is not None:
-            labels[shorter] = other[:n][shorter]
+        labels[shorter] = other[shorter]
 
     def _follow_lines(
         self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, begin: FloatArray, label: AnyArray

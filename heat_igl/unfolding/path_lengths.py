@@ -1,4 +1,4 @@
-"""Distances as lengths of paths: one answer of the unfolding or of exact windows, to be differentiated."""
+"""Distances as lengths of paths: one answer of exact windows, to be differentiated."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import numpy as np
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.mesh import SurfacePoints
 from heat_igl.sources import SightLines, SourceSet
-from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.path_derivatives import Change, Paths, Places, Starts, Ways, half_edge_arrays
-from heat_igl.unfolding.refinement import Refinement
 
-__all__ = ["PathLengths", "SideChange", "from_lines", "from_walks", "from_windows"]
+__all__ = ["PathLengths", "SideChange", "from_lines", "from_windows"]
 
 
 class SideChange(NamedTuple):
@@ -44,38 +43,27 @@ class PathLengths:
     triangulation : IntrinsicTriangulation
         m triangles on n vertices.
     paths : Paths
-        On these triangles, or on others that `refinement` made of them.
-    rows : (n,) int
-        Where each vertex stands in `paths`.
+        On these triangles.
     points : SurfacePoints or None
         Source points in the faces of the mesh.
-    refinement : Refinement, optional
-        Carries sides to the triangles of `paths` and back.
     """
 
     def __init__(
         self,
         triangulation: IntrinsicTriangulation,
         paths: Paths,
-        rows: AnyArray,
         points: SurfacePoints | None,
-        refinement: Refinement | None = None,
     ) -> None:
-        self.triangulation, self._paths, self._rows, self._refinement = triangulation, paths, rows, refinement
-        self._points = points
+        self.triangulation, self._paths, self._points = triangulation, paths, points
 
     @property
     def lost(self) -> IntArray:
         """Vertices whose path could not be followed to its end: it does not count in the derivative."""
-        return np.flatnonzero(self._paths.is_lost[self._rows])
+        return np.flatnonzero(self._paths.is_lost)
 
     def pull_back(self, g: FloatArray) -> Change:
         """The derivative of the sum of distances times g (n,), by the sides of the triangulation."""
-        weight = np.zeros(self._paths.n)
-        weight[self._rows] = g
-        change = self._paths.pull_back(weight)
-        if self._refinement is not None:
-            change = change._replace(by_side=self._refinement.by_given_sides(change.by_side))
+        change = self._paths.pull_back(g)
         if change.by_place is not None:
             change = change._replace(by_place=self._by_points(change.by_place))
         return change
@@ -105,8 +93,6 @@ class PathLengths:
         """For each corner of the places' triangles: whether the point's own triangle has it, the point, the corner."""
         places = self._paths.places
         F = self._paths.corners(places.faces)
-        if self._refinement is not None:
-            F = self._refinement.vertex_of(F)
         own_faces, _ = self.triangulation.locate(points.faces, points.barycentric)
         own = self.triangulation.F[own_faces[places.point]]
         same = [own == F[:, [c]] for c in range(3)]
@@ -115,23 +101,12 @@ class PathLengths:
 
     def push_forward(self, change: SideChange) -> FloatArray:
         """How the distances (n,) change with the sides and the places of points, those of the triangulation alone."""
-        by_side = change.by_side
-        if self._refinement is not None:
-            by_side = self._refinement.on_tables(by_side)
         by_place = None if change.by_place is None else self._at_places(change.by_place)
-        return np.asarray(self._paths.push_forward(by_side, by_place)[self._rows])
+        return np.asarray(self._paths.push_forward(change.by_side, by_place))
 
     def lengths(self) -> FloatArray:
         """Lengths (n,) of the paths; 0 at unreachable vertices."""
-        return np.asarray(self._paths.lengths()[self._rows])
-
-
-def from_walks(refinement: Refinement, sources: SourceSet, u: FloatArray) -> PathLengths:
-    """The paths that unfolding finds from vertices and points, in the order of the heat u (n,)."""
-    starts = Starts.of(sources)
-    paths = refinement.paths(-u, starts)
-    rows = refinement.rows_of(paths.distance)
-    return PathLengths(refinement.triangulation, paths, rows, starts.points, refinement)
+        return np.asarray(self._paths.lengths())
 
 
 def from_windows(surface: ExactSurface, triangulation: IntrinsicTriangulation, sources: SourceSet) -> PathLengths:
@@ -148,7 +123,7 @@ def from_windows(surface: ExactSurface, triangulation: IntrinsicTriangulation, s
     length = triangulation.l.ravel()[origin.entered]
     ways = Ways(found.distance, origin.entered, origin.crossing / length, found.distance - begins[origin.root])
     paths = Paths(half_edge_arrays(triangulation), places, ways, is_source=origin.root == np.arange(n))
-    return PathLengths(triangulation, paths, np.arange(n), starts.points)
+    return PathLengths(triangulation, paths, starts.points)
 
 
 def from_lines(triangulation: IntrinsicTriangulation, sources: SourceSet, lines: SightLines) -> PathLengths:
@@ -161,4 +136,4 @@ def from_lines(triangulation: IntrinsicTriangulation, sources: SourceSet, lines:
     is_source[starts.vertices] = True
     ways = Ways(lines.value, lines.entered, lines.share, lines.reach)
     paths = Paths(half_edge_arrays(triangulation), places, ways, is_source)
-    return PathLengths(triangulation, paths, np.arange(triangulation.n), starts.points)
+    return PathLengths(triangulation, paths, starts.points)

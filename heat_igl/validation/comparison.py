@@ -30,7 +30,7 @@ __all__ = ["METHODS", "Method", "Progress", "Solver", "draw_sources", "validate"
 def validate(
     mesh: MeshLike,
     sources: Sources | Sequence[Sources],
-    methods: Sequence[Method] = ("heat", "sweep", "unfold", "meshlab", "igl"),
+    methods: Sequence[Method] = ("heat", "sweep", "windows", "meshlab", "igl"),
     reference: str | ArrayLike | Callable[[Mesh, IntArray], FloatArray] | None = "exact",
     *,
     name: str = "mesh",
@@ -50,7 +50,7 @@ def validate(
         One set of sources (an index, a sequence of indices, a mask), or a sequence of sets, with one distance for each:
         ``[3, 7]`` is one set of two vertices, ``[[3], [7]]`` are two sets of one vertex.
     methods : sequence of str or (str, callable)
-        Names from `METHODS`: "heat", "sweep" and "unfold" are `HeatMethodSolver` without and with ``refine``; "igl" and
+        Names from `METHODS`: "heat" is `HeatMethodSolver`, "sweep" and "windows" are `GeodesicSolver`; "igl" and
         "potpourri3d" are the heat methods of these libraries; "meshlab" and "meshlab_heat" are MeshLab's filters;
         "exact" is the polyhedral distance. Any other method is a pair of a name and a function from the mesh to an
         object with a method ``distance(sources)``.
@@ -84,9 +84,9 @@ def validate(
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.disk(20)
-    >>> report = heat_igl.validate(mesh, 0, methods=["heat", "unfold"], reference=heat_igl.closed_forms.plane)
+    >>> report = heat_igl.validate(mesh, 0, methods=["heat", "windows"], reference=heat_igl.closed_forms.plane)
     >>> [(row.method, round(row.errors.mean, 2)) for row in report.rows]
-    [('heat', 0.0), ('unfold', 0.0)]
+    [('heat', 0.0), ('windows', 0.0)]
     """
     given = as_mesh(mesh)
     mesh = as_simplices(given)

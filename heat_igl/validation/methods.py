@@ -12,8 +12,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from heat_igl import reference
-from heat_igl.errors import AccuracyWarning, ReferenceSolverError, shown
-from heat_igl.heat_method import HeatMethodSolver, SolverOptions
+from heat_igl.errors import AccuracyWarning, shown
+from heat_igl.geodesic import DistanceMethod, SolverChoice
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh, as_simplices
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
@@ -22,7 +22,7 @@ __all__ = ["METHODS", "Counter", "Method", "Prepare", "Progress", "Run", "Solver
 
 
 class Solver(Protocol):
-    """The interface of a method; `HeatMethodSolver` has it."""
+    """The interface of a method; `GeodesicSolver` has it."""
 
     def distance(self, sources: IntArray, /) -> FloatArray:
         """Distance (n,) from a set of sources."""
@@ -33,8 +33,8 @@ Prepare = Callable[[Any], Solver]
 Method = str | tuple[str, Prepare]
 Progress = Callable[[str, int, int], None]
 
-# Methods that run in this process, with the options of the solver; the others are native references.
-_OPTIONS: Mapping[str, Mapping[str, Any]] = {"heat": {}, "sweep": {"refine": "sweep"}, "unfold": {"refine": "unfold"}}
+# Methods that run in this process, as `geodesic_distance` names them; the others are native references.
+_OWN: tuple[DistanceMethod, ...] = ("heat", "sweep", "windows")
 _NATIVE = {
     "meshlab": "meshlab",
     "meshlab_heat": "meshlab_heat",
@@ -44,7 +44,7 @@ _NATIVE = {
 }
 
 #: The names of methods that `validate` takes.
-METHODS = (*_OPTIONS, *_NATIVE)
+METHODS = (*_OWN, *_NATIVE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,17 +110,11 @@ def resolved(method: Method) -> tuple[str, Prepare | None]:
         if method[0] in METHODS:
             raise ValueError(f"{method[0]!r} names a method of the package: give yours another name")
         return method
-    if method in _OPTIONS:
-        return method, lambda mesh: _heat_solver(mesh, _OPTIONS[method])
+    if method in _OWN:
+        return method, SolverChoice.of(method).on
     if method not in _NATIVE:
         raise ValueError(f"method {method!r} is unknown: choose from {', '.join(METHODS)}")
     return method, None
-
-
-def _heat_solver(mesh: Mesh | PolygonMesh | PointCloud, options: Mapping[str, Any]) -> Solver:
-    if isinstance(mesh, Mesh) and mesh.is_tetrahedral and options.get("refine") == "unfold":
-        raise ReferenceSolverError("refine='unfold' unfolds triangles, and the mesh holds tetrahedra: take sweep")
-    return HeatMethodSolver.from_options(mesh, SolverOptions(**options).by_heat_on(mesh))
 
 
 def run(
@@ -151,6 +145,8 @@ def run(
         for key in ("t", "t_requested", "mean_edge_length", "backend")
         if hasattr(diagnostics, key)
     }
+    if hasattr(solver, "plan"):
+        parameters["plan"] = str(solver.plan)
     return Run(np.stack(distances), ready - start, float(np.median(seconds)), peak.bytes, parameters, tuple(notes))
 
 

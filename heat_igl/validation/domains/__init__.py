@@ -26,7 +26,7 @@ DOMAINS = tuple(dict.fromkeys(case.domain for case in CASES))
 def validate_domains(
     domains: Iterable[str] | None = None, *, seed: int = 0, progress: Progress | None = None
 ) -> DomainReport:
-    """Measure the methods of `HeatMethodSolver` on small domains of every kind, against exact distances.
+    """Measure the methods of `GeodesicSolver`, and heat, on small domains of every kind, against exact distances.
 
     Each case has a closed form: arcs on a sphere for a point cloud, a linear map for a constant metric, Snell's law for
     layers, straight lines in solids, polygons and images, and straight lines around edges and walls.

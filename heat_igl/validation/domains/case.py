@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.geodesic import DistanceMethod, Solver, SolverChoice
 from heat_igl.mesh import MeshLike
 from heat_igl.operators import Operators
 from heat_igl.sources import Sources
 from heat_igl.typing import FloatArray
 
-__all__ = ["OPTIONS", "DomainCase", "Problem", "solver_for"]
+__all__ = ["METHODS", "DomainCase", "Problem", "solver_for"]
 
-#: Options of `HeatMethodSolver` for each method in the rows.
-OPTIONS: Mapping[str, Mapping[str, Any]] = {
-    "default": {},
-    "heat": {"magnitude": "damped"},
-    "sweep": {"refine": "sweep"},
-    "unfold": {"refine": "unfold"},
-    "exact": {"refine": "exact"},
+#: Methods in the rows; "default" is what `GeodesicSolver` takes by itself.
+METHODS: Mapping[str, DistanceMethod] = {
+    "default": "auto",
+    "heat": "heat",
+    "sweep": "sweep",
+    "windows": "windows",
+    "exact": "exact",
 }
 
 
@@ -45,7 +45,7 @@ class DomainCase(NamedTuple):
     against : str
         Where the exact distance comes from.
     bounds : mapping of str to float
-        The largest mean relative error that a method may have, by the names in `OPTIONS`.
+        The largest mean relative error that a method may have, by the names in `METHODS`.
     problem : callable
         Makes the `Problem` from a random generator.
     """
@@ -57,8 +57,6 @@ class DomainCase(NamedTuple):
     problem: Callable[[np.random.Generator], Problem]
 
 
-def solver_for(domain: MeshLike | Operators, method: str) -> HeatMethodSolver:
+def solver_for(domain: MeshLike | Operators, method: str) -> Solver:
     """The solver of a method, on a mesh or on operators."""
-    if isinstance(domain, Operators):
-        return HeatMethodSolver.from_operators(domain, **OPTIONS[method])
-    return HeatMethodSolver(domain, **OPTIONS[method])
+    return SolverChoice(METHODS[method]).on(domain)

@@ -12,8 +12,8 @@ __all__ = ["LEGEND", "DomainReport", "DomainRow"]
 #: The words of the table, for readers of the report alone.
 LEGEND = (
     "Errors: |d - exact| / exact over all vertices; a row passes if the mean is at most the bound. Methods: heat, the "
-    "heat method; default, a solver without options, which sweeps over points, follows straight lines in bodies, and "
-    "fronts or exact windows where a speed varies much; the others, values of refine."
+    "heat method; default, GeodesicSolver without options, which sweeps over points, follows straight "
+    "lines in bodies and fronts where a speed jumps, and takes windows elsewhere; the others, its methods."
 )
 
 
@@ -28,7 +28,7 @@ class DomainRow:
     against : str
         Where the exact distance comes from.
     method : str
-        "default", "heat", "sweep", "unfold" or "exact".
+        "default", "heat", "sweep", "windows" or "exact".
     n_vertices : int
         Vertices or points.
     mean, maximum : float or None

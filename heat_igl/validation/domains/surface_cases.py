@@ -123,7 +123,7 @@ def by_fermat(V: FloatArray, source: int, left: float, right: float) -> FloatArr
     return np.where(beyond, refracted, time)
 
 
-_POINTS = {"heat": 0.02, "default": 0.01, "unfold": 0.003}
+_POINTS = {"heat": 0.02, "default": 0.01, "windows": 0.003}
 
 CASES = (
     DomainCase("point cloud", "random points on a sphere", "arc of the great circle", _POINTS, _sphere),
@@ -133,14 +133,14 @@ CASES = (
         "metric",
         "one tensor on a square, 1 : 100",
         "straight line after the linear map",
-        {"heat": 0.02, "sweep": 0.001, "unfold": 0.001, "exact": 1e-9},
+        {"heat": 0.02, "sweep": 0.001, "windows": 0.001, "exact": 1e-9},
         _one_tensor,
     ),
     DomainCase(
         "metric",
         "helical fibres on a cylinder, 1 : 3",
         "straight line on the unrolled prism",
-        {"heat": 0.02, "sweep": 0.001, "unfold": 0.001, "exact": 1e-9},
+        {"heat": 0.02, "sweep": 0.001, "windows": 0.001, "exact": 1e-9},
         _helical_fibres,
     ),
     DomainCase(
@@ -161,7 +161,7 @@ CASES = (
         "metric",
         "speed that grows exponentially, 1 : 1e6",
         "straight line after the map exp(-k z) / k",
-        {"default": 0.005, "sweep": 0.005, "unfold": 0.005},
+        {"default": 0.005, "sweep": 0.005, "windows": 0.005},
         _exponential_speed,
     ),
 )

@@ -1,0 +1,72 @@
+"""`SolverChoice`: which solver to make on a mesh, with its options, as commands, views and batches pass it on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal, get_args
+
+from heat_igl.errors import require_choice
+from heat_igl.geodesic.solver import GeodesicSolver
+from heat_igl.heat_method import HeatMethodSolver, SolverOptions
+from heat_igl.mesh import MeshLike
+from heat_igl.operators import Operators
+
+__all__ = ["DistanceMethod", "Solver", "SolverChoice"]
+
+Solver = GeodesicSolver | HeatMethodSolver
+DistanceMethod = Literal["auto", "windows", "exact", "sweep", "heat"]
+_OPTIONS_OF_HEAT = tuple(option.name for option in fields(SolverOptions))
+
+
+@dataclass(frozen=True)
+class SolverChoice:
+    """A method of distance with its options; hashable.
+
+    Attributes
+    ----------
+    method : {"auto", "windows", "exact", "sweep", "heat"}
+        "heat" is `HeatMethodSolver`, the others are those of `GeodesicSolver`.
+    tolerance : float
+        For windows.
+    heat : SolverOptions
+        For heat.
+    """
+
+    method: DistanceMethod = "auto"
+    tolerance: float = 1e-5
+    heat: SolverOptions = field(default_factory=SolverOptions)
+
+    def __post_init__(self) -> None:
+        require_choice("method", self.method, get_args(DistanceMethod))
+
+    @classmethod
+    def of(cls, method: str | None = None, tolerance: float = 1e-5, **options: Any) -> SolverChoice:
+        """A choice by options as users give them: those of heat ask for heat.
+
+        Raises
+        ------
+        ValueError
+            If an option has no meaning, or is one of heat and another method is named.
+        TypeError
+            If there is no such option.
+        """
+        heat = SolverOptions(**options)
+        given = [name for name in _OPTIONS_OF_HEAT if getattr(heat, name) != getattr(SolverOptions(), name)]
+        if given and method not in (None, "heat"):
+            raise ValueError(f"{given[0]} is an option of the heat method, but the method is {method}: leave one away")
+        return cls(method or ("heat" if given else "auto"), tolerance, heat)  # type: ignore[arg-type]
+
+    def changed(self, **options: Any) -> SolverChoice:
+        """The same choice with other options."""
+        own = {name: value for name, value in options.items() if name not in _OPTIONS_OF_HEAT}
+        of_heat = {name: value for name, value in options.items() if name in _OPTIONS_OF_HEAT}
+        return replace(self, heat=replace(self.heat, **of_heat), **own)
+
+    def on(self, mesh: MeshLike | Operators) -> Solver:
+        """The solver on a mesh, or on operators."""
+        if self.method == "heat" and isinstance(mesh, Operators):
+            options = {name: getattr(self.heat, name) for name in _OPTIONS_OF_HEAT if name != "laplacian"}
+            return HeatMethodSolver.from_operators(mesh, **options)
+        if self.method == "heat":
+            return HeatMethodSolver.from_options(mesh, self.heat)
+        return GeodesicSolver(mesh, method=self.method, tolerance=self.tolerance)

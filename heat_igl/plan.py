@@ -1,0 +1,199 @@
+"""Which engine, triangulation or fallback answers: every threshold that decides, with the measurement behind it.
+
+Engines and operators measure; the decisions are made here, so that an engine does what it is asked for. Shares and
+angles below were measured on scans and models, and on the shapes of `heat_igl.validation`, of which some are held out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from heat_igl.errors import MeshError, is_number, require_choice, shown
+
+__all__ = ["DomainKind", "Engine", "Method", "Plan", "SurfaceMeasures", "distance_plan", "heat_plan", "sweep_plan"]
+
+Engine = Literal["windows", "sweep", "fronts", "heat"]
+Method = Literal["auto", "windows", "exact", "sweep"]
+DomainKind = Literal["triangles", "points", "tetrahedra", "separate simplices"]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a solver answers.
+
+    Attributes
+    ----------
+    engine : {"windows", "sweep", "fronts", "heat"}
+        What finds the distance.
+    tolerance : float or None
+        The largest error over the distance; 0 for exact, None for engines without a bound.
+    reason : str
+        Why, in one sentence.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> heat_igl.GeodesicSolver(heat_igl.shapes.grid(8), tolerance=0).plan.engine
+    'windows'
+    """
+
+    engine: Engine
+    tolerance: float | None
+    reason: str
+
+    def __str__(self) -> str:
+        accuracy = "" if self.tolerance is None else ", exact" if self.tolerance == 0 else f" to {self.tolerance:g}"
+        return f"{self.engine}{accuracy}: {self.reason}"
+
+
+# --- The engine of a distance ---
+
+# A sweep is replaced by windows in three cases, in which both take about the same time. On up to so many vertices a
+# query by windows takes a few milliseconds.
+_FEW = 1000
+# With more curvature than this at a vertex, in radians and in the mean, a sweep passes vertices on the wrong side. On
+# plates, beams, voxels and terrain, most with 0.5 to 3 radians, it is wrong by up to 3.4 % of the largest distance;
+# scans have 0.005 to 0.05, and a coarse cow 0.14.
+_ROUGH_FOR_SWEEP = 0.25
+# With this share of flat vertices and holes, windows stay few: they are not split by curvature.
+_FLAT = 0.5
+
+
+# Signed distance is measured by windows everywhere, not only near the curves, on so few vertices and with so much
+# curvature, for the same reasons.
+FRONTS_EVERYWHERE_EXACT = _FEW
+ROUGH_FOR_FRONTS = _ROUGH_FOR_SWEEP
+
+
+@dataclass(frozen=True)
+class SurfaceMeasures:
+    """What decides whether a surface is swept.
+
+    Attributes
+    ----------
+    n : int
+        Vertices.
+    curvature : float
+        Mean over the vertices of how far their angles are from those of a plane, in radians.
+    flatness : float
+        Share of the vertices without curvature, those on the boundary included.
+    has_holes : bool
+        Whether a component is neither a disk nor a sphere.
+    """
+
+    n: int
+    curvature: float
+    flatness: float
+    has_holes: bool
+
+
+def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
+    """The engine that measures distance on a domain.
+
+    Raises
+    ------
+    ValueError
+        If there is no such method, or the tolerance is not a number from 0 up to 1.
+    MeshError
+        If the method is not there for the domain.
+    """
+    require_choice("method", method, get_args(Method))
+    if not (is_number(tolerance) and 0 <= tolerance < 1):
+        raise ValueError(f"tolerance must be at least 0 and less than 1, not {shown(tolerance)}: 0 is exact")
+    if kind in ("tetrahedra", "separate simplices"):
+        if method in ("windows", "exact"):
+            what = "the mesh holds tetrahedra" if kind == "tetrahedra" else "those of this metric do not fit together"
+            raise MeshError(f"method={method!r} needs triangles that fit together, and {what}: take method='auto'")
+        follows = "straight lines and the edges that they bend around" if kind == "tetrahedra" else "each simplex"
+        return Plan("fronts", None, f"{kind} are passed by fronts, which follow {follows}")
+    if method == "sweep":
+        return Plan("sweep", None, "a sweep was asked for")
+    if method == "auto" and kind == "points":
+        return Plan("sweep", None, "between points the triangles are an estimate themselves")
+    if method == "exact" or tolerance == 0:
+        return Plan("windows", 0.0, "exact distance was asked for")
+    return Plan("windows", float(tolerance), "windows have a bound on their error, and need no factor")
+
+
+def sweep_plan(measures: SurfaceMeasures, plan: Plan) -> Plan:
+    """The plan for a surface on which a sweep is due: windows where these cost little and a sweep is inaccurate."""
+    reason = None
+    if measures.n <= _FEW:
+        reason = f"on {measures.n} vertices windows take as long as a sweep, and are exact"
+    elif measures.curvature > _ROUGH_FOR_SWEEP:
+        reason = f"the surface is rough, with {measures.curvature:.2g} radians of curvature at each vertex"
+    elif measures.flatness > _FLAT and measures.has_holes:
+        reason = "the surface is flat with holes, on which windows are few"
+    return plan if reason is None else replace(plan, engine="windows", tolerance=0.0, reason=reason)
+
+
+# With more of the faces within a cutoff, leaving out the others saves nothing.
+MOST_WITHIN_REACH = 0.5
+
+# --- The triangulation that heat is solved on ---
+
+# A boundary edge opposite an obtuse angle keeps a negative weight, the cotangent of the angle. A few small ones do no
+# harm: on scans their sum is at most 0.0012 of the number of vertices and none is below -1; on the shapes of the zoo
+# (those that are not held out) with worse answers than on the cover, one is below -1.5 or the sum above 0.03.
+STEEPEST_WEIGHT = -1.5
+NEGATIVE_SHARE = 0.006
+# Thin triangles are those with an angle below 20 degrees; they do harm where they cover the surface. Shares of the area
+# are at most 0.27 on scans and models, and at least 0.37 on shapes of the zoo on which heat is wrong because of them.
+THIN_SINE = float(np.sin(np.radians(20.0)))
+THIN_SHARE = 0.3
+# Large triangles are those with a circumradius of more than 1.5 square roots of the area per vertex; equilateral ones
+# have 0.62. Shares of the area are at most 0.43 on scans and models, and at least 0.67 on such shapes of the zoo.
+LARGE_RADIUS = 1.5
+LARGE_SHARE = 0.55
+# Share of triangles in components with many of these kinds, from which on the components are refined: a scan with a few
+# stray triangles stays as it is.
+UNEVEN_SHARE = 0.01
+# With so few vertices a triangle is large beside the distances that are asked for, and a thousand cost nothing.
+FEW_FOR_HEAT = 64
+ENOUGH_FOR_HEAT = 1000
+# What circumradii of coarse meshes are refined to, in square roots of the area per vertex.
+LARGEST_RADIUS = 1.4
+# Growth by refinement: at most so many times the vertices, and some thousands more.
+GROWTH, MORE = 4, 4000
+
+# --- The time step of heat ---
+
+# Mean angle by which the angles around a vertex differ from a full turn, from which on a surface is rough: scans and
+# models have at most 0.5, voxels and noise at least 1.
+ROUGH_FOR_HEAT = 0.7
+# Share of vertices on the boundary from which on a surface is narrow: at most 0.28 on scans and models, 0.4 in a maze.
+NARROW = 0.33
+# Two rows on the boundary and one inside make 2/3. Above that a surface is one cell wide, heat goes along one line, and
+# the larger time step follows it better: 1 % too short instead of 5 on a stroke of pixels.
+ONE_CELL_WIDE = 0.7
+# Between two aims, see docs/cost.md: on scans the error falls further with t, on a regular grid of squares, on which
+# heat prefers diagonals, it grows.
+T_COEF_FITTED = 0.5
+# On rough and on narrow surfaces fronts bend at every vertex, and the less heat spreads the less it cuts corners: on
+# voxels, noise and a maze the error at 0.15 is 0.2 to 0.8 of that at 0.5.
+T_COEF_ROUGH = 0.15
+# The paper's: t = h^2.
+T_COEF = 1.0
+# The sides of random points' triangles differ so much that heat needs a larger step, see docs/clouds.md.
+T_COEF_EVEN_POINTS, T_COEF_RANDOM_POINTS = 0.5, 1.0
+# Median ratio of the longest to the shortest side above which points count as random: these have 1.9, the vertices of
+# meshes 1.2 to 1.8.
+RANDOM_SIDES = 1.82
+# Heat that spreads over more than this many of the longest distances is level to 1e-10.
+FARTHEST_SPREAD = 1e5
+
+# --- The linear solver ---
+
+# Below, SuperLU takes less time for both factors and ten queries (scripts/tune_backends.py).
+SMALLEST_MULTIFRONTAL = 1000
+
+
+def heat_plan(n_given: int, n_solved: int, is_surface: bool, t: float, h: float) -> Plan:
+    """The plan of the heat method: on which triangulation, and with which time step."""
+    where = "on the given tetrahedra" if not is_surface else "on triangles between the given vertices"
+    if n_solved > n_given:
+        where = f"on triangles that are refined to {n_solved} vertices"
+    return Plan("heat", None, f"heat was asked for, {where}, with t = {t / h**2:.3g} h^2")

@@ -1,0 +1,73 @@
+"""Tables of the spokes around vertices, and their triangles, as a sweep reads them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.intrinsic import IntrinsicTriangulation, double_cover
+from heat_igl.kernels import half_edges, numbering
+from heat_igl.typing import AnyArray, BoolArray, FloatArray
+
+__all__ = ["Spokes", "aligned", "numbered_spokes"]
+
+_SPOKE = np.dtype(
+    [(name, "f8") for name in ("length", "along", "height", "base", "beyond_along", "beyond_depth")]
+    + [(name, "i4") for name in ("neighbour", "next_neighbour", "beyond", "next")]
+)
+
+
+class Spokes(NamedTuple):
+    """The edges around n vertices, each with the triangle to the left of it.
+
+    Attributes
+    ----------
+    first : (n + 1,) int32
+        Spokes of vertex v are ``first[v]`` to ``first[v + 1]``, counter-clockwise, fan after fan.
+    spoke : (s,) structures
+        `length`. Of the triangle to the left of the spoke: v's place over the opposite side, `along` it from the
+        spoke's end and in `height`; the length of that side, `base`; and the place of the vertex beyond it,
+        `beyond_along` it and in `beyond_depth`. Past the end of an open fan, without a triangle, these are 0
+        and the height is nan, so that whatever is computed from them compares false. The `neighbour`; the one at the
+        next spoke, `next_neighbour`; the vertex `beyond` the side between them, -1 if none; the `next` spoke, on the
+        other side of that triangle (or the spoke itself).
+    total : (k,) float64
+        Sum of the angles of each fan, negative for a fan that is open.
+    is_flat : (n,) bool
+        Whether a vertex, or the first fan of it, has no curvature; true on the boundary.
+    """
+
+    first: AnyArray
+    spoke: AnyArray
+    total: FloatArray
+    is_flat: BoolArray
+
+
+def numbered_spokes(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, Spokes]:
+    """The rows (n,) of the vertices, which are numbered breadth-first, and their spokes.
+
+    Neighbours on the surface become neighbours in memory: nothing on most meshes, a fifth of the time where vertices
+    come in an arbitrary order. A surface whose faces are not aligned is replaced by its oriented double cover, with
+    2 n rows.
+    """
+    F, lengths, twin, n = triangulation.F, triangulation.l, triangulation.twin, triangulation.n
+    if not triangulation.aligned.all():
+        F, lengths, twin = double_cover(triangulation)
+        n = 2 * n
+    vertex, twin, _, _, lengths, number, _ = numbering.breadth_first(
+        F.ravel().astype(np.int32), twin.astype(np.int32), None, None, np.ascontiguousarray(lengths).ravel(), n, 0
+    )
+    F, lengths = vertex.reshape(-1, 3), lengths.reshape(-1, 3)
+    first = half_edges.first_spokes(F, twin, n)
+    spoke = aligned(first[-1], _SPOKE)
+    total, is_flat = half_edges.fill(F, lengths, twin, first, spoke)
+    return number, Spokes(first, spoke, total, is_flat)
+
+
+def aligned(n: int, record: np.dtype[np.void]) -> AnyArray:
+    """Structures of zeros whose first address is a multiple of a cache line, 64 bytes."""
+    size = int(n) * record.itemsize  # beyond 32 bits from 11 million vertices on, unlike n
+    room = np.zeros(size + 64, np.uint8)
+    start = -room.ctypes.data % 64
+    return room[start : start + size].view(record)
