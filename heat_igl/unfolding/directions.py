@@ -62,6 +62,8 @@ class WindowWays(NamedTuple):
         There, from the side to the next corner.
     entered, crossing : (n,) int64, (n,) float64
         As in `Origin`.
+    turn : (n,) float64, optional
+        As in `Leaving`, for source points.
     """
 
     vertex: IntArray
@@ -70,6 +72,7 @@ class WindowWays(NamedTuple):
     direction: FloatArray
     entered: IntArray
     crossing: FloatArray
+    turn: FloatArray | None = None
 
 
 class PathDirections:
@@ -105,7 +108,15 @@ class PathDirections:
         if leaving is None:
             raise ValueError("of_windows needs a solution that was asked for with directed=True")
         vertices = np.arange(len(found.distance))
-        ways = WindowWays(vertices, origin.root, leaving.corner, leaving.direction, origin.entered, origin.crossing)
+        ways = WindowWays(
+            vertices,
+            origin.root,
+            leaving.corner,
+            leaving.direction,
+            origin.entered,
+            origin.crossing,
+            leaving.turn,
+        )
         return self.of_ways(ways, points)
 
     def of_ways(self, ways: WindowWays, points: SurfacePoints | None = None) -> PathAngles:
@@ -122,9 +133,9 @@ class PathDirections:
             outward = np.flatnonzero(at_vertex)
             departure[row] = seen
             departure[row[outward]] = self._at_corners(corner[outward], seen[outward])
-            if points is not None and found.leaving.turn is not None:
+            if points is not None and ways.turn is not None:
                 inside = row[~at_vertex]
-                departure[inside] += found.leaving.turn[inside] + self._turns(points)[root[~at_vertex] - n]
+                departure[inside] += ways.turn[inside] + self._turns(points)[root[~at_vertex] - n]
         # Over the half-edge opposite, or from the source point in the same face.
         entered, crossing = ways.entered[row], ways.crossing[row]
         over = entered >= 0
