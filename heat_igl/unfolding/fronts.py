@@ -102,7 +102,8 @@ class FrontSolver(Engine):
             np.maximum(distance, line * (1 - _ROUNDING), out=distance)
         if bounds.is_longer(*self._edges, distance):
             labels = label.astype(np.int64)
-            bounds.shorten(*self._edges, *bounds.incident_edges(self._edges[0], len(distance)), distance, labels)
+            first, incident = bounds.incident_edges(self._edges[0], len(distance))
+            bounds.shorten(*self._edges, first, incident, distance, labels)
             label[:] = labels
 
     @cached_property
