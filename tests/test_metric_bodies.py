@@ -63,7 +63,9 @@ def test_no_distance_contradicts_lines_or_edges(most):
     least = np.sqrt(np.linalg.eigvalsh(g)[:, 0].min())
     sources, start = [5, 77, 200], np.array([0.0, 0.01, 0.02])
     distance = solver(mesh, g).distance(OffsetSources(sources, start))
-    lines = np.min([o + least * np.linalg.norm(mesh.V - mesh.V[v], axis=1) for v, o in zip(sources, start)], axis=0)
+    lines = np.min(
+        [o + least * np.linalg.norm(mesh.V - mesh.V[v], axis=1) for v, o in zip(sources, start, strict=True)], axis=0
+    )
     assert (distance >= lines * (1 - 1e-9)).all()
     corners = mesh.V[mesh.F]
     e = corners[:, :, None] - corners[:, None]

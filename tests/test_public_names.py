@@ -31,6 +31,8 @@ GeodesicSolver validate voronoi_cells write_curves write_distances_within write_
 fibre_metric metric_operators
 DomainReport DomainRow validate_domains
 CutMesh OrientedPoints SignedHeatSolver VoxelBox cut region_boundary volume_signed_distance
+Terrain curve_through geodesic_errors log_maps_within parcel_distances signed_distance smooth terrain to_open3d
+to_pyvista to_trimesh
 """.split()
 
 # Arguments and their defaults, in their order; those after the star may come in any. More arguments may follow, if they
