@@ -7,14 +7,17 @@ usual one indexes without checks, as callers pass arrays whose sizes they have c
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
 from collections.abc import Iterator
-from importlib.util import find_spec
+from importlib.metadata import version
+from importlib.util import find_spec, source_hash
 from pathlib import Path
 
 from build_backend import has_compiler
@@ -90,11 +93,20 @@ class BuildKernels(build_ext):
             zig = f"{sys.executable} -m ziglang cc -mcpu=baseline -Wno-unused-command-line-argument"
             os.environ["CC"] = zig
             os.environ["LDSHARED"] = f"{zig} -shared"
+        sources = {
+            path.name: source_hash(path.read_bytes()).hex()
+            for path in sorted(KERNELS.glob("*.p*"))
+            if path.stem != "__init__"
+        }
         super().run()
+        if self.inplace:
+            # heat_igl.kernels compares: the extensions beside the sources are compiled from these.
+            (KERNELS / "compiled.json").write_text(json.dumps(sources, indent=1), encoding="utf8")
 
     def build_extensions(self) -> None:
         """Translate and compile all kernels, several at once."""
         self.parallel = self.parallel or os.cpu_count() or 1
+        _forget_other_options()
         _copy_sources()
         super().build_extensions()
 
@@ -109,6 +121,16 @@ class BuildKernels(build_ext):
             options = f"{OPTIONS} {ANY_ORDER if kernel in WIDE else ''} {VECTORS.get(vectors, '')}"
         extension.extra_compile_args = options.split()
         super().build_extension(extension)
+
+
+def _forget_other_options() -> None:
+    """Remove C files that another Cython, or other options, made."""
+    stamp, options = BUILD / "options.json", [version("Cython"), DIRECTIVES, OPTIONS, OPTIONS_MSVC, ANY_ORDER, VECTORS]
+    text = json.dumps(options)
+    if stamp.exists() and stamp.read_text(encoding="utf8") != text:
+        shutil.rmtree(C_FILES)
+    BUILD.mkdir(parents=True, exist_ok=True)
+    stamp.write_text(text, encoding="utf8")
 
 
 def _copies() -> Iterator[tuple[Path, Path]]:
@@ -147,8 +169,8 @@ def _read_by(source: Path) -> set[Path]:
 def _translated(name: str) -> Path:
     """The C file of a module, written anew where its source or a declaration that it reads is newer."""
     source, into = COPIES / KERNELS / f"{name}.py", C_FILES / f"{name}.c"
-    read = [Path(__file__), *(_read_by(source) if name != SHARED else [])]
-    if into.exists() and into.stat().st_mtime > max(path.stat().st_mtime for path in read):
+    read = _read_by(source) if name != SHARED else set()
+    if into.exists() and all(into.stat().st_mtime > path.stat().st_mtime for path in read):
         return into
     into.parent.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "cython", "--module-name", _module(name)]

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import heat_igl
+from heat_igl.validation.zoo import SHAPES
 
 ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared" / "meshes"
@@ -33,6 +34,11 @@ def shared_path(name: str) -> Path:
     if not path.exists():
         pytest.skip(f"{name} is not at hand")
     return path
+
+
+def zoo(name: str) -> heat_igl.Mesh:
+    """A shape of the zoo."""
+    return next(shape.make() for shape in SHAPES if shape.name == name)
 
 
 def load_script(name: str) -> ModuleType:

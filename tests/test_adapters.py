@@ -26,10 +26,10 @@ def test_the_package_imports_neither() -> None:
 @pytest.mark.parametrize("name", ["torch", "jax"])
 def test_what_to_install_is_said(name: str) -> None:
     if importlib.util.find_spec(name) is not None:
-        assert importlib.import_module(f"heat_igl.{name}").geodesic_distance
+        assert importlib.import_module(f"heat_igl.applications.{name}").geodesic_distance
         return
-    with pytest.raises(MissingExtraError, match=rf"heat_igl\.{name} needs {name}: pip install {name}"):
-        importlib.import_module(f"heat_igl.{name}")
+    with pytest.raises(MissingExtraError, match=rf"{name} needs {name}: pip install {name}"):
+        importlib.import_module(f"heat_igl.applications.{name}")
 
 
 class TestTorch:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import shared_path
+from conftest import zoo
 
 import heat_igl
 from heat_igl import shapes
@@ -226,9 +226,9 @@ def test_offset_of_a_curve_drawn_on_the_plane():
 def test_offset_of_a_curve_drawn_on_a_part():
     """Of a path over sharp edges, against exact distance from the vertices of the faces that it crosses."""
     pytest.importorskip("pygeodesic")
-    mesh = heat_igl.read_mesh(shared_path("fandisk.off"))
+    mesh = zoo("pill")
     solver = heat_igl.HeatMethodSolver(mesh)
-    drawn = heat_igl.shortest_paths(mesh, solver, 1000, 3000)[0]
+    drawn = heat_igl.shortest_paths(mesh, solver, 0, 900)[0]
     radius = 4 * mesh.edge_lengths.mean()
     curves = heat_igl.offset_curves(mesh, solver, drawn, radius)
     assert curves

@@ -1,23 +1,20 @@
-"""Imports run one way, and optional libraries are loaded only where they are used."""
+"""Rooms stand in their order, and optional libraries are loaded only where they are used."""
 
 from __future__ import annotations
 
+import ast
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
-from typing import Any
 
 import pytest
-from conftest import load_script
 
 import heat_igl
 
 PACKAGE = Path(heat_igl.__file__).parent
-
 ROOT = PACKAGE.parent
-structure = load_script("structure")
-# From the lowest room to the highest, as ARCHITECTURE.md lists them.
-ORDER = structure.table_order((ROOT / "ARCHITECTURE.md").read_text(encoding="utf8"))
 
 EXTRAS = """
 Xlib
@@ -46,33 +43,24 @@ zarr
 """.split()
 
 
-def modules() -> list[str]:
-    return list(structure.room_files(PACKAGE))
+def test_rooms_import_only_from_those_below(capsys: pytest.CaptureFixture[str]) -> None:
+    cli = pytest.importorskip("importlinter.cli")
+    failed = cli.lint_imports(config_filename=str(ROOT / "pyproject.toml"), no_cache=True)
+    assert not failed, capsys.readouterr().out
 
 
-@pytest.fixture(scope="module")
-def found() -> dict[str, Any]:
-    return structure.measured(ROOT, 3)
-
-
-def test_every_module_has_its_place():
-    assert set(modules()) <= set(ORDER)
-
-
-@pytest.mark.parametrize("name", modules())
-def test_imports_run_one_way(found, name):
-    allowed = set(ORDER[: ORDER.index(name)])
-    assert set(found["arrows"][name]) <= allowed
-
-
-def test_the_table_of_rooms_says_what_their_docstrings_say():
+def test_the_page_lists_the_rooms_in_the_order_of_the_contract() -> None:
+    """With the first sentence of each docstring."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf8"))
+    contract = settings["tool"]["importlinter"]["contracts"][0]
+    rows = []
+    for room in reversed(contract["layers"]):
+        path = PACKAGE / room / "__init__.py" if (PACKAGE / room).is_dir() else PACKAGE / f"{room}.py"
+        doc = ast.get_docstring(ast.parse(path.read_text(encoding="utf8"))) or ""
+        sentence = re.split(r"(?<=\.)\s", " ".join(doc.split()))[0].removesuffix(".")
+        rows.append(f"| `{room}` | {sentence} |")
     page = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf8")
-    assert structure.room_table(PACKAGE, ORDER) in page, "run: python scripts/structure.py --write"
-
-
-@pytest.mark.parametrize("name", structure.BOUNDS)
-def test_the_package_keeps_to_its_bounds(found, name):
-    assert found["counts"][name] <= structure.BOUNDS[name], found.get(name)
+    assert page.partition("|---|---|\n")[2].partition("\n<!-- /rooms -->")[0].splitlines() == rows
 
 
 def loaded(statement: str, names: list[str]) -> list[str]:
@@ -102,8 +90,9 @@ def test_names_loaded_on_first_use_are_those_of_their_modules():
     assert heat_igl.validate is validation.validate
     assert heat_igl.metrics.__name__ == "heat_igl.validation.metrics"
     assert set(heat_igl.__all__) <= set(dir(heat_igl))
-    with pytest.raises(AttributeError, match="module 'heat_igl' has no attribute 'valdate'"):
+    with pytest.raises(AttributeError, match="module 'heat_igl' has no attribute 'valdate'; did you mean 'validate'"):
         _ = heat_igl.valdate
+    assert not {"Any", "TYPE_CHECKING", "import_module", "re", "Path"} & set(dir(heat_igl))
 
 
 def test_public_names_exist_and_are_documented():

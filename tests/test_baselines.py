@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import load_script, perturbed
+from conftest import perturbed
 from scipy.spatial.distance import cdist
 from scipy.special import ive, logsumexp
 
@@ -713,25 +712,3 @@ def test_bad_graph_limits():
             baselines.graph_limit(sp.identity(2), 0, log_t)
     with pytest.raises(SourceError, match="is no vertex"):
         baselines.graph_limit(sp.identity(2), 2, -1.0)
-
-
-# The script.
-
-
-def test_table_of_errors(tmp_path, capsys):
-    """The quick table holds every method, and what it says of them is sound: the factor 1/2 alone is half wrong."""
-    needs("mesh")
-    needs("grid")
-    script = load_script("baselines_table")
-    assert script.main(["--quick", "--sources", "2", "--output", str(tmp_path)]) == 0
-    written = (tmp_path / "baselines.md").read_text(encoding="utf8")
-    assert capsys.readouterr().out == written
-    result = json.loads((tmp_path / "baselines.json").read_text(encoding="utf8"))
-    for method in (*script.METHODS, *script.GRID_METHODS):
-        assert f"| {method} |" in written
-    for row in result["meshes"] + result["grids"]:
-        wrong = "1/2" in row["method"]
-        assert all((0.4 < e < 0.6) if wrong else (0 <= e < 0.2) for e in row["error"]), row
-    differences = [row["largest"] for row in result["theorem 3.1"]]
-    assert differences == sorted(differences, reverse=True)
-    assert differences[-1] < 1e-3

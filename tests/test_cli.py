@@ -16,8 +16,8 @@ import pytest
 import typer
 
 import heat_igl
-from heat_igl import cli, demo, drawing, io, reference, shapes
-from heat_igl.cli import comparison, distances
+from heat_igl import cli, drawing, io, reference, shapes
+from heat_igl.cli import comparison, demo, distances
 from heat_igl.cli.examples import EXAMPLES
 from heat_igl.cli.program import application
 

@@ -32,7 +32,9 @@ def examples() -> Iterator[pytest.param]:
                 text = ast.get_docstring(node) or ""
                 if ">>>" in text:
                     name = getattr(node, "name", path.parent.name if path.stem == "__init__" else path.stem)
-                    yield pytest.param(name, text, id=f"{path.relative_to(folder).with_suffix('')}-{name}")
+                    # It starts processes, and gives up on a busy machine.
+                    marks = [pytest.mark.slow] if name == "cluster" else []
+                    yield pytest.param(name, text, marks=marks, id=f"{path.relative_to(folder).with_suffix('')}-{name}")
 
 
 @pytest.mark.parametrize("name", heat_igl.__all__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import flat_perturbed, perturbed, shared_path
+from conftest import flat_perturbed, perturbed, zoo
 from surfaces import moebius_strip, rough_field, rough_star, two_arms
 from test_paths import assert_on_surface, ends, lengths, turns
 
@@ -13,7 +13,6 @@ from heat_igl import (
     OffsetSources,
     SourceError,
     SurfacePoints,
-    read_mesh,
     reference,
     shapes,
     shortest_paths,
@@ -93,9 +92,9 @@ def test_paths_to_many_sources_end_at_the_nearest(name):
     np.testing.assert_allclose(ends(mesh, paths)[1], at, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["suzanne.obj", "truck.obj", "fandisk.off"])
-def test_files_with_edges_of_many_faces_and_flat_parts(name):
-    mesh = read_mesh(shared_path(name))
+@pytest.mark.parametrize("name", ["voxel blob", "book", "slotted plate", "dust"])
+def test_edges_of_many_faces_flat_parts_and_pieces(name):
+    mesh = zoo(name)
     source = int(mesh.F[0, 0])
     distance = ExactSurface(intrinsic_triangulation(mesh)).solve(np.array([source])).distance
     targets = np.flatnonzero(np.isfinite(distance))[::5]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import flat_perturbed, load_script, perturbed
+from conftest import flat_perturbed, perturbed
 
 import heat_igl
 from heat_igl import (
@@ -331,9 +331,17 @@ def test_the_work_for_unused_vertices_and_components_is_linear(kind: str, unused
     """What is looked at while an order of elimination is found, counted: at most so many times each vertex."""
     from heat_igl.linear import dissection
 
-    work = load_script("scaling_table").dissection_work
     for n in (10_000, 100_000, 1_000_000):
-        assert work(n, unused) <= dissection._TOGETHER * n, kind
+        if unused:
+            ends, neighbours = np.zeros(n + 1, np.int32), np.empty(0, np.int32)
+        else:  # components of four vertices each, on a ring
+            first, step = np.divmod(np.arange(n), 4)
+            neighbours = (4 * first[:, None] + (step[:, None] + [1, 3]) % 4).ravel().astype(np.int32)
+            ends = np.arange(0, len(neighbours) + 1, 2, dtype=np.int32)
+        parts = dissection._apart(ends, neighbours)
+        # All of a part is looked at for each component in it.
+        work = sum((high - low) * ((high - low) // (1 if unused else 4)) for _, low, high in parts)
+        assert work <= dissection._TOGETHER * n, kind
 
 
 def test_large_steps_are_warned_about() -> None:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import load_script
 from test_derivatives import HEAT, MESHES, differences
 
 import heat_igl
@@ -198,17 +197,3 @@ def test_points_on_a_cover_are_refused() -> None:
     with pytest.raises(ValueError, match="the triangles are a cover of the surface: take a GeodesicSolver"):
         solver.distance_vjp(POINTS)
     assert GeodesicSolver(MESHES["book"](), method="exact").distance_vjp(POINTS)[1](np.ones(solver.n_vertices)).any()
-
-
-def test_the_table_of_derivatives(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    script = load_script("derivatives_table")
-    row = script.measured(script.roughened(heat_igl.shapes.icosphere(3)), n_directions=1, seed=0)
-    for method, bound in (("exact", 1e-5), ("heat", 1e-4)):
-        found = row[method]
-        assert max(found["sums"], found["norms"]) < bound
-        assert max(found[key] for key in script.IDENTITIES) < 1e-10
-        assert found["kinks"] < 0.1 * row["n"]
-    monkeypatch.setattr(script, "measured", lambda *_: row)
-    monkeypatch.setattr(script, "SHAPES", {"ball": lambda: heat_igl.shapes.icosphere(1)})
-    assert script.main([]) == 0
-    assert "| ball | 642 |" in capsys.readouterr().out

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import shared_path
+from conftest import zoo
 
 import heat_igl
 from heat_igl import shapes
@@ -360,10 +360,10 @@ def test_the_distance_in_the_page_is_exact_where_it_is_flat(browser: Browser) ->
     np.testing.assert_allclose(browser.distance(), straight, rtol=1e-6, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["teapot.obj", "truck.obj", "camelhead.off"])
+@pytest.mark.parametrize("name", ["voxel blob", "sphere with slivers", "dust"])
 def test_bad_meshes_agree_with_python_too(browser: Browser, name: str) -> None:
     """More than two faces at an edge, slivers, pieces."""
-    mesh = heat_igl.read_mesh(shared_path(name))
+    mesh = zoo(name)
     browser.open(page(mesh, np.zeros(mesh.n_vertices)))
     browser.run("window.heatIgl.setSources([7])")
     assert_agree(browser.distance(), heat_igl.GeodesicSolver(mesh, method="sweep").distance(7))

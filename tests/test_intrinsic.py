@@ -3,7 +3,7 @@ from __future__ import annotations
 import igl
 import numpy as np
 import pytest
-from conftest import perturbed, shared_path
+from conftest import perturbed, zoo
 
 import heat_igl
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, shapes
@@ -36,12 +36,12 @@ def assert_glued(triangulation):
     assert (opposite | ~triangulation.aligned[inner]).all()
 
 
-@pytest.mark.parametrize("name", ["cow.obj", "homer.obj", "camelhead.off"])
+@pytest.mark.parametrize("name", ["sheared grid by 10", "crumpled", "noise 100 times"])
 def test_agrees_with_libigl(name):
     """The intrinsic Delaunay triangulation is unique but for cocircular corners, and those have weight 0."""
-    mesh = heat_igl.read_mesh(shared_path(name))
+    mesh = zoo(name)
     found = delaunay(mesh)
-    assert found.n_flips > 1000
+    assert found.n_flips > 0.1 * mesh.n_vertices
     assert_glued(found)
     L, _, _ = igl.intrinsic_delaunay_cotmatrix(mesh.V, mesh.F)
     assert abs(igl.cotmatrix_intrinsic(found.l, found.F) - L).max() <= 1e-8 * abs(L).max()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import flat_perturbed, shared_path
+from conftest import flat_perturbed, zoo
 
 import heat_igl
 from heat_igl import (
@@ -191,7 +191,7 @@ def test_crossings_are_those_of_libigl(bunny):
 
 
 def test_an_offset_curve_on_a_part():
-    mesh = heat_igl.read_mesh(shared_path("fandisk.off"))
+    mesh = zoo("pill")
     solver = GeodesicSolver(mesh, method="exact")
     radius = 0.05 * np.ptp(mesh.V, axis=0).max()
     curves = offset_curves(mesh, solver, [100, 200], radius)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
 import sys
 from importlib import import_module
+from importlib.machinery import EXTENSION_SUFFIXES
+from importlib.util import source_hash
 from pathlib import Path
 
 import numpy as np
@@ -87,17 +90,28 @@ def test_every_build_solves_alike(monkeypatch):
         np.testing.assert_allclose(other, solutions[0], rtol=0, atol=1e-12 * np.abs(solutions[0]).max())
 
 
-def test_sources_alone_are_refused(tmp_path):
-    """A checkout that was not installed: Python would run the sources, which are valid Python."""
-    folder = Path(kernels.__file__).parent
-    package = tmp_path / "heat_igl"
-    shutil.copytree(folder, package / "kernels", ignore=shutil.ignore_patterns("*.so", "*.pyd", "__pycache__"))
-    (package / "__init__.py").touch()
-    run = subprocess.run(
-        [sys.executable, "-c", "import heat_igl.kernels"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert run.returncode == 1
-    assert f"run `pip install -e .` in {tmp_path}" in run.stderr
+def imported(folder: Path) -> str:
+    """What an interpreter says to an import of the kernels in this folder."""
+    code = "import heat_igl.kernels"
+    return subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False).stderr
+
+
+def test_kernels_that_are_not_those_of_the_sources_are_refused(tmp_path: Path) -> None:
+    """None compiled: Python would run the sources, which are valid Python. Or compiled from earlier sources."""
+    folder = tmp_path / "heat_igl" / "kernels"
+    folder.mkdir(parents=True)
+    (folder.parent / "__init__.py").touch()
+    shutil.copy(kernels.__file__, folder)
+    source = folder / "doubled.py"
+    source.write_text("def doubled(x): return 2 * x")
+    assert f"run `pip install -e .` in {tmp_path}" in imported(tmp_path)
+    source.with_suffix(EXTENSION_SUFFIXES[0]).touch()
+    (folder / "compiled.json").write_text(json.dumps({source.name: source_hash(source.read_bytes()).hex()}))
+    assert imported(tmp_path) == ""
+    source.write_text("def doubled(x): return 3 * x")
+    assert "1 sources of kernels" in imported(tmp_path)
+    source.unlink()
+    assert "have changed since they were compiled (doubled.py)" in imported(tmp_path)
 
 
 @pytest.mark.skipif(os.environ.get("HEAT_IGL_CHECKED") != "1", reason="the usual build does not check indices")

@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import perturbed, shared_path
+from conftest import perturbed, zoo
 from surfaces import bent_pages, bumpy, two_arms
 
-from heat_igl import Mesh, MeshError, SourceError, distances_within, nearest_vertices, pair_distances, read_mesh, shapes
+from heat_igl import Mesh, MeshError, SourceError, distances_within, nearest_vertices, pair_distances, shapes
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import (
     blocks_within,
@@ -205,8 +205,8 @@ def test_a_cutoff_ends_the_search():
     assert windows[1] < 0.03 * windows[-1]
 
 
-def test_nonmanifold_mesh_from_a_file():
-    mesh = read_mesh(shared_path("suzanne.obj"))
+def test_edges_of_four_faces():
+    mesh = zoo("voxel blob")
     sources = [0, 100, 250]
     indices, distances = nearest_vertices(mesh, 12, sources)
     for i, v in enumerate(sources):

@@ -55,7 +55,7 @@ def test_coming_from_another_library(block: str) -> None:
 
 # Pages with tests of their own, and what single blocks of the others need.
 TESTED_APART = ("quickstart.md", "coming_from.md", "tasks.md")
-NEEDS = {"plot(": "matplotlib", "heat_igl.torch": "torch", "cluster.": "distributed", "xarray": "xarray"}
+NEEDS = {"plot(": "matplotlib", "heat_igl.applications.torch": "torch", "cluster.": "distributed", "xarray": "xarray"}
 ELSEWHERE = ("SLURMCluster",)  # runs on such a machine only
 
 
@@ -129,19 +129,3 @@ def test_the_drawn_strip_is_flat_and_true_to_length() -> None:
     np.testing.assert_allclose(sides, np.linalg.norm(np.roll(in_space, -1, axis=1) - in_space, axis=2), rtol=1e-12)
     np.testing.assert_allclose(way[:, 1], 0, atol=1e-9)  # one straight line
     np.testing.assert_allclose(way[-1, 0], path.lengths(mesh).sum(), rtol=1e-12)
-
-
-def test_a_site_is_checked_for_links_that_lead_nowhere_and_for_what_it_loads() -> None:
-    check = load_script("check_site")
-    Path("site/folder").mkdir(parents=True)
-    Path("site/index.html").write_text(
-        '<a href="folder/one.html#there">1</a><a href="folder/one.html#gone">2</a><a href="gone.html">3</a>'
-        '<a href="https://example.org">4</a><img src="https://example.org/x.png"><a id="top" href="#top">5</a>'
-    )
-    Path("site/folder/one.html").write_text('<p id="there"><a href="../index.html#top">back</a><a href="#no">no</a>')
-    assert check.faults(Path("site")) == [
-        "folder/one.html: #no names no place on that page",
-        "index.html loads https://example.org/x.png from outside",
-        "index.html: folder/one.html#gone names no place on that page",
-        "index.html: gone.html does not exist",
-    ]

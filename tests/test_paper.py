@@ -11,7 +11,6 @@ import pytest
 import scipy.sparse.linalg as spl
 from conftest import load_script
 
-import heat_igl
 from heat_igl import shapes
 from heat_igl.operators import operators
 from heat_igl.steps import diffuse, integrate, normalize
@@ -199,20 +198,6 @@ def test_figures_from_one_command(tmp_path: Path) -> None:
     heat = np.array([float(row["heat"]) for row in tables["5"]])
     assert (np.diff(heat) < 0).all()
     assert "numpy" in json.loads((tmp_path / "environment.json").read_text(encoding="utf8"))
-
-
-def test_the_first_figure_takes_another_mesh_and_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("matplotlib")
-    for name in ("plot", "save"):  # the pictures are those of the test above
-        monkeypatch.setattr(paper_figures, name, lambda *_, **__: None)
-    sphere = shapes.icosphere(2)
-    heat_igl.write_mesh(tmp_path / "sphere.off", sphere)
-    arguments = ["--figure", "1", "--mesh", str(tmp_path / "sphere.off"), "--source", "5", "--out", str(tmp_path)]
-    assert paper_figures.main(arguments) == 0
-    with (tmp_path / "figure_1.csv").open(encoding="utf8") as file:
-        rows = list(csv.DictReader(file))
-    assert [k for k, row in enumerate(rows) if float(row["distance"]) == 0] == [5]
-    assert not (tmp_path / "figure_2.csv").exists()
 
 
 def test_claims_from_one_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import flat_perturbed, shared_path, wheel_path
+from conftest import flat_perturbed, wheel_path, zoo
 from scipy.spatial import ConvexHull
 
 import heat_igl
@@ -116,8 +116,8 @@ def test_the_side_on_which_to_pass_is_found_on_large_faces(name):
     assert np.quantile(error, 0.99) < 1e-3
 
 
-def test_an_edge_of_four_faces_in_a_head():
-    mesh = heat_igl.read_mesh(shared_path("suzanne.obj"))
+def test_an_edge_of_four_faces():
+    mesh = zoo("voxel blob")
     assert mesh.facets.n_faces.max() == 4
     ends = mesh.facets.vertices[mesh.facets.n_faces.argmax()]
     solver = GeodesicSolver(mesh, method="exact")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import pytest
 import heat_igl
 
 yaml = pytest.importorskip("yaml")
-tomllib = pytest.importorskip("tomllib", reason="new in Python 3.11")
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf8"))["project"]

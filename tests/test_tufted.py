@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import perturbed, shared_path
+from conftest import perturbed
 
-import heat_igl
 from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, shapes
 from heat_igl.intrinsic import has_nonmanifold_edges, intrinsic_delaunay, intrinsic_triangulation, tufted_cover
 from heat_igl.mesh import split_long_edges
@@ -348,24 +347,3 @@ def test_every_face_twice(cow):
     assert heat_error(twice, sources, truth) == once
     assert heat_error(plain, sources, truth) > 3 * once
     assert heat_error(plain, sources, truth, magnitude="unit") > 0.1
-
-
-def test_errors_on_the_uneven_suzanne_are_within_three_percent():
-    """507 vertices of very uneven spacing."""
-    suzanne = heat_igl.read_mesh(shared_path("suzanne.obj"))
-    sources = sample_sources(suzanne, 10)
-    truth = steiner_distance(suzanne, sources)
-    assert heat_error(suzanne, sources, truth) < 0.03
-    fine = split_long_edges(suzanne, suzanne.edge_lengths.mean())
-    assert heat_error(fine, sources, truth) < 0.025
-
-
-# The operators that the cover is compared with are as far off as the warning says.
-@pytest.mark.filterwarnings("ignore:.*heat gave distances:heat_igl.AccuracyWarning")
-def test_the_cover_reduces_the_error_beside_edges_of_three_faces():
-    """54 edges of three faces and slivers of 179.7 degrees at them."""
-    truck = heat_igl.read_mesh(shared_path("truck.obj"))
-    sources = sample_sources(truck, 5)
-    truth = graph_distance(truck, sources, 12)
-    plain = intrinsic_operators(intrinsic_delaunay(intrinsic_triangulation(truck)), truck)
-    assert heat_error(truck, sources, truth) < 0.7 * heat_error(plain, sources, truth)

@@ -11,14 +11,13 @@ import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import load_script, shared_path
+from conftest import zoo
 
 import heat_igl
 from heat_igl import (
@@ -178,9 +177,9 @@ def test_a_method_that_fails_is_a_row_that_says_why(monkeypatch: pytest.MonkeyPa
     assert report.plot().axes
 
 
-@pytest.mark.parametrize("name", ["suzanne.obj", "truck.obj", "teapot.obj"])
+@pytest.mark.parametrize("name", ["voxel blob", "pinched", "dust"])
 def test_no_reference_brings_the_process_down(name: str) -> None:
-    mesh = heat_igl.read_mesh(shared_path(name))
+    mesh = zoo(name)
     report = validate(mesh, draw_sources(mesh, 3), validation.METHODS, reference=None)
     assert [row.method for row in report.rows] == list(validation.METHODS)
     for row in report.rows:
@@ -360,12 +359,7 @@ def test_every_method_on_the_bunny(bunny: Mesh) -> None:
     assert 5e-4 < means["meshlab"] < 5e-3
 
 
-# --- scripts/validate_meshes.py --------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def script() -> ModuleType:
-    return load_script("validate_meshes")
+# --- heat-igl validate -----------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -380,79 +374,6 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "meshes" / "noise.off").write_text("OFF\n3 1 0\n0 0 zero\n")
     (tmp_path / "meshes" / "notes.txt").write_text("not a mesh")
     return tmp_path
-
-
-def run(script: ModuleType, folder: Path, *options: str) -> tuple[int, list[dict[str, Any]], str]:
-    out = folder / "out"
-    status = script.main([str(folder / "meshes"), "--output", str(out), "--methods", "heat,meshlab", *options])
-    lines = (out / "cases.jsonl").read_text().splitlines()
-    return status, [json.loads(line) for line in lines], (out / "table.md").read_text()
-
-
-def test_script_validates_a_folder(script: ModuleType, folder: Path) -> None:
-    status, found, table = run(script, folder)
-    assert status == 0
-    assert [record["file"] for record in found] == ["disk.off", "fin.off", "grid.off", "noise.off"]
-    assert ["report" in record for record in found] == [True, True, True, False]
-    assert found[3]["failure"]
-    assert str(folder) not in json.dumps(found)
-    assert found[0]["environment"]["numpy"] == np.__version__
-    assert {row["method"]: row["failure"] for row in found[0]["report"]["rows"]} == {"heat": None, "meshlab": None}
-    lines = table.splitlines()
-    assert lines[2:4] == ["| mesh | vertices | heat | meshlab |", "|---|---:|---:|---:|"]
-    mean = found[0]["report"]["rows"][0]["errors"]["mean"]
-    assert lines[4].startswith(f"| disk | 217 | {100 * mean:.3g} |")
-    assert lines[5].startswith("| fin | 5 | ")
-    assert (folder / "out" / "errors.png").stat().st_size > 10_000
-
-
-def test_script_resumes(script: ModuleType, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _, first, table = run(script, folder)
-    log = folder / "out" / "cases.jsonl"
-    whole = log.read_text().splitlines(keepends=True)
-    log.write_text("".join(whole[:2]) + whole[2][:40])  # as if killed while writing the third
-    validated: list[str] = []
-    original = heat_igl.validate
-
-    def counted(*args: Any, **options: Any) -> Any:
-        validated.append(options["name"])
-        return original(*args, **options)
-
-    monkeypatch.setattr(heat_igl, "validate", counted)
-    _, again, _ = run(script, folder)
-    assert validated == ["grid"]
-    assert [record["file"] for record in again] == [record["file"] for record in first]
-    # The same seed draws the same sources, and the same errors come out.
-    errors = [[row["errors"] for row in record["report"]["rows"]] for record in (first[2], again[2])]
-    assert errors[0] == errors[1]
-    assert run(script, folder)[2].splitlines()[:9] == table.splitlines()[:9]
-    assert validated == ["grid"]
-    run(script, folder, "--seed", "1")
-    assert validated == ["grid", "disk", "fin", "grid"]
-
-
-def test_script_has_a_threshold(script: ModuleType, folder: Path) -> None:
-    for name in ("fin.off", "noise.off"):
-        (folder / "meshes" / name).unlink()
-    assert run(script, folder, "--fail-above", "10")[0] == 0
-    assert run(script, folder, "--fail-above", "0.01")[0] == 1
-
-
-def test_script_refuses_what_it_does_not_know(script: ModuleType, folder: Path, capsys: Any) -> None:
-    with pytest.raises(SystemExit, match="2"):
-        run(script, folder, "--methods", "heat,magic")
-    assert "'magic' is unknown: choose from heat, sweep" in capsys.readouterr().err
-    with pytest.raises(SystemExit, match="2"):
-        script.main([str(folder / "nowhere")])
-    assert "there is no" in capsys.readouterr().err
-    (folder / "empty").mkdir()
-    with pytest.raises(SystemExit, match="2"):
-        script.main([str(folder / "empty")])
-    assert "no mesh files there" in capsys.readouterr().err
-    assert not (folder / "out").exists()
-
-
-# --- heat-igl validate -----------------------------------------------------------------------------------------------
 
 
 def command(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:

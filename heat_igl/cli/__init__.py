@@ -1,6 +1,6 @@
 """The command line ``heat-igl`` and the demonstration: the package's words, one line per error, no half-written files.
 
-Typer and rich (extra ``cli``) are loaded by `run`, and `heat_igl.demo` is there without them.
+Typer and rich (extra ``cli``) are loaded by `run`, and `heat_igl.cli.demo` is there without them.
 """
 
 import sys

@@ -5,17 +5,20 @@ A kernel checks nothing that it is given: the modules that call it pass contiguo
 
 from __future__ import annotations
 
+import json
 from importlib.machinery import EXTENSION_SUFFIXES
-from importlib.util import find_spec
+from importlib.util import find_spec, source_hash
 from pathlib import Path
 
 __all__ = ["builds"]
 
 
 def _require_extensions() -> None:
-    """Refuse to go on if the kernels have not been compiled, such as in a fresh checkout.
+    """Refuse to go on if the kernels have not been compiled from the sources that stand here.
 
-    Python would import the sources instead, and run them slowly or not at all.
+    In a fresh checkout Python would import the sources instead, and run them slowly or not at all. In a checkout that
+    has changed since it was built, answers would come from earlier code. A build in place leaves the hash of each
+    source that it compiled; an installed package has no such list and needs none.
     """
     here = Path(__file__).parent
     compiled = {path.name.partition(".")[0] for path in here.iterdir() if path.name.endswith(tuple(EXTENSION_SUFFIXES))}
@@ -25,6 +28,19 @@ def _require_extensions() -> None:
             f"heat_igl is imported from {here.parent}, where {len(missing)} of its kernels are not compiled "
             f"({missing[0]}): run `pip install -e .` in {here.parent.parent}, or start Python in another folder"
         )
+    built = here / "compiled.json"
+    if built.exists():
+        hashes = json.loads(built.read_text(encoding="utf8"))
+        changed = [name for name in hashes if _hash(here / name) != hashes[name]]
+        if changed:
+            raise ImportError(
+                f"{len(changed)} sources of kernels in {here} have changed since they were compiled ({changed[0]}): "
+                f"run `python setup.py -q build_ext --inplace` or `pip install -e .` in {here.parent.parent}"
+            )
+
+
+def _hash(path: Path) -> str:
+    return source_hash(path.read_bytes()).hex() if path.exists() else ""
 
 
 _require_extensions()

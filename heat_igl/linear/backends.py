@@ -2,7 +2,7 @@
 
 `analyse` looks at the pattern alone; the result factors every matrix of that pattern, and principal submatrices,
 so that the heat and the Poisson problem share one ordering. Each backend is one small class of analysis and one of
-factorization in a separate file; scripts/tune_backends.py measures them.
+factorization in a separate file.
 
 Libraries that were tried and left: cholespy holds the interpreter's lock and orders each matrix anew; cvxopt and
 scikit-sparse are GPL; MKL's PARDISO is proprietary and for one kind of processor.

@@ -1,4 +1,4 @@
-"""Execution: threads, blocks of right-hand sides, progress, memory, the range of doubles, warnings, module aliases."""
+"""Execution: threads, blocks of right-hand sides, progress, memory, the range of doubles, warnings."""
 
 from heat_igl.runtime.blocks import WORKING_MEMORY, block_size, in_blocks, in_order
 from heat_igl.runtime.heat_range import LARGEST_EXPONENT, LOWEST_HEAT, RANGE_LIMIT, SOURCE_HEAT
