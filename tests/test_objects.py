@@ -216,7 +216,7 @@ def test_an_image_domain_is_the_mesh_of_the_pixels() -> None:
 
 
 def test_operators_and_solvers_are_refused_by_name() -> None:
-    with pytest.raises(MeshError, match=r"Operators: HeatMethodSolver.from_operators takes operators"):
+    with pytest.raises(MeshError, match=r"Operators: GeodesicSolver and HeatMethodSolver take operators"):
         as_mesh(heat_igl.speed_operators(SPHERE, np.ones(len(F))))
     with pytest.raises(MeshError, match=r"HeatMethodSolver: a solver is asked itself"):
         as_mesh(heat_igl.HeatMethodSolver(SPHERE))

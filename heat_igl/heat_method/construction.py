@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import TypeVar
 
 from heat_igl.errors import shown
@@ -52,8 +53,9 @@ class PreparedSolver(BatchedSolver):
                 f"domain must be Operators, as metric_operators returns them, not {shown(domain)}: "
                 "HeatMethodSolver(mesh) takes meshes"
             )
-        options = SolverOptions(t_coef, t, "intrinsic-delaunay", boundary, magnitude, backend)
-        return cls._of(prepare(domain, options))
+        solver = cls.__new__(cls)
+        solver._set_up(domain, SolverOptions(t_coef, t, "auto", boundary, magnitude, backend))
+        return solver
 
     @classmethod
     def from_edge_lengths(
@@ -133,8 +135,14 @@ class PreparedSolver(BatchedSolver):
         options, known = self._parts.options, self._parts.analysis
         return self._of(prepare_mesh(moved, options, known), moved)
 
-    def _set_up(self, mesh: Mesh | PolygonMesh | PointCloud, options: SolverOptions) -> None:
-        if isinstance(mesh, PolygonMesh):
+    def _set_up(self, mesh: Mesh | PolygonMesh | PointCloud | Operators, options: SolverOptions) -> None:
+        if isinstance(mesh, Operators):
+            if options.laplacian != "auto":
+                raise ValueError(f"laplacian={options.laplacian!r} is for meshes: operators have a Laplacian already")
+            # Whoever made the operators chose the triangulation.
+            chosen = replace(options, laplacian="intrinsic-delaunay")
+            self._mesh, self._parts = None, prepare(mesh, chosen)
+        elif isinstance(mesh, PolygonMesh):
             self._mesh, self._parts = None, prepare_polygons(mesh, options)
         else:
             self._mesh, self._parts = mesh, prepare_mesh(mesh, options)

@@ -20,7 +20,7 @@ from heat_igl.heat_method.side_lengths import SideLengths
 from heat_igl.heat_method.solution import HeatSolution, LabelledDistance
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, as_mesh
-from heat_igl.operators import Laplacian
+from heat_igl.operators import Laplacian, Operators
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
 from heat_igl.steps import Boundary
@@ -34,9 +34,10 @@ class HeatMethodSolver(PreparedSolver):
 
     Parameters
     ----------
-    mesh : mesh or (n, 3) array_like
+    mesh : mesh, Operators or (n, 3) array_like
         Whatever `as_mesh` takes, or the positions V of a mesh whose faces are `F`. Polygons are solved on with
-        `polygon_operators`, points with those of the triangles between them.
+        `polygon_operators`, points with those of the triangles between them. Or the operators of a metric, a speed or
+        another domain, as `metric_operators` returns them.
     F : (m, 3) or (m, 4) array_like, optional
         Faces, when `mesh` is V.
     t_coef : float, optional
@@ -96,7 +97,7 @@ class HeatMethodSolver(PreparedSolver):
 
     def __init__(
         self,
-        mesh: MeshLike,
+        mesh: MeshLike | Operators,
         F: ArrayLike | None = None,
         *,
         t_coef: float | None = None,
@@ -107,7 +108,7 @@ class HeatMethodSolver(PreparedSolver):
         backend: Backend = "auto",
     ) -> None:
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
-        self._set_up(as_mesh(mesh, F), options)
+        self._set_up(mesh if isinstance(mesh, Operators) and F is None else as_mesh(mesh, F), options)
 
     def distance(self, sources: Sources, cutoff: float | None = None) -> FloatArray:
         """Distance from the nearest source.

@@ -32,7 +32,7 @@ _TRIANGLES, _QUADS, _POLYGONS, _TETRAHEDRA = ("triangle", 5), ("quad", 9), ("pol
 
 # What else might be taken for a mesh, by the end of the name of the class.
 _NOT_MESHES = {
-    "Operators": "HeatMethodSolver.from_operators takes operators, and the solver answers what is asked of a mesh",
+    "Operators": "GeodesicSolver and HeatMethodSolver take operators, and the solver answers what is asked of a mesh",
     "Solver": "a solver is asked itself, as in solver.distance(sources)",
     **dict.fromkeys(
         ("StructuredGrid", "RectilinearGrid", "ImageData"),
