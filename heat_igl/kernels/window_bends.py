@@ -2,13 +2,18 @@
 
 Paths bend at a vertex with angles that sum to more than 2 pi, into directions at least pi from the arriving path on
 both sides; at the boundary; and, into all faces, at a vertex with several fans.
+
+Two paths to the vertex whose lengths agree to rounding can differ in direction by the square root of that: excess grows
+with the square of the angle. What passes the vertex on its two sides may have come on the other path. So that nothing
+between is left out, the rays that bound the directions of windows from the vertex are moved apart by this angle. Such
+windows are paths too, and are cut where another is shorter.
 """
 
 import cython
 from cython.cimports.heat_igl.kernels.triangles import foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_distances import relax
 from cython.cimports.heat_igl.kernels.window_lists import add
-from cython.cimports.heat_igl.kernels.window_structures import BENDS, JOINS, SHADOW_MARGIN, Ray, Search, Window
+from cython.cimports.heat_igl.kernels.window_structures import BENDS, FLATNESS, JOINS, ROUNDING, WIDEST, Ray, Search, Window
 from cython.cimports.heat_igl.kernels.window_surface import beyond, third, turn
 from cython.cimports.libc.math import sqrt
 
@@ -60,23 +65,32 @@ def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _straighten(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Ray)) -> cython.bint:
-    """Turn around the vertex over a side of corner k by pi; true if the fan reaches that far.
+def _straighten(
+    s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Ray), margin: cython.double
+) -> cython.bint:
+    """Turn around the vertex over a side of corner k by pi, less a margin; true if the fan reaches as far as pi.
 
     `ray` takes the corner that holds the direction, the side over which it was entered, and the angle between them.
     """
-    cosine: cython.double
-    sine: cython.double
+    ahead: Ray
+    sine: cython.double = ray.sine
+    ray.sine = sine + margin * ray.cosine
+    ray.cosine -= margin * sine
+    ray.corner = -1
+    ahead = ray[0]
     while True:
         k = beyond(s, k, side)
         if k < 0:
             return False
         side = s.twin[side]
-        cosine, sine = ray.cosine, ray.sine
-        turn(s, k, side, ray)
-        if ray.sine < 0.0:
-            ray.corner, ray.side = k, side
-            ray.cosine, ray.sine = -cosine, sine
+        turn(s, k, side, cython.address(ahead))
+        if ray.corner < 0:
+            if ahead.sine < 0.0:
+                ray.corner, ray.side = k, side
+                ray.cosine = -ray.cosine
+            else:
+                ray[0] = ahead
+        if ahead.sine < margin * ahead.cosine - FLATNESS:
             return True
         side = third(k, side)
 
@@ -108,7 +122,7 @@ def _fill(
     """Windows from v between two rays, or between the first ray and the boundary if there is no second."""
     k: cython.int = first.corner
     side: cython.int = first.side
-    near: cython.double = _reach(s, first) - SHADOW_MARGIN * s.length[k]
+    near: cython.double = _reach(s, first)
     far: cython.double
     length: cython.double
     offset: cython.double = s.distance[v]
@@ -116,7 +130,7 @@ def _fill(
         length = s.length[k]
         far = length
         if last != cython.NULL and k == last.corner:
-            far = length - _reach(s, last) + SHADOW_MARGIN * length
+            far = length - _reach(s, last)
         _reach_ends(s, k, v, offset)
         if near < far:
             if side == previous_half_edge(k):
@@ -145,6 +159,7 @@ def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
     y: cython.double
     at: cython.double = s.crossing[v]
     norm: cython.double
+    margin: cython.double
     left: Ray
     right: Ray
     has_left: cython.bint
@@ -165,8 +180,11 @@ def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
     left.cosine, left.sine = (x * (x - at) + y * y) / (norm * left_length), y * at / (norm * left_length)
     right.cosine = ((length - x) * (at - x) + y * y) / (norm * right_length)
     right.sine = y * (length - at) / (norm * right_length)
-    has_left = _straighten(s, h, previous_half_edge(h), cython.address(left))
-    has_right = _straighten(s, h, next_half_edge(h), cython.address(right))
+    margin = sqrt(ROUNDING * s.distance[v] / norm)
+    if margin > WIDEST:
+        margin = WIDEST
+    has_left = _straighten(s, h, previous_half_edge(h), cython.address(left), margin)
+    has_right = _straighten(s, h, next_half_edge(h), cython.address(right), margin)
     # Around a closed fan both rays bound one shadow; in an open one there are two, each up to the boundary.
     if s.kind[v] == BENDS:
         if has_left and has_right:

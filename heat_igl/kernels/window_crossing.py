@@ -86,6 +86,7 @@ def _reach_apex(
     m: cython.double
     a: cython.double
     b: cython.double
+    at: cython.double
     distance: cython.double
     w: cython.pointer(Window)
     for i in range(n):
@@ -118,8 +119,11 @@ def _reach_apex(
                 apex.nearest = distance
                 apex.best = i
             continue
-        # The apex is just beside the window: the path over the end of the window is hardly longer.
-        _arrive(s, h, w, _bent(w, b, apex.x, apex.y), b)
+        # The apex is just beside the window: the path over the end of the window is hardly longer, and comes from the
+        # same direction as a straight one.
+        at = backward(w, apex.x, apex.y)
+        at = 0.0 if at < 0.0 else apex.length if at > apex.length else at
+        _arrive(s, h, w, _bent(w, b, apex.x, apex.y), at)
     if apex.best >= 0:
         w = windows + apex.best
         apex.best_at = backward(w, apex.x, apex.y)

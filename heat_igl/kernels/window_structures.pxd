@@ -236,8 +236,10 @@ cdef inline double backward(const Window* w, double x, double y) noexcept nogil:
 
 cdef extern from *:
     """
-    // Windows from a bend are this fraction of a side wider, so that none is missed between them and their neighbours.
-    #define SHADOW_MARGIN 1e-9
+    // Two paths are equally long if they differ by less than this fraction: some hundred times the rounding of one step.
+    #define ROUNDING 1e-13
+    // The largest angle, in radians, by which the directions from a bend are widened.
+    #define WIDEST 0.01
     // What is narrower, as a fraction of a side, is no window.
     #define NARROW 1e-14
     // A vertex missed by less than this fraction of a side is reached over the end of the window, which is longer by
@@ -256,7 +258,8 @@ cdef extern from *:
     // What a list costs beside its windows, in windows.
     #define PER_LIST 4
     """
-    double SHADOW_MARGIN
+    double ROUNDING
+    double WIDEST
     double NARROW
     double NEAR
     double SAME

@@ -151,8 +151,7 @@ def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
         if k == start:
             if n_seen < n_corners:
                 return JOINS
-            # Less than 1e-8 above 2 pi is flat: what a path loses there is the square of it.
-            if n_half_turns < 2 or (n_half_turns == 2 and ray.cosine > 0.0 and ray.sine < 1e-8):
+            if n_half_turns < 2 or (n_half_turns == 2 and ray.cosine > 0.0 and ray.sine < FLATNESS):
                 return FLAT if ray.cosine > 0.0 and fabs(ray.sine) < FLATNESS else PASSED
             return BENDS
     # An open fan: from the start to its other end.
