@@ -4,7 +4,7 @@ Half-edge ``3 f + c`` is the side of face f opposite its corner c; the corner ca
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge, twice_area
+from cython.cimports.heat_igl.kernels.triangles import area, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_structures import BENDS, ENDS, FLAT, FLATNESS, JOINS, PASSED, Ray, Search
 from cython.cimports.libc.math import fabs
 
@@ -54,18 +54,18 @@ def shapes(
     a: cython.double
     b: cython.double
     d: cython.double
-    area: cython.double
+    twice: cython.double
     is_delaunay: cython.bint = True
     with cython.nogil:
         for f in range(m):
             h = 3 * f
             a, b, d = length[h], length[h + 1], length[h + 2]
             # A needle without height would have no circle.
-            area = twice_area(a, b, d) + 1e-20 * a * a
-            double_area[f] = area
-            bulge[h] = a * (b * b + d * d - a * a) / (2.0 * area)
-            bulge[h + 1] = b * (a * a + d * d - b * b) / (2.0 * area)
-            bulge[h + 2] = d * (a * a + b * b - d * d) / (2.0 * area)
+            twice = 2.0 * area(a, b, d) + 1e-20 * a * a
+            double_area[f] = twice
+            bulge[h] = a * (b * b + d * d - a * a) / (2.0 * twice)
+            bulge[h + 1] = b * (a * a + d * d - b * b) / (2.0 * twice)
+            bulge[h + 2] = d * (a * a + b * b - d * d) / (2.0 * twice)
             for c in range(3):
                 v = vertex[h + c]
                 next_corner[h + c] = corner_of_vertex[v]
