@@ -10,10 +10,20 @@ windows are paths too, and are cut where another is shorter.
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.triangles import foot, next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_distances import relax
 from cython.cimports.heat_igl.kernels.window_lists import add
-from cython.cimports.heat_igl.kernels.window_structures import BENDS, FLATNESS, JOINS, ROUNDING, WIDEST, Ray, Search, Window
+from cython.cimports.heat_igl.kernels.window_structures import (
+    BENDS,
+    FLATNESS,
+    JOINS,
+    ROUNDING,
+    WIDEST,
+    Ray,
+    Search,
+    Window,
+    twice_product,
+)
 from cython.cimports.heat_igl.kernels.window_surface import beyond, third, turn
 from cython.cimports.libc.math import sqrt
 
@@ -36,14 +46,14 @@ def _emit(
     left: cython.double = s.length[next_half_edge(k)]
     if s.twin[k] == -1:
         return
-    one.x = length - 0.5 * (length + (right - left) * (right + left) / length)
+    one.x = 0.5 * twice_product(length, left, right) / length
     one.depth = s.double_area[k // 3] / length
     one.start = length - stop if stop < length else 0.0
     one.stop = length - start if start > 0.0 else length
     one.offset = offset
     one.root = root
     one.corner = k
-    one.turn_x, one.turn_y = (length - one.x) / right, -one.depth / right
+    one.turn_x, one.turn_y = 0.5 * twice_product(length, right, left) / (length * right), -one.depth / right
     one.side = one.is_plane = 0
     if one.depth > 0.0:
         add(s, k, cython.address(one), 1, False)
@@ -59,7 +69,17 @@ def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset:
     a: cython.double = s.length[tail]
     b: cython.double = s.length[head]
     relax(s, s.vertex[head], offset + a, v, head, b, k, 1.0, 0.0)
-    relax(s, s.vertex[tail], offset + b, v, tail, 0.0, k, foot(a, b, s.length[k]), s.double_area[k // 3] / a)
+    relax(
+        s,
+        s.vertex[tail],
+        offset + b,
+        v,
+        tail,
+        0.0,
+        k,
+        0.5 * twice_product(a, b, s.length[k]) / a,
+        s.double_area[k // 3] / a,
+    )
 
 
 @cython.cfunc
@@ -104,7 +124,7 @@ def _reach(s: cython.pointer(Search), ray: cython.pointer(Ray)) -> cython.double
     length: cython.double = s.length[k]
     p: cython.double = s.length[ray.side]
     q: cython.double = s.length[third(k, ray.side)]
-    cosine: cython.double = (p * p + length * length - q * q) / (2.0 * p * length)
+    cosine: cython.double = 0.5 * twice_product(p, length, q) / (p * length)
     sine: cython.double = s.double_area[k // 3] / (p * length)
     x: cython.double = ray.sine * cosine + ray.cosine * sine
     if x <= 0.0:
@@ -174,11 +194,12 @@ def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
         return
     # From the apex of h: the angles between the way back, to where the path crosses h, and the two sides.
     length, left_length, right_length = s.length[h], s.length[previous_half_edge(h)], s.length[next_half_edge(h)]
-    x = 0.5 * (length + (left_length - right_length) * (left_length + right_length) / length)
+    x = 0.5 * twice_product(length, left_length, right_length) / length
     y = s.double_area[h // 3] / length
     norm = sqrt((at - x) * (at - x) + y * y)
     left.cosine, left.sine = (x * (x - at) + y * y) / (norm * left_length), y * at / (norm * left_length)
-    right.cosine = ((length - x) * (at - x) + y * y) / (norm * right_length)
+    right.cosine = 0.5 * twice_product(length, right_length, left_length) / length
+    right.cosine = (right.cosine * (at - x) + y * y) / (norm * right_length)
     right.sine = y * (length - at) / (norm * right_length)
     margin = sqrt(ROUNDING * s.distance[v] / norm)
     if margin > WIDEST:

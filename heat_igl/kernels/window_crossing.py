@@ -21,6 +21,7 @@ from cython.cimports.heat_igl.kernels.window_structures import (
     backward,
     lateral,
     reach,
+    twice_product,
 )
 from cython.cimports.heat_igl.kernels.window_trimming import trim
 from cython.cimports.libc.math import INFINITY, sqrt
@@ -44,12 +45,11 @@ def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
     apex.length = s.length[h]
     apex.left_length = s.length[previous_half_edge(h)]
     apex.right_length = s.length[next_half_edge(h)]
-    apex.x = 0.5 * (
-        apex.length + (apex.left_length - apex.right_length) * (apex.left_length + apex.right_length) / apex.length
-    )
+    apex.x = 0.5 * twice_product(apex.length, apex.left_length, apex.right_length) / apex.length
+    apex.right_x = 0.5 * twice_product(apex.length, apex.right_length, apex.left_length) / apex.length
     apex.y = s.double_area[h // 3] / apex.length
     apex.cos_left, apex.sin_left = apex.x / apex.left_length, apex.y / apex.left_length
-    apex.cos_right, apex.sin_right = (apex.length - apex.x) / apex.right_length, apex.y / apex.right_length
+    apex.cos_right, apex.sin_right = apex.right_x / apex.right_length, apex.y / apex.right_length
     apex.best, apex.best_at, apex.nearest = -1, 0.0, INFINITY
     return apex
 

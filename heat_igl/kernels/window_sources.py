@@ -5,7 +5,7 @@ from cython.cimports.heat_igl.kernels.triangles import foot, next_half_edge, pre
 from cython.cimports.heat_igl.kernels.window_distances import relax, take, tell
 from cython.cimports.heat_igl.kernels.window_lists import add
 from cython.cimports.heat_igl.kernels.window_queue import push
-from cython.cimports.heat_igl.kernels.window_structures import Search, Window, apart, at_corner
+from cython.cimports.heat_igl.kernels.window_structures import Search, Window, apart, at_corner, twice_product
 from cython.cimports.libc.math import INFINITY
 
 
@@ -64,7 +64,7 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         length = s.length[h]
         left_length = s.length[previous_half_edge(h)]
         right_length = s.length[next_half_edge(h)]
-        one.x = at[c] * 0.5 * (length + (left_length - right_length) * (left_length + right_length) / length)
+        one.x = at[c] * 0.5 * twice_product(length, left_length, right_length) / length
         one.x = length - (one.x + at[previous_half_edge(h) % 3] * length)
         one.depth = at[c] * s.double_area[f] / length
         one.start = 0.0

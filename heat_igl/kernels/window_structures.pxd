@@ -29,6 +29,7 @@ cdef extern from *:
 cdef struct Apex:
     # The corner opposite a half-edge in its frame, the directions of the two sides there, and how it is reached.
     double x, y
+    double right_x       # how far before the head of the half-edge
     double length, left_length, right_length
     double cos_left, sin_left, cos_right, sin_right
     int best             # the window through which the apex is nearest, -1 if none sees it
@@ -163,6 +164,14 @@ cdef enum Side:
     RIGHT_OF_APEX = 0
     LEFT_OF_APEX = 1
     AROUND_APEX = 2
+
+
+# Twice the scalar product of two sides p and q of a triangle, by the third side. The difference of squares is that of
+# the two longest sides: on needles too, the cosine is off by no more than rounding of one.
+cdef inline double twice_product(double p, double q, double opposite) noexcept nogil:
+    if p >= q:
+        return (p - opposite) * (p + opposite) + q * q
+    return (q - opposite) * (q + opposite) + p * p
 
 
 # Scalar product of two differences of barycentric coordinates, in a face with these sides opposite its corners.

@@ -5,7 +5,17 @@ Half-edge ``3 f + c`` is the side of face f opposite its corner c; the corner ca
 
 import cython
 from cython.cimports.heat_igl.kernels.triangles import area, next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.window_structures import BENDS, ENDS, FLAT, FLATNESS, JOINS, PASSED, Ray, Search
+from cython.cimports.heat_igl.kernels.window_structures import (
+    BENDS,
+    ENDS,
+    FLAT,
+    FLATNESS,
+    JOINS,
+    PASSED,
+    Ray,
+    Search,
+    twice_product,
+)
 from cython.cimports.libc.math import fabs
 
 __all__ = ["FLAT_VERTEX", "SEVERAL_FANS", "shapes"]
@@ -63,9 +73,9 @@ def shapes(
             # A needle without height would have no circle.
             twice = 2.0 * area(a, b, d) + 1e-20 * a * a
             double_area[f] = twice
-            bulge[h] = a * (b * b + d * d - a * a) / (2.0 * twice)
-            bulge[h + 1] = b * (a * a + d * d - b * b) / (2.0 * twice)
-            bulge[h + 2] = d * (a * a + b * b - d * d) / (2.0 * twice)
+            bulge[h] = a * twice_product(b, d, a) / (2.0 * twice)
+            bulge[h + 1] = b * twice_product(a, d, b) / (2.0 * twice)
+            bulge[h + 2] = d * twice_product(a, b, d) / (2.0 * twice)
             for c in range(3):
                 v = vertex[h + c]
                 next_corner[h + c] = corner_of_vertex[v]
@@ -110,7 +120,7 @@ def turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython
     p: cython.double = s.length[side]
     q: cython.double = s.length[third(k, side)]
     scale: cython.double = 0.5 / (p * q)
-    cosine: cython.double = (p * p + q * q - s.length[k] * s.length[k]) * scale
+    cosine: cython.double = twice_product(p, q, s.length[k]) * scale
     sine: cython.double = 2.0 * s.double_area[k // 3] * scale
     ray.cosine, ray.sine = ray.cosine * cosine - ray.sine * sine, ray.cosine * sine + ray.sine * cosine
 
