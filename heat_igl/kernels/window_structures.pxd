@@ -245,8 +245,8 @@ cdef inline double backward(const Window* w, double x, double y) noexcept nogil:
 
 cdef extern from *:
     """
-    // Two paths are equally long if they differ by less than this fraction: some hundred times the rounding of one step.
-    #define ROUNDING 1e-13
+    // Two paths are equally long if they differ by less than this fraction: fifty times the rounding of one step.
+    #define ROUNDING 1e-14
     // The largest angle, in radians, by which the directions from a bend are widened.
     #define WIDEST 0.01
     // What is narrower, as a fraction of a side, is no window.

@@ -8,6 +8,7 @@ from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_
 from cython.cimports.heat_igl.kernels.window_structures import (
     NARROW,
     OVERLAP,
+    ROUNDING,
     SAME,
     U_NEARER,
     U_THEN_W,
@@ -57,29 +58,70 @@ def _meeting(
     high: cython.double,
     at_low: cython.double,
     at_high: cython.double,
+    shift: cython.double,
+    slope: cython.p_double,
 ) -> cython.double:
-    """The point that is equally far by two windows: a few steps of Newton's method inside a bracket."""
+    """The point at which distance by u less that by w, plus `shift`, is 0: Newton's method inside a bracket.
+
+    The bracket is [low, high], with the values `at_low` and `at_high` of opposite signs. `slope` takes the derivative.
+    """
     x: cython.double = low + (high - low) * at_low / (at_low - at_high)
     y: cython.double
     a: cython.double
     b: cython.double
     _: cython.int
+    shift += u.offset - w.offset
     for _ in range(8):
         a = reach(u, x)
         b = reach(w, x)
-        y = (u.offset - w.offset) + a - b
+        y = shift + a - b
         if (y < 0.0) == (at_low < 0.0):
             low = x
         else:
             high = x
+        slope[0] = _slope(u, x, a) - _slope(w, x, b)
         if fabs(y) <= 1e-15 * (fabs(a) + fabs(u.offset)):
             break
-        a = _slope(u, x, a) - _slope(w, x, b)
-        if a != 0.0:
-            x -= y / a
+        if slope[0] != 0.0:
+            x -= y / slope[0]
         if not (low < x < high):
             x = 0.5 * (low + high)
     return x
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _compare_squares(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    tolerance: cython.double,
+    until: cython.p_double,
+) -> cython.int:
+    """`_compare` for roots with the same offset: the difference of the squares of both distances is linear."""
+    # |x - u|^2 - |x - w|^2 = b - a x
+    a: cython.double = 2.0 * (u.x - w.x)
+    b: cython.double = (u.x - w.x) * (u.x + w.x) + (u.depth - w.depth) * (u.depth + w.depth)
+    at_low: cython.double = b - a * low
+    at_high: cython.double = b - a * high
+    reached: cython.double = fabs(low - u.x) + u.depth
+    margin: cython.double = 2.0 * tolerance * (u.offset + reached) * reached
+    if at_low < -margin and at_high < -margin:
+        return U_NEARER
+    if at_low > margin and at_high > margin:
+        return W_NEARER
+    if a == 0.0:
+        return UNDECIDED
+    a = 1.0 / a
+    if a < 0.0:
+        until[0] = high if at_high <= margin else (b - margin) * a
+        until[1] = low if at_low >= -margin else (b + margin) * a
+        return U_THEN_W
+    until[0] = low if at_low <= margin else (b - margin) * a
+    until[1] = high if at_high >= -margin else (b + margin) * a
+    return W_THEN_U
 
 
 @cython.cfunc
@@ -90,62 +132,85 @@ def _compare(
     w: cython.pointer(Window),
     low: cython.double,
     high: cython.double,
-    meeting: cython.p_double,
+    tolerance: cython.double,
+    until: cython.p_double,
 ) -> cython.int:
-    """Which of two windows is nearer between two points; `meeting` takes the point at which they are equally far."""
+    """Which of two windows is nearer between two points, by more than a fraction `tolerance` of the distance.
+
+    If one is nearer at one end and the other at the other, `until` takes the points up to which u and w are needed.
+    """
     a: cython.double
     b: cython.double
     at_low: cython.double
     at_high: cython.double
     slope_low: cython.double
     slope_high: cython.double
+    x: cython.double
+    margin: cython.double
     is_point: cython.bint = not (u.is_plane or w.is_plane)
     difference: cython.double = u.offset - w.offset
     if difference == 0.0 and is_point:
-        # |x - u|^2 - |x - w|^2 = b - a x
-        a = 2.0 * (u.x - w.x)
-        b = (u.x - w.x) * (u.x + w.x) + (u.depth - w.depth) * (u.depth + w.depth)
-        at_low = b - a * low
-        at_high = b - a * high
-        if at_low <= 0.0 and at_high <= 0.0:
-            return U_NEARER
-        if at_low >= 0.0 and at_high >= 0.0:
-            return W_NEARER
-        meeting[0] = b / a
-        return U_THEN_W if at_low < 0.0 else W_THEN_U
+        return _compare_squares(u, w, low, high, tolerance, until)
     at_low = _excess(u, w, low, cython.address(slope_low))
     at_high = _excess(u, w, high, cython.address(slope_high))
-    # The difference has at most one extremum: for two roots, where the line through both meets the half-edge.
-    if at_low <= 0.0 and at_high <= 0.0:
+    margin = tolerance * (fabs(u.offset) + reach(u, low))
+    if at_low < -margin and at_high < -margin:
+        # The difference has at most one extremum: for two roots, where the line through both meets the half-edge.
         if slope_low <= 0.0 or slope_high >= 0.0:
             return U_NEARER
         a = u.x - w.x
         b = u.depth - w.depth
         return U_NEARER if is_point and difference <= 0.0 and a * a + b * b <= difference * difference else UNDECIDED
-    if at_low >= 0.0 and at_high >= 0.0:
+    if at_low > margin and at_high > margin:
         if slope_low >= 0.0 or slope_high <= 0.0:
             return W_NEARER
         a = u.x - w.x
         b = u.depth - w.depth
         return W_NEARER if is_point and difference >= 0.0 and a * a + b * b <= difference * difference else UNDECIDED
-    meeting[0] = _meeting(u, w, low, high, at_low, at_high)
-    return U_THEN_W if at_low < 0.0 else W_THEN_U
+    if (at_low < -margin and at_high > margin) or (at_low > margin and at_high < -margin):
+        x = _meeting(u, w, low, high, at_low, at_high, 0.0, cython.address(slope_low))
+        # The difference grows to the margin within this, as it grows further before its extremum.
+        b = 2.0 * margin / fabs(slope_low) if slope_low != 0.0 else high - low
+        if at_low < 0.0:
+            until[0] = min(x + b, high)
+            until[1] = max(x - b, low)
+            return U_THEN_W
+        until[0] = max(x - b, low)
+        until[1] = min(x + b, high)
+        return W_THEN_U
+    # Equally near at one end, or at both.
+    if at_low < -margin or at_high > margin:
+        until[0], until[1] = high, low
+        if at_low < -margin and slope_high >= 0.0:
+            until[1] = _meeting(u, w, low, high, at_low + margin, at_high + margin, margin, cython.address(slope_low))
+        elif at_high > margin and slope_low >= 0.0:
+            until[0] = _meeting(u, w, low, high, at_low - margin, at_high - margin, -margin, cython.address(slope_low))
+        return U_THEN_W
+    if at_low > margin or at_high < -margin:
+        until[0], until[1] = low, high
+        if at_low > margin and slope_high <= 0.0:
+            until[0] = _meeting(u, w, low, high, at_low - margin, at_high - margin, -margin, cython.address(slope_low))
+        elif at_high < -margin and slope_low <= 0.0:
+            until[1] = _meeting(u, w, low, high, at_low + margin, at_high + margin, margin, cython.address(slope_low))
+        return W_THEN_U
+    return UNDECIDED
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _settle(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.int:
+def _settle(u: cython.pointer(Window), w: cython.pointer(Window), tolerance: cython.double) -> cython.int:
     """Cut two windows of one half-edge where the other is nearer. 1: u is gone, 2: w is gone, 4: w comes before u."""
     low: cython.double = u.start if u.start > w.start else w.start
     high: cython.double = u.stop if u.stop < w.stop else w.stop
-    x: cython.double = 0.0
+    until: cython.double[2]
     order: cython.int
+    first: cython.int = 4 if w.start < u.start and w.stop < u.stop else 0
     if low >= high:
-        return 4 if w.stop <= u.start else 0
+        return first
     if high - low < OVERLAP * (u.stop - u.start) and high - low < OVERLAP * (w.stop - w.start):
-        return 0
-    order = _compare(u, w, low, high, cython.address(x))
+        return first
+    order = _compare(u, w, low, high, tolerance, until)
     if order == U_NEARER:
         if low <= w.start:
             if high >= w.stop:
@@ -165,16 +230,16 @@ def _settle(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.int:
             u.stop = low
     elif order == U_THEN_W:
         if high >= u.stop:
-            u.stop = x
+            u.stop = until[0]
         if low <= w.start:
-            w.start = x
+            w.start = until[1]
     elif order == W_THEN_U:
         if high >= w.stop:
-            w.stop = x
+            w.stop = until[1]
         if low <= u.start:
-            u.start = x
+            u.start = until[0]
         return 4
-    return 0
+    return first
 
 
 @cython.cfunc
@@ -242,7 +307,11 @@ def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cytho
 @cython.nogil
 @cython.exceptval(check=False)
 def _insert(
-    windows: cython.pointer(Window), k: cython.int, w: cython.pointer(Window), length: cython.double
+    windows: cython.pointer(Window),
+    k: cython.int,
+    w: cython.pointer(Window),
+    length: cython.double,
+    tolerance: cython.double,
 ) -> cython.int:
     """Add a window to k that lie side by side, after cutting all where another is nearer; how many there are then.
 
@@ -253,7 +322,7 @@ def _insert(
     moved: Window
     narrow: cython.double = NARROW * length
     while j > 0:
-        outcome = _settle(cython.address(windows[j - 1]), w)
+        outcome = _settle(cython.address(windows[j - 1]), w, tolerance)
         if outcome == 1 or windows[j - 1].stop - windows[j - 1].start <= narrow:
             # remove j - 1
             if j < k:
@@ -303,5 +372,5 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
         if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset):
             continue
         if w.stop - w.start > NARROW * length:
-            k = _insert(windows, k, w, length)
+            k = _insert(windows, k, w, length, ROUNDING)
     return k
