@@ -11,6 +11,7 @@ from heat_igl.validation.zoo import (  # noqa: F401 - they register their shapes
     carved,
     families,
     latest,
+    nearly_flat,
     rough,
     scattered,
     smooth,

@@ -1,0 +1,56 @@
+"""Windows cover what they enter: no vertex of a nearly flat surface is missed, whatever rounding does to its angles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import load_script
+
+from heat_igl import Mesh, geodesic_distance, pair_distances, shapes
+from heat_igl.unfolding import exact_distance
+
+
+def single_precision_cylinder() -> Mesh:
+    """Turned, and rounded as an STL file rounds it: the angles at a vertex sum to 2 pi up to about 1e-7."""
+    mesh = shapes.cylinder(100, 199, 10.0)
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    return Mesh((mesh.V @ turn).astype(np.float32).astype(float), mesh.F)
+
+
+@pytest.mark.parametrize("source", [50, 2883, 5000])
+def test_a_cylinder_in_single_precision_is_covered(source):
+    mesh = single_precision_cylinder()
+    found = exact_distance(mesh.V, mesh.F, source)
+    radius, (around, along) = 1.0, (100, 200)
+    # The smooth cylinder through the vertices is longer by the arc over each chord, (pi / 100)^2 / 6 of it.
+    ring, place = np.divmod(np.arange(along * around), around)
+    turn = np.abs(place - source % around)
+    turn = np.minimum(turn, around - turn) * 2 * radius * np.sin(np.pi / around)
+    height = (ring - source // around) * 10.0 / (along - 1)
+    assert np.abs(found - np.hypot(turn, height)).max() < 1e-5
+
+
+def test_pairs_on_a_cylinder_in_single_precision():
+    mesh = single_precision_cylinder()
+    truth = geodesic_distance(mesh, 2883, method="exact")
+    goals = [13625, 17239, 4690]
+    found = pair_distances(mesh, [[2883, goal] for goal in goals])
+    np.testing.assert_allclose(found, truth[goals], rtol=1e-12)
+
+
+def test_random_nearly_flat_surfaces():
+    """The script compares thousands."""
+    script = load_script("random_coverage")
+    found = [script.compared(seed) for seed in range(60)]
+    assert {one[0] for one in found} == set(script.NAMES)
+    assert sum(0 < one[1] <= 60 for one in found) > 15
+    for seed, (_, _, *differences) in enumerate(found):
+        assert max(differences) < 1e-9, seed
+
+
+def test_straight_lines_agree_with_the_plane():
+    """The reference of the script, on a grid whose lines pass through many vertices."""
+    mesh = shapes.grid(5)
+    found = load_script("random_coverage").straight_lines(mesh, [0, 7])
+    truth = np.linalg.norm(mesh.V[[0, 7], None] - mesh.V, axis=2)
+    np.testing.assert_allclose(found, truth, atol=1e-14)
