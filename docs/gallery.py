@@ -76,7 +76,7 @@ def near() -> Picture:
 def paths() -> Picture:
     """Shortest paths from one vertex to the farthest points of the surface."""
     mesh = heat_igl.sample_mesh()
-    solver = heat_igl.HeatMethodSolver(mesh, refine="unfold")
+    solver = heat_igl.GeodesicSolver(mesh)
     ends = heat_igl.farthest_points(solver, 40, start=1234)[1:]
     return plot(mesh, solver.distance(1234), sources=1234, curves=heat_igl.shortest_paths(mesh, solver, ends, 1234))
 
@@ -121,7 +121,7 @@ def region() -> Picture:
 def offsets() -> Picture:
     """Curves at a given distance from two vertices."""
     mesh = heat_igl.sample_mesh()
-    solver = heat_igl.HeatMethodSolver(mesh, refine="unfold")
+    solver = heat_igl.GeodesicSolver(mesh)
     phi = solver.distance([1234, 9000])
     found = heat_igl.offset_curves(mesh, solver, [1234, 9000], 0.3 * phi.max())
     return plot(mesh, phi, sources=[1234, 9000], style="plain", curves=found)
@@ -135,7 +135,7 @@ def scribble() -> Picture:
     loop = np.stack([0.9 + 0.55 * x, np.sin(angle) * 0.6, np.full(200, 0.39)], axis=1)
     places = heat_igl.closest_points(mesh, loop).points.positions(mesh)
     arcs = [heat_igl.curve_on(mesh, places[i : i + 36]) for i in (0, 50, 100, 150)]
-    phi = heat_igl.SignedHeatSolver(mesh, refine="unfold").distance(arcs)
+    phi = heat_igl.SignedHeatSolver(mesh, method="windows").distance(arcs)
     return plot_field(mesh, phi, label="signed distance", limits=(-1, 1), spacing=0.1, curves=arcs, view=(10, 60))
 
 
@@ -144,7 +144,7 @@ def grown() -> Picture:
     mesh = heat_igl.sample_mesh()
     sites = np.random.default_rng(2).choice(mesh.n_vertices, 25, replace=False)
     region = heat_igl.HeatMethodSolver(mesh).distance(sites) < 0.07
-    phi = heat_igl.SignedHeatSolver(mesh, refine="unfold").distance(region)
+    phi = heat_igl.SignedHeatSolver(mesh, method="windows").distance(region)
     outline = heat_igl.isolines(mesh, phi, 0)[0]
     return plot_field(mesh, phi, label="signed distance", spacing=0.03, limits=(-0.12, 0.12), curves=outline)
 
@@ -174,7 +174,7 @@ def tool_path() -> Picture:
     angle, reach = np.radians([-45, 0, 45, 40, 0, -40]), np.array([0.9, 0.9, 0.9, 0.48, 0.58, 0.48])
     corners = np.stack([reach * np.sin(angle), [0.15, 0.15, 0.15, 0.8, 0.65, 0.8], reach * np.cos(angle)], axis=1)
     contour = heat_igl.geodesic_path(part, heat_igl.closest_points(part, [*corners, corners[0]]).points)
-    phi = heat_igl.SignedHeatSolver(part, refine="unfold").distance(contour)
+    phi = heat_igl.SignedHeatSolver(part, method="windows").distance(contour)
     paths = heat_igl.isolines(part, phi, [*np.arange(-0.06, phi.min(), -0.06), 0.06])
     drawn = [contour, *(curve for level in paths for curve in level)]
     return plot_field(part, phi, label="signed distance", limits=(-0.4, 0.4), curves=drawn, view=(0, 25))
@@ -183,7 +183,7 @@ def tool_path() -> Picture:
 def pieces() -> Picture:
     """A surface cut along a curve and two offsets of it, the pieces moved apart."""
     mesh, axis = shapes.blob(5), np.array([0.2, 1, 0.3])
-    phi = heat_igl.SignedHeatSolver(mesh, refine="unfold").distance(heat_igl.isolines(mesh, mesh.V @ axis, 0))
+    phi = heat_igl.SignedHeatSolver(mesh, method="windows").distance(heat_igl.isolines(mesh, mesh.V @ axis, 0))
     found = heat_igl.cut(mesh, heat_igl.isolines(mesh, phi, [-0.4, 0, 0.4]))
     carried, parts = found.carry(phi), found.split()
     moved = [part.mesh.V + 2 * carried[part.vertices].mean() * axis for part in parts]
@@ -196,7 +196,7 @@ def pieces() -> Picture:
 def tetrahedra() -> Picture:
     """Distance through a solid of tetrahedra, along straight lines."""
     mesh = shapes.box(12, (2.0, 1.0, 1.0))
-    return plot(mesh, heat_igl.HeatMethodSolver(mesh).distance(0), sources=0, view=(215, -30))
+    return plot(mesh, heat_igl.GeodesicSolver(mesh).distance(0), sources=0, view=(215, -30))
 
 
 def voxels() -> Picture:
@@ -205,7 +205,7 @@ def voxels() -> Picture:
     mask[:, :18, 11] = False
     body = heat_igl.image_domain(mask)
     source = body.index[-1, 4, 4]
-    return plot(body.mesh, heat_igl.HeatMethodSolver(body.mesh).distance(source), sources=source, view=(25, 50))
+    return plot(body.mesh, heat_igl.GeodesicSolver(body.mesh).distance(source), sources=source, view=(25, 50))
 
 
 def polygons() -> Picture:
@@ -222,7 +222,7 @@ def cloud() -> Picture:
     """Distance on points without faces, drawn on the triangles that the cloud finds for itself."""
     P = np.random.default_rng(0).standard_normal((4000, 3))
     cloud = heat_igl.PointCloud(P / np.linalg.norm(P, axis=1, keepdims=True) * [1.0, 0.6, 0.8])
-    phi = heat_igl.HeatMethodSolver(cloud).distance(0)
+    phi = heat_igl.GeodesicSolver(cloud).distance(0)
     return plot(cloud.triangles, phi, sources=0)
 
 
@@ -264,7 +264,7 @@ def checkerboard() -> Picture:
 def transported() -> Picture:
     """A vector at one vertex, transported along the shortest paths to evenly spread ones."""
     mesh = shapes.blob(4)
-    vectors = heat_igl.VectorHeatSolver(mesh, refine="unfold").transport(0, [1.0, 0.0])
+    vectors = heat_igl.VectorHeatSolver(mesh, method="windows").transport(0, [1.0, 0.0])
     sites = heat_igl.farthest_points(mesh, 200)
     short = [heat_igl.trace_geodesic(mesh, int(v), vectors[v], 0.12) for v in sites]
     return plot(mesh, heat_igl.geodesic_distance(mesh, 0), sources=0, style="plain", curves=short)
@@ -302,7 +302,7 @@ def travel_time() -> Picture:
     mesh = shapes.grid(80)
     fast = mesh.V[mesh.F].mean(axis=1)[:, 0] > mesh.V[:, 0].mean()
     domain = heat_igl.speed_operators(mesh, np.where(fast, 4.0, 1.0))
-    time = heat_igl.HeatMethodSolver.from_operators(domain).distance(41)
+    time = heat_igl.GeodesicSolver(domain).distance(41)
     return plot(mesh, time, sources=41, label="time")
 
 
@@ -313,7 +313,7 @@ def fibres() -> Picture:
     along = np.stack([-side[:, 1], side[:, 0], np.full(mesh.n_faces, 0.5)], axis=1)
     domain = heat_igl.metric_operators(mesh, heat_igl.fibre_metric(along, along=1, across=3))
     source = 36 * 96 + 80
-    phi = heat_igl.HeatMethodSolver.from_operators(domain, refine="unfold").distance(source)
+    phi = heat_igl.GeodesicSolver(domain).distance(source)
     turned = heat_igl.Mesh(mesh.V[:, [1, 2, 0]], mesh.F)
     return plot(turned, phi, sources=source, view=(20, 15))
 
@@ -338,17 +338,17 @@ def cut_locus() -> Picture:
     return plot_field(mesh, largest, label="| |grad d| - 1 |", limits=(0, 0.5), view=(180, 20))
 
 
-def unfolded() -> Picture:
-    """The error of unfolding, near-exact, on a logarithmic scale."""
+def swept() -> Picture:
+    """The error of a sweep on a logarithmic scale."""
     mesh = shapes.blob(5)
     exact = heat_igl.geodesic_distance(mesh, 0, method="exact")
-    error = np.abs(heat_igl.geodesic_distance(mesh, 0) - exact) / exact.max()
-    return plot_field(mesh, np.log10(np.maximum(error, 1e-9)), label="log10 of error", limits=(-9, -3), sources=0)
+    error = np.abs(heat_igl.geodesic_distance(mesh, 0, method="sweep") - exact) / exact.max()
+    return plot_field(mesh, np.log10(np.maximum(error, 1e-9)), label="log10 of error", limits=(-6, -2), sources=0)
 
 
 ENTRIES = (
     torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, scribble, grown, noisy, tool_path, pieces,
-    heat, error, unfolded, cut_locus, book, tetrahedra, voxels, polygons, cloud, scan, maze,
+    heat, error, swept, cut_locus, book, tetrahedra, voxels, polygons, cloud, scan, maze,
     travel_time, fibres, directions, checkerboard,
     straightest, transported, extended, loops, bezier, asked,
 )  # fmt: skip

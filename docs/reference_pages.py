@@ -7,7 +7,7 @@ import heat_igl
 # Names that the package lacks are left out, and those in no group come last.
 GROUPS = {
     "Distance": """geodesic_distance HeatMethodSolver HeatSolution Diagnostics LabelledDistance heat_method_distance
-        unfolded_distance Refinement""",
+        GeodesicSolver""",
     "Only what is asked": """distances_within nearest_vertices pair_distances distance_matrix
         write_distances_within read_distances_within""",
     "Meshes, polygons and points": """Mesh PolygonMesh PointCloud as_mesh sample_mesh MeshReport ImageDomain

@@ -28,7 +28,7 @@ def split_long_edges(mesh: MeshLike, longest: float | None = None) -> Mesh:
         Triangles, manifold or not.
     longest : float, optional
         In the mesh's unit; ``mesh.edge_lengths.mean()`` by default. On meshes with triangles of very different size,
-        twice the mean already reduces the error of the heat method by up to a fifth (docs/refinement.md).
+        twice the mean already reduces the error of the heat method by up to a fifth.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["NormalizedDivergence", "damping", "lowest_full_rate", "normalize"]
 
-# Share of a front's rate of decay from which on a direction is trusted fully; docs/heat_path.md compares values. Fronts
+# Share of a front's rate of decay from which on a direction is trusted fully; docs/engines.md compares values. Fronts
 # of a fitted flow scatter less.
 _FULL_RATE, _FULL_RATE_FITTED = 0.9, 0.95
 # At an insulated boundary a front meets the mirror image of itself and falls a little more slowly. A fitted flow is
@@ -72,7 +72,7 @@ def damping(
         Time step that the heat was made with.
     full_rate : float, optional
         Share of a front's rate from which on a direction is trusted fully: on a mesh, fronts scatter by some percent
-        around 1. 0.95 for a fitted flow and 0.9 else; docs/heat_path.md compares values.
+        around 1. 0.95 for a fitted flow and 0.9 else; docs/engines.md compares values.
     fitted : bool
         Whether the heat comes from a fitted `HeatFlow`.
 
