@@ -1,11 +1,15 @@
 """Random members of families that once had wrong directions, wrong signs or endless queries.
 
-    python scripts/random_edges.py [log-maps] [--members 1000] [--first 0] [--json FILE]
+    python scripts/random_edges.py [log-maps] [signed] [--members 1000] [--first 0] [--json FILE]
 
 A member is determined by its seed. `log-maps`: hulls stretched by up to 100, spiky spheres, tori, cylinders and rough
 squares, from vertices, edges and faces, also from 1e-6 to 1e-3 of an edge beside vertices: the largest distance
 between a vertex and `exp_map` of its log map, over the vertices whose shortest path is straight, as a share of the
 largest distance.
+
+`signed`: Delaunay triangulations of 2000 unevenly spread points in the plane, and discs of their faces with faces taken
+out and others put in at random: how far the size is from the exact distance, as a share of the largest distance; 1 for
+a wrong sign, where all faces of a vertex are inside, or none.
 """
 
 from __future__ import annotations
@@ -16,9 +20,18 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, Delaunay
 
-from heat_igl import Mesh, SurfacePoints, exp_map, log_map, shapes
+from heat_igl import (
+    Mesh,
+    SignedHeatSolver,
+    SurfacePoints,
+    exp_map,
+    geodesic_distance,
+    log_map,
+    region_boundary,
+    shapes,
+)
 from heat_igl.operators import operators
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import ExactSurface
@@ -26,7 +39,7 @@ from heat_igl.unfolding import ExactSurface
 from scaffold import add_json, environment, option_parser, publish, table
 
 # Larger figures are failures.
-LARGEST = {"log-maps": 1e-8}
+LARGEST = {"log-maps": 1e-8, "signed": 1e-12}
 
 
 def hull(rng: np.random.Generator) -> Mesh:
@@ -84,7 +97,51 @@ def log_maps(seed: int) -> tuple[str, float]:
     return f"{body}, {place}", float(gap[is_straight].max() / np.hypot(*log.T).max())
 
 
-FAMILIES: dict[str, Callable[[int], tuple[str, float]]] = {"log-maps": log_maps}
+def powers(rng: np.random.Generator) -> FloatArray:
+    """Dense towards two sides of a square."""
+    return rng.random((2000, 2)) ** rng.uniform(1, 4)
+
+
+def clusters(rng: np.random.Generator) -> FloatArray:
+    """Six clusters, each point at a distance of its own order."""
+    return rng.random((6, 2))[rng.integers(6, size=2000)] + around(rng)
+
+
+def around(rng: np.random.Generator) -> FloatArray:
+    """Dense towards the middle."""
+    return rng.normal(size=(2000, 2)) * 10 ** rng.uniform(-3, -0.5, (2000, 1))
+
+
+SPREADS: dict[str, Callable[[np.random.Generator], FloatArray]] = {
+    "powers": powers,
+    "clusters": clusters,
+    "around a point": around,
+}
+
+
+def signed(seed: int) -> tuple[str, float]:
+    """Spread of the points and share of exchanged faces of a member, and its figure."""
+    rng = np.random.default_rng(seed)
+    spread, exchanged = rng.choice(list(SPREADS)), rng.choice([0.0, 0.1, 0.3])
+    P = np.pad(SPREADS[spread](rng), ((0, 0), (0, 1)))
+    F = Delaunay(P[:, :2]).simplices
+    upward = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])[:, 2] > 0
+    mesh = Mesh(P, np.where(upward[:, None], F, F[:, ::-1]))
+    centres = mesh.V[mesh.F].mean(axis=1)
+    radius = np.linalg.norm(centres - centres[rng.integers(len(centres))], axis=1)
+    region = (radius < np.quantile(radius, rng.uniform(0.05, 0.6))) ^ (rng.random(len(radius)) < exchanged)
+    distance = SignedHeatSolver(mesh).distance(region)
+    n_faces, n_inside = (np.bincount(f.ravel(), minlength=mesh.n_vertices) for f in (mesh.F, mesh.F[region]))
+    is_wrong = (distance >= 0) & (n_inside == n_faces) | (distance <= 0) & (n_inside == 0)
+    exact = geodesic_distance(mesh, region_boundary(mesh, faces=region), method="exact")
+    off = 1.0 if is_wrong[n_faces > 0].any() else float(np.abs(np.abs(distance) - exact).max() / exact.max())
+    return f"{spread}, {100 * exchanged:.0f} % exchanged", off
+
+
+FAMILIES: dict[str, Callable[[int], tuple[str, float]]] = {
+    "log-maps": log_maps,
+    "signed": signed,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> dict[str, Any]:

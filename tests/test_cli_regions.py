@@ -23,12 +23,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_signed_writes_what_the_library_returns(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["signed", "sphere.ply", "--curves=circle.obj", "--output=out.ply", "--method=windows"]
+    arguments = ["signed", "sphere.ply", "--curves=circle.obj", "--output=out.ply"]
     assert cli.run([*arguments, "--picture=out.png"]) == 0
     sphere = read_mesh("sphere.ply")
     circle = read_polylines("circle.obj")[0]
     curve = heat_igl.curve_on(sphere, circle.positions, closed=True)
-    phi = heat_igl.SignedHeatSolver(sphere, method="windows").distance(curve)
+    phi = heat_igl.SignedHeatSolver(sphere).distance(curve)
     np.testing.assert_array_equal(read_attributes("out.ply")["distance"], phi)
     assert (folder / "out.png").stat().st_size > 1000
     # The cap of the north pole is on the left.

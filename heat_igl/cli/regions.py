@@ -12,7 +12,7 @@ import heat_igl
 from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, choice, positive
 from heat_igl.cli.output import Row, check_json, check_outputs, check_writable, print_rows, write_distance
 from heat_igl.errors import MeshError, SourceError
-from heat_igl.heat_method import Level, SignedHeatSolver, SignedMethod
+from heat_igl.heat_method import Level, SignedHeatSolver
 from heat_igl.io import MESH_SUFFIXES, read_mesh_or_cloud, read_polylines, write_mesh
 from heat_igl.mesh import Mesh, SurfaceCurve, as_simplices, curve_on
 
@@ -28,7 +28,6 @@ def signed(
     curves: CurvesOption,
     output: Annotated[Path | None, typer.Option(help="PLY or VTU file for mesh and distance.")] = None,
     picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for a picture.")] = None,
-    method: Annotated[str | None, choice(SignedMethod, "Size of the distance by exact windows, not fronts.")] = None,
     level: Annotated[
         str | None, choice(Level, "The integrated distance: what is 0 of it, each curve, or the mean over all.")
     ] = None,
@@ -43,7 +42,7 @@ def signed(
     drawn_on = projected(loaded, curves)
     check_outputs(loaded, output, picture)
     check_json(json_file)
-    solver = SignedHeatSolver(loaded, method=cast(SignedMethod | None, method), t_coef=t_coef)
+    solver = SignedHeatSolver(loaded, t_coef=t_coef)
     phi = solver.distance(drawn_on, level=cast(Level | None, level))
     drawn = None
     if picture is not None:

@@ -217,7 +217,7 @@ class MeshFastMarchingDistanceSolver:
 
     @cached_property
     def _signed(self) -> SignedHeatSolver:
-        return SignedHeatSolver(self._mesh, method="windows")
+        return SignedHeatSolver(self._mesh)
 
     def compute_distance(
         self,

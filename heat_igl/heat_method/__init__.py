@@ -3,7 +3,7 @@
 from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.directions import Directions
 from heat_igl.heat_method.options import Backend, Boundary, Laplacian, Magnitude, SolverOptions
-from heat_igl.heat_method.signed_heat import Level, SignedHeatSolver, SignedMethod
+from heat_igl.heat_method.signed_heat import Level, SignedHeatSolver
 from heat_igl.heat_method.signed_volumes import VoxelBox, volume_signed_distance
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.heat_method.solver import HeatMethodSolver, heat_method_distance
@@ -22,7 +22,6 @@ __all__ = [
     "Level",
     "Magnitude",
     "SignedHeatSolver",
-    "SignedMethod",
     "SolverOptions",
     "VectorHeatSolver",
     "VectorMethod",

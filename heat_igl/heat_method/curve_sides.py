@@ -92,8 +92,9 @@ def left_of_closed(
 ) -> tuple[BoolArray, BoolArray]:
     """Which vertices (n,) are on the left of curves without gaps, and of which vertices (n,) that is known.
 
-    Vertices are in one region if edges join them that no curve meets. The corners of the faces in which the curves run
-    see the side of their region.
+    The surface without the curves falls into regions. Vertices are in one if an edge joins them that no curve meets; so
+    are a face that no curve crosses and its vertices off the curves, and two such faces if no curve runs along the edge
+    between them. A region is on the side of the segments that are seen from inside.
 
     Parameters
     ----------
@@ -109,27 +110,61 @@ def left_of_closed(
     left, is_known : (n,) bool
         Nothing is known of vertices on curves, of regions that see both sides, and of components without a curve.
     """
-    n, on_curve = mesh.n_vertices, vertices_on(mesh, sources)
-    is_met = np.zeros(len(mesh.edges), bool)
+    n, m, twin = mesh.n_vertices, mesh.n_faces, triangulation.twin
+    edge = mesh.facets.of_face
+    is_met, is_divided = np.zeros((2, len(mesh.edges)), bool)
     for barycentric in (sources.start, sources.end):
         on_edge = (barycentric == 0).sum(axis=1) == 1
-        is_met[mesh.facets.of_face[sources.faces[on_edge], barycentric[on_edge].argmin(axis=1)]] = True
+        is_met[edge[sources.faces[on_edge], barycentric[on_edge].argmin(axis=1)]] = True
+    along = (sources.start == 0) & (sources.end == 0)
+    is_along, opposite = along.any(axis=1), along.argmax(axis=1)
+    is_divided[edge[sources.faces[is_along], opposite[is_along]]] = True
+    is_whole = np.ones(m, bool)
+    is_whole[sources.faces[~is_along]] = False
+    # Regions: the faces that are whole are numbered after the vertices.
+    free = ~vertices_on(mesh, sources)
     tail, head = mesh.edges.T
-    joins = ~(is_met | on_curve[tail] | on_curve[head])
-    region = connectivity.connected_components(mesh.edges[joins], n)
-    n_regions = int(region.max()) + 1
+    f, c = np.nonzero(is_whole[:, None] & free[mesh.F])
+    half_edge = np.flatnonzero((twin > np.arange(3 * m)) & ~is_divided[edge.ravel()] & np.repeat(is_whole, 3))
+    half_edge = half_edge[is_whole[twin[half_edge] // 3]]
+    joined = np.concatenate(
+        [
+            mesh.edges[~is_met & free[tail] & free[head]],
+            np.column_stack([n + f, mesh.F[f, c]]),
+            n + np.column_stack([half_edge, twin[half_edge]]) // 3,
+        ]
+    )
+    region = connectivity.connected_components(joined, n + m)
+    # What each region sees: from corners, of the segments in the face the nearest, and of equally near ones that under
+    # the largest angle; from the middles of sides of divided faces, on behalf of whole ones beyond.
+    side_is_open = ~(is_met | is_divided)[edge.ravel()] & (twin >= 0) & ~np.repeat(is_whole, 3)
+    side_is_open &= is_whole[twin // 3]
+    nodes = np.concatenate(
+        [np.where(free[mesh.F], mesh.F, -1), np.where(side_is_open, n + twin // 3, -1).reshape(m, 3)], axis=1
+    )
     seen = _seen(triangulation, sources)
-    # Of the segments in a face, each corner sees the nearest, and of equally near ones that under the largest angle.
     angle = np.abs(seen.sine)
-    order = np.lexsort((-angle, seen.away, seen.corner))
-    corners, first = np.unique(seen.corner[order], return_index=True)
-    nearest = order[first][np.searchsorted(corners, seen.corner)]
+    order = np.lexsort((-angle, seen.away, seen.place))
+    places, first = np.unique(seen.place[order], return_index=True)
+    nearest = order[first][np.searchsorted(places, seen.place)]
     # Several, if curves run along each other.
     is_seen = (seen.away <= seen.away[nearest] * (1 + _SAME_DISTANCE)) & (angle >= angle[nearest] - _LEAST_SINE)
-    sine, where = seen.sine[is_seen], region[seen.vertex[is_seen]]
-    total = np.bincount(where, sine, n_regions)
-    decided = np.abs(total) > _AGREED * np.bincount(where, np.abs(sine), n_regions)
-    return total[region] > 0, decided[region] & ~on_curve
+    # A whole face lies on one side of the segments along its sides.
+    faces, start, end = _in_both_faces(triangulation, sources)
+    along = (start == 0) & (end == 0)
+    beside = np.flatnonzero(along.any(axis=1) & is_whole[faces])
+    opposite = along[beside].argmax(axis=1)
+    at_head = (opposite + 2) % 3
+    place = np.append(seen.place[is_seen], 6 * m + 3 * faces[beside] + opposite)
+    sine = np.append(seen.sine[is_seen], np.sign(end[beside, at_head] - start[beside, at_head]))
+    # Segments that run along each other in opposite directions cancel.
+    net = np.clip(np.bincount(place, sine, 9 * m), -1, 1)
+    where = np.concatenate([nodes.ravel(), np.repeat(n + np.arange(m), 3)])
+    seen_at = np.flatnonzero((net != 0) & (where >= 0))
+    region_there = region[where[seen_at]]
+    total, most = (np.bincount(region_there, w, int(region.max()) + 1) for w in (net[seen_at], np.abs(net[seen_at])))
+    decided = np.abs(total) > _AGREED * most
+    return total[region[:n]] > 0, decided[region[:n]] & free
 
 
 def left_of_nearest(
@@ -149,31 +184,32 @@ def left_of_nearest(
         The answer at all other vertices.
     """
     seen = _seen(triangulation, sources)
+    face, place = np.divmod(seen.place, 6)
+    vertex = triangulation.F[face, place % 3]
     nearest = np.flatnonzero(
-        (seen.away <= distance[seen.vertex] * (1 + _SAME_DISTANCE)) & (np.abs(seen.sine) > _LEAST_SINE)
+        (place < 3) & (seen.away <= distance[vertex] * (1 + _SAME_DISTANCE)) & (np.abs(seen.sine) > _LEAST_SINE)
     )
     # Of segments that meet in the nearest place, the one seen under the largest angle is written last.
     nearest = nearest[np.argsort(np.abs(seen.sine[nearest]), kind="stable")]
     left = otherwise.copy()
-    left[seen.vertex[nearest]] = seen.sine[nearest] > 0
+    left[vertex[nearest]] = seen.sine[nearest] > 0
     return left
 
 
 class _Seen(NamedTuple):
-    """Segments as the corners of their faces see them.
+    """Segments as they are seen from the corners of their faces and from the middles of the sides.
 
     Attributes
     ----------
-    corner, vertex : (q,) int64
-        The corner 3 f + c, and the vertex there.
+    place : (q,) int64
+        6 f + c for corner c of face f, 6 f + 3 + c for the middle of the side opposite.
     away : (q,) float64
         Distance of the nearest place of the segment.
     sine : (q,) float64
-        Sine of the angle between the segment and the line from that place to the corner: positive on the left.
+        Sine of the angle between the segment and the line from there to the place: positive on the left.
     """
 
-    corner: IntArray
-    vertex: IntArray
+    place: IntArray
     away: FloatArray
     sine: FloatArray
 
@@ -184,14 +220,15 @@ def _seen(triangulation: IntrinsicTriangulation, sources: OrientedSet) -> _Seen:
     begin, finish = np.einsum("sc,sc->s", start, flat), np.einsum("sc,sc->s", end, flat)
     along = finish - begin
     length = np.abs(along)
-    # Corners relative to the start of the segment, in its direction.
+    # Places relative to the start of the segment, in its direction.
     turn = np.divide(along.conj(), length, out=np.zeros_like(along), where=length > 0)
-    relative = (flat - begin[:, None]) * turn[:, None]
+    middles = (np.roll(flat, -1, axis=1) + np.roll(flat, -2, axis=1)) / 2
+    relative = (np.concatenate([flat, middles], axis=1) - begin[:, None]) * turn[:, None]
     beyond = relative.real - np.clip(relative.real, 0, length[:, None])
     away = np.hypot(beyond, relative.imag)
     sine = np.divide(relative.imag, away, out=np.zeros_like(away), where=away > 0)
-    corner = 3 * faces[:, None] + np.arange(3)
-    return _Seen(corner.ravel(), triangulation.F[faces].ravel(), away.ravel(), sine.ravel())
+    place = 6 * faces[:, None] + np.arange(6)
+    return _Seen(place.ravel(), away.ravel(), sine.ravel())
 
 
 def _in_both_faces(

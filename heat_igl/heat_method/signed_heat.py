@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -21,16 +21,14 @@ from heat_igl.heat_method.parts import prepare
 from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.intrinsic import IntrinsicTriangulation, oriented
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices
 from heat_igl.operators import Operators, operators
-from heat_igl.runtime import both
+from heat_igl.runtime import both, n_threads
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, source_set
 from heat_igl.typing import BoolArray, FloatArray
-from heat_igl.unfolding import CurvedFronts, Front, MeshTriangles, WindowEngine
+from heat_igl.unfolding import ExactSurface, MeshTriangles
 
-__all__ = ["Level", "SignedHeatSolver", "SignedMethod"]
-
-SignedMethod = Literal["windows"]
+__all__ = ["Level", "SignedHeatSolver"]
 
 # Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
 # alike (docs/signed.md).
@@ -40,20 +38,17 @@ _T_COEF = 0.25
 class SignedHeatSolver:
     """The signed heat method (Feng and Crane 2024): factor once, ask many times.
 
-    Heat finds the sides of the curves and closes their gaps. From the closed curves distance is measured by fronts, or
-    as `method` says; from points with normals, and if a time step is given, it is the integrated one of the paper.
+    Closed curves have sides, and the distance from them is exact. Heat closes the gaps of broken ones, and gives the
+    sign there. From points with normals, and if a time step is given, the distance is the integrated one of the paper.
 
     Parameters
     ----------
     mesh : mesh
         Triangles, manifold and oriented alike; whatever `as_mesh` takes.
-    method : {"windows"}, optional
-        Take the size from exact windows, measured from the curves, and in gaps between them from the zero curve of the
-        integrated distance. By default fronts give it, see docs/signed.md.
     t_coef : float, optional
         t = t_coef h^2, with h the mean edge length of the intrinsic Delaunay triangulation; 0.25 by default. Larger
-        values close wide gaps with rounder curves, and smooth noisy ones. If it is given, and no `method`, the distance
-        is the integrated one.
+        values close wide gaps with rounder curves, and smooth noisy ones. If it is given, the distance is the
+        integrated one.
     t : float, optional
         Time step as a squared length; overrides `t_coef`, and counts like it. It is raised if heat would not cross the
         mesh.
@@ -78,7 +73,7 @@ class SignedHeatSolver:
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.grid(20)
     >>> line = heat_igl.isolines(mesh, mesh.V[:, 0], 0.5)[0]  # x = 1/2
-    >>> phi = heat_igl.SignedHeatSolver(mesh, method="windows").distance(line)
+    >>> phi = heat_igl.SignedHeatSolver(mesh).distance(line)
     >>> phi[:21:5].round(6).tolist()
     [-0.5, -0.25, 0.0, 0.25, 0.5]
     """
@@ -87,24 +82,21 @@ class SignedHeatSolver:
         self,
         mesh: MeshLike,
         *,
-        method: SignedMethod | None = None,
         t_coef: float | None = None,
         t: float | None = None,
         backend: Backend = "auto",
     ) -> None:
         is_default = t_coef is None and t is None
         options = SolverOptions(_T_COEF if is_default else t_coef, t, backend=backend)
-        require_choice("method", method, (None, *get_args(SignedMethod)))
         self._mesh = as_simplices(mesh)
         domain, self._faces, triangulation = _oriented_domain(self._mesh)
         parts = prepare(domain, options, V=self._mesh.V)
         self._domain = parts.operators
         self._integration = NormalIntegration(self._mesh, self._faces, triangulation, parts)
         self._unsigned = HeatMethodSolver._of(parts)
-        self._windows = WindowEngine(MeshTriangles(self._mesh)) if method == "windows" else None
-        self._fronts: CurvedFronts | None = None
-        if method is None and is_default:
-            self._fronts = CurvedFronts(self._faces, triangulation, domain.mean_edge_length)
+        # On the faces before any flip, in which curves lie.
+        self._exact = ExactSurface(MeshTriangles(self._mesh).faces)
+        self._integrates = not is_default
 
     def __repr__(self) -> str:
         return repr(self._unsigned).replace("HeatMethodSolver", "SignedHeatSolver", 1)
@@ -139,12 +131,11 @@ class SignedHeatSolver:
             More sources, as for `HeatMethodSolver.distance`, without a sign: near them the size of the distance is
             that from them, and the sign is the one that the curves give.
         level : {"zero", "constant", "none"}, optional
-            Asks for the integrated distance without `method`, with this level. "zero" subtracts from each vertex the
+            Asks for the integrated distance, with this level. "zero" subtracts from each vertex the
             value at the place on the curves that its heat comes from, so that all curves are near 0: within 0.03 mean
             edge lengths (root mean square) on coarse meshes, and exactly at vertices on them, see docs/signed.md.
             "constant" makes the value nearly constant along each curve, with a different level for each, and 0 in the
-            mean over all. "none" only makes the mean 0. ``method="windows"`` measures from the curves in any case, and
-            takes the sign from this if curves have gaps. Where the integrated distance is meant and no level is given,
+            mean over all. "none" only makes the mean 0. Where the integrated distance is meant and no level is given,
             it is "zero".
 
         Returns
@@ -162,18 +153,16 @@ class SignedHeatSolver:
 
         Notes
         -----
-        If no curve has a gap, the regions between curves have one sign each. The levels "constant" and "none" keep the
-        sign of the integrated value instead, unless there is a `method`. The diffused normals of all curves are added:
-        if curves contradict each other, the longer pieces decide.
+        If no curve has a gap, the regions between curves have one sign each, that of the side on which the curves lie.
+        The levels "constant" and "none" keep the sign of the integrated value instead. The diffused normals of all
+        curves are added: if curves contradict each other, the longer pieces decide.
         """
         if level is not None:
             require_choice("level", level, get_args(Level))
         chosen = oriented_set(curves, self._mesh)
         # Points are samples with noise, over which heat takes the mean.
-        by_fronts = self._fronts is not None and level is None and not len(chosen.point_faces)
-        size, left = (self._measured if self._windows is not None or by_fronts else self._from_heat)(
-            chosen, level or "zero"
-        )
+        integrates = self._integrates or level is not None or len(chosen.point_faces) > 0
+        size, left = (self._from_heat if integrates else self._measured)(chosen, level or "zero")
         reached = np.isfinite(size)
         if not reached.any():
             raise SourceError("curves reach no vertex: the components that they lie on have no area")
@@ -196,36 +185,29 @@ class SignedHeatSolver:
         """Distance (n,) from the curves, with their gaps closed, and which vertices (n,) are on the left."""
         sources = chosen.unoriented()
         if not has_gaps(self._mesh, chosen):
-            near, (left, is_known) = both(
-                lambda: self._near(sources), lambda: left_of_closed(self._mesh, self._faces, chosen)
+            size, (left, is_known) = both(
+                lambda: self._from(sources), lambda: left_of_closed(self._mesh, self._faces, chosen)
             )
-            size = self._continued(near)
             if (is_known | (size == 0) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
             return size, np.where(is_known, left, self._integration.distance(chosen, level) < 0)
-        near, phi = self._integration.distance_beside(lambda: self._near(sources), chosen, level)
-        left = left_of_nearest(self._faces, chosen, near.distance, phi < 0)
-        closing = zero_curve_in_gaps(self._mesh, phi, near.distance, self._domain.mean_edge_length)
-        return self._continued(near if closing is None else near.before(self._near([closing]))), left
-
-    def _near(self, sources: list[SurfaceCurve | SurfacePoints]) -> Front:
-        """Distance from curves and points: near them, or by windows at all vertices."""
-        chosen = source_set(sources, self.n_vertices, self._mesh.F)
-        if self._windows is not None:
-            return Front(self._windows.distance(chosen), np.full(self.n_vertices, np.nan))
-        if self._fronts is None:
-            return Front(self._unsigned.distance(sources), np.full(self.n_vertices, np.nan))
-        return self._fronts.near(chosen)
+        size, phi = self._integration.distance_beside(lambda: self._from(sources), chosen, level)
+        left = left_of_nearest(self._faces, chosen, size, phi < 0)
+        closing = zero_curve_in_gaps(self._mesh, phi, size, self._domain.mean_edge_length)
+        return size if closing is None else np.minimum(size, self._from([closing])), left
 
     def _from(self, sources: Sources) -> FloatArray:
-        """Distance (n,) from sources without a side."""
-        if self._windows is None:
-            return self._unsigned.distance(sources)
-        return self._windows.distance(source_set(sources, self.n_vertices, self._mesh.F))
-
-    def _continued(self, front: Front) -> FloatArray:
-        """Distance (n,) at all vertices, from that near the curves."""
-        return front.distance if self._fronts is None else self._fronts.continued(front)
+        """Exact distance (n,) from sources without a side."""
+        places = source_set(sources, self.n_vertices, self._mesh.F)
+        points, segments = places.points, places.segments
+        return self._exact.solve(
+            places.vertices,
+            places.vertex_offset,
+            SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
+            points.offset if len(points.faces) else None,
+            segments if len(segments.faces) else None,
+            threads=n_threads(),
+        ).distance
 
 
 def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, IntrinsicTriangulation]:

@@ -1,6 +1,5 @@
 """Distance along simplices: windows, exact or to a tolerance, and sweeps and fronts in an order of their own."""
 
-from heat_igl.unfolding.curved_fronts import CurvedFronts, Front
 from heat_igl.unfolding.directions import PathAngles, PathDirections, WindowWays, in_circle
 from heat_igl.unfolding.engine import Engine, MeshTriangles, OperatorTriangles, Triangles
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
@@ -16,12 +15,10 @@ from heat_igl.unfolding.within_store import read_distances_within, write_distanc
 
 __all__ = [
     "Change",
-    "CurvedFronts",
     "Engine",
     "ExactPaths",
     "ExactSolution",
     "ExactSurface",
-    "Front",
     "FrontSolver",
     "MeshTriangles",
     "OperatorTriangles",
