@@ -327,7 +327,7 @@ def test_a_warning_of_the_package_is_one_line(sphere: Path, capsys: pytest.Captu
         (["--method=guess"], 2, ("--method", "'guess' is not one of auto, windows, exact, sweep, heat")),
         (["--method=windows", "--t-coef=2"], 1, ("--t-coef is an option of the heat method", "--method is windows")),
         (["--backend=abacus"], 2, ("abacus", "auto, scipy, multifrontal")),
-        (["--output=out.obj"], 1, ("out.obj", ".ply, .vtu, .vtp, .gii, .npy or .csv")),
+        (["--output=out.obj"], 1, ("out.obj", ".ply, .vtu, .gii, .npy or .csv")),
         (["--picture=out.gif"], 1, ("out.gif", ".png, .pdf, .svg")),
         (["--output=.ply/out.ply"], 1, (".ply",)),
         (["--picture=folder.png"], 1, ("folder.png is a directory",)),

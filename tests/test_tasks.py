@@ -45,7 +45,6 @@ def of_trimesh(names: Names) -> None:
 
 def of_pyvista(names: Names) -> None:
     assert close(names["mesh"]["distance"])
-    assert close(heat_igl.read_attributes("distance.vtp")["distance"])
 
 
 def of_meshio(names: Names) -> None:

@@ -53,7 +53,7 @@ def distance(
     tolerance: ToleranceOption = 1e-5,
     cutoff: Annotated[float | None, typer.Option(help="Distances beyond this are inf.", callback=positive)] = None,
     output: Annotated[
-        Path | None, typer.Option(help="PLY, VTU, VTP or GIFTI file for mesh and distance, or NPY or CSV file for it.")
+        Path | None, typer.Option(help="PLY, VTU or GIFTI file for mesh and distance, or NPY or CSV file for it.")
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for a picture.")] = None,
     t_coef: Annotated[

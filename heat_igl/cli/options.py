@@ -28,8 +28,8 @@ MeshArgument = Annotated[
     Path,
     typer.Argument(
         metavar="MESH",
-        help="OFF, OBJ, PLY, STL, MESH, MSH, VTU, VTP, GIFTI or FreeSurfer file; or a point cloud: XYZ, NPY or PCD, "
-        "and with --points PLY or OBJ.",
+        help="OFF, OBJ, PLY, STL, MESH, MSH, VTU, GIFTI or FreeSurfer file; or a point cloud: XYZ or NPY, and "
+        "with --points PLY or OBJ.",
     ),
 ]
 PointsOption = Annotated[bool, typer.Option("--points", help="The file holds points; faces are not read.")]

@@ -131,7 +131,7 @@ def check_outputs(mesh: Mesh | PointCloud, output: Path | None, picture: Path | 
     """Check that mesh and distance can be written to `output`, and a picture to `picture`."""
     if output is not None:
         kind = "distances"
-        with_mesh: tuple[str, ...] = (".ply", ".vtu", ".vtp", ".gii")
+        with_mesh: tuple[str, ...] = (".ply", ".vtu", ".gii")
         if isinstance(mesh, PointCloud):
             kind, with_mesh = "points with distances", (".ply",)
         elif mesh.is_tetrahedral:
@@ -139,7 +139,7 @@ def check_outputs(mesh: Mesh | PointCloud, output: Path | None, picture: Path | 
         accepted = with_mesh + ARRAY_SUFFIXES
         if output.suffix.lower() not in accepted:
             raise MeshError(f"--output {output}: {kind} go to {', '.join(accepted[:-1])} or {accepted[-1]} files")
-        for suffix, package, extra in ((".vtu", "meshio", "io"), (".gii", "nibabel", "neuro")):
+        for suffix, package, extra in ((".vtu", "meshio", "io"), (".gii", "nibabel", "io")):
             if output.suffix.lower() == suffix:
                 MissingExtraError.check(f"a {suffix} file", package, extra)
         check_writable(output)

@@ -66,8 +66,8 @@ def distances(
     dtype : {"float32", "float64"}
         Type to which the distances are rounded.
     points : bool
-        Read all files as point clouds, by `read_point_cloud`. Otherwise .xyz, .npy and .pcd files hold points, and a
-        file of another format without faces fails.
+        Read all files as point clouds, by `read_point_cloud`. Otherwise .xyz and .npy files hold points, and a file
+        of another format without faces fails.
     progress : bool
         Show on standard error how many meshes and blocks are done (extra ``cli``).
     **options

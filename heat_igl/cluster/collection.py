@@ -33,7 +33,7 @@ class Item:
 
 
 def folder(path: str | os.PathLike[str], points: bool = False) -> dict[str, Path]:
-    """All files of meshes and of point clouds (.xyz, .pcd) below a folder; the keys are paths in it.
+    """All files of meshes and of point clouds (.xyz) below a folder; the keys are paths in it.
 
     With `points`, all files that `read_point_cloud` reads. Arrays (.npy) are left out, since they may hold anything.
 
@@ -53,7 +53,7 @@ def folder(path: str | os.PathLike[str], points: bool = False) -> dict[str, Path
     if not found:
         suffixes = (".ply", ".obj") if points else MESH_SUFFIXES
         kind = "point cloud" if points else "mesh"
-        raise ValueError(f"{root} holds no {kind}: files must end in {', '.join(suffixes)}, .xyz or .pcd")
+        raise ValueError(f"{root} holds no {kind}: files must end in {', '.join(suffixes)} or .xyz")
     return found
 
 

@@ -26,7 +26,7 @@ def complete_file(path: Path) -> Iterator[Path]:
         If the file cannot be written; an existing file is then unchanged.
     """
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(4)}{target.suffix}")
+    temporary = target.with_name(f".{secrets.token_hex(4)}.{target.name[-100:]}")  # with all suffixes
     if target.exists() and not target.is_file():
         raise OSError(f"{path} is not a regular file")
     try:

@@ -1,4 +1,4 @@
-"""Reading and writing mesh files: OFF, OBJ, PLY, STL, MESH, MSH, VTU, VTP, GIFTI, FreeSurfer, chosen by the extension.
+"""Reading and writing mesh files, chosen by the extension: OFF, OBJ and PLY here, others by meshio and nibabel.
 
 Every defect of a file raises a `MeshError` that names the file, the position and the remedy. Counts in headers are
 compared with the size of the file before memory is allocated.
@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io import freesurfer, gifti, medit, msh, obj, off, ply, stl, vtp, vtu
+from heat_igl.io import by_meshio, by_nibabel, obj, off, ply
 from heat_igl.io.atomic import replacing
 from heat_igl.io.contents import Contents
 from heat_igl.io.packed import form_suffix, is_packed, pack, unpacked
@@ -49,17 +49,21 @@ _FORMATS = {
     ".off": _Format(off.read, off.write),
     ".obj": _Format(obj.read, obj.write),
     ".ply": _Format(ply.read, ply.write, attributes=True),
-    ".stl": _Format(stl.read, stl.write),
-    ".mesh": _Format(medit.read, medit.write, tetrahedra=True),
-    ".msh": _Format(msh.read, msh.write, tetrahedra=True),
-    ".vtu": _Format(vtu.read, vtu.write, tetrahedra=True, attributes=True, packed=False),
-    ".vtp": _Format(vtp.read, vtp.write, attributes=True, packed=False),
-    ".gii": _Format(gifti.read, gifti.write, attributes=True),
-} | dict.fromkeys(freesurfer.SUFFIXES, _Format(freesurfer.read, freesurfer.write, packed=False))
+    ".stl": _Format(by_meshio.read, by_meshio.write),
+    ".mesh": _Format(by_meshio.read, by_meshio.write, tetrahedra=True),
+    ".msh": _Format(by_meshio.read, by_meshio.write, tetrahedra=True),
+    ".vtu": _Format(by_meshio.read, by_meshio.write, tetrahedra=True, attributes=True, packed=False),
+    ".gii": _Format(by_nibabel.read, by_nibabel.write, attributes=True),
+} | dict.fromkeys(by_nibabel.FREESURFER_SUFFIXES, _Format(by_nibabel.read, by_nibabel.write, packed=False))
 
 MESH_SUFFIXES = tuple(_FORMATS)
 # Formats of points alone.
-POINT_SUFFIXES = (".xyz", ".npy", ".pcd")
+POINT_SUFFIXES = (".xyz", ".npy")
+# Formats of other libraries, whose objects `as_mesh` takes.
+_READ_ELSEWHERE = {
+    ".vtp": "pass pyvista.read(path), or write .vtu",
+    ".pcd": "pass open3d.io.read_point_cloud(path)",
+}
 _PACKED = tuple(suffix for suffix, form in _FORMATS.items() if form.packed)
 
 _ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
@@ -71,9 +75,9 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     Parameters
     ----------
     path : path-like
-        The extension, in upper or lower case, selects the format: .off, .obj, .ply, .stl, .mesh, .msh, .vtu, .vtp, .gii
+        The extension, in upper or lower case, selects the format: .off, .obj, .ply, .stl, .mesh, .msh, .vtu, .gii
         (GIFTI), or the name of a FreeSurfer surface: .white, .pial, .inflated, .sphere, .smoothwm, .midthickness.
-        A further .gz stands for a file packed by gzip, in all of these but VTK's and FreeSurfer's.
+        A further .gz stands for a file packed by gzip, in all of these but VTU and FreeSurfer's.
 
     Returns
     -------
@@ -87,14 +91,14 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
         If the file is missing, unreadable or damaged, or contains no mesh. ``__cause__`` is the error of the operating
         system, if there is one.
     MissingExtraError
-        For .vtu without meshio, for GIFTI and FreeSurfer without nibabel.
+        For STL, MESH, MSH and VTU without meshio, for GIFTI and FreeSurfer without nibabel.
 
     Notes
     -----
     A polygon is split into the fan of triangles around the first corner, a concave one by clipping ears;
     `read_polygon_mesh` keeps polygons. STL has no shared vertices: equal positions are merged, and triangles
     that collapse by this are removed. Materials, normals, texture coordinates, colours and line elements are ignored.
-    OBJ has neither counts nor an end mark, so a file that is truncated between two lines cannot be detected.
+    OBJ has neither counts nor an end mark: a file that may be cut short is an `AccuracyWarning`.
 
     Examples
     --------
@@ -126,7 +130,7 @@ def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
     MeshError
         As `read_mesh`; also if the file holds tetrahedra.
     MissingExtraError
-        For .vtu without meshio, for GIFTI and FreeSurfer without nibabel.
+        For STL, MESH, MSH and VTU without meshio, for GIFTI and FreeSurfer without nibabel.
 
     Examples
     --------
@@ -149,7 +153,7 @@ def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
 
 
 def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
-    """Read the vertex attributes of a PLY, VTU, VTP or GIFTI file.
+    """Read the vertex attributes of a PLY, VTU or GIFTI file.
 
     Parameters
     ----------
@@ -193,7 +197,7 @@ def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, /, **attributes: Ar
     mesh : mesh
         Triangles, or (.mesh, .msh, .vtu) tetrahedra, as `as_mesh` takes them; polygons are written as triangles.
     **attributes : (n,) or (n, k) array_like of real numbers
-        Arrays per vertex, stored in .ply, .vtu and .vtp files in double precision, including infinite values. In PLY an
+        Arrays per vertex, stored in .ply and .vtu files in double precision, including infinite values. In PLY an
         array (n, k) becomes properties ``name_0``, ``name_1``, ..., which `read_attributes` combines again. GIFTI
         holds arrays (n,) in single precision.
 
@@ -203,7 +207,7 @@ def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, /, **attributes: Ar
         If the format cannot hold the mesh or the attributes, an attribute has the wrong shape or type, or the file
         cannot be written.
     MissingExtraError
-        For .vtu without meshio, for GIFTI and FreeSurfer without nibabel.
+        For STL, MESH, MSH and VTU without meshio, for GIFTI and FreeSurfer without nibabel.
 
     Notes
     -----
@@ -261,9 +265,8 @@ def checked_path(path: str | os.PathLike[str], suffixes: Collection[str], packed
     if suffix not in suffixes:
         if found.is_dir():
             raise MeshError(f"{found} is a directory: name a mesh file in it")
-        remedy = (
-            "read_point_cloud and write_point_cloud take points" if suffix in POINT_SUFFIXES else "take another library"
-        )
+        of_points = "read_point_cloud and write_point_cloud take points" if suffix in POINT_SUFFIXES else ""
+        remedy = of_points or _READ_ELSEWHERE.get(suffix, "pass meshio.read(path), or the mesh of another library")
         raise MeshError(
             f"{found}: unknown extension '{found.suffix}'; the formats are {', '.join(suffixes)}; for others, {remedy}"
         )

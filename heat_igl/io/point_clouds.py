@@ -1,4 +1,4 @@
-"""Reading and writing point clouds: PLY, OBJ, XYZ, NPY and PCD, selected by the extension."""
+"""Reading and writing point clouds: PLY, OBJ, XYZ and NPY, selected by the extension."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl.errors import MeshError, shown
-from heat_igl.io import pcd, ply
+from heat_igl.io import ply
 from heat_igl.io.atomic import replacing
 from heat_igl.io.files import (
     MESH_SUFFIXES,
@@ -50,8 +50,8 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
         The extension, in upper or lower case, selects the format. .ply: the vertices, and their properties nx, ny, nz
         as normals. .obj: the lines v, and the lines vn as normals if there are as many. .xyz: a point in each line,
         three coordinates, or three and a normal or a colour, or two in the plane z = 0; separated by white space or
-        commas, "#" starts a comment. .npy: an array (n, 3), (n, 6) with normals or colours, or (n, 2). .pcd: the fields
-        x, y, z and normal_x, normal_y, normal_z, text or binary. A further .gz stands for a file packed by gzip.
+        commas, "#" starts a comment. .npy: an array (n, 3), (n, 6) with normals or colours, or (n, 2).
+        A further .gz stands for a file packed by gzip.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
 
 
 def read_mesh_or_cloud(path: str | os.PathLike[str], points: bool = False) -> Mesh | PointCloud:
-    """Read .xyz, .npy and .pcd files, or with `points` all, by `read_point_cloud`, and others by `read_mesh`.
+    """Read .xyz and .npy files, or with `points` all, by `read_point_cloud`, and others by `read_mesh`.
 
     Raises
     ------
@@ -227,7 +227,6 @@ _FORMATS: dict[str, Callable[[Path, bytes], _Points]] = {
     ".obj": _from_obj,
     ".xyz": _from_xyz,
     ".npy": _from_npy,
-    ".pcd": pcd.read,
 }
 
 POINT_CLOUD_SUFFIXES = tuple(_FORMATS)

@@ -55,7 +55,7 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     ----------
     mesh : mesh or array_like
         `Mesh`, `PolygonMesh` and `PointCloud` are returned as they are, and of an `ImageDomain` the mesh. Besides: a
-        pair (V, F); a path, read by `read_mesh`, or by `read_point_cloud` if the file holds no faces; meshes of
+        pair (V, F); a path, read by `read_mesh`, or by `read_point_cloud` if the format holds points only; meshes of
         trimesh, pyvista and vtk (PolyData, UnstructuredGrid), open3d, meshio, pymeshlab (also a MeshSet: the current
         mesh), vedo, and nibabel (surfaces in GIFTI). The point clouds of trimesh, open3d and vedo, and objects of
         pyvista, vtk and meshio that hold points alone, become a `PointCloud`, with the normals of open3d, pyvista and
