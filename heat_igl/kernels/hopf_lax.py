@@ -15,11 +15,12 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.hopf_lax import (
     FIRST_GAIN,
+    FIRST_SETTLED,
     FLAT,
     GAIN,
     MOST_HALVINGS,
-    MOST_PASSES,
     MOST_STEPS,
+    MOST_VISITS,
     PLACED,
     SETTLED,
 )
@@ -59,6 +60,8 @@ class HopfLax:
     inverse: cython.const[cython.double][:, :, ::1]
     V: cython.const[cython.double][:, ::1]
     queue: PriorityQueue
+    pending: cython.double[::1]
+    n_visits: cython.int[::1]
     unit: cython.double
     d: cython.double[::1]
     label: cython.int[::1]
@@ -111,10 +114,9 @@ class HopfLax:
             self.spread(low)
         if not second_order:
             return
-        order: cython.const[cython.int][::1] = np.argsort(np.asarray(d), kind="stable").astype(np.int32)
-        stale: cython.uchar[::1] = np.isfinite(d).astype(np.uint8)
+        self.pending, self.n_visits = np.where(np.isfinite(d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
-            self.sharpen(order, fixed, stale)
+            self.sharpen(fixed, low)
 
     @cython.cfunc
     @cython.nogil
@@ -267,40 +269,38 @@ class HopfLax:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def sharpen(
-        self,
-        order: cython.const[cython.int][::1],
-        fixed: cython.const[cython.uchar][::1],
-        stale: cython.uchar[::1],
-    ) -> cython.void:
-        """Second order: passes over the vertices from near to far, until their distances stay."""
+    def sharpen(self, fixed: cython.const[cython.uchar][::1], low: cython.double) -> cython.void:
+        """Second order: the nearest vertex next, until no distance around any has changed by more than is settled."""
         v: cython.int
         k: cython.int
         c: cython.int
         size: cython.int = self.p + 1
-        i: cython.Py_ssize_t
-        count: cython.int = 0
-        n_stale: cython.Py_ssize_t = 1
-        while n_stale > 0 and count < MOST_PASSES:
-            n_stale = 0
-            count += 1
-            for i in range(order.shape[0]):
-                v = order[i]
-                if fixed[v] or not stale[v]:
-                    continue
-                stale[v] = 0
+        settled: cython.double = FIRST_SETTLED
+        while True:
+            for v in range(self.d.shape[0]):
+                if self.pending[v] > settled and not fixed[v] and self.n_visits[v] < MOST_VISITS:
+                    self.queue.set_key(v, 1.0 / (1.0 + (self.d[v] - low) / self.unit))
+            while self.queue.count > 0:
+                v = cython.cast(cython.int, self.queue.first())
+                self.queue.set_key(v, 0.0)
+                self.pending[v] = 0.0
+                self.n_visits[v] += 1
                 old: cython.double = self.d[v]
-                was_sloped: cython.bint = self.is_sloped[v]
+                change: cython.double = 0.0 if self.is_sloped[v] else INFINITY
                 self.visit(v)
-                if was_sloped and fabs(self.d[v] - old) <= SETTLED * fabs(old):
-                    continue
+                change = max(change, fabs(self.d[v] - old) / max(fabs(old - low), fabs(self.d[v] - low)))
                 for k in range(self.first[v], self.first[v + 1]):
                     s: cython.int = self.incident[k] // size
                     for c in range(size):
                         u: cython.int = self.corners[s, c]
-                        if u != v:
-                            n_stale += not stale[u]
-                            stale[u] = 1
+                        if u == v or fixed[u] or not change > self.pending[u]:
+                            continue
+                        self.pending[u] = change
+                        if change > settled and self.n_visits[u] < MOST_VISITS:
+                            self.queue.set_key(u, 1.0 / (1.0 + (self.d[u] - low) / self.unit))
+            if not settled > SETTLED:
+                break
+            settled *= 0.1
 
     @cython.cfunc
     @cython.nogil
@@ -385,7 +385,7 @@ class HopfLax:
             return self.along_edges()
         trust: cython.double[3]
         for i in range(self.p):
-            trust[i] = self.trust(s, self.corners[s, self.side[i]])
+            trust[i] = 1.0 if self.q > 1 else self.trust(s, self.corners[s, self.side[i]])
         if self.p == 3 and self.is_flat():
             return best
         for i in range(self.p):
@@ -454,10 +454,13 @@ class HopfLax:
         sag = sag - doubt if sag > 0 else sag + doubt
         if fabs(0.5 * (at_j - at_i) - level) <= doubt:
             return 0.0
-        length: cython.double = sqrt(self.mean[s, self.side[i], self.side[j]])
-        most: cython.double = min(rise + 2.0 * Di * length, 2.0 * Dj * length - rise) - level
-        least: cython.double = max(rise - 2.0 * Di * length, -2.0 * Dj * length - rise) - level
-        return max(min(sag, most, length * length - level), least)
+        at: cython.int = self.side[i] if self.q > 1 else 0
+        from_i: cython.double = 2.0 * Di * sqrt(self.squares[s, at, self.side[i], self.side[j]])
+        at = self.side[j] if self.q > 1 else 0
+        from_j: cython.double = 2.0 * Dj * sqrt(self.squares[s, at, self.side[i], self.side[j]])
+        most: cython.double = min(rise + from_i, from_j - rise) - level
+        least: cython.double = max(rise - from_i, -from_j - rise) - level
+        return max(min(sag, most), least)
 
     @cython.cfunc
     @cython.inline
