@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, as_array, positive, real_numbers, require_choice, truth
 from heat_igl.linear import factorize
-from heat_igl.mesh import Mesh, MeshLike, SubMesh, as_simplices, sub_mesh
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, as_simplices
 from heat_igl.operators import operators
 from heat_igl.runtime import progress_bar
 from heat_igl.sampling import as_solver
@@ -96,27 +96,25 @@ def parcel_distances(
     return np.asarray((found + found.T) / 2)
 
 
-def _part(mesh: MeshLike, region: ArrayLike | None) -> tuple[Mesh, SubMesh | None]:
-    """The triangles that paths may enter, and where they are in the mesh."""
+def _part(mesh: MeshLike, region: ArrayLike | None) -> tuple[Mesh, MeshPart | None]:
+    """The triangles that paths may enter, on all vertices; and the part of the mesh that they are."""
     triangles = as_simplices(mesh)
     if triangles.is_tetrahedral:
         raise MeshError("maps on a surface need triangles, and the mesh holds tetrahedra")
-    part = None if region is None else sub_mesh(triangles, region)
+    part = None if region is None else MeshPart.of(triangles, region)
     return triangles if part is None else part.mesh, part
 
 
-def _parcels(labels: ArrayLike, n: int, part: SubMesh | None) -> tuple[IntArray, IntArray, IntArray]:
+def _parcels(labels: ArrayLike, n: int, part: MeshPart | None) -> tuple[IntArray, IntArray, IntArray]:
     """The labels of p parcels, the vertices (k,) of the part that are in one, and which (k,) that is."""
     given = as_array("labels", labels)
-    n = n if part is None else part.n_whole
     if given.dtype.kind not in "iu" or given.shape != (n,):
         raise ValueError(f"labels must be integers of shape ({n},), not {given.dtype} of shape {given.shape}")
     names = np.unique(given[given >= 0])
     if not len(names):
         raise ValueError("labels name no parcel: all are negative")
-    label = given if part is None else given[part.vertices]
-    vertices = np.flatnonzero(label >= 0)
-    parcel = np.searchsorted(names, label[vertices])
+    vertices = np.flatnonzero(given >= 0 if part is None else (given >= 0) & part.inside)
+    parcel = np.searchsorted(names, given[vertices])
     lost = np.bincount(parcel, minlength=len(names)) == 0
     if lost.any():
         raise ValueError(
@@ -179,36 +177,31 @@ def smooth(mesh: MeshLike, values: ArrayLike, fwhm: float, *, region: ArrayLike 
     >>> bool(heat_igl.smooth(mesh, noise, 0.5).std() < 0.2 * noise.std())
     True
     """
-    triangles, part = _part(mesh, region)
-    n = triangles.n_vertices if part is None else part.n_whole
+    triangles, _ = _part(mesh, region)
+    n = triangles.n_vertices
     given = real_numbers("values", values)
     if given.ndim not in (1, 2) or given.shape[-1] != n:
         raise ValueError(f"values must have shape ({n},) or (k, {n}), not {given.shape}")
-    bad = ~np.isfinite(given)
+    bad = ~np.isfinite(given) & triangles.referenced
     if bad.any():
         first = np.argwhere(bad)[0].tolist()
         raise ValueError(
             f"values{first} is {given[tuple(first)]} ({int(bad.sum())} of {given.size} are not finite): fill them, or "
             "leave these vertices out by region"
         )
-    inside = given if part is None else given[..., part.vertices]
-    smoothed = _diffused(triangles, inside.T, positive("fwhm", fwhm) ** 2 / (16 * np.log(2))).T
-    if part is None:
-        return np.ascontiguousarray(smoothed)
-    given[..., part.vertices] = smoothed
+    given[..., triangles.referenced] = _diffused(triangles, given, positive("fwhm", fwhm) ** 2 / (16 * np.log(2)))
     return given
 
 
 def _diffused(mesh: Mesh, values: FloatArray, time: float) -> FloatArray:
-    """Heat (n,) or (n, k) after a time, from values at the vertices."""
+    """Values (..., k) at the k vertices that faces use after a time of heat flow, from values (..., n)."""
     domain = operators(mesh, "intrinsic-delaunay")
-    mass, inner = domain.M.diagonal(), domain.referenced
+    inner = domain.referenced
+    mass, u = domain.M.diagonal(), np.where(inner, values, 0.0).T
     # w = 1 / (1 - z / root) for z = t lambda: the step is (1 + sqrt 2) w^2 - sqrt 2 w, of order 2, and 0 for z = -inf.
     step = time / _STEPS * (1 - np.sqrt(0.5))
     factor = factorize((domain.M - step * domain.L).tocsc(), free=inner)
-    u = np.array(values)
     for _ in range(_STEPS):
         v = factor.solve((mass * u.T).T)
-        w = factor.solve((mass * v.T).T)
-        u[inner] = ((1 + np.sqrt(2)) * w - np.sqrt(2) * v)[inner]
-    return u
+        u = (1 + np.sqrt(2)) * factor.solve((mass * v.T).T) - np.sqrt(2) * v
+    return np.asarray(u[inner].T)

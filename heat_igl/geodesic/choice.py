@@ -10,6 +10,7 @@ from heat_igl.geodesic.solver import GeodesicSolver
 from heat_igl.heat_method import HeatMethodSolver, SolverOptions
 from heat_igl.mesh import MeshLike
 from heat_igl.operators import Operators
+from heat_igl.typing import ArrayLike
 
 __all__ = ["DistanceMethod", "Solver", "SolverChoice"]
 
@@ -62,11 +63,11 @@ class SolverChoice:
         of_heat = {name: value for name, value in options.items() if name in _OPTIONS_OF_HEAT}
         return replace(self, heat=replace(self.heat, **of_heat), **own)
 
-    def on(self, mesh: MeshLike | Operators) -> Solver:
+    def on(self, mesh: MeshLike | Operators, region: ArrayLike | None = None) -> Solver:
         """The solver on a mesh, or on operators."""
         if self.method == "heat" and isinstance(mesh, Operators):
             options = {name: getattr(self.heat, name) for name in _OPTIONS_OF_HEAT if name != "laplacian"}
             return HeatMethodSolver.from_operators(mesh, **options)
         if self.method == "heat":
-            return HeatMethodSolver.from_options(mesh, self.heat)
-        return GeodesicSolver(mesh, method=self.method, tolerance=self.tolerance)
+            return HeatMethodSolver.from_options(mesh, self.heat, region)
+        return GeodesicSolver(mesh, method=self.method, tolerance=self.tolerance, region=region)

@@ -52,7 +52,7 @@ def geodesic_distance(
         The vertices or points whose distance is asked for: only theirs is returned, and a search by windows ends once
         they are known.
     region : (n,) or (m,) array_like of bool, optional
-        Vertices, or faces, that paths may enter; elsewhere distance is ``inf``.
+        What paths may enter, as for `GeodesicSolver`; elsewhere distance is ``inf``.
 
     Returns
     -------
@@ -86,9 +86,7 @@ def geodesic_distance(
     beyond = checked_cutoff(cutoff)
     given = as_mesh(mesh)
     if method == "heat":
-        if region is not None:
-            raise NotImplementedError("region is not there yet: cut the mesh to the faces that paths may enter")
-        distance = HeatMethodSolver(given).distance(sources, beyond)
+        distance = HeatMethodSolver(given, region=region).distance(sources, beyond)
         return distance if targets is None else distance[named_vertices(targets, len(distance), "targets")]
     if isinstance(given, PolygonMesh):
         given = given.triangles

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +14,8 @@ from heat_igl.heat_method.directions import Directions, directions
 from heat_igl.heat_method.side_lengths import SideLengths, SidesOfMesh
 from heat_igl.heat_method.solution import LabelledDistance
 from heat_igl.intrinsic import TangentFrames, tangent_frames
-from heat_igl.mesh import Mesh, MeshLike, PointCloud, PolygonMesh, SurfacePoints, as_mesh
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh
+from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import MetricSimplices, Operators, edge_length_operators
 from heat_igl.plan import DomainKind, Method, Plan, distance_plan, sweep_plan
 from heat_igl.runtime import n_threads
@@ -47,7 +49,9 @@ class GeodesicSolver(BatchedSolver):
     tolerance : float
         Largest error over the distance; 0 is exact.
     region : (n,) or (m,) array_like of bool, optional
-        Vertices, or faces, that paths may enter; elsewhere distance is ``inf``.
+        What paths may enter, of a mesh: faces all of whose vertices are selected, or selected faces. Elsewhere distance
+        is ``inf``, and sources are an error; all numbers stay those of the whole mesh. Angles of `directions` are those
+        of `tangent_frames` of the part alone.
 
     Raises
     ------
@@ -82,8 +86,6 @@ class GeodesicSolver(BatchedSolver):
         tolerance: float = 1e-5,
         region: ArrayLike | None = None,
     ) -> None:
-        if region is not None:
-            raise NotImplementedError("region is not there yet: cut the mesh to the faces that paths may enter")
         self._method, self._tolerance = method, tolerance
         self._domain: Mesh | PointCloud | Operators
         if isinstance(mesh, Operators):
@@ -91,6 +93,9 @@ class GeodesicSolver(BatchedSolver):
         else:
             given = as_mesh(mesh)
             self._domain = given.triangles if isinstance(given, PolygonMesh) else given
+        self._part = None if region is None else MeshPart.of(self._domain, region)
+        if self._part is not None:
+            self._domain = self._part.mesh
         self._triangles: Triangles | None = None
         self._engine: Engine
         self._plan, self._engine = self._prepared()
@@ -258,8 +263,11 @@ class GeodesicSolver(BatchedSolver):
         ValueError
             If the engine is not windows, or the solver was made from operators.
         """
-        found = self._windows("directions follow").directed(self._source_set(sources))
-        return directions(*found, self._frames)
+        found = directions(*self._windows("directions follow").directed(self._source_set(sources)), self._frames)
+        if self._part is None:
+            return found
+        start = unchecked_points(self._part.faces[found.start.faces], found.start.barycentric)
+        return replace(found, start=start)
 
     @cached_property
     def _frames(self) -> TangentFrames:
@@ -297,6 +305,8 @@ class GeodesicSolver(BatchedSolver):
         """Distance (t,) of some vertices or points; a search by windows ends once all are known."""
         chosen = self._source_set(sources)
         places = targets if isinstance(targets, SurfacePoints) else named_vertices(targets, self.n_vertices, "targets")
+        if isinstance(places, SurfacePoints) and self._part is not None:
+            places = SurfacePoints(self._part.numbers_of(places.faces, "targets"), places.barycentric)
         if isinstance(self._engine, WindowEngine):
             if isinstance(places, SurfacePoints) and isinstance(self._domain, Mesh):
                 places.positions(self._domain)  # which checks the faces
@@ -327,9 +337,16 @@ class GeodesicSolver(BatchedSolver):
         """
         if isinstance(self._domain, Operators):
             raise ValueError("this solver was made from operators and has no vertices to move: make it again")
-        return GeodesicSolver(self._domain.with_vertices(V), method=self._method, tolerance=self._tolerance)
+        moved = self._domain.with_vertices(V)
+        solver = GeodesicSolver(moved, method=self._method, tolerance=self._tolerance)
+        if self._part is not None and isinstance(moved, Mesh):
+            solver._part = replace(self._part, mesh=moved)
+        return solver
 
     def _source_set(self, sources: Sources) -> SourceSet:
+        if self._part is not None:
+            faces = None if self._triangles is None else self._part.whole
+            return source_set(sources, self.n_vertices, faces).within(self._part)
         chosen, domain = source_set(sources, self.n_vertices, self._given_faces), self._domain
         moved = isinstance(domain, PointCloud) and domain.has_copies
         return chosen.with_vertices_moved(domain.originals) if moved and isinstance(domain, PointCloud) else chosen

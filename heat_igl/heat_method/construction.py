@@ -12,7 +12,7 @@ from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
 from heat_igl.heat_method.solution import Diagnostics
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh, MeshLike, PointCloud, PolygonMesh, as_mesh
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, as_mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators
 from heat_igl.plan import Plan
 from heat_igl.steps import Boundary
@@ -28,12 +28,15 @@ class PreparedSolver(BatchedSolver):
 
     _mesh: Mesh | PointCloud | None = None
     _parts: SolverParts
+    _part: MeshPart | None = None
 
     @classmethod
-    def from_options(cls: type[Solver], mesh: MeshLike, options: SolverOptions) -> Solver:
+    def from_options(
+        cls: type[Solver], mesh: MeshLike, options: SolverOptions, region: ArrayLike | None = None
+    ) -> Solver:
         """A solver on `mesh` with options that were put together before."""
         solver = cls.__new__(cls)
-        solver._set_up(as_mesh(mesh), options)
+        solver._set_up(as_mesh(mesh), options, region)
         return solver
 
     @classmethod
@@ -133,9 +136,20 @@ class PreparedSolver(BatchedSolver):
             return self._of(prepare_polygons(PolygonMesh(positions, fans.polygons.polygons), self._parts.options))
         moved = self._mesh.with_vertices(V)
         options, known = self._parts.options, self._parts.analysis
-        return self._of(prepare_mesh(moved, options, known), moved)
+        solver = self._of(prepare_mesh(moved, options, known), moved)
+        if self._part is not None and isinstance(moved, Mesh):
+            solver._part = replace(self._part, mesh=moved)
+        return solver
 
-    def _set_up(self, mesh: Mesh | PolygonMesh | PointCloud | Operators, options: SolverOptions) -> None:
+    def _set_up(
+        self,
+        mesh: Mesh | PolygonMesh | PointCloud | Operators,
+        options: SolverOptions,
+        region: ArrayLike | None = None,
+    ) -> None:
+        if region is not None:
+            self._part = MeshPart.of(mesh, region)
+            mesh = self._part.mesh
         if isinstance(mesh, Operators):
             if options.laplacian != "auto":
                 raise ValueError(f"laplacian={options.laplacian!r} is for meshes: operators have a Laplacian already")

@@ -60,6 +60,9 @@ class HeatMethodSolver(PreparedSolver):
         source vertex get the lengths of the edges.
     backend : {"auto", "scipy", "multifrontal", "iterative"}
         Linear solver, see `factorize`.
+    region : (n,) or (m,) array_like of bool, optional
+        What heat may enter, of a mesh: faces all of whose vertices are selected, or selected faces. Elsewhere distance
+        is ``inf``, and sources are an error. Fields per face, as those of `solve`, are those of the part alone.
 
     Raises
     ------
@@ -106,9 +109,10 @@ class HeatMethodSolver(PreparedSolver):
         boundary: Boundary = "neumann",
         magnitude: Magnitude = "auto",
         backend: Backend = "auto",
+        region: ArrayLike | None = None,
     ) -> None:
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
-        self._set_up(mesh if isinstance(mesh, Operators) and F is None else as_mesh(mesh, F), options)
+        self._set_up(mesh if isinstance(mesh, Operators) and F is None else as_mesh(mesh, F), options, region)
 
     def distance(self, sources: Sources, cutoff: float | None = None) -> FloatArray:
         """Distance from the nearest source.
@@ -147,7 +151,10 @@ class HeatMethodSolver(PreparedSolver):
         return np.asarray(cut_off(distance, beyond))
 
     def _source_set(self, sources: Sources) -> SourceSet:
-        return source_set(sources, self.n_vertices, self._parts.given_faces)
+        if self._part is None:
+            return source_set(sources, self.n_vertices, self._parts.given_faces)
+        faces = None if self._parts.given_faces is None else self._part.whole
+        return source_set(sources, self.n_vertices, faces).within(self._part)
 
     def _answers(
         self,

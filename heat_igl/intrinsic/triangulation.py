@@ -113,6 +113,13 @@ class IntrinsicTriangulation:
         return float(self.l.ravel()[self.edges].mean())
 
     @cached_property
+    def n_used(self) -> int:
+        """Number of vertices that a triangle uses."""
+        used = np.zeros(self.n, bool)
+        used[self.F] = True
+        return int(np.count_nonzero(used))
+
+    @cached_property
     def areas(self) -> FloatArray:
         """Area (m,) of each triangle, by Heron's formula in Kahan's order."""
         return np.asarray(igl.doublearea(self.l, 0.0) / 2)

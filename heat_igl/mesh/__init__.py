@@ -9,6 +9,7 @@ from heat_igl.mesh.heights import Terrain, terrain
 from heat_igl.mesh.level_segments import Segments, crossings, joined_segments, level_segments
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
 from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with
+from heat_igl.mesh.part import MeshPart
 from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygon_fans import PolygonFans
@@ -16,7 +17,6 @@ from heat_igl.mesh.polygons import PolygonMesh, which_repeat_a_vertex
 from heat_igl.mesh.projection import ClosestPoints, closest_points
 from heat_igl.mesh.regions import region_boundary
 from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
-from heat_igl.mesh.sub_mesh import SubMesh, sub_mesh
 from heat_igl.mesh.subdivision import split_long_edges
 from heat_igl.mesh.surface_curves import curve_on
 from heat_igl.mesh.surface_points import (
@@ -35,6 +35,7 @@ __all__ = [
     "ImageDomain",
     "Mesh",
     "MeshLike",
+    "MeshPart",
     "MeshReport",
     "NestedCurves",
     "ON_SIDE",
@@ -43,7 +44,6 @@ __all__ = [
     "PolygonFans",
     "PolygonMesh",
     "Segments",
-    "SubMesh",
     "SurfaceCurve",
     "SurfacePoints",
     "Terrain",
@@ -65,7 +65,6 @@ __all__ = [
     "read_paths_with",
     "region_boundary",
     "split_long_edges",
-    "sub_mesh",
     "terrain",
     "to_open3d",
     "to_pyvista",

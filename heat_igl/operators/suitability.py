@@ -74,7 +74,7 @@ def has_negative_boundary(triangulation: IntrinsicTriangulation) -> bool:
         return False
     angle = corner_angles(triangulation.l[outer // 3])[np.arange(len(outer)), outer % 3]
     weight = np.minimum(1 / np.tan(angle), 0.0)
-    return bool(weight.min() < STEEPEST_WEIGHT or -weight.sum() > NEGATIVE_SHARE * triangulation.n)
+    return bool(weight.min() < STEEPEST_WEIGHT or -weight.sum() > NEGATIVE_SHARE * triangulation.n_used)
 
 
 def uneven_components(triangulation: IntrinsicTriangulation, component: IntArray) -> BoolArray:
@@ -83,7 +83,7 @@ def uneven_components(triangulation: IntrinsicTriangulation, component: IntArray
     All, where there are few triangles at all.
     """
     n_components = int(component.max(initial=-1)) + 1
-    if triangulation.n < FEW_FOR_HEAT:
+    if triangulation.n_used < FEW_FOR_HEAT:
         return np.ones(n_components, bool)
     area, lengths = triangulation.areas, triangulation.l
     a, b, c = lengths.T
@@ -118,7 +118,7 @@ def refined(triangulation: IntrinsicTriangulation, component: IntArray, is_chose
     unit = np.where(
         is_chosen[component[triangulation.F[:, 0]]], _area_per_vertex(triangulation, component) ** 0.5, np.inf
     )
-    scale = min(1.0, (triangulation.n / ENOUGH_FOR_HEAT) ** 0.5)
+    scale = min(1.0, (triangulation.n_used / ENOUGH_FOR_HEAT) ** 0.5)
     made = delaunay_refinement(
         triangulation,
         sheets * (GROWTH * triangulation.n + MORE),
@@ -143,11 +143,11 @@ def is_rough_or_narrow(domain: Operators) -> bool:
         return False
     triangulation = surface.unfolding
     added = (domain.n - triangulation.n) / (2 if surface.triangulation.is_cover else 1)
-    n = triangulation.n + added
+    n = triangulation.n_used + added
     n_outer = np.count_nonzero(domain.boundary & domain.referenced)
     if NARROW * n < n_outer < ONE_CELL_WIDE * n:
         return True
-    return _mean_angle_defect(triangulation) * triangulation.n > ROUGH_FOR_HEAT * n
+    return _mean_angle_defect(triangulation) * triangulation.n_used > ROUGH_FOR_HEAT * n
 
 
 def _mean_angle_defect(triangulation: IntrinsicTriangulation) -> float:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from heat_igl.mesh import MeshPart
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["NO_POINTS", "NO_SEGMENTS", "SourcePoints", "SourceSegments", "SourceSet", "nearest_first"]
@@ -89,6 +90,13 @@ class SourceSet:
         if self.on_vertices_alone:
             return self.vertex_offset
         return np.concatenate([self.vertex_offset, self.points.offset, self.segments.offset])
+
+    def within(self, part: MeshPart) -> SourceSet:
+        """The same sources, by the faces of a part of the mesh; a `SourceError` names the first that is outside."""
+        part.require_vertices(self.vertices, position=self.vertex_label)
+        points = replace(self.points, faces=part.numbers_of(self.points.faces, position=self.points.label))
+        segments = replace(self.segments, faces=part.numbers_of(self.segments.faces, position=self.segments.label))
+        return replace(self, points=points, segments=segments)
 
     def with_vertices_moved(self, to: IntArray) -> SourceSet:
         """The same sources with vertex v at the vertex ``to[v]``; where several meet, the earliest stays."""

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, SourceError, positive, shown
-from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, as_simplices
 from heat_igl.runtime import available_memory, n_threads
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -23,7 +23,9 @@ _BYTES = 48
 _MOST_PADDED = 2**28
 
 
-def distances_within(mesh: MeshLike, radius: float, sources: Sources | None = None) -> sp.csr_array:
+def distances_within(
+    mesh: MeshLike, radius: float, sources: Sources | None = None, *, region: ArrayLike | None = None
+) -> sp.csr_array:
     """Exact distances from each of some vertices to all vertices up to a radius.
 
     Parameters
@@ -34,6 +36,8 @@ def distances_within(mesh: MeshLike, radius: float, sources: Sources | None = No
         In the mesh's unit, positive; ``inf`` for all that can be reached.
     sources : int, sequence of int, or (n,) mask of bool, optional
         The k vertices that are asked, each for itself; all n if not given.
+    region : (n,) or (m,) array_like of bool, optional
+        What paths may enter, as for `GeodesicSolver`. Without sources, rows of vertices elsewhere are empty.
 
     Returns
     -------
@@ -60,9 +64,10 @@ def distances_within(mesh: MeshLike, radius: float, sources: Sources | None = No
     ([48, 49, 50, 51, 52], [2.0, 1.0, 0.0, 1.0, 2.0])
     """
     limit = positive("radius", radius, infinite=True)
-    triangles = _triangles(mesh)
-    chosen = _chosen(sources, triangles)
-    return _rows_within(from_mesh(triangles, int(chosen[0])), chosen, limit)
+    triangles, part = _triangles(mesh, region)
+    chosen = _chosen(sources, triangles, part)
+    found = _rows_within(from_mesh(triangles, int(chosen[0])), chosen, limit)
+    return found if sources is not None or part is None else _with_empty_rows(found, chosen)
 
 
 def blocks_within(
@@ -83,8 +88,8 @@ def blocks_within(
         Shape (rows, n).
     """
     limit = positive("radius", radius, infinite=True)
-    triangles = _triangles(mesh)
-    chosen = _chosen(sources, triangles)
+    triangles, part = _triangles(mesh)
+    chosen = _chosen(sources, triangles, part)
     edges = from_mesh(triangles, int(chosen[0]))
     least = local_searches.CHUNK * n_threads()
     start, rows = 0, least
@@ -115,7 +120,9 @@ def _rows_within(edges: HalfEdges, chosen: IntArray, limit: float) -> sp.csr_arr
     return found
 
 
-def nearest_vertices(mesh: MeshLike, k: int, sources: Sources | None = None) -> tuple[IntArray, FloatArray]:
+def nearest_vertices(
+    mesh: MeshLike, k: int, sources: Sources | None = None, *, region: ArrayLike | None = None
+) -> tuple[IntArray, FloatArray]:
     """The k vertices nearest to each of some vertices, by exact distance.
 
     Parameters
@@ -126,6 +133,8 @@ def nearest_vertices(mesh: MeshLike, k: int, sources: Sources | None = None) -> 
         How many vertices; the vertex itself is the first of them.
     sources : int, sequence of int, or (n,) mask of bool, optional
         The s vertices that are asked, each for itself; all n if not given.
+    region : (n,) or (m,) array_like of bool, optional
+        What paths may enter, as for `GeodesicSolver`. Without sources, vertices elsewhere have no nearest ones.
 
     Returns
     -------
@@ -155,8 +164,8 @@ def nearest_vertices(mesh: MeshLike, k: int, sources: Sources | None = None) -> 
     """
     if isinstance(k, bool) or not isinstance(k, int | np.integer) or k < 1:
         raise ValueError(f"k must be a positive integer, not {shown(k)}")
-    triangles = _triangles(mesh)
-    chosen = _chosen(sources, triangles)
+    triangles, part = _triangles(mesh, region)
+    chosen = _chosen(sources, triangles, part)
     edges = from_mesh(triangles, int(chosen[0]))
     # More than all vertices cannot be found.
     wanted = min(int(k), triangles.n_vertices)
@@ -169,6 +178,10 @@ def nearest_vertices(mesh: MeshLike, k: int, sources: Sources | None = None) -> 
     i, j = np.nonzero(np.arange(int(k)) < np.concatenate([part.counts for part in parts])[:, None])
     indices[order[i], j] = np.concatenate([part.vertex for part in parts])
     distances[order[i], j] = edges.unscaled(np.concatenate([part.distance for part in parts]))
+    if sources is None and part is not None:
+        spread = _unfilled(triangles.n_vertices, int(k), triangles.n_vertices)
+        spread[0][chosen], spread[1][chosen] = indices, distances
+        return spread
     return indices, distances
 
 
@@ -186,7 +199,7 @@ def _unfilled(s: int, k: int, n: int) -> tuple[IntArray, FloatArray]:
     )
 
 
-def pair_distances(mesh: MeshLike, pairs: ArrayLike) -> FloatArray:
+def pair_distances(mesh: MeshLike, pairs: ArrayLike, *, region: ArrayLike | None = None) -> FloatArray:
     """Exact distance between the two vertices of each of some pairs.
 
     Parameters
@@ -196,6 +209,8 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike) -> FloatArray:
     pairs : (p, 2) array_like of int
         Vertices. Pairs with the same first vertex share one search, which ends at the farthest of the second ones.
         A search for one pair leaves out what is too far from the second vertex along a straight line in space.
+    region : (n,) or (m,) array_like of bool, optional
+        What paths may enter, as for `GeodesicSolver`. The first vertices must lie there.
 
     Returns
     -------
@@ -215,8 +230,10 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike) -> FloatArray:
     >>> heat_igl.pair_distances(heat_igl.shapes.strip(4, 3), [[0, 4], [0, 19]]).round(6).tolist()
     [4.0, 5.0]
     """
-    triangles = _triangles(mesh)
+    triangles, part = _triangles(mesh, region)
     first, second = _checked_pairs(pairs, triangles.n_vertices).T
+    if part is not None:
+        part.require_vertices(first, "pairs")
     distance = np.full(len(first), np.inf)
     components = triangles.components
     joined = np.flatnonzero(components[first] == components[second])
@@ -258,15 +275,30 @@ class _Count:
         return near
 
 
-def _triangles(mesh: MeshLike) -> Mesh:
+def _triangles(mesh: MeshLike, region: ArrayLike | None = None) -> tuple[Mesh, MeshPart | None]:
+    """The triangles that paths may enter, on all vertices; and the part of the mesh that they are."""
     triangles = as_simplices(mesh)
     if triangles.is_tetrahedral:
         raise MeshError("exact distances need triangles, and the mesh holds tetrahedra: take distance_matrix")
-    return triangles
+    part = None if region is None else MeshPart.of(triangles, region)
+    return triangles if part is None else part.mesh, part
 
 
-def _chosen(sources: Sources | None, mesh: Mesh) -> IntArray:
-    return np.arange(mesh.n_vertices) if sources is None else named_vertices(sources, mesh.n_vertices)
+def _chosen(sources: Sources | None, mesh: Mesh, part: MeshPart | None) -> IntArray:
+    if sources is None:
+        return np.arange(mesh.n_vertices) if part is None else np.flatnonzero(part.inside)
+    named = named_vertices(sources, mesh.n_vertices)
+    if part is not None:
+        part.require_vertices(named)
+    return named
+
+
+def _with_empty_rows(found: sp.csr_array, rows: IntArray) -> sp.csr_array:
+    """A matrix (n, n) with these rows (k,), and others empty."""
+    n = found.shape[1]
+    counts = np.zeros(n, found.indptr.dtype)
+    counts[rows] = np.diff(found.indptr)
+    return sp.csr_array((found.data, found.indices, np.append(0, np.cumsum(counts))), shape=(n, n))
 
 
 def _checked_pairs(pairs: ArrayLike, n: int) -> IntArray:

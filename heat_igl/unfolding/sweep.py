@@ -64,13 +64,14 @@ class SweepEngine(Engine):
     @property
     def measures(self) -> SurfaceMeasures:
         """What tells whether a sweep is accurate here."""
+        used = np.diff(self._spokes.first) > 0
         total = self._spokes.total
         excess = np.abs(2 * np.pi - total)
         # On the boundary, a notch with more than half a turn counts.
         is_open = total <= 0
         excess[is_open] = np.maximum(-total[is_open] - np.pi, 0.0)
-        flatness = float(self._spokes.is_flat.mean())
-        return SurfaceMeasures(self._n, float(excess.mean()), flatness, self._has_holes())
+        flatness = float(self._spokes.is_flat[used].mean())
+        return SurfaceMeasures(self._triangulation.n_used, float(excess.mean()), flatness, self._has_holes())
 
     def _has_holes(self) -> bool:
         """Whether some component is neither a disk nor a sphere, by its Euler characteristic."""

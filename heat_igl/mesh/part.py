@@ -1,0 +1,89 @@
+"""The part of a mesh that paths may enter, with the vertices of the whole mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from heat_igl.errors import MeshError, SourceError, as_array
+from heat_igl.mesh.mesh import Mesh
+from heat_igl.typing import ArrayLike, BoolArray, IntArray
+
+__all__ = ["MeshPart"]
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPart:
+    """Some faces of a mesh of n vertices and m faces, made by `MeshPart.of`.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        These faces, on all n vertices: what is not reached in the part is not reached in this mesh.
+    inside : (n,) bool
+        The vertices of the part. Others may not be sources.
+    faces : (k,) int64
+        The face of the whole mesh that each face is.
+    whole : (m, 3) or (m, 4) int64
+        The faces of the whole mesh.
+    """
+
+    mesh: Mesh
+    inside: BoolArray
+    faces: IntArray
+    whole: IntArray
+
+    @classmethod
+    def of(cls, mesh: object, region: ArrayLike) -> MeshPart:
+        """The part of a mesh that a mask selects.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            n vertices, m faces.
+        region : (n,) or (m,) array_like of bool
+            Of vertices, for the faces all of whose vertices are selected; or of faces. Where n is m, of vertices.
+
+        Raises
+        ------
+        MeshError
+            If `mesh` is no `Mesh`, or `region` is no such mask or selects no face.
+        """
+        if not isinstance(mesh, Mesh):
+            raise MeshError(f"region selects faces of a mesh, not of {type(mesh).__name__}: pass a mesh of triangles")
+        mask = as_array("region", region, MeshError)
+        n, m = mesh.n_vertices, mesh.n_faces
+        if mask.dtype.kind != "b" or mask.shape not in ((n,), (m,)):
+            raise MeshError(
+                f"region must be a mask of bool, with {n} entries for vertices or {m} for faces, not {mask.dtype} of "
+                f"shape {mask.shape}"
+            )
+        of_vertices = len(mask) == n
+        faces = np.flatnonzero(mask[mesh.F].all(axis=1) if of_vertices else mask)
+        if not len(faces):
+            kind = "vertices" if of_vertices else "faces"
+            raise MeshError(f"region selects {int(mask.sum())} {kind}, and no whole face: there is nowhere to go")
+        inside = mask.copy() if of_vertices else np.zeros(n, bool)
+        inside[mesh.F[faces]] = True
+        return cls(Mesh(mesh.V, mesh.F[faces]), inside, faces, mesh.F)
+
+    def require_vertices(self, vertices: IntArray, name: str = "sources", position: IntArray | None = None) -> None:
+        """Raise a `SourceError` that names the first of some vertices (j,) outside, by its position if given."""
+        _require(self.inside[vertices], vertices, name, "vertex", position)
+
+    def numbers_of(self, faces: IntArray, name: str = "sources", position: IntArray | None = None) -> IntArray:
+        """Faces (j,) of the whole mesh as those of `mesh`; a `SourceError` names the first outside, as for vertices."""
+        at = np.minimum(np.searchsorted(self.faces, faces), len(self.faces) - 1)
+        _require(self.faces[at] == faces, faces, name, "face", position)
+        return np.asarray(at)
+
+
+def _require(is_inside: BoolArray, places: IntArray, name: str, kind: str, position: IntArray | None) -> None:
+    if not is_inside.all():
+        first = int(np.argmin(is_inside))
+        at = first if position is None else int(position[first])
+        raise SourceError(
+            f"{name}[{at}]: {kind} {places[first]} lies outside the region ({int((~is_inside).sum())} of "
+            f"{len(places)} do): leave it out, or widen the region"
+        )

@@ -1,0 +1,154 @@
+"""Distances in a region are those on the mesh cut out of the whole, under the numbers of the whole."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+import heat_igl
+from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, SourceError, SurfacePoints, shapes
+
+
+def bumpy() -> Mesh:
+    mesh = shapes.icosphere(3)
+    return Mesh(mesh.V * np.random.default_rng(3).uniform(0.9, 1.1, (mesh.n_vertices, 1)), mesh.F)
+
+
+def random_region(mesh: Mesh, rng: np.random.Generator) -> np.ndarray:
+    """A mask of vertices or of faces, with holes and several parts."""
+    at = mesh.V if rng.random() < 0.5 else mesh.V[mesh.F].mean(axis=1)
+    hills = sum(np.cos(at @ rng.normal(scale=3, size=3) + rng.uniform(0, 6)) for _ in range(3))
+    return np.asarray(hills < np.quantile(hills, rng.uniform(0.3, 0.95)))
+
+
+def cut_out(mesh: Mesh, region: np.ndarray) -> tuple[Mesh, np.ndarray, np.ndarray]:
+    """The faces of a region as a mesh of their own, its vertices, and its faces."""
+    faces = np.flatnonzero(region[mesh.F].all(axis=1) if len(region) == mesh.n_vertices else region)
+    used, F = np.unique(mesh.F[faces], return_inverse=True)
+    return Mesh(mesh.V[used], F.reshape(-1, 3)), used, faces
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_distances_are_those_on_the_mesh_cut_out(seed):
+    mesh, rng = bumpy(), np.random.default_rng(seed)
+    region = random_region(mesh, rng)
+    part, used, faces = cut_out(mesh, region)
+    outside = np.setdiff1d(np.arange(mesh.n_vertices), used)
+    sources = rng.integers(len(used), size=2)
+    spots = np.sort(rng.integers(len(faces), size=2)), rng.dirichlet([1, 1, 1], 2)
+    for there, here in (
+        (used[sources], sources),
+        (SurfacePoints(faces[spots[0]], spots[1]), SurfacePoints(*spots)),
+        ([int(used[sources[0]]), SurfacePoints(faces[spots[0]], spots[1])], [int(sources[0]), SurfacePoints(*spots)]),
+    ):
+        exact = heat_igl.geodesic_distance(mesh, there, method="exact", region=region)
+        np.testing.assert_allclose(
+            exact[used], heat_igl.geodesic_distance(part, here, method="exact"), rtol=1e-12, atol=1e-12
+        )
+        assert np.isinf(exact[outside]).all()
+        for make in (GeodesicSolver, lambda m, **options: GeodesicSolver(m, method="sweep", **options)):
+            np.testing.assert_allclose(
+                make(mesh, region=region).distance(there)[used], make(part).distance(here), rtol=2e-5
+            )
+    solver = HeatMethodSolver(mesh, region=region)
+    heat = solver.distance(used[sources])
+    np.testing.assert_allclose(heat[used], HeatMethodSolver(part).distance(sources), rtol=1e-6, atol=1e-9)
+    assert np.isinf(heat[outside]).all()
+    near, alone = (
+        heat_igl.distances_within(m, 0.7, s, **options).toarray()
+        for m, s, options in ((mesh, used[sources], {"region": region}), (part, sources, {}))
+    )
+    np.testing.assert_allclose(near[:, used], alone, rtol=1e-12)
+    assert not near[:, outside].any()
+
+
+def test_local_queries_in_a_region():
+    mesh = bumpy()
+    region = mesh.V[:, 2] < 0.4
+    part, used, _ = cut_out(mesh, region)
+    rows = heat_igl.distances_within(mesh, 0.4, region=region)
+    np.testing.assert_allclose(rows.toarray()[np.ix_(used, used)], heat_igl.distances_within(part, 0.4).toarray())
+    assert rows.shape == (mesh.n_vertices,) * 2
+    assert rows[[int(np.flatnonzero(~region)[0])]].nnz == 0
+    vertices, distances = heat_igl.nearest_vertices(mesh, 4, region=region)
+    expected = heat_igl.nearest_vertices(part, 4)
+    np.testing.assert_array_equal(vertices[used], used[expected[0]])
+    np.testing.assert_allclose(distances[used], expected[1], rtol=1e-12)
+    assert (vertices[~region] == -1).all()
+    pairs = np.random.default_rng(0).integers(len(used), size=(30, 2))
+    np.testing.assert_allclose(
+        heat_igl.pair_distances(mesh, used[pairs], region=region), heat_igl.pair_distances(part, pairs), rtol=1e-12
+    )
+    far = int(np.flatnonzero(~region)[0])
+    assert np.isinf(heat_igl.pair_distances(mesh, [[used[0], far]], region=region)[0])
+
+
+def test_the_rest_of_a_solver_in_a_region():
+    mesh = bumpy()
+    region = mesh.V[:, 2] < 0.4
+    part, used, faces = cut_out(mesh, region)
+    solver, alone = GeodesicSolver(mesh, tolerance=0, region=region), GeodesicSolver(part, tolerance=0)
+    cells, expected = solver.voronoi(used[[3, 40, 90]]), alone.voronoi([3, 40, 90])
+    np.testing.assert_array_equal(cells.labels[used], expected.labels)
+    assert (cells.labels[~region] == -1).all()
+    np.testing.assert_allclose(solver.distances([[int(used[3])], used[:2]])[:, used], alone.distances([[3], [0, 1]]))
+    found, wanted = solver.directions(int(used[3])), alone.directions(3)
+    np.testing.assert_allclose(found.departure[used], wanted.departure, atol=1e-12)
+    np.testing.assert_array_equal(found.start.faces[used], faces[wanted.start.faces])
+    (phi, pull_back), (other, back) = solver.distance_vjp(int(used[3])), alone.distance_vjp(3)
+    np.testing.assert_allclose(phi[used], other, rtol=1e-12)
+    g = np.random.default_rng(0).normal(size=len(used))
+    whole = np.zeros(mesh.n_vertices)
+    whole[used] = g
+    np.testing.assert_allclose(pull_back(whole)[used], back(g), atol=1e-10)
+    moved = solver.with_vertices(2 * mesh.V)
+    np.testing.assert_allclose(moved.distance(int(used[3]))[used], 2 * other, rtol=1e-12)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(solver)).distance(int(used[3])), phi)
+    heat = HeatMethodSolver(mesh, region=region)
+    np.testing.assert_allclose(
+        heat.with_vertices(2 * mesh.V).distance(int(used[3]))[used], 2 * heat.distance(int(used[3]))[used], rtol=1e-6
+    )
+    sites = heat_igl.farthest_points(solver, 6, start=int(used[0]))
+    assert region[sites].all()
+    spot = SurfacePoints(faces[[5]], [[0.2, 0.3, 0.5]])
+    there = heat_igl.geodesic_distance(mesh, int(used[3]), method="exact", targets=spot, region=region)
+    here = heat_igl.geodesic_distance(part, 3, method="exact", targets=SurfacePoints([5], [[0.2, 0.3, 0.5]]))
+    np.testing.assert_allclose(there, here, rtol=1e-12)
+
+
+def test_a_ring_is_gone_around_and_tetrahedra_too():
+    mesh = shapes.grid(8)
+    x, y, _ = mesh.V[mesh.F].mean(axis=1).T
+    wall = (np.abs(x - 0.5) < 0.125) & (y < 0.875)
+    phi = heat_igl.geodesic_distance(mesh, 0, method="exact", region=~wall)
+    assert phi[8] == pytest.approx(2 * np.hypot(0.375, 0.875) + 0.25)
+    assert np.flatnonzero(np.isinf(phi)).tolist() == [4 + 9 * row for row in range(7)]
+    body = heat_igl.image_domain(np.ones((3, 3, 3), bool)).mesh
+    inside = body.V[body.F].mean(axis=1)[:, 0] < 1.5
+    used = np.unique(body.F[inside])
+    phi = heat_igl.geodesic_distance(body, int(used[0]), region=inside)
+    assert np.isfinite(phi[used]).all()
+    assert np.isinf(np.delete(phi, used)).all()
+
+
+def test_names_what_is_wrong():
+    mesh = shapes.grid(4)
+    region = mesh.V[:, 0] < 0.6
+    with pytest.raises(SourceError, match=r"sources\[1\]: vertex 4 lies outside the region \(1 of 2 do\)"):
+        GeodesicSolver(mesh, region=region).distance([0, 4])
+    with pytest.raises(SourceError, match=r"sources\[0\]: vertex 4 lies outside"):
+        HeatMethodSolver(mesh, region=region).distance(4)
+    with pytest.raises(SourceError, match=r"sources\[0\]: face 7 lies outside"):
+        GeodesicSolver(mesh, region=region).distance(SurfacePoints([7], [[0.2, 0.3, 0.5]]))
+    with pytest.raises(SourceError, match=r"sources\[0\]: vertex 4 lies outside"):
+        heat_igl.distances_within(mesh, 1.0, [4], region=region)
+    with pytest.raises(SourceError, match=r"pairs\[1\]: vertex 4 lies outside"):
+        heat_igl.pair_distances(mesh, [[0, 1], [4, 0]], region=region)
+    with pytest.raises(MeshError, match="region must be a mask of bool, with 25 entries for vertices or 32 for faces"):
+        GeodesicSolver(mesh, region=[0, 1, 2])
+    with pytest.raises(MeshError, match="region selects 1 vertices, and no whole face"):
+        heat_igl.geodesic_distance(mesh, 0, region=np.arange(25) == 0)
+    with pytest.raises(MeshError, match="region selects faces of a mesh, not of PointCloud"):
+        GeodesicSolver(heat_igl.PointCloud(shapes.icosphere(2).V), region=np.ones(162, bool))
