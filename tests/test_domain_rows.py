@@ -13,7 +13,7 @@ import heat_igl
 from heat_igl import HeatMethodSolver, cli
 from heat_igl.validation import domains
 from heat_igl.validation.domains import CASES, DOMAINS, body_cases, surface_cases
-from heat_igl.validation.domains.case import OPTIONS
+from heat_igl.validation.domains.case import METHODS
 
 
 def test_every_kind_of_domain_passes():
@@ -104,7 +104,7 @@ def test_the_report_in_every_format(capsys: pytest.CaptureFixture[str]):
 
 
 def test_a_row_that_does_not_pass_sets_the_status(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setitem(OPTIONS, "default", {"magnitude": "unit"})  # type: ignore[arg-type]
+    monkeypatch.setitem(METHODS, "default", "heat")  # type: ignore[arg-type]
     assert cli.run(["validate-domains", "--domain", "tetrahedra"]) == 1
     shown = capsys.readouterr()
     assert "| 1 | NO |" in shown.out
