@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 import heat_igl
+from heat_igl.geodesic import DistanceMethod, SolverChoice
 from heat_igl.typing import FloatArray
 
 from measuring import Query, drawn_sources, errors, exact_distance, potpourri3d, seconds_of
@@ -27,12 +28,8 @@ from scaffold import add_json, environment, option_parser, publish, table
 Row = dict[str, Any]
 
 
-def ours(refine: str | None) -> Callable[[heat_igl.Mesh], Query]:
-    return lambda mesh: heat_igl.HeatMethodSolver(mesh, refine=refine).distance
-
-
-def without_factorization(mesh: heat_igl.Mesh) -> Query:
-    return lambda source: heat_igl.unfolded_distance(mesh.V, mesh.F, source)
+def ours(method: DistanceMethod) -> Callable[[heat_igl.Mesh], Query]:
+    return lambda mesh: SolverChoice(method).on(mesh).distance
 
 
 def front(mesh: heat_igl.Mesh) -> Query:
@@ -57,10 +54,9 @@ def front(mesh: heat_igl.Mesh) -> Query:
 METHODS: dict[str, Callable[[heat_igl.Mesh], Query]] = {
     "potpourri3d": potpourri3d,
     "MeshLab front": front,
-    "heat": ours(None),
+    "heat": ours("heat"),
     "sweep": ours("sweep"),
-    "unfold": ours("unfold"),
-    "unfolded_distance": without_factorization,
+    "windows": ours("windows"),
 }
 
 

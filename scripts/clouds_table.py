@@ -30,7 +30,16 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl import HeatMethodSolver, PointCloud, VectorHeatSolver, log_map, read_mesh, shapes, tangent_frames
+from heat_igl import (
+    GeodesicSolver,
+    HeatMethodSolver,
+    PointCloud,
+    VectorHeatSolver,
+    log_map,
+    read_mesh,
+    shapes,
+    tangent_frames,
+)
 from heat_igl.typing import FloatArray
 
 from scaffold import add_json, add_seed, environment, option_parser, publish, table
@@ -64,13 +73,13 @@ def torus(n: int, rng: np.random.Generator) -> tuple[FloatArray, Truth]:
     finer = int(np.ceil(np.sqrt(n / 144_000)))
     mesh = shapes.torus(240 * finer, 600 * finer)
     chosen = rng.choice(mesh.n_vertices, n, replace=False)
-    solver = HeatMethodSolver(mesh, refine="unfold")
+    solver = GeodesicSolver(mesh)
     return mesh.V[chosen], lambda i: solver.distance(int(chosen[i]))[chosen]
 
 
 def vertices(file: str, _: np.random.Generator) -> tuple[FloatArray, Truth]:
     mesh = read_mesh(file)
-    return mesh.V, HeatMethodSolver(mesh, refine="unfold").distance
+    return mesh.V, GeodesicSolver(mesh).distance
 
 
 SHAPES = {"sphere": sphere, "torus": torus, "cylinder": cylinder, "square": square}
@@ -95,7 +104,7 @@ def timed(
     return 100 * float(np.mean(errors)), made, asked
 
 
-METHODS = ("heat", "default", "unfold", "potpourri3d")
+METHODS = ("heat", "default", "windows", "potpourri3d")
 
 
 def measure(
@@ -105,9 +114,9 @@ def measure(
 
     sources = rng.choice(len(P), k, replace=False).tolist()
     make: dict[str, Callable[[], Callable[[int], FloatArray]]] = {
-        "heat": lambda: HeatMethodSolver(PointCloud(P), magnitude="damped").distance,
-        "default": lambda: HeatMethodSolver(PointCloud(P)).distance,
-        "unfold": lambda: HeatMethodSolver(PointCloud(P), refine="unfold").distance,
+        "heat": lambda: HeatMethodSolver(PointCloud(P)).distance,
+        "default": lambda: GeodesicSolver(PointCloud(P)).distance,
+        "windows": lambda: GeodesicSolver(PointCloud(P), method="windows").distance,
         "potpourri3d": lambda: potpourri3d.PointCloudHeatSolver(P).compute_distance,
     }
     return {name: timed(make[name], sources, truth) for name in methods}
@@ -156,14 +165,14 @@ def log_maps(file: str, sources: int, rng: np.random.Generator) -> dict[str, tup
 
     mesh = read_mesh(file)
     on_mesh = tangent_frames(mesh)
-    heat, unfold = (VectorHeatSolver(PointCloud(mesh.V), refine=refine) for refine in (None, "unfold"))
+    heat, paths = (VectorHeatSolver(PointCloud(mesh.V), method=method) for method in ("heat", "windows"))
     peer = potpourri3d.PointCloudHeatSolver(mesh.V)
     of_peer = peer.get_tangent_frames()
-    found: dict[str, list[tuple[float, float]]] = {"heat": [], "unfold": [], "potpourri3d": []}
+    found: dict[str, list[tuple[float, float]]] = {"heat": [], "paths": [], "potpourri3d": []}
     for i in rng.choice(mesh.n_vertices, sources, replace=False).tolist():
         exact = log_map(mesh, i, method="exact")
         away = np.linalg.norm(exact, axis=1) > 0
-        for name, solver in (("heat", heat), ("unfold", unfold)):
+        for name, solver in (("heat", heat), ("paths", paths)):
             vectors = solver.log_map(i) @ [solver.frames.x[i], solver.frames.y[i]]
             found[name].append(_apart(on_mesh.from_world(vectors, np.full(len(vectors), i))[away], exact[away]))
         vectors = peer.compute_log_map(i) @ np.stack([of_peer[0][i], of_peer[1][i]])
@@ -184,7 +193,7 @@ def log_map_table(arguments: argparse.Namespace) -> None:
         found = log_maps(file, arguments.sources, np.random.default_rng(arguments.seed))
         rows.append({"vertices of": Path(file).stem, **found})
         print(rows[-1], file=sys.stderr, flush=True)
-    methods = ("heat", "unfold", "potpourri3d")
+    methods = ("heat", "paths", "potpourri3d")
     head = ["vertices of", *(f"{m}, degrees, %" for m in methods)]
     cells = [(str(row["vertices of"]), *(f"{row[m][0]:.2g}, {row[m][1]:.2g}" for m in methods)) for row in rows]
     publish({"environment": environment(), "rows": rows}, "\n".join(table(head, cells)), json_file=arguments.json)

@@ -117,17 +117,17 @@ def _peak() -> int:
     return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmHWM"))) * 1024
 
 
-def memory(name: str, mesh: Mesh, refine: Any) -> dict[str, Any]:
+def memory(name: str, mesh: Mesh, method: str) -> dict[str, Any]:
     """Peak memory of a worker that does one mesh, beside the bound that the batch states for it."""
     with tempfile.TemporaryDirectory() as scratch, cluster.connected(n_workers=1) as client:
         sources = list(range(2 * SOURCES))
-        cluster.distances({name: mesh}, sources, Path(scratch) / "store", client=client, refine=refine)
+        cluster.distances({name: mesh}, sources, Path(scratch) / "store", client=client, method=method)
         (peak,) = client.run(_peak).values()
     stated = PROCESS_MEMORY + solver_memory(mesh)
     return {
         "mesh": name,
         "vertices": mesh.n_vertices,
-        "refine": refine,
+        "method": method,
         "peak": peak,
         "stated": stated,
         "ratio": peak / stated,
@@ -171,7 +171,7 @@ def markdown(result: dict[str, Any]) -> str:
         (
             row["mesh"],
             f"{row['vertices']}",
-            row["refine"] or "",
+            row["method"],
             *(f"{row[name] / 2**20:.0f}" for name in ("peak", "stated")),
             f"{row['ratio']:.2f}",
         )
@@ -185,7 +185,7 @@ def markdown(result: dict[str, Any]) -> str:
         f"Two workers are {rate['rate_of_two']:.2f} times as fast as one. One worker takes "
         f"{100 * rate['overhead']:+.1f} % more time than the loop. Same bits: {'yes' if rate['same_bits'] else 'NO'}.",
         "",
-        *table("mesh | vertices | refine | peak memory, MiB | stated, MiB | ratio".split(" | "), memory_cells, (0, 2)),
+        *table("mesh | vertices | method | peak memory, MiB | stated, MiB | ratio".split(" | "), memory_cells, (0, 2)),
     ]
     return "\n".join(lines)
 
@@ -208,7 +208,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     result = {
         "environment": environment(),
         "rates": rates(arguments.meshes, arguments.add, arguments.repeats),
-        "memory": [memory(*each, refine) for each in memory_meshes(arguments.add) for refine in (None, "sweep")],
+        "memory": [memory(*each, method) for each in memory_meshes(arguments.add) for method in ("heat", "sweep")],
     }
     page = publish(result, markdown(result), folder=arguments.out, name="cluster_table")
     if arguments.docs:

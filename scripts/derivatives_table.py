@@ -22,15 +22,15 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl import HeatMethodSolver, Mesh, shapes
+from heat_igl import Mesh, shapes
+from heat_igl.geodesic import Solver, SolverChoice
 from heat_igl.heat_method.derivatives import DistanceDerivative
 from heat_igl.typing import FloatArray
 
 from scaffold import add_output, add_seed, environment, option_parser, over_meshes, publish, table
 
 METHODS: dict[str, dict[str, Any]] = {
-    "exact": {"refine": "exact"},
-    "unfold": {"refine": "unfold"},
+    "exact": {"method": "exact"},
     "heat": {"laplacian": "intrinsic-delaunay"},
 }
 SHAPES: dict[str, Callable[[], Mesh]] = {
@@ -45,7 +45,7 @@ _MOVED = 0.01
 # Step of the differences in mean edge lengths: few kinks lie within it, and rounding is 1e-6 for heat.
 _STEP = 1e-7
 # A second difference above this share of a step is a kink, and not the curvature of a smooth function.
-_KINK = {"exact": 1e-5, "unfold": 1e-5, "heat": 1e-4}
+_KINK = {"exact": 1e-5, "heat": 1e-4}
 _CALLS = 5
 
 
@@ -58,7 +58,7 @@ def measured(mesh: Mesh, n_directions: int, seed: int) -> dict[str, Any]:
     source = int(rng.choice(np.unique(mesh.F)))
     row: dict[str, Any] = {"n": mesh.n_vertices}
     for name, options in METHODS.items():
-        solver = HeatMethodSolver(moved, **options)
+        solver = SolverChoice.of(**options).on(moved)
         distance, pull_back = solver.distance_vjp(source)
         directions = np.random.default_rng(seed + 1).standard_normal((n_directions, *V.shape))
         row[name] = {
@@ -76,7 +76,7 @@ def roughened(mesh: Mesh) -> Mesh:
 
 
 def compared(
-    solver: HeatMethodSolver,
+    solver: Solver,
     mesh: Mesh,
     source: int,
     pull_back: DistanceDerivative,
@@ -135,7 +135,7 @@ def identities(mesh: Mesh, distance: FloatArray, pull_back: DistanceDerivative, 
 
 
 def costs(
-    solver: HeatMethodSolver, source: int, pull_back: DistanceDerivative, g: FloatArray, direction: FloatArray
+    solver: Solver, source: int, pull_back: DistanceDerivative, g: FloatArray, direction: FloatArray
 ) -> dict[str, float]:
     """Processor time of both directions in queries, medians of alternating calls; bytes per vertex at most."""
     calls = (lambda: solver.distance(source), lambda: pull_back(g), lambda: pull_back.push_forward(direction))

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 import heat_igl
-from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, VectorHeatSolver, exp_map, log_map, tangent_frames
+from heat_igl import GeodesicSolver, Mesh, SurfacePoints, VectorHeatSolver, exp_map, log_map, tangent_frames
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 from scaffold import add_output, add_seed, environment, option_parser, over_meshes, publish, table
@@ -84,14 +84,13 @@ def in_our_frame(mesh: Mesh, source: int, theirs: FloatArray, axes: Sequence[Flo
 
 def log_maps(mesh: Mesh, sources: IntArray) -> list[dict[str, Any]]:
     """Errors of each way to the log map, and the largest |exp(log x) - x| at the ends of straight paths."""
-    solvers = {refine: HeatMethodSolver(mesh, refine=refine) for refine in ("unfold", "exact")}
+    solver = GeodesicSolver(mesh)
     rows = []
     for source in sources.tolist():
         truth, straight = exact_log(mesh, source)
         away = away_from_jumps(mesh, truth)
         ways = {"log_map": log_map(mesh, source)}
-        ways |= {f"solver, {refine}": log_map(solver, source) for refine, solver in solvers.items()}
-        ways |= {f"directions, {r}": as_vectors(solver, source) for r, solver in solvers.items()}
+        ways |= {"solver": log_map(solver, source), "directions": as_vectors(solver, source)}
         ways["vector-heat"] = log_map(mesh, source, method="vector-heat")
         ways |= {name: in_our_frame(mesh, source, *log) for name, log in peer_log_maps(mesh, source).items()}
         found = {name: errors(log, truth, away) for name, log in ways.items()}
@@ -103,7 +102,7 @@ def log_maps(mesh: Mesh, sources: IntArray) -> list[dict[str, Any]]:
     return rows
 
 
-def as_vectors(solver: HeatMethodSolver, source: int) -> FloatArray:
+def as_vectors(solver: GeodesicSolver, source: int) -> FloatArray:
     found = solver.directions(source)
     return heat_igl.TangentFrames.from_angles(found.departure, found.distance)
 
@@ -122,7 +121,7 @@ def vector_heat(mesh: Mesh, sources: IntArray) -> dict[str, Any]:
     """Mean errors of values and directions from three sources, against those of the nearest one along the path."""
     import potpourri3d
 
-    ours, near = VectorHeatSolver(mesh), VectorHeatSolver(mesh, refine="exact")
+    ours, near = VectorHeatSolver(mesh), VectorHeatSolver(mesh, method="windows")
     theirs = potpourri3d.MeshVectorHeatSolver(mesh.V, mesh.F)
     x, y, _ = theirs.get_tangent_frames()
     vectors = ours.frames.from_angles([0.0, 2.0, 4.0])
@@ -171,15 +170,12 @@ def costs(mesh: Mesh, sources: IntArray) -> dict[str, list[float]]:
     curves = [
         heat_igl.shortest_paths(mesh, None, int(a), int(b))[0] for a, b in zip(sources, sources[::-1], strict=True)
     ]
-    for refine in ("unfold", "exact"):
-        solver = HeatMethodSolver(mesh, refine=refine)
-        for kind, all_of_kind in (("vertex", sources.tolist()), ("point", points), ("curve", curves)):
-            turns = range(len(all_of_kind))
-            found[f"{refine}, {kind}"] = paired(
-                lambda i, s=solver, a=all_of_kind: s.directions(a[i]),
-                lambda i, s=solver, a=all_of_kind: s.distance(a[i]),
-                turns,
-            )
+    solver = GeodesicSolver(mesh)
+    for kind, all_of_kind in (("vertex", sources.tolist()), ("point", points), ("curve", curves)):
+        turns = range(len(all_of_kind))
+        found[kind] = paired(
+            lambda i, a=all_of_kind: solver.directions(a[i]), lambda i, a=all_of_kind: solver.distance(a[i]), turns
+        )
     return found
 
 
@@ -188,7 +184,7 @@ def log_map_times(mesh: Mesh, sources: IntArray) -> dict[str, list[float]]:
     import potpourri3d
 
     V, F = mesh.V, mesh.F
-    theirs, ours = potpourri3d.MeshVectorHeatSolver(V, F), HeatMethodSolver(mesh, refine="unfold")
+    theirs, ours = potpourri3d.MeshVectorHeatSolver(V, F), GeodesicSolver(mesh)
     return {
         "from arrays": paired(
             lambda v: log_map(Mesh(V, F), v),

@@ -7,7 +7,7 @@
 
 Truth is pygeodesic's (extra ``validate``); meshes that it refuses have no such column. The program of VTP (Qin et al.
 2016) is called with ``-m FILE -s VERTEX -o DISTANCES``, each time beside exact distance from arrays. Local queries are
-compared with a query of the unfolding solver. Times are those of the processor, as VTP prints them, summed over
+compared with a full query. Times are those of the processor, as VTP prints them, summed over
 threads. The rows of the matrix are those of the first vertices of a torus of 100 000.
 """
 
@@ -26,15 +26,15 @@ from typing import Any
 import numpy as np
 
 from heat_igl import (
-    HeatMethodSolver,
+    GeodesicSolver,
     Mesh,
     ReferenceSolverError,
     distances_within,
+    geodesic_distance,
     nearest_vertices,
     pair_distances,
     reference,
     shapes,
-    unfolded_distance,
     write_distances_within,
     write_mesh,
 )
@@ -42,7 +42,6 @@ from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.runtime import PeakMemory
 from heat_igl.unfolding import exact_distance
 from heat_igl.unfolding.exact import ExactSurface
-from heat_igl.unfolding.refinement import TOLERANCE
 
 from measuring import drawn_sources
 from scaffold import add_output, environment, option_parser, over_meshes, publish, table
@@ -62,11 +61,6 @@ def measured(mesh: Mesh, n_sources: int, repeats: int, vtp: Path | None) -> dict
         "n": mesh.n_vertices,
         "windows per edge": float(np.mean([found.n_windows for found in solutions])) / len(mesh.edges),
         "from arrays": processor_seconds(lambda: exact_distance(mesh.V.copy(), mesh.F.copy(), sources[0]), repeats),
-        "unfolded from arrays": processor_seconds(
-            # Not the default, with which small meshes take windows.
-            lambda: unfolded_distance(mesh.V.copy(), mesh.F.copy(), sources[0], tolerance=1.001 * TOLERANCE),
-            repeats,
-        ),
         "per query": processor_seconds(lambda: surface.solve(np.array([sources[0]])), repeats),
     }
     with PeakMemory() as peak:
@@ -101,7 +95,7 @@ def processor_seconds(call: Callable[[], object], repeats: int) -> float:
 
 
 def local(mesh: Mesh, source: int, distance: Any, repeats: int) -> dict[str, Any]:
-    """Seconds of each of many local queries, preparation shared, and of one query of unfolding."""
+    """Seconds of each of many local queries, preparation shared, and of one full query."""
     rng = np.random.default_rng(0)
     usable = np.flatnonzero(np.isfinite(distance))
     drawn = rng.choice(usable, min(_LOCAL, len(usable)), replace=False)
@@ -112,9 +106,9 @@ def local(mesh: Mesh, source: int, distance: Any, repeats: int) -> dict[str, Any
     for vertex, begin, end in zip(drawn, near.indptr[:-1], near.indptr[1:], strict=True):
         best = np.argmin(np.abs(near.data[begin:end] - apart))
         pairs.append((vertex, near.indices[begin + best]))
-    solver = HeatMethodSolver(mesh, refine="unfold")
+    solver = GeodesicSolver(mesh)
     return {
-        "unfolded": processor_seconds(lambda: solver.distance(source), max(repeats, 5)),
+        "query": processor_seconds(lambda: solver.distance(source), max(repeats, 5)),
         "within": processor_seconds(lambda: distances_within(mesh, radius, drawn), repeats) / len(drawn),
         "held": float(np.diff(distances_within(mesh, radius, drawn).indptr).mean()),
         "pair": processor_seconds(lambda: pair_distances(mesh, pairs), repeats) / len(pairs),
@@ -129,15 +123,15 @@ def beside_vtp(program: Path, mesh: Mesh, source: int, repeats: int) -> dict[str
             run_vtp(program, mesh, source)[0],
             # Three times: the first call after another program finds nothing in the caches.
             processor_seconds(lambda: exact_distance(mesh.V.copy(), mesh.F.copy(), source), 3),
-            processor_seconds(lambda: unfolded_distance(mesh.V.copy(), mesh.F.copy(), source), 3),
+            processor_seconds(lambda: geodesic_distance((mesh.V.copy(), mesh.F.copy()), source), 3),
         )
         for _ in range(repeats)
     ]
-    theirs, exact, unfolded = np.array(rows).T
+    theirs, exact, within = np.array(rows).T
     return {
         "vtp": float(np.median(theirs)),
         "share": float(np.median(exact / theirs)),
-        "unfolded share": float(np.median(unfolded / theirs)),
+        "tolerance share": float(np.median(within / theirs)),
     }
 
 
@@ -174,28 +168,28 @@ def _mebibytes(size: int | None) -> str:
     return "-" if size is None else f"{size / 2**20:.1f}"
 
 
-_OPTIONAL = (("vtp", 3), ("share", 2), ("unfolded share", 2), ("difference", 2), ("vtp difference", 2))
+_OPTIONAL = (("vtp", 3), ("share", 2), ("tolerance share", 2), ("difference", 2), ("vtp difference", 2))
 
 
 def markdown(result: dict[str, Any]) -> str:
     rows, shares, memory = [], [], []
     for name, row in result["meshes"].items():
         optional = (f"{row[key]:.{digits}g}" if key in row else "-" for key, digits in _OPTIONAL)
-        timed = ("from arrays", "per query", "unfolded from arrays", "unfolded")
+        timed = ("from arrays", "per query")
         seconds = (f"{row['windows per edge']:.2f}", *(f"{row[key]:.4f}" for key in timed))
         rows.append((name, f"{row['n']}", *seconds, *optional))
-        parts = (f"1/{row['unfolded'] / row[key]:.0f}" for key in ("within", "pair"))
+        parts = (f"1/{row['query'] / row[key]:.0f}" for key in ("within", "pair"))
         last = (f"{1e6 * row['pair']:.1f}", f"{row['nearest']:.2f}")
-        shares.append((name, f"{row['unfolded']:.4f}", f"{row['held']:.0f}", *parts, *last))
+        shares.append((name, f"{row['query']:.4f}", f"{row['held']:.0f}", *parts, *last))
         memory.append((name, *(_mebibytes(row.get(key)) for key in ("peak", "their peak"))))
-    times = ("from arrays, s", "per query, s", "unfolded from arrays, s", "per unfolded query, s")
-    head = ("mesh", "vertices", "windows per edge", *times, "VTP, s", "from arrays / VTP", "`unfolded_distance` / VTP")
+    times = ("from arrays, s", "per query, s")
+    head = ("mesh", "vertices", "windows per edge", *times, "VTP, s", "from arrays / VTP", "to the tolerance / VTP")
     nearest = f"{_NEAREST} nearest of all, s"
-    local_head = ("mesh", "unfolded query, s", "vertices within", "within", "pair", "pair, µs", nearest)
+    local_head = ("mesh", "query, s", "vertices within", "within", "pair", "pair, µs", nearest)
     lines = [
         *table((*head, "difference to pygeodesic", "to VTP"), rows),
         "",
-        f"Local queries as a share of an unfolded one, of {_LOCAL}, preparation included: a radius "
+        f"Local queries as a share of a full one, of {_LOCAL}, preparation included: a radius "
         f"that holds {100 * _SHARE:.0f} % of the vertices around one of them, and pairs {_APART:g} mean edges apart.",
         "",
         *table(local_head, shares),

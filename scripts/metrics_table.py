@@ -3,7 +3,7 @@
     python scripts/metrics_table.py [--rows 48] [--points 20000] [--sources 3] [--seed 0] [--json FILE]
 
 Every row has a closed form. Prints, as a Markdown table, the mean of |d - exact| / exact over vertices and sources in
-percent for the default of `HeatMethodSolver` and for other methods, "-" where a method does not apply. "heat" is the
+percent for the default of `GeodesicSolver` and for other methods, "-" where a method does not apply. "heat" is the
 paper's method, ``magnitude="unit"``. For tetrahedra, also by how much the worst value is below the straight line, and
 seconds to make the solver and for a query. docs/metrics.md shows the tables.
 """
@@ -20,13 +20,13 @@ import numpy as np
 
 from heat_igl import (
     AccuracyWarning,
-    HeatMethodSolver,
     Mesh,
     geodesic_distance,
     metric_operators,
     shapes,
     speed_operators,
 )
+from heat_igl.geodesic import SolverChoice
 from heat_igl.operators import Operators
 from heat_igl.typing import BoolArray, FloatArray
 from heat_igl.validation.domains.body_cases import around_the_edge, delaunay, without
@@ -36,10 +36,10 @@ from scaffold import add_json, add_seed, environment, option_parser, publish, ta
 
 Truth = Callable[[int], FloatArray]
 METHODS: dict[str, dict[str, Any]] = {
-    "default": {},
+    "default": {"method": "auto"},
     "heat": {"magnitude": "unit"},
-    "sweep": {"refine": "sweep"},
-    "unfold": {"refine": "unfold"},
+    "sweep": {"method": "sweep"},
+    "windows": {"method": "windows"},
 }
 
 
@@ -136,9 +136,9 @@ def surfaces_table(rows: int, k: int, rng: np.random.Generator) -> list[dict[str
             sources = rng.choice(domain.n_given, k, replace=False).tolist()
             row: dict[str, Any] = {"case": name}
             for method, options in METHODS.items():
-                if method == "unfold" and domain.surface is None:
+                if method == "windows" and domain.surface is None:
                     continue
-                solver = HeatMethodSolver.from_operators(domain, **options)
+                solver = SolverChoice.of(**options).on(domain)
                 row[method] = float(np.mean([mean_error(solver.distance(i), truth(i)) for i in sources]))
             found.append(row)
             print(row, file=sys.stderr, flush=True)
@@ -152,7 +152,7 @@ def bodies_table(points: int, k: int, rng: np.random.Generator) -> list[dict[str
         row: dict[str, Any] = {"body": name, "vertices": mesh.n_vertices, "tetrahedra": mesh.n_faces}
         for method in ("default", "heat"):
             start = time.perf_counter()
-            solver = HeatMethodSolver(mesh, **METHODS[method])
+            solver = SolverChoice.of(**METHODS[method]).on(mesh)
             made = time.perf_counter() - start
             start = time.perf_counter()
             distances = [solver.distance(i) for i in sources]

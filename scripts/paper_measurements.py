@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from scipy.optimize import curve_fit
 
-from heat_igl import HeatMethodSolver, baselines, shapes
+from heat_igl import GeodesicSolver, HeatMethodSolver, baselines, shapes
 from heat_igl.operators import operators
 from heat_igl.steps import diffuse, integrate, normalize
 
@@ -77,7 +77,7 @@ def accuracy(i: int) -> dict[str, float]:
 
     ``edges`` is the curve that the paper's section 4.2.2 expects, paths along edges; ``bound`` the one it is bounded
     by. ``heat`` is the paper's three steps at its t, ``log_gradient`` takes the direction from log u instead of u;
-    ``default`` and ``sweep`` are `HeatMethodSolver` without and with ``refine="sweep"``.
+    ``default`` and ``sweep`` are `HeatMethodSolver`, and `GeodesicSolver` with ``method="sweep"``.
     """
     square = shapes.grid(i)
     truth = np.linalg.norm(square.V, axis=1)
@@ -97,7 +97,7 @@ def accuracy(i: int) -> dict[str, float]:
         "heat": error(integrate(domain, normalize(domain, u))),
         "log_gradient": error(integrate(domain, normalize(domain, np.log(u)))),
         "default": error(HeatMethodSolver(square).distance(0)),
-        "sweep": error(HeatMethodSolver(square, refine="sweep").distance(0)),
+        "sweep": error(GeodesicSolver(square, method="sweep").distance(0)),
     }
 
 

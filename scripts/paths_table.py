@@ -23,7 +23,7 @@ import numpy as np
 import scipy.sparse.csgraph as csgraph
 
 import heat_igl
-from heat_igl import GeodesicPathSolver, HeatMethodSolver, Mesh, edge_curve, reference, shortest_paths
+from heat_igl import GeodesicPathSolver, Mesh, edge_curve, geodesic_distance, reference, shortest_paths
 
 from scaffold import add_output, add_seed, environment, option_parser, publish, table
 
@@ -38,8 +38,8 @@ def measured(mesh: Mesh, name: str, n_targets: int, seed: int) -> list[dict[str,
     targets = np.array(drawn)
     exact = reference.exact(mesh, int(source))[targets]
     rows = []
-    for refine in ("unfold", None):
-        distance = HeatMethodSolver(mesh, refine=refine).distance(int(source))
+    for method in ("windows", "heat"):
+        distance = geodesic_distance(mesh, int(source), method=method)
         start = time.perf_counter()
         paths = shortest_paths(mesh, distance, targets, int(source))
         seconds = time.perf_counter() - start
@@ -49,7 +49,7 @@ def measured(mesh: Mesh, name: str, n_targets: int, seed: int) -> list[dict[str,
             {
                 "mesh": name,
                 "n": mesh.n_vertices,
-                "down": refine or "heat",
+                "down": method,
                 "targets": len(targets),
                 "median": float(np.median(error)),
                 "mean": float(error.mean()),

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl import HeatMethodSolver, Mesh, write_mesh
+from heat_igl import GeodesicSolver, Mesh, write_mesh
 
 from scaffold import environment_line, fill_in, table
 
@@ -40,9 +40,9 @@ UNREACHED = 1e99  # VTP writes 1e100
 Prepared = tuple[Callable[[int], np.ndarray], Callable[[Sequence[int]], Any] | None, dict[str, Any]]
 
 
-def _refined(refine: str) -> Callable[[np.ndarray, np.ndarray], Prepared]:
+def _solver(method: str) -> Callable[[np.ndarray, np.ndarray], Prepared]:
     def prepare(V: np.ndarray, F: np.ndarray) -> Prepared:
-        solver = HeatMethodSolver(V, F, refine=refine)
+        solver = GeodesicSolver((V, F), method=method)
         return solver.distance, solver.distances, {}
 
     return prepare
@@ -94,8 +94,8 @@ def _vtp(V: np.ndarray, F: np.ndarray) -> Prepared:
 
 
 PREPARE = {
-    "heat_igl near-exact": _refined("unfold"),
-    "heat_igl exact": _refined("exact"),
+    "heat_igl windows": _solver("windows"),
+    "heat_igl exact": _solver("exact"),
     "potpourri3d fast marching": _fast_marching,
     "libigl exact": _libigl_exact,
     "gdist": _gdist,
@@ -113,7 +113,7 @@ def measured(
         print(name, file=sys.stderr)
         rng = np.random.default_rng(0)
         sources = rng.choice(np.flatnonzero(mesh.referenced), 6, replace=False)
-        exact = HeatMethodSolver(mesh, refine="exact").distance(int(sources[0]))
+        exact = GeodesicSolver(mesh, tolerance=0).distance(int(sources[0]))
         chosen = [method for method in methods if mesh.n_vertices <= LARGEST[method]]
         rows += measure(name, mesh, chosen, runs, sources, exact)
     return rows

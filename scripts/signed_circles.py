@@ -81,12 +81,12 @@ def circle_errors(surface: str, n: int, seed: int) -> dict[str, Any]:
         "default": SignedHeatSolver(mesh),
         "heat, t = h^2 / 4": SignedHeatSolver(mesh, t_coef=0.25),
         "heat, t with h": SignedHeatSolver(mesh, t_coef=n / 80),
-        "unfold": SignedHeatSolver(mesh, refine="unfold"),
+        "windows": SignedHeatSolver(mesh, method="windows"),
     }
     found = {name: solver.distance(curves) for name, solver in solvers.items()}
     found["polyhedral"] = np.where(truth < 0, -1, 1) * geodesic_distance(mesh, curves, method="exact")
     errors = {name: _percent(distance, truth) for name, distance in found.items()}
-    for name in ("default", "unfold"):
+    for name in ("default", "windows"):
         errors[f"{name} from polyhedral"] = _percent(found[name], found["polyhedral"])
     return {"surface": surface, "n": n, "vertices": mesh.n_vertices} | errors
 

@@ -29,10 +29,10 @@ from heat_igl import (
     SignedHeatSolver,
     SurfaceCurve,
     cut,
+    geodesic_distance,
     isolines,
     region_boundary,
     sublevel_areas,
-    unfolded_distance,
 )
 from heat_igl.typing import FloatArray
 
@@ -105,7 +105,7 @@ def our_solvers(mesh: Mesh) -> dict[str, Any]:
     return {
         "default": SignedHeatSolver(mesh),
         "heat": SignedHeatSolver(mesh, t_coef=T_COEFS[0]),
-        "unfold": SignedHeatSolver(mesh, refine="unfold"),
+        "windows": SignedHeatSolver(mesh, method="windows"),
     }
 
 
@@ -116,7 +116,7 @@ def measure_case(mesh: Mesh, solvers: dict[str, Any], share: float, rng: np.rand
     whole = isolines(mesh, values, level)[0]
     gaps = int(rng.integers(1, 7))
     pieces = [piece for curve in whole for piece in broken(mesh, curve, share, gaps, rng)]
-    truth = np.where(values < level, -1, 1) * unfolded_distance(mesh, whole)
+    truth = np.where(values < level, -1, 1) * geodesic_distance(mesh, whole)
     size = float(np.sqrt(sublevel_areas(mesh, values, level)[0]))
     answers: dict[str, FloatArray | None] = {}
     for name, solver in solvers.items():
@@ -154,7 +154,7 @@ def measure_times(mesh: Mesh, rounds: int) -> dict[str, float]:
         solver = potpourri3d.MeshSignedHeatSolver(mesh.V, mesh.F)
         solver.compute_distance(nodes, level_set_constraint="None")
 
-    solver, refined = ours(), SignedHeatSolver(mesh, refine="unfold")
+    solver, refined = ours(), SignedHeatSolver(mesh, method="windows")
     queries = {
         "query": lambda: solver.distance(curves),
         "broken query": lambda: solver.distance(pieces),
@@ -199,7 +199,7 @@ def wrong_signs(mesh: Mesh, count: int, rng: np.random.Generator) -> dict[str, i
             raise RuntimeError(f"case {case}: the curves do not separate the mesh")
         is_left = np.zeros(pieces.mesh.n_vertices, bool)
         is_left[pieces.mesh.F[np.isin(pieces.pieces, sorted(left))]] = True
-        far = unfolded_distance(mesh, curves) > mesh.edge_lengths.mean() / 2
+        far = geodesic_distance(mesh, curves) > mesh.edge_lengths.mean() / 2
         found["cases"] += 1
         found["curves"] += len(curves)
         found["vertices compared"] += int(far.sum())
@@ -217,7 +217,7 @@ def errors_by_step(mesh: Mesh, rng: np.random.Generator) -> dict[str, Any]:
         values = smooth_function(mesh, rng)
         level = float(np.quantile(values, rng.uniform(0.3, 0.7)))
         whole = isolines(mesh, values, level)[0]
-        truth = np.where(values < level, -1, 1) * unfolded_distance(mesh, whole)
+        truth = np.where(values < level, -1, 1) * geodesic_distance(mesh, whole)
         size = float(np.sqrt(sublevel_areas(mesh, values, level)[0]))
         pieces = [piece for curve in whole for piece in broken(mesh, curve, 0.3, 3, rng)]
         for row, curves in zip(errors, (whole, pieces), strict=True):

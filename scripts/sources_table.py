@@ -17,12 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from heat_igl import HeatMethodSolver, Mesh, SurfacePoints, reference
+from heat_igl import Mesh, SurfacePoints, reference
+from heat_igl.geodesic import SolverChoice
 
 from measuring import mean_error
 from scaffold import add_json, add_seed, environment, option_parser, over_meshes, publish, table
 
-METHODS = (None, "sweep", "unfold")
+METHODS = ("heat", "sweep")
 
 
 def inserted(mesh: Mesh, point: SurfacePoints) -> Mesh:
@@ -41,7 +42,7 @@ def drawn_points(mesh: Mesh, k: int, seed: int) -> list[SurfacePoints]:
 
 def measure(mesh: Mesh, k: int, seed: int) -> dict[str, float]:
     found: dict[str, list[float]] = {}
-    solvers = {method: HeatMethodSolver(mesh, refine=method) for method in METHODS}
+    solvers = {method: SolverChoice(method).on(mesh) for method in METHODS}
     for point in drawn_points(mesh, k, seed):
         corners = mesh.F[point.faces[0]]
         truth = reference.exact(inserted(mesh, point), mesh.n_vertices)[:-1]

@@ -23,6 +23,7 @@ import numpy as np
 
 import heat_igl
 from heat_igl.errors import AccuracyWarning, MeshError, ReferenceSolverError
+from heat_igl.geodesic import DistanceMethod, SolverChoice
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation.zoo import SHAPES, Shape
 
@@ -35,12 +36,8 @@ LEAST = 0.01
 SEED, N_SOURCES = 7, 3
 
 
-def ours(refine: str | None) -> Callable[[heat_igl.Mesh], Query]:
-    return lambda mesh: heat_igl.HeatMethodSolver(mesh, refine=refine).distance
-
-
-def without_factorization(mesh: heat_igl.Mesh) -> Query:
-    return lambda source: heat_igl.unfolded_distance(mesh.V, mesh.F, source)
+def ours(method: DistanceMethod) -> Callable[[heat_igl.Mesh], Query]:
+    return lambda mesh: SolverChoice(method).on(mesh).distance
 
 
 def libigl(mesh: heat_igl.Mesh) -> Query:
@@ -48,10 +45,9 @@ def libigl(mesh: heat_igl.Mesh) -> Query:
 
 
 METHODS: dict[str, Callable[[heat_igl.Mesh], Query]] = {
-    "heat": ours(None),
+    "heat": ours("heat"),
     "sweep": ours("sweep"),
-    "unfold": ours("unfold"),
-    "unfolded_distance": without_factorization,
+    "windows": ours("windows"),
     "potpourri3d": potpourri3d,
     "igl": libigl,
 }
