@@ -207,7 +207,7 @@ OBJ_VERTICES = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
         OBJ_VERTICES + "f 1//1 2//2 3//3\nf 1//1 2//2 4//1\n",
         OBJ_VERTICES + "vn 0 0 1\nvt 0 0\nf 1/1/1 2/1/1 3/1/1\nf 1 2/1 4//1\n",
         OBJ_VERTICES + "f -4 -3 -2\nf -4 2 -1\n",
-        OBJ_VERTICES + "f -4/-1/-1 -3/-1/-1 -2/-1/-1\nf -4 2 -1",
+        OBJ_VERTICES + "f -4/-1/-1 -3/-1/-1 -2/-1/-1\nf -4 2 -1\n",
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 1\nf -4 -3 -1\n",
         "f 1 2 3\nf 1 2 4\n" + OBJ_VERTICES,
         "v 0 0 \\\n 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 \\\r\n2 \\  \n 3\nf 1 2 4\n",
@@ -215,7 +215,7 @@ OBJ_VERTICES = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
         OBJ_VERTICES.replace("\n", " 0.5 0.25 1\n", 2) + "f 1 2 3\nf 1 2 4\n",
         "# f 1 2 99\nmtllib a/b.mtl\no thing\ng a b\n"
         + OBJ_VERTICES
-        + "usemtl x/y\ns off\nf 1 2 3 # yes\nl 1 2\np 1\nf 1 2 4",
+        + "usemtl x/y\ns off\nf 1 2 3 # yes\nl 1 2\np 1\nf 1 2 4\n",
         ("  " + OBJ_VERTICES + "\tf 1 2 3\nf 1 2 4\n").replace("\n", " \r\n"),
     ],
 )
@@ -474,7 +474,7 @@ def test_vtu_polygons_and_quadrilaterals(tmp_path: Path) -> None:
 # --- files that are cut short -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("extension", "lost"), [(".off", 2), (".ply", 2), (".obj", 2), (".obj", 4)])
+@pytest.mark.parametrize(("extension", "lost"), [(".off", 2), (".ply", 2), (".obj", 1), (".obj", 2), (".obj", 4)])
 def test_a_last_face_that_may_be_cut_is_a_warning(tmp_path: Path, extension: str, lost: int) -> None:
     """Of "4 8 9 10 11", the beginning "4 8 9 10 1" is a face as well, and in OBJ, so is "9 10 11"."""
     vertices = "".join(f"{i} {i * i} 0\n" for i in range(12))
@@ -491,6 +491,18 @@ def test_a_last_face_that_may_be_cut_is_a_warning(tmp_path: Path, extension: str
         warnings.simplefilter("always")
         read_mesh(save(tmp_path / f"b{extension}", content[:-lost]))
     assert re.search(rf"b{extension}, last line \(.*\): no line break ends it", str(caught[-1].message))
+
+
+@pytest.mark.parametrize("extension", SURFACE_FORMATS)
+def test_no_file_is_cut_without_a_word(tmp_path: Path, extension: str) -> None:
+    """On a closed surface, the vertices of the last faces belong to other faces, too."""
+    write_mesh(tmp_path / f"whole{extension}", heat_igl.shapes.torus(12, 9))
+    whole = (tmp_path / f"whole{extension}").read_bytes()
+    path = tmp_path / f"a{extension}"
+    for tenth in range(1, 10):
+        path.write_bytes(whole[: len(whole) * tenth // 10])
+        with pytest.raises((MeshError, AccuracyWarning), match=f"a{extension}"):  # warnings are errors here
+            heat_igl.as_mesh(path)
 
 
 def test_an_obj_file_that_lost_faces_is_a_warning_and_one_without_any_an_error(tmp_path: Path) -> None:

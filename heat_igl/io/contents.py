@@ -113,29 +113,24 @@ def check(
         )
 
 
-def warn_if_cut(path: Path, data: bytes, cells: Cells, last: int, n: int, counted: bool = True) -> None:
-    """Warn if the last line of a text file has no end and may be the beginning of a longer line with another face.
+def warn_if_cut(path: Path, data: bytes, last: int, n: int) -> None:
+    """Warn if the last line of a text file has no end, and may be the beginning of a longer line with another face.
 
     Parameters
     ----------
     path, data
         The file.
-    cells : Cells
-        Polygons, of which the last stands in the last line.
     last : int
-        The last index, as it stands in the file.
+        The last index, as it stands in the file; 0 if the file has no counts, so that more may be lost than a digit.
     n : int
         Number of vertices: with one more digit, `last` may still be an index.
-    counted : bool
-        Whether the number of corners stands before them. Otherwise the last polygon may have lost corners.
 
     Warns
     -----
     AccuracyWarning
         With the last line.
     """
-    longer = 0 < 10 * last <= n or (not counted and cells.degree[-1] < cells.degree.max())
-    if longer and not data.endswith((b"\n", b"\r")):
+    if 10 * last <= n and not data.endswith((b"\n", b"\r")):
         line = data.rsplit(b"\n", 1)[-1].strip()[:60].decode("utf-8", "backslashreplace")
         warn_caller(
             f"{path}, last line ({line}): no line break ends it, so the file may be cut short there: add one if the "

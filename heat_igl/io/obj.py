@@ -64,7 +64,7 @@ def read(path: Path, data: bytes) -> Contents:
     cells = Cells(corners, degree)
     check(V, cells, lambda i: text.where(V_lines[i]), lambda i: text.where(F_lines[i]), base=1)
     _warn_of_unused(path, len(V), corners)
-    warn_if_cut(path, data, cells, abs(int(number[-1])), len(V), counted=False)
+    warn_if_cut(path, data, 0, len(V))
     return Contents(V, cells, {})
 
 

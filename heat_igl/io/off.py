@@ -68,7 +68,7 @@ def read(path: Path, data: bytes) -> Contents:
     cells = _polygons(text, np.arange(begin, begin + m))
     first = begin - n
     check(V, cells, lambda i: text.where(first + i), lambda i: text.where(begin + i), base=0)
-    warn_if_cut(path, data, cells, int(cells.corners[-1]), n)
+    warn_if_cut(path, data, int(cells.corners[-1]) or n, n)
     return Contents(V, cells, {})
 
 

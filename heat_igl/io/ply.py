@@ -44,7 +44,7 @@ def read(path: Path, data: bytes) -> Contents:
     cells = Cells(corners, degree)
     check(V, cells, lambda i: f"{path}, vertex {i} (counted from 0)", face_at, base=0)
     if not header.order:
-        warn_if_cut(path, data, cells, int(cells.corners[-1]), len(V))
+        warn_if_cut(path, data, int(cells.corners[-1]) or len(V), len(V))
     return Contents(V, cells, _gathered(others, header.vectors))
 
 
