@@ -3,6 +3,7 @@
 from heat_igl import cluster as cluster
 from heat_igl import reference as reference
 from heat_igl import sampling as sampling
+from heat_igl.applications import activation_times as activation_times
 from heat_igl.applications import geodesic_errors as geodesic_errors
 from heat_igl.applications import parcel_distances as parcel_distances
 from heat_igl.applications import smooth as smooth

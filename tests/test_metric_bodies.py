@@ -1,4 +1,4 @@
-"""A metric that changes from tetrahedron to tetrahedron: maps of space whose image is convex, and bounds."""
+"""Metrics that change from place to place: maps of space whose image is convex, bounds, activation times."""
 
 from __future__ import annotations
 
@@ -8,13 +8,22 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from heat_igl import HeatMethodSolver, Mesh, OffsetSources, metric_operators, shapes
+from heat_igl import (
+    GeodesicSolver,
+    Mesh,
+    OffsetSources,
+    SourceError,
+    activation_times,
+    fibre_metric,
+    metric_operators,
+    shapes,
+)
 from heat_igl.typing import FloatArray
 from heat_igl.validation.domains.body_cases import delaunay, straight
 
 
-def solver(mesh: Mesh, metric: FloatArray) -> HeatMethodSolver:
-    return HeatMethodSolver.from_operators(metric_operators(mesh, metric))
+def solver(mesh: Mesh, metric: FloatArray) -> GeodesicSolver:
+    return GeodesicSolver(metric_operators(mesh, metric))
 
 
 def sheared(x: FloatArray, a: float) -> tuple[FloatArray, FloatArray]:
@@ -38,16 +47,46 @@ def bent_bar(n: int, a: float) -> tuple[Mesh, FloatArray]:
 
 @pytest.mark.parametrize("a", [0.5, 1.0])
 def test_metrics_of_bent_bars_converge(a):
-    """The largest ratio of lengths in one place is 1:2.6 and 1:5.8."""
-    errors = []
+    """The largest ratio of lengths in one place is 1:2.6 and 1:5.8; of second order from a metric at the vertices."""
+    per_face, per_vertex = [], []
     for n in (5, 10):
         mesh, image = bent_bar(n, a)
-        g = sheared(mesh.V[mesh.F].mean(axis=1), a)[1]
         exact = straight(image, 0)
-        distance = solver(mesh, g).distance(0)
-        errors.append(np.abs(distance - exact).mean() / exact.mean())
-    assert errors[1] < 0.6 * errors[0]
-    assert errors[1] < 0.01
+        for errors, places in ((per_face, mesh.V[mesh.F].mean(axis=1)), (per_vertex, mesh.V)):
+            distance = solver(mesh, sheared(places, a)[1]).distance(0)
+            errors.append(np.abs(distance - exact).mean() / exact.mean())
+    assert per_face[1] < 0.6 * per_face[0]
+    assert per_face[1] < 0.01
+    assert per_vertex[1] < 0.4 * per_vertex[0]
+    assert per_vertex[1] < 0.01
+
+
+def twisted_disk(n: int, k: float) -> tuple[Mesh, FloatArray, FloatArray]:
+    """A disk, its image after a turn by k r^2 / 2 about the middle, and the metric (n, 3, 3) that it pulls back."""
+    disk = shapes.disk(n)
+    x = disk.V[:, :2]
+    z = (x[:, 0] + 1j * x[:, 1]) * np.exp(0.5j * k * (x**2).sum(axis=1))
+    turn = np.exp(0.5j * k * (x**2).sum(axis=1))
+    # Derivatives by x and y of the complex image.
+    dx, dy = turn * (1 + 0j) + 1j * k * x[:, 0] * z, turn * 1j + 1j * k * x[:, 1] * z
+    J = np.stack([np.stack([dx.real, dy.real], axis=1), np.stack([dx.imag, dy.imag], axis=1)], axis=1)
+    g = np.tile(np.eye(3), (len(x), 1, 1))
+    g[:, :2, :2] = np.swapaxes(J, 1, 2) @ J
+    return disk, np.stack([z.real, z.imag, 0 * z.real], axis=1), g
+
+
+@pytest.mark.parametrize(("k", "has_windows"), [(1.0, True), (6.0, False)])
+def test_a_metric_at_the_vertices_of_triangles(k, has_windows):
+    """Up to 1:2.6 lengths of edges are those of triangles; up to 1:38 they are not on these coarse disks."""
+    errors = []
+    for n in (12, 24):
+        mesh, image, g = twisted_disk(n, k)
+        domain = metric_operators(mesh, g)
+        assert (domain.surface is not None) == has_windows
+        exact = straight(image, 7)
+        errors.append(np.abs(GeodesicSolver(domain).distance(7) - exact).mean() / exact.mean())
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[1] < (0.0005 if has_windows else 0.04)
 
 
 def random_metric(m: int, rng: np.random.Generator, most: float) -> FloatArray:
@@ -79,7 +118,7 @@ def test_one_metric_everywhere_is_a_linear_map():
     box = shapes.box(6)
     mesh = Mesh(box.V, box.F[~(box.V[box.F].mean(axis=1)[:, :2] > 0.5).all(axis=1)])
     A = np.array([[2.0, 0.3, 0], [0, 0.5, 0.1], [0.2, 0, 1]])
-    mapped = HeatMethodSolver(Mesh(mesh.V @ A.T, mesh.F)).distance(0)
+    mapped = GeodesicSolver(Mesh(mesh.V @ A.T, mesh.F)).distance(0)
     assert solver(mesh, np.tile(A.T @ A, (mesh.n_faces, 1, 1))).distance(0) == pytest.approx(mapped, rel=1e-9)
 
 
@@ -99,3 +138,61 @@ def test_the_same_after_scaling_renumbering_and_copies():
     assert (pickle.loads(pickle.dumps(one)).distance(0) == distance).all()
     with ThreadPoolExecutor(4) as pool:
         assert all((other == one.distance(v)).all() for v, other in enumerate(pool.map(one.distance, range(8))))
+
+
+def test_activation_of_a_twisted_block():
+    """Velocities along three axes, from two sites that start at their own times; sheets need not be at right angles."""
+    rng = np.random.default_rng(5)
+    mesh = shapes.box(5)
+    axes = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    f, s = (np.tile(v, (mesh.n_vertices, 1)) for v in (axes[0], axes[1] + 0.3 * axes[0]))
+    g = fibre_metric(f, 1 / 0.6, 1 / 0.4, sheets=s, normal=1 / 0.2)
+    velocity = axes.T @ np.diag([0.6, 0.4, 0.2]) @ axes
+    assert np.linalg.inv(g) == pytest.approx(np.broadcast_to(velocity @ velocity, g.shape))
+    slowness = np.linalg.inv(velocity)
+    arrivals = [t + np.linalg.norm((mesh.V - mesh.V[v]) @ slowness, axis=1) for v, t in ((0, -1.0), (215, 0.5))]
+    for D in (np.linalg.inv(g), velocity @ velocity):
+        times = activation_times(mesh, D, [0, 215], [-1.0, 0.5])
+        assert times == pytest.approx(np.min(arrivals, axis=0), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("D", "times", "message"),
+    [
+        (np.diag([1.0, 1, -1]), 0, r"D\[0\] = .* must be positive definite \(48 of 48"),
+        (np.full((3, 3), np.nan), 0, r"D\[0\] = .* must be finite"),
+        (np.triu(np.ones((3, 3))), 0, r"D\[0\] = .* must be symmetric"),
+        (np.ones((5, 3, 3)), 0, r"D must have shape \(3, 3\), \(48, 3, 3\) per face or \(27, 3, 3\) per vertex"),
+        (np.eye(3), np.inf, "times must be finite"),
+    ],
+)
+def test_wrong_tissue_is_refused(D, times, message):
+    mesh = shapes.box(2)
+    assert len(activation_times(mesh, np.eye(3), 0)) == mesh.n_vertices
+    with pytest.raises(ValueError, match=message):
+        activation_times(mesh, D, 0, times)
+    with pytest.raises(SourceError):
+        activation_times(mesh, np.eye(3), [27])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"sheets": [[0, 1, 0]]}, "sheets and normal go together"),
+        ({"sheets": [[2, 0, 0]], "normal": 1}, r"sheets\[0\] = .* has the direction of its fibre"),
+        ({"sheets": [[0, 0, 0]], "normal": 1}, r"sheets\[0\] = .* is no direction"),
+        ({"sheets": [[0, 1, 0]], "normal": -1}, r"normal\[0\] = -1.0 must be positive"),
+    ],
+)
+def test_wrong_sheets_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        fibre_metric([[1, 0, 0]], 1, 2, **arguments)
+
+
+def test_a_wrong_metric_at_a_vertex_is_named():
+    mesh = shapes.box(2)
+    g = np.tile(np.eye(3), (mesh.n_vertices, 1, 1))
+    assert metric_operators(mesh, g).n == mesh.n_vertices
+    g[5, 0, 0] = -1
+    with pytest.raises(ValueError, match=r"metric\[5\] = .* must be positive definite"):
+        metric_operators(mesh, g)

@@ -1,4 +1,4 @@
-"""Applications of geodesic distance: maps on a cortex, errors of matches, search on edges, particles in images.
+"""Applications: activation times, maps on a cortex, errors of matches, search on edges, particles in images.
 
 notebooks/10_applications.ipynb shows them. `heat_igl.applications.torch` and `heat_igl.applications.jax`, distance as a
 function that PyTorch and JAX differentiate, are imported by these names alone.
@@ -6,6 +6,7 @@ function that PyTorch and JAX differentiate, are imported by these names alone.
 
 from __future__ import annotations
 
+from heat_igl.applications.activation import activation_times
 from heat_igl.applications.edge_search import EdgePath, EdgeSearch
 from heat_igl.applications.matches import geodesic_errors
 from heat_igl.applications.particles import particle_length, reconstruct, skeleton, zones_of_influence
@@ -14,6 +15,7 @@ from heat_igl.applications.surface_maps import parcel_distances, smooth
 __all__ = [
     "EdgePath",
     "EdgeSearch",
+    "activation_times",
     "geodesic_errors",
     "parcel_distances",
     "particle_length",

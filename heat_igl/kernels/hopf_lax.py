@@ -45,7 +45,7 @@ class HopfLax:
         Squared distances between the corners of each simplex, in its metric (q = 1), or in that of each of its corners
         (q = p + 1): the metric is linear in between.
     inverse : (m, 3, 3) float64
-        Of the metric of each simplex, or of the mean over its corners.
+        Of the metric of each simplex; not read if q > 1.
     V : (n, 3) float64
         Positions.
     """

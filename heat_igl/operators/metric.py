@@ -42,10 +42,12 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
     ----------
     mesh : mesh
         m triangles or tetrahedra.
-    metric : (m, 3, 3) or (m, 2, 2) array_like
-        Symmetric and positive definite. (m, 3, 3) in space, of which a triangle takes what lies in its plane. (m, 2, 2)
-        in the plane of each triangle: the first axis along the edge from corner 0 to corner 1, the second towards
-        corner 2. Unit: squared length in the metric per squared length of the mesh.
+    metric : (m, 3, 3), (n, 3, 3) or (m, 2, 2) array_like
+        Symmetric and positive definite. (m, 3, 3) in space, of which a triangle takes what lies in its plane. (n, 3, 3)
+        at each vertex, of a metric that is linear in between: take this where the metric is smooth, as then distance is
+        of second order. If n = m, (m, 3, 3) is per face. (m, 2, 2) in the plane of each triangle: the first axis along
+        the edge from corner 0 to corner 1, the second towards corner 2. Unit: squared length in the metric per squared
+        length of the mesh.
     laplacian : {"auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"}
         Of triangles, see `operators`.
 
@@ -63,6 +65,10 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
         straight: there is no `surface`, flips end at such edges, and `HeatMethodSolver` takes the fronts of
         `GeodesicSolver` by fronts; its windows are refused, and sources are vertices.
 
+        With a metric at the vertices, the length of an edge is the integral along it. Where these are the sides of
+        triangles, they are an intrinsic triangulation; if there is a face where they are not, since the metric turns
+        too far along an edge, distance is that of the scheme for tetrahedra, on triangles.
+
         Tetrahedra: in one metric for all, distance is exact as in space. In any other, it is that of a scheme of first
         order, sharpened to second where the metric and the distance are smooth, see `FrontSolver`.
 
@@ -71,7 +77,8 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
     MeshError
         If a face has no area or volume.
     ValueError
-        If `metric` is not symmetric and positive definite on every face, or `laplacian` is unknown.
+        If `metric` has another shape, is not finite, symmetric and positive definite on every face, or `laplacian` is
+        unknown.
 
     Notes
     -----
@@ -93,32 +100,47 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
     check_laplacian(laplacian)
     mesh = as_simplices(mesh)
     _check_faces(mesh)
-    domain = operators_in_metric(mesh, _checked(metric, mesh), laplacian)
+    g = real_numbers("metric", metric)
+    if g.shape == (mesh.n_vertices, 3, 3) and mesh.n_vertices != mesh.n_faces:
+        return _of_smooth_metric(mesh, _checked_at_corners(g, mesh), laplacian)
+    domain = operators_in_metric(mesh, _checked(g, mesh), laplacian)
     if domain.surface is None:
         return domain
     return replace(domain, metric=MetricSides.of(mesh, metric))
 
 
-def fibre_metric(directions: ArrayLike, along: ArrayLike, across: ArrayLike) -> FloatArray:
+def fibre_metric(
+    directions: ArrayLike,
+    along: ArrayLike,
+    across: ArrayLike,
+    *,
+    sheets: ArrayLike | None = None,
+    normal: ArrayLike | None = None,
+) -> FloatArray:
     """The metric in space in which lengths are multiplied by `along` along a direction, and by `across` across it.
 
     Parameters
     ----------
-    directions : (m, 3) array_like
-        Of the fibres, or a principal direction, on each face; of any length but 0, and either sign. (m, 2) in the plane
-        z = 0.
-    along, across : float or (m,) array_like
+    directions : (k, 3) array_like
+        Of the fibres, or a principal direction, on each face or at each vertex; of any length but 0, and either sign.
+        (k, 2) in the plane z = 0.
+    along, across : float or (k,) array_like
         Positive factors; for a speed, one over it.
+    sheets : (k, 3) array_like, optional
+        Directions across the fibres in which `across` holds; their part along the fibres is left out.
+    normal : float or (k,) array_like, optional
+        Factor across fibres and sheets; `across` if it is not given.
 
     Returns
     -------
-    (m, 3, 3) float64
+    (k, 3, 3) float64
         For `metric_operators`.
 
     Raises
     ------
     ValueError
-        If a direction is 0 or not finite, or a factor is not positive.
+        If a direction is 0 or not finite, a sheet has the direction of its fibre, a factor is not positive, or one of
+        `sheets` and `normal` is given without the other.
 
     Examples
     --------
@@ -126,29 +148,57 @@ def fibre_metric(directions: ArrayLike, along: ArrayLike, across: ArrayLike) -> 
     >>> g = heat_igl.fibre_metric([[1, 0, 0]], along=0.5, across=2.0)
     >>> g[0].tolist()
     [[0.25, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]]
+
+    Velocities of .6 along fibres, .4 along sheets and .2 across:
+
+    >>> g = heat_igl.fibre_metric([[1, 0, 0]], 1 / 0.6, 1 / 0.4, sheets=[[0, 1, 0]], normal=1 / 0.2)
+    >>> g[0].diagonal().round(2).tolist()
+    [2.78, 6.25, 25.0]
     """
-    w = real_numbers("directions", directions)
+    if (sheets is None) != (normal is None):
+        raise ValueError("sheets and normal go together: give both, or neither for one factor across the fibres")
+    fibre = _unit_directions("directions", directions)
+    k = len(fibre)
+    one, two = _squared_factor("along", along, k), _squared_factor("across", across, k)
+    projection = fibre[:, :, None] * fibre[:, None]
+    if sheets is None or normal is None:
+        return np.asarray(one * projection + two * (np.eye(3) - projection))
+    sheet = _unit_directions("sheets", sheets)
+    if sheet.shape != fibre.shape:
+        raise ValueError(f"sheets must have the shape of directions, ({k}, 3), not {np.shape(sheets)}")
+    sheet -= np.einsum("ki,ki->k", sheet, fibre)[:, None] * fibre
+    size = np.linalg.norm(sheet, axis=1, keepdims=True)
+    _raise_at_first(size[:, 0] < _ROUNDING, "sheets", np.asarray(sheets), "has the direction of its fibre")
+    sheet /= size
+    second = sheet[:, :, None] * sheet[:, None]
+    three = _squared_factor("normal", normal, k)
+    return np.asarray(one * projection + two * second + three * (np.eye(3) - projection - second))
+
+
+def _unit_directions(name: str, given: ArrayLike) -> FloatArray:
+    """Unit vectors (k, 3) from (k, 3) or (k, 2), checked."""
+    w = real_numbers(name, given)
     if w.ndim != 2 or w.shape[1] not in (2, 3):
-        raise ValueError(f"directions must have shape (m, 3), one per face, or (m, 2) in the plane, not {w.shape}")
+        raise ValueError(
+            f"{name} must have shape (k, 3), one per face or vertex, or (k, 2) in the plane, not {w.shape}"
+        )
     w = np.pad(w, ((0, 0), (0, 3 - w.shape[1])))
     with np.errstate(over="ignore"):
         length = np.linalg.norm(w, axis=1)
-    _raise_at_first(~((length > 0) & np.isfinite(length)), "directions", w, "is no direction")
-    factors = []
-    for name, given in (("along", along), ("across", across)):
-        factor = real_numbers(name, given)
-        if factor.shape not in ((), (len(w),)):
-            raise ValueError(f"{name} must be a number or have shape ({len(w)},), not {factor.shape}")
-        factor = np.broadcast_to(factor, len(w))
-        with np.errstate(over="ignore", under="ignore"):
-            square = factor**2
-        _raise_at_first(
-            ~((factor > 0) & (square > 0) & np.isfinite(square)), name, factor, "must be positive and finite"
-        )
-        factors.append(square[:, None, None])
-    unit = w / length[:, None]
-    projection = unit[:, :, None] * unit[:, None]
-    return np.asarray(factors[0] * projection + factors[1] * (np.eye(3) - projection))
+    _raise_at_first(~((length > 0) & np.isfinite(length)), name, w, "is no direction")
+    return np.asarray(w / length[:, None])
+
+
+def _squared_factor(name: str, given: ArrayLike, k: int) -> FloatArray:
+    """The squares (k, 1, 1) of positive numbers (k,) or one number, checked."""
+    factor = real_numbers(name, given)
+    if factor.shape not in ((), (k,)):
+        raise ValueError(f"{name} must be a number or have shape ({k},), not {factor.shape}")
+    factor = np.broadcast_to(factor, k)
+    with np.errstate(over="ignore", under="ignore"):
+        square = factor**2
+    _raise_at_first(~((factor > 0) & (square > 0) & np.isfinite(square)), name, factor, "must be positive and finite")
+    return np.asarray(square[:, None, None])
 
 
 def operators_in_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian = "auto") -> Operators:
@@ -169,6 +219,22 @@ def operators_in_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian = "auto"
         return replace(domain, contrast=float(slowness.max() / slowness.min()))
     least = float(np.sqrt(np.linalg.eigvalsh(g)[:, 0].min()))
     return _refracting(mesh, sides, slowness, least, laplacian)
+
+
+def _of_smooth_metric(mesh: Mesh, corners: FloatArray, laplacian: Laplacian) -> Operators:
+    """The operators of simplices with a metric (m, p + 1, 3, 3) at each corner, linear in between."""
+    simplices = MetricSimplices.in_metric(mesh, corners)
+    mean = corners.mean(axis=1)
+    if mesh.is_tetrahedral:
+        return _of_tetrahedra(mesh, simplices, mean)
+    sides = simplices.lengths[:, [1, 2, 0], [2, 0, 1]]
+    contrast = float(simplices.slowness.max() / simplices.slowness.min())
+    if (sides.sum(axis=1) > 2 * (1 + _ROUNDING) * longest_sides(sides)).all():
+        return replace(edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian), contrast=contrast)
+    # For heat: what each face says alone.
+    axes = plane_axes(mesh)
+    domain = operators_in_metric(mesh, axes @ mean @ np.swapaxes(axes, 1, 2), laplacian)
+    return replace(domain, surface=None, simplices=simplices, contrast=contrast)
 
 
 def _smoothed(mesh: Mesh, sides: FloatArray) -> tuple[FloatArray, bool]:
@@ -279,43 +345,56 @@ def _check_faces(mesh: Mesh) -> None:
         )
 
 
-def _checked(metric: ArrayLike, mesh: Mesh) -> FloatArray:
-    """The metric (m, p, p) in the planes of triangles or in space."""
+def _checked(g: FloatArray, mesh: Mesh) -> FloatArray:
+    """The metric (m, p, p) in the planes of triangles or in space, from one per face."""
     m, p = mesh.n_faces, mesh.F.shape[1] - 1
-    g = real_numbers("metric", metric)
-    shapes = [(m, 3, 3)] if p == 3 else [(m, 3, 3), (m, 2, 2)]
-    if g.shape not in shapes:
+    shapes = [(m, 3, 3), (mesh.n_vertices, 3, 3)] + [(m, 2, 2)] * (p == 2)
+    if g.shape not in (shapes[0], *shapes[2:]):
+        remedy = f": np.broadcast_to(metric, ({m}, 3, 3)) is the same on all" if g.shape == (3, 3) else ""
         raise ValueError(
-            f"metric must have shape {' or '.join(map(str, shapes))}, one per face, not {g.shape}"
-            + _remedy(g.shape, mesh)
+            f"metric must have shape {' or '.join(map(str, shapes))}, one per face or vertex, not {g.shape}{remedy}"
         )
+    symmetric = _symmetric(g)
+    if p < g.shape[1]:
+        axes = plane_axes(mesh)
+        symmetric = np.asarray(axes @ symmetric @ np.swapaxes(axes, 1, 2), np.float64)
+    _check_definite(np.asarray(np.linalg.eigvalsh(symmetric)[:, 0]), g)
+    return symmetric
+
+
+def _checked_at_corners(g: FloatArray, mesh: Mesh) -> FloatArray:
+    """The metric (m, p + 1, 3, 3) at the corners of faces, from one per vertex."""
+    symmetric = _symmetric(g)
+    corners = symmetric[mesh.F]
+    inside = corners
+    if not mesh.is_tetrahedral:
+        axes = plane_axes(mesh)[:, None]
+        inside = axes @ corners @ np.swapaxes(axes, 2, 3)
+    smallest = np.full(mesh.n_vertices, np.inf)
+    np.minimum.at(smallest, mesh.F, np.linalg.eigvalsh(inside)[..., 0])
+    _check_definite(smallest, g)
+    return np.asarray(corners)
+
+
+def _symmetric(g: FloatArray) -> FloatArray:
+    """Tensors (k, p, p), after a check that they are finite and symmetric but for rounding."""
     transposed = np.swapaxes(g, 1, 2)
     size = np.abs(g).max(axis=(1, 2))
     _raise_at_first(~np.isfinite(size), "metric", g, "must be finite")
     _raise_at_first(np.abs(g - transposed).max(axis=(1, 2)) > _ROUNDING * size, "metric", g, "must be symmetric")
-    g = (g + transposed) / 2
-    if p < g.shape[1]:
-        axes = plane_axes(mesh)
-        g = axes @ g @ np.swapaxes(axes, 1, 2)
-    smallest = np.linalg.eigvalsh(g)[:, 0]
-    _raise_at_first(~(smallest > 0), "metric", np.asarray(metric), "must be positive definite on its face")
+    return np.asarray((g + transposed) / 2)
+
+
+def _check_definite(smallest: FloatArray, g: FloatArray) -> None:
+    """An error unless the smallest eigenvalues (k,) of tensors (k, p, p) on their faces are in the range of doubles."""
+    _raise_at_first(~(smallest > 0), "metric", g, "must be positive definite on its face")
     _raise_at_first(
-        (smallest < 1 / _LARGEST) | (size > _LARGEST),
+        (smallest < 1 / _LARGEST) | (np.abs(g).max(axis=(1, 2)) > _LARGEST),
         "metric",
-        np.asarray(metric),
+        g,
         f"must have entries and eigenvalues between {1 / _LARGEST:g} and {_LARGEST:g}, or squares leave the range of "
         "doubles: take another unit",
     )
-    return np.asarray(g)
-
-
-def _remedy(shape: tuple[int, ...], mesh: Mesh) -> str:
-    """How one metric for all faces, or one for each vertex, becomes one for each face."""
-    if shape == (3, 3):
-        return f": np.broadcast_to(metric, ({mesh.n_faces}, 3, 3)) is the same on all"
-    if shape == (mesh.n_vertices, 3, 3):
-        return ": metric[mesh.F].mean(axis=1) is the mean over the corners"
-    return ""
 
 
 def _raise_at_first(bad: AnyArray, name: str, values: AnyArray, problem: str) -> None:

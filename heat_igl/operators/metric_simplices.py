@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from heat_igl.mesh import Mesh
+from heat_igl.operators.metric_derivatives import plane_axes
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["MetricSimplices"]
@@ -61,13 +62,17 @@ class MetricSimplices:
 
         Where it is the same everywhere, distance is that in space after a linear map.
         """
+        p = mesh.F.shape[1] - 1
         first = tensors[0, 0]
-        if np.abs(tensors - first).max() <= _ROUNDING * np.abs(first).max():
+        if p == 3 and np.abs(tensors - first).max() <= _ROUNDING * np.abs(first).max():
             # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T; relative to a vertex, as digits are lost far from the origin.
             return cls.in_space(Mesh((mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(first), mesh.F))
-        p = mesh.F.shape[1] - 1
-        slowness = np.linalg.det(tensors.mean(axis=1)) ** (1 / (2 * p))
-        least = float(np.sqrt(np.linalg.eigvalsh(tensors)[..., 0].min()))
+        inside = tensors
+        if p == 2:
+            axes = plane_axes(mesh)[:, None]
+            inside = axes @ tensors @ np.swapaxes(axes, 2, 3)
+        slowness = np.linalg.det(inside.mean(axis=1)) ** (1 / (2 * p))
+        least = float(np.sqrt(np.linalg.eigvalsh(inside)[..., 0].min()))
         simplices = cls(mesh.F, np.empty(0), slowness, mesh.n_vertices, None, mesh.V, least, tensors)
         squares = simplices.squared_lengths()
         lengths = np.sqrt(squares[:, 0])

@@ -79,8 +79,9 @@ class FrontSolver(Engine):
         self._finer = FrontSolver(simplices.halved(), is_halved=True) if is_refined else None
 
     def _measured(self, tensors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """What `HopfLax` reads of tensors: squared lengths, inverses (m, 3, 3), and the positions."""
-        inverse = np.ascontiguousarray(np.linalg.inv(tensors.mean(axis=1)))
+        """What `HopfLax` reads of tensors: squared lengths, inverses, and the positions."""
+        # Read only where each simplex has one.
+        inverse = np.ascontiguousarray(np.linalg.inv(tensors[:, 0])) if tensors.shape[1] == 1 else np.empty((0, 3, 3))
         return self._simplices.squared_lengths(), inverse, np.ascontiguousarray(self._simplices.place)
 
     @cached_property

@@ -1,0 +1,91 @@
+"""Activation times of excitable tissue: distance in the metric of conductivity or of squared velocity."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heat_igl.errors import real_numbers
+from heat_igl.geodesic import GeodesicSolver
+from heat_igl.mesh import MeshLike, as_simplices
+from heat_igl.operators import metric_operators
+from heat_igl.sources import OffsetSources, Sources
+from heat_igl.typing import ArrayLike, FloatArray
+
+__all__ = ["activation_times"]
+
+
+def activation_times(mesh: MeshLike, D: ArrayLike, sites: Sources, times: ArrayLike = 0) -> FloatArray:
+    """When a wave that starts at the sites arrives at each vertex: sqrt(grad T . D grad T) = 1.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles or tetrahedra.
+    D : (3, 3), (m, 3, 3) or (n, 3, 3) array_like
+        Symmetric and positive definite: everywhere, on each face, or at each vertex. Its eigenvectors are the axes of
+        the tissue, and its eigenvalues the squared velocities along them. With velocities v, fibres f and sheets s, it
+        is the inverse of ``fibre_metric(f, 1 / v[0], 1 / v[1], sheets=s, normal=1 / v[2])``.
+    sites : sources
+        Where the wave starts, as for `geodesic_distance`; on tetrahedra, vertices.
+    times : float or (k,) array_like
+        When it starts: everywhere, or at each site. May be negative.
+
+    Returns
+    -------
+    (n,) float64
+        ``inf`` at vertices that no wave reaches. A site that another wave reaches before its time has that time.
+
+    Raises
+    ------
+    ValueError
+        If `D` or `times` has another shape or is not finite, or `D` is not symmetric and positive definite.
+    SourceError
+        If `sites` does not describe places on the mesh.
+    MeshError
+        If a face has no area or volume.
+
+    Notes
+    -----
+    Distance with the metric of the inverse of D, see `metric_operators`. D at the vertices is that of a smooth field,
+    and times are then of second order.
+
+    Examples
+    --------
+    A bar in which velocity is 2 along x, and 1 across:
+
+    >>> import numpy as np
+    >>> import heat_igl
+    >>> bar = heat_igl.shapes.box(4)
+    >>> T = heat_igl.activation_times(bar, np.diag([4.0, 1.0, 1.0]), [0], times=-0.25)
+    >>> bool(np.allclose(T, np.linalg.norm(bar.V * [0.5, 1, 1], axis=1) - 0.25))
+    True
+    """
+    simplices = as_simplices(mesh)
+    D = real_numbers("D", D)
+    m, n = simplices.n_faces, simplices.n_vertices
+    if D.shape == (3, 3):
+        D = np.broadcast_to(D, (m, 3, 3))
+    if D.shape not in ((m, 3, 3), (n, 3, 3)):
+        raise ValueError(f"D must have shape (3, 3), {(m, 3, 3)} per face or {(n, 3, 3)} per vertex, not {D.shape}")
+    size = np.abs(D).max(axis=(1, 2))
+    skew = np.abs(D - np.swapaxes(D, 1, 2)).max(axis=(1, 2))
+    least = np.linalg.eigvalsh(np.where(np.isfinite(size)[:, None, None], D, 0))[:, 0]
+    for bad, problem in (
+        (~np.isfinite(size), "must be finite"),
+        (skew > _ROUNDING * size, "must be symmetric"),
+        (~(least > 0), "must be positive definite"),
+    ):
+        if bad.any():
+            first = int(np.argmax(bad))
+            raise ValueError(f"D[{first}] = {D[first].tolist()} {problem} ({int(bad.sum())} of {len(D)} are not)")
+    inverse = np.linalg.inv(D)
+    start = real_numbers("times", times)
+    if not np.isfinite(start).all():
+        raise ValueError("times must be finite: leave out sites where no wave starts")
+    first_time = float(start.min(initial=np.inf)) if start.size else 0.0
+    solver = GeodesicSolver(metric_operators(simplices, (inverse + np.swapaxes(inverse, 1, 2)) / 2))
+    return np.asarray(solver.distance(OffsetSources(sites, start - first_time)) + first_time)
+
+
+# Asymmetry that is taken for rounding.
+_ROUNDING = 1e-9
