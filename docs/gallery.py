@@ -135,7 +135,7 @@ def scribble() -> Picture:
     loop = np.stack([0.9 + 0.55 * x, np.sin(angle) * 0.6, np.full(200, 0.39)], axis=1)
     places = heat_igl.closest_points(mesh, loop).points.positions(mesh)
     arcs = [heat_igl.curve_on(mesh, places[i : i + 36]) for i in (0, 50, 100, 150)]
-    phi = heat_igl.SignedHeatSolver(mesh, method="windows").distance(arcs)
+    phi = heat_igl.SignedHeatSolver(mesh).distance(arcs)
     return plot_field(mesh, phi, label="signed distance", limits=(-1, 1), spacing=0.1, curves=arcs, view=(10, 60))
 
 
@@ -144,7 +144,7 @@ def grown() -> Picture:
     mesh = heat_igl.sample_mesh()
     sites = np.random.default_rng(2).choice(mesh.n_vertices, 25, replace=False)
     region = heat_igl.HeatMethodSolver(mesh).distance(sites) < 0.07
-    phi = heat_igl.SignedHeatSolver(mesh, method="windows").distance(region)
+    phi = heat_igl.SignedHeatSolver(mesh).distance(region)
     outline = heat_igl.isolines(mesh, phi, 0)[0]
     return plot_field(mesh, phi, label="signed distance", spacing=0.03, limits=(-0.12, 0.12), curves=outline)
 
@@ -174,7 +174,7 @@ def tool_path() -> Picture:
     angle, reach = np.radians([-45, 0, 45, 40, 0, -40]), np.array([0.9, 0.9, 0.9, 0.48, 0.58, 0.48])
     corners = np.stack([reach * np.sin(angle), [0.15, 0.15, 0.15, 0.8, 0.65, 0.8], reach * np.cos(angle)], axis=1)
     contour = heat_igl.geodesic_path(part, heat_igl.closest_points(part, [*corners, corners[0]]).points)
-    phi = heat_igl.SignedHeatSolver(part, method="windows").distance(contour)
+    phi = heat_igl.SignedHeatSolver(part).distance(contour)
     paths = heat_igl.isolines(part, phi, [*np.arange(-0.06, phi.min(), -0.06), 0.06])
     drawn = [contour, *(curve for level in paths for curve in level)]
     return plot_field(part, phi, label="signed distance", limits=(-0.4, 0.4), curves=drawn, view=(0, 25))
@@ -183,7 +183,7 @@ def tool_path() -> Picture:
 def pieces() -> Picture:
     """A surface cut along a curve and two offsets of it, the pieces moved apart."""
     mesh, axis = shapes.blob(5), np.array([0.2, 1, 0.3])
-    phi = heat_igl.SignedHeatSolver(mesh, method="windows").distance(heat_igl.isolines(mesh, mesh.V @ axis, 0))
+    phi = heat_igl.SignedHeatSolver(mesh).distance(heat_igl.isolines(mesh, mesh.V @ axis, 0))
     found = heat_igl.cut(mesh, heat_igl.isolines(mesh, phi, [-0.4, 0, 0.4]))
     carried, parts = found.carry(phi), found.split()
     moved = [part.mesh.V + 2 * carried[part.vertices].mean() * axis for part in parts]

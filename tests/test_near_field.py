@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from conftest import perturbed
+from scipy.spatial import Delaunay
 
 from heat_igl import (
     GeodesicSolver,
@@ -19,7 +20,7 @@ from heat_igl import (
     shapes,
 )
 from heat_igl.intrinsic import Adjacency, intrinsic_triangulation
-from heat_igl.sources import NearField, Seeds, Sources, source_set, windows
+from heat_igl.sources import NearField, Seeds, Sources, near_field, source_set, windows
 from heat_igl.sources.own_faces import seen_from_points
 
 
@@ -185,3 +186,38 @@ def test_joints_of_segments_count_once():
     corners = seen_from_points(ends, Adjacency(intrinsic_triangulation(mesh)))[1][0].vertex
     # All joints lie on edges: once in each of two faces, though two segments meet there.
     assert len(corners) == 2 * len(curve)
+
+
+def random_boundary(seed: int, n: int) -> Mesh:
+    """The boundary of a random half of the tetrahedra of a Delaunay triangulation: edges of up to a dozen faces."""
+    rng = np.random.default_rng(seed)
+    P = rng.random((n, 3))
+    T = Delaunay(P).simplices
+    T = T[rng.random(len(T)) < 0.5]
+    sides = np.concatenate([np.delete(T, c, axis=1) for c in range(4)])
+    F, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+    used, F = np.unique(F[count == 1], return_inverse=True)
+    return Mesh(P[used], F.reshape(-1, 3))
+
+
+def test_work_at_edges_of_many_faces_is_bounded_and_what_is_found_is_complete(monkeypatch):
+    mesh = random_boundary(0, 60)
+    point = SurfacePoints([7], [[0.2, 0.3, 0.5]])
+    found = source_set(point, mesh.n_vertices, mesh.F)
+    field = NearField(intrinsic_triangulation(mesh))
+    crossed = []
+    cross = near_field.cross
+    monkeypatch.setattr(near_field, "cross", lambda w, adjacency: crossed.append(len(w)) or cross(w, adjacency))
+    values = []
+    for most in (10**9, 2000):
+        monkeypatch.setattr(near_field, "_MOST_WINDOWS", most)
+        crossed.clear()
+        near = field.seeds(found.points, found.segments, 0.6)[0]
+        values.append(np.full(mesh.n_vertices, np.inf))
+        values[-1][near.vertex] = near.value
+    assert sum(crossed) <= 2000
+    everything, bounded = values
+    limit = bounded[np.isfinite(bounded)].max()
+    assert np.isfinite(bounded).sum() > 3
+    # Up to the farthest of what is found, nothing is missing and nothing is longer.
+    np.testing.assert_array_equal(bounded[everything <= limit], everything[everything <= limit])

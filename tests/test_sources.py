@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from heat_igl import (
     SourceError,
     SurfaceCurve,
     SurfacePoints,
+    geodesic_distance,
     isolines,
     shapes,
     shortest_paths,
@@ -164,3 +167,14 @@ def test_lists_of_curves_may_be_nested():
     solver = GeodesicSolver(mesh, method="sweep")
     np.testing.assert_array_equal(solver.distance(lines), solver.distance(flat))
     np.testing.assert_array_equal(solver.distance([lines, [3, 4]]), solver.distance([*flat, 3, 4]))
+
+
+@pytest.mark.parametrize("method", ["exact", "sweep", "heat"])
+def test_offsets_from_which_distances_cannot_be_told_are_refused(method):
+    mesh = shapes.grid(8)
+    for offset in (1e13, 1e16, 1e300):
+        for sources in (OffsetSources(0, offset), OffsetSources([0, 80], [0, offset])):
+            with pytest.raises(SourceError, match=re.escape(f"an offset of {offset:.4g} is too large for a mesh")):
+                geodesic_distance(mesh, sources, method=method)
+    late = geodesic_distance(mesh, OffsetSources(0, 1e9), method=method)
+    np.testing.assert_allclose(late - 1e9, geodesic_distance(mesh, 0, method=method), atol=2.4e-7)

@@ -19,7 +19,7 @@ from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import MetricSimplices, Operators, edge_length_operators
 from heat_igl.plan import DomainKind, Method, Plan, distance_plan, sweep_plan
 from heat_igl.runtime import n_threads
-from heat_igl.sources import Sources, SourceSet, named_vertices, source_set
+from heat_igl.sources import Sources, SourceSet, named_vertices, require_resolved, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import (
     Engine,
@@ -344,10 +344,18 @@ class GeodesicSolver(BatchedSolver):
         return solver
 
     def _source_set(self, sources: Sources) -> SourceSet:
-        if self._part is not None:
-            faces = None if self._triangles is None else self._part.whole
-            return source_set(sources, self.n_vertices, faces).within(self._part)
-        chosen, domain = source_set(sources, self.n_vertices, self._given_faces), self._domain
+        part, domain, faces = self._part, self._domain, self._given_faces
+        if part is not None:
+            faces = None if self._triangles is None else part.whole
+        chosen = source_set(sources, self.n_vertices, faces)
+        if part is not None:
+            chosen = chosen.within(part)
+        if chosen.offsets.any():
+            if isinstance(domain, Operators):
+                h = domain.mean_edge_length
+            else:
+                h = float((domain.triangles if isinstance(domain, PointCloud) else domain).edge_lengths.mean())
+            require_resolved(chosen, h)
         moved = isinstance(domain, PointCloud) and domain.has_copies
         return chosen.with_vertices_moved(domain.originals) if moved and isinstance(domain, PointCloud) else chosen
 

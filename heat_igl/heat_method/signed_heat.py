@@ -24,7 +24,7 @@ from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices
 from heat_igl.operators import Operators, operators
 from heat_igl.runtime import both, n_threads
-from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, source_set
+from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, require_resolved, source_set
 from heat_igl.typing import BoolArray, FloatArray
 from heat_igl.unfolding import ExactSurface, MeshTriangles
 
@@ -199,6 +199,7 @@ class SignedHeatSolver:
     def _from(self, sources: Sources) -> FloatArray:
         """Exact distance (n,) from sources without a side."""
         places = source_set(sources, self.n_vertices, self._mesh.F)
+        require_resolved(places, self._domain.mean_edge_length)
         points, segments = places.points, places.segments
         return self._exact.solve(
             places.vertices,

@@ -22,7 +22,7 @@ from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, as_mesh
 from heat_igl.operators import Laplacian, Operators
 from heat_igl.runtime import warn_caller
-from heat_igl.sources import Sources, SourceSet, SourceTerm, right_hand_side, source_set
+from heat_igl.sources import Sources, SourceSet, SourceTerm, require_resolved, right_hand_side, source_set
 from heat_igl.steps import Boundary
 from heat_igl.typing import ArrayLike, FloatArray
 
@@ -151,10 +151,13 @@ class HeatMethodSolver(PreparedSolver):
         return np.asarray(cut_off(distance, beyond))
 
     def _source_set(self, sources: Sources) -> SourceSet:
-        if self._part is None:
-            return source_set(sources, self.n_vertices, self._parts.given_faces)
-        faces = None if self._parts.given_faces is None else self._part.whole
-        return source_set(sources, self.n_vertices, faces).within(self._part)
+        faces = self._parts.given_faces
+        if self._part is not None and faces is not None:
+            faces = self._part.whole
+        chosen = source_set(sources, self.n_vertices, faces)
+        if self._part is not None:
+            chosen = chosen.within(self._part)
+        return require_resolved(chosen, self._parts.operators.mean_edge_length)
 
     def _answers(
         self,

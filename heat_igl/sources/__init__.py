@@ -6,7 +6,14 @@ from heat_igl.sources.ordered import ordered_vertices
 from heat_igl.sources.oriented import Oriented, OrientedPoints, OrientedSet, oriented_set
 from heat_igl.sources.source_sets import SourcePoints, SourceSegments, SourceSet, nearest_first
 from heat_igl.sources.source_terms import SourceTerm, right_hand_side
-from heat_igl.sources.specification import OffsetSources, Sources, named_vertices, source_set, vertex_sources
+from heat_igl.sources.specification import (
+    OffsetSources,
+    Sources,
+    named_vertices,
+    require_resolved,
+    source_set,
+    vertex_sources,
+)
 
 __all__ = [
     "NEAR_RADIUS",
@@ -27,6 +34,7 @@ __all__ = [
     "nearest_first",
     "ordered_vertices",
     "oriented_set",
+    "require_resolved",
     "right_hand_side",
     "source_set",
     "take_shorter",

@@ -18,6 +18,10 @@ __all__ = ["NearField", "Seeds", "SightLines"]
 
 # Number of triangles that a window may cross, one after another. On ordinary meshes the radius is reached long before.
 _MOST_LEVELS = 50
+# Windows that are followed for each source. On ordinary meshes there are up to 1000 for a point, on a camel and a cow
+# with long triangles 4500, and up to 430 for a segment of a curve. At an edge of k faces each window becomes k - 1, and
+# on boundaries of random tetrahedra there were tens of millions: those that come first tell less than the radius then.
+_MOST_WINDOWS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,21 +107,24 @@ class NearField:
             Corners of the sources' own faces beyond `radius`, at which another source may be nearer.
         """
         radius = np.broadcast_to(radius, self.triangulation.n)
-        found, own = self._found(points, segments, radius, vertices)
-        near = self._shortest(found, radius)
+        found, own, complete = self._found(points, segments, radius, vertices)
+        near = self._shortest(found, radius, complete)
         return near, own.at(~np.isin(own.vertex, near.vertex))
 
     def lines(
         self, points: SourcePoints, segments: SourceSegments, radius: float | FloatArray, vertices: Seeds | None = None
     ) -> SightLines:
         """The straight lines whose lengths `seeds` finds; arguments as for it."""
-        found, _ = self._found(points, segments, np.broadcast_to(radius, self.triangulation.n), vertices)
+        found, _, _ = self._found(points, segments, np.broadcast_to(radius, self.triangulation.n), vertices)
         return found.lines()
 
     def _found(
         self, points: SourcePoints, segments: SourceSegments, radius: FloatArray, vertices: Seeds | None
-    ) -> tuple[_Nearest, Seeds]:
-        """The shortest straight line to each vertex, and the corners of the sources' own faces."""
+    ) -> tuple[_Nearest, Seeds, float]:
+        """The shortest straight line to each vertex, the corners of the sources' own faces, and a limit.
+
+        All lines within the radius were followed whose values at the end are below the limit.
+        """
         points, segments = self._carried(points, segments)
         if vertices is not None:
             points = points.joined(self._as_points(vertices))
@@ -129,6 +136,8 @@ class NearField:
         windows = joined([*from_points, *from_segments])
         own = found.seeds()
         base = self.triangulation.l.ravel()
+        n_left = _MOST_WINDOWS * (len(points.faces) + len(segments.faces))
+        complete = np.inf
         for _ in range(_MOST_LEVELS):
             nearest = windows.nearest()
             ends = self.triangulation.tail(windows.half_edge), self.triangulation.head(windows.half_edge)
@@ -136,15 +145,22 @@ class NearField:
             useful = windows.offset + nearest < np.minimum(tail, head) + base[windows.half_edge]
             useful &= windows.are_nearer_than(tail, head, base[windows.half_edge])
             windows = windows.at((nearest < radius[ends[0]]) & useful)
-            if not len(windows):
+            n_left -= len(windows)
+            if n_left < 0:
+                complete = float((windows.offset + windows.nearest()).min())
+            if n_left < 0 or not len(windows):
                 break
             windows, seen = cross(windows, self._adjacency)
             found.add(seen)
-        return found, own
+        return found, own, complete
 
-    def _shortest(self, found: _Nearest, radius: FloatArray) -> Seeds:
-        """Seeds within `radius`, without the vertices that another reaches along an edge on a shorter path."""
+    def _shortest(self, found: _Nearest, radius: FloatArray, complete: float) -> Seeds:
+        """Seeds within `radius`, without the vertices that another reaches along an edge on a shorter path.
+
+        None of them beyond `complete`, from where on shorter lines may not have been followed.
+        """
         seeds = found.seeds(radius)
+        seeds = seeds.at(seeds.value <= complete)
         which, ends, lengths = self.spokes(seeds.vertex)
         beaten = found.at(ends) > (seeds.value[which] + lengths) * (1 + ROUNDING)
         return seeds.at(~np.isin(seeds.vertex, ends[beaten]))

@@ -25,6 +25,7 @@ __all__ = [
     "Sources",
     "named_vertices",
     "on_simplex",
+    "require_resolved",
     "source_set",
     "vertex_sources",
 ]
@@ -33,6 +34,8 @@ _ACCEPTED = "a vertex index, a sequence of vertex indices, or a boolean mask wit
 # Barycentric coordinates below this are 0: the point lies on the edge, or in the vertex.
 _ON_RIM = 1e-12
 _NOWHERE = np.empty(0, np.int64)
+# At an offset, doubles may be so far apart in mean edge lengths: all distances beyond it are rounded by half of that.
+_COARSEST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +52,8 @@ class OffsetSources:
     Raises
     ------
     SourceError
-        If an offset is negative or not finite. That their number fits is checked when the sources are used.
+        If an offset is negative or not finite. That their number fits, and that distances can be told from them, is
+        checked when the sources are used.
 
     Examples
     --------
@@ -99,6 +103,33 @@ def source_set(sources: Sources, n: int, F: IntArray | None) -> SourceSet:
     builder = _Builder(n, F)
     builder.add(sources)
     return builder.finish()
+
+
+def require_resolved(sources: SourceSet, mean_edge_length: float) -> SourceSet:
+    """The same sources, if distances can be told from the offsets at which they begin.
+
+    Parameters
+    ----------
+    sources : SourceSet
+        Sources on a domain.
+    mean_edge_length : float
+        Of the domain.
+
+    Raises
+    ------
+    SourceError
+        If doubles as large as an offset are farther apart than a thousandth of the mean edge length.
+    """
+    offsets = sources.offsets
+    wrong = np.spacing(offsets) > _COARSEST * mean_edge_length
+    if wrong.any():
+        offset = float(offsets[np.argmax(wrong)])
+        raise SourceError(
+            f"an offset of {offset:.4g} is too large for a mesh with edges of {mean_edge_length:.4g} in the mean: "
+            f"doubles are {np.spacing(offset):.2g} apart there, and distances would be lost; subtract the least offset "
+            "from all, and leave out sources that begin after all others have arrived"
+        )
+    return sources
 
 
 def vertex_sources(sources: Sources, n: int, name: str = "sources") -> IntArray:
