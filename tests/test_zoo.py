@@ -32,10 +32,10 @@ MEASURED = {
     "box cube": 0.92,
     "hull of 12": 0.52,
     "scattered square 1000": 0.52,
-    "sheared grid by 3": 1.27,
+    "sheared grid by 3": 0.61,
     "height field coarse": 1.4,
     "noise 10 times": 3.0,
-    "beams": 3.8,
+    "beams": 2.18,
     "maze": 0.53,
     "regular grid": 1.45,
     "spiky sphere": 2.85,
@@ -145,17 +145,12 @@ def thin_rectangle() -> Mesh:
     return Mesh(flat.V @ np.array([[1.0, 0, 0], [3, 1, 0], [0, 0, 1]]), flat.F)
 
 
-def test_a_wrong_answer_warns_and_is_raised_to_straight_lines() -> None:
+def test_a_wrong_answer_is_raised_to_straight_lines_or_warns() -> None:
     mesh = thin_rectangle()
     lines = np.linalg.norm(mesh.V - mesh.V[210], axis=1)
     solver = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay")
-    with pytest.warns(
-        AccuracyWarning, match=r"at least \d+\.\d % too short on average, .* were raised, most at vertex \d+; use ref"
-    ):
-        distance = solver.distance(210)
-    assert (distance >= lines - 1e-12).all()
-    with pytest.warns(AccuracyWarning, match="too short"):
-        check = solver.solve(210).diagnostics.check
+    assert relative_error(solver.distance(210), lines) < 0.02
+    check = solver.solve(210).diagnostics.check
     assert check is not None
     assert check.shortfall > 0.1
     assert check.raised
@@ -168,7 +163,8 @@ def test_a_wrong_answer_warns_and_is_raised_to_straight_lines() -> None:
     with pytest.warns(AccuracyWarning, match="too short"):
         assert np.mean(smooth.distance(210) < 0.9 * lines) > 0.2
     # Nothing is known about lines without positions.
-    unchecked = HeatMethodSolver.from_operators(solver.operators).solve(210)
+    with pytest.warns(AccuracyWarning, match=r"off by 2\d\.\d % on average"):
+        unchecked = HeatMethodSolver.from_operators(solver.operators).solve(210)
     assert unchecked.diagnostics.check is not None
     assert np.isnan(unchecked.diagnostics.check.shortfall)
     assert np.mean(unchecked.distance < 0.9 * lines) > 0.2
@@ -186,9 +182,10 @@ def test_a_batch_warns_once() -> None:
 
 def test_a_good_answer_is_left_alone() -> None:
     mesh = shapes.icosphere(3)
-    solution = HeatMethodSolver(mesh).solve(0)
+    solution = HeatMethodSolver(mesh, t_coef=0.5).solve(0)
     check = solution.diagnostics.check
     assert check is not None
+    assert not check.raised
     assert 0 <= check.shortfall < 0.005
     assert check.steepness < 0.01
     assert check.largest_shortfall < 0.02

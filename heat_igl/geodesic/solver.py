@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import (
     Engine,
     FrontSolver,
+    GuardedEngine,
+    Invariants,
     MeshTriangles,
     OperatorTriangles,
     SweepEngine,
@@ -99,6 +101,7 @@ class GeodesicSolver(BatchedSolver):
         self._triangles: Triangles | None = None
         self._engine: Engine
         self._plan, self._engine = self._prepared()
+        self._answering = self._guarded()
 
     @classmethod
     def from_edge_lengths(
@@ -158,6 +161,22 @@ class GeodesicSolver(BatchedSolver):
             if chosen.engine == "sweep":
                 return chosen, sweep
         return chosen, WindowEngine(triangles, chosen.tolerance or 0.0, originals)
+
+    def _guarded(self) -> Engine:
+        """The engine with a check of its answers: that of windows. Sweeps and fronts are held to the same bounds."""
+        domain, triangles = self._domain, self._triangles
+        if triangles is None or not isinstance(self._engine, WindowEngine):
+            return self._engine
+        originals = domain.originals if isinstance(domain, PointCloud) and domain.has_copies else None
+        components = triangles.components if originals is None else triangles.components[originals]
+        if isinstance(domain, Operators):
+            faces = triangles.faces
+            invariants = Invariants(faces.F, components, lengths=faces.l)
+        else:
+            invariants = Invariants(triangles.given_faces, components, domain.V)
+        return GuardedEngine(
+            self._engine, invariants, self._plan.tolerance or 0.0, (partial(SweepEngine, triangles, originals),)
+        )
 
     def __repr__(self) -> str:
         tolerance = "" if self._plan.tolerance is None else f", tolerance={self._plan.tolerance:g}"
@@ -220,7 +239,7 @@ class GeodesicSolver(BatchedSolver):
         """
         beyond = checked_cutoff(cutoff)
         limit = np.inf if beyond is None else beyond
-        return np.asarray(cut_off(self._engine.distance(self._source_set(sources), limit, n_threads()), beyond))
+        return np.asarray(cut_off(self._answering.distance(self._source_set(sources), limit, n_threads()), beyond))
 
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
         """Distance, and which source is nearest: a geodesic Voronoi diagram.
@@ -238,7 +257,7 @@ class GeodesicSolver(BatchedSolver):
         """
         beyond = checked_cutoff(cutoff)
         limit = np.inf if beyond is None else beyond
-        distance, labels = self._engine.labelled(self._source_set(sources), limit, n_threads())
+        distance, labels = self._answering.labelled(self._source_set(sources), limit, n_threads())
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
@@ -263,7 +282,11 @@ class GeodesicSolver(BatchedSolver):
         ValueError
             If the engine is not windows, or the solver was made from operators.
         """
-        found = directions(*self._windows("directions follow").directed(self._source_set(sources)), self._frames)
+        chosen = self._source_set(sources)
+        paths = self._windows("directions follow").directed(chosen)
+        if isinstance(self._answering, GuardedEngine):
+            self._answering.require(paths[0], chosen)
+        found = directions(*paths, self._frames)
         if self._part is None:
             return found
         start = unchecked_points(self._part.faces[found.start.faces], found.start.barycentric)
@@ -360,5 +383,5 @@ class GeodesicSolver(BatchedSolver):
         return chosen.with_vertices_moved(domain.originals) if moved and isinstance(domain, PointCloud) else chosen
 
     def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[str | None]]:
-        rows = [self._engine.distance(sources, cutoff) for sources in source_sets]
+        rows = [self._answering.distance(sources, cutoff) for sources in source_sets]
         return np.stack(rows), [None] * len(rows)

@@ -1,6 +1,6 @@
 """`HeatMethodSolver`: the steps put together, factored once, asked many times."""
 
-from heat_igl.heat_method.checking import AnswerCheck
+from heat_igl.heat_method.checking import AnswerCheck, Comparison
 from heat_igl.heat_method.directions import Directions
 from heat_igl.heat_method.options import Backend, Boundary, Laplacian, Magnitude, SolverOptions
 from heat_igl.heat_method.signed_heat import Level, SignedHeatSolver
@@ -11,6 +11,7 @@ from heat_igl.heat_method.vector_heat import VectorHeatSolver, VectorMethod
 
 __all__ = [
     "AnswerCheck",
+    "Comparison",
     "Backend",
     "Boundary",
     "Diagnostics",

@@ -43,6 +43,10 @@ class BatchedSolver(ABC):
     def _source_set(self, sources: Sources) -> SourceSet:
         """`sources`, checked."""
 
+    def _drawn(self, source_sets: list[SourceSet]) -> list[SourceSet]:
+        """The sets of the next block, in their order and on the caller's thread: before `_answers`."""
+        return source_sets
+
     @abstractmethod
     def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[str | None]]:
         """Distances (k, n) from k sets of sources, and for each the text of a warning, if one is due; on any thread.
@@ -169,7 +173,7 @@ class BatchedSolver(ABC):
 
         size, threads = block_size(self._n_faces, n_sets, n_threads())
         solved_before, has_complained = 0, False
-        for rows, held, complaints in in_order(solved, in_blocks(source_sets, size), threads):
+        for rows, held, complaints in in_order(solved, map(self._drawn, in_blocks(source_sets, size)), threads):
             # The caller's line is on this thread.
             for warning in held:
                 warn_caller(*warning)

@@ -194,7 +194,8 @@ class PreparedSolver(BatchedSolver):
     @property
     def diagnostics(self) -> Diagnostics:
         """What the solver did and rests on."""
-        return self._parts.diagnostics
+        comparisons = self._parts.comparisons
+        return replace(self._parts.diagnostics, compared=None if comparisons is None else comparisons.worst)
 
     @property
     def n_vertices(self) -> int:

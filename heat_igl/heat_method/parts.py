@@ -13,7 +13,7 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.heat_method.checking import Checker
+from heat_igl.heat_method.checking import Checker, Comparisons
 from heat_igl.heat_method.element_slopes import ElementSlopes
 from heat_igl.heat_method.integration import Integration
 from heat_igl.heat_method.options import SolverOptions
@@ -64,6 +64,8 @@ class SolverParts:
         Whether the heat flow is fitted to the lengths of edges.
     checker : Checker
         Checks answers against bounds that need no reference.
+    comparisons : Comparisons or None
+        Compares the first answers with those of another engine; None if answers are not held to bounds.
     plan : Plan
         For the user.
     diagnostics : Diagnostics
@@ -81,6 +83,7 @@ class SolverParts:
     t_damping: float | FloatArray | None
     fitted: bool
     checker: Checker
+    comparisons: Comparisons | None
     plan: Plan
     diagnostics: Diagnostics
 
@@ -88,6 +91,11 @@ class SolverParts:
     def slopes(self) -> ElementSlopes:
         """The derivatives of what is made of the triangles."""
         return ElementSlopes(self.operators, self.time_steps, self.t_damping, self.fitted)
+
+    @property
+    def is_default(self) -> bool:
+        """Whether answers are held to bounds: neither the paper's field, a time step nor a boundary was asked for."""
+        return _is_default(self.options, self.t_damping is not None)
 
     @property
     def n_vertices(self) -> int:
@@ -196,6 +204,7 @@ def prepare(
         seconds_analysis=analysed - begun,
         seconds_factorization=factored - analysed,
     )
+    is_triangles = domain.surface is not None and domain.fans is None
     return SolverParts(
         options=options,
         operators=domain,
@@ -208,6 +217,7 @@ def prepare(
         t_damping=t_damping,
         fitted=fitted,
         checker=Checker(domain.source_surface, domain.referenced[: domain.n_given], V),
+        comparisons=Comparisons(domain) if is_triangles and _is_default(options, damped) else None,
         plan=heat_plan(domain.n_given, domain.n, domain.is_surface, diagnostics.t, domain.mean_edge_length),
         diagnostics=diagnostics,
     )
@@ -237,6 +247,10 @@ def _factored(
     threads = 1 if found.backend == "scipy" else min(2, n_threads())
     poisson, heat_flow, divergence = in_order(lambda make: make(), makers, threads)
     return heat_flow, poisson, divergence
+
+
+def _is_default(options: SolverOptions, damped: bool) -> bool:
+    return damped and options.default_time_step and options.boundary == "neumann"
 
 
 def _of_largest(step: float | FloatArray, domain: Operators) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from heat_igl.heat_method.checking import AnswerCheck
+from heat_igl.heat_method.checking import AnswerCheck, Comparison
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["Diagnostics", "HeatSolution", "LabelledDistance"]
@@ -39,7 +39,10 @@ class Diagnostics:
         Wall-clock time of the stages of the constructor: operators; order of elimination, which begins beside them, as
         far as it takes longer; factors.
     check : AnswerCheck or None
-        Of a `HeatSolution`, by how much the distance leaves bounds that need no reference. None for the solver.
+        Of a `HeatSolution`, by how much the distance left bounds that need no reference. None for the solver.
+    compared : Comparison or None
+        How far first answers were from those of a sweep, of the kind of sources for which that is most; None before
+        the first answer, and where answers are not compared, see `AnswerCheck`.
 
     Examples
     --------
@@ -63,6 +66,7 @@ class Diagnostics:
     seconds_analysis: float
     seconds_factorization: float
     check: AnswerCheck | None = None
+    compared: Comparison | None = None
 
     @property
     def t_raised(self) -> bool:

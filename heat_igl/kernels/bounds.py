@@ -11,6 +11,7 @@ def is_longer(
     ends: cython.const[cython.int][:, ::1],
     length: cython.const[cython.double][::1],
     d: cython.const[cython.double][::1],
+    share: cython.double = 0.0,
 ) -> bool:
     """Whether `shorten` would lower any of the distances `d` (n,) along the edges: mostly it would not."""
     e: cython.Py_ssize_t
@@ -18,8 +19,8 @@ def is_longer(
     with cython.nogil:
         for e in range(length.shape[0]):
             # Infinite at both ends gives nan, and false.
-            if fabs(d[ends[e, 0]] - d[ends[e, 1]]) > length[e]:
-                found = _far_end(ends, length, d, e) >= 0
+            if fabs(d[ends[e, 0]] - d[ends[e, 1]]) > length[e] * (1 + share):
+                found = _far_end(ends, length, d, e, share) >= 0
                 if found:
                     break
     return found
@@ -84,11 +85,13 @@ def shorten(
     incident: cython.const[cython.int][::1],
     d: cython.double[::1],
     labels: cython.longlong[::1],
+    share: cython.double = 0.0,
 ):
     """Lower `d` (n,) to the paths along edges, in place; `labels` (n,), or none at all, are handed on with it.
 
     The pairs (e, 2) of `ends` are edges of those lengths (e,); ``incident[first[v] : first[v + 1]]`` are the edges of
-    vertex v. One pass over all edges, and then only over those of vertices that were lowered.
+    vertex v. One pass over all edges, and then only over those of vertices that were lowered. Nothing is done on an
+    edge on which the distance is too long by less than a `share` of the length.
     """
     n: cython.Py_ssize_t = d.shape[0]
     # A ring: no vertex waits twice, so n places suffice.
@@ -103,8 +106,8 @@ def shorten(
     with cython.nogil:
         for e in range(length.shape[0]):
             # Nearly always false, and so cheaper than to ask which end is nearer.
-            if fabs(d[ends[e, 0]] - d[ends[e, 1]]) > length[e]:
-                lowered = _lowered(ends, length, d, labels, e)
+            if fabs(d[ends[e, 0]] - d[ends[e, 1]]) > length[e] * (1 + share):
+                lowered = _lowered(ends, length, d, labels, e, share)
                 if lowered >= 0 and not is_waiting[lowered]:
                     is_waiting[lowered] = True
                     waiting[count] = lowered
@@ -115,7 +118,7 @@ def shorten(
             begin = begin + 1 if begin + 1 < n else 0
             count -= 1
             for k in range(first[v], first[v + 1]):
-                lowered = _lowered(ends, length, d, labels, incident[k])
+                lowered = _lowered(ends, length, d, labels, incident[k], share)
                 if lowered >= 0 and not is_waiting[lowered]:
                     is_waiting[lowered] = True
                     end = begin + count
@@ -133,9 +136,10 @@ def _lowered(
     d: cython.double[::1],
     labels: cython.longlong[::1],
     e: cython.Py_ssize_t,
+    share: cython.double,
 ) -> cython.int:
     """The end of edge e whose distance was lowered to the path along it; -1 if that is not shorter."""
-    far: cython.int = _far_end(ends, length, d, e)
+    far: cython.int = _far_end(ends, length, d, e, share)
     if far >= 0:
         near: cython.int = ends[e, 0] if ends[e, 1] == far else ends[e, 1]
         d[far] = d[near] + length[e]
@@ -153,14 +157,15 @@ def _far_end(
     length: cython.const[cython.double][::1],
     d: cython.const[cython.double][::1],
     e: cython.Py_ssize_t,
+    share: cython.double,
 ) -> cython.int:
-    """The end of edge e to which the path along it is shorter; -1 if there is none."""
+    """The end of edge e to which the path along it is shorter, by more than that share; -1 if there is none."""
     near: cython.int = ends[e, 0]
     far: cython.int = ends[e, 1]
     if d[far] < d[near]:
         near, far = far, near
     # Not by rounding, which would pass along many edges.
-    return far if d[near] + length[e] < d[far] * (1 - 1e-12) else -1
+    return far if d[near] + length[e] * (1 + share) < d[far] * (1 - 1e-12) else -1
 
 
 def lengthen(V: cython.const[cython.double][:, ::1], place: cython.const[cython.double][::1], d: cython.double[::1]):

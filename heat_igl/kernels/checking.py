@@ -1,10 +1,10 @@
-"""How far distances leave the bounds that need no reference: straight lines from below, edges from above."""
+"""How far distances leave the bounds that need no reference: edges from above, straight lines from below."""
 
 import cython
 import numpy as np
-from cython.cimports.libc.math import fabs, isfinite, sqrt
+from cython.cimports.libc.math import INFINITY, fabs, isfinite, sqrt
 
-__all__ = ["edge_excess", "line_shortfall", "straight_lines"]
+__all__ = ["below_line", "edge_excess", "largest_finite", "line_shortfall", "steepest_edge", "straight_lines"]
 
 
 def edge_excess(
@@ -48,6 +48,120 @@ def edge_excess(
     return total, excess, worst
 
 
+def largest_finite(distance: cython.const[cython.double][::1]) -> float:
+    """The largest distance (n,) that is finite; 0 if there is none."""
+    i: cython.Py_ssize_t
+    largest: cython.double = 0.0
+    with cython.nogil:
+        for i in range(distance.shape[0]):
+            if largest < distance[i] < INFINITY:
+                largest = distance[i]
+    return largest
+
+
+def below_line(
+    distance: cython.const[cython.double][::1],
+    V: cython.const[cython.double][:, ::1],
+    step: cython.Py_ssize_t,
+    places: cython.const[cython.double][:, ::1],
+    offsets: cython.const[cython.double][::1],
+    slack: cython.double,
+) -> int:
+    """The first of every `step`-th vertices that is below the straight lines from all places; -1 if there is none.
+
+    Lines begin at `offsets` (k,) in the `places` (k, 3); distances below them by `slack` count as rounding.
+    """
+    k: cython.Py_ssize_t
+    s: cython.Py_ssize_t
+    found: cython.Py_ssize_t = -1
+    with cython.nogil:
+        for k in range((distance.shape[0] + step - 1) // step):
+            i: cython.Py_ssize_t = k * step
+            for s in range(places.shape[0]):
+                x: cython.double = V[i, 0] - places[s, 0]
+                y: cython.double = V[i, 1] - places[s, 1]
+                z: cython.double = V[i, 2] - places[s, 2]
+                reach: cython.double = distance[i] + slack - offsets[s]
+                if reach >= 0 and x * x + y * y + z * z <= reach * reach:
+                    break
+            else:
+                found = i
+                break
+    return found
+
+
+def steepest_edge(
+    distance: cython.const[cython.double][::1],
+    F: cython.const[cython.longlong][:, ::1],
+    V: cython.const[cython.double][:, ::1],
+    l: cython.const[cython.double][:, ::1],
+    cutoff: cython.double,
+    slack: cython.double,
+):
+    """An end of the first edge of simplices along which distance grows by more than the length of the edge.
+
+    Parameters
+    ----------
+    distance : (n,) float64
+        Distances.
+    F : (m, 3) or (m, 4) int64
+        Triangles or tetrahedra.
+    V : (n, 3) float64
+        Positions, from which lengths follow; (0, 3) if `l` has them.
+    l : (m, 3) float64
+        Lengths of the sides of triangles, each opposite its corner; (0, 3) if V has them.
+    cutoff : float
+        Beyond it distances may be ``inf``, at any vertex.
+    slack : float
+        An excess that is rounding.
+
+    Returns
+    -------
+    far, near : int
+        Both ends of the edge; -1 if there is none.
+    """
+    n_corners: cython.int = F.shape[1]
+    has_lengths: cython.bint = l.shape[0] > 0
+    f: cython.Py_ssize_t
+    a: cython.int
+    b: cython.int
+    i: cython.longlong
+    j: cython.longlong
+    far: cython.longlong = -1
+    near: cython.longlong = -1
+    squared: cython.double
+    difference: cython.double
+    with cython.nogil:
+        for f in range(F.shape[0]):
+            for a in range(n_corners - 1):
+                i = F[f, a]
+                for b in range(a + 1, n_corners):
+                    j = F[f, b]
+                    if has_lengths:
+                        squared = l[f, 3 - a - b] * l[f, 3 - a - b]
+                    else:
+                        x: cython.double = V[i, 0] - V[j, 0]
+                        y: cython.double = V[i, 1] - V[j, 1]
+                        z: cython.double = V[i, 2] - V[j, 2]
+                        squared = x * x + y * y + z * z
+                    difference = fabs(distance[i] - distance[j]) - slack
+                    # Neither inf nor NaN passes.
+                    if difference <= 0 or difference * difference <= squared:
+                        continue
+                    if distance[i] == INFINITY and distance[j] == INFINITY:
+                        continue
+                    far, near = (j, i) if distance[i] < distance[j] else (i, j)
+                    if distance[far] == INFINITY and not distance[near] + sqrt(squared) < cutoff - slack:
+                        far, near = -1, -1
+                        continue
+                    break
+                if far >= 0:
+                    break
+            if far >= 0:
+                break
+    return far, near
+
+
 def straight_lines(
     positions: cython.const[cython.double][:, ::1],
     sources: cython.const[cython.double][:, ::1],
@@ -73,7 +187,10 @@ def straight_lines(
 
 
 def line_shortfall(
-    distance: cython.double[::1], vertex: cython.longlong[::1], line: cython.double[::1], start: cython.double
+    distance: cython.const[cython.double][::1],
+    vertex: cython.const[cython.longlong][::1],
+    line: cython.const[cython.double][::1],
+    start: cython.double,
 ):
     """By how much distances fall short of straight lines.
 

@@ -6,6 +6,8 @@ from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_
 from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
 from heat_igl.unfolding.from_vertex import vectors_from
 from heat_igl.unfolding.fronts import FrontSolver
+from heat_igl.unfolding.guarded import GuardedEngine
+from heat_igl.unfolding.invariants import Invariants
 from heat_igl.unfolding.local import blocks_within, distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.path_derivatives import Change
 from heat_igl.unfolding.path_lengths import PathLengths, SideChange, from_lines
@@ -20,6 +22,8 @@ __all__ = [
     "ExactSolution",
     "ExactSurface",
     "FrontSolver",
+    "GuardedEngine",
+    "Invariants",
     "MeshTriangles",
     "OperatorTriangles",
     "Origin",

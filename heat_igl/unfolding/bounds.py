@@ -47,10 +47,13 @@ class Bounds:
         first, incident = kernels.incident_edges(self._edges[0], self._surface.unfolding.n)
         return first, incident
 
-    def shorten(self, distance: FloatArray, labels: IntArray | None = None) -> None:
-        """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them."""
-        if kernels.is_longer(*self._edges, distance):
-            kernels.shorten(*self._edges, *self._incident, distance, _NO_LABELS if labels is None else labels)
+    def shorten(self, distance: FloatArray, labels: IntArray | None = None, share: float = 0.0) -> None:
+        """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them.
+
+        Where the path is longer than that by less than a `share` of the last edge, nothing is done.
+        """
+        if kernels.is_longer(*self._edges, distance, share):
+            kernels.shorten(*self._edges, *self._incident, distance, _NO_LABELS if labels is None else labels, share)
 
     def lengthen(self, distance: FloatArray, sources: SourceSet, points: SourcePoints) -> None:
         """Raise distances (n,) to the straight lines from the nearest source, in place.
