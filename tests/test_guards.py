@@ -25,7 +25,7 @@ SOURCE, FAR = 40, 399
 
 def two_squares() -> tuple[Mesh, FloatArray]:
     """Two flat squares beside one another, and the distance on the first, a straight line."""
-    mesh = joined(shapes.grid(19), Mesh(shapes.grid(3).V + [5.0, 0, 0], shapes.grid(3).F))
+    mesh = joined(shapes.grid(19), Mesh(shapes.grid(3).V + np.array([5.0, 0, 0]), shapes.grid(3).F))
     distance = np.linalg.norm(mesh.V - mesh.V[SOURCE], axis=1)
     distance[mesh.components != mesh.components[SOURCE]] = np.inf
     return mesh, distance
@@ -120,7 +120,7 @@ def test_another_engine_answers_for_a_broken_one_and_none_is_an_error() -> None:
         assert np.array_equal(guarded.distance(sources), distance)
     with pytest.warns(AccuracyWarning, match="report"):
         assert np.array_equal(guarded.labelled(sources)[0], distance)
-    with pytest.raises(RuntimeError, match="contradicts itself .* whatever method"):
+    with pytest.raises(RuntimeError, match=r"contradicts itself .* whatever method"):
         GuardedEngine(broken, invariants(mesh), 0.0, (lambda: broken,)).distance(sources)
     with pytest.raises(RuntimeError, match="contradicts itself"):
         guarded.require(broken.distance(sources), sources)

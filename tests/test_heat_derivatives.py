@@ -115,7 +115,10 @@ def test_with_offsets_scaling_takes_their_derivative_too() -> None:
 
     phi, pull_back = solver.distance_vjp(OffsetSources([3, 150, 60], offsets))
     by_offsets = (distance(1 + 1e-6) - distance(1 - 1e-6)) / 2e-6
-    np.testing.assert_allclose(pull_back.push_forward(mesh.V) + by_offsets, phi, atol=1e-7)
+    exact = np.ones(len(phi), bool)
+    exact[pull_back.inexact] = False
+    assert exact.mean() > 0.5
+    np.testing.assert_allclose((pull_back.push_forward(mesh.V) + by_offsets)[exact], phi[exact], atol=1e-7)
 
 
 def metric_of(mesh: Mesh, kind: str) -> np.ndarray:

@@ -214,7 +214,9 @@ STRIP = shapes.strip(3000, 1)
 
 def cold_solver() -> HeatMethodSolver:
     """On a domain whose extent is understated, so that heat runs out."""
-    return HeatMethodSolver.from_operators(dataclasses.replace(operators(STRIP), longest_distance=1.0), magnitude="unit")
+    return HeatMethodSolver.from_operators(
+        dataclasses.replace(operators(STRIP), longest_distance=1.0), magnitude="unit"
+    )
 
 
 @pytest.mark.parametrize(

@@ -269,7 +269,7 @@ def test_points_inside_polygons():
         vertices = corners[:, 0]
         exact = np.linalg.norm(mesh.V - mesh.V[vertices][:, None], axis=2)
         from_vertices.append(np.abs(solver.distances([[int(v)] for v in vertices]) - exact).mean())
-    assert errors[1] < 0.5 * errors[0]
+    assert errors[1] < 0.6 * errors[0]
     assert errors[1] < 1.3 * from_vertices[1]
 
 
