@@ -51,7 +51,7 @@ class Plan:
 
 # --- The engine of a distance ---
 
-# A sweep is replaced by windows in three cases, in which both take about the same time. On up to so many vertices a
+# A sweep is replaced by windows in four cases, in which both take about the same time. On up to so many vertices a
 # query by windows takes a few milliseconds.
 _FEW = 1000
 # With more curvature than this at a vertex, in radians and in the mean, a sweep passes vertices on the wrong side. On
@@ -60,6 +60,9 @@ _FEW = 1000
 _ROUGH_FOR_SWEEP = 0.25
 # With this share of flat vertices and holes, windows stay few: they are not split by curvature.
 _FLAT = 0.5
+# Where large triangles (`LARGE_SHARE` below) cover the surface, a sweep is wrong by up to 3 % in the mean, and by 17 %
+# of the largest distance at single vertices (CAD cylinders, thin plates, extruded polygons); elsewhere by at most 1.4
+# and 5 %, over 10 members each of 15 kinds of shapes.
 
 
 # Signed distance is measured by windows everywhere, not only near the curves, on so few vertices and with so much
@@ -82,12 +85,16 @@ class SurfaceMeasures:
         Share of the vertices without curvature, those on the boundary included.
     has_holes : bool
         Whether a component is neither a disk nor a sphere.
+    large : float
+        Share of the faces in components of large triangles: more than `LARGE_SHARE` of the area in triangles with a
+        circumradius above `LARGE_RADIUS`.
     """
 
     n: int
     curvature: float
     flatness: float
     has_holes: bool
+    large: float = 0.0
 
 
 def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
@@ -127,6 +134,8 @@ def sweep_plan(measures: SurfaceMeasures, plan: Plan) -> Plan:
         reason = f"the surface is rough, with {measures.curvature:.2g} radians of curvature at each vertex"
     elif measures.flatness > _FLAT and measures.has_holes:
         reason = "the surface is flat with holes, on which windows are few"
+    elif measures.large > UNEVEN_SHARE:
+        reason = "triangles are large, as in CAD parts, which a sweep from their corners does not resolve"
     return plan if reason is None else replace(plan, engine="windows", tolerance=0.0, reason=reason)
 
 

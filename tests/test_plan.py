@@ -56,6 +56,7 @@ def test_tolerances_without_a_meaning(tolerance):
         (SurfaceMeasures(900, 0.02, 0.0, False), "on 900 vertices"),
         (SurfaceMeasures(5000, 0.5, 0.0, False), "0.5 radians"),
         (SurfaceMeasures(5000, 0.02, 0.8, True), "flat with holes"),
+        (SurfaceMeasures(5000, 0.02, 0.0, False, 0.5), "triangles are large"),
     ],
 )
 def test_where_a_sweep_is_replaced_the_plan_says_why(measures, words):

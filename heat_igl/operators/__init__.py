@@ -18,7 +18,7 @@ from heat_igl.operators.point_clouds import point_cloud_operators
 from heat_igl.operators.polygons import fan_operators, polygon_operators
 from heat_igl.operators.simplices import cotan_operators
 from heat_igl.operators.speed import speed_operators
-from heat_igl.operators.suitability import is_rough_or_narrow
+from heat_igl.operators.suitability import is_rough_or_narrow, share_on_large_triangles
 from heat_igl.operators.surface import Surface
 from heat_igl.operators.triangles import operators, tufted_operators, unfolding_surface
 
@@ -49,6 +49,7 @@ __all__ = [
     "operators",
     "point_cloud_operators",
     "polygon_operators",
+    "share_on_large_triangles",
     "speed_operators",
     "tufted_operators",
     "unfolding_surface",

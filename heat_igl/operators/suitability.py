@@ -31,7 +31,14 @@ from heat_igl.plan import (
 )
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["fit_for_heat", "has_negative_boundary", "is_rough_or_narrow", "refined", "uneven_components"]
+__all__ = [
+    "fit_for_heat",
+    "has_negative_boundary",
+    "is_rough_or_narrow",
+    "refined",
+    "share_on_large_triangles",
+    "uneven_components",
+]
 
 _MOST_SAMPLES = 1000
 
@@ -82,9 +89,21 @@ def uneven_components(triangulation: IntrinsicTriangulation, component: IntArray
 
     All, where there are few triangles at all.
     """
-    n_components = int(component.max(initial=-1)) + 1
     if triangulation.n_used < FEW_FOR_HEAT:
-        return np.ones(n_components, bool)
+        return np.ones(int(component.max(initial=-1)) + 1, bool)
+    thin, large = _thin_and_large(triangulation, component)
+    return np.asarray((thin > THIN_SHARE) | (large > LARGE_SHARE))
+
+
+def share_on_large_triangles(triangulation: IntrinsicTriangulation, component: IntArray) -> float:
+    """Share of the faces that are in components which triangles cover that are large for the component."""
+    _, large = _thin_and_large(triangulation, component)
+    return float(np.mean(large[component[triangulation.F[:, 0]]] > LARGE_SHARE))
+
+
+def _thin_and_large(triangulation: IntrinsicTriangulation, component: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Share of the area (k,) of each component in thin triangles, and in large ones."""
+    n_components = int(component.max(initial=-1)) + 1
     area, lengths = triangulation.areas, triangulation.l
     a, b, c = lengths.T
     # Twice the circumradius; the shortest side is this times the sine of the smallest angle.
@@ -96,7 +115,8 @@ def uneven_components(triangulation: IntrinsicTriangulation, component: IntArray
     total, thin, large = (
         np.bincount(of_face, counted, n_components) for counted in (area, area * is_thin, area * is_large)
     )
-    return np.asarray((thin > THIN_SHARE * total) | (large > LARGE_SHARE * total))
+    total[total == 0] = 1
+    return thin / total, large / total
 
 
 def refined(triangulation: IntrinsicTriangulation, component: IntArray, is_chosen: BoolArray) -> IntrinsicTriangulation:

@@ -12,6 +12,7 @@ import numpy as np
 
 from heat_igl.intrinsic import lay_out, oriented
 from heat_igl.kernels import sweeping
+from heat_igl.operators import share_on_large_triangles
 from heat_igl.plan import SurfaceMeasures
 from heat_igl.sources import NEAR_RADIUS, NearField, SourcePoints, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -71,7 +72,8 @@ class SweepEngine(Engine):
         is_open = total <= 0
         excess[is_open] = np.maximum(-total[is_open] - np.pi, 0.0)
         flatness = float(self._spokes.is_flat[used].mean())
-        return SurfaceMeasures(self._triangulation.n_used, float(excess.mean()), flatness, self._has_holes())
+        large = share_on_large_triangles(self._triangulation, self._triangles.components)
+        return SurfaceMeasures(self._triangulation.n_used, float(excess.mean()), flatness, self._has_holes(), large)
 
     def _has_holes(self) -> bool:
         """Whether some component is neither a disk nor a sphere, by its Euler characteristic."""
