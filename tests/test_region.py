@@ -30,6 +30,7 @@ def cut_out(mesh: Mesh, region: np.ndarray) -> tuple[Mesh, np.ndarray, np.ndarra
     return Mesh(mesh.V[used], F.reshape(-1, 3)), used, faces
 
 
+@pytest.mark.filterwarnings("ignore:heat is off")
 @pytest.mark.parametrize("seed", range(12))
 def test_distances_are_those_on_the_mesh_cut_out(seed):
     mesh, rng = bumpy(), np.random.default_rng(seed)
