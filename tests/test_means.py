@@ -182,7 +182,10 @@ def test_sites_become_centroidal():
     assert (np.diff(found.energies) < 0).all()
     assert len(np.unique(found.sites)) == 9
     cells = voronoi_cells(mesh, found.sites)
-    np.testing.assert_array_equal(found.labels, cells.labels)
+    # Of two equally near sites either may be named.
+    rows = np.stack([geodesic_distance(mesh, int(site)) for site in found.sites])
+    for labels in (found.labels, cells.labels):
+        np.testing.assert_allclose(rows[labels, np.arange(mesh.n_vertices)], rows.min(axis=0), atol=1e-9)
     areas = np.bincount(mesh.F.ravel(), np.repeat(mesh.measures / 3, 3), mesh.n_vertices)
     assert found.energies[-1] == pytest.approx(areas @ cells.distance**2, rel=1e-3)
     # Hexagons are the best cells of a plane, and squares are better than what 9 cells of a square come to by chance.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, SourceError, SurfacePoints, shapes
+from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, SourceError, SurfacePoints, cli, shapes
 
 
 def bumpy() -> Mesh:
@@ -132,6 +132,21 @@ def test_a_ring_is_gone_around_and_tetrahedra_too():
     phi = heat_igl.geodesic_distance(body, int(used[0]), region=inside)
     assert np.isfinite(phi[used]).all()
     assert np.isinf(np.delete(phi, used)).all()
+
+
+def test_the_command_takes_a_region(tmp_path, capsys):
+    mesh = shapes.grid(6)
+    region = mesh.V[:, 0] < 0.6
+    heat_igl.write_mesh(tmp_path / "grid.ply", mesh, cortex=region.astype(np.float32))
+    np.save(tmp_path / "faces.npy", region[mesh.F].all(axis=1))
+    expected = heat_igl.geodesic_distance(mesh, 0, region=region)
+    for name in (str(tmp_path / "faces.npy"), "cortex"):
+        arguments = [str(tmp_path / "grid.ply"), "--source", "0", "--region", name, "--output", str(tmp_path / "d.npy")]
+        assert cli.run(["distance", *arguments]) == 0
+        np.testing.assert_array_equal(np.load(tmp_path / "d.npy"), expected)
+    capsys.readouterr()
+    assert cli.run(["distance", str(tmp_path / "grid.ply"), "--source", "0", "--region", "wall"]) != 0
+    assert "--region wall: no NPY file, and no vertex attribute" in capsys.readouterr().err
 
 
 def test_names_what_is_wrong():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
@@ -69,9 +67,9 @@ def test_points_are_distinct_where_distances_are_zero():
 
     class Nowhere:
         n_vertices = 5
-        operators = SimpleNamespace(referenced=np.ones(5, bool))
+        referenced = np.ones(5, bool)
 
-        def distance(self, _source):
+        def distance(self, _source, cutoff):  # noqa: ARG002
             return np.zeros(5)
 
     assert sorted(heat_igl.farthest_points(Nowhere(), 5, start=2).tolist()) == [0, 1, 2, 3, 4]

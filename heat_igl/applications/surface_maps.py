@@ -166,7 +166,8 @@ def smooth(mesh: MeshLike, values: ArrayLike, fwhm: float, *, region: ArrayLike 
     -----
     Heat flow on the intrinsic Delaunay triangulation for the time ``fwhm**2 / (16 log 2)``, in eight steps of second
     order that damp all frequencies (Alexander 1977: two stages, one matrix, which is factored once). In the plane the
-    width is then .4 % too large. Of widths below about four edges, the mesh resolves the Gaussian only coarsely.
+    width is then .4 % too large. Of a narrow Gaussian the mesh makes a narrower one: on an icosphere and a scan, the
+    width of a smoothed delta was 7.5 % too small for four mean edge lengths, 2.7 % for six and .5 % for ten.
 
     Examples
     --------

@@ -17,10 +17,12 @@ from heat_igl.cli.options import (
     MeshArgument,
     MethodOption,
     PointsOption,
+    RegionOption,
     ToleranceOption,
     choice,
     position,
     positive,
+    region_mask,
 )
 from heat_igl.cli.output import Row, check_curves, check_json, check_outputs, described, print_rows, write_distance
 from heat_igl.errors import SourceError
@@ -29,7 +31,7 @@ from heat_igl.heat_method import Backend, Boundary, HeatMethodSolver, Laplacian,
 from heat_igl.io import is_flat, read_mesh_or_cloud
 from heat_igl.mesh import Mesh, PointCloud, as_simplices, closest_points
 from heat_igl.sources import vertex_sources
-from heat_igl.typing import FloatArray
+from heat_igl.typing import BoolArray, FloatArray
 
 __all__ = ["distance", "isolines"]
 
@@ -52,6 +54,7 @@ def distance(
     method: MethodOption = None,
     tolerance: ToleranceOption = 1e-5,
     cutoff: Annotated[float | None, typer.Option(help="Distances beyond this are inf.", callback=positive)] = None,
+    region: RegionOption = None,
     output: Annotated[
         Path | None, typer.Option(help="PLY, VTU or GIFTI file for mesh and distance, or NPY or CSV file for it.")
     ] = None,
@@ -80,6 +83,7 @@ def distance(
         gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap), gap.tolist())]
     check_outputs(loaded, output, picture)
     check_json(json_file)
+    mask = None if region is None else region_mask(mesh, region)
     chosen = _choice(
         method,
         tolerance,
@@ -92,7 +96,7 @@ def distance(
     )
     with Console(stderr=True).status("measuring"):
         _warm_up(loaded, chosen)
-        phi, about = _measured(loaded, sources, chosen, cutoff)
+        phi, about = _measured(loaded, sources, chosen, cutoff, mask)
     written = _write(loaded, phi, vertices, output, picture)
     rows = [*_summary(mesh, loaded, phi, cutoff), *about, *gaps]
     print_rows([*rows, *(("wrote", str(path)) for path in written)], json_file)
@@ -107,11 +111,15 @@ def _choice(method: str | None, tolerance: float, **options: Any) -> SolverChoic
 
 
 def _measured(
-    mesh: Mesh | PointCloud, sources: Any, choice: SolverChoice, cutoff: float | None
+    mesh: Mesh | PointCloud,
+    sources: Any,
+    choice: SolverChoice,
+    cutoff: float | None,
+    region: BoolArray | None = None,
 ) -> tuple[FloatArray, list[Row]]:
     """The distance, and remarks on how it was found."""
     start = time.perf_counter()
-    solver = choice.on(mesh)
+    solver = choice.on(mesh, region)
     once = time.perf_counter() - start
     start = time.perf_counter()
     phi = solver.distance(sources, cutoff)

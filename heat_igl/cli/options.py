@@ -9,19 +9,23 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import MeshError, SourceError
 from heat_igl.geodesic import DistanceMethod
+from heat_igl.io import read_attributes
+from heat_igl.typing import BoolArray
 
 __all__ = [
     "JsonOption",
     "MeshArgument",
     "MethodOption",
     "PointsOption",
+    "RegionOption",
     "ToleranceOption",
     "choice",
     "one_of",
     "position",
     "positive",
+    "region_mask",
 ]
 
 MeshArgument = Annotated[
@@ -33,6 +37,13 @@ MeshArgument = Annotated[
     ),
 ]
 PointsOption = Annotated[bool, typer.Option("--points", help="The file holds points; faces are not read.")]
+RegionOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NPY|NAME",
+        help="What paths may enter, where this is not 0: an NPY file for vertices or faces, or a vertex attribute.",
+    ),
+]
 JsonOption = Annotated[
     Path | None,
     typer.Option("--json", metavar="FILE", help="JSON file for the results; with - they are printed as JSON."),
@@ -79,3 +90,21 @@ MethodOption = Annotated[
     choice(DistanceMethod, "Default: auto, windows on triangles; heat with one of the options of heat."),
 ]
 ToleranceOption = Annotated[float, typer.Option(help="Largest error over the distance, of windows; 0 is exact.")]
+
+
+def region_mask(mesh: Path, region: str) -> BoolArray:
+    """The mask that `RegionOption` names: of an NPY file, or of a vertex attribute in the file of the mesh."""
+    if Path(region).suffix == ".npy":
+        try:
+            values = np.load(region, allow_pickle=False)
+        except (OSError, ValueError, EOFError) as error:
+            raise MeshError(f"--region {region}: {error or 'no NPY file'}") from None
+    else:
+        attributes = read_attributes(mesh)
+        if region not in attributes:
+            known = ", ".join(attributes) or "none"
+            raise MeshError(f"--region {region}: no NPY file, and no vertex attribute of {mesh} (it has {known})")
+        values = attributes[region]
+    if values.dtype.kind not in "biuf":
+        raise MeshError(f"--region {region} holds {values.dtype}: numbers or bools are expected")
+    return np.asarray(np.nan_to_num(values) != 0)

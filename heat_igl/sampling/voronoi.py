@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heat_igl.geodesic import Solver
+from heat_igl.geodesic import GeodesicSolver, Solver
 from heat_igl.mesh import MeshLike
 from heat_igl.sampling.queries import as_solver, checked_vertices, distance_rows
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -23,7 +23,7 @@ class VoronoiCells:
     sites : (k,) int64
         The site of each cell.
     labels : (n,) int64
-        Position in `sites` of the nearest site, the earlier of two equally near ones; -1 at vertices that no site
+        Position in `sites` of the nearest site, either of two equally near ones; -1 at vertices that no site
         reaches.
     distance : (n,) float64
         Distance from the nearest site, ``inf`` at vertices that no site reaches.
@@ -48,7 +48,7 @@ class VoronoiCells:
 
 
 def voronoi_cells(solver: Solver | MeshLike, sites: ArrayLike) -> VoronoiCells:
-    """The geodesic Voronoi diagram of given vertices, by one query for each site.
+    """The geodesic Voronoi diagram of given vertices: of a `GeodesicSolver` in one query, of others one for each site.
 
     Parameters
     ----------
@@ -76,6 +76,9 @@ def voronoi_cells(solver: Solver | MeshLike, sites: ArrayLike) -> VoronoiCells:
     """
     solver = as_solver(solver)
     chosen = checked_vertices("sites", sites, solver.n_vertices)
+    if isinstance(solver, GeodesicSolver):
+        found = solver.voronoi(chosen)
+        return VoronoiCells(chosen, found.labels, found.distance)
     labels = np.full(solver.n_vertices, -1)
     distance = np.full(solver.n_vertices, np.inf)
     for i, row in enumerate(distance_rows(solver, chosen)):
