@@ -698,7 +698,7 @@ def test_graph_limit_keeps_what_is_near_the_source():
 
 
 def test_graph_limit_where_nothing_arrives():
-    limit = baselines.graph_limit(sp.block_diag([np.ones((2, 2)), np.ones((1, 1))]), 1, -50.0)
+    limit = baselines.graph_limit(sp.block_diag([sp.coo_matrix(np.ones((2, 2))), np.ones((1, 1))]), 1, -50.0)
     np.testing.assert_allclose(limit, [1, 0, np.inf], atol=1e-12)
 
 

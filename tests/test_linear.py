@@ -130,7 +130,7 @@ def graph(name: str) -> sp.csc_matrix:
     if name == "path":
         return sp.diags([np.ones(29_999)], [1], format="csc")
     if name == "many pieces":
-        return sp.block_diag([np.ones((3, 3))] * 8000, format="csc")
+        return sp.block_diag([sp.coo_matrix(np.ones((3, 3)))] * 8000, format="csc")
     return sp.random(1500, 1500, density=0.003, rng=rng, format="csc")
 
 
