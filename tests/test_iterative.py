@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 from conftest import perturbed, zoo
 
-from heat_igl import FactorizationError, GeodesicSolver, HeatMethodSolver, Mesh, shapes
+from heat_igl import FactorizationError, HeatMethodSolver, Mesh, shapes
 from heat_igl.linear import backends, factor_memory, iterative
 from heat_igl.operators import operators
 
@@ -127,8 +127,6 @@ def test_chosen_where_factors_would_not_fit(monkeypatch):
     assert HeatMethodSolver(mesh).diagnostics.backend != "iterative"
     monkeypatch.setattr(factor_memory, "available_memory", lambda: 0.99 * estimate)
     assert HeatMethodSolver(mesh).diagnostics.backend == "iterative"
-    # A refinement factors one matrix.
-    assert GeodesicSolver(mesh, method="sweep").diagnostics.backend != "iterative"
     monkeypatch.setattr(backends, "has_iterative", lambda: False)
     assert HeatMethodSolver(mesh).diagnostics.backend != "iterative"
 

@@ -35,7 +35,7 @@ _ANALYSES: dict[str, Callable[[sp.csc_matrix], Analysis]] = {
 }
 
 
-def analyse(pattern: sp.csc_matrix, backend: Backend = "auto", n_factors: int = 2) -> Analysis:
+def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
     """Order and analyse symmetric matrices of a pattern.
 
     Parameters
@@ -46,8 +46,6 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto", n_factors: int = 
         SuperLU; the package's own factorization; or no factors at all, see `iterative`, which needs pyamg. "auto" takes
         the second if the matrix is not small, and the third if pyamg is installed and factors would not fit into
         memory, by an estimate made before.
-    n_factors : int
-        How many matrices of the pattern will be factored, for that estimate.
 
     Raises
     ------
@@ -55,11 +53,11 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto", n_factors: int = 
         If there is no such backend.
     """
     require_choice("backend", backend, get_args(Backend))
-    return _ANALYSES[_choice(pattern, n_factors) if backend == "auto" else backend](pattern)
+    return _ANALYSES[_choice(pattern) if backend == "auto" else backend](pattern)
 
 
-def _choice(pattern: sp.csc_matrix, n_factors: int) -> str:
-    if has_iterative() and not factors_fit(pattern, n_factors):
+def _choice(pattern: sp.csc_matrix) -> str:
+    if has_iterative() and not factors_fit(pattern):
         return "iterative"
     return "multifrontal" if pattern.shape[0] >= SMALLEST_MULTIFRONTAL else "scipy"
 

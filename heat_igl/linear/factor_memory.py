@@ -15,9 +15,9 @@ _BYTES_SURFACE = 45.0
 _BYTES_VOLUME = 100.0
 
 
-def factors_fit(A: sp.csc_matrix, n_factors: int = 2) -> bool:
+def factors_fit(A: sp.csc_matrix) -> bool:
     """Whether factors with the pattern of `A`, heat's and Poisson's, would fit into the memory available now."""
-    return n_factors * factor_bytes(A.shape[0], A.nnz) < available_memory()
+    return 2 * factor_bytes(A.shape[0], A.nnz) < available_memory()
 
 
 def factor_bytes(n: int, n_entries: int) -> float:

@@ -9,7 +9,7 @@ from heat_igl.operators.connection import (
 )
 from heat_igl.operators.element_derivatives import ElementChange, Elements
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
-from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators, without_refinement
+from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian, divergence_matrix
 from heat_igl.operators.metric import fibre_metric, metric_operators
 from heat_igl.operators.metric_derivatives import MetricSides
@@ -54,5 +54,4 @@ __all__ = [
     "tufted_operators",
     "unfolding_surface",
     "with_rotations",
-    "without_refinement",
 ]

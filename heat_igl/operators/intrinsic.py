@@ -18,7 +18,7 @@ from heat_igl.operators.suitability import fit_for_heat
 from heat_igl.operators.surface import Surface
 from heat_igl.typing import ArrayLike
 
-__all__ = ["changed_operators", "edge_length_operators", "intrinsic_operators", "without_refinement"]
+__all__ = ["changed_operators", "edge_length_operators", "intrinsic_operators"]
 
 
 def intrinsic_operators(
@@ -107,17 +107,6 @@ def changed_operators(
     if not triangulation.is_cover:
         return domain
     return replace(domain, L=domain.L / 2, M=domain.M / 2, weights=domain.weights / 2)
-
-
-def without_refinement(domain: Operators) -> Operators:
-    """The operators on the vertices of the mesh alone, of a `domain` to which refinement has added vertices."""
-    surface = domain.surface
-    if surface is None or surface.faces is None or surface.uncovered is None:
-        return domain
-    given = intrinsic_operators(surface.faces)
-    plain = changed_operators(surface.uncovered, surface.faces, surface.uncovered, given)
-    surface = Surface(surface.uncovered, surface.faces, V=surface.V)
-    return replace(plain, surface=surface, contrast=domain.contrast, metric=domain.metric)
 
 
 def edge_length_operators(

@@ -11,16 +11,13 @@ from heat_igl.typing import FloatArray
 __all__ = ["analysis", "shifted"]
 
 
-def analysis(
-    L: sp.csc_matrix, backend: Backend = "auto", known: Analysis | None = None, n_factors: int = 2
-) -> Analysis:
+def analysis(L: sp.csc_matrix, backend: Backend = "auto", known: Analysis | None = None) -> Analysis:
     """Order and analyse the pattern that the matrices of the heat flow and of the Poisson problem have in common.
 
-    Of the Laplacian `L` only the pattern matters. An analysis that is `known` is returned as it is if it fits. With
-    `n_factors` 1, only one of the matrices will be factored.
+    Of the Laplacian `L` only the pattern matters. An analysis that is `known` is returned as it is if it fits.
     """
     pattern = shifted(L, 1.0, np.zeros(L.shape[0]))
-    return known if known is not None and known.fits(pattern) else analyse(pattern, backend, n_factors)
+    return known if known is not None and known.fits(pattern) else analyse(pattern, backend)
 
 
 def shifted(L: sp.csc_matrix, factor: float | FloatArray, diagonal: FloatArray) -> sp.csc_matrix:
