@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import AccuracyWarning, MeshError
 from heat_igl.mesh.cloud_objects import cloud_of_cells, cloud_of_points, cloud_of_poly_data, refuse_other_cells
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.pixel_domain import ImageDomain
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygons import PolygonMesh
+from heat_igl.mesh.seams import seam_pairs
+from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
 __all__ = ["MeshLike", "as_mesh", "as_simplices", "read_paths_with"]
@@ -74,6 +76,11 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     MeshError
         If the object is not understood (the message lists the known kinds), or the mesh cannot be used.
 
+    Warns
+    -----
+    AccuracyWarning
+        If boundary edges of a file's or another library's mesh lie on each other: `merge_seams` joins them.
+
     Notes
     -----
     Objects are recognized by the attributes that hold positions and faces. An array (m, 4) in a pair (V, F) holds
@@ -89,6 +96,24 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     >>> heat_igl.as_mesh(theirs)
     Mesh(3 vertices, 1 triangles)
     """
+    found = without_warning(mesh, F)
+    if F is None and not isinstance(mesh, (Mesh, PolygonMesh, PointCloud, ImageDomain, tuple, list)):
+        _warn_of_seams(found)
+    return found
+
+
+def _warn_of_seams(mesh: Mesh | PolygonMesh | PointCloud) -> None:
+    n = 0 if isinstance(mesh, PointCloud) else len(seam_pairs(mesh if isinstance(mesh, Mesh) else mesh.triangles))
+    if n:
+        warn_caller(
+            f"{n} boundary edges of the mesh lie on others, as where a loader has split vertices at texture seams, "
+            "and distance does not cross there: heat_igl.merge_seams joins them",
+            AccuracyWarning,
+        )
+
+
+def without_warning(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | PointCloud:
+    """`as_mesh` without a look at seams."""
     if F is not None:
         if isinstance(mesh, (Mesh, PolygonMesh, PointCloud)):
             raise MeshError(f"F is given beside a {type(mesh).__name__}: pass a mesh alone, or positions V and faces F")

@@ -10,6 +10,7 @@ import igl
 import numpy as np
 
 from heat_igl.mesh import connectivity
+from heat_igl.mesh.seams import seam_pairs
 from heat_igl.runtime import RANGE_LIMIT
 from heat_igl.typing import FloatArray, IntArray
 
@@ -53,6 +54,8 @@ class MeshReport:
         Faces with the same vertices as an earlier face.
     unreferenced_vertices : (k,) int64
         Vertices that no face uses; every distance there is ``inf``.
+    seam_edges : (k, 2) int64
+        Boundary edges that lie on another one, as at texture seams; see `merge_seams`.
     crossed_polygons : (k,) int64
         Polygons that the triangles were cut from and whose sides cross each other, counted as in the file.
     shortest_edge, mean_edge, longest_edge : float
@@ -89,6 +92,7 @@ class MeshReport:
     degenerate_faces: IntArray
     duplicate_faces: IntArray
     unreferenced_vertices: IntArray
+    seam_edges: IntArray
     crossed_polygons: IntArray
     shortest_edge: float
     mean_edge: float
@@ -145,6 +149,7 @@ def mesh_report(mesh: Mesh) -> MeshReport:
         degenerate_faces=np.flatnonzero(mesh.measures <= _DEGENERATE * longest ** (F.shape[1] - 1)),
         duplicate_faces=connectivity.duplicate_faces(F, n),
         unreferenced_vertices=np.flatnonzero(~mesh.referenced),
+        seam_edges=seam_pairs(mesh)[:, :2],
         crossed_polygons=mesh.crossed_polygons,
         shortest_edge=float(mesh.edge_lengths.min()),
         mean_edge=mean_edge,
