@@ -153,7 +153,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, default=Path("validation"), help="folder for results (%(default)s)")
     parser.add_argument("--sources", type=int, default=3, help="single sources per mesh (%(default)s)")
     add_seed(parser)
-    parser.add_argument("--methods", default="heat,sweep,unfold,meshlab,igl,potpourri3d", help="%(default)s")
+    parser.add_argument("--methods", default="heat,sweep,windows,meshlab,igl,potpourri3d", help="%(default)s")
     parser.add_argument("--reference", default="exact", help="%(default)s")
     parser.add_argument("--timeout", type=float, default=120.0, help="seconds per native solve (%(default)s)")
     parser.add_argument("--fail-above", type=float, metavar="PERCENT", help="largest mean error of any method")

@@ -272,6 +272,7 @@ def test_info_prints_the_report(sphere: Path, capsys: pytest.CaptureFixture[str]
     out = capsys.readouterr().out
     for name, value in shapes.icosphere(2).report().rows():
         assert [line[len(name) :].strip() for line in out.splitlines() if line.startswith(name + " ")] == [value]
+    assert re.search(r"^plan +windows to 1e-05: ", out, re.MULTILINE)
 
 
 def test_unreachable_vertices_are_counted(two_spheres: Path, capsys: pytest.CaptureFixture[str]) -> None:

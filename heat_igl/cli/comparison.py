@@ -14,7 +14,7 @@ from rich.progress import Progress
 import heat_igl
 from heat_igl.cli.error_table import print_report
 from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, positive
-from heat_igl.cli.output import check_json, check_outputs, described, print_json, print_rows, prints_json, say
+from heat_igl.cli.output import check_json, check_outputs, described, plan_row, print_json, print_rows, prints_json, say
 from heat_igl.drawing.output import Picture
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.reference.guarded import TIMEOUT
@@ -22,7 +22,7 @@ from heat_igl.validation import METHODS, ValidationRow, draw_sources
 
 __all__ = ["info", "validate"]
 
-_DEFAULT_METHODS = "heat,sweep,unfold,meshlab,igl"
+_DEFAULT_METHODS = "heat,sweep,windows,meshlab,igl"
 
 
 def info(mesh: MeshArgument, points: PointsOption = False, json_file: JsonOption = None) -> None:
@@ -33,7 +33,11 @@ def info(mesh: MeshArgument, points: PointsOption = False, json_file: JsonOption
     values = [getattr(report, field.name) for field in fields(report)]
     plain = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
     rows = [(*row, value) for row, value in zip(report.rows(), plain, strict=True)]
-    print_rows([described(mesh, loaded), *rows], json_file)
+    try:
+        plan = [plan_row(heat_igl.GeodesicSolver(loaded).plan)]
+    except heat_igl.MeshError:  # the report above says what is wrong
+        plan = []
+    print_rows([described(mesh, loaded), *rows, *plan], json_file)
 
 
 def validate(

@@ -24,7 +24,16 @@ from heat_igl.cli.options import (
     positive,
     region_mask,
 )
-from heat_igl.cli.output import Row, check_curves, check_json, check_outputs, described, print_rows, write_distance
+from heat_igl.cli.output import (
+    Row,
+    check_curves,
+    check_json,
+    check_outputs,
+    described,
+    plan_row,
+    print_rows,
+    write_distance,
+)
 from heat_igl.errors import SourceError
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat_method import Backend, Boundary, HeatMethodSolver, Laplacian, Magnitude
@@ -124,10 +133,7 @@ def _measured(
     start = time.perf_counter()
     phi = solver.distance(sources, cutoff)
     seconds = time.perf_counter() - start
-    plan = solver.plan
-    rows: list[Row] = [
-        ("plan", str(plan), {"engine": plan.engine, "tolerance": plan.tolerance, "reason": plan.reason}),
-    ]
+    rows = [plan_row(solver.plan)]
     if isinstance(solver, HeatMethodSolver):
         found = solver.diagnostics
         raised = " (raised, so that heat crosses the mesh in double precision)" if found.t_raised else ""

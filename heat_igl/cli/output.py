@@ -16,6 +16,7 @@ from rich.text import Text
 from heat_igl.errors import MeshError, MissingExtraError
 from heat_igl.io import CURVE_SUFFIXES, complete_file, write_mesh, write_point_cloud
 from heat_igl.mesh import Mesh, PointCloud
+from heat_igl.plan import Plan
 from heat_igl.typing import FloatArray
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "check_page",
     "check_writable",
     "described",
+    "plan_row",
     "print_json",
     "print_rows",
     "prints_json",
@@ -45,6 +47,11 @@ def say(message: str) -> None:
 
 # Name and text of a line, and what JSON holds in place of the text, if anything.
 Row = tuple[str, str] | tuple[str, str, Any]
+
+
+def plan_row(plan: Plan) -> Row:
+    """The line that says which engine measures distance, and why."""
+    return "plan", str(plan), {"engine": plan.engine, "tolerance": plan.tolerance, "reason": plan.reason}
 
 
 def described(path: Path, mesh: Mesh | PointCloud) -> Row:
