@@ -141,7 +141,7 @@ def test_types_of_the_result(solver):
         solver.iter_distances([4], dtype=np.float16)
 
 
-@pytest.mark.parametrize("method", [None, "sweep"])
+@pytest.mark.parametrize("method", ["heat", "sweep"])
 def test_rows_do_not_depend_on_blocks_or_threads(sphere, method, monkeypatch):
     solver = SolverChoice(method).on(sphere)
     sets = [[int(i)] for i in np.random.default_rng(0).choice(sphere.n_vertices, 19, replace=False)]
