@@ -42,8 +42,14 @@ def client():
         yield connected
 
 
-def expected(mesh: Mesh, source_sets, dtype="float32", **options):
-    return heat_igl.HeatMethodSolver(mesh, **options).distances(source_sets).astype(dtype)
+def expected(mesh: Mesh, source_sets, dtype="float32", method=None, **options):
+    is_heat = method == "heat" or options
+    solver = (
+        heat_igl.HeatMethodSolver(mesh, **options)
+        if is_heat
+        else heat_igl.GeodesicSolver(mesh, method=method or "auto")
+    )
+    return solver.distances(source_sets).astype(dtype)
 
 
 @pytest.mark.parametrize("options", [{}, {"method": "sweep"}, {"dtype": "float64", "boundary": "average"}])
@@ -56,8 +62,9 @@ def test_the_bits_are_those_of_a_solver(client, tmp_path, options):
         n = mesh.n_vertices
         np.testing.assert_array_equal(group["source_vertex"][:], np.arange(n))
         np.testing.assert_array_equal(group["distance"][:], expected(mesh, range(n), **options))
-        of_solver = {name: value for name, value in options.items() if name != "dtype"}
-        assert group.attrs["t"] == pytest.approx(heat_igl.HeatMethodSolver(mesh, **of_solver).t, rel=1e-15)
+        of_heat = {name: value for name, value in options.items() if name not in ("dtype", "method")}
+        if of_heat or options.get("method") == "heat":
+            assert group.attrs["t"] == pytest.approx(heat_igl.HeatMethodSolver(mesh, **of_heat).t, rel=1e-15)
 
 
 def test_source_sets_and_farthest_points(client, tmp_path):
@@ -70,7 +77,7 @@ def test_source_sets_and_farthest_points(client, tmp_path):
     np.testing.assert_array_equal(group["distance"][:], expected(mesh, sets))
     cluster.distances([mesh], "farthest:5", tmp_path / "far", client=client)
     group = zarr.open_group(tmp_path / "far" / "000000", mode="r")
-    points = heat_igl.farthest_points(heat_igl.HeatMethodSolver(mesh), 5)
+    points = heat_igl.farthest_points(heat_igl.GeodesicSolver(mesh), 5)
     np.testing.assert_array_equal(group["source_vertex"][:], points)
     np.testing.assert_array_equal(group["distance"][:], expected(mesh, points))
 
@@ -139,7 +146,7 @@ def test_files_of_points_are_clouds(client, tmp_path, caplog):
     assert "--points" in report.failed[0].reason
     assert caplog.text.count(str(folder / "bad.xyz")) == 1
     found = zarr.open_group(tmp_path / "store")["a.xyz"]["distance"][:]
-    np.testing.assert_array_equal(found, heat_igl.HeatMethodSolver(cloud).distances([0, [3, 5]]).astype(np.float32))
+    np.testing.assert_array_equal(found, expected(cloud, [0, [3, 5]]))
     as_points = cluster.distances(
         cluster.folder(folder, points=True), [0, [3, 5]], tmp_path / "points", client=client, points=True
     )
