@@ -13,6 +13,7 @@ import pytest
 import heat_igl
 from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, Mesh, SurfacePoints, shapes
 from heat_igl.heat_method.checking import Comparisons
+from heat_igl.kernels import sweeping
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.steps import PoissonProblem
 from heat_igl.typing import FloatArray
@@ -147,6 +148,25 @@ def test_windows_that_are_wrong_do_not_leave_the_solver(monkeypatch: pytest.Monk
         with pytest.warns(AccuracyWarning, match=f"{FAR}.*report"):
             found = each()
         assert np.allclose(found, distance, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "everywhere"), [(np.inf, False), (np.nan, False), (0.1, False), (1.5, False), (0.5, True), (1.5, True)]
+)
+def test_a_sweep_that_is_wrong_is_named(monkeypatch: pytest.MonkeyPatch, wrong: float, everywhere: bool) -> None:
+    mesh, solver = shapes.icosphere(4), GeodesicSolver(shapes.icosphere(4), method="sweep")
+    right, sweep = solver.distance(0), sweeping.sweep
+
+    def step(spokes: object, distance: FloatArray, *arguments: object) -> object:
+        visits = sweep(spokes, distance, *arguments)
+        distance[slice(None) if everywhere else 1000] *= wrong
+        return visits
+
+    monkeypatch.setattr(sweeping, "sweep", step)
+    with pytest.warns(AccuracyWarning, match="sweep contradicted .* report"):
+        distance = solver.distance(0)
+    assert invariants(mesh).contradiction(distance, source_set(0, mesh.n_vertices, mesh.F)) is None
+    assert distance[0] == 0 == right[0]
 
 
 # Heat.

@@ -11,11 +11,12 @@ import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from heat_igl import FactorizationError, HeatMethodSolver, MissingExtraError, shapes
+from heat_igl import FactorizationError, HeatMethodSolver, Mesh, MissingExtraError, shapes
 from heat_igl.linear import analyse, factorize
 from heat_igl.linear.dissection import dissect
 from heat_igl.operators import operators
 from heat_igl.runtime import threads
+from heat_igl.validation.zoo import SHAPES
 
 
 @pytest.fixture(params=["scipy", "multifrontal"])
@@ -251,3 +252,17 @@ def test_factors_of_a_small_mesh_are_made_on_the_thread_that_drops_them(monkeypa
     assert HeatMethodSolver(shapes.icosphere(2)).diagnostics.backend == "scipy"
     assert set(made) == {get_ident()}
     assert len(made) == 2
+
+
+def test_an_order_with_much_fill_is_not_taken() -> None:
+    """On triangles that grow away from two fine rings nested dissection leaves ten times the entries of SuperLU."""
+    graded = next(shape for shape in SHAPES if shape.name == "capped cylinder 512").make()
+    assert analyse(operators(graded, "auto").L).backend == "multifrontal"
+    ring = 4000
+    side = shapes.cylinder(ring, 1, 4.0)
+    k = np.arange(1, ring - 1)
+    cap = np.stack([np.zeros_like(k), k + 1, k], axis=1)
+    L = operators(Mesh(side.V, np.concatenate([side.F, cap, ring + cap[:, ::-1]])), "auto").L
+    assert analyse(L).backend == "scipy"
+    assert analyse(L, "multifrontal").backend == "multifrontal"
+    assert analyse(operators(shapes.icosphere(4)).L).backend == "multifrontal"

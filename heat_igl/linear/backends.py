@@ -13,15 +13,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal, get_args
 
+import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import require_choice
-from heat_igl.linear.factor_memory import factors_fit
+from heat_igl.linear.factor_memory import factors_fit, is_of_volume
 from heat_igl.linear.iterative import IterativeAnalysis, has_iterative
 from heat_igl.linear.multifrontal import MultifrontalAnalysis
 from heat_igl.linear.protocols import Analysis, Factorization
 from heat_igl.linear.superlu import SuperLUAnalysis
-from heat_igl.plan import SMALLEST_MULTIFRONTAL
+from heat_igl.plan import MOST_FILL, SMALLEST_MULTIFRONTAL
 from heat_igl.typing import BoolArray
 
 __all__ = ["Backend", "analyse", "factorize"]
@@ -44,8 +45,8 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
         Both triangles stored, indices sorted or not; the values do not matter.
     backend : {"auto", "scipy", "multifrontal", "iterative"}
         SuperLU; the package's own factorization; or no factors at all, see `iterative`, which needs pyamg. "auto" takes
-        the second if the matrix is not small, and the third if pyamg is installed and factors would not fit into
-        memory, by an estimate made before.
+        the second if the matrix is not small and the order of elimination good, and the third if pyamg is installed
+        and factors would not fit into memory, by an estimate made before.
 
     Raises
     ------
@@ -53,7 +54,12 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
         If there is no such backend.
     """
     require_choice("backend", backend, get_args(Backend))
-    return _ANALYSES[_choice(pattern) if backend == "auto" else backend](pattern)
+    found = _ANALYSES[_choice(pattern) if backend == "auto" else backend](pattern)
+    if backend != "auto" or not isinstance(found, MultifrontalAnalysis):
+        return found
+    n = pattern.shape[0]
+    is_poor = found.nonzeros > MOST_FILL * n * np.log2(n) and not is_of_volume(n, pattern.nnz)
+    return SuperLUAnalysis(pattern) if is_poor else found
 
 
 def _choice(pattern: sp.csc_matrix) -> str:

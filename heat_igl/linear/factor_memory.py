@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from heat_igl.runtime import available_memory
 
-__all__ = ["factor_bytes", "factors_fit"]
+__all__ = ["factor_bytes", "factors_fit", "is_of_volume"]
 
 # Bytes per row of each of two factors while they are made, on log2 n and on n^(1/3): the multifrontal ones of spheres
 # and tori of 150k vertices took 25 to 37, those of a box of 30k vertices 35. Rather too much than too little.
@@ -27,5 +27,11 @@ def factor_bytes(n: int, n_entries: int) -> float:
     which: by Euler's formula it has 7 entries on a triangulated surface, and 13 to 15 in a volume. (A lattice of right
     angles, whose diagonals weigh nothing, is taken for a surface.)
     """
-    is_volume = n_entries > 10 * n
-    return float(n * (_BYTES_VOLUME * n ** (1 / 3) if is_volume else _BYTES_SURFACE * np.log2(max(n, 2))))
+    return float(
+        n * (_BYTES_VOLUME * n ** (1 / 3) if is_of_volume(n, n_entries) else _BYTES_SURFACE * np.log2(max(n, 2)))
+    )
+
+
+def is_of_volume(n: int, n_entries: int) -> bool:
+    """Whether an (n, n) matrix with so many entries is taken for that of a volume."""
+    return n_entries > 10 * n

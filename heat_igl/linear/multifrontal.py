@@ -42,6 +42,7 @@ class MultifrontalAnalysis:
             tree = dissect(self._ends, self._neighbours, workers)
         self.fronts = fronts(self._ends, self._neighbours, tree)
         self.order: IntArray | None = self.fronts.order
+        self.nonzeros = int(self.fronts.end_entry[-1])
 
     def fits(self, A: sp.csc_matrix) -> bool:
         """Whether A has the pattern that was analysed."""
