@@ -54,6 +54,8 @@ def _emit(
     one.root = root
     one.corner = k
     one.turn_x, one.turn_y = 0.5 * twice_product(length, right, left) / (length * right), -one.depth / right
+    if s.merging > 0.0:
+        one.turn_x = s.merging * offset
     one.side = one.is_plane = 0
     if one.depth > 0.0:
         add(s, k, cython.address(one), 1, False)
@@ -62,24 +64,19 @@ def _emit(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset: cython.double) -> cython.void:
-    """Distances along the two sides of corner k from its vertex v."""
+def _reach_end(
+    s: cython.pointer(Search), k: cython.int, is_tail: cython.bint, v: cython.int, offset: cython.double
+) -> cython.void:
+    """Distance along a side of corner k from its vertex v: to the tail of half-edge k, or to its head."""
     head: cython.int = next_half_edge(k)
     tail: cython.int = previous_half_edge(k)
     a: cython.double = s.length[tail]
     b: cython.double = s.length[head]
-    relax(s, s.vertex[head], offset + a, v, head, b, k, 1.0, 0.0)
-    relax(
-        s,
-        s.vertex[tail],
-        offset + b,
-        v,
-        tail,
-        0.0,
-        k,
-        0.5 * twice_product(a, b, s.length[k]) / a,
-        s.double_area[k // 3] / a,
-    )
+    if is_tail:
+        relax(s, s.vertex[head], offset + a, v, head, b, k, 1.0, 0.0)
+    else:
+        x: cython.double = 0.5 * twice_product(a, b, s.length[k]) / a
+        relax(s, s.vertex[tail], offset + b, v, tail, 0.0, k, x, s.double_area[k // 3] / a)
 
 
 @cython.cfunc
@@ -151,7 +148,12 @@ def _fill(
         far = length
         if last != cython.NULL and k == last.corner:
             far = length - _reach(s, last)
-        _reach_ends(s, k, v, offset)
+        # An end that the windows leave out is reached by others. Its path over v would be longer, but with a tolerance
+        # that is not known, and windows from that end would not fit between those that pass it.
+        if near <= 0.0:
+            _reach_end(s, k, side == previous_half_edge(k), v, offset)
+        if far >= length:
+            _reach_end(s, k, side != previous_half_edge(k), v, offset)
         if near < far:
             if side == previous_half_edge(k):
                 _emit(s, k, near, far, v, offset)
@@ -188,7 +190,8 @@ def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
     if h < 0 or s.kind[v] == JOINS:
         k = s.corner_of_vertex[v]
         while k >= 0:
-            _reach_ends(s, k, v, s.distance[v])
+            _reach_end(s, k, True, v, s.distance[v])
+            _reach_end(s, k, False, v, s.distance[v])
             _emit(s, k, 0.0, s.length[k], v, s.distance[v])
             k = s.next_corner[k]
         return

@@ -133,8 +133,13 @@ def _reach_apex(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
-    """Make the window over the side between the tail and the apex; true if there is one."""
+def _to_left(
+    w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window), turns: cython.bint
+) -> cython.bint:
+    """Make the window over the side between the tail and the apex; true if there is one.
+
+    Without `turns` windows are not asked where their lines leave the root.
+    """
     scale: cython.double
     out[0] = w[0]
     if w.is_plane:
@@ -143,8 +148,9 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
     else:
         out.x = w.x * apex.cos_left - w.depth * apex.sin_left
         out.depth = w.x * apex.sin_left + w.depth * apex.cos_left
-        out.turn_x = w.turn_x * apex.cos_left - w.turn_y * apex.sin_left
-        out.turn_y = w.turn_x * apex.sin_left + w.turn_y * apex.cos_left
+        if turns:
+            out.turn_x = w.turn_x * apex.cos_left - w.turn_y * apex.sin_left
+            out.turn_y = w.turn_x * apex.sin_left + w.turn_y * apex.cos_left
     if out.depth <= 0.0:
         return False
     scale = w.depth * apex.cos_left
@@ -160,7 +166,9 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
+def _to_right(
+    w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window), turns: cython.bint
+) -> cython.bint:
     """Make the window over the side between the apex and the head; true if there is one."""
     scale: cython.double
     x: cython.double = apex.length - w.x
@@ -173,8 +181,9 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
     else:
         out.x = apex.right_length - (x * apex.cos_right - w.depth * apex.sin_right)
         out.depth = x * apex.sin_right + w.depth * apex.cos_right
-        out.turn_x = w.turn_x * apex.cos_right + w.turn_y * apex.sin_right
-        out.turn_y = w.turn_y * apex.cos_right - w.turn_x * apex.sin_right
+        if turns:
+            out.turn_x = w.turn_x * apex.cos_right + w.turn_y * apex.sin_right
+            out.turn_y = w.turn_y * apex.cos_right - w.turn_x * apex.sin_right
     if out.depth <= 0.0:
         return False
     scale = w.depth * apex.cos_right
@@ -215,6 +224,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     apex: Apex
     w: cython.pointer(Window)
     is_best: cython.bint
+    turns: cython.bint = s.merging == 0.0
     _fetch(s, s.twin[previous_half_edge(h)])
     _fetch(s, s.twin[next_half_edge(h)])
     s.slot[h] = -1
@@ -238,13 +248,13 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
             or w.start < apex.best_at
             or (w.side != AROUND_APEX and not apex.nearest <= _bent(w, w.stop, apex.x, apex.y))
         ):
-            n_left += _to_left(w, cython.address(apex), s.to_left + n_left)
+            n_left += _to_left(w, cython.address(apex), s.to_left + n_left, turns)
         if w.side != LEFT_OF_APEX and (
             is_best
             or w.stop > apex.best_at
             or (w.side != AROUND_APEX and not apex.nearest <= _bent(w, w.start, apex.x, apex.y))
         ):
-            n_right += _to_right(w, cython.address(apex), s.to_right + n_right)
+            n_right += _to_right(w, cython.address(apex), s.to_right + n_right, turns)
     # The list is free again; its room stays with it.
     s.lists[place].count = s.free_list
     s.lists[place].half_edge = -1

@@ -74,6 +74,8 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         one.corner = 3 * f
         one.turn_x = (place_x[(c + 1) % 3] - place_x[(c + 2) % 3]) / length
         one.turn_y = (place_y[(c + 1) % 3] - place_y[(c + 2) % 3]) / length
+        if s.merging > 0.0:
+            one.turn_x = 0.0
         one.side = one.is_plane = 0
         if one.depth > 0.0:
             add(s, h, cython.address(one), 1, False)

@@ -17,7 +17,8 @@ cdef extern from *:
     ctypedef struct Window:
         double x, depth      # the root laid out in the plane lies at (x, -depth); of a plane, the direction of the lines
         # The half-edge as a unit vector in the frame of `corner`; of a plane, how far along the segment the line
-        # through the tail starts, and 1 if lines leave the segment to the left, -1 to the right.
+        # through the tail starts, and 1 if lines leave the segment to the left, -1 to the right. In a search with a
+        # tolerance, the first is the error that a window has taken on instead, unless it is a plane.
         double turn_x, turn_y
         double start, stop   # from where to where along the half-edge
         double offset        # distance of the root; of a plane, the distance that it gives the tail
@@ -122,6 +123,7 @@ cdef struct Search:
     bint failed
     long long n_windows, n_lists_done
     double tolerance
+    double merging       # the largest error, as a fraction of the distance
     # Where the search ends: at a distance, or, if so many vertices are asked for, once the nearest are known.
     double cutoff
     double last_key      # what has a larger key can change nothing that is asked for
@@ -264,6 +266,8 @@ cdef extern from *:
     #define FLATNESS 1e-12
     // Looks at the lock of another thread before it is waited for.
     #define TRIES 2000
+    // How far behind merged windows their root lies at most, in lengths of the part of the half-edge.
+    #define FARTHEST 256.0
     // What a list costs beside its windows, in windows.
     #define PER_LIST 4
     """
@@ -273,6 +277,7 @@ cdef extern from *:
     double NEAR
     double SAME
     double OVERLAP
+    double FARTHEST
     double MARGIN
     double FLATNESS
     int TRIES

@@ -6,6 +6,7 @@ That path leads over an end of the half-edge (Xin and Wang 2009), or through ano
 import cython
 from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_structures import (
+    FARTHEST,
     NARROW,
     OVERLAP,
     ROUNDING,
@@ -17,9 +18,10 @@ from cython.cimports.heat_igl.kernels.window_structures import (
     W_THEN_U,
     Search,
     Window,
+    lateral,
     reach,
 )
-from cython.cimports.libc.math import fabs
+from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.string import memmove
 
 
@@ -197,9 +199,29 @@ def _compare(
 
 
 @cython.cfunc
+@cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def _settle(u: cython.pointer(Window), w: cython.pointer(Window), tolerance: cython.double) -> cython.int:
+def _diverge(right: cython.pointer(Window), left: cython.pointer(Window), at: cython.double) -> cython.double:
+    """Positive if the line of the left window through a point leads further right than that of the right one."""
+    return lateral(left, at) * right.depth - lateral(right, at) * left.depth
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _leads_out(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
+    """Whether the lines of u through the ends of w, or its own ends there, lead no further inward than those of w."""
+    return _diverge(w, u, w.stop) >= 0.0 or _diverge(u, w, w.start) >= 0.0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _settle(
+    u: cython.pointer(Window), w: cython.pointer(Window), tolerance: cython.double, merges: cython.bint
+) -> cython.int:
     """Cut two windows of one half-edge where the other is nearer. 1: u is gone, 2: w is gone, 4: w comes before u."""
     low: cython.double = u.start if u.start > w.start else w.start
     high: cython.double = u.stop if u.stop < w.stop else w.stop
@@ -212,22 +234,26 @@ def _settle(u: cython.pointer(Window), w: cython.pointer(Window), tolerance: cyt
         return first
     order = _compare(u, w, low, high, tolerance, until)
     if order == U_NEARER:
-        if low <= w.start:
+        if low <= w.start and (high < w.stop or not merges or _leads_out(u, w)):
             if high >= w.stop:
                 return 2
-            w.start = high
+            if not merges or _diverge(w, u, high) >= 0.0:
+                w.start = high
             return 0
         if high >= w.stop:
-            w.stop = low
+            if not merges or _diverge(u, w, low) >= 0.0:
+                w.stop = low
             return 4
     elif order == W_NEARER:
-        if low <= u.start:
+        if low <= u.start and (high < u.stop or not merges or _leads_out(w, u)):
             if high >= u.stop:
                 return 1
-            u.start = high
+            if not merges or _diverge(u, w, high) >= 0.0:
+                u.start = high
             return 4
         if high >= u.stop:
-            u.stop = low
+            if not merges or _diverge(w, u, low) >= 0.0:
+                u.stop = low
     elif order == U_THEN_W:
         if high >= u.stop:
             u.stop = until[0]
@@ -312,6 +338,7 @@ def _insert(
     w: cython.pointer(Window),
     length: cython.double,
     tolerance: cython.double,
+    merges: cython.bint,
 ) -> cython.int:
     """Add a window to k that lie side by side, after cutting all where another is nearer; how many there are then.
 
@@ -322,7 +349,7 @@ def _insert(
     moved: Window
     narrow: cython.double = NARROW * length
     while j > 0:
-        outcome = _settle(cython.address(windows[j - 1]), w, tolerance)
+        outcome = _settle(cython.address(windows[j - 1]), w, tolerance, merges)
         if outcome == 1 or windows[j - 1].stop - windows[j - 1].start <= narrow:
             # remove j - 1
             if j < k:
@@ -355,6 +382,124 @@ def _insert(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def _merged(
+    u: cython.pointer(Window), w: cython.pointer(Window), merging: cython.double, out: cython.pointer(Window)
+) -> cython.bint:
+    """Make one window of two side by side, u before w; false if its error would exceed a fraction of the distance.
+
+    Its root is where the line of u through its start and that of w through its end meet, so that its lines cover those
+    of both; if they do not meet behind the half-edge, or too far from it, it lies at a distance of FARTHEST lengths in
+    the mean of both directions. The offset makes the largest and the smallest difference to u and w opposite.
+    """
+    width: cython.double = w.stop - u.start
+    a: cython.double = reach(u, u.start)
+    b: cython.double = reach(w, w.stop)
+    error: cython.double = u.turn_x if u.turn_x > w.turn_x else w.turn_x
+    budget: cython.double = merging * (min(u.offset + a, w.offset + b) - width) - error
+    sine_a: cython.double = (u.start - u.x) / a
+    cosine_a: cython.double = u.depth / a
+    sine_b: cython.double = (w.stop - w.x) / b
+    cosine_b: cython.double = w.depth / b
+    between: cython.double = cosine_a * sine_b - sine_a * cosine_b
+    far: cython.double
+    low: cython.double
+    high: cython.double
+    value: cython.double
+    i: cython.int
+    is_met: cython.bint = between * FARTHEST > cosine_b
+    if budget <= 0.0:
+        return False
+    out[0] = u[0]
+    if is_met:
+        far = width * cosine_b / between
+        out.x, out.depth = u.start - far * sine_a, far * cosine_a
+    else:
+        far = FARTHEST * width
+        sine_a, cosine_a = sine_a + sine_b, cosine_a + cosine_b
+        value = sqrt(sine_a * sine_a + cosine_a * cosine_a)
+        out.x = 0.5 * (u.start + w.stop) - far * sine_a / value
+        out.depth = far * cosine_a / value
+        if not (_covers(out, u, u.start, -1.0) and _covers(out, w, w.stop, 1.0)):
+            return False
+    out.stop = w.stop
+    # The difference to either window has at most one extremum on the half-edge. With lines in common it is at the end.
+    low = high = (u.offset + a) - reach(out, u.start)
+    for i in range(3):
+        if i == 0:
+            value = (u.offset + reach(u, u.stop)) - reach(out, u.stop)
+        elif i == 1:
+            value = (w.offset + reach(w, w.start)) - reach(out, w.start)
+        else:
+            value = (w.offset + b) - reach(out, w.stop)
+        low, high = min(low, value), max(high, value)
+    if high - low > 2.0 * budget:
+        return False
+    if not is_met and not (_is_monotone(out, u) and _is_monotone(out, w)):
+        return False
+    out.offset = 0.5 * (low + high)
+    out.turn_x = error + 0.5 * (high - low)
+    return True
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _covers(
+    out: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, outward: cython.double
+) -> cython.bint:
+    """Whether the line of `out` through a point of the half-edge leads no further inward than that of w."""
+    return outward * ((at - out.x) * w.depth - (at - w.x) * out.depth) >= 0.0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _is_monotone(out: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
+    """Whether the difference of two windows has no extremum between the ends of w."""
+    a: cython.double
+    b: cython.double
+    _excess(out, w, w.start, cython.address(a))
+    _excess(out, w, w.stop, cython.address(b))
+    return (a >= 0.0 and b >= 0.0) or (a <= 0.0 and b <= 0.0)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _merge(
+    windows: cython.pointer(Window), n: cython.int, s: cython.pointer(Search), length: cython.double
+) -> cython.int:
+    """Merge windows side by side as far as the errors that they have taken on allow; how many are left.
+
+    Over a gap nothing is merged: what covers it is not known here.
+    """
+    i: cython.int
+    k: cython.int = 0
+    u: cython.pointer(Window)
+    w: cython.pointer(Window)
+    one: Window
+    for i in range(1, n):
+        u, w = windows + k, windows + i
+        if (
+            not (u.is_plane or w.is_plane)
+            and s.label[u.root] == s.label[w.root]
+            and u.start <= w.start <= u.stop + NARROW * length
+            and u.stop <= w.stop
+            and _merged(u, w, s.merging, cython.address(one))
+        ):
+            u[0] = one
+            continue
+        k += 1
+        if k < i:
+            windows[k] = w[0]
+    return k + 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int) -> cython.int:
     """Cut from windows what a path over an end of the half-edge or another window makes useless; how many are left."""
     i: cython.int
@@ -372,5 +517,7 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
         if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset):
             continue
         if w.stop - w.start > NARROW * length:
-            k = _insert(windows, k, w, length, ROUNDING)
+            k = _insert(windows, k, w, length, ROUNDING, s.merging > 0.0)
+    if s.merging > 0.0 and k > 1:
+        k = _merge(windows, k, s, length)
     return k

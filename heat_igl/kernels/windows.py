@@ -37,6 +37,8 @@ class Front:
         found yet at n vertices, with labels for as many source points and segments as there will be.
     tolerance : float
         A window is cut where another path is shorter by more than this fraction of the distance.
+    merging : float
+        The largest error of a distance, as a fraction of it: within this, windows side by side become one.
     leaving : Leaving, optional
         Takes in which direction the straight last parts of the paths leave their roots, see `window_distances.relax`:
         on surfaces whose faces are oriented alike.
@@ -52,6 +54,7 @@ class Front:
         tolerance: cython.double,
         leaving=None,
         position: cython.const[cython.double][::1] = None,
+        merging: cython.double = 0.0,
     ) -> None:
         s: cython.pointer(Search) = cython.address(self.state)
         n = len(tables.corner_of_vertex)
@@ -71,7 +74,9 @@ class Front:
         if position is not None:
             s.position = cython.cast(cython.p_double, cython.address(position[0]))
         s.aim = -1
-        s.tolerance = tolerance
+        # Of two windows at most twice the error each, a path over an end of the half-edge may be the shorter one.
+        s.tolerance = tolerance + 2.0 * merging
+        s.merging = merging
         s.n_points = s.n_segments = s.n_targets = s.n_goals = 0
         s.first_target = cython.NULL
 

@@ -150,6 +150,7 @@ def search(
     goals: IntArray | None = None,
     directed: bool = False,
     threads: int = 1,
+    tolerance: float = 0.0,
 ) -> Searched:
     """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`."""
     n, wanted = edges.n, _targets_at(edges, targets)
@@ -163,13 +164,13 @@ def search(
     statistics = None
     # Vertices are found flat by the first search.
     asks_for_all = not len(wanted.place.faces) and goals is None and not directed
-    if threads > 1 and n >= _FEWEST_SHARED and asks_for_all and not (edges.tables.kind == FLAT_VERTEX).any():
+    if threads > 1 and tolerance == 0 and n >= _FEWEST_SHARED and asks_for_all and not (edges.tables.kind == FLAT_VERTEX).any():
         statistics = _beside(edges, starts, found, run)
         if statistics is None:
             found = Found.of(n, n_labels)
     if statistics is None:
         statistics = np.zeros(3, np.int64)
-        _require(run(_front(edges, found, leaving), starts, statistics))
+        _require(run(_front(edges, found, leaving, tolerance), starts, statistics))
     return Searched(starts, found, wanted, int(statistics[1]), int(statistics[2]), leaving)
 
 
@@ -178,9 +179,9 @@ def _require(is_done: bool) -> None:
         raise MemoryError("the windows of the exact distance do not fit into memory")
 
 
-def _front(edges: HalfEdges, found: Found, leaving: Leaving | None = None) -> windows.Front:
+def _front(edges: HalfEdges, found: Found, leaving: Leaving | None = None, tolerance: float = 0.0) -> windows.Front:
     """The arrays that the kernel writes in one search."""
-    return windows.Front(edges.tables, found, TOLERANCE, leaving)
+    return windows.Front(edges.tables, found, TOLERANCE, leaving, None, tolerance)
 
 
 def _beside(edges: HalfEdges, starts: Starts, found: Found, run: _Run) -> IntArray | None:
