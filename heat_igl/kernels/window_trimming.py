@@ -211,9 +211,42 @@ def _diverge(right: cython.pointer(Window), left: cython.pointer(Window), at: cy
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def _leads_out(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
-    """Whether the lines of u through the ends of w, or its own ends there, lead no further inward than those of w."""
-    return _diverge(w, u, w.stop) >= 0.0 or _diverge(u, w, w.start) >= 0.0
+def _holds_start(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
+    """Whether the first line of u leads as far to the left as that of w, or u begins well before w."""
+    return u.start < w.start - (w.stop - w.start) or (lateral(u, u.start) * w.depth <= lateral(w, w.start) * u.depth)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _holds_stop(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
+    """Whether the last line of u leads as far to the right as that of w, or u ends well behind w."""
+    return u.stop > w.stop + (w.stop - w.start) or (lateral(u, u.stop) * w.depth >= lateral(w, w.stop) * u.depth)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _gives_way(
+    u: cython.pointer(Window), w: cython.pointer(Window), low: cython.double, high: cython.double, merges: cython.bint
+) -> cython.int:
+    """Cut w between two points where u is nearer. 2: w is gone, 4: what is left comes before u, 0: or behind.
+
+    A search with a tolerance knows distances up to errors, so u can be nearer up to its last line, and w lead beyond
+    this line: what would be left without a window stays.
+    """
+    if low <= w.start and (not merges or _holds_start(u, w)):
+        if high >= w.stop:
+            return 2 if not merges or _holds_stop(u, w) else 0
+        if not merges or _diverge(w, u, high) >= 0.0:
+            w.start = high
+        return 0
+    if high >= w.stop and low > w.start and (not merges or _holds_stop(u, w)):
+        if not merges or _diverge(u, w, low) >= 0.0:
+            w.stop = low
+        return 4
+    return 4 if w.start < u.start and w.stop < u.stop else 0
 
 
 @cython.cfunc
@@ -234,27 +267,14 @@ def _settle(
         return first
     order = _compare(u, w, low, high, tolerance, until)
     if order == U_NEARER:
-        if low <= w.start and (high < w.stop or not merges or _leads_out(u, w)):
-            if high >= w.stop:
-                return 2
-            if not merges or _diverge(w, u, high) >= 0.0:
-                w.start = high
-            return 0
-        if high >= w.stop:
-            if not merges or _diverge(u, w, low) >= 0.0:
-                w.stop = low
-            return 4
-    elif order == W_NEARER:
-        if low <= u.start and (high < u.stop or not merges or _leads_out(w, u)):
-            if high >= u.stop:
-                return 1
-            if not merges or _diverge(u, w, high) >= 0.0:
-                u.start = high
-            return 4
-        if high >= u.stop:
-            if not merges or _diverge(w, u, low) >= 0.0:
-                u.stop = low
-    elif order == U_THEN_W:
+        return _gives_way(u, w, low, high, merges)
+    if order == W_NEARER:
+        order = _gives_way(w, u, low, high, merges)
+        if order == 2:
+            return 1
+        # What is left of u comes before w, unless w comes first.
+        return 4 if order == 0 and w.start < u.start else 0
+    if order == U_THEN_W:
         if high >= u.stop:
             u.stop = until[0]
         if low <= w.start:

@@ -14,14 +14,16 @@ which shortest paths can bend (`window_bends`).
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.window_memory import allocate, empty_front, free_front
 from cython.cimports.heat_igl.kernels.window_queue import push
 from cython.cimports.heat_igl.kernels.window_search import run
 from cython.cimports.heat_igl.kernels.window_sharing import run_beside
 from cython.cimports.heat_igl.kernels.window_sources import start_at
-from cython.cimports.heat_igl.kernels.window_structures import Search
+from cython.cimports.heat_igl.kernels.window_structures import MARGIN, Search
+from cython.cimports.libc.math import INFINITY
 
-__all__ = ["Front", "search"]
+__all__ = ["Front", "contradicts", "search"]
 
 
 class Front:
@@ -164,6 +166,24 @@ def search(
     statistics[1] = s.n_windows
     statistics[2] = s.n_lists_done
     return not s.failed
+
+
+def contradicts(front: Front) -> bool:
+    """Whether distances after a `search` for all vertices grow faster than along edges, by more than their error."""
+    s: cython.pointer(Search) = cython.address(front.state)
+    h: cython.int
+    a: cython.double
+    b: cython.double
+    along: cython.double
+    with cython.nogil:
+        for h in range(s.n_half_edges):
+            a = s.distance[s.vertex[next_half_edge(h)]]
+            b = s.distance[s.vertex[previous_half_edge(h)]]
+            along = min(a, b) + s.length[h]
+            if along <= s.cutoff and along < INFINITY and max(a, b) > along * (1.0 + 3.0 * s.merging + MARGIN):
+                with cython.gil:
+                    return True
+    return False
 
 
 @cython.cfunc

@@ -164,13 +164,19 @@ def search(
     statistics = None
     # Vertices are found flat by the first search.
     asks_for_all = not len(wanted.place.faces) and goals is None and not directed
-    if threads > 1 and tolerance == 0 and n >= _FEWEST_SHARED and asks_for_all and not (edges.tables.kind == FLAT_VERTEX).any():
+    if goals is not None:
+        tolerance = 0.0
+    shares = threads > 1 and tolerance == 0 and n >= _FEWEST_SHARED and asks_for_all
+    if shares and not (edges.tables.kind == FLAT_VERTEX).any():
         statistics = _beside(edges, starts, found, run)
         if statistics is None:
             found = Found.of(n, n_labels)
     if statistics is None:
         statistics = np.zeros(3, np.int64)
-        _require(run(_front(edges, found, leaving, tolerance), starts, statistics))
+        front = _front(edges, found, leaving, tolerance)
+        _require(run(front, starts, statistics))
+        if tolerance > 0 and windows.contradicts(front):
+            return search(edges, starts, cutoff=cutoff, targets=targets, threads=threads)
     return Searched(starts, found, wanted, int(statistics[1]), int(statistics[2]), leaving)
 
 
