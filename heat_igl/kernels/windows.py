@@ -76,8 +76,7 @@ class Front:
         if position is not None:
             s.position = cython.cast(cython.p_double, cython.address(position[0]))
         s.aim = -1
-        # Of two windows at most twice the error each, a path over an end of the half-edge may be the shorter one.
-        s.tolerance = tolerance + 2.0 * merging
+        s.tolerance = tolerance
         s.merging = merging
         s.n_points = s.n_segments = s.n_targets = s.n_goals = 0
         s.first_target = cython.NULL
