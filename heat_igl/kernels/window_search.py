@@ -2,6 +2,7 @@
 
 import cython
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
+from cython.cimports.heat_igl.kernels.signals import is_interrupted
 from cython.cimports.heat_igl.kernels.window_bends import emit_vertex
 from cython.cimports.heat_igl.kernels.window_crossing import cross, over_corners
 from cython.cimports.heat_igl.kernels.window_memory import empty_front
@@ -11,6 +12,9 @@ from cython.cimports.heat_igl.kernels.window_sources import emit_point
 from cython.cimports.heat_igl.kernels.window_structures import MARGIN, Entry, Search
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdlib import free, malloc
+
+# Lists that cross a face before a signal is asked for: some milliseconds.
+_ASK = cython.declare(cython.longlong, 4096)
 
 
 @cython.cfunc
@@ -45,6 +49,8 @@ def carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
         place = s.slot[entry.what]
         if place >= 0 and s.lists[place].key == entry.key:
             cross(s, entry.what)
+            if s.n_lists_done % _ASK == 0 and is_interrupted():
+                s.failed = True
         return
     v = entry.what - s.n_half_edges
     if v >= s.n + s.n_points:

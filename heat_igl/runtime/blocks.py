@@ -78,21 +78,21 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], n_threads: i
     failure: Exception | None = None
     pending: deque[Future[Result]] = deque()
     iterator = iter(items)
-    with pool(n_threads) as workers:
-        try:
-            while True:
-                while failure is None and len(pending) < n_threads:
-                    try:
-                        pending.append(workers.submit(work, next(iterator)))
-                    except StopIteration:
-                        break
-                    except Exception as error:
-                        failure = error
-                if not pending:
+    workers = pool(n_threads)
+    try:
+        while True:
+            while failure is None and len(pending) < n_threads:
+                try:
+                    pending.append(workers.submit(work, next(iterator)))
+                except StopIteration:
                     break
-                yield pending.popleft().result()
-        finally:
-            for future in pending:
-                future.cancel()
+                except Exception as error:
+                    failure = error
+            if not pending:
+                break
+            yield pending.popleft().result()
+    finally:
+        # After Ctrl-C, or when no more results are wanted, what is in progress ends.
+        workers.abandon()
     if failure is not None:
         raise failure

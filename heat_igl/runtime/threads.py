@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
+from heat_igl.kernels.signals import obey
+
 __all__ = ["both", "n_threads", "over_rows", "pool", "side_by_side"]
 
 Item = TypeVar("Item")
@@ -41,10 +43,28 @@ def n_threads() -> int:
     return max(1, available // _among())
 
 
-def pool(k: int) -> ThreadPoolExecutor:
+class _Pool(ThreadPoolExecutor):
     """A pool of k threads, among which the processors of the calling thread are divided (see `n_threads`)."""
-    among = k * _among()
-    return ThreadPoolExecutor(k, initializer=lambda: setattr(_divided, "among", among))
+
+    def __init__(self, k: int) -> None:
+        among, stop = k * _among(), threading.Event()
+
+        def begin() -> None:
+            _divided.among = among
+            obey(stop)
+
+        super().__init__(k, initializer=begin)
+        self._stop = stop
+
+    def abandon(self) -> None:
+        """End compiled loops, begin nothing new, and do not wait: after an exception, such as that of Ctrl-C."""
+        self._stop.set()
+        self.shutdown(wait=False, cancel_futures=True)
+
+
+def pool(k: int) -> _Pool:
+    """A pool of k threads, among which the processors of the calling thread are divided (see `n_threads`)."""
+    return _Pool(k)
 
 
 def _among() -> int:
@@ -52,15 +72,23 @@ def _among() -> int:
 
 
 def side_by_side(work: Callable[[Item], Any], items: Sequence[Item]) -> None:
-    """Call `work` on every item in parallel: the first on the calling thread, each other on a new thread."""
+    """Call `work` on every item in parallel: the first on the calling thread, each other on a new thread.
+
+    After an exception, such as that of Ctrl-C, the other threads are told to end, and not waited for.
+    """
     if len(items) == 1:
         work(items[0])
         return
-    with pool(len(items)) as workers:
+    workers = pool(len(items))
+    try:
         others = [workers.submit(work, item) for item in items[1:]]
         work(items[0])
         for other in others:
             other.result()
+    except BaseException:
+        workers.abandon()
+        raise
+    workers.shutdown()
 
 
 def over_rows(work: Callable[[slice], Result], n: int, most: int) -> list[Result]:
@@ -79,7 +107,11 @@ def over_rows(work: Callable[[slice], Result], n: int, most: int) -> list[Result
                 return
             results[at] = work(slices[at])
 
-    side_by_side(work_off, range(max(min(threads, len(slices)), 1)))
+    try:
+        side_by_side(work_off, range(max(min(threads, len(slices)), 1)))
+    except BaseException:
+        waiting.clear()
+        raise
     return [results[at] for at in range(len(slices))]
 
 
@@ -87,6 +119,12 @@ def both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[Firs
     """The results of two calls, the second of them on another thread if there is one."""
     if n_threads() == 1:
         return first(), second()
-    with pool(2) as workers:
+    workers = pool(2)
+    try:
         other = workers.submit(second)
-        return first(), other.result()
+        result = first(), other.result()
+    except BaseException:
+        workers.abandon()
+        raise
+    workers.shutdown()
+    return result

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from heat_igl.kernels import local_windows, windows
+from heat_igl.kernels.signals import raise_caught
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges
@@ -96,6 +97,7 @@ class Workspace:
             line,
         )
         if n_done < 0:
+            raise_caught()
             raise MemoryError("the windows of the exact distance do not fit into memory")
         return ends[:n_done]
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.kernels import window_pairs, windows
+from heat_igl.kernels.signals import raise_caught
 from heat_igl.kernels.window_surface import FLAT_VERTEX
 from heat_igl.mesh import SurfacePoints
 from heat_igl.runtime import side_by_side
@@ -182,6 +183,7 @@ def search(
 
 def _require(is_done: bool) -> None:
     if not is_done:
+        raise_caught()
         raise MemoryError("the windows of the exact distance do not fit into memory")
 
 
