@@ -5,7 +5,7 @@
 Meshes are Delaunay triangles of random points in the unit square, rotated. Layers are strips of equal width, with the
 source in the first. The reference is the shortest way through points on the borders, or on all edges with a metric per
 face. Prints, as Markdown tables, the mean and the largest of |d - reference| / reference in percent for the default of
-`HeatMethodSolver`, and those of the reference with half as many points. docs/metrics.md shows the tables.
+`GeodesicSolver`, and those of the reference with half as many points. docs/metrics.md shows the tables.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay
 
-from heat_igl import HeatMethodSolver, Mesh, fibre_metric, metric_operators
+from heat_igl import GeodesicSolver, Mesh, fibre_metric, metric_operators
 from heat_igl.typing import FloatArray, IntArray
 
 from scaffold import add_json, add_seed, environment, option_parser, publish, table
@@ -106,7 +106,7 @@ def errors(mesh: Mesh, source: int, g: FloatArray, reference: FloatArray, angle:
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     in_space = np.pad(g, ((0, 0), (0, 1), (0, 1))) + np.diag([0, 0, 1])
     domain = metric_operators(Mesh(mesh.V @ turn.T, mesh.F), turn @ in_space @ turn.T)
-    return relative(HeatMethodSolver.from_operators(domain).distance(source), reference)
+    return relative(GeodesicSolver(domain).distance(source), reference)
 
 
 def speeds(values: Sequence[float] | FloatArray) -> FloatArray:

@@ -63,6 +63,8 @@ class HopfLax:
     pending: cython.double[::1]
     n_visits: cython.int[::1]
     unit: cython.double
+    low: cython.double
+    fixed: cython.const[cython.uchar][::1]
     d: cython.double[::1]
     label: cython.int[::1]
     handed: cython.double[::1]
@@ -89,8 +91,10 @@ class HopfLax:
         self.unit = np.sqrt(squares.mean())
         self.mean = squares[:, 0] if self.q == 1 else np.ascontiguousarray(squares.mean(axis=1))
 
-    def distance(self, d, label, offset, second_order):
+    def first_order(self, d, label, offset):
         """Lower distances `d` (n,) to those from the vertices where they are finite, in place.
+
+        They are never below the straight line times the smallest length of a unit vector in any metric.
 
         Parameters
         ----------
@@ -98,25 +102,22 @@ class HopfLax:
             Distances, ``inf`` but at the sources, and the source of each, -1 for none; changed.
         offset : (k,) float64
             Of each source.
-        second_order : bool
-            Whether to follow with T of second order. `d` of first order is never below the straight line times the
-            smallest length of a unit vector in any metric.
-
         """
         n = len(d)
-        self.d, self.label, self.offset = d, label, offset
-        self.slope, self.is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
-        fixed: cython.const[cython.uchar][::1] = np.isfinite(d).view(np.uint8)
+        self.d, self.label, self.offset, self.low = d, label, offset, np.min(d)
+        self.fixed = np.isfinite(d).view(np.uint8)
         self.queue = PriorityQueue(n)
         self.handed = np.full(n, np.inf)
-        low: cython.double = np.min(d)
         with cython.nogil:
-            self.spread(low)
-        if not second_order:
-            return
-        self.pending, self.n_visits = np.where(np.isfinite(d), np.inf, 0.0), np.zeros(n, np.int32)
+            self.spread(self.low)
+
+    def second_order(self):
+        """After `first_order`: change its distances to those of second order."""
+        n = self.d.shape[0]
+        self.slope, self.is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
+        self.pending, self.n_visits = np.where(np.isfinite(self.d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
-            self.sharpen(fixed, low)
+            self.sharpen(self.fixed, self.low)
 
     @cython.cfunc
     @cython.nogil

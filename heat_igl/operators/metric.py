@@ -61,9 +61,9 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
         30 times as long in one place as in another, `HeatMethodSolver` takes exact windows by default: one time step
         cannot suit both.
 
-        Where faces differ by more anywhere, as at a jump of the speed, fronts are refracted, and no unfolding is
-        straight: there is no `surface`, flips end at such edges, and `HeatMethodSolver` takes the fronts of
-        `GeodesicSolver` by fronts; its windows are refused, and sources are vertices.
+        Where faces differ by more anywhere, as at a jump of the speed, no unfolding is straight: there is no `surface`,
+        flips end at such edges, sources are vertices, and `GeodesicSolver` takes the shorter of two: the scheme for
+        tetrahedra on triangles, and fronts that are refracted, if most edges have one length.
 
         With a metric at the vertices, the length of an edge is the integral along it. Where these are the sides of
         triangles, they are an intrinsic triangulation; if there is a face where they are not, since the metric turns
@@ -217,8 +217,7 @@ def operators_in_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian = "auto"
     if fit_together:
         domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
         return replace(domain, contrast=float(slowness.max() / slowness.min()))
-    least = float(np.sqrt(np.linalg.eigvalsh(g)[:, 0].min()))
-    return _refracting(mesh, sides, slowness, least, laplacian)
+    return _refracting(mesh, sides, slowness, g, laplacian)
 
 
 def _of_smooth_metric(mesh: Mesh, corners: FloatArray, laplacian: Laplacian) -> Operators:
@@ -257,7 +256,7 @@ def _smoothed(mesh: Mesh, sides: FloatArray) -> tuple[FloatArray, bool]:
     return smoothed, bool(is_one.all() and not differs.any())
 
 
-def _refracting(mesh: Mesh, sides: FloatArray, slowness: FloatArray, least: float, laplacian: Laplacian) -> Operators:
+def _refracting(mesh: Mesh, sides: FloatArray, slowness: FloatArray, g: FloatArray, laplacian: Laplacian) -> Operators:
     """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
     glued = _glued_where_equal(mesh, sides + mollify(sides, mesh.F)[:, None])
     triangulation = glued if laplacian == "cotan" else intrinsic_delaunay(glued)
@@ -269,7 +268,16 @@ def _refracting(mesh: Mesh, sides: FloatArray, slowness: FloatArray, least: floa
     # Where triangles fit together, fronts go straight on. A flip keeps the numbers of its two faces, and their region.
     regions = _regions(glued)
     mean = np.exp(np.bincount(regions, np.log(slowness)) / np.bincount(regions))
+    least = float(np.sqrt(np.linalg.eigvalsh(g)[:, 0].min()))
     simplices = MetricSimplices(triangulation.F, lengths, mean[regions], mesh.n_vertices, None, mesh.V, least)
+    # Fronts are for regions in which triangles fit together, and fall short where most edges have two lengths. Only
+    # fronts pass triangles without area, which know no metric in their plane.
+    if (mesh.measures > 0).all():
+        axes = plane_axes(mesh)
+        in_space = np.swapaxes(axes, 1, 2) @ g @ axes
+        is_inside = mesh.facets.n_faces[mesh.facets.of_face] == 2
+        fits = 2 * np.count_nonzero(glued.twin.reshape(-1, 3)[is_inside] >= 0) > np.count_nonzero(is_inside)
+        simplices = replace(MetricSimplices.in_metric(mesh, in_space[:, None]), flipped=simplices if fits else None)
     return replace(domain, simplices=simplices, contrast=float(slowness.max() / slowness.min()))
 
 

@@ -38,6 +38,8 @@ class MetricSimplices:
         Smallest length in any metric per length in that space: no path is shorter than a straight line times this.
     tensors : (m, q, 3, 3) float64 or None
         A metric that is not the same everywhere: of each simplex (q = 1), or at each of its corners (q = p + 1).
+    flipped : MetricSimplices or None
+        The triangles after flips of edges, where they fit together; for fronts, which go on straight there.
     """
 
     corners: IntArray
@@ -48,6 +50,7 @@ class MetricSimplices:
     place: FloatArray | None = None
     least: float = 1.0
     tensors: FloatArray | None = None
+    flipped: MetricSimplices | None = None
 
     @classmethod
     def in_space(cls, mesh: Mesh) -> MetricSimplices:

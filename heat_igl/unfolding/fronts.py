@@ -46,10 +46,10 @@ class FrontSolver(Engine):
     In space, distance follows straight lines from the sources, and lines that bend around edges of the body with more
     than half a turn inside: once its ends know their distances, such an edge is a source itself.
 
-    In a metric that changes from tetrahedron to tetrahedron, the Hopf-Lax formula on each is iterated until distances
-    are a fixed point, and then with distance of second order on facets (`heat_igl.kernels.hopf_lax`).
+    In a metric that changes from simplex to simplex, the Hopf-Lax formula on each is iterated until distances are a
+    fixed point, and then with distance of second order on facets (`heat_igl.kernels.hopf_lax`).
 
-    Where each triangle has lengths of its own, a vertex gets its distance from the other corners of a triangle: from
+    Triangles that mostly fit together are passed by fronts too, and the shorter distance stands. A vertex gets its distance from the other corners of a triangle: from
     each alone along an edge, and from two by the point behind the edge between them that lies at their distances, if
     the straight line from it crosses there.
 
@@ -73,6 +73,7 @@ class FrontSolver(Engine):
         self._lengths = np.ascontiguousarray(simplices.lengths)
         self._slowness = np.ascontiguousarray(simplices.slowness)
         self._V = np.empty((0, 3)) if simplices.V is None else np.ascontiguousarray(simplices.V)
+        self._flipped = None if simplices.flipped is None else FrontSolver(simplices.flipped)
         self._in_metric = None if simplices.tensors is None else self._measured(simplices.tensors)
         self._is_small = simplices.V is not None and simplices.n <= _FEW
         is_refined = self._is_small and not is_halved and len(self._reflex_edges[0]) > 0
@@ -81,8 +82,31 @@ class FrontSolver(Engine):
     def _measured(self, tensors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """What `HopfLax` reads of tensors: squared lengths, inverses, and the positions."""
         # Read only where each simplex has one.
-        inverse = np.ascontiguousarray(np.linalg.inv(tensors[:, 0])) if tensors.shape[1] == 1 else np.empty((0, 3, 3))
+        inverse = (
+            np.ascontiguousarray(np.linalg.pinv(tensors[:, 0], hermitian=True))
+            if tensors.shape[1] == 1
+            else np.empty((0, 3, 3))
+        )
         return self._simplices.squared_lengths(), inverse, np.ascontiguousarray(self._simplices.place)
+
+    def _advance(self, vertices: AnyArray, distance: FloatArray, begin: FloatArray, label: AnyArray) -> None:
+        """Lower distance to fronts."""
+        mesh = self._corners, self._first, self._incident
+        advance(self._order(vertices), *mesh, self._lengths, self._slowness, distance, begin, label)
+
+    def _by_hopf_lax(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
+        """Lower distance to that of second order, and to fronts."""
+        fronts, origin = distance.copy(), label.copy()
+        scheme: Any = HopfLax
+        scheme = scheme(self._corners, self._first, self._incident, *self._in_metric or ())
+        scheme.first_order(distance, label, offset)
+        scheme.second_order()
+        if self._flipped is None:
+            return
+        self._flipped._advance(vertices, fronts, fronts.copy(), origin)
+        # Where triangles fit together, fronts go straight on, however long the triangles are in the metric.
+        shorter = fronts < distance
+        distance[shorter], label[shorter] = fronts[shorter], origin[shorter]
 
     @cached_property
     def _edges(self) -> tuple[AnyArray, FloatArray]:
@@ -146,11 +170,9 @@ class FrontSolver(Engine):
         if self._simplices.V is not None:
             self._follow_lines(vertices, offset, distance, begin, label)
         elif self._in_metric is not None:
-            scheme: Any = HopfLax
-            scheme(self._corners, self._first, self._incident, *self._in_metric).distance(distance, label, offset, True)
+            self._by_hopf_lax(vertices, offset, distance, label)
         else:
-            mesh = self._corners, self._first, self._incident
-            advance(self._order(vertices), *mesh, self._lengths, self._slowness, distance, begin, label)
+            self._advance(vertices, distance, begin, label)
         self._keep_bounds(vertices, offset, distance, label)
         labels = np.concatenate([sources.vertex_label, [-1]])[label]
         if self._finer is not None:
