@@ -261,7 +261,7 @@ def test_demo_does_the_whole_job(tmp_path: Path) -> None:
     assert files(tmp_path / "made/results") == {f"{name}.ply", f"{name}.png"}
     mesh = io.read_mesh(tmp_path / "made/results" / f"{name}.ply")
     distance = io.read_attributes(tmp_path / "made/results" / f"{name}.ply")["distance"]
-    np.testing.assert_array_equal(distance, heat_igl.HeatMethodSolver(mesh).distance(1234))
+    np.testing.assert_array_equal(distance, heat_igl.geodesic_distance(mesh, 1234))
     assert f"{mesh.n_vertices} vertices" in done.stdout
     error = next(line for line in done.stdout.splitlines() if line.startswith("error of heat"))
     assert 0.1 < float(error.split()[3]) < 1.5
@@ -344,8 +344,7 @@ def test_a_bad_option_stops_before_anything_is_solved(
 ) -> None:
     monkeypatch.chdir(sphere.parent)
     Path("folder.png").mkdir()
-    for name in ("HeatMethodSolver", "geodesic_distance"):
-        monkeypatch.setattr(distances, name, lambda *_, **__: pytest.fail("solved before it checked"))
+    monkeypatch.setattr(distances.SolverChoice, "on", lambda *_: pytest.fail("solved before it checked"))
     assert cli.run(["distance", str(sphere), "--source", "0", *arguments]) == status
     assert_one_line(capsys.readouterr().err, *words)
     assert files(sphere.parent) == {"sphere.off", "folder.png"}
