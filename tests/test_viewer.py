@@ -28,7 +28,7 @@ def sphere() -> heat_igl.Mesh:
 
 def test_the_distance_follows_the_click(sphere: heat_igl.Mesh) -> None:
     now = Exploration(sphere, 5)
-    solver = heat_igl.HeatMethodSolver(sphere)
+    solver = heat_igl.GeodesicSolver(sphere)
     np.testing.assert_array_equal(now.distance, solver.distance(5))
     now.choose(17)
     assert now.sources.tolist() == [17]
@@ -68,7 +68,7 @@ def test_few_solvers_are_kept(sphere: heat_igl.Mesh, monkeypatch: pytest.MonkeyP
         return build(mesh, options)
 
     monkeypatch.setattr(exploration.HeatMethodSolver, "from_options", counting)
-    now = Exploration(sphere, 0)
+    now = Exploration(sphere, 0, SolverChoice("heat"))
     for t_coef in (2.0, 1.0, 3.0, 4.0, 1.0, 5.0, 2.0):
         now.change(t_coef=t_coef)
     assert made == [None, 2.0, 1.0, 3.0, 4.0, 5.0, 2.0]  # 1 was used in between, so 2 was the one to go
@@ -79,7 +79,7 @@ def test_what_cannot_be_solved_changes_nothing(sphere: heat_igl.Mesh) -> None:
     before = now.distance
     now.change(t_coef=-1.0)
     assert now.message == "t_coef must be a positive number, not -1.0"
-    assert now.options == SolverOptions()
+    assert now.options == SolverChoice()
     assert now.distance is before
     with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 9999"):
         now.choose(9999)
@@ -124,7 +124,7 @@ def test_directions_and_log_maps_follow_the_source(sphere: heat_igl.Mesh) -> Non
 def test_a_cloud_is_measured_as_a_cloud(sphere: heat_igl.Mesh) -> None:
     cloud = heat_igl.PointCloud(sphere.V[sphere.V[:, 2] > -0.5])
     now = Exploration(cloud, 3)
-    np.testing.assert_array_equal(now.distance, heat_igl.HeatMethodSolver(cloud).distance(3))
+    np.testing.assert_array_equal(now.distance, heat_igl.GeodesicSolver(cloud).distance(3))
     assert now.is_cloud
     assert '"points": true' in now.page("cloud").html
     assert '"points": false' in Exploration(cloud.triangles, 3).page("triangles").html
