@@ -23,6 +23,7 @@ from heat_igl.curves import karcher_mean as karcher_mean
 from heat_igl.curves import log_map as log_map
 from heat_igl.curves import log_maps_within as log_maps_within
 from heat_igl.curves import offset_curves as offset_curves
+from heat_igl.curves import shortest_path as shortest_path
 from heat_igl.curves import shortest_paths as shortest_paths
 from heat_igl.curves import signed_distance as signed_distance
 from heat_igl.curves import straighten as straighten

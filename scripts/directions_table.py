@@ -37,7 +37,7 @@ STRATEGIES = ("VectorHeat", "AffineLocal", "AffineAdaptive")
 def exact_log(mesh: Mesh, source: int) -> tuple[AnyArray, BoolArray]:
     """The log map as complex numbers (n,), by paths on the faces of the mesh; which paths (n,) pass no vertex."""
     targets = np.setdiff1d(np.flatnonzero(mesh.components == mesh.components[source]), source)
-    paths = heat_igl.shortest_paths(mesh, None, targets, source)
+    paths = heat_igl.shortest_paths(mesh, targets, source)
     length = np.array([path.lengths(mesh).sum() for path in paths])
     faces = np.array([path.faces[-1] for path in paths])
     leaving = np.stack([path.start[-1] - path.end[-1] for path in paths])
@@ -167,9 +167,7 @@ def costs(mesh: Mesh, sources: IntArray) -> dict[str, list[float]]:
     rng, found = np.random.default_rng(0), {}
     faces = rng.integers(0, mesh.n_faces, len(sources))
     points = [SurfacePoints([face], [[0.2, 0.3, 0.5]]) for face in faces]
-    curves = [
-        heat_igl.shortest_paths(mesh, None, int(a), int(b))[0] for a, b in zip(sources, sources[::-1], strict=True)
-    ]
+    curves = [heat_igl.shortest_paths(mesh, int(a), int(b))[0] for a, b in zip(sources, sources[::-1], strict=True)]
     solver = GeodesicSolver(mesh)
     for kind, all_of_kind in (("vertex", sources.tolist()), ("point", points), ("curve", curves)):
         turns = range(len(all_of_kind))

@@ -41,7 +41,7 @@ def measured(mesh: Mesh, name: str, n_targets: int, seed: int) -> list[dict[str,
     for method in ("windows", "heat"):
         distance = geodesic_distance(mesh, int(source), method=method)
         start = time.perf_counter()
-        paths = shortest_paths(mesh, distance, targets, int(source))
+        paths = shortest_paths(mesh, targets, int(source), distance=distance)
         seconds = time.perf_counter() - start
         error = np.array([path.lengths(mesh).sum() for path in paths]) / exact - 1
         gap = max(float(np.abs(path.positions(mesh)[-1] - mesh.V[source]).max()) for path in paths)

@@ -224,7 +224,7 @@ class _Causes:
         if abs(distance - other) <= self._rounding * other:
             return "rounding"
         try:
-            (path,) = shortest_paths(self._mesh, None, [target], [self._source])
+            (path,) = shortest_paths(self._mesh, [target], [self._source])
         except SourceError:
             return "unexplained"
         if self._added > 0 and abs(distance - other) <= self._added * (1 + len(path.faces)):

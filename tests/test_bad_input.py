@@ -259,7 +259,7 @@ def argument_cases() -> Iterator[Case]:
         r"g has \d+ masked entries: fill or remove them",
     )
     for name, ask in {
-        "distance": lambda mesh: heat_igl.shortest_paths(mesh, ragged, [3], 0),
+        "distance": lambda mesh: heat_igl.shortest_paths(mesh, [3], 0, distance=ragged),
         "vectors": lambda mesh: heat_igl.tangent_frames(mesh).from_world(ragged),
         "vertices": lambda mesh: heat_igl.edge_curve(mesh, ragged),
         "faces": lambda mesh: heat_igl.region_boundary(mesh, faces=ragged),
@@ -324,7 +324,7 @@ def argument_cases() -> Iterator[Case]:
     )
     yield argument_case(
         "paths down an infinite distance",
-        lambda mesh: heat_igl.shortest_paths(mesh, np.full(42, np.inf), [3], 0),
+        lambda mesh: heat_igl.shortest_paths(mesh, [3], 0, distance=np.full(42, np.inf)),
         r"from targets\[0\] no source can be reached",
         error="SourceError",
     )

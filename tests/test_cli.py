@@ -113,7 +113,7 @@ def test_paths_and_traces_are_those_of_the_library(
     place = heat_igl.closest_points(mesh, [0.3, 2, 0.1]).points
     expected = {
         ("path", "12", "0.3,2,0.1", "40"): heat_igl.geodesic_path(mesh, [12, place, 40]),
-        ("path", "--from=12", "--to=40"): heat_igl.shortest_paths(mesh, None, 12, 40)[0],
+        ("path", "--from=12", "--to=40"): heat_igl.shortest_paths(mesh, 12, 40)[0],
         ("trace", "--from=12", "--direction=1,2,3", "--length=0.7"): heat_igl.trace_geodesic(mesh, 12, [1, 2, 3], 0.7),
     }
     for (name, *arguments), curve in expected.items():

@@ -186,7 +186,7 @@ def test_departures_are_those_of_straightened_paths(bunny):
     source, targets = 900, np.arange(0, bunny.n_vertices, 400)
     distance = heat_igl.geodesic_distance(bunny, source, method="exact")
     frames, log = tangent_frames(bunny), log_map(bunny, source, method="exact")
-    paths = heat_igl.shortest_paths(bunny, distance, targets, source)
+    paths = heat_igl.shortest_paths(bunny, targets, source, distance=distance)
     length = np.array([path.lengths(bunny).sum() for path in paths])
     assert (np.hypot(*log[targets].T) <= length * (1 + 1e-9)).all()
     faces = np.array([path.faces[-1] for path in paths])

@@ -47,7 +47,7 @@ def test_curves_in_the_plane(mesh):
     for curve in (
         isolines(mesh, mesh.V[:, 0] + 0.2 * mesh.V[:, 1], 0.43)[0][0],
         isolines(mesh, from_point, 0.2)[0][0],
-        shortest_paths(mesh, None, 5, mesh.n_vertices // 2 + 3)[0],
+        shortest_paths(mesh, 5, mesh.n_vertices // 2 + 3)[0],
     ):
         truth = to_polyline(mesh.V, curve.positions(mesh))
         for distance in (
@@ -69,7 +69,7 @@ def test_curves_on_a_prism():
         geodesic_distance(mesh, level, method="exact"), np.abs(z - 0.43 * z.max()), rtol=1e-12, atol=1e-14
     )
     start, end = 3 + 24 * 2, 10 + 24 * 9
-    (screw,) = shortest_paths(mesh, None, start, end)
+    (screw,) = shortest_paths(mesh, start, end)
     truth = np.min(
         [to_polyline(rolled_out + np.array([shift * around, 0]), rolled_out[[start, end]]) for shift in (-1, 0, 1)],
         axis=0,
@@ -96,7 +96,7 @@ def test_curves_on_a_cube():
 def test_curves_are_nearer_than_points_on_them_by_no_more_than_the_gaps(name):
     mesh = MESHES[name]()
     used = np.unique(mesh.F)
-    (along,) = shortest_paths(mesh, None, int(used[0]), int(used[len(used) // 2]))
+    (along,) = shortest_paths(mesh, int(used[0]), int(used[len(used) // 2]))
     height = np.linalg.norm(mesh.V - mesh.V[used[3]], axis=1)
     level = isolines(mesh, height, 0.37 * height.max())[0][0]
     surface = ExactSurface(intrinsic_triangulation(mesh))
@@ -120,7 +120,7 @@ def test_exact_paths_end_on_curves(name):
     used = np.unique(mesh.F)
     height = np.linalg.norm(mesh.V - mesh.V[used[3]], axis=1)
     level = isolines(mesh, height, 0.37 * height.max())[0][0]
-    paths = shortest_paths(mesh, None, used, level)
+    paths = shortest_paths(mesh, used, level)
     distance = geodesic_distance(mesh, level, method="exact")[used]
     np.testing.assert_allclose(lengths(mesh, paths), distance, rtol=1e-12, atol=1e-14)
     assert_on_surface(mesh, paths)

@@ -54,7 +54,7 @@ def places(mesh: Mesh, k: int) -> SurfacePoints:
 
 
 def assert_exact(mesh: Mesh, targets, sources, distance: FloatArray) -> None:
-    paths = shortest_paths(mesh, None, targets, sources)
+    paths = shortest_paths(mesh, targets, sources)
     np.testing.assert_allclose(lengths(mesh, paths), distance, rtol=1e-12, atol=1e-14)
     assert_on_surface(mesh, paths)
     for path in paths:
@@ -85,7 +85,7 @@ def test_paths_to_many_sources_end_at_the_nearest(name):
     found = ExactSurface(intrinsic_triangulation(mesh)).solve(vertices, begins[:2], points, begins[2:])
     at = np.concatenate([mesh.V[vertices], points.positions(mesh)])[found.origin.label[used]]
     sources = [OffsetSources(vertices.tolist(), begins[:2]), OffsetSources(points, begins[2:])]
-    paths = shortest_paths(mesh, None, used, sources)
+    paths = shortest_paths(mesh, used, sources)
     np.testing.assert_allclose(
         lengths(mesh, paths), found.distance[used] - begins[found.origin.label[used]], rtol=1e-12, atol=1e-13
     )
@@ -103,14 +103,16 @@ def test_edges_of_many_faces_flat_parts_and_pieces(name):
 
 def test_paths_are_straight_over_every_edge():
     mesh = MESHES["rough sphere"]()
-    paths = shortest_paths(mesh, None, np.arange(0, mesh.n_vertices, 7), 0)
+    paths = shortest_paths(mesh, np.arange(0, mesh.n_vertices, 7), 0)
     assert max(np.abs(turns(mesh, path)).max(initial=0) for path in paths) < 1e-6
 
 
 def test_a_solver_with_exact_distances_gives_exact_paths():
     mesh = perturbed(shapes.grid(40), 0.8, 2)
     targets = np.arange(1, mesh.n_vertices, 50)
-    paths = [shortest_paths(mesh, GeodesicSolver(mesh, tolerance=tolerance), targets, 0) for tolerance in (0, 1e-3)]
+    paths = [
+        shortest_paths(mesh, targets, 0, distance=GeodesicSolver(mesh, tolerance=tolerance)) for tolerance in (0, 1e-3)
+    ]
     for found in paths:  # paths are exact whatever the tolerance
         np.testing.assert_allclose(lengths(mesh, found), reference.exact(mesh, 0)[targets], rtol=1e-12)
 
@@ -120,7 +122,7 @@ def test_on_rough_ground_exact_paths_take_the_place_of_straightened_ones():
     mesh = terrain(40)
     exact = reference.exact(mesh, 0)
     targets = np.arange(1, mesh.n_vertices, 10)
-    excess = lengths(mesh, shortest_paths(mesh, exact, targets)) / exact[targets] - 1
+    excess = lengths(mesh, shortest_paths(mesh, targets, distance=exact)) / exact[targets] - 1
     assert excess.min() > -1e-12
     assert excess.max() < 0.01
     assert excess.mean() < 0.002
@@ -130,8 +132,8 @@ def test_a_path_from_a_source_stays_there():
     mesh = flat_perturbed(shapes.grid(6))
     inside = SurfacePoints([20], [[0.2, 0.5, 0.3]])
     for source in (7, inside):
-        (path,) = shortest_paths(mesh, None, source, source)
+        (path,) = shortest_paths(mesh, source, source)
         assert len(path) == 1
         assert path.lengths(mesh)[0] == 0
     with pytest.raises(SourceError, match="sources are missing"):
-        shortest_paths(mesh, None, 7)
+        shortest_paths(mesh, 7)

@@ -262,7 +262,7 @@ PHI = TORUS.V[:, 0] + 3
         lambda mesh: heat_igl.diameter(mesh, rounds=2)[0],
         lambda mesh: heat_igl.geodesic_centre(mesh, mesh, [3, 9, 40]).barycentric,
         lambda mesh: heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(mesh, 40)).F,
-        lambda mesh: heat_igl.shortest_paths(mesh, None, [40], 3)[0].lengths(mesh),
+        lambda mesh: heat_igl.shortest_paths(mesh, [40], 3)[0].lengths(mesh),
         lambda mesh: heat_igl.isolines(mesh, PHI, 3.1)[0][0].positions(mesh),
         lambda mesh: heat_igl.sublevel_areas(mesh, PHI, [3.1]),
         lambda mesh: heat_igl.enclosed_areas(mesh, PHI, 3.1),

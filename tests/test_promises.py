@@ -85,7 +85,7 @@ def test_paths_down_an_exact_distance_are_as_long_as_it():
     solver = GeodesicSolver(mesh, method="exact")
     d = solver.distance(5)
     targets = np.arange(0, mesh.n_vertices, 97)
-    length = np.array([path.lengths(mesh).sum() for path in shortest_paths(mesh, solver, targets, 5)])
+    length = np.array([path.lengths(mesh).sum() for path in shortest_paths(mesh, targets, 5, distance=solver)])
     np.testing.assert_allclose(length, d[targets], rtol=1e-3)
     assert (length >= d[targets] - 1e-9).all()
 

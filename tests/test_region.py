@@ -134,6 +134,28 @@ def test_a_ring_is_gone_around_and_tetrahedra_too():
     assert np.isinf(np.delete(phi, used)).all()
 
 
+def test_paths_in_a_region():
+    mesh = bumpy()
+    region = mesh.V[:, 2] < 0.4
+    part, used, faces = cut_out(mesh, region)
+    path, alone = heat_igl.shortest_path(mesh, used[7], used[90], region=region), heat_igl.shortest_path(part, 7, 90)
+    np.testing.assert_allclose(path.points, alone.points, atol=1e-12)
+    np.testing.assert_array_equal(path.faces, faces[alone.faces])
+    assert path.length == pytest.approx(heat_igl.pair_distances(mesh, [used[[7, 90]]], region=region)[0], rel=1e-12)
+    np.testing.assert_allclose(path.points[[0, -1]], mesh.V[used[[7, 90]]], atol=1e-12)
+    spots = SurfacePoints(faces[[5, 60]], [[0.2, 0.3, 0.5], [0.1, 0.6, 0.3]])
+    found = heat_igl.shortest_paths(mesh, spots, used[[3, 4]], region=region)
+    wanted = heat_igl.shortest_paths(part, SurfacePoints([5, 60], spots.barycentric), [3, 4])
+    assert [curve.length for curve in found] == pytest.approx([curve.length for curve in wanted], rel=1e-12)
+    far = int(np.flatnonzero(~region)[0])
+    with pytest.raises(SourceError, match=rf"targets\[0\]: vertex {far} lies outside the region"):
+        heat_igl.shortest_path(mesh, far, used[3], region=region)
+    with pytest.raises(SourceError, match="a must be one place, not 2"):
+        heat_igl.shortest_path(mesh, [0, 1], 2)
+    with pytest.raises(ValueError, match="paths in a region are exact: leave distance away"):
+        heat_igl.shortest_paths(mesh, 0, 1, distance=np.zeros(mesh.n_vertices), region=region)
+
+
 def test_the_command_takes_a_region(tmp_path, capsys):
     mesh = shapes.grid(6)
     region = mesh.V[:, 0] < 0.6

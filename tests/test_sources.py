@@ -149,7 +149,7 @@ def test_a_curve_without_length_is_a_point(method):
     """The path from a vertex to itself emits no heat."""
     mesh = shapes.icosphere(2)
     solver = SolverChoice(method).on(mesh)
-    (path,) = shortest_paths(mesh, None, targets=3, sources=3)
+    (path,) = shortest_paths(mesh, targets=3, sources=3)
     np.testing.assert_array_equal(solver.distance(path), solver.distance(3))
     inside = [[0.2, 0.5, 0.3]]
     curve = SurfaceCurve([7, 7], [*inside, *inside], [*inside, *inside])

@@ -59,7 +59,7 @@ def path(
         if vertex is None or not 0 <= vertex < loaded.n_vertices:
             raise SourceError(f"{option} {vertex} is no vertex: the mesh has {loaded.n_vertices}, counted from 0")
         ends.append(vertex)
-    found = heat_igl.shortest_paths(loaded, None, *ends)
+    found = heat_igl.shortest_paths(loaded, *ends)
     _write(loaded, found[0], output, json_file, ())
 
 

@@ -44,7 +44,7 @@ class EdgeFlipGeodesicSolver:
         """Corners (k, 3) of the path from one vertex to another."""
         if v_start == v_end:
             raise ValueError(f"v_start and v_end are the same vertex, {v_start}")
-        return shortest_paths(self._mesh, self._solver, v_start, v_end)[0].positions(self._mesh)
+        return shortest_paths(self._mesh, v_start, v_end, distance=self._solver)[0].positions(self._mesh)
 
     def find_geodesic_path_poly(
         self,

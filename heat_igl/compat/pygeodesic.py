@@ -10,7 +10,7 @@ from os import PathLike
 
 import numpy as np
 
-from heat_igl.curves import shortest_paths
+from heat_igl.curves import shortest_path
 from heat_igl.errors import MeshError, positive
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, named_vertices
@@ -71,7 +71,7 @@ class PyGeodesicAlgorithmExact:
         )
         if source == target:
             return 0.0, np.array(self._mesh.V[[source]])
-        (path,) = shortest_paths(self._mesh, None, target, source)
+        path = shortest_path(self._mesh, target, source)
         points, lengths = path.positions(self._mesh), path.lengths(self._mesh)
         return float(lengths.sum()), points[np.append(True, lengths > 0)]
 

@@ -10,7 +10,7 @@ from heat_igl.curves.level_sets import enclosed_areas, isolines, offset_curves, 
 from heat_igl.curves.local_log_maps import LogMapsWithin, log_maps_within
 from heat_igl.curves.log_map import log_map
 from heat_igl.curves.means import karcher_mean
-from heat_igl.curves.paths import shortest_paths
+from heat_igl.curves.paths import shortest_path, shortest_paths
 from heat_igl.curves.relaxation import CentroidalSites, centroidal_voronoi
 from heat_igl.curves.straightest import exp_map, trace_geodesic
 
@@ -33,6 +33,7 @@ __all__ = [
     "log_map",
     "log_maps_within",
     "offset_curves",
+    "shortest_path",
     "shortest_paths",
     "signed_distance",
     "straighten",

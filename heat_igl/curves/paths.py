@@ -10,12 +10,12 @@ from heat_igl.curves import tracing
 from heat_igl.curves.places import places, snapped
 from heat_igl.errors import MeshError, SourceError, as_array
 from heat_igl.geodesic import Solver, geodesic_distance
-from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
-from heat_igl.sources import Sources, SourceSet, source_set
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, SurfaceCurve, SurfacePoints, as_simplices
+from heat_igl.sources import Sources, SourceSet, named_vertices, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import exact_paths
 
-__all__ = ["shortest_paths"]
+__all__ = ["shortest_path", "shortest_paths"]
 
 # A path passes a source vertex whose distance is below the offset of the source by more than this share, the rounding
 # of refined distances: the vertex is nearer to another source.
@@ -27,26 +27,30 @@ _EXCESS = 0.01
 
 def shortest_paths(
     mesh: MeshLike,
-    distance: ArrayLike | Solver | None,
     targets: Sources,
     sources: Sources | None = None,
+    *,
+    distance: ArrayLike | Solver | None = None,
+    region: ArrayLike | None = None,
 ) -> list[SurfaceCurve]:
-    """Locally shortest paths from targets to the sources of a distance.
+    """Shortest paths from targets to the nearest of some sources: exact ones, or along a distance.
 
     Parameters
     ----------
     mesh : mesh
         Triangles.
-    distance : (n,) array_like, GeodesicSolver, HeatMethodSolver or None
-        None, or a `GeodesicSolver` whose engine is windows, for exact shortest paths. Otherwise a distance from
-        the sources, or a solver to compute it. It decides which way around the surface a path takes: the more accurate
-        the distance, the more often this is the shortest way.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints
         Start of each path: vertices, in the order given and with repetitions, or points on faces.
     sources : optional
         Possible ends of the paths, as ``solver.distance`` takes them; by default the vertices at distance 0. Needed
         with a solver, and for sources inside faces. On a curve, a path ends at the nearest point of the segment in the
         face in which it arrives.
+    distance : (n,) array_like, GeodesicSolver, HeatMethodSolver or None
+        None, or a `GeodesicSolver` whose engine is windows, for exact shortest paths. Otherwise a distance from
+        the sources, or a solver to compute it. It decides which way around the surface a path takes: the more accurate
+        the distance, the more often this is the shortest way.
+    region : (n,) or (m,) array_like of bool, optional
+        What exact paths may enter, as for `GeodesicSolver`.
 
     Returns
     -------
@@ -84,13 +88,17 @@ def shortest_paths(
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.strip(4, 3)
-    >>> (path,) = heat_igl.shortest_paths(mesh, None, targets=19, sources=0)  # along the diagonal of 3 by 4
+    >>> (path,) = heat_igl.shortest_paths(mesh, targets=19, sources=0)  # along the diagonal of 3 by 4
     >>> round(float(path.lengths(mesh).sum()), 6)
     5.0
     """
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")
+    if region is not None:
+        if distance is not None:
+            raise ValueError("paths in a region are exact: leave distance away")
+        return _in_region(mesh, MeshPart.of(mesh, region), targets, _required(None, sources))
     face, barycentric = places("targets", mesh, targets)
     solver = distance if isinstance(distance, Solver) else None
     if distance is None or (solver is not None and solver.plan.engine == "windows"):
@@ -107,6 +115,60 @@ def shortest_paths(
         longer = _too_long(mesh, values - chosen.offsets.min(), paths, face, barycentric)
         if len(longer):
             paths |= _exact(mesh, chosen, face, barycentric, longer)
+    return [paths[i].on(mesh) for i in range(len(face))]
+
+
+def shortest_path(mesh: MeshLike, a: Sources, b: Sources, *, region: ArrayLike | None = None) -> SurfaceCurve:
+    """The exact shortest path from one place to another.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles.
+    a, b : int or SurfacePoints
+        A vertex, or a point in a face. Of several places `b`, the path leads to the nearest.
+    region : (n,) or (m,) array_like of bool, optional
+        What the path may enter, as for `GeodesicSolver`.
+
+    Returns
+    -------
+    SurfaceCurve
+        From a to b; its ``length`` is their distance.
+
+    Raises
+    ------
+    MeshError
+        If the mesh is tetrahedral.
+    SourceError
+        If `a` or `b` is no place on the mesh, `a` is several, or no path joins them.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> path = heat_igl.shortest_path(heat_igl.shapes.strip(4, 3), 0, 19)  # the diagonal of 3 by 4
+    >>> round(path.length, 6), path.points[-1].tolist()
+    (5.0, [4.0, 3.0, 0.0])
+    """
+    paths = shortest_paths(mesh, a, b, region=region)
+    if len(paths) > 1:
+        raise SourceError(f"a must be one place, not {len(paths)}: shortest_paths takes several targets")
+    return paths[0]
+
+
+def _in_region(mesh: Mesh, part: MeshPart, targets: Sources, sources: Sources) -> list[SurfaceCurve]:
+    """Exact paths on the faces of a part, by the numbers of the whole mesh."""
+    if isinstance(targets, SurfacePoints):
+        face, barycentric = places("targets", mesh, targets)
+        face = part.numbers_of(face, "targets")
+    else:
+        part.require_vertices(named_vertices(targets, mesh.n_vertices, "targets"), "targets")
+        face, barycentric = places("targets", part.mesh, targets)
+    found = exact_paths(part.mesh, _source_set(mesh, sources).within(part), face, barycentric)
+    _refuse_lost(np.isinf(found.distance))
+    paths = _curves(np.arange(len(face)), part.faces[found.faces], found.points, found.first)
+    if len(paths) < len(face):
+        missing = np.setdiff1d(np.arange(len(face)), list(paths))
+        raise MeshError(f"the path from targets[{missing[0]}] is lost among faces without area: repair these faces")
     return [paths[i].on(mesh) for i in range(len(face))]
 
 

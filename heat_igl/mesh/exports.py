@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import MeshError, MissingExtraError, as_array
+from heat_igl.errors import MeshError, as_array
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.typing import AnyArray, ArrayLike
@@ -34,12 +34,12 @@ def to_trimesh(mesh: MeshLike, **attributes: ArrayLike) -> Any:
         If the mesh cannot be used, or holds tetrahedra.
     ValueError
         If values have neither n nor m rows.
-    MissingExtraError
-        If trimesh is not installed.
+    ImportError
+        If trimesh is not installed; no extra of this package installs it.
     """
     triangles = _triangles(mesh)
-    with MissingExtraError.guard("to_trimesh", "trimesh", "bench"):
-        import trimesh  # type: ignore[import-not-found]
+    import trimesh  # type: ignore[import-not-found]
+
     of_vertices, of_faces = _attributes(triangles, attributes)
     return trimesh.Trimesh(
         triangles.vertices, triangles.faces, vertex_attributes=of_vertices, face_attributes=of_faces, process=False
@@ -52,8 +52,8 @@ def to_pyvista(mesh: MeshLike, **attributes: ArrayLike) -> Any:
     Parameters, result and errors are those of `to_trimesh`, for pyvista.
     """
     triangles = _triangles(mesh)
-    with MissingExtraError.guard("to_pyvista", "pyvista", "bench"):
-        import pyvista  # type: ignore[import-not-found]
+    import pyvista  # type: ignore[import-not-found]
+
     of_vertices, of_faces = _attributes(triangles, attributes)
     surface = pyvista.PolyData.from_regular_faces(triangles.vertices, triangles.faces)
     surface.point_data.update(of_vertices)
@@ -68,8 +68,8 @@ def to_open3d(mesh: MeshLike, **attributes: ArrayLike) -> Any:
     attributes, is ``to_open3d(mesh).to_legacy()``. In open3d, values have two dimensions: (n,) becomes (n, 1).
     """
     triangles = _triangles(mesh)
-    with MissingExtraError.guard("to_open3d", "open3d", "bench"):
-        import open3d  # type: ignore[import-not-found]
+    import open3d  # type: ignore[import-not-found]
+
     surface = open3d.t.geometry.TriangleMesh(
         open3d.core.Tensor(triangles.vertices), open3d.core.Tensor(triangles.faces)
     )
