@@ -63,9 +63,9 @@ def test_few_solvers_are_kept(sphere: heat_igl.Mesh, monkeypatch: pytest.MonkeyP
     made = []
     build = heat_igl.HeatMethodSolver.from_options
 
-    def counting(mesh: heat_igl.Mesh, options: SolverOptions) -> heat_igl.HeatMethodSolver:
+    def counting(mesh: heat_igl.Mesh, options: SolverOptions, *others: object) -> heat_igl.HeatMethodSolver:
         made.append(options.t_coef)
-        return build(mesh, options)
+        return build(mesh, options, *others)
 
     monkeypatch.setattr(exploration.HeatMethodSolver, "from_options", counting)
     now = Exploration(sphere, 0, SolverChoice("heat"))
