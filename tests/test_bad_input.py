@@ -343,7 +343,7 @@ def argument_cases() -> Iterator[Case]:
     yield argument_case(
         "offset_curves by a mesh",
         lambda mesh: heat_igl.offset_curves(mesh, mesh, 0, 1.0),
-        "solver must be a HeatMethod",
+        "solver must be a GeodesicSolver",
     )
 
 
