@@ -49,9 +49,9 @@ class FrontSolver(Engine):
     In a metric that changes from simplex to simplex, the Hopf-Lax formula on each is iterated until distances are a
     fixed point, and then with distance of second order on facets (`heat_igl.kernels.hopf_lax`).
 
-    Triangles that mostly fit together are passed by fronts too, and the shorter distance stands. A vertex gets its distance from the other corners of a triangle: from
-    each alone along an edge, and from two by the point behind the edge between them that lies at their distances, if
-    the straight line from it crosses there.
+    Triangles that mostly fit together are passed by fronts too, and the shorter distance stands. A vertex gets its
+    distance from the other corners of a triangle: from each alone along an edge, and from two by the point behind the
+    edge between them that lies at their distances, if the straight line from it crosses there.
 
     Where a front passes into a triangle of another slowness, it is refracted: its values along the facet stay, which is
     Snell's law, and its radius is divided by the square of the ratio of speeds, as that of a paraxial ray.
