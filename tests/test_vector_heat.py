@@ -142,7 +142,9 @@ def test_log_map_is_undone_by_the_exponential_map(sphere):
     gap = np.linalg.norm(ends - sphere.V, axis=1)
     assert np.median(gap) < 0.05
     assert gap.max() < 0.35
-    np.testing.assert_allclose(np.hypot(*log.T), heat_igl.HeatMethodSolver(sphere).distance(5))
+    # The length is that of heat's three steps, before the distance is held to bounds: as with a time step of one's own.
+    solver_of_steps = heat_igl.HeatMethodSolver(sphere, t_coef=0.5)
+    np.testing.assert_allclose(np.hypot(*log.T), solver_of_steps.distance(5))
     # Neighbours lie in the direction of their edges.
     ring = np.unique(sphere.F[(sphere.F == 5).any(axis=1)])
     assert gap[ring].max() < 1e-6
@@ -170,6 +172,7 @@ def test_lengths_and_linearity_of_transport(sphere):
     assert np.isfinite(solver.transport([3, 9], np.zeros((2, 2)))).all()
 
 
+@pytest.mark.filterwarnings("ignore:heat is off")
 def test_vertices_that_no_source_reaches_get_zero():
     grid = shapes.grid(4)
     V = np.vstack([grid.V, grid.V + np.array([3, 0, 0]), [[9, 9, 9]]])
