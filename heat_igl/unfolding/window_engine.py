@@ -34,8 +34,8 @@ class WindowEngine(Engine):
     """
 
     def __init__(self, triangles: Triangles, tolerance: float = 0.0, originals: IntArray | None = None) -> None:
-        # `ExactSurface` can merge windows within the tolerance. No search is asked to yet: on bunny, fandisk, camelhead and
-        # armadillo, at 1e-5, the result contradicted edges and was found once more, in 1.5 to 2.4 of the exact time.
+        # `ExactSurface` can merge windows within the tolerance. No search is asked to yet: on bunny, fandisk, camelhead
+        # and armadillo, at 1e-5, the result contradicted edges and was found again, in 1.5 to 2.4 of the exact time.
         self._triangles, self._tolerance, self._originals = triangles, tolerance, originals
         # Made at once, since nearly every query needs it; what points, curves and paths need is made on request.
         self._from_vertices = ExactSurface(triangles.half_edges())
