@@ -23,7 +23,7 @@ GROUPS = {
     "Sampling": """farthest_points farthest_cells voronoi_cells VoronoiCells dual_triangulation geodesic_centre
         karcher_mean centroidal_voronoi CentroidalSites diameter sampling""",
     "Operators of a domain": """Operators polygon_operators point_cloud_operators speed_operators metric_operators
-        fibre_metric""",
+        fibre_metric activation_times""",
     "Validation": """validate ValidationReport ValidationRow validate_domains DomainReport DomainRow reference
         closed_forms metrics shapes baselines""",
     "Pictures": "plots",
