@@ -145,10 +145,10 @@ class ExactSurface:
             With more than one, two threads share the search for distances of all vertices, on large surfaces. The
             distances are the same; of paths that are equally long, another may be found.
         tolerance : float
-            The intended largest error of a distance, as a fraction of it; 0 for exact distances. With a tolerance, windows side
-            by side become one where that changes distances by less. One thread searches. Where the result contradicts
-            paths along edges, and always with `goals`, the search is exact. Origins name the source; the rest of them
-            is that of an exact path only at 0.
+            The intended largest error of a distance, as a fraction of it; 0 for exact distances. With a tolerance,
+            windows side by side become one where that changes distances by less. One thread searches. Where the result
+            contradicts paths along edges, and always with `goals`, the search is exact. Origins name the source; the
+            rest of them is that of an exact path only at 0.
 
         Returns
         -------
