@@ -67,8 +67,9 @@ def test_a_wall_is_passed_at_both_corners():
     "wrong", [lambda d: 1.08 * d, lambda d: 0.92 * d, lambda d: np.where(d > 0.5 * d.max(), np.inf, d)]
 )
 def test_wrong_distances_do_not_pass(wrong: Any, monkeypatch: pytest.MonkeyPatch):
-    right = HeatMethodSolver.distance
-    monkeypatch.setattr(HeatMethodSolver, "distance", lambda self, sources: wrong(right(self, sources)))
+    for solver in (HeatMethodSolver, heat_igl.GeodesicSolver):
+        right = solver.distance
+        monkeypatch.setattr(solver, "distance", lambda self, sources, right=right: wrong(right(self, sources)))
     report = heat_igl.validate_domains(["polygons", "tetrahedra"])
     assert report.failed == report.rows
     assert report.to_markdown().startswith(f"0 of {len(report.rows)} rows passed")
@@ -96,7 +97,7 @@ def test_the_report_in_every_format(capsys: pytest.CaptureFixture[str]):
     table = lines[2 : 4 + len(report.rows)]
     assert len({line.count("|") for line in table}) == 1
     assert lines[len(table) + 2] == ""
-    assert "default, a solver without options" in lines[len(table) + 3]
+    assert "default, GeodesicSolver without options" in lines[len(table) + 3]
     assert cli.run(["validate-domains", "--domain", "polygons"]) == 0
     assert capsys.readouterr().out == report.to_markdown()
     assert cli.run(["validate-domains", "--domain=polygons", "--json=-"]) == 0

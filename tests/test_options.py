@@ -2,35 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
-import inspect
-
 import numpy as np
 import pytest
 from conftest import perturbed
 
 from heat_igl import HeatMethodSolver, shapes
-from heat_igl.cli import distances
 from heat_igl.heat_method import SolverOptions
 from heat_igl.operators import operators
-
-FIELDS = {field.name: field.default for field in dataclasses.fields(SolverOptions)}
-
-
-@pytest.mark.parametrize(
-    ("make", "others"),
-    [
-        (HeatMethodSolver, {"mesh", "F"}),
-        (HeatMethodSolver.from_operators, {"domain"}),
-        (HeatMethodSolver.from_edge_lengths, {"F", "lengths", "n", "twin"}),
-        (distances.distance, {"mesh", "source", "at", "method", "cutoff", "output", "picture", "json_file"}),
-    ],
-)
-def test_options_have_the_same_names_and_defaults_everywhere(make, others):
-    parameters = inspect.signature(make).parameters
-    options = {name: p.default for name, p in parameters.items() if name not in others}
-    without_laplacian = {name: default for name, default in FIELDS.items() if name != "laplacian"}
-    assert options == (without_laplacian if "domain" in others else FIELDS)
 
 
 @pytest.mark.parametrize(
