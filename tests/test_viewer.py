@@ -165,9 +165,10 @@ from Xlib import X, display
 from Xlib.ext import xtest
 from heat_igl import shapes
 from heat_igl.drawing.viewer import Exploration, Window
+from heat_igl.geodesic import SolverChoice
 
 mesh = shapes.icosphere(3)
-now = Exploration(mesh, 100, fields={"height": mesh.V[:, 2]})
+now = Exploration(mesh, 100, SolverChoice("heat"), fields={"height": mesh.V[:, 2]})
 ps.set_window_size(1000, 560)
 window = Window(now)
 screen = display.Display()
@@ -363,7 +364,7 @@ def test_without_a_display_the_command_writes_a_page(folder: Path, monkeypatch: 
     text = (folder / "ball-view.html").read_text(encoding="utf8")
     assert "<title>ball.off</title>" in text
     assert '"sources": [3, 7]' in text
-    assert "Distance by the heat method, t = 0.5 h^2, boundary neumann." in text
+    assert "with t = 0.5 h^2." in text
 
 
 def test_the_command_writes_the_page_that_it_is_told_to(folder: Path) -> None:
