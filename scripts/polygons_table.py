@@ -55,7 +55,7 @@ def errors(mesh: PolygonMesh, sources: Sequence[int]) -> list[float]:
     """Mean errors in percent of the three ways."""
     fans, n = PolygonFans.of(mesh).mesh, mesh.n_vertices
     solvers = (
-        (HeatMethodSolver.from_operators(polygon_operators(mesh)), fans),
+        (HeatMethodSolver(polygon_operators(mesh)), fans),
         (HeatMethodSolver(mesh.triangles), mesh.triangles),
         (HeatMethodSolver(mesh), fans),
     )

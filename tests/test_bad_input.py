@@ -207,21 +207,9 @@ def array_type_cases() -> Iterator[Case]:
             yield argument_case(f"{name}, {kind}", lambda _, ask=ask, bad=bad: ask(bad), refused, error=error)
 
 
-def operator_cases() -> Iterator[Case]:
-    for bad in (None, 3, heat_igl.shapes.icosphere(1)):
-        refused = "domain must be Operators, as metric_operators returns them, not "
-        yield argument_case(
-            f"operators = {bad!r:.20}",
-            lambda _, bad=bad: heat_igl.HeatMethodSolver.from_operators(bad),
-            refused,
-            error="TypeError",
-        )
-
-
 def argument_cases() -> Iterator[Case]:
     yield from number_cases()
     yield from array_type_cases()
-    yield from operator_cases()
     yield from choice_cases()
     far = argument_case(
         "positions that overflow",

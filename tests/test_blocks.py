@@ -269,4 +269,4 @@ def test_a_mesh_that_moves_shares_what_its_faces_say(cow):
 
 def test_only_vertices_can_move(sphere):
     with pytest.raises(ValueError, match="made from operators and has no vertices to move"):
-        HeatMethodSolver.from_operators(operators(sphere)).with_vertices(sphere.V)
+        HeatMethodSolver(operators(sphere)).with_vertices(sphere.V)

@@ -59,7 +59,7 @@ def box(n: int) -> tuple[Operators, int, np.ndarray]:
 
 
 def mean_error(domain: Operators, source: int, exact: np.ndarray, t: float, **options) -> float:
-    distance = HeatMethodSolver.from_operators(domain, t=t, **options).distance(source)
+    distance = HeatMethodSolver(domain, t=t, **options).distance(source)
     return float(np.abs(distance - exact).mean())
 
 

@@ -206,7 +206,7 @@ def test_every_kind_of_answer(solver: HeatMethodSolver) -> None:
 
 
 def test_the_same_operators_give_the_same_answers(solver: HeatMethodSolver) -> None:
-    other = HeatMethodSolver.from_operators(solver.operators)
+    other = HeatMethodSolver(solver.operators)
     assert other.n_vertices == solver.n_vertices
     assert np.array_equal(other.distance(5), solver.distance(5))
     moved = solver.with_vertices(stretched(20.0).V)

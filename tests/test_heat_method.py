@@ -205,7 +205,7 @@ def test_cold_vertices_are_reported():
     """A domain whose extent is understated: heat runs out, and the user is told."""
     domain = dataclasses.replace(operators(shapes.strip(3000, 1)), longest_distance=1.0)
     with pytest.warns(AccuracyWarning, match=r"no heat arrives at \d+ of 6002 vertices.*raise t_coef"):
-        distance = HeatMethodSolver.from_operators(domain, magnitude="unit").distance(0)
+        distance = HeatMethodSolver(domain, magnitude="unit").distance(0)
     assert np.isfinite(distance).all()
 
 
@@ -214,16 +214,14 @@ STRIP = shapes.strip(3000, 1)
 
 def cold_solver() -> HeatMethodSolver:
     """On a domain whose extent is understated, so that heat runs out."""
-    return HeatMethodSolver.from_operators(
-        dataclasses.replace(operators(STRIP), longest_distance=1.0), magnitude="unit"
-    )
+    return HeatMethodSolver(dataclasses.replace(operators(STRIP), longest_distance=1.0), magnitude="unit")
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (lambda _: HeatMethodSolver(STRIP, t=0.5), "too small"),
-        (lambda _: HeatMethodSolver.from_operators(operators(STRIP), t=0.5), "too small"),
+        (lambda _: HeatMethodSolver(operators(STRIP), t=0.5), "too small"),
         (lambda _: heat_igl.heat_method_distance(STRIP.V, STRIP.F, 0, t=0.5), "too small"),
         (lambda cold: cold.distance(0), "no heat arrives"),
         (lambda cold: cold.voronoi(0), "no heat arrives"),

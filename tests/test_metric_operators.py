@@ -27,7 +27,7 @@ def flat(mesh: Mesh, seed: int = 0) -> Mesh:
 def distance(domain: Operators, source: int = 0, method: str = "heat") -> FloatArray:
     if method != "heat":
         return heat_igl.GeodesicSolver(domain, method=method).distance(source)
-    return heat_igl.HeatMethodSolver.from_operators(domain).distance(source)
+    return heat_igl.HeatMethodSolver(domain).distance(source)
 
 
 def error(found: FloatArray, exact: FloatArray) -> float:

@@ -27,7 +27,7 @@ def solver(mesh: Mesh, speed: FloatArray, method: str | None = None, **options: 
     domain = speed_operators(mesh, speed)
     if method != "heat" and not options:
         return heat_igl.GeodesicSolver(domain, method=method or "auto")
-    return heat_igl.HeatMethodSolver.from_operators(domain, **options)
+    return heat_igl.HeatMethodSolver(domain, **options)
 
 
 @pytest.mark.parametrize("mesh", [perturbed(shapes.torus(12, 30)), perturbed(shapes.box(4))], ids=["torus", "box"])

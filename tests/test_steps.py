@@ -341,8 +341,8 @@ def test_twice_the_laplacian():
     both = replace(domain, L=2 * domain.L, M=2 * domain.M)
     np.testing.assert_allclose(HeatFlow(both, t, fitted=True).solve(b), heat, rtol=1e-13)
     # The surface counted twice, as a cover does.
-    found = HeatMethodSolver.from_operators(replace(both, weights=2 * domain.weights)).distance(7)
-    np.testing.assert_allclose(found, HeatMethodSolver.from_operators(domain).distance(7), rtol=1e-12, atol=1e-14)
+    found = HeatMethodSolver(replace(both, weights=2 * domain.weights)).distance(7)
+    np.testing.assert_allclose(found, HeatMethodSolver(domain).distance(7), rtol=1e-12, atol=1e-14)
     # Alone it makes all edges shorter by sqrt(2), and with these lengths it is the flow of 2 t.
     edges = domain.surface.triangulation.edges
     ends = domain.surface.triangulation.tail(edges), domain.surface.triangulation.head(edges)

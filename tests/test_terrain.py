@@ -88,7 +88,7 @@ def test_speed_per_cell():
     # Linear in the position, as the values at cells and in the middle of four are.
     between = np.clip(middle - 14, 1, 2)
     np.testing.assert_allclose(ground.per_face(speed), between)
-    solver = heat_igl.HeatMethodSolver.from_operators(heat_igl.speed_operators(ground.mesh, ground.per_face(speed)))
+    solver = heat_igl.HeatMethodSolver(heat_igl.speed_operators(ground.mesh, ground.per_face(speed)))
     assert solver.n_vertices == ground.mesh.n_vertices
 
 

@@ -41,9 +41,7 @@ from heat_igl.validation.plots import error_figure
 def with_changed_operators(**changes: Callable[[Operators], Any]) -> Callable[[Mesh], HeatMethodSolver]:
     def prepare(mesh: Mesh) -> HeatMethodSolver:
         good = operators(mesh, "intrinsic-delaunay")
-        return HeatMethodSolver.from_operators(
-            dataclasses.replace(good, **{name: change(good) for name, change in changes.items()})
-        )
+        return HeatMethodSolver(dataclasses.replace(good, **{name: change(good) for name, change in changes.items()}))
 
     return prepare
 

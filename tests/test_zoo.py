@@ -164,7 +164,7 @@ def test_a_wrong_answer_is_raised_to_straight_lines_or_warns() -> None:
         assert np.mean(smooth.distance(210) < 0.9 * lines) > 0.2
     # Nothing is known about lines without positions.
     with pytest.warns(AccuracyWarning, match=r"off by 2\d\.\d % on average"):
-        unchecked = HeatMethodSolver.from_operators(solver.operators).solve(210)
+        unchecked = HeatMethodSolver(solver.operators).solve(210)
     assert unchecked.diagnostics.check is not None
     assert np.isnan(unchecked.diagnostics.check.shortfall)
     assert np.mean(unchecked.distance < 0.9 * lines) > 0.2

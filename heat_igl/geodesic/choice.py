@@ -65,9 +65,6 @@ class SolverChoice:
 
     def on(self, mesh: MeshLike | Operators, region: ArrayLike | None = None) -> Solver:
         """The solver on a mesh, or on operators."""
-        if self.method == "heat" and isinstance(mesh, Operators):
-            options = {name: getattr(self.heat, name) for name in _OPTIONS_OF_HEAT if name != "laplacian"}
-            return HeatMethodSolver.from_operators(mesh, **options)
         if self.method == "heat":
             return HeatMethodSolver.from_options(mesh, self.heat, region)
         return GeodesicSolver(mesh, method=self.method, tolerance=self.tolerance, region=region)

@@ -6,7 +6,6 @@ import time
 from dataclasses import replace
 from typing import TypeVar
 
-from heat_igl.errors import shown
 from heat_igl.heat_method.batches import BatchedSolver
 from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
@@ -32,32 +31,11 @@ class PreparedSolver(BatchedSolver):
 
     @classmethod
     def from_options(
-        cls: type[Solver], mesh: MeshLike, options: SolverOptions, region: ArrayLike | None = None
+        cls: type[Solver], mesh: MeshLike | Operators, options: SolverOptions, region: ArrayLike | None = None
     ) -> Solver:
         """A solver on `mesh` with options that were put together before."""
         solver = cls.__new__(cls)
-        solver._set_up(as_mesh(mesh), options, region)
-        return solver
-
-    @classmethod
-    def from_operators(
-        cls: type[Solver],
-        domain: Operators,
-        *,
-        t_coef: float | None = None,
-        t: float | None = None,
-        boundary: Boundary = "neumann",
-        magnitude: Magnitude = "auto",
-        backend: Backend = "auto",
-    ) -> Solver:
-        """A solver on any domain that has operators; parameters as for the class."""
-        if not isinstance(domain, Operators):
-            raise TypeError(
-                f"domain must be Operators, as metric_operators returns them, not {shown(domain)}: "
-                "HeatMethodSolver(mesh) takes meshes"
-            )
-        solver = cls.__new__(cls)
-        solver._set_up(domain, SolverOptions(t_coef, t, "auto", boundary, magnitude, backend))
+        solver._set_up(mesh if isinstance(mesh, Operators) else as_mesh(mesh), options, region)
         return solver
 
     @classmethod
@@ -129,9 +107,7 @@ class PreparedSolver(BatchedSolver):
         if self._mesh is None:
             fans = self.operators.fans
             if fans is None:
-                raise ValueError(
-                    "this solver was made from operators and has no vertices to move: use from_operators again"
-                )
+                raise ValueError("this solver was made from operators and has no vertices to move: make it again")
             positions = fans.polygons.triangles.with_vertices(V).V
             return self._of(prepare_polygons(PolygonMesh(positions, fans.polygons.polygons), self._parts.options))
         moved = self._mesh.with_vertices(V)

@@ -54,7 +54,7 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
     Returns
     -------
     Operators
-        For `HeatMethodSolver.from_operators`; all lengths are those of the metric.
+        For `GeodesicSolver` and `HeatMethodSolver`; all lengths are those of the metric.
 
         Triangles: where faces see their common edges at the same length, within 10 %, they are an intrinsic
         triangulation with these lengths (the mean of both). Edges are flipped, and every method works. If lengths are

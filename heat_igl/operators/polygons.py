@@ -23,7 +23,7 @@ _NEGATIVE = 0.03
 
 
 def polygon_operators(mesh: MeshLike) -> Operators:
-    """The operators of a polygon mesh, for `HeatMethodSolver.from_operators`.
+    """The operators of a polygon mesh, for `HeatMethodSolver`.
 
     Each polygon gets a virtual vertex, the affine combination of its corners with the least sum of squared areas of the
     triangles between it and the rim. P, which gives it that combination of the values at the corners, takes the usual
@@ -58,7 +58,7 @@ def polygon_operators(mesh: MeshLike) -> Operators:
     >>> from heat_igl import HeatMethodSolver, PolygonMesh, polygon_operators
     >>> hexagon = [[np.cos(a), np.sin(a), 0.0] for a in np.arange(6) * np.pi / 3]
     >>> mesh = PolygonMesh([*hexagon, [1.75, 3**0.5 / 2, 0]], [[0, 1, 2, 3, 4, 5], [0, 6, 1]])
-    >>> distance = HeatMethodSolver.from_operators(polygon_operators(mesh)).distance(3)
+    >>> distance = HeatMethodSolver(polygon_operators(mesh)).distance(3)
     >>> int(distance.argmax())
     6
     """
