@@ -131,7 +131,7 @@ class SweepEngine(Engine):
         distance[sources.vertices] = np.minimum(distance[sources.vertices], sources.vertex_offset)
         self._bounds.shorten(distance, labels)
         self._bounds.lengthen(distance, sources, points)
-        _warn_if_moved(swept, distance)
+        _warn_if_moved(swept, distance, self._triangles.mean_edge_length)
         if self._originals is not None:
             distance, labels = distance[self._originals], labels[self._originals]
         return distance, labels
@@ -217,11 +217,11 @@ class SweepEngine(Engine):
         return groups
 
 
-def _warn_if_moved(swept: FloatArray, distance: FloatArray) -> None:
-    """Warn if bounds moved an answer (n,) by more than a sweep is wrong by."""
+def _warn_if_moved(swept: FloatArray, distance: FloatArray, h: float) -> None:
+    """Warn if bounds moved an answer (n,) by more than a sweep is wrong by, and than the mean edge length h."""
     with np.errstate(invalid="ignore"):  # no distance at all is no difference
         moved = np.abs(swept - distance)
-    is_moved = ~(moved <= _MOVED * largest_finite(distance)) & np.isfinite(distance)
+    is_moved = ~(moved <= max(_MOVED * largest_finite(distance), h)) & np.isfinite(distance)
     if is_moved.any():
         at = int(np.argmax(is_moved))
         warn_caller(
