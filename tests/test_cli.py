@@ -357,7 +357,7 @@ def test_tetrahedra_go_to_vtu_only(tmp_path: Path, capsys: pytest.CaptureFixture
     assert_one_line(capsys.readouterr().err, "tetrahedra with distances go to .vtu, .npy or .csv files")
     assert cli.run(["distance", str(box), "--source", "0", "--output", str(tmp_path / "out.vtu")]) == 0
     distance = io.read_attributes(tmp_path / "out.vtu")["distance"]
-    np.testing.assert_array_equal(distance, heat_igl.HeatMethodSolver(shapes.box(2)).distance(0))
+    np.testing.assert_array_equal(distance, heat_igl.GeodesicSolver(shapes.box(2)).distance(0))
     # Straight lines have no time step; an option of heat asks for heat.
     assert "time step" not in capsys.readouterr().out
     assert cli.run(["distance", str(box), "--source", "0", "--t-coef", "1"]) == 0
@@ -452,7 +452,7 @@ def test_json_holds_what_the_lines_say(sphere: Path, capsys: pytest.CaptureFixtu
     assert np.array_equal(np.load(sphere.with_name("d.npy")), distance)
     assert found["mesh"] == {"path": str(sphere), "n_vertices": 162, "n_triangles": 320}
     assert found["farthest"] == {"distance": distance.max(), "vertex": distance.argmax()}
-    assert (found["method"], found["mean"]) == ("heat", distance.mean())
+    assert (found["plan"]["engine"], found["mean"]) == ("heat", distance.mean())
     assert found["wrote"] == [str(sphere.with_name("d.npy"))]
     assert found["seconds"]["per_distance"] > 0
     file = sphere.with_name("d.json")

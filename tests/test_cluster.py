@@ -36,7 +36,7 @@ def client():
     """Two workers, as threads of this process: real ones are started where processes have to die."""
     distributed = pytest.importorskip("distributed")
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as local,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0") as local,
         distributed.Client(local) as connected,
     ):
         yield connected

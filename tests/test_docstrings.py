@@ -17,7 +17,11 @@ NEEDS = {
     "BatchError": "distributed",
     "cluster": "distributed",
     "plots": "matplotlib",
+    "read_distances": "zarr",
     "read_distances_within": "zarr",
+    "to_open3d": "open3d",
+    "to_pyvista": "pyvista",
+    "to_trimesh": "trimesh",
     "write_distances_within": "zarr",
 }
 PARSER = doctest.DocTestParser()

@@ -36,6 +36,14 @@ def to_trimesh(mesh: MeshLike, **attributes: ArrayLike) -> Any:
         If values have neither n nor m rows.
     ImportError
         If trimesh is not installed; no extra of this package installs it.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.icosphere(2)
+    >>> surface = heat_igl.to_trimesh(mesh, distance=heat_igl.geodesic_distance(mesh, 0))
+    >>> surface.vertex_attributes["distance"].shape
+    (162,)
     """
     triangles = _triangles(mesh)
     import trimesh  # type: ignore[import-not-found]
@@ -50,6 +58,14 @@ def to_pyvista(mesh: MeshLike, **attributes: ArrayLike) -> Any:
     """A mesh of triangles as a ``pyvista.PolyData``, values as ``point_data`` or ``cell_data``.
 
     Parameters, result and errors are those of `to_trimesh`, for pyvista.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.icosphere(2)
+    >>> surface = heat_igl.to_pyvista(mesh, distance=heat_igl.geodesic_distance(mesh, 0))
+    >>> surface.point_data["distance"].shape
+    (162,)
     """
     triangles = _triangles(mesh)
     import pyvista  # type: ignore[import-not-found]
@@ -66,6 +82,14 @@ def to_open3d(mesh: MeshLike, **attributes: ArrayLike) -> Any:
 
     Parameters, result and errors are those of `to_trimesh`, for open3d; the older mesh of open3d, which has no
     attributes, is ``to_open3d(mesh).to_legacy()``. In open3d, values have two dimensions: (n,) becomes (n, 1).
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.icosphere(2)
+    >>> surface = heat_igl.to_open3d(mesh, distance=heat_igl.geodesic_distance(mesh, 0))
+    >>> surface.vertex["distance"].shape
+    SizeVector[162, 1]
     """
     triangles = _triangles(mesh)
     import open3d  # type: ignore[import-not-found]

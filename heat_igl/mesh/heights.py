@@ -91,6 +91,14 @@ def terrain(heights: ArrayLike, spacing: float | Sequence[float] = 1.0, nodata: 
     no triangle is made are reached from nowhere. Distance on this surface differs from that on the ground by the error
     of the interpolation, of second order in the spacing; a graph of eight neighbours is up to 8 % too long at every
     spacing.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> ground = heat_igl.terrain([[0.0, 3.0, 6.0], [0.0, 3.0, 6.0]], spacing=4.0)
+    >>> phi = heat_igl.geodesic_distance(ground, ground.index[0, 0])
+    >>> ground.image(phi)[0].round(6).tolist()
+    [0.0, 5.0, 10.0]
     """
     z, has_ground = _checked_heights(heights, nodata)
     down, across = checked_spacing(spacing, 2)
