@@ -22,7 +22,7 @@ def irregular(kind: str) -> Mesh:
         "handle": shapes.torus(12, 30),
         "tetrahedra": shapes.box(4),
     }[kind]
-    mesh = perturbed(start, 0.25)
+    mesh = perturbed(start, 0.2)
     return mesh if kind == "tetrahedra" else Mesh(mesh.V * [1.0, 0.7, 0.4], mesh.F)
 
 

@@ -344,5 +344,6 @@ def test_every_face_twice(cow):
     once = heat_error(cow, sources, truth)
     assert once < 0.03
     assert heat_error(twice, sources, truth) == once
-    assert heat_error(plain, sources, truth) > 3 * once
+    # With a time step that is asked for, heat is not compared with windows, which multiply where all edges branch.
+    assert heat_error(plain, sources, truth, t_coef=0.5) > 3 * once
     assert heat_error(plain, sources, truth, magnitude="unit") > 0.1

@@ -63,7 +63,7 @@ def isolines(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> list[list[
     >>> (curve,), none = heat_igl.isolines(mesh, mesh.V[:, 0], [0.25, 2.0])  # of the coordinate x
     >>> round(curve.length, 6), none
     (1.0, [])
-    >>> [curve.points[0, 0].round(6) for (curve,) in heat_igl.isolines(mesh, mesh.V[:, 0], 3)]
+    >>> [float(curve.points[0, 0].round(6)) for (curve,) in heat_igl.isolines(mesh, mesh.V[:, 0], 3)]
     [0.25, 0.5, 0.75]
     """
     mesh = as_simplices(mesh)

@@ -90,8 +90,8 @@ def shorten(
     """Lower `d` (n,) to the paths along edges, in place; `labels` (n,), or none at all, are handed on with it.
 
     The pairs (e, 2) of `ends` are edges of those lengths (e,); ``incident[first[v] : first[v + 1]]`` are the edges of
-    vertex v. One pass over all edges, and then only over those of vertices that were lowered. Nothing is done on an
-    edge on which the distance is too long by less than a `share` of the length.
+    vertex v. One pass over all edges, and then only over those of vertices that were lowered. With a `share`, edges are
+    taken as longer by it: whatever the order of the edges, the result is the same.
     """
     n: cython.Py_ssize_t = d.shape[0]
     # A ring: no vertex waits twice, so n places suffice.
@@ -142,7 +142,7 @@ def _lowered(
     far: cython.int = _far_end(ends, length, d, e, share)
     if far >= 0:
         near: cython.int = ends[e, 0] if ends[e, 1] == far else ends[e, 1]
-        d[far] = d[near] + length[e]
+        d[far] = d[near] + length[e] * (1 + share)
         if labels.shape[0] > 0:
             labels[far] = labels[near]
     return far

@@ -50,7 +50,7 @@ class Bounds:
     def shorten(self, distance: FloatArray, labels: IntArray | None = None, share: float = 0.0) -> None:
         """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them.
 
-        Where the path is longer than that by less than a `share` of the last edge, nothing is done.
+        With a `share`, edges are taken as longer by it.
         """
         if kernels.is_longer(*self._edges, distance, share):
             kernels.shorten(*self._edges, *self._incident, distance, _NO_LABELS if labels is None else labels, share)
