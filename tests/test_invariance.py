@@ -19,10 +19,10 @@ def irregular(kind: str) -> Mesh:
     start = {
         "closed": shapes.icosphere(3),
         "boundary": shapes.disk(10),
-        "handle": shapes.torus(12, 30),
+        "handle": shapes.torus(16, 40),
         "tetrahedra": shapes.box(4),
     }[kind]
-    mesh = perturbed(start, 0.2)
+    mesh = perturbed(start, 0.25)
     return mesh if kind == "tetrahedra" else Mesh(mesh.V * [1.0, 0.7, 0.4], mesh.F)
 
 
