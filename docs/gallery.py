@@ -146,7 +146,7 @@ def grown() -> Picture:
     sites = np.random.default_rng(2).choice(mesh.n_vertices, 25, replace=False)
     region = heat_igl.HeatMethodSolver(mesh).distance(sites) < 0.07
     phi = heat_igl.SignedHeatSolver(mesh).distance(region)
-    outline = heat_igl.isolines(mesh, phi, 0)[0]
+    outline = heat_igl.isolines(mesh, phi, [0])[0]
     return plot_field(mesh, phi, label="signed distance", spacing=0.03, limits=(-0.12, 0.12), curves=outline)
 
 
@@ -184,7 +184,7 @@ def tool_path() -> Picture:
 def pieces() -> Picture:
     """A surface cut along a curve and two offsets of it, the pieces moved apart."""
     mesh, axis = shapes.blob(5), np.array([0.2, 1, 0.3])
-    phi = heat_igl.SignedHeatSolver(mesh).distance(heat_igl.isolines(mesh, mesh.V @ axis, 0))
+    phi = heat_igl.SignedHeatSolver(mesh).distance(heat_igl.isolines(mesh, mesh.V @ axis, [0]))
     found = heat_igl.cut(mesh, heat_igl.isolines(mesh, phi, [-0.4, 0, 0.4]))
     carried, parts = found.carry(phi), found.split()
     moved = [part.mesh.V + 2 * carried[part.vertices].mean() * axis for part in parts]

@@ -55,7 +55,13 @@ def test_coming_from_another_library(block: str) -> None:
 
 # Pages with tests of their own, and what single blocks of the others need.
 TESTED_APART = ("quickstart.md", "coming_from.md", "tasks.md")
-NEEDS = {"plot(": "matplotlib", "heat_igl.applications.torch": "torch", "cluster.": "distributed", "xarray": "xarray"}
+NEEDS = {
+    "plot(": "matplotlib",
+    "heat_igl.applications.torch": "torch",
+    "cluster.": "distributed",
+    "xarray": "xarray",
+    "to_pyvista": "pyvista",
+}
 ELSEWHERE = ("SLURMCluster",)  # runs on such a machine only
 
 
