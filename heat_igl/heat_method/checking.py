@@ -37,8 +37,8 @@ _VERY_FEW_SOURCES = 4
 # (on 92 without the comparison), and by less than 2 % with one on 6; with 3 % on 11, with 4.5 % one was missed.
 _DIFFERENT = 0.035
 _BY_SWEEP = Plan("sweep", None, "heat is compared with a sweep")
-# Differences along an edge are reduced to its length and this share of it. On scans few are larger, and it takes 2 to
-# 10 % of a query; without a share it takes up to 70 %.
+# Differences along an edge are reduced to its length where they are larger by this share of it. On scans few are, and
+# it takes 2 to 10 % of a query; without a share it takes up to 70 %.
 _STEEP = 0.04
 
 

@@ -90,12 +90,14 @@ def shorten(
     """Lower `d` (n,) to the paths along edges, in place; `labels` (n,), or none at all, are handed on with it.
 
     The pairs (e, 2) of `ends` are edges of those lengths (e,); ``incident[first[v] : first[v + 1]]`` are the edges of
-    vertex v. One pass over all edges, and then only over those of vertices that were lowered. With a `share`, edges are
-    taken as longer by it: whatever the order of the edges, the result is the same.
+    vertex v. One pass over all edges, and then only over those of vertices that were lowered. With a `share`, the pass
+    leaves edges alone on which the given distances are too long by less than that share of the length; whatever the
+    order of the edges, the result is the same.
     """
     n: cython.Py_ssize_t = d.shape[0]
     # A ring: no vertex waits twice, so n places suffice.
     waiting: cython.int[::1] = np.empty(n, np.int32)
+    given: cython.const[cython.double][::1] = np.array(d) if share > 0 else d
     is_waiting: cython.uchar[::1] = np.zeros(n, np.uint8)
     begin: cython.Py_ssize_t = 0
     count: cython.Py_ssize_t = 0
@@ -106,8 +108,8 @@ def shorten(
     with cython.nogil:
         for e in range(length.shape[0]):
             # Nearly always false, and so cheaper than to ask which end is nearer.
-            if fabs(d[ends[e, 0]] - d[ends[e, 1]]) > length[e] * (1 + share):
-                lowered = _lowered(ends, length, d, labels, e, share)
+            if fabs(given[ends[e, 0]] - given[ends[e, 1]]) > length[e] * (1 + share):
+                lowered = _lowered(ends, length, d, labels, e)
                 if lowered >= 0 and not is_waiting[lowered]:
                     is_waiting[lowered] = True
                     waiting[count] = lowered
@@ -118,7 +120,7 @@ def shorten(
             begin = begin + 1 if begin + 1 < n else 0
             count -= 1
             for k in range(first[v], first[v + 1]):
-                lowered = _lowered(ends, length, d, labels, incident[k], share)
+                lowered = _lowered(ends, length, d, labels, incident[k])
                 if lowered >= 0 and not is_waiting[lowered]:
                     is_waiting[lowered] = True
                     end = begin + count
@@ -136,13 +138,12 @@ def _lowered(
     d: cython.double[::1],
     labels: cython.longlong[::1],
     e: cython.Py_ssize_t,
-    share: cython.double,
 ) -> cython.int:
     """The end of edge e whose distance was lowered to the path along it; -1 if that is not shorter."""
-    far: cython.int = _far_end(ends, length, d, e, share)
+    far: cython.int = _far_end(ends, length, d, e, 0.0)
     if far >= 0:
         near: cython.int = ends[e, 0] if ends[e, 1] == far else ends[e, 1]
-        d[far] = d[near] + length[e] * (1 + share)
+        d[far] = d[near] + length[e]
         if labels.shape[0] > 0:
             labels[far] = labels[near]
     return far

@@ -50,7 +50,7 @@ class Bounds:
     def shorten(self, distance: FloatArray, labels: IntArray | None = None, share: float = 0.0) -> None:
         """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them.
 
-        With a `share`, edges are taken as longer by it.
+        With a `share`, only from edges on which they are too long by more than that share of the length.
         """
         if kernels.is_longer(*self._edges, distance, share):
             kernels.shorten(*self._edges, *self._incident, distance, _NO_LABELS if labels is None else labels, share)
