@@ -33,6 +33,8 @@ def shared_path(name: str) -> Path:
     path = SHARED / name
     if not path.exists():
         pytest.skip(f"{name} is not at hand")
+    if path.suffix == ".mesh":
+        pytest.importorskip("meshio")
     return path
 
 
