@@ -361,12 +361,16 @@ def test_the_distance_in_the_page_is_exact_where_it_is_flat(browser: Browser) ->
 
 
 @pytest.mark.parametrize("name", ["voxel blob", "sphere with slivers", "dust"])
-def test_bad_meshes_agree_with_python_too(browser: Browser, name: str) -> None:
+def test_bad_meshes_are_measured_too(browser: Browser, name: str) -> None:
     """More than two faces at an edge, slivers, pieces."""
     mesh = zoo(name)
     browser.open(page(mesh, np.zeros(mesh.n_vertices)))
     browser.run("window.heatIgl.setSources([7])")
-    assert_agree(browser.distance(), heat_igl.GeodesicSolver(mesh, method="sweep").distance(7))
+    exact = heat_igl.GeodesicSolver(mesh, tolerance=0).distance(7)
+    found = browser.distance()
+    np.testing.assert_array_equal(np.isfinite(found), np.isfinite(exact))
+    away = np.isfinite(exact) & (exact > 0)
+    assert np.abs(found[away] / exact[away] - 1).mean() < 0.02
 
 
 def test_what_is_behind_is_not_picked(browser: Browser) -> None:
