@@ -4,7 +4,7 @@
 
 Prints a Markdown table of the mean of |d - exact| / exact over vertices and sources, in percent, its geometric mean
 over the meshes, and that relative to potpourri3d's default, in the mean and at worst. The defaults of
-`HeatMethodSolver` are chosen by this table; docs/heat_path.md shows it. Needs the extras ``validate`` and ``bench``. A
+`HeatMethodSolver` are chosen by this table; docs/engines.md shows it. Needs the extras ``validate`` and ``bench``. A
 mesh of 5000 vertices takes about a second.
 """
 
