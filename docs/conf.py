@@ -45,7 +45,7 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_extra_path = ["_parts/pages"]  # interactive pages, copied unchanged
 templates_path = ["_templates"]
-exclude_patterns = ["_build", "_parts"]
+exclude_patterns = ["jupyter_execute", "_build", "_parts"]
 nitpicky = False
 default_role = "py:obj"  # for names between single backticks in docstrings
 
