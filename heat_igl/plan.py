@@ -114,8 +114,9 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
         if method in ("windows", "exact"):
             what = "the mesh holds tetrahedra" if kind == "tetrahedra" else "those of this metric do not fit together"
             raise MeshError(f"method={method!r} needs triangles that fit together, and {what}: take method='auto'")
-        follows = "straight lines and the edges that they bend around" if kind == "tetrahedra" else "each simplex"
-        return Plan("fronts", None, f"{kind} are passed by fronts, which follow {follows}")
+        return Plan(
+            "fronts", None, f"{kind} are passed by fronts, and where the metric varies by a scheme that converges"
+        )
     if method == "sweep":
         return Plan("sweep", None, "a sweep was asked for")
     if method == "auto" and kind == "points":

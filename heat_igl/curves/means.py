@@ -68,7 +68,7 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
 
     Notes
     -----
-    The search starts at the best vertex, by a near-exact distance query for each point, and on rough surfaces at the
+    The search starts at the best vertex, by a distance query for each point, and on rough surfaces at the
     three best. There, the place that is found may still be only locally best. Each step goes along the mean of the log
     maps v_i of the points, weighted by w_i d_i^(p - 2): the Karcher iteration for p = 2 (Karcher 1977) and Weiszfeld's
     for p = 1. The step is halved until the sum falls, so the sum falls in every step. A median can be one of the
