@@ -44,7 +44,7 @@ DIRECTIVES = {
     "show_performance_hints": not CHECKED,
 }
 # Kernels of long loops over numbers, for which vectors pay. Only here may sums be taken in any order, products fused.
-WIDE = ("multifrontal", "substitution")
+WIDE = ("linear/multifrontal", "linear/substitution")
 VECTORS = {"avx2": "-mavx2 -mfma", "avx512": "-mavx512f -mavx512dq -mavx512vl -mfma -mprefer-vector-width=512"}
 VECTORS_MSVC = {"avx2": "/arch:AVX2", "avx512": "/arch:AVX512"}
 # The same bits on every processor: no fused multiplications. Square roots set no errno, so they are one instruction.
@@ -67,15 +67,30 @@ def extensions() -> list[Extension]:
     processor = platform.machine().lower()
     vectors = list(VECTORS) if processor in ("x86_64", "amd64") else []
     found = [Extension(_module(SHARED), [])]
-    for path in sorted(KERNELS.glob("*.py")):
-        if path.stem != "__init__":
-            names = [path.stem, *(f"{path.stem}_{one}" for one in vectors if path.stem in WIDE)]
-            found += [Extension(_module(name), [path.as_posix()]) for name in names]
+    for path in _sources():
+        if path.suffix == ".py" and path.stem != "__init__":
+            name = _name(path)
+            names = [name, *(f"{name}_{one}" for one in vectors if name in WIDE)]
+            found += [Extension(_module(each), [path.as_posix()]) for each in names]
     return found
 
 
+def _sources() -> list[Path]:
+    """Every kernel and what it declares to others, and the packages that they are in."""
+    return sorted(path for path in KERNELS.rglob("*.p*") if path.suffix in (".py", ".pxd"))
+
+
+def _name(path: Path) -> str:
+    """A kernel's folder and name, as "linear/substitution"."""
+    return path.relative_to(KERNELS).with_suffix("").as_posix()
+
+
 def _module(name: str) -> str:
-    return f"{'.'.join(KERNELS.parts)}.{name}"
+    return ".".join([*KERNELS.parts, *name.split("/")])
+
+
+def _of_module(module: str) -> str:
+    return "/".join(module.split(".")[len(KERNELS.parts) :])
 
 
 class BuildKernels(build_ext):
@@ -94,8 +109,8 @@ class BuildKernels(build_ext):
             os.environ["CC"] = zig
             os.environ["LDSHARED"] = f"{zig} -shared"
         sources = {
-            path.name: source_hash(path.read_bytes()).hex()
-            for path in sorted(KERNELS.glob("*.p*"))
+            path.relative_to(KERNELS).as_posix(): source_hash(path.read_bytes()).hex()
+            for path in _sources()
             if path.stem != "__init__"
         }
         super().run()
@@ -108,12 +123,12 @@ class BuildKernels(build_ext):
         self.parallel = self.parallel or os.cpu_count() or 1
         _forget_other_options()
         _copy_sources()
-        _translate([extension.name.rpartition(".")[2] for extension in self.extensions], self.parallel)
+        _translate([_of_module(extension.name) for extension in self.extensions], self.parallel)
         super().build_extensions()
 
     def build_extension(self, extension: Extension) -> None:
         """Compile one kernel."""
-        name = extension.name.rpartition(".")[2]
+        name = _of_module(extension.name)
         extension.sources = [(C_FILES / f"{name}.c").as_posix()]
         kernel, _, vectors = name.partition("_")
         if self.compiler.compiler_type == "msvc":
@@ -136,15 +151,16 @@ def _forget_other_options() -> None:
 
 def _copies() -> Iterator[tuple[Path, Path]]:
     """Each source of a kernel, and a copy of it for each module that is made of it."""
-    for path in (KERNELS.parent / "__init__.py", *sorted(KERNELS.glob("*.p*"))):
-        suffixes = ["", *(f"_{name}" for name in VECTORS if path.stem in WIDE)]
+    for path in (KERNELS.parent / "__init__.py", *_sources()):
+        is_wide = KERNELS in path.parents and _name(path) in WIDE
+        suffixes = ["", *(f"_{name}" for name in VECTORS if is_wide)]
         for suffix in suffixes:
             yield path, COPIES / path.with_stem(path.stem + suffix)
 
 
 def _copy_sources() -> None:
-    (COPIES / KERNELS).mkdir(parents=True, exist_ok=True)
     for path, copy in _copies():
+        copy.parent.mkdir(parents=True, exist_ok=True)
         text = path.read_text(encoding="utf8")
         if CHECKED:
             # What a function raises that is declared to raise nothing would be printed and forgotten.
@@ -160,8 +176,8 @@ def _read_by(source: Path) -> set[Path]:
         path = waiting.pop()
         if path.exists():
             found.add(path)
-            names = re.findall(r"heat_igl\.kernels\.(\w+)", path.read_text(encoding="utf8"))
-            declared = {source.with_name(f"{name}.pxd") for name in names}
+            modules = re.findall(r"heat_igl\.kernels\.[\w.]+", path.read_text(encoding="utf8"))
+            declared = {COPIES / KERNELS / f"{_of_module(module)}.pxd" for module in modules}
             waiting += declared - found
             found |= {one for one in declared if one.exists()}
     return found
@@ -195,7 +211,9 @@ def _translate(names: list[str], n_processes: int) -> None:
         if process.returncode:
             raise CompileError(f"heat_igl: Cython cannot translate the kernels:\n{text}")
     for name in stale:
-        (COPIES / KERNELS / f"{name}.c").replace(C_FILES / f"{name}.c")
+        into = C_FILES / f"{name}.c"
+        into.parent.mkdir(parents=True, exist_ok=True)
+        (COPIES / KERNELS / f"{name}.c").replace(into)
 
 
 def _is_current(name: str) -> bool:

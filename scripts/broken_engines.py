@@ -22,7 +22,7 @@ import numpy as np
 
 import heat_igl
 from heat_igl.errors import AccuracyWarning
-from heat_igl.kernels import sweeping
+from heat_igl.kernels.sweep import sweeping
 from heat_igl.sources import source_set
 from heat_igl.steps import PoissonProblem
 from heat_igl.typing import FloatArray

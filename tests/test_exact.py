@@ -32,7 +32,7 @@ from surfaces import (
 from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
-from heat_igl.kernels import flipping, gluing
+from heat_igl.kernels.mesh import flipping, gluing
 from heat_igl.reference.steiner import graph_distance
 from heat_igl.unfolding.exact import ExactSurface, exact_distance
 from heat_igl.unfolding.half_edges import from_mesh

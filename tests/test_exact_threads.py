@@ -11,7 +11,7 @@ from surfaces import bent_pages, moebius_strip, two_arms
 
 from heat_igl import Mesh, SurfacePoints, isolines, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
-from heat_igl.kernels import windows
+from heat_igl.kernels.windows import windows
 from heat_igl.sources import source_set
 from heat_igl.unfolding import window_search
 from heat_igl.unfolding.exact import ExactSurface

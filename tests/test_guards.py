@@ -13,7 +13,7 @@ import pytest
 import heat_igl
 from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, Mesh, SurfacePoints, shapes
 from heat_igl.heat_method.checking import Comparisons
-from heat_igl.kernels import sweeping
+from heat_igl.kernels.sweep import sweeping
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.steps import PoissonProblem
 from heat_igl.typing import FloatArray

@@ -19,7 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from heat_igl import kernels, shapes
-from heat_igl.kernels import relaxation
+from heat_igl.kernels.linear import relaxation
 from heat_igl.kernels.ordering import ascending
 from heat_igl.linear import factorize, multifrontal, substitution
 from heat_igl.linear.dissection import dissect
@@ -77,7 +77,7 @@ def test_every_build_solves_alike(monkeypatch):
     A = (domain.M - domain.mean_edge_length**2 * domain.L).tocsc()
     b = np.random.default_rng(0).standard_normal((A.shape[0], 9))
     solutions = []
-    pairs = zip(kernels.builds("multifrontal"), kernels.builds("substitution"), strict=True)
+    pairs = zip(kernels.builds("linear.multifrontal"), kernels.builds("linear.substitution"), strict=True)
     for of_factor, of_solve in pairs:
         monkeypatch.setattr(multifrontal, "_kernel", import_module(of_factor))
         monkeypatch.setattr(substitution, "_kernel", import_module(of_solve))
@@ -85,7 +85,7 @@ def test_every_build_solves_alike(monkeypatch):
         assert (one == again).all()
         np.testing.assert_allclose(A @ one, b, rtol=0, atol=1e-13)
         solutions.append(one)
-    assert kernels.builds("multifrontal")[-1] == "heat_igl.kernels.multifrontal"
+    assert kernels.builds("linear.multifrontal")[-1] == "heat_igl.kernels.linear.multifrontal"
     for other in solutions[1:]:
         np.testing.assert_allclose(other, solutions[0], rtol=0, atol=1e-12 * np.abs(solutions[0]).max())
 

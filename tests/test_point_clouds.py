@@ -23,8 +23,8 @@ from heat_igl import (
 from heat_igl.drawing.discs import discs
 from heat_igl.geodesic import SolverChoice
 from heat_igl.io import ply
-from heat_igl.kernels.local_delaunay import delaunay_stars
-from heat_igl.kernels.local_planes import principal_axes
+from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
+from heat_igl.kernels.cloud.local_planes import principal_axes
 from heat_igl.mesh.cloud_fans import with_fans_joined
 from heat_igl.mesh.cloud_gaps import pinched_vertices, with_one_fan
 from heat_igl.mesh.cloud_loops import with_loops_filled

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heat_igl.kernels.local_planes import principal_axes
-from heat_igl.kernels.quadrics import onto_quadrics
+from heat_igl.kernels.cloud.local_planes import principal_axes
+from heat_igl.kernels.cloud.quadrics import onto_quadrics
 from heat_igl.mesh.neighbourhoods import point_tree
 
 rng = np.random.default_rng

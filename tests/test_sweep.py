@@ -8,7 +8,7 @@ from conftest import perturbed, pygeodesic_distance, relative_error
 from surfaces import COORDINATES, moebius_strip, random_disk, sheared, with_point
 
 from heat_igl import GeodesicSolver, Mesh, OffsetSources, SurfacePoints, shapes
-from heat_igl.kernels import sweeping
+from heat_igl.kernels.sweep import sweeping
 from heat_igl.sources import source_set
 from heat_igl.unfolding import MeshTriangles, SweepEngine
 

@@ -9,7 +9,7 @@ import numpy as np
 from heat_igl.curves.shortening import Course
 from heat_igl.curves.tracing import Surface, opposite_sides
 from heat_igl.errors import SourceError
-from heat_igl.kernels import routes
+from heat_igl.kernels.paths import routes
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 

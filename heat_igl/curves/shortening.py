@@ -11,7 +11,8 @@ from heat_igl.curves.places import snapped
 from heat_igl.curves.tracing import Surface, opposite_sides, surface
 from heat_igl.curves.words import crossing_letters
 from heat_igl.errors import SourceError
-from heat_igl.kernels import polar_angles, shortening
+from heat_igl.kernels.mesh import polar_angles
+from heat_igl.kernels.paths import shortening
 from heat_igl.mesh import Mesh, SurfaceCurve
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import AnyArray, FloatArray, IntArray

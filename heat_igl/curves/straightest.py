@@ -9,7 +9,7 @@ import numpy as np
 
 from heat_igl.errors import SourceError, real_numbers, shown
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
-from heat_igl.kernels import straightest
+from heat_igl.kernels.paths import straightest
 from heat_igl.mesh import ON_SIDE, Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, ordered_vertices

@@ -14,7 +14,7 @@ import igl
 import numpy as np
 
 from heat_igl.intrinsic import corner_angles
-from heat_igl.kernels import tracing
+from heat_igl.kernels.paths import tracing
 from heat_igl.mesh import Mesh
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray

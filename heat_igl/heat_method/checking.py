@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels import checking
+from heat_igl.kernels.mesh import checking
 from heat_igl.operators import Operators, Surface
 from heat_igl.plan import Plan, sweep_plan
 from heat_igl.sources import SourceSet

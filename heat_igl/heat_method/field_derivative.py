@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.heat_method.parts import SolverParts
-from heat_igl.kernels import heat_adjoint as kernels
-from heat_igl.kernels import heat_tangent as tangent
+from heat_igl.kernels.heat import heat_adjoint as kernels
+from heat_igl.kernels.heat import heat_tangent as tangent
 from heat_igl.operators import ElementChange, Surface
 from heat_igl.runtime import LOWEST_HEAT
 from heat_igl.typing import BoolArray, FloatArray, IntArray

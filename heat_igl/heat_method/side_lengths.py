@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from heat_igl.kernels import side_derivatives as kernels
+from heat_igl.kernels.mesh import side_derivatives as kernels
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
 

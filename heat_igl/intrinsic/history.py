@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.intrinsic.layout import apex
-from heat_igl.kernels import carrying
+from heat_igl.kernels.mesh import carrying
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["Covered", "Flipped", "Merged", "Refined", "Turned"]
@@ -172,7 +172,7 @@ class Refined(NamedTuple):
     numbers : (k, 5) float64
         Barycentric coordinates of the new vertex, or the lengths of `Flipped`.
     first, following : (m,) int64, (k, 3) int64
-        Tables to find the next move that concerns a face, see `heat_igl.kernels.carrying`.
+        Tables to find the next move that concerns a face, see `heat_igl.kernels.mesh.carrying`.
     """
 
     kind: IntArray

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.kernels.gluing import has_needles
+from heat_igl.kernels.mesh.gluing import has_needles
 from heat_igl.mesh import connectivity
 from heat_igl.typing import FloatArray, IntArray
 

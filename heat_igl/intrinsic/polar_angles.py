@@ -15,7 +15,7 @@ from heat_igl.errors import MeshError
 from heat_igl.intrinsic.history import Flipped
 from heat_igl.intrinsic.layout import apex, corner_angles
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, sides_from
-from heat_igl.kernels.polar_angles import polar_angles as kernel
+from heat_igl.kernels.mesh.polar_angles import polar_angles as kernel
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["PolarAngles", "carried_angles", "polar_angles", "transport_angles"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from heat_igl.intrinsic.history import Refined
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
-from heat_igl.kernels import carrying, refinement
+from heat_igl.kernels.mesh import carrying, refinement
 from heat_igl.typing import FloatArray
 
 __all__ = ["delaunay_refinement"]

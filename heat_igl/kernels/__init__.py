@@ -21,8 +21,10 @@ def _require_extensions() -> None:
     source that it compiled; an installed package has no such list and needs none.
     """
     here = Path(__file__).parent
-    compiled = {path.name.partition(".")[0] for path in here.iterdir() if path.name.endswith(tuple(EXTENSION_SUFFIXES))}
-    missing = sorted({path.stem for path in here.glob("*.py")} - compiled - {"__init__"})
+    suffixes = tuple(EXTENSION_SUFFIXES)
+    compiled = {path.with_name(path.name.partition(".")[0]) for path in here.rglob("*") if path.name.endswith(suffixes)}
+    sources = {path.with_suffix("") for path in here.rglob("*.py") if path.stem != "__init__"}
+    missing = sorted(path.name for path in sources - compiled)
     if missing:
         raise ImportError(
             f"heat_igl is imported from {here.parent}, where {len(missing)} of its kernels are not compiled "
@@ -47,7 +49,7 @@ _require_extensions()
 
 
 def builds(name: str) -> list[str]:
-    """The modules that a kernel was compiled to and this processor can run, those with the widest vectors first."""
+    """The modules of a kernel, as "linear.substitution", that this processor can run, widest vectors first."""
     from heat_igl.kernels.processor import vectors
 
     modules = [f"heat_igl.kernels.{name}_{one}" if one else f"heat_igl.kernels.{name}" for one in vectors()]

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels import dissection, graphs
+from heat_igl.kernels.linear import dissection, graphs
 from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 
 __all__ = ["Dissection", "dissect"]

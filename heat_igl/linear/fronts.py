@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels import symbolic
+from heat_igl.kernels.linear import symbolic
 from heat_igl.linear.dissection import Dissection
 from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 

@@ -27,7 +27,7 @@ __all__ = ["MultifrontalAnalysis", "MultifrontalFactorization"]
 # A pivot that has shrunk to less than this share of the diagonal is rounding.
 _SINGULAR = 1e-13
 
-_kernel = import_module(builds("multifrontal")[0])
+_kernel = import_module(builds("linear.multifrontal")[0])
 
 
 class MultifrontalAnalysis:

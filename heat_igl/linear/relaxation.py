@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import FactorizationError
-from heat_igl.kernels.relaxation import relax
+from heat_igl.kernels.linear.relaxation import relax
 from heat_igl.linear.principal_submatrix import PrincipalSubmatrix
 from heat_igl.runtime import n_threads
 from heat_igl.typing import BoolArray, FloatArray

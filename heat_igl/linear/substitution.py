@@ -19,7 +19,7 @@ from heat_igl.typing import FloatArray
 
 __all__ = ["Substitution"]
 
-_kernel = import_module(builds("substitution")[0])
+_kernel = import_module(builds("linear.substitution")[0])
 
 
 class Substitution:

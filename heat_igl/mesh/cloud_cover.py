@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.kernels.incidence import components
+from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.cloud_gaps import pinched_vertices
 from heat_igl.mesh.cloud_orientation import neighbours_across_edges
 from heat_igl.mesh.mesh import Mesh

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels.fitting_triangles import fitting_triangles
-from heat_igl.kernels.incidence import components
+from heat_igl.kernels.cloud.fitting_triangles import fitting_triangles
+from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.connectivity import ascending_rows, connected_components, facets, unique_rows
 from heat_igl.mesh.grouping import group_by_label, next_in_run
 from heat_igl.mesh.neighbourhoods import Neighbourhoods

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.kernels.loop_filling import filling_triangles
+from heat_igl.kernels.cloud.loop_filling import filling_triangles
 from heat_igl.mesh.connectivity import connected_components, facets
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels.agreeing import orient
+from heat_igl.kernels.cloud.agreeing import orient
 from heat_igl.mesh.cloud_fans import with_fans_joined
 from heat_igl.mesh.cloud_gaps import pinched_vertices, with_one_fan
 from heat_igl.mesh.connectivity import facets

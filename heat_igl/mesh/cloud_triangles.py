@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.kernels.agreeing import agreement
-from heat_igl.kernels.fitting_triangles import fitting_triangles
-from heat_igl.kernels.local_delaunay import delaunay_stars
+from heat_igl.kernels.cloud.agreeing import agreement
+from heat_igl.kernels.cloud.fitting_triangles import fitting_triangles
+from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.mesh.cloud_fans import with_fans_joined
 from heat_igl.mesh.cloud_gaps import pinched_vertices, with_gaps_closed, with_one_fan
 from heat_igl.mesh.cloud_loops import with_loops_filled

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
-from heat_igl.kernels import incidence
+from heat_igl.kernels.mesh import incidence
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.typing import FloatArray, IntArray
 

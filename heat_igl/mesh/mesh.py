@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import AccuracyWarning, MeshError, refuse_masked
-from heat_igl.kernels import mesh_arrays
+from heat_igl.kernels.mesh import mesh_arrays
 from heat_igl.mesh import connectivity
 from heat_igl.mesh.quadrilaterals import first_quadrilateral
 from heat_igl.mesh.report import MeshReport, mesh_report

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heat_igl.kernels.local_planes import principal_axes, tangent_planes
-from heat_igl.kernels.quadrics import onto_quadrics
+from heat_igl.kernels.cloud.local_planes import principal_axes, tangent_planes
+from heat_igl.kernels.cloud.quadrics import onto_quadrics
 from heat_igl.mesh.sheets import axes_along, one_sheet
 from heat_igl.runtime import over_rows
 from heat_igl.typing import AnyArray, FloatArray, IntArray

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.kernels.empty_balls import on_one_side, roomiest_normals
-from heat_igl.kernels.local_planes import principal_axes, tangent_planes
+from heat_igl.kernels.cloud.empty_balls import on_one_side, roomiest_normals
+from heat_igl.kernels.cloud.local_planes import principal_axes, tangent_planes
 from heat_igl.runtime import over_rows
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels import heat_tangent as kernels
+from heat_igl.kernels.heat import heat_tangent as kernels
 from heat_igl.operators.matrices import Operators
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 

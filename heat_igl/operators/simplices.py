@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError
-from heat_igl.kernels import assembling
+from heat_igl.kernels.linear import assembling
 from heat_igl.mesh import Mesh
 from heat_igl.operators.elements import TriangleElements
 from heat_igl.operators.matrices import OnLaplacian, Operators, laplacian_of_gradient

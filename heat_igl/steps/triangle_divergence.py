@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels.divergence import divergence_of_descent
+from heat_igl.kernels.heat.divergence import divergence_of_descent
 from heat_igl.operators import TriangleElements
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 

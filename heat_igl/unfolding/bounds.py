@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation
-from heat_igl.kernels import bounds as kernels
+from heat_igl.kernels.mesh import bounds as kernels
 from heat_igl.operators import Surface
 from heat_igl.sources import SourcePoints, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray

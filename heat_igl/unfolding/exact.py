@@ -1,4 +1,4 @@
-"""Exact polyhedral distance by windows, from all kinds of sources; `heat_igl.kernels.windows` has the algorithm."""
+"""Exact polyhedral distance by windows, from all kinds of sources; the algorithm is in `heat_igl.kernels.windows`."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.intrinsic import intrinsic_triangulation
-from heat_igl.kernels import window_paths
+from heat_igl.kernels.windows import window_paths
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray

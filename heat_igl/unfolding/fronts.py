@@ -9,12 +9,12 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from heat_igl.kernels import bounds
-from heat_igl.kernels.bends import bend_around
-from heat_igl.kernels.bodies import Body
-from heat_igl.kernels.fronts import advance
-from heat_igl.kernels.hopf_lax import HopfLax
-from heat_igl.kernels.sight import look_around
+from heat_igl.kernels.bodies.bends import bend_around
+from heat_igl.kernels.bodies.bodies import Body
+from heat_igl.kernels.bodies.sight import look_around
+from heat_igl.kernels.mesh import bounds
+from heat_igl.kernels.sweep.fronts import advance
+from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.mesh import connectivity
 from heat_igl.operators import MetricSimplices
 from heat_igl.sources import SourceSet
@@ -47,7 +47,7 @@ class FrontSolver(Engine):
     than half a turn inside: once its ends know their distances, such an edge is a source itself.
 
     In a metric that changes from simplex to simplex, the Hopf-Lax formula on each is iterated until distances are a
-    fixed point, and then with distance of second order on facets (`heat_igl.kernels.hopf_lax`).
+    fixed point, and then with distance of second order on facets (`heat_igl.kernels.sweep.hopf_lax`).
 
     Triangles that mostly fit together are passed by fronts too, and the shorter distance stands. A vertex gets its
     distance from the other corners of a triangle: from each alone along an edge, and from two by the point behind the

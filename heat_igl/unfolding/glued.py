@@ -8,7 +8,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import mollify
-from heat_igl.kernels import flipping, gluing
+from heat_igl.kernels.mesh import flipping, gluing
 from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -23,7 +23,7 @@ _LARGEST_LENGTH = 1e30
 
 
 class Glued(NamedTuple):
-    """The triangles of a mesh by their sides, as `heat_igl.kernels.gluing.glue` returns them.
+    """The triangles of a mesh by their sides, as `heat_igl.kernels.mesh.gluing.glue` returns them.
 
     Attributes
     ----------

@@ -9,7 +9,8 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, lay_out
-from heat_igl.kernels import numbering, window_surface
+from heat_igl.kernels.mesh import numbering
+from heat_igl.kernels.windows import window_surface
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
@@ -41,7 +42,7 @@ _LARGEST_EXPONENT = 1000
 
 
 class Tables(NamedTuple):
-    """What the kernel reads, in its order; see `heat_igl.kernels.window_surface.shapes`."""
+    """What the kernel reads, in its order; see `heat_igl.kernels.windows.window_surface.shapes`."""
 
     vertex: AnyArray
     length: FloatArray

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from heat_igl.kernels import checking
+from heat_igl.kernels.mesh import checking
 from heat_igl.sources import SourceSet
 from heat_igl.typing import FloatArray, IntArray
 

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels import local_windows, windows
 from heat_igl.kernels.signals import raise_caught
+from heat_igl.kernels.windows import local_windows, windows
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges

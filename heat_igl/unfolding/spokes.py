@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation, double_cover
-from heat_igl.kernels import half_edges, numbering
+from heat_igl.kernels.mesh import numbering
+from heat_igl.kernels.sweep import half_edges
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
 
 __all__ = ["Spokes", "aligned", "numbered_spokes"]

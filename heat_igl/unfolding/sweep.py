@@ -12,8 +12,8 @@ import numpy as np
 
 from heat_igl.errors import AccuracyWarning
 from heat_igl.intrinsic import lay_out, oriented
-from heat_igl.kernels import sweeping
-from heat_igl.kernels.checking import largest_finite
+from heat_igl.kernels.mesh.checking import largest_finite
+from heat_igl.kernels.sweep import sweeping
 from heat_igl.operators import share_on_large_triangles
 from heat_igl.plan import SurfaceMeasures
 from heat_igl.runtime import warn_caller

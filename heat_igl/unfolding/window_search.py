@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels import window_pairs, windows
 from heat_igl.kernels.signals import raise_caught
-from heat_igl.kernels.window_surface import FLAT_VERTEX
+from heat_igl.kernels.windows import window_pairs, windows
+from heat_igl.kernels.windows.window_surface import FLAT_VERTEX
 from heat_igl.mesh import SurfacePoints
 from heat_igl.runtime import side_by_side
 from heat_igl.typing import AnyArray, FloatArray, IntArray

@@ -1,0 +1,230 @@
+"""Balls that touch a point of a cloud and hold none of the neighbours: they tell the sheets of a surface apart."""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.cloud.empty_balls import ASIDE, ROUNDS, TINY
+from cython.cimports.libc.math import fabs, sqrt
+
+__all__ = ["on_one_side", "roomiest_normals"]
+
+
+def roomiest_normals(
+    P: cython.const[cython.double][:, ::1],
+    index: cython.const[cython.int][:, ::1],
+    square: cython.const[cython.double][:, ::1],
+    directions: cython.const[cython.double][:, ::1],
+):
+    """Normals of points, on the side with most room for balls, and the radii of balls on both sides.
+
+    Neighbours on another sheet bend the plane that fits best, but between them and the point there is little room.
+    Balls are tried along `directions`; those on the side of the largest are averaged, with weights r^4 for radius r.
+
+    Parameters
+    ----------
+    P : (n, 3) float64
+        All points.
+    index, square : (b, k) int32, (b, k) float64
+        Neighbours of some points, by distance and each point first, and the squared distances.
+    directions : (3, m) float64
+        Unit vectors in all directions, in columns.
+
+    Returns
+    -------
+    normals : (b, 3) float64
+        Of length 1.
+    radii : (b, 2) float64
+        Of the largest empty balls that touch the point along the normal, and opposite to it; no larger than the
+        neighbourhood.
+    room : (b, 2) float64
+        Radii of the largest balls on the side of the normal and on the other side, in shares of the neighbourhood.
+    """
+    normals, radii, room = np.empty((index.shape[0], 3)), np.empty((index.shape[0], 2)), np.empty((index.shape[0], 2))
+    normal: cython.double[:, ::1] = normals
+    radius: cython.double[:, ::1] = radii
+    free: cython.double[:, ::1] = room
+    inverted: cython.double[:, ::1] = np.empty((index.shape[1], 3))
+    least: cython.double[::1] = np.empty(directions.shape[1])
+    row: cython.Py_ssize_t
+    with cython.nogil:
+        for row in range(index.shape[0]):
+            reach: cython.double = sqrt(square[row, square.shape[1] - 1])
+            _invert(P, index[row], square[row], reach, inverted)
+            _shares(inverted, directions, least)
+            _average(directions, least, normal[row], free[row])
+            radius[row, 0] = reach * _share(inverted, normal[row], 1.0)
+            radius[row, 1] = reach * _share(inverted, normal[row], -1.0)
+    return normals, radii, room
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _invert(
+    P: cython.const[cython.double][:, ::1],
+    index: cython.const[cython.int][::1],
+    square: cython.const[cython.double][::1],
+    reach: cython.double,
+    inverted: cython.double[:, ::1],
+) -> cython.void:
+    """The neighbours d as 2 R d / |d|^2, R the reach: a ball along u of radius R / max(that . u) is empty."""
+    j: cython.Py_ssize_t
+    x: cython.Py_ssize_t
+    for j in range(index.shape[0]):
+        for x in range(3):
+            inverted[j, x] = 0.0
+            if square[j] > 0.0:
+                near: cython.double = max(square[j] / reach / reach, TINY)
+                inverted[j, x] = 2.0 * ((P[index[j], x] - P[index[0], x]) / reach) / near
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _shares(
+    inverted: cython.double[:, ::1], directions: cython.const[cython.double][:, ::1], share: cython.double[::1]
+) -> cython.void:
+    """Radii of the largest empty balls along all directions, in shares of the reach, at most 1."""
+    j: cython.Py_ssize_t
+    a: cython.Py_ssize_t
+    for a in range(share.shape[0]):
+        share[a] = 1.0
+    for j in range(inverted.shape[0]):
+        x: cython.double = inverted[j, 0]
+        y: cython.double = inverted[j, 1]
+        z: cython.double = inverted[j, 2]
+        for a in range(share.shape[0]):
+            along: cython.double = x * directions[0, a] + y * directions[1, a] + z * directions[2, a]
+            share[a] = along if along > share[a] else share[a]
+    for a in range(share.shape[0]):
+        share[a] = 1.0 / share[a]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _share(inverted: cython.double[:, ::1], u: cython.double[::1], sign: cython.double) -> cython.double:
+    j: cython.Py_ssize_t
+    most: cython.double = 1.0
+    for j in range(inverted.shape[0]):
+        most = max(most, sign * (inverted[j, 0] * u[0] + inverted[j, 1] * u[1] + inverted[j, 2] * u[2]))
+    return 1.0 / most
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _average(
+    directions: cython.const[cython.double][:, ::1],
+    share: cython.double[::1],
+    normal: cython.double[::1],
+    room: cython.double[::1],
+) -> cython.void:
+    """The mean direction on the side of the largest ball, and the largest balls on that side and on the other."""
+    a: cython.Py_ssize_t
+    x: cython.Py_ssize_t
+    best: cython.Py_ssize_t = 0
+    mean: cython.double[3]
+    for a in range(share.shape[0]):
+        if share[a] > share[best]:
+            best = a
+    for x in range(3):
+        normal[x] = directions[x, best]
+    for _ in range(ROUNDS):
+        mean[0] = mean[1] = mean[2] = 0.0
+        for a in range(share.shape[0]):
+            weight: cython.double = _along(directions, a, normal)
+            if weight > 0.0:
+                weight *= share[a] * share[a] * share[a] * share[a]
+                for x in range(3):
+                    mean[x] += weight * directions[x, a]
+        size: cython.double = sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2])
+        for x in range(3):
+            normal[x] = mean[x] / size
+    room[0] = room[1] = 0.0
+    for a in range(share.shape[0]):
+        along: cython.double = _along(directions, a, normal)
+        if fabs(along) > ASIDE:
+            side: cython.Py_ssize_t = 0 if along > 0.0 else 1
+            room[side] = max(room[side], share[a])
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _along(
+    directions: cython.const[cython.double][:, ::1], a: cython.Py_ssize_t, u: cython.double[::1]
+) -> cython.double:
+    return directions[0, a] * u[0] + directions[1, a] * u[1] + directions[2, a] * u[2]
+
+
+def on_one_side(
+    P: cython.const[cython.double][:, ::1],
+    index: cython.const[cython.int][:, ::1],
+    number: cython.const[cython.int][::1],
+    normals: cython.const[cython.double][:, ::1],
+    radii: cython.const[cython.double][:, ::1],
+):
+    """Which neighbours (c, k) of some points see the same side of the same sheet.
+
+    On one sheet, the empty balls of two neighbours meet at more than a right angle on one side of it at least, since
+    what separates balls is the surface. On the two sides of a thin part or of a narrow gap only those between the
+    sheets do, which are opposite to each other as the normals have them.
+
+    Parameters
+    ----------
+    P : (n, 3) float64
+        All points.
+    index : (c, k) int32
+        Neighbours, each point first.
+    number : (n,) int32
+        Row of each point in `normals` and `radii`, -1 if it has none: such neighbours are on one sheet with all.
+    normals, radii : (b, 3) float64, (b, 2) float64
+        As `roomiest_normals` has them; normals may have either sign.
+    """
+    keeps = np.ones((index.shape[0], index.shape[1]), np.bool_)
+    keep: cython.uchar[:, ::1] = keeps.view(np.uint8)
+    row: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    with cython.nogil:
+        for row in range(index.shape[0]):
+            at: cython.int = index[row, 0]
+            for j in range(1, index.shape[1]):
+                other: cython.int = index[row, j]
+                if number[other] >= 0:
+                    keep[row, j] = _sees_the_same(P, at, other, number[at], number[other], normals, radii)
+    return keeps
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _sees_the_same(
+    P: cython.const[cython.double][:, ::1],
+    i: cython.Py_ssize_t,
+    j: cython.Py_ssize_t,
+    of_i: cython.Py_ssize_t,
+    of_j: cython.Py_ssize_t,
+    normals: cython.const[cython.double][:, ::1],
+    radii: cython.const[cython.double][:, ::1],
+) -> cython.bint:
+    alike: cython.double = 0.0
+    x: cython.Py_ssize_t
+    for x in range(3):
+        alike += normals[of_i, x] * normals[of_j, x]
+    # The side of j that is on the side of i towards which the normal of i points.
+    other: cython.Py_ssize_t = 0 if alike >= 0.0 else 1
+    side: cython.Py_ssize_t
+    for side in range(2):
+        a: cython.double = radii[of_i, side] if side == 0 else -radii[of_i, side]
+        of_side: cython.Py_ssize_t = side if other == 0 else 1 - side
+        b: cython.double = radii[of_j, of_side] if of_side == 0 else -radii[of_j, of_side]
+        apart: cython.double = 0.0
+        for x in range(3):
+            between: cython.double = (P[j, x] + b * normals[of_j, x]) - (P[i, x] + a * normals[of_i, x])
+            apart += between * between
+        # The angle between two spheres, by the law of cosines.
+        if apart < a * a + b * b:
+            return True
+    return False

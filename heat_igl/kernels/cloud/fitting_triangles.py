@@ -1,0 +1,114 @@
+"""Of the triangles of a point cloud, those that fit together: around no point do two of them overlap."""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.cloud.fitting_triangles import ROUNDING, TURN
+from cython.cimports.heat_igl.kernels.cloud.unrolling import InPlane, in_plane
+from cython.cimports.libc.math import atan2
+
+__all__ = ["fitting_triangles"]
+
+
+def fitting_triangles(
+    P: cython.const[cython.double][:, ::1],
+    axes: cython.const[cython.double][:, :, ::1],
+    triangles: cython.const[cython.int][:, ::1],
+    n_accepted: cython.Py_ssize_t,
+):
+    """Mask (m,) of `triangles` that overlap none before them: the first `n_accepted`, and those accepted one by one.
+
+    Two triangles overlap if they have a corner in common and, in the tangent plane of that corner, their angles
+    do. So no edge keeps more than two triangles.
+    """
+    m: cython.Py_ssize_t = triangles.shape[0]
+    accepted = np.zeros(m, np.bool_)
+    keep: cython.uchar[::1] = accepted.view(np.uint8)
+    head: cython.int[::1] = np.full(P.shape[0], -1, np.int32)
+    following: cython.int[:, ::1] = np.empty((m, 3), np.int32)
+    sector: cython.double[:, :, ::1] = np.empty((m, 3, 2))
+    f: cython.Py_ssize_t
+    c: cython.Py_ssize_t
+    with cython.nogil:
+        for f in range(m):
+            fits: cython.bint = True
+            for c in range(3):
+                if not _find_sector(P, axes, triangles, f, c, sector) and f >= n_accepted:
+                    fits = False
+                    break
+                if f >= n_accepted and _overlaps(triangles[f, c], f, c, head, following, sector):
+                    fits = False
+                    break
+            if fits:
+                keep[f] = 1
+                for c in range(3):
+                    following[f, c] = head[triangles[f, c]]
+                    head[triangles[f, c]] = 3 * f + c
+    return accepted
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _find_sector(
+    P: cython.const[cython.double][:, ::1],
+    axes: cython.const[cython.double][:, :, ::1],
+    triangles: cython.const[cython.int][:, ::1],
+    f: cython.Py_ssize_t,
+    c: cython.Py_ssize_t,
+    sector: cython.double[:, :, ::1],
+) -> cython.bint:
+    """Start of the angle of triangle f at corner c, counterclockwise, and size; False if it has none."""
+    at: cython.Py_ssize_t = triangles[f, c]
+    begin: cython.double = _direction(P, axes, at, triangles[f, (c + 1) % 3])
+    end: cython.double = _direction(P, axes, at, triangles[f, (c + 2) % 3])
+    width: cython.double = end - begin
+    if width < 0.0:
+        width += TURN
+    if width > 0.5 * TURN:
+        begin, width = end, TURN - width
+    sector[f, c, 0], sector[f, c, 1] = begin, width
+    return width > ROUNDING and width < 0.5 * TURN - ROUNDING
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _direction(
+    P: cython.const[cython.double][:, ::1],
+    axes: cython.const[cython.double][:, :, ::1],
+    i: cython.Py_ssize_t,
+    j: cython.Py_ssize_t,
+) -> cython.double:
+    """Angle of point j around point i in the tangent plane of i."""
+    flat: InPlane = in_plane(
+        cython.address(P[i, 0]), cython.address(axes[i, 0, 0]), cython.address(P[j, 0]), cython.address(axes[j, 0, 0])
+    )
+    return atan2(flat.y, flat.x)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _overlaps(
+    vertex: cython.Py_ssize_t,
+    f: cython.Py_ssize_t,
+    c: cython.Py_ssize_t,
+    head: cython.int[::1],
+    following: cython.int[:, ::1],
+    sector: cython.double[:, :, ::1],
+) -> cython.bint:
+    """Whether the angle of triangle f at corner c overlaps one that was accepted at the same vertex."""
+    other: cython.Py_ssize_t = head[vertex]
+    while other >= 0:
+        g: cython.Py_ssize_t = other // 3
+        e: cython.Py_ssize_t = other % 3
+        ahead: cython.double = sector[g, e, 0] - sector[f, c, 0]
+        if ahead < 0.0:
+            ahead += TURN
+        if ahead < sector[f, c, 1] - ROUNDING or TURN - ahead < sector[g, e, 1] - ROUNDING:
+            return True
+        other = following[g, e]
+    return False

@@ -1,0 +1,275 @@
+"""Triangles of a point cloud: the Delaunay star of each point among its neighbours, in its tangent plane."""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.cloud.unrolling import InPlane, in_plane
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
+
+__all__ = ["delaunay_stars"]
+
+
+def delaunay_stars(
+    P: cython.const[cython.double][:, ::1],
+    axes: cython.const[cython.double][:, :, ::1],
+    neighbours: cython.const[cython.int][:, ::1],
+    largest: cython.const[cython.double][::1],
+    least_cosine: cython.double,
+    begin: cython.Py_ssize_t,
+    end: cython.Py_ssize_t,
+):
+    """The Delaunay triangles at the points from `begin` to `end` among their neighbours, in tangent planes.
+
+    `axes` (n, 3, 3) are the tangents and the normal of each of the points P (n, 3); rows of `neighbours` (n, k) ascend
+    by distance. Triangles with a circumscribed circle of a radius above `largest` (n,) are left out, and neighbours
+    whose normals have a product below `least_cosine`.
+
+    Returns
+    -------
+    triangles : (s, 3) int32
+        Star by star, the point itself first, and around each point counterclockwise.
+    radii : (s,) float64
+        Of the circumscribed circles.
+    sizes : (end - begin,) int32
+        Number of triangles of each star.
+    is_closed : (end - begin,) uint8
+        Whether a star goes all the way around its point.
+    """
+    n: cython.Py_ssize_t = end - begin
+    k: cython.Py_ssize_t = neighbours.shape[1]
+    corners, radii = np.empty((n * k, 3), np.int32), np.empty(n * k)
+    sizes, closed = np.empty(n, np.int32), np.zeros(n, np.uint8)
+    size: cython.int[::1] = sizes
+    is_closed: cython.uchar[::1] = closed
+    found: cython.int[:, ::1] = corners
+    radius: cython.double[::1] = radii
+    star: cython.double[:, ::1] = np.empty((k + 1, 5))
+    members: cython.int[::1] = np.empty(k + 1, np.int32)
+    stack: cython.int[::1] = np.empty(k + 2, np.int32)
+    m: cython.Py_ssize_t = 0
+    i: cython.Py_ssize_t
+    with cython.nogil:
+        for i in range(begin, end):
+            before: cython.Py_ssize_t = m
+            count: cython.Py_ssize_t = _neighbours_around(i, P, axes, neighbours, least_cosine, star, members, stack)
+            if count >= 2:
+                top: cython.Py_ssize_t = _visible_hull(count, star, stack)
+                m = _triangles(i, top, star, members, stack, largest[i], found, radius, m)
+                is_closed[i - begin] = m - before == top
+            size[i - begin] = cython.cast(cython.int, m - before)
+    return corners[:m].copy(), radii[:m].copy(), sizes, closed
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _neighbours_around(
+    i: cython.Py_ssize_t,
+    P: cython.const[cython.double][:, ::1],
+    axes: cython.const[cython.double][:, :, ::1],
+    neighbours: cython.const[cython.int][:, ::1],
+    least_cosine: cython.double,
+    star: cython.double[:, ::1],
+    members: cython.int[::1],
+    stack: cython.int[::1],
+) -> cython.Py_ssize_t:
+    """Put the neighbours of point i into `star` and `members`, sorted by angle and inverted; return how many there are.
+
+    The inversion p / |p|^2 takes circles through the point to straight lines: the star of the point is the part of the
+    convex hull of the inverted neighbours that it sees, found by Graham's scan. Neighbours inside the hull of the
+    nearest ones are left out.
+    """
+    a: cython.Py_ssize_t
+    b: cython.Py_ssize_t
+    size: cython.Py_ssize_t = 0
+    n_sides: cython.Py_ssize_t = 0
+    reach: cython.double = INFINITY  # squared: twice the largest radius of the circles of the star
+    for a in range(neighbours.shape[1]):
+        j: cython.Py_ssize_t = neighbours[i, a]
+        if j < 0 or j == i:
+            continue
+        if least_cosine > -1.0 and (
+            axes[i, 2, 0] * axes[j, 2, 0] + axes[i, 2, 1] * axes[j, 2, 1] + axes[i, 2, 2] * axes[j, 2, 2] < least_cosine
+        ):
+            continue
+        if size == FEW and n_sides == 0:
+            n_sides = _sides(_visible_hull(size, star, stack), star, stack)
+            reach = _reach(n_sides, star)
+        # In the plane, distances are shorter by a few percent at most, see `in_plane`; the others are farther away.
+        if _squared_distance(P, i, j) > 1.2 * reach:
+            break
+        flat: InPlane = in_plane(
+            cython.address(P[i, 0]),
+            cython.address(axes[i, 0, 0]),
+            cython.address(P[j, 0]),
+            cython.address(axes[j, 0, 0]),
+        )
+        x, y = flat.x, flat.y
+        square: cython.double = x * x + y * y
+        # A point above the centre has no direction in the plane.
+        if square <= 0.0:
+            continue
+        if square > reach or _is_inside(n_sides, star, x / square, y / square):
+            continue
+        # Grows with the angle, and needs no arctangent.
+        angle: cython.double = y / (fabs(x) + fabs(y))
+        if x < 0.0:
+            angle = 2.0 - angle
+        b = size
+        while b > 0 and star[b - 1, ANGLE] > angle:
+            _copy(star, members, b - 1, b)
+            b -= 1
+        star[b, ANGLE], star[b, X], star[b, Y] = angle, x / square, y / square
+        members[b] = cython.cast(cython.int, j)
+        size += 1
+    return size
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _squared_distance(
+    P: cython.const[cython.double][:, ::1], i: cython.Py_ssize_t, j: cython.Py_ssize_t
+) -> cython.double:
+    dx: cython.double = P[j, 0] - P[i, 0]
+    dy: cython.double = P[j, 1] - P[i, 1]
+    dz: cython.double = P[j, 2] - P[i, 2]
+    return dx * dx + dy * dy + dz * dz
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _copy(
+    star: cython.double[:, ::1], members: cython.int[::1], source: cython.Py_ssize_t, target: cython.Py_ssize_t
+) -> cython.void:
+    star[target, ANGLE], star[target, X], star[target, Y] = star[source, ANGLE], star[source, X], star[source, Y]
+    members[target] = members[source]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _visible_hull(size: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.Py_ssize_t:
+    """The scan around the point, from the neighbour that is nearest in the plane: `stack` gets the corners of the hull.
+
+    Returns how many sides there are; the last corner is the first.
+    """
+    a: cython.Py_ssize_t
+    first: cython.Py_ssize_t = 0
+    for a in range(size):
+        if _square(star, a) > _square(star, first):
+            first = a
+    top: cython.Py_ssize_t = 0
+    stack[0] = cython.cast(cython.int, first)
+    for a in range(1, size + 1):
+        # The last round comes back to the first, which stays in any case.
+        following: cython.Py_ssize_t = first + a
+        if following >= size:
+            following -= size
+        while top > 0 and _is_hidden(star, stack[top - 1], stack[top], following):
+            top -= 1
+        top += 1
+        stack[top] = cython.cast(cython.int, following)
+    return top
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _sides(top: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.Py_ssize_t:
+    """Fill the columns of the sides in `star`; return how many there are, -1 if the hull is not around the point."""
+    a: cython.Py_ssize_t
+    for a in range(top):
+        p: cython.Py_ssize_t = stack[a]
+        q: cython.Py_ssize_t = stack[a + 1]
+        turn: cython.double = star[p, X] * star[q, Y] - star[p, Y] * star[q, X]
+        if turn <= 0.0:
+            return -1
+        star[a, ACROSS_X] = (star[p, Y] - star[q, Y]) / turn
+        star[a, ACROSS_Y] = (star[q, X] - star[p, X]) / turn
+    return top
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _reach(n_sides: cython.Py_ssize_t, star: cython.double[:, ::1]) -> cython.double:
+    """Squared distance beyond which neighbours, inverted, are inside all sides; infinite if there are none."""
+    a: cython.Py_ssize_t
+    largest: cython.double = 0.0
+    for a in range(n_sides):
+        largest = max(largest, star[a, ACROSS_X] * star[a, ACROSS_X] + star[a, ACROSS_Y] * star[a, ACROSS_Y])
+    return largest / (INSIDE * INSIDE) if n_sides > 0 else INFINITY
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _is_inside(
+    n_sides: cython.Py_ssize_t, star: cython.double[:, ::1], x: cython.double, y: cython.double
+) -> cython.bint:
+    """Whether a point is inside all sides of a hull, of which there are some."""
+    a: cython.Py_ssize_t
+    for a in range(n_sides):
+        if star[a, ACROSS_X] * x + star[a, ACROSS_Y] * y < -INSIDE:
+            return False
+    return n_sides > 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _triangles(
+    i: cython.Py_ssize_t,
+    top: cython.Py_ssize_t,
+    star: cython.double[:, ::1],
+    members: cython.int[::1],
+    stack: cython.int[::1],
+    largest: cython.double,
+    found: cython.int[:, ::1],
+    radius: cython.double[::1],
+    m: cython.Py_ssize_t,
+) -> cython.Py_ssize_t:
+    """Append the triangles of point i on the sides of the hull to the m that are found; return how many there are."""
+    a: cython.Py_ssize_t
+    for a in range(top):
+        p: cython.Py_ssize_t = stack[a]
+        q: cython.Py_ssize_t = stack[a + 1]
+        turn: cython.double = star[p, X] * star[q, Y] - star[p, Y] * star[q, X]
+        dx: cython.double = star[q, X] - star[p, X]
+        dy: cython.double = star[q, Y] - star[p, Y]
+        side: cython.double = sqrt(dx * dx + dy * dy)
+        # The line through two inverted points is 1 / (2 R) away from the point; beyond half a turn there is no face.
+        if turn > 0.0 and side <= 2.0 * largest * turn:
+            found[m, 0], found[m, 1], found[m, 2] = cython.cast(cython.int, i), members[p], members[q]
+            radius[m] = 0.5 * side / turn
+            m += 1
+    return m
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _square(star: cython.double[:, ::1], a: cython.Py_ssize_t) -> cython.double:
+    return star[a, X] * star[a, X] + star[a, Y] * star[a, Y]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _is_hidden(
+    star: cython.double[:, ::1], p: cython.Py_ssize_t, q: cython.Py_ssize_t, r: cython.Py_ssize_t
+) -> cython.bint:
+    """Whether q lies behind the line from p to r, less than half a turn apart."""
+    if star[p, X] * star[r, Y] - star[p, Y] * star[r, X] <= 0.0:
+        return False
+    ax: cython.double = star[q, X] - star[p, X]
+    ay: cython.double = star[q, Y] - star[p, Y]
+    bx: cython.double = star[r, X] - star[p, X]
+    by: cython.double = star[r, Y] - star[p, Y]
+    return ax * by - ay * bx <= 0.0

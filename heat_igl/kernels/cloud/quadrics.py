@@ -1,0 +1,248 @@
+"""Quadrics fitted to the neighbours of points. Points weigh 1 - (d / r)^2, at distance d of radius r."""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.cloud.local_planes import LEAST_WEIGHT, TINY, principal
+from cython.cimports.heat_igl.kernels.cloud.quadrics import DIAGONAL, LANES
+from cython.cimports.libc.math import sqrt
+
+__all__ = ["onto_quadrics"]
+
+
+def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][:, ::1]):
+    """Points moved along the normals of fitted planes onto quadrics that are fitted to their neighbours.
+
+    Parameters
+    ----------
+    P : (n, 3) float64
+        All points.
+    index : (b, k) int32
+        Some of them, each followed by neighbours, in any order.
+
+    Returns
+    -------
+    moved : (b, 3) float64
+        The new positions.
+    deviation : (b,) float64
+        Standard deviation of the neighbours from the quadric, in radii of the neighbourhood.
+    thickness : (b,) float64
+        Ratio of the two smaller variances of the neighbours.
+    """
+    b: cython.Py_ssize_t = index.shape[0]
+    k: cython.Py_ssize_t = index.shape[1]
+    positions, deviations, ratios = np.empty((b, 3)), np.empty(b), np.empty(b)
+    moved: cython.double[:, ::1] = positions
+    deviation: cython.double[::1] = deviations
+    thickness: cython.double[::1] = ratios
+    # Sums are taken over LANES neighbours at a time; the last of these may be none, which weigh nothing.
+    local: cython.double[:, ::1] = np.zeros((4, (k + LANES - 1) // LANES * LANES))
+    system: cython.double[:, ::1] = np.empty((6, 7))
+    work: cython.double[:, ::1] = np.empty((6, 3))
+    axes: cython.double[:, ::1] = np.empty((3, 3))
+    variances: cython.double[::1] = np.empty(3)
+    # Six coefficients take six degrees of freedom from the neighbours.
+    freedom: cython.double = max(1.0 - 6.0 / (k - 1.0), 0.5)
+    row: cython.Py_ssize_t
+    x: cython.int
+    with cython.nogil:
+        for row in range(b):
+            radius: cython.double = _around(P, index[row], local)
+            _covariance(local, work)
+            total: cython.double = work[3, 0]
+            principal(work, axes, variances)
+            _turn(local, axes)
+            _normal_equations(local, system)
+            for x in range(6):
+                system[x, x] += DIAGONAL * k
+            _eliminate(system)
+            deviation[row] = sqrt(_weighted_squares(local, system) / (total * freedom))
+            thickness[row] = variances[0] / max(variances[1], TINY)
+            for x in range(3):
+                moved[row, x] = P[index[row, 0], x] + radius * system[0, 6] * axes[2, x]
+    return positions, deviations, ratios
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _around(
+    P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][::1], local: cython.double[:, ::1]
+) -> cython.double:
+    """Put the neighbours, from the point and in units of the radius, and the weights into `local`; the radius."""
+    k: cython.Py_ssize_t = index.shape[0]
+    farthest: cython.double = 0.0
+    px: cython.double = P[index[0], 0]
+    py: cython.double = P[index[0], 1]
+    pz: cython.double = P[index[0], 2]
+    j: cython.Py_ssize_t
+    for j in range(k):
+        dx: cython.double = P[index[j], 0] - px
+        dy: cython.double = P[index[j], 1] - py
+        dz: cython.double = P[index[j], 2] - pz
+        local[0, j], local[1, j], local[2, j] = dx, dy, dz
+        local[3, j] = dx * dx + dy * dy + dz * dz
+        farthest = max(farthest, local[3, j])
+    # In units of the radius: squares of tiny lengths would underflow.
+    radius: cython.double = max(sqrt(farthest), TINY)
+    scale: cython.double = 1.0 / radius
+    per_square: cython.double = 1.0 / max(farthest, TINY)
+    for j in range(k):
+        local[0, j], local[1, j], local[2, j] = scale * local[0, j], scale * local[1, j], scale * local[2, j]
+        local[3, j] = max(1.0 - per_square * local[3, j], LEAST_WEIGHT)
+    return radius
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _covariance(local: cython.double[:, ::1], work: cython.double[:, ::1]) -> cython.void:
+    """The covariance in rows 0 to 2 of `work`, and the sum of the weights in row 3."""
+    part: cython.double[40]
+    sums: cython.double[10]
+    c: cython.Py_ssize_t
+    lane: cython.Py_ssize_t
+    block: cython.Py_ssize_t
+    for c in range(10 * LANES):
+        part[c] = 0.0
+    for block in range(local.shape[1] // LANES):
+        for lane in range(LANES):
+            j: cython.Py_ssize_t = LANES * block + lane
+            wx: cython.double = local[3, j] * local[0, j]
+            wy: cython.double = local[3, j] * local[1, j]
+            wz: cython.double = local[3, j] * local[2, j]
+            part[lane] += local[3, j]
+            part[LANES + lane] += wx
+            part[2 * LANES + lane] += wy
+            part[3 * LANES + lane] += wz
+            part[4 * LANES + lane] += wx * local[0, j]
+            part[5 * LANES + lane] += wx * local[1, j]
+            part[6 * LANES + lane] += wx * local[2, j]
+            part[7 * LANES + lane] += wy * local[1, j]
+            part[8 * LANES + lane] += wy * local[2, j]
+            part[9 * LANES + lane] += wz * local[2, j]
+    for c in range(10):
+        sums[c] = 0.0
+        for lane in range(LANES):
+            sums[c] += part[c * LANES + lane]
+    for c in range(1, 10):
+        sums[c] /= sums[0]
+    work[0, 0], work[1, 1] = sums[4] - sums[1] * sums[1], sums[7] - sums[2] * sums[2]
+    work[2, 2] = sums[9] - sums[3] * sums[3]
+    work[0, 1] = work[1, 0] = sums[5] - sums[1] * sums[2]
+    work[0, 2] = work[2, 0] = sums[6] - sums[1] * sums[3]
+    work[1, 2] = work[2, 1] = sums[8] - sums[2] * sums[3]
+    work[3, 0] = sums[0]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _turn(local: cython.double[:, ::1], axes: cython.double[:, ::1]) -> cython.void:
+    """Turn rows 0 to 2 of `local` into the axes."""
+    j: cython.Py_ssize_t
+    for j in range(local.shape[1]):
+        x: cython.double = local[0, j]
+        y: cython.double = local[1, j]
+        z: cython.double = local[2, j]
+        local[0, j] = x * axes[0, 0] + y * axes[0, 1] + z * axes[0, 2]
+        local[1, j] = x * axes[1, 0] + y * axes[1, 1] + z * axes[1, 2]
+        local[2, j] = x * axes[2, 0] + y * axes[2, 1] + z * axes[2, 2]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _normal_equations(local: cython.double[:, ::1], system: cython.double[:, ::1]) -> cython.void:
+    """The upper half of the matrix (6, 6) of least squares for the terms 1, x, y, xx, xy, yy of z; z in column 6."""
+    moment: cython.double[84]
+    sums: cython.double[21]
+    j: cython.Py_ssize_t
+    block: cython.Py_ssize_t
+    lane: cython.Py_ssize_t
+    c: cython.Py_ssize_t
+    for c in range(21 * LANES):
+        moment[c] = 0.0
+    for block in range(local.shape[1] // LANES):
+        j = LANES * block
+        for lane in range(LANES):
+            x: cython.double = local[0, j + lane]
+            y: cython.double = local[1, j + lane]
+            z: cython.double = local[2, j + lane]
+            w: cython.double = local[3, j + lane]
+            wx: cython.double = w * x
+            wy: cython.double = w * y
+            wxx: cython.double = wx * x
+            wxy: cython.double = wx * y
+            wyy: cython.double = wy * y
+            moment[lane] += w
+            moment[LANES + lane] += wx
+            moment[2 * LANES + lane] += wy
+            moment[3 * LANES + lane] += wxx
+            moment[4 * LANES + lane] += wxy
+            moment[5 * LANES + lane] += wyy
+            moment[6 * LANES + lane] += wxx * x
+            moment[7 * LANES + lane] += wxx * y
+            moment[8 * LANES + lane] += wyy * x
+            moment[9 * LANES + lane] += wyy * y
+            moment[10 * LANES + lane] += wxx * x * x
+            moment[11 * LANES + lane] += wxx * x * y
+            moment[12 * LANES + lane] += wxx * y * y
+            moment[13 * LANES + lane] += wyy * x * y
+            moment[14 * LANES + lane] += wyy * y * y
+            moment[15 * LANES + lane] += w * z
+            moment[16 * LANES + lane] += wx * z
+            moment[17 * LANES + lane] += wy * z
+            moment[18 * LANES + lane] += wxx * z
+            moment[19 * LANES + lane] += wxy * z
+            moment[20 * LANES + lane] += wyy * z
+    for c in range(21):
+        sums[c] = 0.0
+        for lane in range(LANES):
+            sums[c] += moment[c * LANES + lane]
+    # Row 0 has the moments of order 0 to 2, row 1 those of x, xx, xy, xxx and so on.
+    for c in range(6):
+        system[0, c], system[c, 6] = sums[c], sums[15 + c]
+    system[1, 1], system[1, 2], system[1, 3], system[1, 4], system[1, 5] = sums[3], sums[4], sums[6], sums[7], sums[8]
+    system[2, 2], system[2, 3], system[2, 4], system[2, 5] = sums[5], sums[7], sums[8], sums[9]
+    system[3, 3], system[3, 4], system[3, 5] = sums[10], sums[11], sums[12]
+    system[4, 4], system[4, 5], system[5, 5] = sums[12], sums[13], sums[14]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _eliminate(system: cython.double[:, ::1]) -> cython.void:
+    """Gaussian elimination; the matrix is symmetric and positive definite, so its upper half is enough."""
+    a: cython.int
+    b: cython.int
+    c: cython.int
+    for c in range(6):
+        for a in range(c + 1, 6):
+            factor: cython.double = system[c, a] / system[c, c]
+            for b in range(a, 7):
+                system[a, b] -= factor * system[c, b]
+    for c in range(5, -1, -1):
+        for b in range(c + 1, 6):
+            system[c, 6] -= system[c, b] * system[b, 6]
+        system[c, 6] /= system[c, c]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _weighted_squares(local: cython.double[:, ::1], system: cython.double[:, ::1]) -> cython.double:
+    """The weighted sum of the squared deviations from the quadric whose coefficients are column 6 of `system`."""
+    squares: cython.double[4]
+    squares[0] = squares[1] = squares[2] = squares[3] = 0.0
+    j: cython.Py_ssize_t
+    block: cython.Py_ssize_t
+    lane: cython.Py_ssize_t
+    for block in range(local.shape[1] // LANES):
+        j = LANES * block
+        for lane in range(LANES):
+            x: cython.double = local[0, j + lane]
+            y: cython.double = local[1, j + lane]
+            off: cython.double = local[2, j + lane] - system[0, 6] - system[1, 6] * x - system[2, 6] * y
+            off -= system[3, 6] * x * x + system[4, 6] * x * y + system[5, 6] * y * y
+            squares[lane] += local[3, j + lane] * off * off
+    return squares[0] + squares[1] + squares[2] + squares[3]

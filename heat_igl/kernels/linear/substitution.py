@@ -1,0 +1,321 @@
+"""Solves with a multifrontal factor, piece by piece of the tree: forward from the leaves, and back from the roots."""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.linear.panels import entries, in_panel, numbers
+from cython.cimports.heat_igl.kernels.prefetch import prefetch
+
+__all__ = ["Substitution", "width"]
+
+width = WIDTH
+
+
+@cython.cclass
+class Substitution:
+    """A factor and the index arrays of it, which `heat_igl.linear.multifrontal.Fronts` describes.
+
+    Parameters
+    ----------
+    fronts : Fronts
+    L : (entries,) float64
+        The factor.
+    """
+
+    L: cython.double[::1]
+    start: cython.longlong[::1]
+    first_row: cython.longlong[::1]
+    rows: cython.int[::1]
+    first_entry: cython.longlong[::1]
+    pieces: cython.longlong[::1]
+    piece_end: cython.longlong[::1]
+    own_rows: cython.longlong[::1]
+    above: cython.int[::1]
+    most_rows: cython.Py_ssize_t
+
+    def __init__(self, fronts, L):
+        self.L = L
+        self.start, self.first_row, self.rows, self.first_entry = (
+            fronts.start,
+            fronts.first_row,
+            fronts.rows,
+            fronts.first_entry,
+        )
+        self.pieces, self.piece_end = fronts.pieces, fronts.piece_end
+        self.own_rows, self.above = fronts.own_rows, fronts.above
+        self.most_rows = int(np.diff(fronts.first_row).max(initial=1))
+
+    def forward_one(
+        self, x: cython.double[::1], first: cython.Py_ssize_t, until: cython.Py_ssize_t, sums: cython.double[:, ::1]
+    ):
+        """Eliminate the columns of the pieces `first` to `until` from x (n,).
+
+        ``sums[piece]`` takes the amount that a piece subtracts from the rows above all pieces.
+        """
+        room: cython.double[::1] = np.empty(self.most_rows)
+        piece: cython.Py_ssize_t
+        with cython.nogil:
+            for piece in range(first, until):
+                _forward_one(self, x, self.piece_end[piece], self.piece_end[piece + 1], sums[piece], room)
+
+    def back_one(self, x: cython.double[::1], first: cython.Py_ssize_t, until: cython.Py_ssize_t):
+        """Solve for the columns of some pieces in x (n,), given those above."""
+        room: cython.double[::1] = np.empty(self.most_rows)
+        with cython.nogil:
+            _back_one(self, x, self.piece_end[first], self.piece_end[until], room)
+
+    def forward_block(
+        self,
+        x: cython.double[:, ::1],
+        first: cython.Py_ssize_t,
+        until: cython.Py_ssize_t,
+        sums: cython.double[:, :, ::1],
+    ):
+        """As `forward_one`, for x (n, WIDTH)."""
+        room: cython.double[:, ::1] = np.empty((self.most_rows, WIDTH))
+        piece: cython.Py_ssize_t
+        with cython.nogil:
+            for piece in range(first, until):
+                _forward_block(self, x, self.piece_end[piece], self.piece_end[piece + 1], sums[piece], room)
+
+    def back_block(self, x: cython.double[:, ::1], first: cython.Py_ssize_t, until: cython.Py_ssize_t):
+        """As `back_one`, for x (n, WIDTH)."""
+        room: cython.double[:, ::1] = np.empty((self.most_rows, WIDTH))
+        with cython.nogil:
+            _back_block(self, x, self.piece_end[first], self.piece_end[until], room)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _forward_one(
+    f: Substitution,
+    x: cython.double[::1],
+    first: cython.Py_ssize_t,
+    end: cython.Py_ssize_t,
+    sums: cython.double[::1],
+    room: cython.double[::1],
+) -> cython.void:
+    p: cython.Py_ssize_t
+    i: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    below: numbers = cython.address(room[0])
+    for p in range(first, end):
+        b: cython.Py_ssize_t = f.pieces[p]
+        start: cython.Py_ssize_t = f.start[b]
+        columns: cython.Py_ssize_t = f.start[b + 1] - start
+        row: cython.Py_ssize_t = f.first_row[b]
+        left: cython.Py_ssize_t = f.first_row[b + 1] - row
+        own: numbers = cython.address(x[start])
+        # Of a source's heat, most fronts have none on the way forward.
+        if _all_zero(own, columns):
+            continue
+        column: entries = cython.address(f.L[f.first_entry[b]])  # from the diagonal on
+        ahead: cython.p_char = cython.cast(cython.p_char, column) - AHEAD
+        for i in range(left):
+            below[i] = 0.0
+        for j in range(columns):
+            y: cython.double = own[j]
+            for i in range(0, 8 * (columns - j + left), 64):
+                prefetch(ahead - i)
+            ahead -= 8 * (columns - j + left)
+            for i in range(1, columns - j):
+                own[j + i] -= column[i] * y
+            column += columns - j
+            for i in range(left):
+                below[i] += column[i] * y
+            column += left
+        for i in range(f.own_rows[b]):
+            x[f.rows[row + i]] -= below[i]
+        for i in range(f.own_rows[b], left):
+            sums[f.above[f.rows[row + i]]] += below[i]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _back_one(
+    f: Substitution, x: cython.double[::1], first: cython.Py_ssize_t, end: cython.Py_ssize_t, room: cython.double[::1]
+) -> cython.void:
+    p: cython.Py_ssize_t
+    i: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    total: cython.double
+    below: numbers = cython.address(room[0])
+    for p in range(end - 1, first - 1, -1):
+        b: cython.Py_ssize_t = f.pieces[p]
+        start: cython.Py_ssize_t = f.start[b]
+        columns: cython.Py_ssize_t = f.start[b + 1] - start
+        row: cython.Py_ssize_t = f.first_row[b]
+        left: cython.Py_ssize_t = f.first_row[b + 1] - row
+        own: numbers = cython.address(x[start])
+        column: entries = cython.address(f.L[f.first_entry[b]])
+        for i in range(left):
+            below[i] = x[f.rows[row + i]]
+        for j in range(columns):
+            pivot: cython.double = column[0]
+            column += columns - j
+            total = 0.0
+            for i in range(left):
+                total += column[i] * below[i]
+            own[j] = own[j] / pivot - total
+            column += left
+        for j in range(columns - 1, -1, -1):
+            column -= columns - j + left
+            total = 0.0
+            for i in range(1, columns - j):
+                total += column[i] * own[j + i]
+            own[j] -= total
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _forward_block(
+    f: Substitution,
+    x: cython.double[:, ::1],
+    first: cython.Py_ssize_t,
+    end: cython.Py_ssize_t,
+    sums: cython.double[:, ::1],
+    room: cython.double[:, ::1],
+) -> cython.void:
+    p: cython.Py_ssize_t
+    i: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    c: cython.Py_ssize_t
+    below: numbers = cython.address(room[0, 0])
+    for p in range(first, end):
+        b: cython.Py_ssize_t = f.pieces[p]
+        start: cython.Py_ssize_t = f.start[b]
+        columns: cython.Py_ssize_t = f.start[b + 1] - start
+        row: cython.Py_ssize_t = f.first_row[b]
+        left: cython.Py_ssize_t = f.first_row[b + 1] - row
+        size: cython.Py_ssize_t = columns + left
+        own: numbers = cython.address(x[start, 0])
+        if _all_zero(own, columns * WIDTH):
+            continue
+        panel: entries = cython.address(f.L[f.first_entry[b]])
+        for j in range(columns):
+            for i in range(j + 1, columns):
+                _subtract_row(own + i * WIDTH, panel[in_panel(j, i, size)], own + j * WIDTH)
+        for i in range(left * WIDTH):
+            below[i] = 0.0
+        _add_below(panel, columns, left, own, below)
+        for i in range(f.own_rows[b]):
+            for c in range(WIDTH):
+                x[f.rows[row + i], c] -= below[i * WIDTH + c]
+        for i in range(f.own_rows[b], left):
+            for c in range(WIDTH):
+                sums[f.above[f.rows[row + i]], c] += below[i * WIDTH + c]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _back_block(
+    f: Substitution,
+    x: cython.double[:, ::1],
+    first: cython.Py_ssize_t,
+    end: cython.Py_ssize_t,
+    room: cython.double[:, ::1],
+) -> cython.void:
+    p: cython.Py_ssize_t
+    i: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    c: cython.Py_ssize_t
+    below: numbers = cython.address(room[0, 0])
+    for p in range(end - 1, first - 1, -1):
+        b: cython.Py_ssize_t = f.pieces[p]
+        start: cython.Py_ssize_t = f.start[b]
+        columns: cython.Py_ssize_t = f.start[b + 1] - start
+        row: cython.Py_ssize_t = f.first_row[b]
+        left: cython.Py_ssize_t = f.first_row[b + 1] - row
+        size: cython.Py_ssize_t = columns + left
+        own: numbers = cython.address(x[start, 0])
+        panel: entries = cython.address(f.L[f.first_entry[b]])
+        for i in range(left):
+            for c in range(WIDTH):
+                below[i * WIDTH + c] = x[f.rows[row + i], c]
+        for j in range(columns):
+            pivot: cython.double = panel[in_panel(j, j, size)]
+            for c in range(WIDTH):
+                own[j * WIDTH + c] /= pivot
+            _subtract_below(panel + in_panel(j, columns, size), left, below, own + j * WIDTH)
+        for j in range(columns - 1, -1, -1):
+            for i in range(j + 1, columns):
+                _subtract_row(own + j * WIDTH, panel[in_panel(j, i, size)], own + i * WIDTH)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _all_zero(x: entries, n: cython.Py_ssize_t) -> cython.bint:
+    i: cython.Py_ssize_t
+    for i in range(n):
+        if x[i] != 0.0:
+            return False
+    return True
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _subtract_row(target: numbers, entry: cython.double, row: entries) -> cython.void:
+    """Subtract a row, times an entry of the factor, from another."""
+    c: cython.Py_ssize_t
+    for c in range(WIDTH):
+        target[c] -= entry * row[c]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _add_below(
+    panel: entries, columns: cython.Py_ssize_t, left: cython.Py_ssize_t, own: entries, below: numbers
+) -> cython.void:
+    """Add the rows below the columns of a front, times `own`, to `below`; four columns per turn."""
+    size: cython.Py_ssize_t = columns + left
+    i: cython.Py_ssize_t
+    c: cython.Py_ssize_t
+    j: cython.Py_ssize_t = 0
+    while j + 4 <= columns:
+        c0: entries = panel + in_panel(j, columns, size)
+        c1: entries = panel + in_panel(j + 1, columns, size)
+        c2: entries = panel + in_panel(j + 2, columns, size)
+        c3: entries = panel + in_panel(j + 3, columns, size)
+        x: entries = own + j * WIDTH
+        for i in range(left):
+            for c in range(WIDTH):
+                below[i * WIDTH + c] += (c0[i] * x[c] + c1[i] * x[WIDTH + c]) + (
+                    c2[i] * x[2 * WIDTH + c] + c3[i] * x[3 * WIDTH + c]
+                )
+        j += 4
+    while j < columns:
+        column: entries = panel + in_panel(j, columns, size)
+        for i in range(left):
+            for c in range(WIDTH):
+                below[i * WIDTH + c] += column[i] * own[j * WIDTH + c]
+        j += 1
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _subtract_below(column: entries, left: cython.Py_ssize_t, below: entries, own: numbers) -> cython.void:
+    """Subtract the rows below one column of a front, times `below`, from `own`; four rows per turn."""
+    c: cython.Py_ssize_t
+    i: cython.Py_ssize_t = 0
+    while i + 4 <= left:
+        b: entries = below + i * WIDTH
+        for c in range(WIDTH):
+            own[c] -= (column[i] * b[c] + column[i + 1] * b[WIDTH + c]) + (
+                column[i + 2] * b[2 * WIDTH + c] + column[i + 3] * b[3 * WIDTH + c]
+            )
+        i += 4
+    while i < left:
+        for c in range(WIDTH):
+            own[c] -= column[i] * below[i * WIDTH + c]
+        i += 1

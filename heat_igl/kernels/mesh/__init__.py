@@ -1,0 +1,1 @@
+"""Triangles known by their edge lengths: checked, glued, numbered, flipped and refined; bounds of distances."""

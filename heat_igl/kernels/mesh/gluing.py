@@ -1,0 +1,175 @@
+"""Triangles by their edge lengths, made from positions: gluing along the edges that faces share.
+
+Half-edge ``3 f + c`` is the side of face f opposite its corner c, and that corner has the same number. This module,
+`flipping` and `numbering` serve a single query on a mesh; `heat_igl.intrinsic` glues with numpy, and keeps the history
+of flips.
+"""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge
+from cython.cimports.libc.math import INFINITY, sqrt
+
+__all__ = ["glue", "has_needles"]
+
+
+def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double][:, ::1], scale: cython.double):
+    """Glue faces along the edges that they share.
+
+    Parameters
+    ----------
+    F : (m, 3) int64
+        Vertices of each face, no face with the same vertex twice.
+    V : (n, 3) float64
+        Positions.
+    scale : float
+        Lengths are multiplied by this.
+
+    Returns
+    -------
+    vertex, twin, ring : (3 m,) int32
+        Vertex of each corner. The half-edge glued to each: -1 on the boundary, -2 where more than two faces meet. There
+        the next half-edge of the same edge, elsewhere the half-edge itself.
+    aligned : (3 m,) uint8
+        Whether the faces at a glued half-edge run along it in opposite directions.
+    length : (3 m,) float64
+        Of each half-edge, of glued ones the same.
+    n_across : int
+        Half-edges that are not aligned.
+    """
+    m: cython.int = F.shape[0]
+    n: cython.int = V.shape[0]
+    vertices, twins, rings = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)
+    alignment, lengths = np.ones(3 * m, np.uint8), np.empty(3 * m)
+    vertex: cython.int[::1] = vertices
+    twin: cython.int[::1] = twins
+    ring: cython.int[::1] = rings
+    aligned: cython.uchar[::1] = alignment
+    length: cython.double[::1] = lengths
+    h: cython.int
+    sides: cython.int[:, ::1] = np.empty((3 * m, 2), np.int32)
+    begin: cython.int[::1] = np.zeros(n + 1, np.int32)
+    seen: cython.int[::1] = np.zeros(n, np.int32)
+    n_across: cython.int = 0
+    with cython.nogil:
+        _by_lower_end(F, vertex, sides, begin)
+        _glue_sides(V, scale, sides, begin, seen, vertex, twin, ring, aligned, length)
+        n_across = 3 * m
+        for h in range(3 * m):
+            n_across -= aligned[h]
+    return vertices, twins, rings, alignment, lengths, n_across
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _by_lower_end(
+    F: cython.const[cython.longlong][:, ::1],
+    vertex: cython.int[::1],
+    sides: cython.int[:, ::1],
+    begin: cython.int[::1],
+) -> cython.void:
+    """Copy the faces, and sort their half-edges by the lower end; `sides` takes each with the upper end.
+
+    `begin` (n + 1,), which must come full of 0, takes where the half-edges with lower end v end, at ``begin[v]``.
+    """
+    f: cython.int
+    i: cython.int
+    at: cython.int
+    a: cython.int
+    b: cython.int
+    c: cython.int
+    for f in range(F.shape[0]):
+        a, b, c = cython.cast(cython.int, F[f, 0]), cython.cast(cython.int, F[f, 1]), cython.cast(cython.int, F[f, 2])
+        vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2] = a, b, c
+        begin[min(b, c) + 1] += 1
+        begin[min(c, a) + 1] += 1
+        begin[min(a, b) + 1] += 1
+    for i in range(begin.shape[0] - 1):
+        begin[i + 1] += begin[i]
+    for f in range(F.shape[0]):
+        a, b, c = vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2]
+        at = begin[min(b, c)]
+        begin[min(b, c)] = at + 1
+        sides[at, 0], sides[at, 1] = 3 * f, max(b, c)
+        at = begin[min(c, a)]
+        begin[min(c, a)] = at + 1
+        sides[at, 0], sides[at, 1] = 3 * f + 1, max(c, a)
+        at = begin[min(a, b)]
+        begin[min(a, b)] = at + 1
+        sides[at, 0], sides[at, 1] = 3 * f + 2, max(a, b)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _glue_sides(
+    V: cython.const[cython.double][:, ::1],
+    scale: cython.double,
+    sides: cython.int[:, ::1],
+    end: cython.int[::1],
+    seen: cython.int[::1],
+    vertex: cython.int[::1],
+    twin: cython.int[::1],
+    ring: cython.int[::1],
+    aligned: cython.uchar[::1],
+    length: cython.double[::1],
+) -> cython.void:
+    """Glue half-edges that have both ends in common, and measure them. `seen` (n,) is working space, full of 0."""
+    lower: cython.int
+    upper: cython.int
+    first: cython.int
+    i: cython.int = 0
+    h: cython.int
+    p: cython.int
+    q: cython.int
+    x: cython.double
+    y: cython.double
+    z: cython.double
+    for lower in range(V.shape[0]):
+        first = i
+        while i < end[lower]:
+            h, upper = sides[i, 0], sides[i, 1]
+            p = seen[upper]
+            if not (first <= p < i and sides[p, 1] == upper):
+                # The first half-edge of this edge.
+                seen[upper] = i
+                i += 1
+                x, y, z = V[upper, 0] - V[lower, 0], V[upper, 1] - V[lower, 1], V[upper, 2] - V[lower, 2]
+                x, y, z = scale * x, scale * y, scale * z
+                length[h] = sqrt(x * x + y * y + z * z)
+                twin[h], ring[h] = -1, h
+                continue
+            i += 1
+            p = sides[p, 0]
+            length[h] = length[p]
+            ring[h] = h
+            if twin[p] == -1:
+                twin[p], twin[h] = h, p
+                if vertex[next_half_edge(p)] == vertex[next_half_edge(h)]:
+                    aligned[p] = aligned[h] = False
+                continue
+            if twin[p] >= 0:
+                q = twin[p]
+                aligned[p] = aligned[q] = True
+                twin[p] = twin[q] = -2
+                ring[p], ring[q] = q, p
+            twin[h] = -2
+            ring[h] = ring[p]
+            ring[p] = h
+
+
+def has_needles(length: cython.const[cython.double][::1], margin: cython.double) -> bool:
+    """Whether in some face two sides (3 m,) exceed the third by less than `margin` times the longest side of all."""
+    h: cython.Py_ssize_t
+    total: cython.double
+    longest: cython.double
+    least: cython.double = INFINITY
+    longest_of_all: cython.double = 0.0
+    with cython.nogil:
+        for h in range(0, length.shape[0], 3):
+            total = length[h] + length[h + 1] + length[h + 2]
+            longest = max(max(length[h], length[h + 1]), length[h + 2])
+            longest_of_all = max(longest_of_all, longest)
+            least = min(least, total - 2.0 * longest)
+    return least < margin * longest_of_all

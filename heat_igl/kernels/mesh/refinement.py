@@ -1,0 +1,261 @@
+"""Delaunay refinement of an intrinsic triangulation: circumcenters of bad triangles become vertices.
+
+Sharp, Soliman and Crane (2019, section 4.2): the worst triangle's circumcenter is found by walking straight across the
+surface from that triangle, the triangle it lies in is split there, and edges are flipped until the triangulation is
+Delaunay again. Only for surfaces without a boundary: there the walk cannot leave.
+"""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.mesh.growing_triangulation import GrowingTriangulation
+from cython.cimports.heat_igl.kernels.mesh.refinement import LEAST, MOST_STEPS, SHARPEST, Exit, Location, Ray
+from cython.cimports.heat_igl.kernels.mesh.triangles import area, foot
+from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
+
+__all__ = ["refine"]
+
+
+def refine(
+    F,
+    l,
+    twin,
+    n: cython.longlong,
+    unit,
+    least_angle: cython.double,
+    largest_radius: cython.double,
+    most_vertices,
+):
+    """Refine triangles without a boundary until none is bad.
+
+    Parameters
+    ----------
+    F, l, twin : (m, 3) int64, (m, 3) float64, (3 m,) int64
+        The triangles, as `IntrinsicTriangulation` has them: intrinsic Delaunay, closed and oriented.
+    n : int
+        Number of vertices.
+    unit : (m,) float64
+        A length for each face, which the faces that are made of it inherit.
+    least_angle : float
+        A triangle with a smaller angle, in radians, is bad.
+    largest_radius : float
+        A triangle with a larger circumradius, in the unit of the face, is bad.
+    most_vertices : int
+        No vertex is added when there are so many.
+
+    Returns
+    -------
+    F, l, twin, n
+        The result.
+    kind, numbers : (k, 3) int64, (k, 5) float64
+        The moves, as `Refined` has them.
+    """
+    triangles: GrowingTriangulation = GrowingTriangulation(F, l, twin, n, max(int(most_vertices) - int(n), 0))
+    rows = triangles.F.shape[0]
+    units = np.empty(rows)
+    units[: len(F)] = unit
+    one = _Refinement()
+    one.triangles, one.bad, one.unit = triangles, PriorityQueue(rows), units
+    one.stack = np.empty(3 * rows + 64, np.int64)
+    one.n_given, one.least_sine, one.largest_radius = n, np.sin(least_angle), largest_radius
+    limit: cython.longlong = most_vertices
+    with cython.nogil:
+        one.run(limit)
+    return *triangles.faces(), int(triangles.n_vertices), *triangles.moves()
+
+
+@cython.final
+@cython.cclass
+class _Refinement:
+    """A triangulation that is being refined, its bad triangles by priority, and edges that may have to be flipped."""
+
+    triangles: GrowingTriangulation
+    bad: PriorityQueue
+    unit: cython.double[::1]
+    stack: cython.longlong[::1]
+    n_given: cython.longlong
+    least_sine: cython.double
+    largest_radius: cython.double
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def run(self, most_vertices: cython.longlong) -> cython.void:
+        """Refine until no triangle is bad, there are `most_vertices`, or there is no more room."""
+        f: cython.longlong
+        for f in range(self.triangles.n_faces):
+            self.judge(f)
+        while self.bad.count > 0 and self.triangles.n_vertices < most_vertices:
+            f = self.bad.first()
+            center: Location = _circumcenter(self.triangles, f)
+            if center.face < 0:
+                self.bad.set_key(f, 0.0)
+            elif not self.insert(center):
+                break
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def judge(self, f: cython.longlong) -> cython.void:
+        """Move a triangle that has changed to the right place in the queue, or out of it."""
+        self.bad.set_key(f, self.badness(f))
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def badness(self, f: cython.longlong) -> cython.double:
+        """Circumradius of a bad triangle in the unit of the face, 0 of another."""
+        a: cython.double = self.triangles.l[f, 0]
+        b: cython.double = self.triangles.l[f, 1]
+        c: cython.double = self.triangles.l[f, 2]
+        size: cython.double = area(a, b, c)
+        if not size > 0.0:
+            return 0.0
+        radius: cython.double = a * b * c / (4.0 * size)
+        badness: cython.double = radius / self.unit[f]
+        if badness > self.largest_radius:
+            return badness
+        shortest: cython.int = 0
+        if self.triangles.l[f, 1] < self.triangles.l[f, shortest]:
+            shortest = 1
+        if self.triangles.l[f, 2] < self.triangles.l[f, shortest]:
+            shortest = 2
+        # The sine of the smallest angle is the side opposite over the diameter of the circumcircle.
+        if self.triangles.l[f, shortest] >= 2.0 * radius * self.least_sine:
+            return 0.0
+        # The angle at the tip of a sharp cone stays as it is.
+        if (
+            self.triangles.F[f, shortest] < self.n_given
+            and self.triangles.total_angle(3 * f + shortest, SHARPEST) < SHARPEST
+        ):
+            return 0.0
+        return badness
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def insert(self, at: Location) -> cython.bint:
+        """Make a location a vertex and flip edges until all are Delaunay; false if there is no more room."""
+        if self.triangles.is_full():
+            return False
+        u: cython.double = max(at.u, LEAST)
+        v: cython.double = max(at.v, LEAST)
+        w: cython.double = max(at.w, LEAST)
+        total: cython.double = u + v + w
+        f: cython.longlong = at.face
+        g: cython.longlong = self.triangles.n_faces
+        k: cython.longlong = self.triangles.n_faces + 1
+        self.triangles.split(f, u / total, v / total, w / total)
+        self.unit[g] = self.unit[k] = self.unit[f]
+        self.judge(f)
+        self.judge(g)
+        self.judge(k)
+        self.stack[0], self.stack[1], self.stack[2] = 3 * f, 3 * g + 1, 3 * k + 2
+        return self.make_delaunay(3)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def make_delaunay(self, n_stack: cython.longlong) -> cython.bint:
+        """Flip edges, beginning with those on the stack, until all are Delaunay; false if there is no more room."""
+        k: cython.int
+        while n_stack > 0:
+            n_stack -= 1
+            h: cython.longlong = self.stack[n_stack]
+            if self.triangles.is_delaunay(h):
+                continue
+            if self.triangles.is_full() or n_stack + 4 > self.stack.shape[0]:
+                return False
+            f: cython.longlong = h // 3
+            c: cython.int = h % 3
+            g: cython.longlong = self.triangles.twin[h] // 3
+            e: cython.int = self.triangles.twin[h] % 3
+            self.triangles.flip(h)
+            self.judge(f)
+            self.judge(g)
+            # The four sides around the new edge.
+            for k in range(3):
+                if k != (c + 1) % 3:
+                    self.stack[n_stack] = 3 * f + k
+                    n_stack += 1
+                if k != (e + 1) % 3:
+                    self.stack[n_stack] = 3 * g + k
+                    n_stack += 1
+        return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _circumcenter(t: GrowingTriangulation, f: cython.longlong) -> Location:
+    """Locate the circumcenter of a triangle, in the triangle or straight on from it; face -1 if it is not found."""
+    a: cython.double = t.l[f, 0]
+    b: cython.double = t.l[f, 1]
+    c: cython.double = t.l[f, 2]
+    u: cython.double = a * a * (b * b + c * c - a * a)
+    v: cython.double = b * b * (c * c + a * a - b * b)
+    w: cython.double = c * c * (a * a + b * b - c * c)
+    total: cython.double = u + v + w
+    u, v, w = u / total, v / total, w / total
+    if u >= 0.0 and v >= 0.0 and w >= 0.0:
+        return Location(f, u, v, w)
+    # Laid out with corner 0 in the origin and corner 1 on the first axis; the walk begins in the centroid.
+    px: cython.double[3]
+    py: cython.double[3]
+    px[0], py[0], px[1], py[1] = 0.0, 0.0, c, 0.0
+    px[2], py[2] = foot(c, b, a), 2.0 * area(a, b, c) / c
+    ray: Ray
+    ray.ox, ray.oy = (c + px[2]) / 3.0, py[2] / 3.0
+    ray.tx, ray.ty = v * c + w * px[2], w * py[2]
+    ray.dx, ray.dy = ray.tx - ray.ox, ray.ty - ray.oy
+    # The ray leaves by the side whose ends lie to the right and to the left of it.
+    side: cython.int = 2
+    i: cython.int
+    j: cython.int
+    corner: cython.int
+    for corner in range(3):
+        i, j = (corner + 1) % 3, (corner + 2) % 3
+        if (
+            ray.dx * (py[i] - ray.oy) - ray.dy * (px[i] - ray.ox) <= 0.0
+            and ray.dx * (py[j] - ray.oy) - ray.dy * (px[j] - ray.ox) > 0.0
+        ):
+            side = corner
+    i, j = (side + 1) % 3, (side + 2) % 3
+    return _walk(t, ray, Exit(3 * f + side, px[i], py[i], px[j], py[j]))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _walk(t: GrowingTriangulation, ray: Ray, way: Exit) -> Location:
+    """Locate the end of a ray that leaves a face, by unfolding the faces that it crosses into the plane."""
+    for _ in range(MOST_STEPS):
+        h: cython.longlong = t.twin[way.h]
+        if h < 0:
+            break
+        g: cython.longlong = h // 3
+        e: cython.int = h % 3
+        # Seen from g, the side runs from s to r; the apex q lies beyond.
+        base: cython.double = t.l[g, e]
+        along: cython.double = foot(base, t.l[g, (e + 2) % 3], t.l[g, (e + 1) % 3]) / base
+        across: cython.double = 2.0 * area(base, t.l[g, (e + 1) % 3], t.l[g, (e + 2) % 3]) / (base * base)
+        ex: cython.double = way.rx - way.sx
+        ey: cython.double = way.ry - way.sy
+        qx: cython.double = way.sx + along * ex - across * ey
+        qy: cython.double = way.sy + along * ey + across * ex
+        # Barycentric coordinates of the target in g: at corner e (the apex), after it (s) and before it (r).
+        area2: cython.double = ex * (qy - way.sy) - ey * (qx - way.sx)
+        at_q: cython.double = (ex * (ray.ty - way.sy) - ey * (ray.tx - way.sx)) / area2
+        at_s: cython.double = ((qx - way.rx) * (ray.ty - way.ry) - (qy - way.ry) * (ray.tx - way.rx)) / area2
+        at_r: cython.double = 1.0 - at_q - at_s
+        if at_s >= 0.0 and at_r >= 0.0:
+            if e == 0:
+                return Location(g, at_q, at_s, at_r)
+            if e == 1:
+                return Location(g, at_r, at_q, at_s)
+            return Location(g, at_s, at_r, at_q)
+        if ray.dx * (qy - ray.oy) - ray.dy * (qx - ray.ox) > 0.0:
+            # The apex lies to the left: leave between r and the apex.
+            way.sx, way.sy, way.h = qx, qy, 3 * g + (e + 1) % 3
+        else:
+            way.rx, way.ry, way.h = qx, qy, 3 * g + (e + 2) % 3
+    return Location(-1, 0.0, 0.0, 0.0)

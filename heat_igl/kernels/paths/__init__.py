@@ -1,0 +1,1 @@
+"""Curves on triangles: followed, shortened within their class, and straightened."""

@@ -1,0 +1,188 @@
+"""Tables of spokes for sweeps over a triangulation."""
+
+import cython
+import numpy as np
+from cython.cimports.heat_igl.kernels.sweep.half_edges import Corner, Spoke, following, preceding
+from cython.cimports.libc.math import M_PI, NAN, atan2, fabs, sqrt
+
+__all__ = ["HalfEdges", "fill", "first_spokes"]
+
+_CORNER = np.dtype([("x", "f8"), ("y", "f8"), ("angle", "f8")])
+
+
+@cython.final
+@cython.cclass
+class HalfEdges:
+    """Views of the arrays of `heat_igl.unfolding.spokes.Spokes`."""
+
+    def __init__(self, spokes):
+        self.first = spokes.first
+        self.spoke = spokes.spoke
+
+
+def first_spokes(F: cython.const[cython.int][:, ::1], twin: cython.const[cython.int][::1], n: cython.int):
+    """First spoke (n + 1,) int32 of each vertex: one per corner, and one more at the end of an open fan."""
+    f: cython.Py_ssize_t
+    c: cython.int
+    h: cython.int
+    v: cython.int
+    array = np.zeros(n + 1, np.int32)
+    first: cython.int[::1] = array
+    with cython.nogil:
+        for f in range(F.shape[0]):
+            for c in range(3):
+                h = 3 * f + c
+                first[F[f, c] + 1] += 2 if twin[following(h)] < 0 else 1
+        for v in range(n):
+            first[v + 1] += first[v]
+    return array
+
+
+def fill(
+    F: cython.const[cython.int][:, ::1],
+    l: cython.const[cython.double][:, ::1],
+    twin: cython.const[cython.int][::1],
+    first: cython.const[cython.int][::1],
+    spoke: Spoke[::1],
+):
+    """Fill the spokes; returns the total angle (k,) of each fan, and whether each vertex (n,) is flat.
+
+    A vertex is flat if the first fan of it has no curvature, or is open; or if it has none.
+    """
+    total_array, flat_array = np.empty(twin.shape[0]), np.ones(first.shape[0] - 1, np.uint8)
+    is_flat: cython.uchar[::1] = flat_array
+    total: cython.double[::1] = total_array
+    corner: Corner[::1] = np.empty(twin.shape[0], _CORNER)
+    # The corner to the left of each spoke, -1 past the end of an open fan.
+    left: cython.int[::1] = np.empty(spoke.shape[0], np.int32)
+    end: cython.int[::1] = np.array(first)
+    is_done: cython.uchar[::1] = np.zeros(twin.shape[0], np.uint8)
+    n_fans: cython.int
+    with cython.nogil:
+        _shapes(l, corner)
+        n_fans = _fans(F, twin, corner, first, total, is_flat, spoke, left, end, is_done)
+        _fill_spokes(F, l, twin, corner, spoke, left)
+    return total_array[:n_fans].copy(), flat_array.view(bool)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _shapes(l: cython.const[cython.double][:, ::1], corner: Corner[::1]) -> cython.void:
+    """Place and angle of each corner."""
+    f: cython.Py_ssize_t
+    c: cython.int
+    for f in range(l.shape[0]):
+        for c in range(3):
+            base: cython.double = l[f, c]
+            right: cython.double = l[f, (c + 2) % 3]
+            left: cython.double = l[f, (c + 1) % 3]
+            # Heron's formula as a product of differences: a height from right^2 - x^2 loses the digits of slivers.
+            half: cython.double = 0.5 * (base + right + left)
+            product: cython.double = max(half * (half - base) * (half - right) * (half - left), 0.0)
+            here = cython.address(corner[3 * f + c])
+            here.x = 0.5 * ((right - left) * (right + left) / (base * base) + 1.0)
+            here.y = 2.0 * sqrt(product) / (base * base)
+            here.angle = 2.0 * atan2(
+                sqrt(max((half - right) * (half - left), 0.0)), sqrt(max(half * (half - base), 0.0))
+            )
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _fans(
+    F: cython.const[cython.int][:, ::1],
+    twin: cython.const[cython.int][::1],
+    corner: Corner[::1],
+    first: cython.const[cython.int][::1],
+    total: cython.double[::1],
+    is_flat: cython.uchar[::1],
+    spoke: Spoke[::1],
+    left: cython.int[::1],
+    end: cython.int[::1],
+    is_done: cython.uchar[::1],
+) -> cython.int:
+    """Glue corners to fans, in rows of spokes from ``end[v]`` on; returns how many fans there are."""
+    h: cython.int
+    k: cython.int
+    t: cython.int = -1
+    n_fans: cython.int = 0
+    for h in range(twin.shape[0]):
+        if is_done[h]:
+            continue
+        start: cython.int = h
+        is_open: cython.bint = False
+        while True:  # clockwise, to the boundary or once around
+            t = twin[preceding(start)]
+            if t < 0:
+                is_open = True
+                break
+            start = preceding(t)
+            if start == h:
+                break
+        v: cython.int = F[h // 3, h % 3]
+        row: cython.int = end[v]
+        begin: cython.int = row
+        angle: cython.double = 0.0
+        k = start
+        while True:  # counter-clockwise
+            is_done[k] = True
+            left[row] = k
+            spoke[row].next = row + 1
+            row += 1
+            angle += corner[k].angle
+            t = twin[following(k)]
+            if t < 0:
+                break
+            k = following(t)
+            if k == start:
+                break
+        if t < 0:  # the last side, which has no triangle to its left
+            left[row] = -1
+            spoke[row].next = row
+            row += 1
+        else:
+            spoke[row - 1].next = begin
+        if begin == first[v]:
+            is_flat[v] = is_open or fabs(angle - 2.0 * M_PI) < 1e-9
+        end[v] = row
+        total[n_fans] = -angle if is_open else angle
+        n_fans += 1
+    return n_fans
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _fill_spokes(
+    F: cython.const[cython.int][:, ::1],
+    l: cython.const[cython.double][:, ::1],
+    twin: cython.const[cython.int][::1],
+    corner: Corner[::1],
+    spoke: Spoke[::1],
+    left: cython.int[::1],
+) -> cython.void:
+    """What a spoke knows of the triangle to its left, and of the one beyond."""
+    k: cython.int
+    h: cython.int = -1
+    t: cython.int
+    for k in range(spoke.shape[0]):
+        s = cython.address(spoke[k])
+        s.beyond = -1
+        if left[k] < 0:  # past the end of the fan of the spoke before
+            s.length = l[following(h) // 3, following(h) % 3]
+            s.height = NAN
+            s.neighbour = s.next_neighbour = F[h // 3, preceding(h) % 3]
+            continue
+        h = left[k]
+        # The spoke is the side opposite the corner at the left neighbour.
+        base: cython.double = l[h // 3, h % 3]
+        s.length, s.base = l[h // 3, preceding(h) % 3], base
+        s.along, s.height = corner[h].x * base, corner[h].y * base
+        s.neighbour, s.next_neighbour = F[h // 3, following(h) % 3], F[h // 3, preceding(h) % 3]
+        t = twin[h]
+        if t >= 0:
+            # Seen from beyond, the side runs the other way.
+            s.beyond_along, s.beyond_depth = (1.0 - corner[t].x) * base, corner[t].y * base
+            s.beyond = F[t // 3, t % 3]

@@ -1,3 +1,0 @@
-from heat_igl.kernels.window_structures cimport Search
-
-cdef void emit_vertex(Search* s, int v) noexcept nogil

@@ -1,6 +1,0 @@
-from heat_igl.kernels.window_structures cimport Ray, Search
-
-cdef int third(int k, int side) noexcept nogil
-cdef int beyond(Search* s, int k, int side) noexcept nogil
-cdef void turn(Search* s, int k, int side, Ray* ray) noexcept nogil
-cdef unsigned char classify(Search* s, int v) noexcept nogil

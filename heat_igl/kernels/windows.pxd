@@ -1,5 +1,0 @@
-from heat_igl.kernels.window_structures cimport Search
-
-cdef class Front:
-    cdef Search state
-    cdef object arrays

@@ -1,0 +1,4 @@
+from heat_igl.kernels.windows.window_structures cimport Search
+
+cdef void cross(Search* s, int h) noexcept nogil
+cdef void over_corners(Search* s, int j) noexcept nogil

@@ -1,0 +1,326 @@
+"""Windows cross a face: they give distances to the opposite vertex and the targets inside, and windows on two sides."""
+
+import cython
+from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.prefetch import prefetch
+from cython.cimports.heat_igl.kernels.windows.window_distances import relax, take
+from cython.cimports.heat_igl.kernels.windows.window_lists import add
+from cython.cimports.heat_igl.kernels.windows.window_memory import more_room
+from cython.cimports.heat_igl.kernels.windows.window_structures import (
+    AROUND_APEX,
+    LEFT_OF_APEX,
+    NARROW,
+    NEAR,
+    RIGHT_OF_APEX,
+    Apex,
+    List,
+    Search,
+    Window,
+    apart,
+    at_corner,
+    backward,
+    lateral,
+    reach,
+    twice_product,
+)
+from cython.cimports.heat_igl.kernels.windows.window_trimming import trim
+from cython.cimports.libc.math import INFINITY, sqrt
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _bent(w: cython.pointer(Window), at: cython.double, x: cython.double, y: cython.double) -> cython.double:
+    """Length of the path through a point of the half-edge to a point of the face."""
+    return w.offset + reach(w, at) + sqrt((at - x) * (at - x) + y * y)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
+    """The corner opposite half-edge h."""
+    apex: Apex
+    apex.length = s.length[h]
+    apex.left_length = s.length[previous_half_edge(h)]
+    apex.right_length = s.length[next_half_edge(h)]
+    apex.x = 0.5 * twice_product(apex.length, apex.left_length, apex.right_length) / apex.length
+    apex.right_x = 0.5 * twice_product(apex.length, apex.right_length, apex.left_length) / apex.length
+    apex.y = s.double_area[h // 3] / apex.length
+    apex.cos_left, apex.sin_left = apex.x / apex.left_length, apex.y / apex.left_length
+    apex.cos_right, apex.sin_right = apex.right_x / apex.right_length, apex.y / apex.right_length
+    apex.best, apex.best_at, apex.nearest = -1, 0.0, INFINITY
+    return apex
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _arrive(
+    s: cython.pointer(Search), h: cython.int, w: cython.pointer(Window), distance: cython.double, at: cython.double
+) -> cython.void:
+    """Take the distance of the corner opposite h by the line of a window through a point of h."""
+    x: cython.double = at - w.x
+    leaving_x: cython.double = x * w.turn_x - w.depth * w.turn_y
+    leaving_y: cython.double = x * w.turn_y + w.depth * w.turn_x
+    if w.is_plane:
+        leaving_x, leaving_y = w.turn_x + w.turn_y * w.depth * at, w.turn_y
+    relax(s, s.vertex[h], distance, w.root, h, at, w.corner, leaving_x, leaving_y)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _reach_apex(
+    s: cython.pointer(Search),
+    h: cython.int,
+    windows: cython.pointer(Window),
+    n: cython.int,
+    apex: cython.pointer(Apex),
+) -> cython.void:
+    """Distance of the apex, and the side on which the lines of each window pass it."""
+    i: cython.int
+    x: cython.double
+    m: cython.double
+    a: cython.double
+    b: cython.double
+    at: cython.double
+    distance: cython.double
+    w: cython.pointer(Window)
+    for i in range(n):
+        w = windows + i
+        if w.is_plane:
+            x = backward(w, apex.x, apex.y)
+            m = 1.0
+            a = w.start - x
+            b = w.stop - x
+            distance = w.offset + w.x * apex.x + w.depth * apex.y
+        else:
+            x = apex.x - w.x
+            m = apex.y + w.depth
+            a = (w.start - w.x) * m - w.depth * x
+            b = (w.stop - w.x) * m - w.depth * x
+            distance = w.offset + sqrt(x * x + m * m)
+        if b < 0.0:
+            w.side = LEFT_OF_APEX
+            if b < -NEAR * apex.length * m:
+                continue
+            b = w.stop
+        elif a > 0.0:
+            w.side = RIGHT_OF_APEX
+            if a > NEAR * apex.length * m:
+                continue
+            b = w.start
+        else:
+            w.side = AROUND_APEX
+            if distance < apex.nearest:
+                apex.nearest = distance
+                apex.best = i
+            continue
+        # The apex is just beside the window: the path over the end of the window is hardly longer, and comes from the
+        # same direction as a straight one.
+        at = backward(w, apex.x, apex.y)
+        at = 0.0 if at < 0.0 else apex.length if at > apex.length else at
+        _arrive(s, h, w, _bent(w, b, apex.x, apex.y), at)
+    if apex.best >= 0:
+        w = windows + apex.best
+        apex.best_at = backward(w, apex.x, apex.y)
+        _arrive(s, h, w, apex.nearest, apex.best_at)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _to_left(
+    w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window), turns: cython.bint
+) -> cython.bint:
+    """Make the window over the side between the tail and the apex; true if there is one.
+
+    Without `turns` windows are not asked where their lines leave the root.
+    """
+    scale: cython.double
+    out[0] = w[0]
+    if w.is_plane:
+        out.x = w.x * apex.cos_left + w.depth * apex.sin_left
+        out.depth = w.depth * apex.cos_left - w.x * apex.sin_left
+    else:
+        out.x = w.x * apex.cos_left - w.depth * apex.sin_left
+        out.depth = w.x * apex.sin_left + w.depth * apex.cos_left
+        if turns:
+            out.turn_x = w.turn_x * apex.cos_left - w.turn_y * apex.sin_left
+            out.turn_y = w.turn_x * apex.sin_left + w.turn_y * apex.cos_left
+    if out.depth <= 0.0:
+        return False
+    scale = w.depth * apex.cos_left
+    out.start = w.start * w.depth / (scale - lateral(w, w.start) * apex.sin_left)
+    out.stop = apex.left_length
+    if w.side == LEFT_OF_APEX:
+        out.stop = w.stop * w.depth / (scale - lateral(w, w.stop) * apex.sin_left)
+        if out.stop > apex.left_length:
+            out.stop = apex.left_length
+    return out.stop - out.start > NARROW * apex.left_length
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _to_right(
+    w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window), turns: cython.bint
+) -> cython.bint:
+    """Make the window over the side between the apex and the head; true if there is one."""
+    scale: cython.double
+    x: cython.double = apex.length - w.x
+    out[0] = w[0]
+    if w.is_plane:
+        out.offset = w.offset + w.x * apex.x + w.depth * apex.y
+        out.x = w.x * apex.cos_right - w.depth * apex.sin_right
+        out.depth = w.x * apex.sin_right + w.depth * apex.cos_right
+        out.turn_x = w.turn_x + w.turn_y * (w.depth * apex.x - w.x * apex.y)
+    else:
+        out.x = apex.right_length - (x * apex.cos_right - w.depth * apex.sin_right)
+        out.depth = x * apex.sin_right + w.depth * apex.cos_right
+        if turns:
+            out.turn_x = w.turn_x * apex.cos_right + w.turn_y * apex.sin_right
+            out.turn_y = w.turn_y * apex.cos_right - w.turn_x * apex.sin_right
+    if out.depth <= 0.0:
+        return False
+    scale = w.depth * apex.cos_right
+    out.stop = apex.right_length - (apex.length - w.stop) * w.depth / (scale + lateral(w, w.stop) * apex.sin_right)
+    out.start = 0.0
+    if w.side == RIGHT_OF_APEX:
+        out.start = apex.right_length - (apex.length - w.start) * w.depth / (
+            scale + lateral(w, w.start) * apex.sin_right
+        )
+        if out.start < 0.0:
+            out.start = 0.0
+    return out.stop - out.start > NARROW * apex.right_length
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _fetch(s: cython.pointer(Search), t: cython.int) -> cython.void:
+    """Prefetch the data for windows over half-edge t."""
+    prefetch(s.slot + t)
+    prefetch(s.length + t)
+    prefetch(s.bulge + t)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
+    """Carry the windows that wait at half-edge h over its face."""
+    place: cython.int = s.slot[h]
+    one: cython.pointer(List) = cython.address(s.lists[place])
+    windows: cython.pointer(Window) = one.windows
+    n: cython.int = one.count
+    i: cython.int
+    n_left: cython.int = 0
+    n_right: cython.int = 0
+    apex: Apex
+    w: cython.pointer(Window)
+    is_best: cython.bint
+    turns: cython.bint = s.merging == 0.0
+    _fetch(s, s.twin[previous_half_edge(h)])
+    _fetch(s, s.twin[next_half_edge(h)])
+    s.slot[h] = -1
+    s.n_lists_done += 1
+    s.n_waiting -= n
+    n = trim(s, windows, n, h)
+    if n > s.n_out:
+        more_room(s, n)
+        if s.failed:
+            return
+    apex = _opposite(s, h)
+    _reach_apex(s, h, windows, n, cython.address(apex))
+    if s.first_target != cython.NULL and s.first_target[h // 3] >= 0:
+        _measure(s, h, windows, n, apex.x, apex.y)
+    for i in range(n):
+        w = windows + i
+        # Windows whose lines would cross a shorter path to the apex go no further.
+        is_best = apex.best < 0 or i == apex.best
+        if w.side != RIGHT_OF_APEX and (
+            is_best
+            or w.start < apex.best_at
+            or (w.side != AROUND_APEX and not apex.nearest <= _bent(w, w.stop, apex.x, apex.y))
+        ):
+            n_left += _to_left(w, cython.address(apex), s.to_left + n_left, turns)
+        if w.side != LEFT_OF_APEX and (
+            is_best
+            or w.stop > apex.best_at
+            or (w.side != AROUND_APEX and not apex.nearest <= _bent(w, w.start, apex.x, apex.y))
+        ):
+            n_right += _to_right(w, cython.address(apex), s.to_right + n_right, turns)
+    # The list is free again; its room stays with it.
+    s.lists[place].count = s.free_list
+    s.lists[place].half_edge = -1
+    s.free_list = place
+    if n_left > 0:
+        add(s, previous_half_edge(h), s.to_left, n_left, True)
+    if n_right > 0:
+        add(s, next_half_edge(h), s.to_right, n_right, False)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _measure(
+    s: cython.pointer(Search),
+    h: cython.int,
+    windows: cython.pointer(Window),
+    n: cython.int,
+    apex_x: cython.double,
+    apex_y: cython.double,
+) -> cython.void:
+    """Distances of the targets in the face of h, over its windows."""
+    j: cython.int = s.first_target[h // 3]
+    i: cython.int
+    length: cython.double = s.length[h]
+    x: cython.double
+    y: cython.double
+    at: cython.double
+    distance: cython.double
+    w: cython.pointer(Window)
+    while j >= 0:
+        x = s.target[3 * j + previous_half_edge(h) % 3] * length + s.target[3 * j + h % 3] * apex_x
+        y = s.target[3 * j + h % 3] * apex_y
+        for i in range(n):
+            w = windows + i
+            at = backward(w, x, y)
+            if at < w.start:
+                if at < w.start - NEAR * length:
+                    continue
+                at = w.start
+            if at > w.stop:
+                if at > w.stop + NEAR * length:
+                    continue
+                at = w.stop
+            distance = _bent(w, at, x, y)
+            if y == 0.0:
+                # On the side itself: the copy in the face before knows the last face of the path.
+                distance += s.tolerance * distance
+            if distance < s.target_distance[j]:
+                s.target_distance[j] = distance
+                s.target_root[j] = w.root
+                s.target_entered[j] = h
+                s.target_crossing[j] = at
+        j = s.next_target[j]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def over_corners(s: cython.pointer(Search), j: cython.int) -> cython.void:
+    """Distance of target j over the corners of its face."""
+    f: cython.int = s.target_face[j]
+    c: cython.int
+    v: cython.int
+    corner: cython.double[3]
+    for c in range(3):
+        at_corner(c, corner)
+        v = s.vertex[3 * f + c]
+        take(s, j, s.distance[v] + apart(s.length + 3 * f, corner, s.target + 3 * j), v)

@@ -1,0 +1,3 @@
+from heat_igl.kernels.windows.window_structures cimport Search
+
+cdef void run_beside(Search* s) noexcept nogil

@@ -1,0 +1,176 @@
+"""The surface as windows read it: shapes of faces, corners of vertices, and whether paths may bend at a vertex.
+
+Half-edge ``3 f + c`` is the side of face f opposite its corner c; the corner carries the same number.
+"""
+
+import cython
+from cython.cimports.heat_igl.kernels.mesh.triangles import area, next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.windows.window_structures import (
+    BENDS,
+    ENDS,
+    FLAT,
+    FLATNESS,
+    JOINS,
+    PASSED,
+    Ray,
+    Search,
+    twice_product,
+)
+from cython.cimports.libc.math import fabs
+
+__all__ = ["FLAT_VERTEX", "SEVERAL_FANS", "shapes"]
+
+#: The kind of a vertex whose faces are several fans, or at an edge of more than two faces.
+SEVERAL_FANS = cython.cast(cython.int, JOINS)
+#: The kind of an inner vertex whose angles sum to 2 pi.
+FLAT_VERTEX = cython.cast(cython.int, FLAT)
+
+
+def shapes(
+    vertex: cython.int[::1],
+    length: cython.double[::1],
+    twin: cython.int[::1],
+    kind: cython.uchar[::1],
+    n_corners: cython.int[::1],
+    double_area: cython.double[::1],
+    bulge: cython.double[::1],
+    corner_of_vertex: cython.int[::1],
+    next_corner: cython.int[::1],
+) -> bool:
+    """Fill the tables that `windows.Front` takes of a surface; returns whether it is intrinsic Delaunay.
+
+    Parameters
+    ----------
+    vertex, length, twin : (3 m,)
+        Vertex of each corner, length of each half-edge, and the half-edge glued to it: -1 on the boundary, -2 where
+        more than two faces meet.
+    kind : (n,)
+        Takes JOINS at the ends of edges of more than two faces; the rest must come as UNKNOWN.
+    n_corners : (n,)
+        Takes the number of corners of each vertex; must come full of 0.
+    double_area : (m,)
+        Takes twice the area of each face.
+    bulge : (3 m,)
+        Takes the length of each half-edge times the cotangent of the angle opposite: the circle around the face has the
+        power ``x (x - length) + y (y + bulge)`` at the point (x, -y) of the frame of the half-edge.
+    corner_of_vertex, next_corner : (n,), (3 m,)
+        Take the corners of each vertex as linked lists that end with -1; the first must come full of -1.
+    """
+    m: cython.int = double_area.shape[0]
+    f: cython.int
+    h: cython.int
+    c: cython.int
+    v: cython.int
+    a: cython.double
+    b: cython.double
+    d: cython.double
+    twice: cython.double
+    is_delaunay: cython.bint = True
+    with cython.nogil:
+        for f in range(m):
+            h = 3 * f
+            a, b, d = length[h], length[h + 1], length[h + 2]
+            # A needle without height would have no circle.
+            twice = 2.0 * area(a, b, d) + 1e-20 * a * a
+            double_area[f] = twice
+            bulge[h] = a * twice_product(b, d, a) / (2.0 * twice)
+            bulge[h + 1] = b * twice_product(a, d, b) / (2.0 * twice)
+            bulge[h + 2] = d * twice_product(a, b, d) / (2.0 * twice)
+            for c in range(3):
+                v = vertex[h + c]
+                next_corner[h + c] = corner_of_vertex[v]
+                corner_of_vertex[v] = h + c
+                n_corners[v] += 1
+        for h in range(3 * m):
+            if twin[h] > h and bulge[h] + bulge[twin[h]] < -1e-6 * length[h]:
+                is_delaunay = False
+            elif twin[h] == -2:
+                kind[vertex[next_half_edge(h)]] = kind[vertex[previous_half_edge(h)]] = JOINS
+                is_delaunay = False
+    return is_delaunay
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def third(k: cython.int, side: cython.int) -> cython.int:
+    """The half-edge of the face that is neither of two others."""
+    return 9 * (k // 3) + 3 - k - side
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def beyond(s: cython.pointer(Search), k: cython.int, side: cython.int) -> cython.int:
+    """The corner of the same vertex beyond a side of corner k; -1 where there is not just one face."""
+    t: cython.int = s.twin[side]
+    is_tail: cython.bint = side == previous_half_edge(k)
+    if t < 0:
+        return -1
+    if s.aligned[side]:
+        is_tail = not is_tail
+    return next_half_edge(t) if is_tail else previous_half_edge(t)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Ray)) -> cython.void:
+    """Turn a direction by the angle of corner k, which has the side `side`."""
+    p: cython.double = s.length[side]
+    q: cython.double = s.length[third(k, side)]
+    scale: cython.double = 0.5 / (p * q)
+    cosine: cython.double = twice_product(p, q, s.length[k]) * scale
+    sine: cython.double = 2.0 * s.double_area[k // 3] * scale
+    ray.cosine, ray.sine = ray.cosine * cosine - ray.sine * sine, ray.cosine * sine + ray.sine * cosine
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
+    """The kind of vertex v, by a walk around it: whether the faces are one fan, and whether the angles exceed 2 pi."""
+    start: cython.int = s.corner_of_vertex[v]
+    k: cython.int = start
+    side: cython.int = previous_half_edge(start)
+    ahead: cython.int
+    n_corners: cython.int = s.n_corners[v]
+    n_seen: cython.int = 0
+    n_half_turns: cython.int = 0
+    was_below: cython.bint
+    ray: Ray
+    ray.cosine, ray.sine = 1.0, 0.0
+    while n_seen < n_corners:
+        n_seen += 1
+        was_below = ray.sine < 0.0
+        turn(s, k, side, cython.address(ray))
+        n_half_turns += was_below != (ray.sine < 0.0)
+        if side == previous_half_edge(k) and s.aligned[next_half_edge(k)]:
+            # The usual case, with fewer steps that wait for one another.
+            side = s.twin[next_half_edge(k)]
+            if side < 0:
+                break
+            k = next_half_edge(side)
+        else:
+            side = third(k, side)
+            ahead = beyond(s, k, side)
+            if ahead < 0:
+                break
+            k = ahead
+            side = s.twin[side]
+        if k == start:
+            if n_seen < n_corners:
+                return JOINS
+            if n_half_turns < 2 or (n_half_turns == 2 and ray.cosine > 0.0 and ray.sine < FLATNESS):
+                return FLAT if ray.cosine > 0.0 and fabs(ray.sine) < FLATNESS else PASSED
+            return BENDS
+    # An open fan: from the start to its other end.
+    k = start
+    side = previous_half_edge(start)
+    while n_seen < n_corners:
+        k = beyond(s, k, side)
+        if k < 0:
+            return JOINS
+        n_seen += 1
+        side = third(k, s.twin[side])
+    return ENDS

@@ -1,0 +1,3 @@
+from heat_igl.kernels.windows.window_structures cimport Search, Window
+
+cdef int trim(Search* s, Window* windows, int n, int h) noexcept nogil
