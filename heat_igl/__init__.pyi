@@ -72,7 +72,6 @@ from heat_igl.mesh import closest_points as closest_points
 from heat_igl.mesh import curve_on as curve_on
 from heat_igl.mesh import edge_curve as edge_curve
 from heat_igl.mesh import image_domain as image_domain
-from heat_igl.mesh import merge_seams as merge_seams
 from heat_igl.mesh import region_boundary as region_boundary
 from heat_igl.mesh import split_long_edges as split_long_edges
 from heat_igl.mesh import terrain as terrain

@@ -73,7 +73,6 @@ CALLS: dict[str, Call] = {
     "smooth": lambda mesh: heat_igl.smooth(mesh, PHI, 0.3),
     "speed_operators": lambda mesh: heat_igl.speed_operators(mesh, np.ones(MESH.n_faces)).L,
     "activation_times": lambda mesh: heat_igl.activation_times(mesh, np.eye(3), 0),
-    "merge_seams": lambda mesh: heat_igl.merge_seams(mesh).mesh.V,
     "split_long_edges": lambda mesh: heat_igl.split_long_edges(mesh, 0.3).V,
     "straighten": lambda mesh: heat_igl.straighten(mesh, PATH).positions(MESH),
     "sublevel_areas": lambda mesh: heat_igl.sublevel_areas(mesh, PHI, [0.1, 0.3]),

@@ -1,4 +1,4 @@
-"""Texture seams: what a loader split is measured as one, and nothing else is joined."""
+"""Texture seams: what a loader split is measured as one where that is asked for, and nothing else is joined."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import Mesh, MeshError, merge_seams, shapes
+from heat_igl import Mesh, as_mesh, shapes
 
 
 def split(mesh: Mesh, chart: np.ndarray) -> tuple[Mesh, np.ndarray]:
@@ -29,19 +29,63 @@ def charts(mesh: Mesh, kind: str, seed: int) -> np.ndarray:
     return np.arange(len(centre))  # every face by itself, as in files without shared vertices
 
 
-@pytest.mark.parametrize("kind", ["halves", "cells", "faces"])
-@pytest.mark.parametrize("seed", range(4))
-def test_a_split_model_is_measured_as_one(kind: str, seed: int) -> None:
-    whole = [shapes.icosphere(3), shapes.torus(20, 12), shapes.grid(9), shapes.strip(30, 4)][seed]
-    parts, was = split(whole, charts(whole, kind, seed))
-    assert len(parts.report().seam_edges)
-    joined = merge_seams(parts)
-    assert joined.mesh.report().seam_edges.size == 0
-    assert (joined.mesh.n_vertices, joined.mesh.n_faces) == (whole.n_vertices, whole.n_faces)
-    np.testing.assert_array_equal(joined.mesh.V[joined.vertex], parts.V)
-    distance = heat_igl.geodesic_distance(joined.mesh, joined.vertex[0], method="exact")[joined.vertex]
-    truth = heat_igl.geodesic_distance(whole, was[0], method="exact")[was]
-    np.testing.assert_allclose(distance, truth, rtol=1e-12, atol=1e-12 * truth.max())
+@pytest.fixture(params=["halves", "cells", "faces"])
+def torn(request) -> tuple[Mesh, Mesh, np.ndarray]:
+    """A surface, the same with seams that are merged, and which of its vertices each of those was."""
+    whole = shapes.torus(20, 12)
+    parts, was = split(whole, charts(whole, request.param, 3))
+    return whole, as_mesh(parts, merge="seams"), was
+
+
+def test_a_split_model_is_measured_as_one(torn) -> None:
+    whole, joined, was = torn
+    assert joined.report().seam_edges.size == joined.report().unreferenced_vertices.size == 0
+    assert joined.with_vertices(2 * joined.V).has_copies
+    source = int(np.argmax(joined.originals != np.arange(len(was))))  # a copy
+    region, region_of_whole = joined.V[:, 0] > -0.5, whole.V[:, 0] > -0.5
+
+    def of_both(answer) -> None:
+        found, truth = answer(joined, source, region), answer(whole, was[source], region_of_whole)[was]
+        np.testing.assert_allclose(found, truth, rtol=1e-12, atol=1e-12)
+
+    of_both(lambda mesh, at, _: heat_igl.geodesic_distance(mesh, at, method="exact"))
+    of_both(lambda mesh, at, _: heat_igl.geodesic_distance(mesh, at, cutoff=0.4))
+    of_both(lambda mesh, at, _: heat_igl.GeodesicSolver(mesh, method="sweep").distances([[at]])[0])
+    of_both(lambda mesh, at, inside: heat_igl.geodesic_distance(mesh, at, region=inside))
+    of_both(lambda mesh, at, _: heat_igl.GeodesicSolver(mesh).directions(at).gradient)
+    of_both(lambda mesh, *_: heat_igl.tangent_frames(mesh).normal)
+    of_both(lambda mesh, at, _: heat_igl.distances_within(mesh, 0.8, at).toarray()[0])
+    np.testing.assert_allclose(
+        heat_igl.distances_within(joined, 0.8, region=region).toarray(),
+        heat_igl.distances_within(whole, 0.8, region=region_of_whole).toarray()[np.ix_(was, was)],
+        atol=1e-12,
+    )
+    assert heat_igl.pair_distances(joined, [[source, joined.originals[source]]]) == 0
+    there = int(np.argmax(joined.originals[::-1] != np.arange(len(was))[::-1]))
+    path = heat_igl.shortest_path(joined, source, len(was) - 1 - there)
+    truth = heat_igl.geodesic_distance(whole, was[source])[was[len(was) - 1 - there]]
+    assert path.length == pytest.approx(truth, rel=1e-12)
+
+
+def test_heat_takes_a_split_model_as_one(torn) -> None:
+    whole, joined, was = torn
+    source = int(np.argmax(joined.originals != np.arange(len(was))))
+    for make in (heat_igl.HeatMethodSolver, heat_igl.VectorHeatSolver):
+        found, truth = make(joined, t_coef=1.0), make(whole, t_coef=1.0)
+        if make is heat_igl.HeatMethodSolver:
+            pairs = [(found.distance(source), truth.distance(was[source]))]
+            pairs.append((found.solve(source).heat, truth.solve(was[source]).heat))
+        else:
+            pairs = [(found.extend([source, 0], [1.0, 2.0]), truth.extend(was[[source, 0]], [1.0, 2.0]))]
+            pairs.append((found.reaches(0), truth.reaches(was[0])))
+        for ours, theirs in pairs:
+            np.testing.assert_allclose(ours, theirs[was], rtol=1e-6, atol=1e-9)
+    loop = heat_igl.isolines(joined, joined.V[:, 2], [0.05])
+    np.testing.assert_allclose(
+        heat_igl.signed_distance(joined, loop),
+        heat_igl.signed_distance(whole, heat_igl.isolines(whole, whole.V[:, 2], [0.05]))[was],
+        atol=1e-9,
+    )
 
 
 def test_a_slit_that_leaves_one_piece_is_closed() -> None:
@@ -51,11 +95,12 @@ def test_a_slit_that_leaves_one_piece_is_closed() -> None:
     V = np.stack([np.cos(angle), np.sin(angle), height], axis=-1).reshape(-1, 3)
     unrolled = Mesh(V, shapes.strip(n, 4).F)
     assert unrolled.components.max() == 0
-    joined = merge_seams(unrolled)
-    assert joined.mesh.n_vertices == 5 * n
-    assert joined.mesh.report().n_boundary_loops == 2
-    beside = joined.vertex[n - 1]
-    assert heat_igl.geodesic_distance(joined.mesh, joined.vertex[0])[beside] == pytest.approx(2 * np.sin(np.pi / n))
+    joined = as_mesh(unrolled, merge="seams")
+    assert joined.referenced.sum() == 5 * n
+    assert joined.report().n_boundary_loops == 2
+    phi = heat_igl.geodesic_distance(joined, n)  # a copy of vertex 0
+    assert phi[0] == phi[n] == 0
+    assert phi[n - 1] == pytest.approx(2 * np.sin(np.pi / n))
 
 
 def with_copy(mesh: Mesh, V: np.ndarray, flipped: bool) -> Mesh:
@@ -67,7 +112,7 @@ def with_copy(mesh: Mesh, V: np.ndarray, flipped: bool) -> Mesh:
 def test_a_sheet_on_another_is_left_alone(flipped: bool) -> None:
     sheet = shapes.grid(5)
     double = with_copy(sheet, sheet.V, flipped)
-    assert merge_seams(double).mesh is double
+    assert as_mesh(double, merge="seams") is double
     assert double.report().seam_edges.size == 0
 
 
@@ -78,28 +123,34 @@ def test_sheets_that_are_only_near_are_left_alone(seed: int) -> None:
     parts, _ = split(ball, charts(ball, "cells", seed))
     gap = 10.0 ** -generator.integers(3, 15)
     moved = Mesh(parts.V * (1 + gap * generator.uniform(1, 2, (parts.n_vertices, 1))), parts.F)
-    assert merge_seams(moved).mesh is moved
+    assert as_mesh(moved, merge="seams") is moved
 
 
 def test_t_junctions_and_three_sheets_are_left_alone() -> None:
     V = np.array([[0, 0, 0], [2, 0, 0], [1, 2, 0], [0, 0, 0], [1, 0, 0], [2, 0, 0], [1, -2, 0]], float)
     tee = Mesh(V, [[0, 1, 2], [4, 3, 6], [5, 4, 6]])
-    assert merge_seams(tee).mesh is tee
+    assert as_mesh(tee, merge="seams") is tee
     three = Mesh(
         [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [0, 0, 0], [0, -1, 0], [1, 0, 0], [0, 0, 0], [0, 0, 1]],
         [[0, 1, 2], [3, 4, 5], [6, 7, 8]],
     )
-    assert merge_seams(three).mesh is three
-    two = Mesh(three.V[:6], three.F[:2])
-    assert merge_seams(two).mesh.n_vertices == 4
+    assert as_mesh(three, merge="seams") is three
+    assert as_mesh((three.V[:6], three.F[:2]), merge="seams").referenced.sum() == 4
+    for other in (shapes.box(1), heat_igl.PointCloud(three.V)):
+        assert as_mesh(other, merge="seams") is other
 
 
-def test_objects_of_other_libraries_are_warned_of() -> None:
+def test_what_is_none_of_this_package_is_warned_of(tmp_path) -> None:
     parts, _ = split(shapes.icosphere(2), charts(shapes.icosphere(2), "halves", 1))
+    heat_igl.write_mesh(tmp_path / "parts.ply", parts)
     theirs = SimpleNamespace(vertices=parts.V, faces=parts.F)
-    with pytest.warns(heat_igl.AccuracyWarning, match=r"\d+ boundary edges .* heat_igl.merge_seams joins them"):
-        heat_igl.geodesic_distance(theirs, 0)
-    assert merge_seams(theirs).mesh.n_vertices == 162
-    heat_igl.as_mesh(SimpleNamespace(vertices=shapes.grid(3).V, faces=shapes.grid(3).F))
-    with pytest.raises(MeshError, match="mesh is tetrahedral"):
-        merge_seams(shapes.box(1))
+    for mesh in (theirs, (parts.V, parts.F), tmp_path / "parts.ply"):
+        with pytest.warns(heat_igl.AccuracyWarning, match=r"\d+ boundary edges .*merge=\"seams\"\) joins them") as said:
+            heat_igl.geodesic_distance(mesh, 0)
+        assert len(said) == 1
+        assert as_mesh(mesh, merge="seams").referenced.sum() == 162
+    as_mesh(SimpleNamespace(vertices=shapes.grid(3).V, faces=shapes.grid(3).F))
+    with pytest.raises(ValueError, match="merge must be one of 'seams'"):
+        as_mesh(parts, merge="all")
+    with pytest.raises(ValueError, match="none of which is a copy"):
+        heat_igl.GeodesicSolver(as_mesh(parts, merge="seams")).distance_vjp(0)

@@ -103,7 +103,7 @@ def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = Non
     if triangles.is_tetrahedral:
         raise MeshError("log maps need triangles, and the mesh holds tetrahedra")
     n = triangles.n_vertices
-    chosen = np.arange(n) if sources is None else named_vertices(sources, n)
+    chosen = triangles.originals[np.arange(n) if sources is None else named_vertices(sources, n)]
     surface = unfolding_surface(triangles, MARGIN)
     directions, edges = PathDirections(surface), from_triangulation(surface.unfolding)
     indptr, ways, distance = _paths(edges, chosen, limit)
@@ -116,7 +116,8 @@ def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = Non
     rotation = turn - 2 * np.pi * np.rint(turn / (2 * np.pi))
     values = [np.nan_to_num(value) for value in (angles.departure, in_circle(back + np.pi), rotation)]
     shape = len(chosen), n
-    return LogMapsWithin(*(sp.csr_array((data, ways.vertex, indptr), shape=shape) for data in (distance, *values)))
+    found = (sp.csr_array((data, ways.vertex, indptr), shape=shape) for data in (distance, *values))
+    return LogMapsWithin(*(array[:, triangles.originals] if triangles.has_copies else array for array in found))
 
 
 def _paths(edges: HalfEdges, chosen: IntArray, radius: float) -> tuple[IntArray, WindowWays, FloatArray]:

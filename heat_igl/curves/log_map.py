@@ -83,9 +83,10 @@ def log_map(
         return VectorHeatSolver(mesh, method="windows").log_map(_one_vertex(source, triangles.n_vertices))
     _require_one(source, triangles.n_vertices)
     if not triangles.is_tetrahedral and not isinstance(source, SurfacePoints):
-        vectors = vectors_from(triangles, int(ordered_vertices(source, triangles.n_vertices, "source")[0]))
+        vertex = triangles.originals[ordered_vertices(source, triangles.n_vertices, "source")[0]]
+        vectors = vectors_from(triangles, int(vertex))
         if vectors is not None:
-            return vectors
+            return vectors[triangles.originals]
     found = GeodesicSolver(triangles).directions(source)
     return _vectors(found.distance, found.departure)
 

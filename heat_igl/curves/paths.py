@@ -231,7 +231,7 @@ def _required(solver: Solver | None, sources: Sources | None) -> Sources:
 
 
 def _source_set(mesh: Mesh, sources: Sources) -> SourceSet:
-    return source_set(sources, mesh.n_vertices, mesh.F)
+    return source_set(sources, mesh.n_vertices, mesh.F).with_vertices_moved(mesh.originals)
 
 
 def _values(mesh: Mesh, distance: ArrayLike | Solver, sources: Sources | None) -> FloatArray:

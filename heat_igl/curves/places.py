@@ -29,7 +29,7 @@ def places(name: str, mesh: Mesh, points: Sources, corner_at: IntArray | None = 
         except SourceError as error:
             raise SourceError(f"{name}: {error}") from None
         return points.faces, snapped(points.barycentric)
-    vertex = named_vertices(points, mesh.n_vertices, name)
+    vertex = mesh.originals[named_vertices(points, mesh.n_vertices, name)]
     corner = (corners(mesh) if corner_at is None else corner_at)[vertex]
     if (corner < 0).any():
         first = int(np.argmax(corner < 0))

@@ -90,9 +90,10 @@ def geodesic_distance(
         return distance if targets is None else distance[named_vertices(targets, len(distance), "targets")]
     if isinstance(given, PolygonMesh):
         given = given.triangles
-    if targets is None and beyond is not None and region is None and method != "sweep":
-        near = _within_reach(given, sources, beyond) if isinstance(given, Mesh) else None
-        if near is not None and isinstance(given, Mesh):
+    is_plain = targets is None and region is None and method != "sweep"
+    if beyond is not None and is_plain and isinstance(given, Mesh) and not given.has_copies:
+        near = _within_reach(given, sources, beyond)
+        if near is not None:
             return _on_part(given, near, sources, tolerance if method != "exact" else 0.0, beyond)
     solver = GeodesicSolver(given, method=method, tolerance=tolerance, region=region)
     if targets is None:

@@ -143,18 +143,23 @@ class GeodesicSolver(BatchedSolver):
             if domain.surface is None:
                 raise MeshError("distance is measured along simplices, and these operators know none: give the mesh")
             chosen = distance_plan("triangles", method, tolerance)
-            return self._on_triangles(OperatorTriangles(domain), chosen, None)
+            return self._on_triangles(OperatorTriangles(domain), chosen)
         if isinstance(domain, PointCloud):
-            originals = domain.originals if domain.has_copies else None
             chosen = distance_plan("points", method, tolerance)
             # For a sweep, as for heat, slivers between points are lengthened a little.
             triangles = MeshTriangles(domain.distinct_triangles, None)
-            return self._on_triangles(triangles, chosen, originals)
+            return self._on_triangles(triangles, chosen)
         chosen = distance_plan("triangles", method, tolerance)
-        return self._on_triangles(MeshTriangles(domain), chosen, None)
+        return self._on_triangles(MeshTriangles(domain), chosen)
 
-    def _on_triangles(self, triangles: Triangles, chosen: Plan, originals: IntArray | None) -> tuple[Plan, Engine]:
-        self._triangles = triangles
+    @cached_property
+    def _originals(self) -> IntArray | None:
+        """The vertex (n,) whose values each takes, where some are copies."""
+        domain = self._domain
+        return None if isinstance(domain, Operators) or not domain.has_copies else domain.originals
+
+    def _on_triangles(self, triangles: Triangles, chosen: Plan) -> tuple[Plan, Engine]:
+        self._triangles, originals = triangles, self._originals
         if chosen.engine == "sweep":
             sweep = SweepEngine(triangles, originals)
             chosen = sweep_plan(sweep.measures, chosen)
@@ -167,7 +172,7 @@ class GeodesicSolver(BatchedSolver):
         domain, triangles = self._domain, self._triangles
         if triangles is None or not isinstance(self._engine, WindowEngine):
             return self._engine
-        originals = domain.originals if isinstance(domain, PointCloud) and domain.has_copies else None
+        originals = self._originals
         components = triangles.components if originals is None else triangles.components[originals]
         if isinstance(domain, Operators):
             faces = triangles.faces
@@ -328,6 +333,8 @@ class GeodesicSolver(BatchedSolver):
         """Distance (t,) of some vertices or points; a search by windows ends once all are known."""
         chosen = self._source_set(sources)
         places = targets if isinstance(targets, SurfacePoints) else named_vertices(targets, self.n_vertices, "targets")
+        if not isinstance(places, SurfacePoints) and self._originals is not None:
+            places = self._originals[places]
         if isinstance(places, SurfacePoints) and self._part is not None:
             places = SurfacePoints(self._part.numbers_of(places.faces, "targets"), places.barycentric)
         if isinstance(self._engine, WindowEngine):
@@ -371,6 +378,8 @@ class GeodesicSolver(BatchedSolver):
         if part is not None:
             faces = None if self._triangles is None else part.whole
         chosen = source_set(sources, self.n_vertices, faces)
+        if self._originals is not None:
+            chosen = chosen.with_vertices_moved(self._originals)
         if part is not None:
             chosen = chosen.within(part)
         if chosen.offsets.any():
@@ -379,8 +388,7 @@ class GeodesicSolver(BatchedSolver):
             else:
                 h = float((domain.triangles if isinstance(domain, PointCloud) else domain).edge_lengths.mean())
             require_resolved(chosen, h)
-        moved = isinstance(domain, PointCloud) and domain.has_copies
-        return chosen.with_vertices_moved(domain.originals) if moved and isinstance(domain, PointCloud) else chosen
+        return chosen
 
     def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[str | None]]:
         rows = [self._answering.distance(sources, cutoff) for sources in source_sets]

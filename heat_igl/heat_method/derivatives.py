@@ -312,6 +312,10 @@ def differentiable_surface(surface: Surface | None, sources: SourceSet, mesh: Me
     """
     if surface is None or isinstance(mesh, PointCloud):
         raise ValueError("derivatives need a surface of triangles: this domain has none, or is a point cloud")
+    if mesh is not None and mesh.has_copies:
+        raise ValueError(
+            "derivatives need vertices none of which is a copy of another, and seams of this mesh were merged"
+        )
     if len(sources.segments.faces):
         raise ValueError(
             "derivatives are there for vertices and points, and a curve is among the sources: place points on it"

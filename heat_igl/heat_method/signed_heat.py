@@ -169,7 +169,7 @@ class SignedHeatSolver:
         if unsigned is not None:
             size = np.minimum(size, self._from(unsigned), out=size, where=reached)
         # Adding 0 makes 0 of -0.
-        return np.where(left, -size, size) + 0.0
+        return np.asarray((np.where(left, -size, size) + 0.0)[self._mesh.originals])
 
     def _from_heat(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) by integration, and which vertices (n,) are on the left."""
@@ -198,7 +198,7 @@ class SignedHeatSolver:
 
     def _from(self, sources: Sources) -> FloatArray:
         """Exact distance (n,) from sources without a side."""
-        places = source_set(sources, self.n_vertices, self._mesh.F)
+        places = source_set(sources, self.n_vertices, self._mesh.F).with_vertices_moved(self._mesh.originals)
         require_resolved(places, self._domain.mean_edge_length)
         points, segments = places.points, places.segments
         return self._exact.solve(

@@ -24,7 +24,7 @@ from heat_igl.operators import Laplacian, Operators
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import Sources, SourceSet, SourceTerm, require_resolved, right_hand_side, source_set
 from heat_igl.steps import Boundary
-from heat_igl.typing import ArrayLike, FloatArray
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = ["HeatMethodSolver", "heat_method_distance"]
 
@@ -156,6 +156,8 @@ class HeatMethodSolver(PreparedSolver):
         if self._part is not None and faces is not None:
             faces = self._part.whole
         chosen = source_set(sources, self.n_vertices, faces)
+        if self._originals is not None:
+            chosen = chosen.with_vertices_moved(self._originals)
         if self._part is not None:
             chosen = chosen.within(self._part)
         return require_resolved(chosen, self._parts.operators.mean_edge_length)
@@ -169,7 +171,16 @@ class HeatMethodSolver(PreparedSolver):
         terms = self._source_terms(source_sets)
         distances = self._distances_from_heat(terms, self._heat(terms))
         checks = [self._checked(*pair) for pair in zip(distances, source_sets, strict=True)]
-        return distances, [check.complaint(self._parts.is_surface) for check in checks]
+        return self._with_copies(distances), [check.complaint(self._parts.is_surface) for check in checks]
+
+    @property
+    def _originals(self) -> IntArray | None:
+        """The vertex (n,) whose values each takes, where seams were merged."""
+        return self._mesh.originals if isinstance(self._mesh, Mesh) and self._mesh.has_copies else None
+
+    def _with_copies(self, values: AnyArray) -> AnyArray:
+        """Values (..., n) in which copies have those of their originals."""
+        return values if self._originals is None else values[..., self._originals]
 
     def _drawn(self, source_sets: list[SourceSet]) -> list[SourceSet]:
         """The same sets; those that are the first of their kind, and so to be compared, are marked."""
@@ -232,7 +243,8 @@ class HeatMethodSolver(PreparedSolver):
         distance = self._distances_from_heat(terms, self._heat(terms))[0]
         labels = warmest_sources(terms[0], self._parts.heat_flow, self.operators.n)[: self.n_vertices]
         _warn(self._checked(distance, chosen).complaint(self._parts.is_surface))
-        distance = cut_off(distance, beyond)
+        distance = cut_off(self._with_copies(distance), beyond)
+        labels = self._with_copies(labels)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
 
@@ -263,10 +275,10 @@ class HeatMethodSolver(PreparedSolver):
         with np.errstate(under="ignore"):
             heat = (u[:, 0] / terms[0].unit / self._parts.heat_flow.mean_mass)[: self.n_vertices]
         return HeatSolution(
-            heat=heat,
+            heat=self._with_copies(heat),
             direction=np.ascontiguousarray(X[:, 0].reshape(self.operators.dimension, -1).T),
             magnitude=np.ascontiguousarray(magnitude[:, 0]),
-            distance=distance,
+            distance=self._with_copies(distance),
             t=self.t,
             diagnostics=replace(self.diagnostics, check=check),
         )

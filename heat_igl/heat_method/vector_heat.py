@@ -21,7 +21,7 @@ from heat_igl.linear import Backend
 from heat_igl.mesh import MeshLike, PointCloud, as_mesh, as_simplices, is_oriented_manifold, two_sided_cover
 from heat_igl.operators import Operators, edge_rotations, operators
 from heat_igl.sources import Sources, ordered_vertices
-from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import MeshTriangles, WindowEngine
 
 __all__ = ["VectorHeatSolver", "VectorMethod"]
@@ -92,6 +92,7 @@ class VectorHeatSolver:
         triangles = as_simplices(mesh)
         #: Vertices that vectors are given at and returned for.
         self.n_vertices = triangles.n_vertices
+        self._originals: IntArray | None = triangles.originals if triangles.has_copies else None
         has_two_sides = isinstance(mesh, PointCloud) and not is_oriented_manifold(triangles)
         if has_two_sides:
             triangles = two_sided_cover(triangles)
@@ -147,7 +148,7 @@ class VectorHeatSolver:
         if rotations.shape != domain.L.shape:
             raise ValueError(f"rotations must have the shape of L, {domain.L.shape}, not {rotations.shape}")
         solver = cls.__new__(cls)
-        solver._frames, solver.n_vertices = None, domain.n
+        solver._frames, solver.n_vertices, solver._originals = None, domain.n, None
         solver._domain, solver._options = domain, SolverOptions(t_coef, t, backend=backend)
         solver._transport = HeatTransport(solver._distance_solver, rotations)
         return solver
@@ -185,7 +186,7 @@ class VectorHeatSolver:
         components, vertices = self.operators.components, self._vertices(sources)
         if isinstance(self._transport, TwoSidedTransport):
             vertices = self._transport.on_both(vertices)
-        return np.isin(components, components[vertices])[: self.n_vertices]
+        return self._with_copies(np.isin(components, components[vertices])[: self.n_vertices])
 
     def extend(self, sources: Sources, values: ArrayLike) -> FloatArray:
         """Values at vertices, extended to all: each vertex gets about the value of the nearest source.
@@ -219,7 +220,8 @@ class VectorHeatSolver:
             raise ValueError(
                 f"values must be one number for each of the {len(vertices)} sources, but the shape is {given.shape}"
             )
-        return self._transport.extend(vertices, checked_vectors("values", given[:, None], len(vertices), 1)[:, 0])
+        checked = checked_vectors("values", given[:, None], len(vertices), 1)[:, 0]
+        return self._with_copies(self._transport.extend(vertices, checked))
 
     def transport(self, sources: Sources, vectors: ArrayLike) -> FloatArray:
         """Tangent vectors at vertices, transported to all along shortest geodesics.
@@ -251,7 +253,7 @@ class VectorHeatSolver:
         """
         vertices = self._vertices(sources)
         given = checked_vectors("vectors", vectors, len(vertices), 2)
-        found = self._transport.transport(vertices, given)
+        found = self._with_copies(self._transport.transport(vertices, given))
         return np.stack([found.real, found.imag], axis=1)
 
     def log_map(self, source: int) -> FloatArray:
@@ -286,7 +288,11 @@ class VectorHeatSolver:
         vertices = self._vertices(source)
         if len(vertices) != 1:
             raise SourceError(f"source must be one vertex, not {len(vertices)}")
-        return self._transport.log_map(int(vertices[0]))
+        return self._with_copies(self._transport.log_map(int(vertices[0])))
 
     def _vertices(self, sources: Sources) -> IntArray:
-        return ordered_vertices(sources, self.n_vertices)
+        return self._with_copies(np.arange(self.n_vertices))[ordered_vertices(sources, self.n_vertices)]
+
+    def _with_copies(self, values: AnyArray) -> AnyArray:
+        """Values at n vertices, in which copies have those of their originals."""
+        return values if self._originals is None else values[self._originals]

@@ -75,7 +75,7 @@ def tangent_frames(mesh: MeshLike) -> TangentFrames:
         np.cross(mesh.V[mesh.F[:, 1]] - mesh.V[mesh.F[:, 0]], mesh.V[mesh.F[:, 2]] - mesh.V[mesh.F[:, 0]])
     )
     normal = _vertex_normals(mesh, angles, face_normals)
-    x = _first_axes(mesh, triangulation, angles, normal)
+    x, normal = (axes[mesh.originals] for axes in (_first_axes(mesh, triangulation, angles, normal), normal))
     return TangentFrames(x, np.cross(normal, x), normal, angles, triangulation, sides, face_normals)
 
 

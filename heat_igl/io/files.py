@@ -20,7 +20,7 @@ from heat_igl.io import by_meshio, by_nibabel, obj, off, ply
 from heat_igl.io.atomic import replacing
 from heat_igl.io.contents import Contents
 from heat_igl.io.packed import form_suffix, is_packed, pack, unpacked
-from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_simplices, warn_of_seams
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = [
@@ -93,6 +93,11 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     MissingExtraError
         For STL, MESH, MSH and VTU without meshio, for GIFTI and FreeSurfer without nibabel.
 
+    Warns
+    -----
+    AccuracyWarning
+        If boundary edges lie on each other, as at texture seams: see `as_mesh`.
+
     Notes
     -----
     A polygon is split into the fan of triangles around the first corner, a concave one by clipping ears;
@@ -109,7 +114,9 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     Mesh(3 vertices, 1 triangles)
     """
     path, contents = _load(path)
-    return contents.mesh(path)
+    mesh = contents.mesh(path)
+    warn_of_seams(mesh)
+    return mesh
 
 
 def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:

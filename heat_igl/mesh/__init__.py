@@ -7,9 +7,8 @@ from heat_igl.mesh.edge_curves import edge_curve
 from heat_igl.mesh.exports import to_open3d, to_pyvista, to_trimesh
 from heat_igl.mesh.heights import Terrain, terrain
 from heat_igl.mesh.level_segments import Segments, crossings, joined_segments, level_segments
-from heat_igl.mesh.merging import MergedSeams, merge_seams
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
-from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with
+from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with, warn_of_seams
 from heat_igl.mesh.part import MeshPart
 from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
 from heat_igl.mesh.point_cloud import PointCloud
@@ -34,7 +33,6 @@ __all__ = [
     "ClosestPoints",
     "DELAUNAY_TOLERANCE",
     "ImageDomain",
-    "MergedSeams",
     "Mesh",
     "MeshLike",
     "MeshPart",
@@ -62,7 +60,6 @@ __all__ = [
     "is_oriented_manifold",
     "joined_segments",
     "level_segments",
-    "merge_seams",
     "named_entries",
     "nearest_copies",
     "read_paths_with",
@@ -74,5 +71,6 @@ __all__ = [
     "to_trimesh",
     "two_sided_cover",
     "usable_normals",
+    "warn_of_seams",
     "which_repeat_a_vertex",
 ]

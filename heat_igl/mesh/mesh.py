@@ -31,7 +31,7 @@ _LARGEST_EXTENT = 1e60
 _SMALLEST_EXTENT = 1e-60
 
 # Cached properties of a mesh that do not depend on positions.
-_OF_THE_FACES = {"facets", "edges", "components", "referenced", "boundary", "crossed_polygons"}
+_OF_THE_FACES = {"facets", "edges", "components", "referenced", "boundary", "crossed_polygons", "originals"}
 
 ArrayT = TypeVar("ArrayT", bound=AnyArray)
 
@@ -226,7 +226,12 @@ class Mesh:
         return f"Mesh({self.n_vertices} vertices, {self.n_faces} {kind})"
 
     def __reduce__(self) -> tuple[type[Mesh], tuple[FloatArray, IntArray], dict[str, IntArray]]:
-        return Mesh, (self.V, self.F), {"crossed_polygons": self.crossed_polygons}
+        return Mesh, (self.V, self.F), {"crossed_polygons": self.crossed_polygons, "originals": self.originals}
+
+    def with_originals(self, originals: IntArray) -> Mesh:
+        """The mesh itself, just made, with `originals`: faces hold no vertex that is a copy of another."""
+        self.__dict__["originals"] = _frozen(originals)
+        return self
 
     @property
     def vertices(self) -> FloatArray:
@@ -289,6 +294,19 @@ class Mesh:
     def crossed_polygons(self) -> IntArray:
         """Polygons (k,) that the triangles were cut from and whose sides cross each other; see `PolygonMesh`."""
         return _frozen(np.empty(0, np.int64))
+
+    @cached_property
+    def originals(self) -> IntArray:
+        """The vertex (n,) whose values each takes: its own number, or, where `as_mesh` merged seams, the first there.
+
+        Faces hold first ones only. Sources may be any.
+        """
+        return _frozen(np.arange(self.n_vertices))
+
+    @property
+    def has_copies(self) -> bool:
+        """Whether seams were merged, so that some vertices take the values of others."""
+        return bool((self.originals != np.arange(self.n_vertices)).any())
 
     @cached_property
     def facets(self) -> connectivity.Facets:

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from heat_igl.errors import AccuracyWarning, MeshError
+from heat_igl.errors import AccuracyWarning, MeshError, require_choice
 from heat_igl.mesh.cloud_objects import cloud_of_cells, cloud_of_points, cloud_of_poly_data, refuse_other_cells
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.pixel_domain import ImageDomain
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygons import PolygonMesh
-from heat_igl.mesh.seams import seam_pairs
+from heat_igl.mesh.seams import seam_originals, seam_pairs
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
-__all__ = ["MeshLike", "as_mesh", "as_simplices", "read_paths_with"]
+__all__ = ["MeshLike", "as_mesh", "as_simplices", "read_paths_with", "warn_of_seams"]
 
 MeshLike = Any
 """`Mesh`, `PolygonMesh`, `PointCloud`, a pair (V, F), a path, or a mesh of another library, see `as_mesh`."""
@@ -42,6 +43,9 @@ _NOT_MESHES = {
     ),
 }
 
+# The beginning of the warning, behind a number.
+_SEAMS = "boundary edges of the mesh lie on others"
+
 _readers: list[Callable[[str | os.PathLike[str]], Mesh | PointCloud]] = []
 
 
@@ -50,7 +54,9 @@ def read_paths_with(reader: Callable[[str | os.PathLike[str]], Mesh | PointCloud
     _readers[:] = [reader]
 
 
-def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | PointCloud:
+def as_mesh(
+    mesh: MeshLike, F: ArrayLike | None = None, *, merge: Literal["seams"] | None = None
+) -> Mesh | PolygonMesh | PointCloud:
     """A mesh of any library as a mesh of this one.
 
     Parameters
@@ -64,12 +70,16 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
         vtk. With `F`, the positions V (n, 3).
     F : (m, 3) or (m, 4) array_like of int, optional
         Triangles or tetrahedra, when `mesh` is V.
+    merge : {"seams"}, optional
+        Joins the boundary edges of a surface that lie on each other. Loaders of textured models split vertices where
+        the texture has a seam, so that distance across it is ``inf``, or leads around it.
 
     Returns
     -------
     Mesh, PolygonMesh or PointCloud
         In the vertices' own order and unit. Polygons with more than three corners give a `PolygonMesh`; a mesh with
-        tetrahedra gives those, without the triangles of their boundary.
+        tetrahedra gives those, without the triangles of their boundary. With merged seams, all vertices are kept and
+        may be asked for, and those that became one have the same values; polygons with seams become triangles.
 
     Raises
     ------
@@ -79,12 +89,17 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     Warns
     -----
     AccuracyWarning
-        If boundary edges of a file's or another library's mesh lie on each other: `merge_seams` joins them.
+        If boundary edges of a mesh that is none of this package lie on each other, and `merge` is not given.
 
     Notes
     -----
     Objects are recognized by the attributes that hold positions and faces. An array (m, 4) in a pair (V, F) holds
     tetrahedra, as everywhere in this package; `PolygonMesh` takes quadrilaterals.
+
+    Two boundary edges are joined if their ends have the same positions, bit for bit, if the faces on both sides have
+    the same orientation, and if no third boundary edge lies there. Cuts with a gap, however small, T-junctions, and a
+    sheet that lies on another are left alone. A cut without a gap cannot be told from a seam, so that nothing is joined
+    unasked.
 
     Examples
     --------
@@ -95,25 +110,44 @@ def as_mesh(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | 
     >>> theirs = SimpleNamespace(vertices=[[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces=[[0, 1, 2]])  # as in trimesh
     >>> heat_igl.as_mesh(theirs)
     Mesh(3 vertices, 1 triangles)
+    >>> V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> square = heat_igl.as_mesh(V, [[0, 1, 2], [3, 4, 5]], merge="seams")  # split along the diagonal
+    >>> heat_igl.geodesic_distance(square, 0).round(3).tolist()
+    [0.0, 1.0, 1.0, 1.0, 1.414, 1.0]
     """
-    found = without_warning(mesh, F)
-    if F is None and not isinstance(mesh, (Mesh, PolygonMesh, PointCloud, ImageDomain, tuple, list)):
-        _warn_of_seams(found)
+    if merge is not None:
+        require_choice("merge", merge, ("seams",))
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", rf"\d+ {_SEAMS}", AccuracyWarning)
+            found = _converted(mesh, F)
+        return found if isinstance(found, PointCloud) else _merged(found)
+    found = _converted(mesh, F)
+    # The reader of a file has warned.
+    if not isinstance(mesh, (Mesh, PolygonMesh, PointCloud, ImageDomain, str, os.PathLike)):
+        warn_of_seams(found)
     return found
 
 
-def _warn_of_seams(mesh: Mesh | PolygonMesh | PointCloud) -> None:
+def _merged(found: Mesh | PolygonMesh) -> Mesh | PolygonMesh:
+    mesh = found if isinstance(found, Mesh) else found.triangles
+    originals = seam_originals(mesh)
+    if (originals == np.arange(mesh.n_vertices)).all():
+        return found
+    return Mesh(mesh.V, originals[mesh.F]).with_originals(originals[mesh.originals])
+
+
+def warn_of_seams(mesh: Mesh | PolygonMesh | PointCloud) -> None:
+    """Warn if boundary edges lie on each other."""
     n = 0 if isinstance(mesh, PointCloud) else len(seam_pairs(mesh if isinstance(mesh, Mesh) else mesh.triangles))
     if n:
         warn_caller(
-            f"{n} boundary edges of the mesh lie on others, as where a loader has split vertices at texture seams, "
-            "and distance does not cross there: heat_igl.merge_seams joins them",
+            f"{n} {_SEAMS}, as where a loader has split vertices at texture seams, and distance does not cross there: "
+            'heat_igl.as_mesh(mesh, merge="seams") joins them',
             AccuracyWarning,
         )
 
 
-def without_warning(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh | PolygonMesh | PointCloud:
-    """`as_mesh` without a look at seams."""
+def _converted(mesh: MeshLike, F: ArrayLike | None) -> Mesh | PolygonMesh | PointCloud:
     if F is not None:
         if isinstance(mesh, (Mesh, PolygonMesh, PointCloud)):
             raise MeshError(f"F is given beside a {type(mesh).__name__}: pass a mesh alone, or positions V and faces F")

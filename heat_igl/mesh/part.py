@@ -66,7 +66,8 @@ class MeshPart:
             raise MeshError(f"region selects {int(mask.sum())} {kind}, and no whole face: there is nowhere to go")
         inside = mask.copy() if of_vertices else np.zeros(n, bool)
         inside[mesh.F[faces]] = True
-        return cls(Mesh(mesh.V, mesh.F[faces]), inside, faces, mesh.F)
+        part = Mesh(mesh.V, mesh.F[faces])
+        return cls(part.with_originals(mesh.originals), inside, faces, mesh.F)
 
     def require_vertices(self, vertices: IntArray, name: str = "sources", position: IntArray | None = None) -> None:
         """Raise a `SourceError` that names the first of some vertices (j,) outside, by its position if given."""

@@ -55,7 +55,7 @@ class MeshReport:
     unreferenced_vertices : (k,) int64
         Vertices that no face uses; every distance there is ``inf``.
     seam_edges : (k, 2) int64
-        Boundary edges that lie on another one, as at texture seams; see `merge_seams`.
+        Boundary edges that lie on another one, as at texture seams; ``as_mesh(mesh, merge="seams")`` joins them.
     crossed_polygons : (k,) int64
         Polygons that the triangles were cut from and whose sides cross each other, counted as in the file.
     shortest_edge, mean_edge, longest_edge : float
@@ -133,6 +133,7 @@ def mesh_report(mesh: Mesh) -> MeshReport:
     sides = igl.edge_lengths(mesh.V, F) if mesh.is_tetrahedral else mesh.edge_lengths[found.of_face]
     longest = reduce(np.maximum, sides.T)
     n_unreferenced = int((~mesh.referenced).sum())
+    is_copy = mesh.originals != np.arange(n)
     cells = len(found.vertices) - len(F) if mesh.is_tetrahedral else len(F)
     mean_edge = float(mesh.edge_lengths.mean())
     return MeshReport(
@@ -148,7 +149,7 @@ def mesh_report(mesh: Mesh) -> MeshReport:
         else connectivity.nonmanifold_vertices(F, found, n),
         degenerate_faces=np.flatnonzero(mesh.measures <= _DEGENERATE * longest ** (F.shape[1] - 1)),
         duplicate_faces=connectivity.duplicate_faces(F, n),
-        unreferenced_vertices=np.flatnonzero(~mesh.referenced),
+        unreferenced_vertices=np.flatnonzero(~mesh.referenced & ~is_copy),
         seam_edges=seam_pairs(mesh)[:, :2],
         crossed_polygons=mesh.crossed_polygons,
         shortest_edge=float(mesh.edge_lengths.min()),

@@ -5,26 +5,32 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.sparse as sp
 
 from heat_igl.mesh.connectivity import unique_rows
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import IntArray
 
 if TYPE_CHECKING:
     from heat_igl.mesh.mesh import Mesh
 
-__all__ = ["seam_pairs"]
+__all__ = ["seam_originals", "seam_pairs"]
 
 
 def seam_pairs(mesh: Mesh) -> IntArray:
-    """Pairs (k, 4) of boundary edges that lie on each other: ends a, b of one and c, d of the other, a on d, b on c."""
-    if mesh.is_tetrahedral:
+    """Pairs (k, 4) of boundary edges that lie on each other: ends a, b of one and c, d of the other, a on d, b on c.
+
+    Their ends have the same positions, bit for bit, the faces on both sides have the same orientation, and no third
+    boundary edge lies there. So cuts with a gap, however small, T-junctions, and a sheet that lies on another are none.
+    """
+    face, corner = np.nonzero(mesh.facets.n_faces[mesh.facets.of_face] == 1)
+    if mesh.is_tetrahedral or not len(face):
         return np.empty((0, 4), np.int64)
     F = mesh.F
-    face, corner = np.nonzero(mesh.facets.n_faces[mesh.facets.of_face] == 1)
     a, b, apex = F[face, (corner + 1) % 3], F[face, (corner + 2) % 3], F[face, corner]
-    place = _places(mesh.V)
+    at_boundary = F[mesh.boundary[F].any(axis=1)]
+    place = _places(mesh, np.unique(at_boundary))
     ends = np.stack([place[a], place[b]], axis=1)
-    _, edge, count = unique_rows(np.sort(ends, axis=1), len(mesh.V))
+    _, edge, count = unique_rows(np.sort(ends, axis=1), mesh.n_vertices)
     twice = np.flatnonzero((count[edge] == 2) & (ends[:, 0] != ends[:, 1]))
     one, other = twice[np.argsort(edge[twice], kind="stable")].reshape(-1, 2).T
     fit = ends[one, 0] == ends[other, 1]  # with the same orientation
@@ -32,12 +38,24 @@ def seam_pairs(mesh: Mesh) -> IntArray:
     one, other = one[fit], other[fit]
     pairs = np.stack([a[one], b[one], a[other], b[other]], axis=1)
     # A face with two corners in one place would lose one of them.
-    corners = place[F]
-    folded = F[(corners == np.roll(corners, 1, axis=1)).any(axis=1)]
+    corners = place[at_boundary]
+    folded = at_boundary[(corners == np.roll(corners, 1, axis=1)).any(axis=1)]
     return pairs[~np.isin(pairs, folded).any(axis=1)]
 
 
-def _places(V: FloatArray) -> IntArray:
-    """A number (n,) for each position, the same for equal ones."""
-    rank = np.stack([np.unique(column, return_inverse=True)[1].ravel() for column in V.T], axis=1)
-    return unique_rows(rank, int(rank.max()) + 1)[1]
+def seam_originals(mesh: Mesh) -> IntArray:
+    """The first vertex (n,) of those that become one with each when all `seam_pairs` are joined."""
+    pairs, n = seam_pairs(mesh), mesh.n_vertices
+    a, b = np.concatenate([pairs[:, [0, 3]], pairs[:, [1, 2]]]).T
+    graph = sp.coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
+    _, label = sp.csgraph.connected_components(graph, directed=False)
+    _, first = np.unique(label, return_index=True)
+    return np.asarray(first[label], np.int64)
+
+
+def _places(mesh: Mesh, vertices: IntArray) -> IntArray:
+    """A number (n,) for the position of each of some vertices, the same for equal ones; 0 for all others."""
+    rank = np.stack([np.unique(column, return_inverse=True)[1].ravel() for column in mesh.V[vertices].T], axis=1)
+    place = np.zeros(mesh.n_vertices, np.int64)
+    place[vertices] = unique_rows(rank, len(vertices))[1]
+    return place

@@ -67,7 +67,9 @@ def distances_within(
     triangles, part = _triangles(mesh, region)
     chosen = _chosen(sources, triangles, part)
     found = _rows_within(from_mesh(triangles, int(chosen[0])), chosen, limit)
-    return found if sources is not None or part is None else _with_empty_rows(found, chosen)
+    if triangles.has_copies:
+        found = found[:, triangles.originals]
+    return found if sources is not None or part is None else _with_empty_rows(found, np.flatnonzero(part.inside))
 
 
 def blocks_within(
@@ -180,7 +182,7 @@ def nearest_vertices(
     distances[order[i], j] = edges.unscaled(np.concatenate([part.distance for part in parts]))
     if sources is None and part is not None:
         spread = _unfilled(triangles.n_vertices, int(k), triangles.n_vertices)
-        spread[0][chosen], spread[1][chosen] = indices, distances
+        spread[0][part.inside], spread[1][part.inside] = indices, distances
         return spread
     return indices, distances
 
@@ -231,7 +233,7 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike, *, region: ArrayLike | None
     [4.0, 5.0]
     """
     triangles, part = _triangles(mesh, region)
-    first, second = _checked_pairs(pairs, triangles.n_vertices).T
+    first, second = triangles.originals[_checked_pairs(pairs, triangles.n_vertices)].T
     if part is not None:
         part.require_vertices(first, "pairs")
     distance = np.full(len(first), np.inf)
@@ -286,8 +288,8 @@ def _triangles(mesh: MeshLike, region: ArrayLike | None = None) -> tuple[Mesh, M
 
 def _chosen(sources: Sources | None, mesh: Mesh, part: MeshPart | None) -> IntArray:
     if sources is None:
-        return np.arange(mesh.n_vertices) if part is None else np.flatnonzero(part.inside)
-    named = named_vertices(sources, mesh.n_vertices)
+        return mesh.originals if part is None else mesh.originals[part.inside]
+    named = mesh.originals[named_vertices(sources, mesh.n_vertices)]
     if part is not None:
         part.require_vertices(named)
     return named
