@@ -72,7 +72,9 @@ def connected(scheduler: str | None = None, n_workers: int | None = None, dashbo
                 distributed.LocalCluster(
                     n_workers=n_workers or n_threads(),
                     threads_per_worker=1,
-                    dashboard_address=":0" if dashboard else None,
+                    # Any free port: without an address the scheduler asks for 8787, and warns where it is taken.
+                    dashboard_address=":0",
+                    scheduler_kwargs={"dashboard": dashboard},
                     silence_logs=logging.CRITICAL,
                 )
             )
