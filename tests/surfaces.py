@@ -7,7 +7,7 @@ import pytest
 import scipy.spatial
 from conftest import perturbed
 
-from heat_igl import Mesh, shapes
+from heat_igl import Mesh, PolygonMesh, shapes
 
 
 def bumpy() -> Mesh:
@@ -94,6 +94,28 @@ def bent_pages() -> Mesh:
     F = np.concatenate([page.F + k * page.n_vertices for k in range(3)])
     _, first, inverse = np.unique(np.round(stacked, 9), axis=0, return_index=True, return_inverse=True)
     return Mesh(stacked[first], inverse.ravel()[F])
+
+
+def dual(mesh: Mesh) -> PolygonMesh:
+    """A polygon around each vertex of a closed mesh, its corners in the middles of the faces."""
+    following = {}
+    for f, (a, b, c) in enumerate(mesh.F.tolist()):
+        following |= {(a, b): (f, c), (b, c): (f, a), (c, a): (f, b)}
+    neighbour = dict(following.keys())
+    polygons = []
+    for v in range(mesh.n_vertices):
+        polygon, there = [], neighbour[v]
+        while not polygon or there != neighbour[v]:
+            face, there = following[v, there]
+            polygon.append(face)
+        polygons.append(polygon)
+    return PolygonMesh(mesh.V[mesh.F].mean(axis=1), polygons)
+
+
+def dual_of_sphere(subdivisions: int) -> PolygonMesh:
+    """Hexagons and twelve pentagons, their vertices on the unit sphere."""
+    mesh = dual(shapes.icosphere(subdivisions))
+    return PolygonMesh(mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), mesh.polygons)
 
 
 # Places in a face, for points as sources and targets.

@@ -7,6 +7,7 @@ import pickle
 import igl
 import numpy as np
 import pytest
+from surfaces import dual, dual_of_sphere
 
 import heat_igl
 from heat_igl import shapes
@@ -28,28 +29,6 @@ def quads(n: int) -> PolygonMesh:
     row, column = np.divmod(np.arange(n * n), n)
     first = row * (n + 1) + column
     return PolygonMesh(V, np.stack([first, first + 1, first + n + 2, first + n + 1], axis=1))
-
-
-def dual(mesh: heat_igl.Mesh) -> PolygonMesh:
-    """A polygon around each vertex of a closed mesh, its corners in the middles of the faces."""
-    following = {}
-    for f, (a, b, c) in enumerate(mesh.F.tolist()):
-        following |= {(a, b): (f, c), (b, c): (f, a), (c, a): (f, b)}
-    neighbour = dict(following.keys())
-    polygons = []
-    for v in range(mesh.n_vertices):
-        polygon, there = [], neighbour[v]
-        while not polygon or there != neighbour[v]:
-            face, there = following[v, there]
-            polygon.append(face)
-        polygons.append(polygon)
-    return PolygonMesh(mesh.V[mesh.F].mean(axis=1), polygons)
-
-
-def dual_of_sphere(subdivisions: int) -> PolygonMesh:
-    """Hexagons and twelve pentagons, their vertices on the unit sphere."""
-    mesh = dual(shapes.icosphere(subdivisions))
-    return PolygonMesh(mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), mesh.polygons)
 
 
 def zigzags(columns: int, rows: int, rise: float) -> PolygonMesh:
