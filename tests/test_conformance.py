@@ -195,6 +195,7 @@ def test_several_sources_are_the_nearest_of_each(name: str, method: str) -> None
     mask = np.zeros(domain(name).n, bool)
     mask[at] = True
     np.testing.assert_array_equal(prepared.distance(mask), prepared.distance(sorted(at)))
+    assert not prepared.distance(np.ones(domain(name).n, bool)).any()
 
 
 @table()

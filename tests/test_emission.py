@@ -91,14 +91,6 @@ def test_a_ring_of_edges_around_a_vertex_is_straight(cow):
     np.testing.assert_allclose(solver.distance(50)[others], lengths, rtol=1e-12)
 
 
-def test_points_on_flat_domains_are_exact_when_refined(method):
-    mesh = plane(20)
-    point = closest_points(mesh, [0.331, 0.672, 0.2]).points
-    distance = SolverChoice(method).on(mesh).distance(point)
-    truth = np.linalg.norm(mesh.V - [0.331, 0.672, 0], axis=1)
-    assert relative_error(distance, truth) < (0.04 if method == "heat" else 1e-12)
-
-
 @pytest.mark.parametrize("amount", [0.0, 0.2])
 def test_a_line_across_the_square(method, amount):
     """Distance is the coordinate across, on both sides; the error falls with the size of the faces."""
@@ -239,36 +231,6 @@ def test_an_offset_for_all_is_added(method, offset):
         np.testing.assert_allclose(solver.distance(OffsetSources(sources, offset)), expected, rtol=1e-9)
 
 
-def test_offsets_on_components_that_are_apart(method):
-    """However late a source, on its own component it is the first."""
-    sphere = perturbed(shapes.icosphere(2))
-    n = sphere.n_vertices
-    mesh = Mesh(
-        np.concatenate([sphere.V, sphere.V + 5, sphere.V + 9]), np.concatenate([sphere.F + k * n for k in (0, 1, 2)])
-    )
-    # With a time step that is asked for, heat is not held to straight lines, which run between components.
-    solver = HeatMethodSolver(mesh, t_coef=0.5) if method == "heat" else SolverChoice(method).on(mesh)
-    found = solver.voronoi(OffsetSources([7, n + 7], [0, 1e5]))
-    one = solver.distance(7)[:n]
-    np.testing.assert_allclose(found.distance[:n], one, rtol=1e-9)
-    np.testing.assert_allclose(found.distance[n : 2 * n], one + 1e5, rtol=1e-9)
-    assert (found.distance[2 * n :] == np.inf).all()
-    assert found.labels.tolist() == n * [0] + n * [1] + n * [-1]
-
-
-def test_cells_of_many_sources(method):
-    """Labels are positions in the sequence, and right but for vertices near a border."""
-    mesh = plane(50)
-    sources = np.random.default_rng(0).choice(mesh.n_vertices, 40, replace=False)
-    found = SolverChoice(method).on(mesh).voronoi(sources)
-    each = np.linalg.norm(mesh.V[:, None] - mesh.V[sources], axis=2)
-    assert (found.labels[sources] == np.arange(40)).all()
-    excess = each[np.arange(len(each)), found.labels] - each.min(axis=1)
-    # A vertex that is less than an edge from a border is by less than two edges nearer to the source across.
-    assert excess.max() < 2 * mesh.edge_lengths.mean()
-    assert (excess > 1e-12).mean() < {"heat": 0.05, "sweep": 0.05, "exact": 0.005}[method]
-
-
 def test_labels_of_several_kinds(method):
     mesh = plane(30)
     line = curve_on(mesh, [[0.9, 0, 0], [0.9, 1, 0]])
@@ -286,18 +248,6 @@ def test_labels_of_several_kinds(method):
     ).all()
     assert (found.labels[each.min(axis=1) > 0.28] == -1).all()
     assert (np.isinf(found.distance) == (found.labels == -1)).all()
-
-
-def test_beyond_the_cutoff_distances_are_infinite_and_within_unchanged(method):
-    mesh = plane(12)
-    solver = SolverChoice(method).on(mesh)
-    whole = solver.distance(5)
-    expected = np.where(whole > 0.4, np.inf, whole)
-    assert (solver.distance(5, cutoff=0.4) == expected).all()
-    np.testing.assert_allclose(solver.distances([5, [5]], cutoff=0.4), [expected, expected], rtol=1e-12)
-    for cutoff in (0, -1.0, np.nan, "far"):
-        with pytest.raises(ValueError, match=f"cutoff must be a positive number, not {cutoff!r}"):
-            solver.distance(5, cutoff=cutoff)
 
 
 def test_batches_of_all_kinds(method):
@@ -411,19 +361,6 @@ def test_refused_edge_lengths(F, lengths, options, message):
         HeatMethodSolver.from_edge_lengths(F, lengths, **options)
     with pytest.raises(ValueError, match="laplacian must be"):
         HeatMethodSolver.from_edge_lengths([[0, 1, 2]], [[1, 1, 1]], laplacian="graph")
-
-
-def test_tetrahedra_take_vertices_with_offsets():
-    mesh = shapes.box(6)
-    solver = HeatMethodSolver(mesh)
-    corner, opposite = 0, mesh.n_vertices - 1
-    each = np.linalg.norm(mesh.V[:, None] - mesh.V[[corner, opposite]], axis=2) + np.array([0, 0.5])
-    found = solver.voronoi(OffsetSources([corner, opposite], [0, 0.5]))
-    assert np.abs(found.distance - each.min(axis=1)).mean() < 0.06 * each.min(axis=1).max()
-    wrong = found.labels != each.argmin(axis=1)
-    assert (np.abs(each[:, 0] - each[:, 1])[wrong] < 2 * mesh.edge_lengths.mean()).all()
-    with pytest.raises(SourceError, match="points and curves lie on triangles, and this domain has none"):
-        solver.distance(SurfacePoints([0], [[0.2, 0.3, 0.5]]))
 
 
 def test_depth_in_a_ball():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -190,25 +189,6 @@ def test_moebius_strip_against_pygeodesic():
         assert relative_error(one, pygeodesic_distance(mesh, 7)).max() < 1e-12
 
 
-@pytest.mark.parametrize("name", ["bumpy", "moebius", "book"])
-def test_distance_is_symmetric(name):
-    mesh = {"bumpy": bumpy, "moebius": lambda: moebius_strip(30, 4), "book": lambda: shapes.book(3, 5)}[name]()
-    chosen = np.random.default_rng(2).choice(mesh.n_vertices, 15, replace=False)
-    surface = delaunay(mesh)
-    between = np.array([surface.solve(np.array([v])).distance[chosen] for v in chosen])
-    np.testing.assert_allclose(between, between.T, rtol=1e-12, atol=1e-14)
-
-
-def test_distances_scale_with_the_mesh():
-    mesh = bumpy()
-    d = exact_distance(mesh.V, mesh.F, 0)
-    np.testing.assert_array_equal(exact_distance(mesh.V * 2.0**90, mesh.F, 0), d * 2.0**90)
-    for scale in (1e-30, 1e30):
-        np.testing.assert_allclose(exact_distance(mesh.V * scale, mesh.F, 0), d * scale, rtol=1e-12)
-        surface = delaunay(Mesh(mesh.V * scale, mesh.F))
-        np.testing.assert_allclose(surface.solve(np.array([0])).distance, d * scale, rtol=1e-12)
-
-
 def test_scale_of_a_small_component():
     """Fourth powers of the edges of the small one are no doubles in the unit of the mesh."""
     mesh = bumpy()
@@ -284,17 +264,6 @@ def test_points_on_an_edge_of_many_faces():
         np.testing.assert_allclose(back, truth[source], rtol=1e-12)
 
 
-def test_several_sources_with_offsets_are_the_nearest_of_each():
-    mesh = bumpy()
-    surface = delaunay(mesh)
-    sources, offsets = np.array([5, 200, 411, 600]), np.array([0.0, 0.3, 0.1, 3.0])
-    each = np.array([surface.solve(sources[i : i + 1], offsets[i : i + 1]).distance for i in range(4)])
-    found = surface.solve(sources, offsets)
-    np.testing.assert_allclose(found.distance, each.min(axis=0), rtol=1e-13)
-    np.testing.assert_array_equal(found.origin.label, each.argmin(axis=0))
-    assert found.distance[600] < 3.0
-
-
 def test_cutoff_and_goals_end_early_with_the_same_bits():
     mesh = bumpy()
     surface = delaunay(mesh)
@@ -311,18 +280,6 @@ def test_cutoff_and_goals_end_early_with_the_same_bits():
     some = surface.solve(source, goals=goals)
     np.testing.assert_array_equal(some.distance[goals], full.distance[goals])
     assert some.n_windows < full.n_windows / 5
-
-
-def test_components_and_unused_vertices_are_not_reached():
-    one = shapes.icosphere(1)
-    n = one.n_vertices
-    mesh = Mesh(np.concatenate([one.V, one.V + 5, [[9, 9, 9]]]), np.concatenate([one.F, one.F + n]))
-    found = delaunay(mesh).solve(np.array([n + 3]))
-    assert np.isinf(found.distance[:n]).all()
-    assert np.isinf(found.distance[-1])
-    assert np.isfinite(found.distance[n:-1]).all()
-    for nothing in (found.origin.label, found.origin.root, found.origin.entered):
-        assert (nothing[:n] == -1).all()
 
 
 def test_origins_lead_back():
@@ -343,15 +300,6 @@ def test_origins_lead_back():
     left = np.linalg.norm(crossings.positions(mesh) - mesh.V[here], axis=1)
     before = surface.solve(np.array([5]), targets=crossings).target_distance
     np.testing.assert_allclose(before + left, found.distance[here], rtol=1e-11)
-
-
-def test_threads_share_a_surface_and_the_bits_are_the_same():
-    surface = delaunay(bumpy())
-    sources = [np.array([v]) for v in range(0, 600, 50)]
-    one_by_one = [surface.solve(source).distance for source in sources]
-    with ThreadPoolExecutor(2) as pool:
-        together = list(pool.map(lambda source: surface.solve(source).distance, sources))
-    np.testing.assert_array_equal(together, one_by_one)
 
 
 def test_coincident_vertices():
@@ -429,13 +377,6 @@ def test_what_has_no_exact_distance_is_refused():
         exact_distance(mesh.V, mesh.F, 99)
     with pytest.raises(ValueError, match="make it from a triangulation"):
         ExactSurface(from_mesh(mesh, 0)).solve(points=SurfacePoints([0], [[0.2, 0.3, 0.5]]))
-
-
-def test_faces_that_are_there_twice_count_once():
-    square = shapes.grid(20)
-    twice = Mesh(square.V, np.concatenate([square.F, square.F[::2]]))
-    found = exact_distance(twice.V, twice.F, 0)
-    np.testing.assert_allclose(found, np.linalg.norm(square.V - square.V[0], axis=1), rtol=1e-12)
 
 
 def test_targets_where_faces_are_there_twice():

@@ -12,19 +12,15 @@ from conftest import flat_perturbed, perturbed
 
 import heat_igl
 from heat_igl import (
-    AccuracyWarning,
     GeodesicSolver,
     HeatMethodSolver,
     Mesh,
     MeshError,
     OffsetSources,
-    PolygonMesh,
     SourceError,
     SurfacePoints,
-    closest_points,
     edge_curve,
     geodesic_distance,
-    reference,
     shapes,
 )
 from heat_igl.unfolding import engine
@@ -68,41 +64,6 @@ def test_distance_in_the_plane(name: str, method: Any) -> None:
     assert np.abs(found - truth).max() < allowed * truth.max()
 
 
-def test_methods_are_the_solvers() -> None:
-    np.testing.assert_array_equal(geodesic_distance(TORUS, 5, method="heat"), HeatMethodSolver(TORUS).distance(5))
-    for method in ("auto", "windows", "exact", "sweep"):
-        expected = GeodesicSolver(TORUS, method=method).distance(5)
-        np.testing.assert_array_equal(geodesic_distance(TORUS, 5, method=method), expected)
-
-
-def test_near_exact_by_default() -> None:
-    exact = reference.exact(TORUS, 5)
-    away = exact > 0
-    relative = geodesic_distance(TORUS, 5)[away] / exact[away] - 1
-    assert relative.min() > -1e-9
-    assert relative.mean() < 1e-4
-    assert (geodesic_distance(TORUS, 5, method="heat")[away] / exact[away] - 1).__abs__().mean() > 1e-3
-
-
-def test_beyond_the_cutoff_is_infinity() -> None:
-    whole = geodesic_distance(TORUS, 5)
-    for method in ("windows", "sweep", "heat", "exact"):
-        whole = geodesic_distance(TORUS, 5, method=method)
-        near = geodesic_distance(TORUS, 5, method=method, cutoff=1)
-        # Near-exact and exact distances are found on the part of the mesh within the cutoff: equal up to rounding.
-        np.testing.assert_allclose(near, np.where(whole > 1, np.inf, whole), rtol=1e-13)
-        np.testing.assert_array_equal(geodesic_distance(TORUS, 5, method=method, cutoff=np.inf), whole)
-    assert HeatMethodSolver(TORUS).distance(5, np.inf).max() < np.inf
-    assert np.isinf(HeatMethodSolver(TORUS).distance(5, 1.0)).any()
-
-
-def test_components_that_no_source_reaches() -> None:
-    two = Mesh(np.concatenate([SQUARE.V, SQUARE.V + 3]), np.concatenate([SQUARE.F, SQUARE.F + SQUARE.n_vertices]))
-    for sources, method in ((0, "windows"), (INSIDE, "windows"), (0, "exact"), (INSIDE, "exact")):
-        found = geodesic_distance(two, sources, method=method)
-        np.testing.assert_array_equal(np.isinf(found), np.arange(two.n_vertices) >= SQUARE.n_vertices)
-
-
 @pytest.mark.parametrize("method", ["windows", "sweep", "heat", "exact"])
 def test_sources_that_no_face_uses(method: Any) -> None:
     n = SQUARE.n_vertices
@@ -113,63 +74,6 @@ def test_sources_that_no_face_uses(method: Any) -> None:
     np.testing.assert_allclose(geodesic_distance(mesh, [n, 3], method=method), [*expected, 0], atol=1e-9)
     late = geodesic_distance(mesh, OffsetSources([n, 3], [1, 2]), method=method)
     np.testing.assert_allclose(late, [*(expected + 2), 1], atol=1e-9)
-
-
-def test_surfaces_that_cannot_be_oriented() -> None:
-    angle, across = np.meshgrid(np.linspace(0, 2 * np.pi, 40, endpoint=False), np.linspace(-0.3, 0.3, 5), indexing="ij")
-    radius = 1 + across * np.cos(angle / 2)
-    V = np.stack([radius * np.cos(angle), radius * np.sin(angle), across * np.sin(angle / 2)], axis=-1).reshape(-1, 3)
-    i, j = np.divmod(np.arange(160), 4)
-    here, there = 5 * i + j, np.where(i < 39, 5 * i + j + 5, 4 - j)
-    beyond = np.where(i < 39, there + 1, there - 1)
-    band = Mesh(V, np.concatenate([np.stack([here, there, here + 1], 1), np.stack([here + 1, there, beyond], 1)]))
-    assert band.report().n_boundary_loops == 1
-    for sources in (3, [SurfacePoints([17], [[0.2, 0.3, 0.5]]), 50]):
-        exact = geodesic_distance(band, sources, method="exact")
-        assert np.abs(geodesic_distance(band, sources) - exact).max() < 1e-4 * exact.max()
-
-
-def test_polygons_and_tetrahedra() -> None:
-    x, y = np.meshgrid(np.arange(6.0), np.arange(5.0))
-    V = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
-    corner = np.arange(4)[:, None] * 6 + np.arange(5)
-    quads = np.stack([corner, corner + 1, corner + 7, corner + 6], axis=-1).reshape(-1, 4)
-    mesh = PolygonMesh(V, quads)
-    truth = np.hypot(*V[:, :2].T)
-    np.testing.assert_allclose(geodesic_distance(mesh, 0), truth, atol=1e-9)
-    np.testing.assert_allclose(GeodesicSolver(mesh, method="exact").distance(0), truth, atol=1e-9)
-    by_heat = heat_igl.HeatMethodSolver(mesh).distance(0)
-    np.testing.assert_array_equal(geodesic_distance(mesh, 0, method="heat"), by_heat)
-    np.testing.assert_allclose(by_heat, truth, rtol=0.07)
-    assert HeatMethodSolver(mesh).n_vertices == 30
-
-    box = shapes.box(2)
-    np.testing.assert_array_equal(geodesic_distance(box, 0, method="heat"), HeatMethodSolver(box).distance(0))
-    for method in ("auto", "sweep"):
-        np.testing.assert_allclose(geodesic_distance(box, 0, method=method), np.linalg.norm(box.V, axis=1), atol=1e-12)
-    with pytest.raises(MeshError, match=r"method='exact' needs triangles .* tetrahedra: take method='auto'"):
-        geodesic_distance(box, 0, method="exact")
-    assert geodesic_distance(box, 0, targets=[1])[0] == pytest.approx(np.linalg.norm(box.V[1] - box.V[0]))
-
-
-def test_exact_windows_take_all_kinds_of_sources_and_end_at_the_cutoff() -> None:
-    """On a flat square every distance is a straight line."""
-    square = shapes.grid(12)
-    x, y, _ = square.V.T
-    middle = SurfacePoints([100], [[0.2, 0.5, 0.3]])
-    place = middle.positions(square)[0]
-    to_point, to_corner = np.linalg.norm(square.V - place, axis=1), np.hypot(x, y)
-    truths = [
-        (0, to_corner),
-        (middle, to_point),
-        ([0, middle], np.minimum(to_corner, to_point)),
-        (OffsetSources([0], [0.25]), to_corner + 0.25),
-    ]
-    for sources, truth in truths:
-        d = geodesic_distance(square, sources, method="exact")
-        np.testing.assert_allclose(d, truth, atol=1e-12)
-        near = geodesic_distance(square, sources, method="exact", cutoff=0.5)
-        np.testing.assert_allclose(near, np.where(d <= 0.5, d, np.inf), rtol=1e-13)
 
 
 @pytest.mark.parametrize("sources", [5, [5, 300], OffsetSources([5, 300], [0.1, 0.0])], ids=["one", "two", "late"])
@@ -250,44 +154,6 @@ OTHERS = SimpleNamespace(vertices=TORUS.V, faces=TORUS.F)
 PHI = TORUS.V[:, 0] + 3
 
 
-@pytest.mark.parametrize(
-    "ask",
-    [
-        lambda mesh: HeatMethodSolver(mesh).distance(3),
-        lambda mesh: geodesic_distance(mesh, 3),
-        lambda mesh: heat_igl.farthest_points(mesh, 4),
-        lambda mesh: heat_igl.farthest_cells(mesh, 4).labels,
-        lambda mesh: heat_igl.voronoi_cells(mesh, [3, 9]).distance,
-        lambda mesh: heat_igl.distance_matrix(mesh, [3, 9]),
-        lambda mesh: heat_igl.diameter(mesh, rounds=2)[0],
-        lambda mesh: heat_igl.geodesic_centre(mesh, mesh, [3, 9, 40]).barycentric,
-        lambda mesh: heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(mesh, 40)).F,
-        lambda mesh: heat_igl.shortest_paths(mesh, [40], 3)[0].lengths(mesh),
-        lambda mesh: heat_igl.isolines(mesh, PHI, 3.1)[0][0].positions(mesh),
-        lambda mesh: heat_igl.sublevel_areas(mesh, PHI, [3.1]),
-        lambda mesh: heat_igl.enclosed_areas(mesh, PHI, 3.1),
-        lambda mesh: heat_igl.offset_curves(mesh, HeatMethodSolver(mesh), 3, 0.5)[0].lengths(mesh),
-        lambda mesh: closest_points(mesh, [[1, 2, 3]]).gap,
-        lambda mesh: edge_curve(mesh, TORUS.F[0, :2]).positions(mesh),
-        lambda mesh: heat_igl.curve_on(mesh, TORUS.V[TORUS.F[0]]).positions(mesh),
-        lambda mesh: heat_igl.split_long_edges(mesh, 0.2).V,
-        lambda mesh: heat_igl.speed_operators(mesh, np.ones(TORUS.n_faces)).weights,
-        lambda mesh: reference.exact(mesh, 3),
-        lambda mesh: reference.straight_lines(mesh, 3),
-        lambda mesh: reference.edge_paths(mesh, 3),
-        lambda mesh: heat_igl.baselines.graph_distance(mesh, 3),
-        lambda mesh: heat_igl.baselines.varadhan(mesh, 3),
-        lambda mesh: heat_igl.metrics.eikonal_residual(mesh, PHI),
-        lambda mesh: heat_igl.validation.draw_sources(mesh, 3),
-        lambda mesh: heat_igl.validate(mesh, 3, ["heat"], None).distances["heat"],
-    ],
-)
-def test_every_mesh_is_taken(ask: Any) -> None:
-    expected = ask(TORUS)
-    for mesh in (OTHERS, (TORUS.V.tolist(), TORUS.F.tolist())):
-        np.testing.assert_array_equal(ask(mesh), expected)
-
-
 def test_files_and_pictures_of_other_meshes(tmp_path: Path) -> None:
     heat_igl.write_mesh(tmp_path / "a.ply", OTHERS, distance=PHI)
     heat_igl.write_mesh(tmp_path / "b.ply", TORUS, distance=PHI)
@@ -303,15 +169,6 @@ def test_files_and_pictures_of_other_meshes(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} >= {"a.png", "a.html"}
 
 
-def test_a_batch_takes_other_meshes_too() -> None:
-    from heat_igl.cluster import collection
-
-    (item,) = collection.items([OTHERS])
-    np.testing.assert_array_equal(item.mesh.V, TORUS.V)
-    with pytest.raises(MeshError, match="000001: mesh is of type int, which is not understood"):
-        list(collection.items([OTHERS, 3]))
-
-
 def test_a_mesh_that_everybody_has(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = heat_igl.sample_mesh()
     assert mesh.n_vertices > 2500
@@ -323,30 +180,6 @@ def test_a_mesh_that_everybody_has(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (report.n_components, report.euler_characteristic, report.n_boundary_loops) == (1, 2, 0)
     assert not len(report.nonmanifold_vertices)
     assert np.isfinite(geodesic_distance(blob, 1234)).all()
-
-
-@pytest.mark.parametrize(("kind", "unused"), [("unused", True), ("components", False)])
-def test_the_work_for_unused_vertices_and_components_is_linear(kind: str, unused: bool) -> None:
-    """What is looked at while an order of elimination is found, counted: at most so many times each vertex."""
-    from heat_igl.linear import dissection
-
-    for n in (10_000, 100_000, 1_000_000):
-        if unused:
-            ends, neighbours = np.zeros(n + 1, np.int32), np.empty(0, np.int32)
-        else:  # components of four vertices each, on a ring
-            first, step = np.divmod(np.arange(n), 4)
-            neighbours = (4 * first[:, None] + (step[:, None] + [1, 3]) % 4).ravel().astype(np.int32)
-            ends = np.arange(0, len(neighbours) + 1, 2, dtype=np.int32)
-        parts = dissection._apart(ends, neighbours)
-        # All of a part is looked at for each component in it.
-        work = sum((high - low) * ((high - low) // (1 if unused else 4)) for _, low, high in parts)
-        assert work <= dissection._TOGETHER * n, kind
-
-
-def test_large_steps_are_warned_about() -> None:
-    for options in ({"t": 1e4}, {"t_coef": 1e6}):
-        with pytest.warns(AccuracyWarning, match=f"{next(iter(options))} = 1e.* is very large: heat spreads over"):
-            HeatMethodSolver(TORUS, **options)
 
 
 @pytest.mark.parametrize("options", [{"t": 1e300}, {"t_coef": 1e20}])

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
-from concurrent.futures import ThreadPoolExecutor
-
 import igl
 import numpy as np
 import pytest
@@ -21,36 +18,6 @@ DOMAINS = {
     "tetrahedra": lambda: GeodesicSolver(shapes.box(4)),
     "metric": lambda: GeodesicSolver(heat_igl.speed_operators(TORUS, np.linspace(1, 1.05, TORUS.n_faces))),
 }
-
-
-@pytest.mark.parametrize("name", DOMAINS)
-def test_the_same_bits_alone_in_batches_in_threads_and_pickled(name):
-    solver = DOMAINS[name]()
-    vertices = [0, 5, 17, 40]
-    alone = [solver.distance(v) for v in vertices]
-    assert all(d[v] == 0 and d.min() == 0 and not np.isnan(d).any() for d, v in zip(alone, vertices, strict=True))
-    np.testing.assert_array_equal(solver.distances(vertices), alone)
-    np.testing.assert_array_equal(list(solver.iter_distances(vertices)), alone)
-    again = pickle.loads(pickle.dumps(solver))
-    with ThreadPoolExecutor(4) as threads:
-        np.testing.assert_array_equal(list(threads.map(again.distance, vertices)), alone)
-    cells = solver.voronoi(vertices)
-    near = np.stack(alone).argmin(axis=0)
-    np.testing.assert_allclose(cells.distance, np.min(alone, axis=0), rtol=0.05)
-    assert (cells.labels == near).mean() > 0.9
-    assert repr(solver).startswith(f"GeodesicSolver({solver.n_vertices} vertices, {solver.plan.engine}")
-
-
-@pytest.mark.parametrize("name", DOMAINS)
-def test_a_cutoff_leaves_what_is_nearer(name):
-    solver = DOMAINS[name]()
-    whole = solver.distance(3)
-    cutoff = float(np.median(whole))
-    expected = np.where(whole <= cutoff, whole, np.inf)
-    np.testing.assert_allclose(solver.distance(3, cutoff), expected, rtol=1e-12)
-    np.testing.assert_allclose(solver.distances([3], cutoff=cutoff)[0], expected, rtol=1e-12)
-    labels = solver.voronoi([3, 9], cutoff=cutoff).labels
-    assert (labels[np.isinf(solver.distance([3, 9], cutoff))] == -1).all()
 
 
 def test_every_kind_of_source_against_the_single_sources():
@@ -71,14 +38,6 @@ def test_directions_are_those_of_the_distance():
     np.testing.assert_array_equal(found.labels, solver.voronoi([3, 500]).labels)
     along = np.linalg.norm(found.gradient, axis=1)
     np.testing.assert_allclose(np.delete(along, [3, 500]), 1, rtol=1e-12)
-
-
-def test_moved_vertices_are_a_new_solver():
-    solver = GeodesicSolver(TORUS, method="sweep")
-    moved = solver.with_vertices(2 * TORUS.V)
-    np.testing.assert_allclose(moved.distance(3), 2 * solver.distance(3), rtol=1e-12)
-    with pytest.raises(ValueError, match="made from operators and has no vertices to move"):
-        DOMAINS["metric"]().with_vertices(TORUS.V)
 
 
 def test_edge_lengths_alone_are_the_mesh():

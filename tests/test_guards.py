@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 import warnings
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -237,14 +236,6 @@ def test_only_the_first_answer_of_a_kind_is_compared(counted: list[int]) -> None
     HeatMethodSolver(mesh, magnitude="unit").distance(0)
     HeatMethodSolver(mesh, t_coef=3).distance(0)
     assert len(counted) == 3
-
-
-def test_threads_compare_once(counted: list[int]) -> None:
-    solver = HeatMethodSolver(shapes.icosphere(3))
-    with ThreadPoolExecutor(4) as threads:
-        answers = list(threads.map(solver.distance, [5] * 12))
-    assert counted == [5]
-    assert all(np.array_equal(answers[0], answer) for answer in answers)
 
 
 def test_a_comparison_that_was_bad_is_repeated_and_once_in_a_batch() -> None:

@@ -146,16 +146,6 @@ def test_threads_and_room_change_nothing(monkeypatch):
         np.testing.assert_array_equal(one, other)
 
 
-def test_units_do_not_matter():
-    mesh = bumpy()
-    pairs = np.array([[0, 5], [9, 200]])
-    for scale in (2.0**-90, 2.0**90):
-        other = Mesh(mesh.V * scale, mesh.F)
-        np.testing.assert_array_equal(pair_distances(other, pairs), pair_distances(mesh, pairs) * scale)
-        near = distances_within(other, 0.3 * scale, [4])
-        np.testing.assert_array_equal(near.toarray(), distances_within(mesh, 0.3, [4]).toarray() * scale)
-
-
 def test_what_is_not_reached_is_padded():
     one = shapes.icosphere(0)
     n = one.n_vertices

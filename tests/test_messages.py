@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import tomllib
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ import pytest
 import heat_igl
 from heat_igl import (
     HeatMethodSolver,
-    MissingExtraError,
     SourceError,
     SurfaceCurve,
     SurfacePoints,
@@ -86,11 +84,6 @@ def test_arguments_that_numpy_would_take_for_something_else_are_refused(ask, mes
         ask()
 
 
-def test_truth_values_may_be_those_of_numpy_and_integers():
-    for closed in (np.True_, 1):
-        assert heat_igl.curve_on(MESH, MESH.V[:3], closed=closed, tolerance=1.0).is_closed is True
-
-
 def test_a_number_of_neighbours_that_no_memory_holds_is_named():
     for k in (10**12, 2**70):
         with pytest.raises(MemoryError, match=f"^k = {k} for each of 1 vertices does not fit into memory"):
@@ -106,23 +99,6 @@ def test_positions_as_sources_are_told_of_closest_points(positions):
     assert geodesic_distance(MESH, heat_igl.closest_points(MESH, positions).points).min() < 0.1
     with pytest.raises(SourceError, match=r"closest_points\(mesh, targets\).points"):
         shortest_paths(MESH, positions, distance=PHI)
-
-
-@pytest.mark.parametrize("option", ["t", "t_coef"])
-@pytest.mark.parametrize("value", ["1", True, None.__class__, [1.0], np.nan, 1j])
-def test_steps_are_numbers(option, value):
-    with pytest.raises(ValueError, match=f"{option} must be a positive number, not "):
-        HeatMethodSolver(MESH, **{option: value})
-    HeatMethodSolver(MESH, **{option: np.float32(0.5)})
-
-
-def test_usual_steps_are_not_warned_about():
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        for t_coef in (0.1, 1, 10, 100):
-            HeatMethodSolver(MESH, t_coef=t_coef)
-        HeatMethodSolver(heat_igl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), t_coef=1)
-    assert [str(warning.message) for warning in caught] == []
 
 
 def test_curves_are_written_from_lists_of_any_depth(tmp_path):
@@ -146,12 +122,6 @@ def test_curves_are_written_from_lists_of_any_depth(tmp_path):
     assert not (tmp_path / "wrong.obj").exists()
 
 
-def test_a_missing_library_is_named_by_its_own_name():
-    message = str(MissingExtraError.of("a picture", "matplotlib", "view"))
-    assert message == "a picture needs matplotlib: pip install matplotlib (or install heat-igl with its extra 'view')"
-    assert "pip install typer rich (" in str(MissingExtraError.of("it", "typer and rich", "cli"))
-
-
 def test_extras_and_libraries_in_messages_are_those_of_the_project():
     root = Path(heat_igl.__file__).parents[1]
     if not (root / "pyproject.toml").exists():
@@ -167,8 +137,3 @@ def test_extras_and_libraries_in_messages_are_those_of_the_project():
     for packages, extra in calls:
         held = {re.split(r"[<>=\[;]", requirement)[0].strip().lower() for requirement in extras[extra]}
         assert set(packages.split(" and ")) <= held, (packages, extra)
-
-
-def test_curves_without_points_are_refused():
-    with pytest.raises(SourceError, match="faces must be one face index or more"):
-        SurfaceCurve([], [], [])

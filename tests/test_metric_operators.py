@@ -186,17 +186,6 @@ def test_no_distance_is_negative_where_fibres_change_at_every_edge(ratio):
         assert (found <= ratio * graph_distance(mesh, source) * (1 + 1e-9)).all()
 
 
-def test_a_metric_on_tetrahedra_is_a_linear_map():
-    mesh, A = shapes.box(6), stretch(10.0)
-    A[2, 0] = 0.5
-    domain = metric_operators(mesh, np.tile(A.T @ A, (mesh.n_faces, 1, 1)))
-    exact = np.linalg.norm((mesh.V - mesh.V[40]) @ A.T, axis=1)
-    np.testing.assert_allclose(distance(domain, 40, method="auto"), exact, rtol=1e-9, atol=1e-12)
-    expected = operators(Mesh(mesh.V @ A.T, mesh.F))
-    for one, other in ((domain.L, expected.L), (domain.M, expected.M)):
-        assert abs(one - other).max() < 1e-9 * abs(other).max()
-
-
 def test_points_are_sources_in_a_metric():
     mesh, A = flat(shapes.grid(12)), stretch(5.0)
     domain = metric_operators(mesh, np.tile(A.T @ A, (mesh.n_faces, 1, 1)))

@@ -11,28 +11,6 @@ from heat_igl.heat_method import SolverOptions
 from heat_igl.operators import operators
 
 
-@pytest.mark.parametrize(
-    ("option", "value", "message"),
-    [
-        ("t_coef", 0, "t_coef must be a positive number, not 0"),
-        ("t", "soon", "t must be a positive number, not 'soon'"),
-        (
-            "laplacian",
-            "graph",
-            "laplacian must be one of 'auto', 'intrinsic-delaunay', 'intrinsic-delaunay-refined', 'cotan', not 'graph'",
-        ),
-        ("boundary", "robin", "boundary must be one of 'neumann', 'dirichlet', 'average', not 'robin'"),
-        ("magnitude", "log", "magnitude must be one of 'auto', 'unit', 'damped', not 'log'"),
-        ("backend", "magma", "backend must be one of 'auto', .*, not 'magma'"),
-    ],
-)
-def test_an_option_without_a_meaning_is_refused_when_options_are_put_together(option, value, message):
-    with pytest.raises(ValueError, match=message):
-        SolverOptions(**{option: value})
-    with pytest.raises(ValueError, match=message):
-        HeatMethodSolver(shapes.grid(2), **{option: value})
-
-
 def test_options_put_together_before_are_those_of_the_keywords():
     mesh = perturbed(shapes.disk(6))
     chosen = {"t_coef": np.float32(3), "laplacian": "cotan", "boundary": "average", "backend": "scipy"}

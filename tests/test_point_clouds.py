@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from heat_igl import (
     MeshError,
     PointCloud,
     cli,
-    farthest_points,
     read_point_cloud,
     shapes,
 )
@@ -125,15 +123,6 @@ def test_distance_on_a_cylinder_with_two_boundaries(options: dict[str, str], mos
     difference[:, 0] = np.minimum(difference[:, 0], 2 * np.pi - difference[:, 0])
     distance = SolverChoice.of(**options).on(PointCloud(P)).distance(0)
     assert mean_error(distance, np.linalg.norm(difference, axis=1)) < most
-
-
-def test_points_are_swept() -> None:
-    cloud = PointCloud(sphere(1500))
-    sweep = GeodesicSolver(cloud, method="sweep").distance(0)
-    default = GeodesicSolver(cloud)
-    assert default.plan.engine == "sweep"
-    np.testing.assert_array_equal(default.distance(0), sweep)
-    np.testing.assert_array_equal(default.with_vertices(2 * cloud.P).distance(0), 2 * sweep)
 
 
 def test_unfolding_is_exact_in_a_plane_where_straight_lines_stay_inside() -> None:
@@ -260,15 +249,6 @@ def test_few_points_in_a_plane(n: int) -> None:
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), found, atol=1e-9)
 
 
-def test_copies_of_a_point_are_at_distance_0_of_each_other() -> None:
-    P = sphere(1000)
-    P = np.append(P, P[[3, 3, 700]], axis=0)
-    distance = GeodesicSolver(PointCloud(P), method="exact").distance(3)
-    np.testing.assert_allclose(distance[[1000, 1001]], 0, atol=1e-6)
-    np.testing.assert_allclose(distance[1002], distance[700], atol=1e-6)
-    assert np.isfinite(GeodesicSolver(PointCloud(P)).distance(3)).all()
-
-
 @pytest.mark.parametrize("copies", ["at random", "six of each", "a thousand of one"])
 def test_copies_have_the_distance_of_the_point(copies: str) -> None:
     """Distance by the sweep, walks and windows, from the front door, and cells: as on the distinct points."""
@@ -292,22 +272,6 @@ def test_copies_have_the_distance_of_the_point(copies: str) -> None:
         np.testing.assert_array_equal(cells.labels, cells.labels[of])
     front_door = heat_igl.geodesic_distance(cloud, source)
     np.testing.assert_allclose(front_door, heat_igl.geodesic_distance(alone, int(of[source]))[of], atol=1e-5)
-
-
-def test_copies_of_an_outlier_are_outliers() -> None:
-    cloud = PointCloud(np.append(sphere(500), [[0, 0, 5.0]] * 3, axis=0))
-    assert np.isinf(GeodesicSolver(cloud).distance(0)[500:]).all()
-    assert cloud.report().unreferenced_vertices.tolist() == [500, 501, 502]
-
-
-@pytest.mark.parametrize("domain", ["points", "copies"])
-def test_heat_by_name_is_the_heat_method(domain: str) -> None:
-    """A solver on points sweeps unless heat is named, and `method` names it."""
-    P = sphere(1100)
-    cloud = PointCloud(P if domain == "points" else np.append(P, P[:40], axis=0))
-    by_heat = HeatMethodSolver(cloud, magnitude="damped").distance(3)
-    np.testing.assert_array_equal(heat_igl.geodesic_distance(cloud, 3, method="heat"), by_heat)
-    assert not np.array_equal(by_heat, GeodesicSolver(cloud).distance(3))
 
 
 def two_sheets(n: int, gap: float) -> tuple[np.ndarray, np.ndarray]:
@@ -363,56 +327,6 @@ def test_sheets_further_apart_than_the_spacing_need_no_normals() -> None:
 
 
 # The solver's other questions need no special case.
-
-
-def test_batches_voronoi_and_farthest_points_as_on_a_mesh() -> None:
-    P = sphere(1500)
-    solver = GeodesicSolver(PointCloud(P))
-    one_by_one = np.stack([solver.distance(i) for i in range(5)])
-    np.testing.assert_allclose(solver.distances(range(5)), one_by_one, atol=1e-9)
-    cells = solver.voronoi([0, 1, 2])
-    nearest = np.stack([on_sphere(P, i) for i in range(3)])
-    clear = np.diff(np.sort(nearest, axis=0)[:2], axis=0)[0] > 0.1
-    assert (cells.labels == nearest.argmin(axis=0))[clear].all()
-    # Four points far from each other on a sphere are near a tetrahedron.
-    chosen = farthest_points(solver, 4)
-    assert min(on_sphere(P, int(i))[np.setdiff1d(chosen, i)].min() for i in chosen) > 1.3
-
-
-def test_a_cloud_and_its_solver_are_pickled() -> None:
-    cloud = PointCloud(sphere(300), sphere(300))
-    copy = pickle.loads(pickle.dumps(cloud))
-    for name in ("P", "F", "normals"):
-        np.testing.assert_array_equal(getattr(copy, name), getattr(cloud, name))
-    solver = GeodesicSolver(cloud)
-    assert (pickle.loads(pickle.dumps(solver)).distance(0) == solver.distance(0)).all()
-
-
-def test_points_move() -> None:
-    P = sphere(800)
-    solver = GeodesicSolver(PointCloud(P))
-    np.testing.assert_allclose(solver.with_vertices(2 * P).distance(0), 2 * solver.distance(0), rtol=1e-9)
-    with pytest.raises(MeshError, match="P has 799 rows, but the cloud has 800 points"):
-        solver.with_vertices(P[:-1])
-
-
-def test_a_batch_on_dask_takes_clouds(tmp_path) -> None:
-    pytest.importorskip("distributed")
-    pytest.importorskip("zarr")
-    zarr = pytest.importorskip("zarr")
-    from heat_igl import cluster
-
-    P = sphere(300)
-    clouds = {
-        "distinct": PointCloud(P),
-        "with copies": PointCloud(np.concatenate([P, P[:150]]), np.tile(P, (2, 1))[:450]),
-    }
-    cluster.distances(clouds, [[0], [1]], tmp_path / "store", dtype="float64")
-    for name, cloud in clouds.items():
-        group = zarr.open_group(tmp_path / "store", mode="r")[name]
-        stored = [array for _, array in group.arrays() if array.ndim == 2]
-        expected = GeodesicSolver(cloud).distances([0, 1])
-        assert any(a.shape == expected.shape and np.allclose(a[:], expected, atol=1e-9) for a in stored)
 
 
 # Bad arguments.
@@ -641,18 +555,6 @@ def test_discs_lie_in_the_tangent_planes_and_continue_the_values() -> None:
     np.testing.assert_array_equal(as_given[flat.F].max(axis=1), as_given[flat.F[:, 0]])
 
 
-def test_a_picture_of_a_cloud_with_an_outlier_and_labels(tmp_path) -> None:
-    pytest.importorskip("matplotlib")
-    cloud = PointCloud(np.append(sphere(300), [[0, 0, 2.0]], axis=0))
-    distance = GeodesicSolver(cloud, method="exact").distance([3, 9])
-    assert np.isinf(distance[-1])
-    heat_igl.plots.plot(cloud, distance, sources=[3, 9]).save(tmp_path / "a.png")
-    labels = GeodesicSolver(cloud).voronoi([3, 9]).labels
-    heat_igl.plots.plot_labels(cloud, labels, sources=[3, 9]).save(tmp_path / "b.png")
-    for name in ("a.png", "b.png"):
-        assert (tmp_path / name).stat().st_size > 5000
-
-
 # The kernel.
 
 
@@ -805,11 +707,6 @@ def test_principal_axes() -> None:
     )
     np.testing.assert_allclose(variances[0], expected, rtol=1e-9)
     np.testing.assert_allclose(np.abs(axes[0][::-1] @ vectors), np.eye(3), atol=1e-9)
-
-
-def test_operators_of_points_want_points():
-    with pytest.raises(heat_igl.MeshError, match="cloud must be a PointCloud, not Mesh"):
-        heat_igl.point_cloud_operators(heat_igl.shapes.grid(2))
 
 
 # Sheets, and the orientation of the triangles.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heat_igl import GeodesicSolver, Mesh, MeshError, PolygonMesh, shapes
+from heat_igl import Mesh, MeshError, PolygonMesh, shapes
 
 
 def quads(bend: float = 0.0, n: int = 6) -> tuple[np.ndarray, np.ndarray]:
@@ -35,12 +35,6 @@ def test_a_sheet_of_quadrilaterals_is_not_taken_for_tetrahedra(bend: float, n: i
 def test_a_cube_of_quadrilaterals_is_not_taken_for_tetrahedra(F: list[list[int]]) -> None:
     with pytest.raises(MeshError, match=r"F\[0\] = \[0, 2, 3, 1\] is a quadrilateral: pass PolygonMesh\(V, F\)"):
         Mesh(CORNERS, F)
-
-
-def test_distance_on_the_cube_of_quadrilaterals() -> None:
-    """From one corner of a cube to the opposite: over two faces that are laid flat."""
-    mesh = PolygonMesh(CORNERS, CUBE)
-    assert GeodesicSolver(mesh, method="exact").distance(0)[7] == pytest.approx(np.sqrt(5))
 
 
 def scattered(n: int, seed: int) -> Mesh:

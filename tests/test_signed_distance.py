@@ -38,13 +38,6 @@ def ring(mesh: Mesh, radius: float = 0.3, start: float = 0.0, end: float = 2 * n
     return curve_on(mesh, positions, closed=closed)
 
 
-def bent_level(mesh: Mesh, seed: int) -> list[SurfaceCurve]:
-    """The level of a random smooth function, with many bends."""
-    rng = np.random.default_rng(seed)
-    values = np.sin(mesh.V @ rng.normal(size=(3, 5)) * 2 + rng.uniform(0, 6, 5)).sum(axis=1)
-    return isolines(mesh, values, float(np.quantile(values, 0.4)))[0]
-
-
 def reversed_curve(curve: SurfaceCurve) -> SurfaceCurve:
     return SurfaceCurve(curve.faces[::-1], curve.end[::-1], curve.start[::-1], curve.is_closed)
 
@@ -376,13 +369,6 @@ def test_components_without_a_curve_are_not_reached():
     moved = SurfaceCurve(circle.faces + one.n_faces, circle.start, circle.end, is_closed=True)
     found = SignedHeatSolver(small).distance([circle, moved])
     np.testing.assert_allclose(found[n:], 1e-3 * found[:n], atol=1e-9)
-
-
-def test_long_strips_stay_in_range():
-    mesh = shapes.strip(2000, 3)
-    across = isolines(mesh, mesh.V[:, 0], 10.5)[0]
-    distance = SignedHeatSolver(mesh).distance(across)
-    np.testing.assert_allclose(distance, mesh.V[:, 0] - 10.5, atol=0.02)
 
 
 def test_surfaces_without_sides():

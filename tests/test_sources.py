@@ -14,9 +14,7 @@ from heat_igl import (
     geodesic_distance,
     isolines,
     shapes,
-    shortest_paths,
 )
-from heat_igl.geodesic import SolverChoice
 from heat_igl.sources import source_set, vertex_sources
 
 
@@ -142,21 +140,6 @@ def test_only_triangles_hold_points():
         source_set([0, SurfacePoints([0], CENTRE)], 5, None)
     with pytest.raises(SourceError, match="here, not SurfacePoints"):
         vertex_sources(SurfacePoints([0], CENTRE), 5)
-
-
-@pytest.mark.parametrize("method", ["heat", "sweep", "exact"])
-def test_a_curve_without_length_is_a_point(method):
-    """The path from a vertex to itself emits no heat."""
-    mesh = shapes.icosphere(2)
-    solver = SolverChoice(method).on(mesh)
-    (path,) = shortest_paths(mesh, targets=3, sources=3)
-    np.testing.assert_array_equal(solver.distance(path), solver.distance(3))
-    inside = [[0.2, 0.5, 0.3]]
-    curve = SurfaceCurve([7, 7], [*inside, *inside], [*inside, *inside])
-    found = solver.voronoi([curve, 5])
-    np.testing.assert_array_equal(found.distance, solver.distance([SurfacePoints([7], inside), 5]))
-    assert found.labels[5] == 1
-    assert (found.labels[mesh.F[7]] == 0).all()
 
 
 def test_lists_of_curves_may_be_nested():

@@ -146,17 +146,6 @@ def test_refraction_at_a_straight_border(speeds):
     assert np.nanmean(relative_error(solver(mesh, speed).distance(source), exact)) < 1e-4
 
 
-def test_what_needs_triangles_that_fit_is_refused_at_jumps():
-    mesh = shapes.grid(3)
-    jump = speed_operators(mesh, np.where(np.arange(18) < 9, 1.0, 5.0))
-    for method in ("windows", "exact"):
-        with pytest.raises(heat_igl.MeshError, match="needs triangles that fit together, and those of this metric"):
-            heat_igl.GeodesicSolver(jump, method=method)
-    assert heat_igl.GeodesicSolver(jump, method="sweep").plan.engine == "fronts"
-    smooth = speed_operators(mesh, np.linspace(1, 1.05, 18))
-    assert heat_igl.GeodesicSolver(smooth, method="exact").distance(0)[0] == 0
-
-
 @pytest.mark.parametrize(
     ("speed", "message"),
     [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Callable
 
 import numpy as np
@@ -11,7 +10,7 @@ from conftest import shared_path
 from scipy.spatial import Delaunay, cKDTree
 
 import heat_igl
-from heat_igl import GeodesicSolver, HeatMethodSolver, MeshError, OffsetSources, SourceError, shapes
+from heat_igl import GeodesicSolver, SourceError, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.typing import BoolArray, FloatArray
@@ -252,19 +251,6 @@ def test_a_line_is_not_followed_across_a_gap():
     assert found[right] == pytest.approx(2 * np.hypot(0.25, 0.5), rel=0.02)
 
 
-def test_offsets_and_components():
-    cube = shapes.box(4)
-    two = Mesh(
-        np.concatenate([cube.V, cube.V + np.array([5, 0, 0])]), np.concatenate([cube.F, cube.F + cube.n_vertices])
-    )
-    corner, opposite = 0, cube.n_vertices - 1
-    each = np.linalg.norm(cube.V[:, None] - cube.V[[corner, opposite]], axis=2) + np.array([0, 0.5])
-    found = GeodesicSolver(two).voronoi(OffsetSources([corner, opposite], [0, 0.5]))
-    np.testing.assert_allclose(found.distance[: cube.n_vertices], each.min(axis=1), atol=1e-9)
-    assert np.isinf(found.distance[cube.n_vertices :]).all()
-    assert (found.labels[cube.n_vertices :] == -1).all()
-
-
 def test_vertices_of_no_tetrahedron():
     """They are neither seen nor see anything, as sources too."""
     box = shapes.box(3)
@@ -275,21 +261,6 @@ def test_vertices_of_no_tetrahedron():
         np.testing.assert_allclose(solver.distance(sources)[:-1], exact, rtol=1e-9)
     assert np.isinf(solver.distance(5)[-1])
     assert np.isinf(solver.distance(box.n_vertices)[:-1]).all()
-
-
-def test_fronts_are_what_all_methods_but_heat_and_windows_take():
-    box = shapes.box(5)
-    solver = GeodesicSolver(box)
-    assert (solver.plan.engine, solver.plan.tolerance) == ("fronts", None)
-    np.testing.assert_array_equal(GeodesicSolver(box, method="sweep").distance(0), solver.distance(0))
-    again = pickle.loads(pickle.dumps(solver))
-    np.testing.assert_array_equal(again.distance(7), solver.distance(7))
-    by_heat = HeatMethodSolver(box)
-    assert by_heat.plan.engine == "heat"
-    assert np.abs(by_heat.distance(0) - solver.distance(0)).max() > 0.01
-    for method in ("windows", "exact"):
-        with pytest.raises(MeshError, match=f"method='{method}' needs triangles .*, and the mesh holds tetrahedra"):
-            GeodesicSolver(box, method=method)
 
 
 def test_depth_below_a_surface():
@@ -320,11 +291,3 @@ def test_depth_below_boundary_faces():
         SourceError, match="points and curves lie on triangles, and this domain has none: name vertices"
     ):
         GeodesicSolver(mesh).distance(heat_igl.SurfacePoints([3], [[0.2, 0.3, 0.5]]))
-
-
-def test_units_and_places_play_no_part():
-    mesh = scattered(600, "ball", 4)
-    distance = GeodesicSolver(mesh).distance(3)
-    for unit in (1e-12, 1e12):
-        moved = Mesh(unit * (mesh.V + 7), mesh.F)
-        np.testing.assert_allclose(heat_igl.geodesic_distance(moved, 3, method="sweep") / unit, distance, rtol=1e-4)
