@@ -1,8 +1,8 @@
 """From heat_igl/kernels to extensions: every module there is Cython in pure Python mode.
 
 A few kernels are compiled once more for each set of wide vectors that the processor may have; `heat_igl.kernels`
-chooses among them at run time. ``HEAT_IGL_CHECKED=1`` makes a build that checks every index and raises, for tests: the
-usual one indexes without checks, as callers pass arrays whose sizes they have checked.
+chooses among them at run time. ``HEAT_IGL_CHECKED=1`` makes a build that checks every index and
+every assertion and raises, for tests: the usual one has neither, as callers pass arrays whose sizes they have checked.
 """
 
 from __future__ import annotations
@@ -136,6 +136,7 @@ class BuildKernels(build_ext):
         else:
             options = f"{OPTIONS} {ANY_ORDER if kernel in WIDE else ''} {VECTORS.get(vectors, '')}"
         extension.extra_compile_args = options.split()
+        extension.define_macros = [] if CHECKED else [("CYTHON_WITHOUT_ASSERTIONS", None)]
         super().build_extension(extension)
 
 

@@ -19,21 +19,15 @@ from cython.cimports.heat_igl.kernels.windows.window_structures import (
     apart,
     at_corner,
     backward,
+    bent,
+    is_within,
     lateral,
     reach,
     twice_product,
 )
-from cython.cimports.heat_igl.kernels.windows.window_trimming import trim
+from cython.cimports.heat_igl.kernels.windows.window_trimming import is_covered, trim
 from cython.cimports.libc.math import INFINITY, sqrt
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _bent(w: cython.pointer(Window), at: cython.double, x: cython.double, y: cython.double) -> cython.double:
-    """Length of the path through a point of the half-edge to a point of the face."""
-    return w.offset + reach(w, at) + sqrt((at - x) * (at - x) + y * y)
+from cython.cimports.libc.string import memcpy
 
 
 @cython.cfunc
@@ -123,7 +117,7 @@ def _reach_apex(
         # same direction as a straight one.
         at = backward(w, apex.x, apex.y)
         at = 0.0 if at < 0.0 else apex.length if at > apex.length else at
-        _arrive(s, h, w, _bent(w, b, apex.x, apex.y), at)
+        _arrive(s, h, w, bent(w, b, apex.x, apex.y), at)
     if apex.best >= 0:
         w = windows + apex.best
         apex.best_at = backward(w, apex.x, apex.y)
@@ -154,7 +148,10 @@ def _to_left(
     if out.depth <= 0.0:
         return False
     scale = w.depth * apex.cos_left
+    # A line along the side meets it anywhere: so near a root on its extension, the quotient is that of two roundings.
     out.start = w.start * w.depth / (scale - lateral(w, w.start) * apex.sin_left)
+    if out.start < 0.0:
+        out.start = 0.0
     out.stop = apex.left_length
     if w.side == LEFT_OF_APEX:
         out.stop = w.stop * w.depth / (scale - lateral(w, w.stop) * apex.sin_left)
@@ -188,6 +185,8 @@ def _to_right(
         return False
     scale = w.depth * apex.cos_right
     out.stop = apex.right_length - (apex.length - w.stop) * w.depth / (scale + lateral(w, w.stop) * apex.sin_right)
+    if out.stop > apex.right_length:
+        out.stop = apex.right_length
     out.start = 0.0
     if w.side == RIGHT_OF_APEX:
         out.start = apex.right_length - (apex.length - w.start) * w.depth / (
@@ -196,6 +195,77 @@ def _to_right(
         if out.start < 0.0:
             out.start = 0.0
     return out.stop - out.start > NARROW * apex.right_length
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _place(
+    apex: cython.pointer(Apex), to_left: cython.bint, at: cython.double, x: cython.p_double, y: cython.p_double
+) -> cython.void:
+    """A point of the side to the left or right of the apex, in the frame of the half-edge."""
+    if to_left:
+        x[0], y[0] = at * apex.cos_left, at * apex.sin_left
+    else:
+        at = apex.right_length - at
+        x[0], y[0] = apex.length - at * apex.cos_right, at * apex.sin_right
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _goes_on(
+    w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window), to_left: cython.bint
+) -> cython.bint:
+    """Whether `out` lies on its side, and begins and ends at the first and the last line of w, or at the apex.
+
+    So it is reached by straight lines through w, all of them inside the faces, and covers what w leads to.
+    """
+    x: cython.double
+    y: cython.double
+    place: cython.double
+    at: cython.double
+    i: cython.int
+    if not 0.0 <= out.start < out.stop <= (apex.left_length if to_left else apex.right_length):
+        return False
+    for i in range(2):
+        place = out.stop if i else out.start
+        at = w.stop if i else w.start
+        _place(apex, to_left, place, cython.address(x), cython.address(y))
+        if w.side == AROUND_APEX and i == to_left:
+            at = min(max(backward(w, apex.x, apex.y), w.start), w.stop)
+        # Lengths agree, not places: a line along the side meets it anywhere.
+        if not is_within(bent(w, at, x, y), out.offset + reach(out, place), apex.length):
+            return False
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _is_behind(
+    w: cython.pointer(Window),
+    apex: cython.pointer(Apex),
+    best: cython.pointer(Window),
+    to_left: cython.bint,
+) -> cython.bint:
+    """Whether the window that the apex is reached through leads to where w does by paths that are no longer."""
+    out: Window
+    x: cython.double
+    y: cython.double
+    place: cython.double
+    i: cython.int
+    if to_left:
+        if not _to_left(w, apex, cython.address(out), False):
+            return True
+    elif not _to_right(w, apex, cython.address(out), False):
+        return True
+    for i in range(2):
+        place = out.stop if i else out.start
+        _place(apex, to_left, place, cython.address(x), cython.address(y))
+        if not is_within(bent(best, apex.best_at, x, y), out.offset + reach(cython.address(out), place), apex.length):
+            return False
+    return True
 
 
 @cython.cfunc
@@ -230,11 +300,14 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     s.slot[h] = -1
     s.n_lists_done += 1
     s.n_waiting -= n
-    n = trim(s, windows, n, h)
     if n > s.n_out:
         more_room(s, n)
         if s.failed:
             return
+    assert memcpy(s.to_left, windows, n * cython.sizeof(Window)) != cython.NULL
+    i = n
+    n = trim(s, windows, n, h)
+    assert is_covered(s, s.to_left, i, windows, n, h)
     apex = _opposite(s, h)
     _reach_apex(s, h, windows, n, cython.address(apex))
     if s.first_target != cython.NULL and s.first_target[h // 3] >= 0:
@@ -246,15 +319,23 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
         if w.side != RIGHT_OF_APEX and (
             is_best
             or w.start < apex.best_at
-            or (w.side != AROUND_APEX and not apex.nearest <= _bent(w, w.stop, apex.x, apex.y))
+            or (w.side != AROUND_APEX and not apex.nearest <= bent(w, w.stop, apex.x, apex.y))
         ):
-            n_left += _to_left(w, cython.address(apex), s.to_left + n_left, turns)
+            if _to_left(w, cython.address(apex), s.to_left + n_left, turns):
+                assert _goes_on(w, cython.address(apex), s.to_left + n_left, True)
+                n_left += 1
+        else:
+            assert w.side == RIGHT_OF_APEX or _is_behind(w, cython.address(apex), windows + apex.best, True)
         if w.side != LEFT_OF_APEX and (
             is_best
             or w.stop > apex.best_at
-            or (w.side != AROUND_APEX and not apex.nearest <= _bent(w, w.start, apex.x, apex.y))
+            or (w.side != AROUND_APEX and not apex.nearest <= bent(w, w.start, apex.x, apex.y))
         ):
-            n_right += _to_right(w, cython.address(apex), s.to_right + n_right, turns)
+            if _to_right(w, cython.address(apex), s.to_right + n_right, turns):
+                assert _goes_on(w, cython.address(apex), s.to_right + n_right, False)
+                n_right += 1
+        else:
+            assert w.side == LEFT_OF_APEX or _is_behind(w, cython.address(apex), windows + apex.best, False)
     # The list is free again; its room stays with it.
     s.lists[place].count = s.free_list
     s.lists[place].half_edge = -1
@@ -299,7 +380,7 @@ def _measure(
                 if at > w.stop + NEAR * length:
                     continue
                 at = w.stop
-            distance = _bent(w, at, x, y)
+            distance = bent(w, at, x, y)
             if y == 0.0:
                 # On the side itself: the copy in the face before knows the last face of the path.
                 distance += s.tolerance * distance

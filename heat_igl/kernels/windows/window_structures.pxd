@@ -168,6 +168,45 @@ cdef enum Side:
     AROUND_APEX = 2
 
 
+cdef extern from *:
+    """
+    // Two paths are equally long if they differ by less than this fraction: fifty times the rounding of one step.
+    #define ROUNDING 1e-14
+    // The largest angle, in radians, by which the directions from a bend are widened.
+    #define WIDEST 0.01
+    // What is narrower, as a fraction of a side, is no window.
+    #define NARROW 1e-14
+    // A vertex missed by less than this fraction of a side is reached over the end of the window, which is longer by
+    // the square of that.
+    #define NEAR 1e-7
+    // Windows whose roots are closer than this fraction of their distance have the same root.
+    #define SAME 2e-14
+    // Windows that overlap by less than this fraction of both are left as they are.
+    #define OVERLAP 0.2
+    // A search goes on beyond its cutoff by this fraction, more than rounding of a key.
+    #define MARGIN 1e-12
+    // A vertex is flat if its angles sum to 2 pi up to this: ten times what still lets halves of a window be joined.
+    #define FLATNESS 1e-12
+    // Looks at the lock of another thread before it is waited for.
+    #define TRIES 2000
+    // How far behind merged windows their root lies at most, in lengths of the part of the half-edge.
+    #define FARTHEST 256.0
+    // What a list costs beside its windows, in windows.
+    #define PER_LIST 4
+    """
+    double ROUNDING
+    double WIDEST
+    double NARROW
+    double NEAR
+    double SAME
+    double OVERLAP
+    double FARTHEST
+    double MARGIN
+    double FLATNESS
+    int TRIES
+    int PER_LIST
+
+
 # Twice the scalar product of two sides p and q of a triangle, by the third side. The difference of squares is that of
 # the two longest sides: on needles too, the cosine is off by no more than rounding of one.
 cdef inline double twice_product(double p, double q, double opposite) noexcept nogil:
@@ -233,6 +272,16 @@ cdef inline double reach(const Window* w, double at) noexcept nogil:
     return sqrt((at - w.x) * (at - w.x) + w.depth * w.depth)
 
 
+# Length of the path of a window through a point of its half-edge to a point of the face.
+cdef inline double bent(const Window* w, double at, double x, double y) noexcept nogil:
+    return w.offset + reach(w, at) + sqrt((at - x) * (at - x) + y * y)
+
+
+# Whether a length exceeds another by no more than rounding, of that and of the sides of its last face.
+cdef inline bint is_within(double length, double other, double side) noexcept nogil:
+    return length <= other + MARGIN * (other + side)
+
+
 # How far the line of a window through a point of its half-edge goes along it while it rises by `depth`.
 cdef inline double lateral(const Window* w, double at) noexcept nogil:
     return w.x if w.is_plane else at - w.x
@@ -243,42 +292,3 @@ cdef inline double backward(const Window* w, double x, double y) noexcept nogil:
     if w.is_plane:
         return x - y * w.x / w.depth
     return w.x + w.depth * (x - w.x) / (y + w.depth)
-
-
-cdef extern from *:
-    """
-    // Two paths are equally long if they differ by less than this fraction: fifty times the rounding of one step.
-    #define ROUNDING 1e-14
-    // The largest angle, in radians, by which the directions from a bend are widened.
-    #define WIDEST 0.01
-    // What is narrower, as a fraction of a side, is no window.
-    #define NARROW 1e-14
-    // A vertex missed by less than this fraction of a side is reached over the end of the window, which is longer by
-    // the square of that.
-    #define NEAR 1e-7
-    // Windows whose roots are closer than this fraction of their distance have the same root.
-    #define SAME 2e-14
-    // Windows that overlap by less than this fraction of both are left as they are.
-    #define OVERLAP 0.2
-    // A search goes on beyond its cutoff by this fraction, more than rounding of a key.
-    #define MARGIN 1e-12
-    // A vertex is flat if its angles sum to 2 pi up to this: ten times what still lets halves of a window be joined.
-    #define FLATNESS 1e-12
-    // Looks at the lock of another thread before it is waited for.
-    #define TRIES 2000
-    // How far behind merged windows their root lies at most, in lengths of the part of the half-edge.
-    #define FARTHEST 256.0
-    // What a list costs beside its windows, in windows.
-    #define PER_LIST 4
-    """
-    double ROUNDING
-    double WIDEST
-    double NARROW
-    double NEAR
-    double SAME
-    double OVERLAP
-    double FARTHEST
-    double MARGIN
-    double FLATNESS
-    int TRIES
-    int PER_LIST

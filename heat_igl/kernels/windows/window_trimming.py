@@ -18,6 +18,7 @@ from cython.cimports.heat_igl.kernels.windows.window_structures import (
     W_THEN_U,
     Search,
     Window,
+    is_within,
     lateral,
     reach,
 )
@@ -541,3 +542,38 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     if s.merging > 0.0 and k > 1:
         k = _merge(windows, k, s, length)
     return k
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def is_covered(
+    s: cython.pointer(Search),
+    before: cython.pointer(cython.const[Window]),
+    n_before: cython.int,
+    windows: cython.pointer(cython.const[Window]),
+    n: cython.int,
+    h: cython.int,
+) -> cython.bint:
+    """Whether n trimmed windows, and the ends of the half-edge, lead to all points of the windows before as shortly."""
+    length: cython.double = s.length[h]
+    at: cython.double
+    reached: cython.double
+    nearest: cython.double
+    i: cython.int
+    j: cython.int
+    k: cython.int
+    w: cython.pointer(cython.const[Window])
+    for i in range(n_before):
+        for j in range(5):
+            at = before[i].start + 0.25 * j * (before[i].stop - before[i].start)
+            reached = before[i].offset + reach(before + i, at)
+            nearest = s.upper[s.vertex[next_half_edge(h)]] + at
+            nearest = min(nearest, s.upper[s.vertex[previous_half_edge(h)]] + (length - at))
+            for k in range(n):
+                w = windows + k
+                if w.start - 2.0 * NARROW * length <= at <= w.stop + 2.0 * NARROW * length:
+                    nearest = min(nearest, w.offset + reach(w, at))
+            if not is_within(nearest, reached, length):
+                return False
+    return True
