@@ -12,7 +12,6 @@ cdef class GrowingTriangulation:
     cdef readonly long long n_faces, n_vertices, n_moves
 
     cdef bint is_full(self) noexcept nogil
-    cdef double total_angle(self, long long corner, double enough) noexcept nogil
     cdef bint is_delaunay(self, long long h) noexcept nogil
     cdef void flip(self, long long h) noexcept nogil
     cdef void split(self, long long f, double u, double v, double w) noexcept nogil

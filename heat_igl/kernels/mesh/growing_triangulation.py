@@ -7,7 +7,7 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.growing_triangulation import FLIP, SPLIT
 from cython.cimports.heat_igl.kernels.mesh.triangles import area, foot
-from cython.cimports.libc.math import atan2, sqrt
+from cython.cimports.libc.math import sqrt
 
 __all__ = ["GrowingTriangulation"]
 
@@ -50,30 +50,6 @@ class GrowingTriangulation:
     def is_full(self) -> cython.bint:
         """Whether there is no room for another move."""
         return self.n_moves == self.kind.shape[0]
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def total_angle(self, corner: cython.longlong, enough: cython.double) -> cython.double:
-        """Sum of the angles around the vertex at a corner 3 f + c, over the faces that are glued to one another there.
-
-        A sum above `enough` is not completed.
-        """
-        total: cython.double = 0.0
-        at: cython.longlong = corner
-        while True:
-            f: cython.longlong = at // 3
-            c: cython.int = at % 3
-            i: cython.int = (c + 1) % 3
-            j: cython.int = (c + 2) % 3
-            a: cython.double = self.l[f, c]
-            b: cython.double = self.l[f, i]
-            d: cython.double = self.l[f, j]
-            total += atan2(4.0 * area(a, b, d), b * b + d * d - a * a)
-            t: cython.longlong = self.twin[3 * f + i]
-            at = 3 * (t // 3) + (t % 3 + 1) % 3
-            if at == corner or total > enough:
-                return total
 
     @cython.cfunc
     @cython.nogil

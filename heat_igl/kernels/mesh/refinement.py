@@ -11,6 +11,7 @@ from cython.cimports.heat_igl.kernels.mesh.growing_triangulation import GrowingT
 from cython.cimports.heat_igl.kernels.mesh.refinement import LEAST, MOST_STEPS, SHARPEST, Exit, Location, Ray
 from cython.cimports.heat_igl.kernels.mesh.triangles import area, foot
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
+from cython.cimports.libc.math import atan2
 
 __all__ = ["refine"]
 
@@ -56,9 +57,12 @@ def refine(
     one = _Refinement()
     one.triangles, one.bad, one.unit = triangles, PriorityQueue(rows), units
     one.stack = np.empty(3 * rows + 64, np.int64)
-    one.n_given, one.least_sine, one.largest_radius = n, np.sin(least_angle), largest_radius
+    one.is_sharp = np.zeros(n, np.uint8)
+    one.least_sine, one.largest_radius = np.sin(least_angle), largest_radius
     limit: cython.longlong = most_vertices
+    seen: cython.uchar[::1] = np.zeros(3 * len(F), np.uint8)
     with cython.nogil:
+        _find_sharp(triangles, seen, one.is_sharp)
         one.run(limit)
     return *triangles.faces(), int(triangles.n_vertices), *triangles.moves()
 
@@ -72,7 +76,7 @@ class _Refinement:
     bad: PriorityQueue
     unit: cython.double[::1]
     stack: cython.longlong[::1]
-    n_given: cython.longlong
+    is_sharp: cython.uchar[::1]
     least_sine: cython.double
     largest_radius: cython.double
 
@@ -123,12 +127,8 @@ class _Refinement:
         if self.triangles.l[f, shortest] >= 2.0 * radius * self.least_sine:
             return 0.0
         # The angle at the tip of a sharp cone stays as it is.
-        if (
-            self.triangles.F[f, shortest] < self.n_given
-            and self.triangles.total_angle(3 * f + shortest, SHARPEST) < SHARPEST
-        ):
-            return 0.0
-        return badness
+        tip: cython.longlong = self.triangles.F[f, shortest]
+        return 0.0 if tip < self.is_sharp.shape[0] and self.is_sharp[tip] else badness
 
     @cython.cfunc
     @cython.nogil
@@ -181,6 +181,29 @@ class _Refinement:
                     self.stack[n_stack] = 3 * g + k
                     n_stack += 1
         return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _find_sharp(t: GrowingTriangulation, seen: cython.uchar[::1], is_sharp: cython.uchar[::1]) -> cython.void:
+    """Mark the vertices with a fan of faces whose angles sum to less than `SHARPEST`, which no split or flip changes."""
+    first: cython.longlong
+    for first in range(3 * t.n_faces):
+        at: cython.longlong = first
+        total: cython.double = 0.0
+        while not seen[at]:
+            seen[at] = True
+            f: cython.longlong = at // 3
+            i: cython.int = (at + 1) % 3
+            a: cython.double = t.l[f, at % 3]
+            b: cython.double = t.l[f, i]
+            d: cython.double = t.l[f, (at + 2) % 3]
+            total += atan2(4.0 * area(a, b, d), b * b + d * d - a * a)
+            h: cython.longlong = t.twin[3 * f + i]
+            at = 3 * (h // 3) + (h % 3 + 1) % 3
+        if 0.0 < total < SHARPEST:
+            is_sharp[t.F[first // 3, first % 3]] = True
 
 
 @cython.cfunc
