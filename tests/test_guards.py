@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import heat_igl
 from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, Mesh, SurfacePoints, shapes
 from heat_igl.heat_method.checking import Comparisons
 from heat_igl.kernels.sweep import sweeping
+from heat_igl.kernels.windows import local_windows
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.steps import PoissonProblem
 from heat_igl.typing import FloatArray
@@ -122,8 +124,6 @@ def test_another_engine_answers_for_a_broken_one_and_none_is_an_error() -> None:
         assert np.array_equal(guarded.labelled(sources)[0], distance)
     with pytest.raises(RuntimeError, match=r"contradicts itself .* whatever method"):
         GuardedEngine(broken, invariants(mesh), 0.0, (lambda: broken,)).distance(sources)
-    with pytest.raises(RuntimeError, match="contradicts itself"):
-        guarded.require(broken.distance(sources), sources)
 
 
 @pytest.mark.parametrize("factor", [0.7, 1.6, np.inf])
@@ -147,6 +147,50 @@ def test_windows_that_are_wrong_do_not_leave_the_solver(monkeypatch: pytest.Monk
         with pytest.warns(AccuracyWarning, match=f"{FAR}.*report"):
             found = each()
         assert np.allclose(found, distance, rtol=1e-6)
+
+
+LOCAL: dict[str, Callable[[Mesh], FloatArray]] = {
+    "within": lambda mesh: heat_igl.distances_within(mesh, 0.3, [SOURCE, 60]).toarray(),
+    "nearest": lambda mesh: heat_igl.nearest_vertices(mesh, 25, [SOURCE, 60])[1],
+    "pairs": lambda mesh: heat_igl.pair_distances(mesh, [[SOURCE, SOURCE + i] for i in range(5)]),
+}
+WRONG: dict[str, Callable[[FloatArray], object]] = {
+    "too near": lambda d: d.__setitem__(3, 0.5 * d[3]),
+    "too far": lambda d: d.__setitem__(3, 3.0 * d[3]),
+    "nan": lambda d: d.__setitem__(3, np.nan),
+    "short": lambda d: d.__imul__(0.9),
+    "long": lambda d: d.__iadd__(0.01),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+@pytest.mark.parametrize("query", LOCAL)
+def test_local_answers_that_are_wrong_are_found_again(monkeypatch: pytest.MonkeyPatch, query: str, wrong: str) -> None:
+    mesh, _ = two_squares()
+    right, search = LOCAL[query](mesh), local_windows.search_each
+
+    def step(*arguments: Any) -> int:
+        done = search(*arguments)
+        WRONG[wrong](arguments[8][: arguments[9][0]])
+        return done
+
+    monkeypatch.setattr(local_windows, "search_each", step)
+    with pytest.warns(AccuracyWarning, match="contradicted themselves .* found again"):
+        found = LOCAL[query](mesh)
+    np.testing.assert_allclose(found, right, rtol=1e-6)
+
+
+@pytest.mark.parametrize("factor", [0.5, np.nan, np.inf])
+def test_wrong_distances_of_targets_are_found_again(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
+    mesh, distance = two_squares()
+    point = SurfacePoints([300], [[0.2, 0.3, 0.5]])
+    to_targets = WindowEngine.to_targets
+    monkeypatch.setattr(WindowEngine, "to_targets", lambda *arguments: to_targets(*arguments) * factor)
+    with pytest.warns(AccuracyWarning, match="at target 0.*report"):
+        found = heat_igl.geodesic_distance(mesh, SOURCE, targets=[FAR, 3])
+    np.testing.assert_allclose(found, distance[[FAR, 3]], rtol=1e-6)
+    with pytest.raises(RuntimeError, match="at target 0"):
+        heat_igl.geodesic_distance(mesh, SOURCE, targets=point)
 
 
 @pytest.mark.parametrize(

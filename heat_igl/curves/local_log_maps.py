@@ -13,7 +13,7 @@ from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.operators import unfolding_surface
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.unfolding import PathDirections, WindowWays, in_circle, local_searches
+from heat_igl.unfolding import PathDirections, WindowWays, contradicted, in_circle, local_searches
 from heat_igl.unfolding.half_edges import MARGIN, HalfEdges, from_triangulation
 
 __all__ = ["LogMapsWithin", "log_maps_within"]
@@ -106,7 +106,7 @@ def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = Non
     chosen = triangles.originals[np.arange(n) if sources is None else named_vertices(sources, n)]
     surface = unfolding_surface(triangles, MARGIN)
     directions, edges = PathDirections(surface), from_triangulation(surface.unfolding)
-    indptr, ways, distance = _paths(edges, chosen, limit)
+    indptr, ways, distance = _paths(edges, triangles.V, chosen, limit)
     angles, polar = directions.of_ways(ways), directions.angles
     back, departure = (
         rigid_angles(angle, polar, at)
@@ -120,15 +120,17 @@ def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = Non
     return LogMapsWithin(*(array[:, triangles.originals] if triangles.has_copies else array for array in found))
 
 
-def _paths(edges: HalfEdges, chosen: IntArray, radius: float) -> tuple[IntArray, WindowWays, FloatArray]:
+def _paths(edges: HalfEdges, V: FloatArray, chosen: IntArray, radius: float) -> tuple[IntArray, WindowWays, FloatArray]:
     """Of paths from vertices (k,), source after source: the ends (k + 1,), how they run, and their lengths."""
     number = edges.number[chosen]
     order = np.argsort(number, kind="stable")
     limit = float(edges.scaled(radius))
     parts = local_searches.in_chunks(
-        edges, number[order], lambda work, part: local_searches.within(work, part, limit), directed=True
+        edges, number[order], lambda work, part: local_searches.within(work, part, limit), V, directed=True
     )
-    counts, vertex, distance, way, line = (np.concatenate(column) for column in zip(*parts, strict=True))
+    counts, vertex, distance, way, line, is_wrong = (np.concatenate(column) for column in zip(*parts, strict=True))
+    if is_wrong.any():
+        raise contradicted(f"from vertex {chosen[order[np.argmax(is_wrong)]]}")
     # In the order of the sources, and of each in the order of the vertices.
     source = np.repeat(order, counts)
     key = source * edges.n + vertex

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
@@ -25,12 +25,11 @@ from heat_igl.unfolding import (
     Engine,
     FrontSolver,
     GuardedEngine,
-    Invariants,
     MeshTriangles,
     OperatorTriangles,
     SweepEngine,
     Triangles,
-    WindowEngine,
+    guarded_windows,
 )
 
 __all__ = ["GeodesicSolver"]
@@ -101,7 +100,6 @@ class GeodesicSolver(BatchedSolver):
         self._triangles: Triangles | None = None
         self._engine: Engine
         self._plan, self._engine = self._prepared()
-        self._answering = self._guarded()
 
     @classmethod
     def from_edge_lengths(
@@ -165,23 +163,9 @@ class GeodesicSolver(BatchedSolver):
             chosen = sweep_plan(sweep.measures, chosen)
             if chosen.engine == "sweep":
                 return chosen, sweep
-        return chosen, WindowEngine(triangles, chosen.tolerance or 0.0, originals)
-
-    def _guarded(self) -> Engine:
-        """The engine with a check of its answers: that of windows. Sweeps and fronts are held to the same bounds."""
-        domain, triangles = self._domain, self._triangles
-        if triangles is None or not isinstance(self._engine, WindowEngine):
-            return self._engine
-        originals = self._originals
-        components = triangles.components if originals is None else triangles.components[originals]
-        if isinstance(domain, Operators):
-            faces = triangles.faces
-            invariants = Invariants(faces.F, components, lengths=faces.l)
-        else:
-            invariants = Invariants(triangles.given_faces, components, domain.V)
-        return GuardedEngine(
-            self._engine, invariants, self._plan.tolerance or 0.0, (partial(SweepEngine, triangles, originals),)
-        )
+        # Sweeps and fronts are held to bounds where they are made.
+        V = None if isinstance(self._domain, Operators) else self._domain.V
+        return chosen, guarded_windows(triangles, V, chosen.tolerance or 0.0, originals)
 
     def __repr__(self) -> str:
         tolerance = "" if self._plan.tolerance is None else f", tolerance={self._plan.tolerance:g}"
@@ -244,7 +228,7 @@ class GeodesicSolver(BatchedSolver):
         """
         beyond = checked_cutoff(cutoff)
         limit = np.inf if beyond is None else beyond
-        return np.asarray(cut_off(self._answering.distance(self._source_set(sources), limit, n_threads()), beyond))
+        return np.asarray(cut_off(self._engine.distance(self._source_set(sources), limit, n_threads()), beyond))
 
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
         """Distance, and which source is nearest: a geodesic Voronoi diagram.
@@ -262,7 +246,7 @@ class GeodesicSolver(BatchedSolver):
         """
         beyond = checked_cutoff(cutoff)
         limit = np.inf if beyond is None else beyond
-        distance, labels = self._answering.labelled(self._source_set(sources), limit, n_threads())
+        distance, labels = self._engine.labelled(self._source_set(sources), limit, n_threads())
         distance = cut_off(distance, beyond)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
@@ -288,10 +272,7 @@ class GeodesicSolver(BatchedSolver):
             If the engine is not windows, or the solver was made from operators.
         """
         chosen = self._source_set(sources)
-        paths = self._windows("directions follow").directed(chosen)
-        if isinstance(self._answering, GuardedEngine):
-            self._answering.require(paths[0], chosen)
-        found = directions(*paths, self._frames)
+        found = directions(*self._windows("directions follow").directed(chosen), self._frames)
         if self._part is None:
             return found
         start = unchecked_points(self._part.faces[found.start.faces], found.start.barycentric)
@@ -319,11 +300,11 @@ class GeodesicSolver(BatchedSolver):
         if isinstance(domain, Operators):
             sides = domain.metric
         distance = self.distance(sources)
-        return distance, DistanceDerivative(distance, chosen, surface, sides, engine.paths(chosen))
+        return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.paths(chosen))
 
-    def _windows(self, what: str) -> WindowEngine:
+    def _windows(self, what: str) -> GuardedEngine:
         """The engine, if it finds paths."""
-        if isinstance(self._engine, WindowEngine):
+        if isinstance(self._engine, GuardedEngine):
             return self._engine
         if self._triangles is None:
             raise MeshError(f"{what} paths on triangles that fit together, and this domain is passed by fronts")
@@ -337,7 +318,7 @@ class GeodesicSolver(BatchedSolver):
             places = self._originals[places]
         if isinstance(places, SurfacePoints) and self._part is not None:
             places = SurfacePoints(self._part.numbers_of(places.faces, "targets"), places.barycentric)
-        if isinstance(self._engine, WindowEngine):
+        if isinstance(self._engine, GuardedEngine):
             if isinstance(places, SurfacePoints) and isinstance(self._domain, Mesh):
                 places.positions(self._domain)  # which checks the faces
             return self._engine.to_targets(chosen, places)
@@ -391,5 +372,5 @@ class GeodesicSolver(BatchedSolver):
         return chosen
 
     def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[str | None]]:
-        rows = [self._answering.distance(sources, cutoff) for sources in source_sets]
+        rows = [self._engine.distance(sources, cutoff) for sources in source_sets]
         return np.stack(rows), [None] * len(rows)

@@ -6,7 +6,7 @@ from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_
 from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
 from heat_igl.unfolding.from_vertex import vectors_from
 from heat_igl.unfolding.fronts import FrontSolver
-from heat_igl.unfolding.guarded import GuardedEngine
+from heat_igl.unfolding.guarded import GuardedEngine, contradicted, guarded_windows
 from heat_igl.unfolding.invariants import Invariants
 from heat_igl.unfolding.local import blocks_within, distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.path_derivatives import Change
@@ -36,10 +36,12 @@ __all__ = [
     "WindowEngine",
     "WindowWays",
     "blocks_within",
+    "contradicted",
     "distances_within",
     "exact_distance",
     "exact_paths",
     "from_lines",
+    "guarded_windows",
     "in_circle",
     "nearest_vertices",
     "pair_distances",

@@ -7,14 +7,15 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.kernels.mesh import checking
+from heat_igl.mesh import SurfacePoints
 from heat_igl.sources import SourceSet
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Invariants"]
+__all__ = ["ROUNDING", "Invariants"]
 
-# Violations by less than this share of the largest distance are rounding. Answers that are exact to rounding violate
-# the bounds by up to 1e-9 of it, with coordinates far from the origin.
-_ROUNDING = 1e-7
+#: Violations by less than this share of the largest distance are rounding. Answers that are exact to rounding violate
+#: the bounds by up to 1e-9 of it, with coordinates far from the origin.
+ROUNDING = 1e-7
 # Lines to so many sources are measured at every vertex; with k times as many, at every k-th.
 _SOURCES_AT_ALL = 8
 _NO_LENGTHS = np.empty((0, 3))
@@ -64,7 +65,7 @@ class Invariants:
             Violations by this share of the largest distance are no contradiction.
         """
         distance = np.ascontiguousarray(distance, np.float64)
-        slack = (_ROUNDING + tolerance) * checking.largest_finite(distance)
+        slack = (ROUNDING + tolerance) * checking.largest_finite(distance)
         return (
             self._at_sources(distance, sources, cutoff, slack)
             or self._elsewhere(distance, sources)
@@ -87,18 +88,41 @@ class Invariants:
             return f"{distance[vertices[at]]:.6g} at vertex {vertices[at]}, where a source gives {bound[at]:.6g}"
         return None
 
+    def contradiction_at(
+        self, distance: FloatArray, sources: SourceSet, targets: SurfacePoints | IntArray
+    ) -> str | None:
+        """How distances (t,) of vertices or points contradict lines and components; None if they do not."""
+        vertices = self._F[targets.faces, 0] if isinstance(targets, SurfacePoints) else targets
+        if self._n_components == 1:
+            stray = ~np.isfinite(distance)
+        else:
+            stray = np.isfinite(distance) != self._has_source(sources)[self._components[vertices]]
+        if stray.any():
+            at = int(np.argmax(stray))
+            return f"{distance[at]:.6g} at target {at}, where sources and components say otherwise"
+        if self._V is None:
+            return None
+        places = self._V[vertices]
+        if isinstance(targets, SurfacePoints):
+            places = np.einsum("kc,kcx->kx", targets.barycentric, self._V[self._F[targets.faces]])
+        return self._below_lines(distance, sources, ROUNDING * checking.largest_finite(distance), places)
+
     def _elsewhere(self, distance: FloatArray, sources: SourceSet) -> str | None:
         """Finite where no source is."""
         if self._n_components == 1:
             return None
+        stray = np.isfinite(distance) & ~self._has_source(sources)[self._components]
+        if stray.any():
+            return f"finite at vertex {int(np.argmax(stray))}, whose component holds no source"
+        return None
+
+    def _has_source(self, sources: SourceSet) -> BoolArray:
+        """Mask of the components that hold a source."""
         has_source = np.zeros(self._n_components, bool)
         has_source[self._components[sources.vertices]] = True
         for faces in (sources.points.faces, sources.segments.faces):
             has_source[self._components[self._F[faces, 0]]] = True
-        stray = np.isfinite(distance) & ~has_source[self._components]
-        if stray.any():
-            return f"finite at vertex {int(np.argmax(stray))}, whose component holds no source"
-        return None
+        return has_source
 
     @cached_property
     def _n_components(self) -> int:
@@ -111,17 +135,21 @@ class Invariants:
             return None
         return f"{distance[far]:.6g} at vertex {far} and {distance[near]:.6g} at its neighbour {near}, which is nearer"
 
-    def _below_lines(self, distance: FloatArray, sources: SourceSet, slack: float) -> str | None:
+    def _below_lines(
+        self, distance: FloatArray, sources: SourceSet, slack: float, at: FloatArray | None = None
+    ) -> str | None:
+        """Below the lines to vertices, or to positions `at` (t, 3)."""
         if self._V is None:
             return None
         places, offsets, faces = self._places(sources)
         places = np.concatenate([self._V[sources.vertices], places])
         offsets = np.concatenate([sources.vertex_offset, offsets - self._half_length(sources, len(faces))])
         step = -(-len(offsets) // _SOURCES_AT_ALL)
-        at = checking.below_line(distance, self._V, step, places, offsets, slack)
-        if at < 0:
+        found = checking.below_line(distance, self._V if at is None else at, step, places, offsets, slack)
+        if found < 0:
             return None
-        return f"{distance[at]:.6g} at vertex {at}, which is farther from every source along a straight line"
+        what = "vertex" if at is None else "target"
+        return f"{distance[found]:.6g} at {what} {found}, which is farther from every source along a straight line"
 
     def _places(self, sources: SourceSet) -> tuple[FloatArray, FloatArray, IntArray]:
         """Positions (k, 3) of points and of both ends of segments, their offsets, and the faces that they are in."""

@@ -13,6 +13,7 @@ from heat_igl.runtime import available_memory, n_threads
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.unfolding import local_searches
+from heat_igl.unfolding.guarded import distances_instead
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
 
 __all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distances"]
@@ -66,7 +67,7 @@ def distances_within(
     limit = positive("radius", radius, infinite=True)
     triangles, part = _triangles(mesh, region)
     chosen = _chosen(sources, triangles, part)
-    found = _rows_within(from_mesh(triangles, int(chosen[0])), chosen, limit)
+    found = _rows_within(triangles, from_mesh(triangles, int(chosen[0])), chosen, limit)
     if triangles.has_copies:
         found = found[:, triangles.originals]
     return found if sources is not None or part is None else _with_empty_rows(found, np.flatnonzero(part.inside))
@@ -96,13 +97,13 @@ def blocks_within(
     least = local_searches.CHUNK * n_threads()
     start, rows = 0, least
     while start < len(chosen):
-        block = _rows_within(edges, chosen[start : start + rows], limit)
+        block = _rows_within(triangles, edges, chosen[start : start + rows], limit)
         yield block
         start += rows
         rows = max(int(most_entries * block.shape[0] / max(block.nnz, 1)) // least, 1) * least
 
 
-def _rows_within(edges: HalfEdges, chosen: IntArray, limit: float) -> sp.csr_array:
+def _rows_within(triangles: Mesh, edges: HalfEdges, chosen: IntArray, limit: float) -> sp.csr_array:
     number = edges.number[chosen]
     order = np.argsort(number, kind="stable")
     count = _Count(len(chosen), available_memory() / _BYTES)
@@ -110,12 +111,22 @@ def _rows_within(edges: HalfEdges, chosen: IntArray, limit: float) -> sp.csr_arr
         edges,
         number[order],
         lambda work, part: count(local_searches.within(work, part, float(edges.scaled(limit)))),
+        triangles.V,
     )
     counts = np.concatenate([part.counts for part in parts])
     ends = np.concatenate([[0], np.cumsum(counts)])
     columns = np.concatenate([part.vertex for part in parts])
     values = edges.unscaled(np.concatenate([part.distance for part in parts]))
     found = sp.csr_array((values, columns, ends), shape=(len(chosen), edges.n))
+    wrong = _wrong(parts)
+    if len(wrong):
+        rows = distances_instead(triangles, chosen[order[wrong]])
+        i, j = np.nonzero(rows <= limit)
+        ends = np.searchsorted(i, np.arange(len(wrong) + 1))
+        found = sp.vstack([found, sp.csr_array((rows[i, j], j, ends), shape=rows.shape)], format="csr")
+        at = np.arange(len(chosen))
+        at[wrong] = len(chosen) + np.arange(len(wrong))
+        found = found[at]
     if (np.diff(order) != 1).any():
         found = found[np.argsort(order)]
     found.sort_indices()
@@ -175,11 +186,17 @@ def nearest_vertices(
     number = edges.number[chosen]
     order = np.argsort(number, kind="stable")
     parts = local_searches.in_chunks(
-        edges, number[order], lambda work, part: local_searches.nearest(work, part, wanted)
+        edges, number[order], lambda work, part: local_searches.nearest(work, part, wanted), triangles.V
     )
     i, j = np.nonzero(np.arange(int(k)) < np.concatenate([part.counts for part in parts])[:, None])
     indices[order[i], j] = np.concatenate([part.vertex for part in parts])
     distances[order[i], j] = edges.unscaled(np.concatenate([part.distance for part in parts]))
+    wrong = order[_wrong(parts)]
+    if len(wrong):
+        rows = distances_instead(triangles, chosen[wrong])
+        nearest = np.argsort(rows, axis=1, kind="stable")[:, :wanted]
+        distances[wrong, :wanted] = np.take_along_axis(rows, nearest, axis=1)
+        indices[wrong, :wanted] = np.where(np.isfinite(distances[wrong, :wanted]), nearest, -1)
     if sources is None and part is not None:
         spread = _unfilled(triangles.n_vertices, int(k), triangles.n_vertices)
         spread[0][part.inside], spread[1][part.inside] = indices, distances
@@ -250,10 +267,18 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike, *, region: ArrayLike | None
         edges,
         sources,
         lambda work, part: local_searches.to_goals(work, part, goals[ends[part.start] : ends[part.stop]], ends),
-        edges.scaled(triangles.V[edges.old_vertex]).ravel(),
+        triangles.V,
     )
     distance[joined] = edges.unscaled(np.concatenate([part.distance for part in parts]))
+    wrong = edges.old_vertex[sources[_wrong(parts)]]
+    for source, row in zip(wrong, distances_instead(triangles, wrong), strict=True):
+        distance[first == source] = row[second[first == source]]
     return distance
+
+
+def _wrong(parts: list[local_searches.Near]) -> IntArray:
+    """The sources, in the order that they were asked in, whose answers contradict themselves."""
+    return np.flatnonzero(np.concatenate([part.is_wrong for part in parts]))
 
 
 class _Count:

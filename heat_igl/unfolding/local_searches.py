@@ -8,11 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from heat_igl.kernels.mesh import checking
 from heat_igl.kernels.signals import raise_caught
 from heat_igl.kernels.windows import local_windows, windows
 from heat_igl.runtime import n_threads, side_by_side
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges
+from heat_igl.unfolding.invariants import ROUNDING
 from heat_igl.unfolding.window_search import TOLERANCE, Found, Leaving
 
 __all__ = [
@@ -31,6 +33,7 @@ CHUNK = 64
 # Initial number of results that a thread has room for.
 _ROOM = 2**16
 _NO_VERTICES = np.empty(0, np.int32)
+_NONE_WRONG = np.empty(0, bool)
 _NO_WAYS, _NO_LINES = np.empty((0, 3), np.int32), np.empty((0, 3))
 
 
@@ -46,6 +49,7 @@ class Near(NamedTuple):
     """The number of vertices found from each source, and the vertices and their distances, source after source.
 
     From a directed search, `way` and `line` (r, 3) say how the path to each runs, see `local_windows.search_each`.
+    What was found from a source `is_wrong` if it contradicts straight lines or the lengths of edges.
     """
 
     counts: IntArray
@@ -53,6 +57,7 @@ class Near(NamedTuple):
     distance: FloatArray
     way: AnyArray = _NO_WAYS
     line: FloatArray = _NO_LINES
+    is_wrong: BoolArray = _NONE_WRONG
 
 
 class Workspace:
@@ -61,11 +66,19 @@ class Workspace:
     With `directed`, searches find in which directions paths leave; the faces must be oriented alike.
     """
 
-    def __init__(self, edges: HalfEdges, position: FloatArray | None = None, directed: bool = False) -> None:
-        self._names, self.is_directed = edges.old_vertex, directed
-        self._found = Found.of(edges.n, edges.n)
+    def __init__(self, edges: HalfEdges, position: FloatArray, directed: bool = False) -> None:
+        self._edges, self.names, self.is_directed = edges, edges.old_vertex, directed
+        self._found, self._position, self._scratch = Found.of(edges.n, edges.n), position, np.full(edges.n, np.inf)
         leaving = Leaving.of(edges.n) if directed else None
-        self._front = windows.Front(edges.tables, self._found, TOLERANCE, leaving, position)
+        self._front = windows.Front(edges.tables, self._found, TOLERANCE, leaving, position.ravel())
+
+    def checked(self, part: Chunk, near: Near, limit: FloatArray | float) -> Near:
+        """The answers of `part` with those that are wrong marked; each holds all vertices up to its limit."""
+        edges, limits = self._edges, np.broadcast_to(limit, len(near.counts)).astype(np.float64)
+        found = edges.number[near.vertex]
+        answers = part.vertices, near.counts, found, near.distance, limits
+        wrong = checking.wrong_rows(edges.tables, self._position, *answers, self._scratch, ROUNDING)
+        return near._replace(is_wrong=wrong)
 
     def search(
         self,
@@ -89,7 +102,7 @@ class Workspace:
             np.zeros(len(sources) + 1, np.int64) if first_goal is None else first_goal,
             cutoff,
             n_nearest,
-            self._names,
+            self.names,
             found,
             value,
             ends,
@@ -117,35 +130,38 @@ def within(work: Workspace, part: Chunk, radius: float) -> Near:
         done += len(ends)
         n = ends[-1]
         rows.append(Near(np.diff(ends, prepend=0), found[:n].copy(), value[:n].copy(), way[:n].copy(), line[:n].copy()))
-    return Near(*(np.concatenate(column) for column in zip(*rows, strict=True)))
+    return work.checked(part, Near(*(np.concatenate(column) for column in zip(*rows, strict=True))), radius)
 
 
 def nearest(work: Workspace, part: Chunk, k: int) -> Near:
     """The k nearest vertices of each source."""
     found, value = np.empty(k * len(part.vertices), np.int32), np.empty(k * len(part.vertices))
     ends = work.search(part.vertices, found, value, n_nearest=k)
-    return Near(np.diff(ends, prepend=0), found[: ends[-1]], value[: ends[-1]])
+    near = Near(np.diff(ends, prepend=0), found[: ends[-1]], value[: ends[-1]])
+    return work.checked(part, near, np.where(near.counts < k, np.inf, value[ends - 1]))
 
 
 def to_goals(work: Workspace, part: Chunk, goals: AnyArray, ends: IntArray) -> Near:
-    """Distances of the goals of some sources; the goals of source i are ``ends[i]`` to ``ends[i + 1]`` of all goals."""
+    """Distances of the goals (g,) of some sources; those of source i are ``ends[i]`` to ``ends[i + 1]`` of all."""
     first = ends[part.start : part.stop + 1] - ends[part.start]
     value = np.empty(len(goals))
     work.search(part.vertices, np.empty(1, np.int32), value, goals=goals, first_goal=first)
-    return Near(np.diff(first), _NO_VERTICES, value)
+    return work.checked(part, Near(np.diff(first), work.names[goals], value), 0.0)
 
 
 def in_chunks(
     edges: HalfEdges,
     sources: AnyArray,
     search: Callable[[Workspace, Chunk], Near],
-    position: FloatArray | None = None,
+    V: FloatArray,
     directed: bool = False,
 ) -> list[Near]:
     """The results of `search` for chunks of consecutive sources, on all processors, in the order of the sources.
 
-    Sources are numbers in the tables. In ascending order, a search often finds its data in the processor's cache.
+    Sources are numbers in the tables. In ascending order, a search often finds its data in the processor's cache. V are
+    the positions (n, 3) of the vertices.
     """
+    position = np.ascontiguousarray(edges.scaled(V[edges.old_vertex]))
     starts = range(0, len(sources), CHUNK)
     waiting = deque(enumerate(starts))
     parts: list[Any] = [None] * len(starts)

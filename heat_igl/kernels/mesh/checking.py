@@ -4,7 +4,15 @@ import cython
 import numpy as np
 from cython.cimports.libc.math import INFINITY, fabs, isfinite, sqrt
 
-__all__ = ["below_line", "edge_excess", "largest_finite", "line_shortfall", "steepest_edge", "straight_lines"]
+__all__ = [
+    "below_line",
+    "edge_excess",
+    "largest_finite",
+    "line_shortfall",
+    "steepest_edge",
+    "straight_lines",
+    "wrong_rows",
+]
 
 
 def edge_excess(
@@ -125,35 +133,38 @@ def steepest_edge(
     f: cython.Py_ssize_t
     a: cython.int
     b: cython.int
-    i: cython.longlong
-    j: cython.longlong
+    d: cython.double[4]
+    x: cython.double[12]
     far: cython.longlong = -1
     near: cython.longlong = -1
     squared: cython.double
     difference: cython.double
     with cython.nogil:
         for f in range(F.shape[0]):
+            for a in range(n_corners):
+                d[a] = distance[F[f, a]]
+                for b in range(0 if has_lengths else 3):
+                    x[3 * a + b] = V[F[f, a], b]
             for a in range(n_corners - 1):
-                i = F[f, a]
                 for b in range(a + 1, n_corners):
-                    j = F[f, b]
                     if has_lengths:
                         squared = l[f, 3 - a - b] * l[f, 3 - a - b]
                     else:
-                        x: cython.double = V[i, 0] - V[j, 0]
-                        y: cython.double = V[i, 1] - V[j, 1]
-                        z: cython.double = V[i, 2] - V[j, 2]
-                        squared = x * x + y * y + z * z
-                    difference = fabs(distance[i] - distance[j]) - slack
+                        squared = (
+                            (x[3 * a] - x[3 * b]) * (x[3 * a] - x[3 * b])
+                            + (x[3 * a + 1] - x[3 * b + 1]) * (x[3 * a + 1] - x[3 * b + 1])
+                            + (x[3 * a + 2] - x[3 * b + 2]) * (x[3 * a + 2] - x[3 * b + 2])
+                        )
+                    difference = fabs(d[a] - d[b]) - slack
                     # Neither inf nor NaN passes.
                     if difference <= 0 or difference * difference <= squared:
                         continue
-                    if distance[i] == INFINITY and distance[j] == INFINITY:
+                    if d[a] == INFINITY and d[b] == INFINITY:
                         continue
-                    far, near = (j, i) if distance[i] < distance[j] else (i, j)
-                    if distance[far] == INFINITY and not distance[near] + sqrt(squared) < cutoff - slack:
-                        far, near = -1, -1
+                    if max(d[a], d[b]) == INFINITY and not min(d[a], d[b]) + sqrt(squared) < cutoff - slack:
                         continue
+                    far = F[f, b] if d[a] < d[b] else F[f, a]
+                    near = F[f, a] if d[a] < d[b] else F[f, b]
                     break
                 if far >= 0:
                     break
@@ -235,3 +246,88 @@ def line_shortfall(
                     largest = line[k] - d
                     worst = k
     return count, total, largest, farthest, worst
+
+
+def wrong_rows(
+    tables,
+    position: cython.const[cython.double][:, ::1],
+    source: cython.const[cython.int][::1],
+    count: cython.const[cython.longlong][::1],
+    found: cython.const[cython.int][::1],
+    value: cython.const[cython.double][::1],
+    limit: cython.const[cython.double][::1],
+    distance: cython.double[::1],
+    share: cython.double,
+):
+    """Which of k answers contradict edges or straight lines; each holds the distances of some vertices.
+
+    Parameters
+    ----------
+    tables : Tables
+        The triangles, along whose edges there are paths.
+    position : (n, 3) float64
+        Of their vertices, in the same unit.
+    source : (k,) int32
+        The vertex that each answer is measured from.
+    count : (k,) int64
+        Number of vertices in each.
+    found, value : (r,) int32, (r,) float64
+        These vertices, answer after answer, and their distances.
+    limit : (k,) float64
+        Up to here all vertices are there, the source too.
+    distance : (n,) float64
+        Working memory, ``inf`` before and after.
+    share : float
+        An excess by this share of the largest distance is rounding.
+
+    Returns
+    -------
+    (k,) bool
+    """
+    marks = np.zeros(source.shape[0], np.uint8)
+    is_wrong: cython.uchar[::1] = marks
+    vertex: cython.const[cython.int][::1] = tables.vertex
+    length: cython.const[cython.double][::1] = tables.length
+    corner_of_vertex: cython.const[cython.int][::1] = tables.corner_of_vertex
+    next_corner: cython.const[cython.int][::1] = tables.next_corner
+    i: cython.Py_ssize_t
+    r: cython.Py_ssize_t
+    v: cython.int
+    w: cython.int
+    c: cython.uint
+    corner: cython.int
+    begin: cython.Py_ssize_t = 0
+    with cython.nogil:
+        for i in range(source.shape[0]):
+            s: cython.int = source[i]
+            # A millionth of a millionth of the mean edge, which is the unit of the tables, is rounding too.
+            slack: cython.double = 1e-12
+            end: cython.Py_ssize_t = begin + count[i]
+            for r in range(begin, end):
+                slack = max(slack, share * value[r])
+                distance[found[r]] = value[r]
+            if limit[i] <= 0.0 and distance[s] == INFINITY:
+                distance[s] = 0.0
+            wrong: cython.bint = distance[s] != 0.0 or slack == INFINITY
+            for r in range(begin, end + 1):
+                v = found[r] if r < end else s
+                d: cython.double = distance[v] + slack
+                x: cython.double = position[v, 0] - position[s, 0]
+                y: cython.double = position[v, 1] - position[s, 1]
+                z: cython.double = position[v, 2] - position[s, 2]
+                wrong |= not (d >= 0.0 and x * x + y * y + z * z <= d * d)
+                # The next vertex of each face: so every vertex is reached from one in each of its faces.
+                corner = corner_of_vertex[v]
+                while corner >= 0:
+                    c = cython.cast(cython.uint, corner) % 3
+                    w = vertex[corner + 1 if c < 2 else corner - 2]
+                    reach: cython.double = d + length[corner + 2 if c == 0 else corner - 1]
+                    if distance[w] > reach and (distance[w] < INFINITY or reach < limit[i] - slack):
+                        wrong = True
+                    corner = next_corner[corner]
+            is_wrong[i] = wrong
+            distance[s] = INFINITY
+            for r in range(begin, end):
+                distance[found[r]] = INFINITY
+            begin = end
+    return marks.view(bool)

@@ -187,7 +187,7 @@ class _Refinement:
 @cython.nogil
 @cython.exceptval(check=False)
 def _find_sharp(t: GrowingTriangulation, seen: cython.uchar[::1], is_sharp: cython.uchar[::1]) -> cython.void:
-    """Mark the vertices with a fan of faces whose angles sum to less than `SHARPEST`, which no split or flip changes."""
+    """Mark vertices with a fan of faces whose angles sum to less than `SHARPEST`: no split or flip changes that."""
     first: cython.longlong
     for first in range(3 * t.n_faces):
         at: cython.longlong = first
