@@ -93,7 +93,7 @@ def _skip_members(app, what, name, obj, skip, options) -> bool | None:
 
     A generic alias such as tuple[int, ...] looks like a class and has no signature.
     """
-    has_page = what == "module" and any(obj is getattr(heat_igl, public) for public in heat_igl.__all__)
+    has_page = what == "module" and reference_pages.has_page(obj)
     return True if has_page or isinstance(obj, types.GenericAlias) else None
 
 
@@ -104,6 +104,8 @@ def _resolve_names(app, env, node, contnode):
     candidates = [f"heat_igl.{target}"]
     if head and not head.startswith("heat_igl"):
         candidates.append(f"heat_igl.{head}.{name}")
+    of_rooms = " ".join(reference_pages.GROUPS.values()).split()
+    candidates += [f"heat_igl.{each}" for each in of_rooms if each.endswith(f".{target.removeprefix('heat_igl.')}")]
     for place in [head] if head.startswith("heat_igl") else []:
         try:
             found = getattr(importlib.import_module(place), name)

@@ -99,7 +99,7 @@ def samples() -> Picture:
 def dual() -> Picture:
     """The dual triangulation of geodesic Voronoi cells: a coarse mesh with the shape of the fine one."""
     mesh = shapes.torus(120, 60)
-    coarse = heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(mesh, 400))
+    coarse = heat_igl.sampling.dual_triangulation(mesh, heat_igl.farthest_cells(mesh, 400))
     return plot(coarse, heat_igl.geodesic_distance(coarse, 0), sources=0, view=(30, 50))
 
 
@@ -124,7 +124,7 @@ def offsets() -> Picture:
     mesh = heat_igl.sample_mesh()
     solver = heat_igl.GeodesicSolver(mesh)
     phi = solver.distance([1234, 9000])
-    found = heat_igl.offset_curves(mesh, solver, [1234, 9000], 0.3 * phi.max())
+    found = heat_igl.curves.offset_curves(mesh, solver, [1234, 9000], 0.3 * phi.max())
     return plot(mesh, phi, sources=[1234, 9000], style="plain", curves=found)
 
 
@@ -277,7 +277,7 @@ def loops() -> Picture:
     dent = 1 + 0.12 * np.sin(3 * np.arctan2(mesh.V[:, 1], mesh.V[:, 0]))
     mesh = heat_igl.Mesh(mesh.V * dent[:, None], mesh.F)
     phi = heat_igl.geodesic_distance(mesh, 0)
-    return plot(mesh, phi, style="plain", colormap="Greys", curves=heat_igl.handle_loops(mesh), view=(30, 50))
+    return plot(mesh, phi, style="plain", colormap="Greys", curves=heat_igl.curves.handle_loops(mesh), view=(30, 50))
 
 
 def bezier() -> Picture:
@@ -285,7 +285,7 @@ def bezier() -> Picture:
     ball = shapes.icosphere(5)
     mesh = heat_igl.Mesh(ball.V * [1.5, 1.0, 0.7], ball.F)
     control = [int(np.argmax(ball.V @ place)) for place in ([-2, -1, 2], [-1, 2, 1], [1, -2, 1], [2, 1, 1])]
-    curves = [heat_igl.geodesic_bezier(mesh, control), heat_igl.geodesic_path(mesh, control)]
+    curves = [heat_igl.curves.geodesic_bezier(mesh, control), heat_igl.geodesic_path(mesh, control)]
     mean = heat_igl.karcher_mean(mesh, control)
     return plot(mesh, heat_igl.geodesic_distance(mesh, mean), sources=mean, curves=curves, view=(15, 15))
 
@@ -333,7 +333,7 @@ def cut_locus() -> Picture:
     """Where fronts from two sides meet: the gradient of the distance is shorter than 1 there."""
     mesh = shapes.blob(5)
     phi = heat_igl.geodesic_distance(mesh, 0)
-    residual = heat_igl.metrics.eikonal_residual(mesh, phi)
+    residual = heat_igl.validation.metrics.eikonal_residual(mesh, phi)
     largest = np.zeros(mesh.n_vertices)
     np.maximum.at(largest, mesh.F, residual[:, None])
     return plot_field(mesh, largest, label="| |grad d| - 1 |", limits=(0, 0.5), view=(180, 20))

@@ -2,39 +2,46 @@
 
 from __future__ import annotations
 
+import importlib
+
 import heat_igl
 
-# Names that the package lacks are left out, and those in no group come last.
+# Names with a dot are those of a room. Public names in no group come last.
 GROUPS = {
-    "Distance": """geodesic_distance HeatMethodSolver HeatSolution Diagnostics LabelledDistance heat_method_distance
-        GeodesicSolver""",
+    "Distance": """geodesic_distance HeatMethodSolver HeatSolution heat_method.Diagnostics
+        heat_method.LabelledDistance GeodesicSolver""",
     "Only what is asked": """distances_within nearest_vertices pair_distances distance_matrix
         write_distances_within read_distances_within""",
-    "Meshes, polygons and points": """Mesh PolygonMesh PointCloud as_mesh sample_mesh MeshReport ImageDomain
-        image_domain closest_points ClosestPoints split_long_edges""",
+    "Meshes, polygons and points": """Mesh PolygonMesh PointCloud as_mesh sample_mesh to_trimesh to_pyvista to_open3d
+        mesh.MeshReport terrain mesh.Terrain image_domain mesh.ImageDomain closest_points mesh.ClosestPoints
+        mesh.split_long_edges""",
     "Files": """read_mesh read_polygon_mesh read_point_cloud read_attributes write_mesh write_point_cloud
         write_curves""",
-    "Sources": "SurfacePoints SurfaceCurve OffsetSources curve_on edge_curve",
-    "Curves": """isolines offset_curves enclosed_areas sublevel_areas shortest_paths geodesic_path straighten
-        GeodesicPathSolver handle_loops geodesic_bezier trace_geodesic cut CutMesh""",
-    "Directions and tangent vectors": """tangent_frames TangentFrames log_map exp_map VectorHeatSolver
-        Directions connection_laplacian""",
-    "Which side": "SignedHeatSolver OrientedPoints region_boundary volume_signed_distance VoxelBox",
-    "Sampling": """farthest_points farthest_cells voronoi_cells VoronoiCells dual_triangulation geodesic_centre
-        karcher_mean centroidal_voronoi CentroidalSites diameter sampling""",
-    "Operators of a domain": """Operators polygon_operators point_cloud_operators speed_operators metric_operators
-        fibre_metric activation_times""",
-    "Validation": """validate ValidationReport ValidationRow validate_domains DomainReport DomainRow reference
-        closed_forms metrics shapes baselines""",
+    "Sources": "SurfacePoints SurfaceCurve OffsetSources curve_on curve_through edge_curve",
+    "Curves": """isolines curves.offset_curves curves.enclosed_areas curves.sublevel_areas shortest_path shortest_paths
+        geodesic_path straighten curves.GeodesicPathSolver curves.handle_loops curves.geodesic_bezier trace_geodesic cut
+        curves.CutMesh""",
+    "Directions and tangent vectors": """tangent_frames intrinsic.TangentFrames log_map exp_map log_maps_within
+        VectorHeatSolver heat_method.Directions operators.connection_laplacian""",
+    "Which side": """signed_distance SignedHeatSolver OrientedPoints mesh.region_boundary volume_signed_distance
+        VoxelBox""",
+    "Sampling": """farthest_points farthest_cells voronoi_cells sampling.VoronoiCells sampling.dual_triangulation
+        sampling.geodesic_centre karcher_mean centroidal_voronoi curves.CentroidalSites diameter""",
+    "Operators of a domain": """Operators operators.polygon_operators operators.point_cloud_operators speed_operators
+        metric_operators fibre_metric activation_times""",
+    "Surface maps": "smooth parcel_distances geodesic_errors",
+    "Validation": """validate ValidationReport validation.ValidationRow validate_domains validation.domains.DomainReport
+        validation.domains.DomainRow reference validation.closed_forms validation.metrics shapes reference.baselines""",
     "Pictures": "plots",
     "Many meshes": "cluster",
-    "Errors and warnings": """MeshError SourceError FactorizationError MissingExtraError ReferenceSolverError BatchError
-        AccuracyWarning""",
+    "Errors and warnings": """MeshError SourceError AccuracyWarning errors.FactorizationError errors.MissingExtraError
+        errors.ReferenceSolverError errors.BatchError""",
 }
 # Modules without an attribute of the package, and what they are for.
 MODULES = {
     "heat_igl.compat.igl": "libigl's functions for distance",
     "heat_igl.compat.potpourri3d": "potpourri3d's classes and functions",
+    "heat_igl.sampling": "samples of a surface",
     "heat_igl.steps": "the three steps of the heat method, each alone",
     "heat_igl.operators": "the operators of every kind of domain",
     "heat_igl.linear": "factor once, solve many times",
@@ -45,14 +52,25 @@ MODULES = {
 def grouped() -> dict[str, list[str]]:
     """The public names of each group."""
     public = list(heat_igl.__all__)
-    found = {title: [name for name in names.split() if name in public] for title, names in GROUPS.items()}
+    found = {title: names.split() for title, names in GROUPS.items()}
     rest = set(public).difference(*found.values())
     return {title: names for title, names in {**found, "Further": sorted(rest)}.items() if names}
 
 
+def _documented(name: str) -> object:
+    """What a name of the tables stands for."""
+    room, _, last = f"heat_igl.{name}".rpartition(".")
+    return getattr(importlib.import_module(room), last, None) or importlib.import_module(f"{room}.{last}")
+
+
+def has_page(thing: object) -> bool:
+    """Whether something has a page of its own."""
+    return any(thing is _documented(name) for names in grouped().values() for name in names)
+
+
 def _target(name: str) -> str:
     """What a name is documented as: modules under the name of their file."""
-    thing = getattr(heat_igl, name)
+    thing = _documented(name)
     return f"heat_igl.{name}" if not hasattr(thing, "__path__") and not hasattr(thing, "__spec__") else thing.__name__
 
 

@@ -65,7 +65,7 @@ class FactorizationError(RuntimeError):
     >>> from heat_igl.linear import factorize
     >>> try:
     ...     factorize(sp.csc_array([[1.0, 2.0], [2.0, 1.0]]))  # of the eigenvalues -1 and 3
-    ... except heat_igl.FactorizationError as error:
+    ... except heat_igl.errors.FactorizationError as error:
     ...     print(error)
     ...
     the matrix (2 rows) is singular or not positive definite
@@ -79,8 +79,8 @@ class ReferenceSolverError(RuntimeError):
     --------
     >>> import heat_igl
     >>> try:
-    ...     heat_igl.closed_forms.plane(heat_igl.shapes.icosphere(1), 0)
-    ... except heat_igl.ReferenceSolverError as error:
+    ...     heat_igl.validation.closed_forms.plane(heat_igl.shapes.icosphere(1), 0)
+    ... except heat_igl.errors.ReferenceSolverError as error:
     ...     print(error)
     ...
     the mesh does not lie in a plane: use reference.exact
@@ -96,7 +96,7 @@ class BatchError(RuntimeError):
     >>> try:
     ...     with heat_igl.cluster.connected("nowhere"):
     ...         pass
-    ... except heat_igl.BatchError as error:
+    ... except heat_igl.errors.BatchError as error:
     ...     print(error)
     ...
     there is no Dask scheduler at nowhere: missing port number in address 'nowhere'
@@ -110,8 +110,8 @@ class MissingExtraError(ImportError):
     --------
     >>> import heat_igl
     >>> try:
-    ...     heat_igl.MissingExtraError.check("reading .abc", "abc_reader", "io")
-    ... except heat_igl.MissingExtraError as error:
+    ...     heat_igl.errors.MissingExtraError.check("reading .abc", "abc_reader", "io")
+    ... except heat_igl.errors.MissingExtraError as error:
     ...     print(error)
     ...
     reading .abc needs abc_reader: pip install abc_reader (or install heat-igl with its extra 'io')

@@ -35,8 +35,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from heat_igl import HeatMethodSolver, Mesh, MissingExtraError, ReferenceSolverError, read_mesh, reference, shapes
+from heat_igl import HeatMethodSolver, Mesh, read_mesh, reference, shapes
 from heat_igl.cli.demo import sample_mesh
+from heat_igl.errors import MissingExtraError, ReferenceSolverError
 from heat_igl.runtime import PeakMemory
 
 import peers

@@ -104,7 +104,7 @@ def log_maps(mesh: Mesh, sources: IntArray) -> list[dict[str, Any]]:
 
 def as_vectors(solver: GeodesicSolver, source: int) -> FloatArray:
     found = solver.directions(source)
-    return heat_igl.TangentFrames.from_angles(found.departure, found.distance)
+    return heat_igl.intrinsic.TangentFrames.from_angles(found.departure, found.distance)
 
 
 def peer_log_maps(mesh: Mesh, source: int) -> dict[str, tuple[FloatArray, Any]]:
@@ -202,7 +202,7 @@ def traces(mesh: Mesh, count: int, seed: int) -> dict[str, float]:
     rng = np.random.default_rng(seed)
     start = SurfacePoints(rng.integers(0, mesh.n_faces, count), rng.dirichlet([1, 1, 1], count))
     length = mesh.longest_distance / 4
-    vectors = length * heat_igl.TangentFrames.from_angles(rng.uniform(0, 2 * np.pi, count))
+    vectors = length * heat_igl.intrinsic.TangentFrames.from_angles(rng.uniform(0, 2 * np.pi, count))
     begin, ticks = time.perf_counter(), time.process_time()
     ends = exp_map(mesh, start, vectors).positions(mesh)
     took = [time.perf_counter() - begin, time.process_time() - ticks]

@@ -25,7 +25,8 @@ import numpy as np
 import scipy.spatial
 from exact_table import beside_vtp, run_vtp
 
-from heat_igl import Mesh, ReferenceSolverError, read_mesh, reference, shapes
+from heat_igl import Mesh, read_mesh, reference, shapes
+from heat_igl.errors import ReferenceSolverError
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import exact_distance

@@ -28,7 +28,6 @@ import numpy as np
 from heat_igl import (
     GeodesicSolver,
     Mesh,
-    ReferenceSolverError,
     distances_within,
     geodesic_distance,
     nearest_vertices,
@@ -38,6 +37,7 @@ from heat_igl import (
     write_distances_within,
     write_mesh,
 )
+from heat_igl.errors import ReferenceSolverError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.runtime import PeakMemory
 from heat_igl.unfolding import exact_distance

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from heat_igl import Mesh, metrics
+from heat_igl import Mesh
 from heat_igl.typing import FloatArray
+from heat_igl.validation import metrics
 
 Query = Callable[[int], FloatArray]
 

@@ -20,8 +20,9 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, baselines, shapes
+from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, shapes
 from heat_igl.operators import operators
+from heat_igl.reference import baselines
 
 from paper_formulas import Square, distance, mean_error
 from paper_measurements import accuracy, computation_times, power_law

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from scipy.optimize import curve_fit
 
-from heat_igl import GeodesicSolver, HeatMethodSolver, baselines, shapes
+from heat_igl import GeodesicSolver, HeatMethodSolver, shapes
 from heat_igl.operators import operators
+from heat_igl.reference import baselines
 from heat_igl.steps import diffuse, integrate, normalize
 
 

@@ -23,7 +23,8 @@ import numpy as np
 import scipy.sparse.csgraph as csgraph
 
 import heat_igl
-from heat_igl import GeodesicPathSolver, Mesh, edge_curve, geodesic_distance, reference, shortest_paths
+from heat_igl import Mesh, edge_curve, geodesic_distance, reference, shortest_paths
+from heat_igl.curves import GeodesicPathSolver
 
 from scaffold import add_output, add_seed, environment, option_parser, publish, table
 

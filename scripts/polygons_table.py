@@ -17,17 +17,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from heat_igl import (
-    AccuracyWarning,
-    HeatMethodSolver,
-    Mesh,
-    PolygonMesh,
-    geodesic_distance,
-    polygon_operators,
-    read_polygon_mesh,
-    shapes,
-)
+from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, PolygonMesh, geodesic_distance, read_polygon_mesh, shapes
 from heat_igl.mesh import PolygonFans
+from heat_igl.operators import polygon_operators
 from heat_igl.typing import FloatArray
 
 from scaffold import add_json, add_seed, environment, option_parser, publish, table

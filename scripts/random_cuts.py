@@ -30,7 +30,8 @@ from typing import Any, NamedTuple
 import igl
 import numpy as np
 
-from heat_igl import CutMesh, Mesh, SurfaceCurve, curve_on, cut, edge_curve, isolines, shapes, tangent_frames
+from heat_igl import Mesh, SurfaceCurve, curve_on, cut, edge_curve, isolines, shapes, tangent_frames
+from heat_igl.curves import CutMesh
 from heat_igl.intrinsic import mollify
 from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.typing import FloatArray

@@ -22,16 +22,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
-from heat_igl import (
-    Mesh,
-    SignedHeatSolver,
-    SurfacePoints,
-    exp_map,
-    geodesic_distance,
-    log_map,
-    region_boundary,
-    shapes,
-)
+from heat_igl import Mesh, SignedHeatSolver, SurfacePoints, exp_map, geodesic_distance, log_map, shapes
+from heat_igl.mesh import region_boundary
 from heat_igl.operators import operators
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import ExactSurface

@@ -29,7 +29,8 @@ from typing import Any
 import numpy as np
 import scipy.spatial
 
-from heat_igl import Mesh, ReferenceSolverError, SourceError, reference, shapes, shortest_paths
+from heat_igl import Mesh, SourceError, reference, shapes, shortest_paths
+from heat_igl.errors import ReferenceSolverError
 from heat_igl.intrinsic import intrinsic_triangulation, mollify
 from heat_igl.reference import guarded
 from heat_igl.typing import FloatArray, IntArray

@@ -24,16 +24,9 @@ from typing import Any
 import numpy as np
 
 import heat_igl
-from heat_igl import (
-    Mesh,
-    SignedHeatSolver,
-    SurfaceCurve,
-    cut,
-    geodesic_distance,
-    isolines,
-    region_boundary,
-    sublevel_areas,
-)
+from heat_igl import Mesh, SignedHeatSolver, SurfaceCurve, cut, geodesic_distance, isolines
+from heat_igl.curves import sublevel_areas
+from heat_igl.mesh import region_boundary
 from heat_igl.typing import FloatArray
 
 from measuring import seconds_of

@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import heat_igl
-from heat_igl import MeshError, MissingExtraError, ReferenceSolverError, SourceError
+from heat_igl import MeshError, SourceError
+from heat_igl.errors import MissingExtraError, ReferenceSolverError
 from heat_igl.validation import METHODS, draw_sources
 
 from scaffold import add_seed, environment, environment_line, option_parser

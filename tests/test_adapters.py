@@ -9,7 +9,8 @@ import sys
 import numpy as np
 import pytest
 
-from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MissingExtraError, shapes
+from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, shapes
+from heat_igl.errors import MissingExtraError
 
 
 def sphere() -> Mesh:

@@ -212,7 +212,7 @@ def test_offset_of_a_curve_drawn_on_the_plane():
     drawn = heat_igl.shortest_paths(mesh, last, first, distance=solver)[0]
     length = np.linalg.norm(mesh.V[first] - mesh.V[last])
     assert drawn.lengths(mesh).sum() == pytest.approx(length, rel=1e-9)
-    (curve,) = heat_igl.offset_curves(mesh, solver, drawn, 0.2)
+    (curve,) = heat_igl.curves.offset_curves(mesh, solver, drawn, 0.2)
     assert curve.is_closed
     assert curve.lengths(mesh).sum() == pytest.approx(2 * length + 2 * np.pi * 0.2, abs=2 * np.pi / 60)
     points = curve.positions(mesh)
@@ -230,7 +230,7 @@ def test_offset_of_a_curve_drawn_on_a_part():
     solver = heat_igl.HeatMethodSolver(mesh)
     drawn = heat_igl.shortest_paths(mesh, 0, 900, distance=solver)[0]
     radius = 4 * mesh.edge_lengths.mean()
-    curves = heat_igl.offset_curves(mesh, solver, drawn, radius)
+    curves = heat_igl.curves.offset_curves(mesh, solver, drawn, radius)
     assert curves
     # Those are an edge from the path at most, and an offset point lies in a face as well.
     exact = heat_igl.reference.exact(mesh, np.unique(mesh.F[drawn.faces]))

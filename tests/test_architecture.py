@@ -85,7 +85,7 @@ def test_names_loaded_on_first_use_are_those_of_their_modules():
     from heat_igl import validation
 
     assert heat_igl.validate is validation.validate
-    assert heat_igl.metrics.__name__ == "heat_igl.validation.metrics"
+    assert heat_igl.validation.metrics.__name__ == "heat_igl.validation.metrics"
     assert set(heat_igl.__all__) <= set(dir(heat_igl))
     with pytest.raises(AttributeError, match="module 'heat_igl' has no attribute 'valdate'; did you mean 'validate'"):
         _ = heat_igl.valdate

@@ -115,7 +115,7 @@ def source_case(name: str, sources: Any, *patterns: str) -> Case:
         mesh = heat_igl.shapes.icosphere(1)
         solver = heat_igl.HeatMethodSolver(mesh)
         ways = (
-            lambda: heat_igl.heat_method_distance(mesh.V, mesh.F, sources),
+            lambda: heat_igl.geodesic_distance(mesh, sources, method="heat"),
             lambda: solver.distance(sources),
             lambda: solver.solve(sources),
             lambda: solver.distances([0, sources]),
@@ -161,7 +161,7 @@ def number_cases() -> Iterator[Case]:
         "cutoff": lambda mesh, value: heat_igl.geodesic_distance(mesh, 0, cutoff=value),
         "t": lambda mesh, value: heat_igl.HeatMethodSolver(mesh, t=value),
         "radius": lambda mesh, value: heat_igl.distances_within(mesh, value),
-        "longest": lambda mesh, value: heat_igl.split_long_edges(mesh, value),
+        "longest": lambda mesh, value: heat_igl.mesh.split_long_edges(mesh, value),
         "tolerance": lambda mesh, value: heat_igl.curve_on(mesh, mesh.V[mesh.F[0, :2]], tolerance=value),
         "spacing": lambda _, value: heat_igl.VoxelBox((0, 0, 0), value, (2, 2, 2)),
     }
@@ -232,7 +232,7 @@ def argument_cases() -> Iterator[Case]:
         "direction": lambda mesh: heat_igl.trace_geodesic(mesh, 0, ragged, 1.0),
         "values": lambda mesh: heat_igl.VectorHeatSolver(mesh).extend([0, 1], ragged),
         "values of isolines": lambda mesh: heat_igl.isolines(mesh, ragged, [0.5]),
-        "weights": lambda mesh: heat_igl.geodesic_centre(mesh, mesh, [0, 1], ragged),
+        "weights": lambda mesh: heat_igl.sampling.geodesic_centre(mesh, mesh, [0, 1], ragged),
         "g": lambda mesh: heat_igl.GeodesicSolver(mesh, method="exact").distance_vjp(0)[1](ragged),
         "reference": lambda mesh: heat_igl.validate(mesh, 0, methods=["heat"], reference=ragged),
         "origin": lambda _: heat_igl.VoxelBox(ragged, 1.0, (2, 2, 2)),
@@ -250,7 +250,7 @@ def argument_cases() -> Iterator[Case]:
         "distance": lambda mesh: heat_igl.shortest_paths(mesh, [3], 0, distance=ragged),
         "vectors": lambda mesh: heat_igl.tangent_frames(mesh).from_world(ragged),
         "vertices": lambda mesh: heat_igl.edge_curve(mesh, ragged),
-        "faces": lambda mesh: heat_igl.region_boundary(mesh, faces=ragged),
+        "faces": lambda mesh: heat_igl.mesh.region_boundary(mesh, faces=ragged),
         "values": lambda _: heat_igl.image_domain(np.ones((3, 3), bool)).image(ragged),
     }.items():
         kind = "SourceError" if name in ("vertices", "faces") else "ValueError"
@@ -304,7 +304,7 @@ def argument_cases() -> Iterator[Case]:
     )
     yield argument_case(
         "pieces = 10^12",
-        lambda mesh: heat_igl.geodesic_bezier(mesh, [0, 1], 10**12),
+        lambda mesh: heat_igl.curves.geodesic_bezier(mesh, [0, 1], 10**12),
         "pieces must be an integer from 1",
     )
     yield argument_case(
@@ -317,8 +317,8 @@ def argument_cases() -> Iterator[Case]:
         error="SourceError",
     )
     for name, ask in {
-        "cells": lambda mesh: heat_igl.dual_triangulation(mesh, np.zeros(42, int)),
-        "cloud": heat_igl.point_cloud_operators,
+        "cells": lambda mesh: heat_igl.sampling.dual_triangulation(mesh, np.zeros(42, int)),
+        "cloud": heat_igl.operators.point_cloud_operators,
         "polygons": lambda mesh: heat_igl.PolygonMesh(mesh.V, 3),
     }.items():
         yield argument_case(f"{name} of another kind", ask, f"{name} must be .*, not ", error="MeshError")
@@ -330,7 +330,7 @@ def argument_cases() -> Iterator[Case]:
     )
     yield argument_case(
         "offset_curves by a mesh",
-        lambda mesh: heat_igl.offset_curves(mesh, mesh, 0, 1.0),
+        lambda mesh: heat_igl.curves.offset_curves(mesh, mesh, 0, 1.0),
         "solver must be a GeodesicSolver",
     )
 

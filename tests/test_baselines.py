@@ -12,8 +12,10 @@ from conftest import perturbed
 from scipy.spatial.distance import cdist
 from scipy.special import ive, logsumexp
 
-from heat_igl import AccuracyWarning, Mesh, MeshError, MissingExtraError, SourceError, baselines, shapes
+from heat_igl import AccuracyWarning, Mesh, MeshError, SourceError, shapes
+from heat_igl.errors import MissingExtraError
 from heat_igl.operators import intrinsic_operators, operators
+from heat_igl.reference import baselines
 from heat_igl.reference.baselines.schrodinger import _inverse_log_bessel
 
 MESH_METHODS = {

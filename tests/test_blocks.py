@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from conftest import perturbed
 
-from heat_igl import HeatMethodSolver, Mesh, MeshError, MissingExtraError, SourceError, shapes
+from heat_igl import HeatMethodSolver, Mesh, MeshError, SourceError, shapes
+from heat_igl.errors import MissingExtraError
 from heat_igl.geodesic import SolverChoice
 from heat_igl.runtime import PeakMemory, blocks, over_rows
 

@@ -395,7 +395,7 @@ def test_demo_goes_on_without_pymeshlab_and_without_references(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def missing(*_: object) -> None:
-        raise heat_igl.ReferenceSolverError("meshlab_front cannot be loaded: libOpenGL.so.0")
+        raise heat_igl.errors.ReferenceSolverError("meshlab_front cannot be loaded: libOpenGL.so.0")
 
     monkeypatch.setattr(demo, "sample_mesh", lambda: None)
     monkeypatch.setattr(reference, "exact", lambda mesh, _: np.arccos(np.clip(mesh.V @ mesh.V[1234], -1, 1)))

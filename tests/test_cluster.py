@@ -17,10 +17,11 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import BatchError, Mesh, SourceError, cluster
+from heat_igl import Mesh, SourceError, cluster
 from heat_igl.cluster.collection import SourcePlan, items
 from heat_igl.cluster.store import Store, rows_per_block
 from heat_igl.cluster.worker import Task, begin
+from heat_igl.errors import BatchError
 
 pytest.importorskip("distributed")
 zarr = pytest.importorskip("zarr")

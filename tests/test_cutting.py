@@ -56,12 +56,12 @@ CURVES = {
 }
 
 
-def is_along_edges(found: heat_igl.CutMesh) -> bool:
+def is_along_edges(found: heat_igl.curves.CutMesh) -> bool:
     n = found.mesh.n_vertices
     return bool(np.isin(np.sort(found.edges, axis=1) @ [n, 1], found.mesh.edges @ [n, 1]).all())
 
 
-def assert_same_surface(mesh: Mesh, found: heat_igl.CutMesh) -> None:
+def assert_same_surface(mesh: Mesh, found: heat_igl.curves.CutMesh) -> None:
     new = found.mesh
     np.testing.assert_array_equal(new.V[: mesh.n_vertices], mesh.V)
     np.testing.assert_allclose(found.places.positions(mesh), new.V, atol=1e-14)
@@ -152,7 +152,7 @@ def test_loops_where_a_piece_touches_itself():
     # Two triangles that share one vertex.
     mesh = shapes.grid(2)
     inside = np.isin(np.arange(mesh.n_faces), np.flatnonzero((mesh.F == 4).any(axis=1))[[0, 3]])
-    piece = cut(mesh, heat_igl.region_boundary(mesh, faces=inside))
+    piece = cut(mesh, heat_igl.mesh.region_boundary(mesh, faces=inside))
     total = sum(len(part.boundary_loops()) for part in piece.split())
     assert total >= len(piece.split())
     for part in piece.split():

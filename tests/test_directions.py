@@ -16,10 +16,10 @@ from heat_igl import (
     geodesic_path,
     isolines,
     log_map,
-    region_boundary,
     shapes,
     tangent_frames,
 )
+from heat_igl.mesh import region_boundary
 from heat_igl.unfolding import ExactSurface, vectors_from
 
 
@@ -336,7 +336,7 @@ def test_exact_paths_from_curves_along_edges_lead_back_to_the_vertices():
     np.testing.assert_allclose(ends, mesh.V[found.distance > 0], atol=1e-12)
 
 
-def followed(mesh: Mesh, found: heat_igl.Directions, v: int) -> np.ndarray:
+def followed(mesh: Mesh, found: heat_igl.heat_method.Directions, v: int) -> np.ndarray:
     """Where the geodesic ends that leaves the start of the path to vertex v in the direction of the departure."""
     face, place = int(found.start.faces[v]), found.start.barycentric[v]
     start = int(mesh.F[face, place.argmax()]) if place.max() == 1 else SurfacePoints([face], [place])
@@ -387,7 +387,8 @@ def test_bad_arguments_are_one_clear_error(sphere):
 def test_pairs_and_polygons_are_meshes_too(sphere):
     pair = (sphere.V, sphere.F)
     np.testing.assert_array_equal(tangent_frames(pair).x, tangent_frames(sphere).x)
-    assert abs(heat_igl.connection_laplacian(pair) - heat_igl.connection_laplacian(sphere)).max() == 0
+    connection = heat_igl.operators.connection_laplacian
+    assert abs(connection(pair) - connection(sphere)).max() == 0
     ends = (exp_map(mesh, 3, [[0.5, 0.2]]).barycentric for mesh in (pair, sphere))
     np.testing.assert_array_equal(*ends)
     lengths = (heat_igl.trace_geodesic(mesh, 3, [1, 0], 0.7).lengths(sphere) for mesh in (pair, sphere))

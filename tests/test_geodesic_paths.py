@@ -12,7 +12,6 @@ from conftest import flat_perturbed, perturbed
 
 import heat_igl
 from heat_igl import (
-    GeodesicPathSolver,
     Mesh,
     MeshError,
     SourceError,
@@ -20,10 +19,10 @@ from heat_igl import (
     SurfacePoints,
     edge_curve,
     geodesic_path,
-    handle_loops,
     shapes,
     straighten,
 )
+from heat_igl.curves import GeodesicPathSolver, handle_loops
 from heat_igl.curves.words import crossing_letters
 
 

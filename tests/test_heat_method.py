@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from conftest import perturbed, zoo
 
-import heat_igl
 from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, MeshError, SourceError, shapes
 from heat_igl.operators import operators
 from heat_igl.steps import fitted_laplacian, integrate
@@ -170,7 +169,6 @@ def cold_solver() -> HeatMethodSolver:
     [
         (lambda _: HeatMethodSolver(STRIP, t=0.5), "too small"),
         (lambda _: HeatMethodSolver(operators(STRIP), t=0.5), "too small"),
-        (lambda _: heat_igl.heat_method_distance(STRIP.V, STRIP.F, 0, t=0.5), "too small"),
         (lambda cold: cold.distance(0), "no heat arrives"),
         (lambda cold: cold.voronoi(0), "no heat arrives"),
         (lambda cold: cold.solve(0), "no heat arrives"),

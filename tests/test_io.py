@@ -17,7 +17,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import heat_igl
-from heat_igl import AccuracyWarning, Mesh, MeshError, MissingExtraError, read_attributes, read_mesh, write_mesh
+from heat_igl import AccuracyWarning, Mesh, MeshError, read_attributes, read_mesh, write_mesh
+from heat_igl.errors import MissingExtraError
 from heat_igl.io import files
 
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="needs meshio")

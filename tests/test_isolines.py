@@ -13,18 +13,8 @@ import pytest
 from conftest import flat_perturbed, zoo
 
 import heat_igl
-from heat_igl import (
-    GeodesicSolver,
-    HeatMethodSolver,
-    Mesh,
-    MeshError,
-    enclosed_areas,
-    isolines,
-    offset_curves,
-    shapes,
-    sublevel_areas,
-    write_curves,
-)
+from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, isolines, shapes, write_curves
+from heat_igl.curves import enclosed_areas, offset_curves, sublevel_areas
 from heat_igl.geodesic import SolverChoice
 
 SQUARE = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])

@@ -7,7 +7,8 @@ import pytest
 import scipy.sparse as sp
 from conftest import perturbed, zoo
 
-from heat_igl import FactorizationError, HeatMethodSolver, Mesh, shapes
+from heat_igl import HeatMethodSolver, Mesh, shapes
+from heat_igl.errors import FactorizationError
 from heat_igl.linear import backends, factor_memory, iterative
 from heat_igl.operators import operators
 

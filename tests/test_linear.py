@@ -11,7 +11,8 @@ import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from heat_igl import FactorizationError, HeatMethodSolver, Mesh, MissingExtraError, shapes
+from heat_igl import HeatMethodSolver, Mesh, shapes
+from heat_igl.errors import FactorizationError, MissingExtraError
 from heat_igl.linear import analyse, factorize
 from heat_igl.linear.dissection import dissect
 from heat_igl.operators import operators

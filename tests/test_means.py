@@ -12,13 +12,13 @@ from heat_igl import (
     SourceError,
     SurfacePoints,
     centroidal_voronoi,
-    geodesic_bezier,
     geodesic_distance,
     karcher_mean,
     pair_distances,
     shapes,
     voronoi_cells,
 )
+from heat_igl.curves import geodesic_bezier
 
 CELLS = 12
 

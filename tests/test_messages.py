@@ -21,6 +21,7 @@ from heat_igl import (
     shortest_paths,
     voronoi_cells,
 )
+from heat_igl.intrinsic import TangentFrames
 
 MESH = shapes.icosphere(2)
 SOLVER = HeatMethodSolver(MESH)
@@ -45,7 +46,7 @@ PHI = SOLVER.distance(0)
         (lambda: voronoi_cells(SOLVER, [1, 162]), r"sites\[1\] = 162 is no vertex"),
         (lambda: heat_igl.distance_matrix(SOLVER, [162]), r"indices\[0\] = 162 is no vertex"),
         (lambda: heat_igl.diameter(SOLVER, start=162), r"start\[0\] = 162 is no vertex"),
-        (lambda: heat_igl.geodesic_centre(MESH, SOLVER, [162]), r"points\[0\] = 162 is no vertex"),
+        (lambda: heat_igl.sampling.geodesic_centre(MESH, SOLVER, [162]), r"points\[0\] = 162 is no vertex"),
     ],
 )
 def test_errors_name_the_argument_of_the_offender(ask, message):
@@ -74,9 +75,12 @@ HIDDEN = np.ma.masked_array([1, 2], mask=[True, False])
         (lambda: shapes.strip("4", 3), "length must be an integer of at least 1, not '4'"),
         (lambda: shapes.icosphere(162), "subdivisions must be at most 12, not 162"),
         (lambda: heat_igl.exp_map(MESH, 0, np.empty((0, 2))), r"vectors must be one vector or more.* \(0, 2\)"),
-        (lambda: heat_igl.TangentFrames.from_angles("1"), "angles must be real numbers, not '?"),
-        (lambda: heat_igl.TangentFrames.from_angles([1, 2], [1, 2, 3]), r"lengths must be one number or \(2,\)"),
-        (lambda: heat_igl.TangentFrames.from_angles(np.datetime64("2020")), "angles must be real numbers"),
+        (lambda: TangentFrames.from_angles("1"), "angles must be real numbers, not '?"),
+        (
+            lambda: TangentFrames.from_angles([1, 2], [1, 2, 3]),
+            r"lengths must be one number or \(2,\)",
+        ),
+        (lambda: TangentFrames.from_angles(np.datetime64("2020")), "angles must be real numbers"),
     ],
 )
 def test_arguments_that_numpy_would_take_for_something_else_are_refused(ask, message):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heat_igl import Mesh, closed_forms, metrics, shapes
+from heat_igl import Mesh, shapes
+from heat_igl.validation import closed_forms, metrics
 
 
 def test_relative_error_entry_by_entry() -> None:

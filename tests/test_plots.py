@@ -393,7 +393,7 @@ def test_zero_everywhere_can_be_drawn() -> None:
 def test_without_matplotlib_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh, x = flat_grid(4)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(heat_igl.MissingExtraError, match="needs matplotlib: pip install matplotlib"):
+    with pytest.raises(heat_igl.errors.MissingExtraError, match="needs matplotlib: pip install matplotlib"):
         plot(mesh, x)
 
 

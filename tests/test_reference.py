@@ -21,20 +21,13 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 from scipy.spatial import Delaunay
 
-from heat_igl import (
-    Mesh,
-    MeshError,
-    MissingExtraError,
-    ReferenceSolverError,
-    closed_forms,
-    read_mesh,
-    reference,
-    shapes,
-)
+from heat_igl import Mesh, MeshError, read_mesh, reference, shapes
+from heat_igl.errors import MissingExtraError, ReferenceSolverError
 from heat_igl.reference import guarded, measurement, native
 from heat_igl.reference.steiner import graph_distance
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
+from heat_igl.validation import closed_forms
 
 
 def real_meshes() -> dict[str, Path]:

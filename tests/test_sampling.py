@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 import heat_igl
-from heat_igl import shapes
+from heat_igl import sampling, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.sampling.centre import _least_in_faces
 
@@ -134,7 +134,7 @@ def test_wrong_sites_are_refused(square, sites):
 )
 def test_dual_has_the_topology_of_the_mesh(mesh, k):
     cells = heat_igl.farthest_cells(heat_igl.HeatMethodSolver(mesh), k)
-    dual = heat_igl.dual_triangulation(mesh, cells)
+    dual = sampling.dual_triangulation(mesh, cells)
     report, original = dual.report(), mesh.report()
     assert dual.n_vertices == k
     assert report.euler_characteristic == original.euler_characteristic
@@ -146,7 +146,7 @@ def test_dual_has_the_topology_of_the_mesh(mesh, k):
 def test_dual_is_oriented_like_the_mesh():
     mesh = shapes.icosphere(4)
     cells = heat_igl.farthest_cells(heat_igl.HeatMethodSolver(mesh), 60)
-    a, b, c = np.moveaxis(heat_igl.dual_triangulation(mesh, cells).V[heat_igl.dual_triangulation(mesh, cells).F], 1, 0)
+    a, b, c = np.moveaxis(sampling.dual_triangulation(mesh, cells).V[sampling.dual_triangulation(mesh, cells).F], 1, 0)
     assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a + b + c) > 0).all()
 
 
@@ -155,7 +155,7 @@ def test_dual_in_the_plane_is_the_delaunay_triangulation():
     mesh = shapes.grid(150)
     sites = np.random.default_rng(11).choice(mesh.n_vertices, 12, replace=False)
     euclidean = np.linalg.norm(mesh.V[:, None] - mesh.V[sites], axis=2)
-    cells = heat_igl.VoronoiCells(sites, euclidean.argmin(axis=1), euclidean.min(axis=1))
+    cells = sampling.VoronoiCells(sites, euclidean.argmin(axis=1), euclidean.min(axis=1))
     faces = np.sort(Delaunay(mesh.V[sites, :2]).simplices, axis=1)
     corner = mesh.V[sites][faces][..., :2]
     squares = (corner**2).sum(axis=2)
@@ -165,21 +165,21 @@ def test_dual_in_the_plane_is_the_delaunay_triangulation():
     apart = np.linalg.norm(centre[:, None] - centre, axis=2) + np.eye(len(faces))
     assert apart.min() > 3 / 150
     inside = ((centre > 0) & (centre < 1)).all(axis=1)
-    found = heat_igl.dual_triangulation(mesh, cells).F
+    found = sampling.dual_triangulation(mesh, cells).F
     assert {tuple(sorted(face)) for face in found.tolist()} == {tuple(face) for face in faces[inside].tolist()}
 
 
 def test_islands_and_zigzag_borders_leave_the_dual_alone():
     mesh = shapes.icosphere(4)
     cells = heat_igl.farthest_cells(heat_igl.HeatMethodSolver(mesh), 40)
-    dual = heat_igl.dual_triangulation(mesh, cells)
+    dual = sampling.dual_triangulation(mesh, cells)
     labels = cells.labels.copy()
     # Inside a cell: next to a border, a vertex of another label may join two cells that are apart.
     at_border = mesh.edges[np.diff(labels[mesh.edges], axis=1)[:, 0] != 0]
     alone = np.setdiff1d(np.arange(mesh.n_vertices), np.concatenate([cells.sites, at_border.ravel()]))[5::200]
     assert len(alone) > 5
     labels[alone] = (labels[alone] + 17) % 40
-    noisy = heat_igl.dual_triangulation(mesh, heat_igl.VoronoiCells(cells.sites, labels, cells.distance))
+    noisy = sampling.dual_triangulation(mesh, sampling.VoronoiCells(cells.sites, labels, cells.distance))
     assert {tuple(face) for face in noisy.F.tolist()} == {tuple(face) for face in dual.F.tolist()}
 
 
@@ -187,32 +187,32 @@ def test_too_few_sites_have_no_dual(square):
     mesh = shapes.torus(20, 60)
     solver = heat_igl.HeatMethodSolver(mesh)
     with pytest.raises(heat_igl.MeshError, match="sample more densely"):
-        heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(solver, 6))
+        sampling.dual_triangulation(mesh, heat_igl.farthest_cells(solver, 6))
     with pytest.raises(heat_igl.MeshError, match="no three cells meet"):
-        heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(solver, 2))
+        sampling.dual_triangulation(mesh, heat_igl.farthest_cells(solver, 2))
     with pytest.raises(heat_igl.MeshError, match="the cells have 1200 vertices and the mesh 441"):
-        heat_igl.dual_triangulation(square[0], heat_igl.farthest_cells(solver, 2))
+        sampling.dual_triangulation(square[0], heat_igl.farthest_cells(solver, 2))
 
 
-def every_vertex_a_site(mesh: Mesh) -> heat_igl.VoronoiCells:
+def every_vertex_a_site(mesh: Mesh) -> sampling.VoronoiCells:
     """Cells whose dual is the mesh itself."""
     every = np.arange(mesh.n_vertices)
-    return heat_igl.VoronoiCells(every, every, np.zeros(mesh.n_vertices))
+    return sampling.VoronoiCells(every, every, np.zeros(mesh.n_vertices))
 
 
 def test_dual_must_be_a_manifold_with_every_site():
     sphere = shapes.icosphere(1)
-    dual = heat_igl.dual_triangulation(sphere, every_vertex_a_site(sphere))
+    dual = sampling.dual_triangulation(sphere, every_vertex_a_site(sphere))
     assert {tuple(sorted(face)) for face in dual.F.tolist()} == {tuple(sorted(face)) for face in sphere.F.tolist()}
     loose = Mesh(np.concatenate([sphere.V, np.ones((2, 3))]), sphere.F)
     with pytest.raises(heat_igl.MeshError, match=r"cell 42 has no triangle \(2 of 44 cells have none\)"):
-        heat_igl.dual_triangulation(loose, every_vertex_a_site(loose))
+        sampling.dual_triangulation(loose, every_vertex_a_site(loose))
     book = shapes.book(3, 2)
     with pytest.raises(heat_igl.MeshError, match=r"between cells 0 and 1 has more than two triangles \(2 edges have\)"):
-        heat_igl.dual_triangulation(book, every_vertex_a_site(book))
+        sampling.dual_triangulation(book, every_vertex_a_site(book))
     bow_tie = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]])
     with pytest.raises(heat_igl.MeshError, match=r"the triangles at cell 0 are not one fan \(1 cells"):
-        heat_igl.dual_triangulation(bow_tie, every_vertex_a_site(bow_tie))
+        sampling.dual_triangulation(bow_tie, every_vertex_a_site(bow_tie))
 
 
 def test_least_value_on_a_face_against_a_search():
@@ -237,16 +237,16 @@ def test_least_value_on_a_face_against_a_search():
 def test_centre_in_the_plane_is_the_weighted_mean(square):
     mesh, solver = square
     points, weights = [3, 417, 200, 200, 62], [1.0, 2.0, 0.5, 0.25, 1.5]
-    centre = heat_igl.geodesic_centre(mesh, solver, points, weights)
+    centre = sampling.geodesic_centre(mesh, solver, points, weights)
     expected = np.average(mesh.V[points], axis=0, weights=weights)
     np.testing.assert_allclose(centre.positions(mesh)[0], expected, atol=1e-9)
 
 
 def test_centre_on_an_edge_and_in_a_corner(square):
     mesh, solver = square
-    on_edge = heat_igl.geodesic_centre(mesh, solver, [0, 1]).positions(mesh)[0]
+    on_edge = sampling.geodesic_centre(mesh, solver, [0, 1]).positions(mesh)[0]
     np.testing.assert_allclose(on_edge, mesh.V[[0, 1]].mean(axis=0), atol=1e-9)
-    in_corner = heat_igl.geodesic_centre(mesh, solver, [5]).positions(mesh)[0]
+    in_corner = sampling.geodesic_centre(mesh, solver, [5]).positions(mesh)[0]
     np.testing.assert_allclose(in_corner, mesh.V[5], atol=1e-9)
 
 
@@ -266,7 +266,7 @@ def test_centre_of_an_arc_of_a_sphere():
         mean += tangent.mean(axis=0)
         mean /= np.linalg.norm(mean)
     solver = heat_igl.GeodesicSolver(mesh, method="exact")
-    found = heat_igl.geodesic_centre(mesh, solver, points).positions(mesh)[0]
+    found = sampling.geodesic_centre(mesh, solver, points).positions(mesh)[0]
     h = mesh.edge_lengths.mean()
     assert np.linalg.norm(found / np.linalg.norm(found) - mean) < 0.1 * h
     assert np.linalg.norm(mesh.V - mean, axis=1).min() > 0.2 * h  # no vertex would do
@@ -276,13 +276,13 @@ def test_centre_refuses_what_has_none(square):
     mesh = two_spheres()
     solver = heat_igl.HeatMethodSolver(mesh)
     with pytest.raises(heat_igl.SourceError, match="no place is reached from all"):
-        heat_igl.geodesic_centre(mesh, solver, [0, 200])
+        sampling.geodesic_centre(mesh, solver, [0, 200])
     with pytest.raises(ValueError, match="weights must be 2 positive numbers"):
-        heat_igl.geodesic_centre(mesh, solver, [0, 1], [1.0, 0.0])
+        sampling.geodesic_centre(mesh, solver, [0, 1], [1.0, 0.0])
     with pytest.raises(heat_igl.SourceError, match=r"points\[0\] = 900 is no vertex"):
-        heat_igl.geodesic_centre(mesh, solver, [900])
+        sampling.geodesic_centre(mesh, solver, [900])
     with pytest.raises(heat_igl.MeshError, match="pass its own"):
-        heat_igl.geodesic_centre(square[0], solver, [0])
+        sampling.geodesic_centre(square[0], solver, [0])
 
 
 def test_diameter_of_a_square_and_a_sphere(square):

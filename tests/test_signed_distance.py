@@ -23,10 +23,10 @@ from heat_igl import (
     edge_curve,
     geodesic_distance,
     isolines,
-    region_boundary,
     shapes,
 )
 from heat_igl.heat_method import curve_levels
+from heat_igl.mesh import region_boundary
 from heat_igl.sources import oriented_set
 
 

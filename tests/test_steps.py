@@ -9,8 +9,8 @@ import pytest
 import scipy.sparse as sp
 from conftest import perturbed
 
-from heat_igl import HeatMethodSolver, Mesh, PolygonMesh, polygon_operators, shapes, steps
-from heat_igl.operators import Operators, operators, speed_operators, tufted_operators
+from heat_igl import HeatMethodSolver, Mesh, PolygonMesh, shapes, steps
+from heat_igl.operators import Operators, operators, polygon_operators, speed_operators, tufted_operators
 from heat_igl.steps import (
     HeatFlow,
     NormalizedDivergence,

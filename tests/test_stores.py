@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from heat_igl import BatchError, distances_within, read_distances_within, shapes, write_distances_within
+from heat_igl import distances_within, read_distances_within, shapes, write_distances_within
+from heat_igl.errors import BatchError
 
 zarr = pytest.importorskip("zarr")
 pytest.importorskip("distributed")

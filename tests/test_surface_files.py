@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import Mesh, MeshError, MissingExtraError, PointCloud
+from heat_igl import Mesh, MeshError, PointCloud
+from heat_igl.errors import MissingExtraError
 from heat_igl.io import write_point_cloud
 
 needs_nibabel = pytest.mark.skipif(importlib.util.find_spec("nibabel") is None, reason="needs nibabel")

@@ -20,21 +20,11 @@ import scipy.sparse as sp
 from conftest import zoo
 
 import heat_igl
-from heat_igl import (
-    AccuracyWarning,
-    HeatMethodSolver,
-    Mesh,
-    MissingExtraError,
-    SourceError,
-    closed_forms,
-    reference,
-    shapes,
-    validate,
-    validation,
-)
+from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, SourceError, reference, shapes, validate, validation
+from heat_igl.errors import MissingExtraError
 from heat_igl.operators import Operators, operators
 from heat_igl.steps import NormalizedDivergence
-from heat_igl.validation import draw_sources
+from heat_igl.validation import closed_forms, draw_sources
 from heat_igl.validation.plots import error_figure
 
 
@@ -216,7 +206,9 @@ TOUCHING = Mesh(  # two tetrahedra's surfaces, with one vertex in common
 
 def test_without_a_reference_the_rest_of_the_report_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     def refusing(*_: object, **__: object) -> None:
-        raise heat_igl.ReferenceSolverError("at 1 vertices connected with the sources two surfaces touch in a point")
+        raise heat_igl.errors.ReferenceSolverError(
+            "at 1 vertices connected with the sources two surfaces touch in a point"
+        )
 
     monkeypatch.setattr(reference, "measured", refusing)
     report = validate(TOUCHING, 1, ["heat", "windows", "exact"])

@@ -10,8 +10,8 @@ import scipy.sparse.linalg as spl
 from conftest import flat_perturbed, perturbed
 
 import heat_igl
-from heat_igl import Mesh, VectorHeatSolver, connection_laplacian, exp_map, shapes, tangent_frames
-from heat_igl.operators import edge_rotations, operators
+from heat_igl import Mesh, VectorHeatSolver, exp_map, shapes, tangent_frames
+from heat_igl.operators import connection_laplacian, edge_rotations, operators
 from heat_igl.steps import VectorHeatFlow
 
 SHAPES = {

@@ -99,14 +99,13 @@ def test_planar_points_of_files(tmp_path):
 FLAT = shapes.disk(6)
 TAKE_POSITIONS = {
     "HeatMethodSolver": lambda V: HeatMethodSolver(V, FLAT.F).distance(3),
-    "heat_method_distance": lambda V: heat_igl.heat_method_distance(V, FLAT.F, 3),
     "geodesic_distance": lambda V: heat_igl.geodesic_distance((V, FLAT.F), 3),
     "closest_points": lambda V: heat_igl.closest_points(FLAT, V[:5] / 2).points.barycentric,
     "curve_on": lambda V: heat_igl.curve_on(FLAT, V[[0, 4, 9]]).start,
     "PointCloud": lambda V: HeatMethodSolver(PointCloud(V)).distance(3),
-    "polygon_operators": lambda V: heat_igl.polygon_operators(PolygonMesh(V, FLAT.F)).L.toarray(),
+    "polygon_operators": lambda V: heat_igl.operators.polygon_operators(PolygonMesh(V, FLAT.F)).L.toarray(),
     "tangent_frames": lambda V: heat_igl.tangent_frames((V, FLAT.F)).x,
-    "closed_forms.plane": lambda V: heat_igl.closed_forms.plane((V, FLAT.F), 3),
+    "closed_forms.plane": lambda V: heat_igl.validation.closed_forms.plane((V, FLAT.F), 3),
     "with_vertices": lambda V: HeatMethodSolver(FLAT).with_vertices(2 * V).distance(3),
     "metric_operators": lambda V: metric_operators((V, FLAT.F), np.tile(np.eye(3), (FLAT.n_faces, 1, 1))).L.toarray(),
     "libigl": lambda V: igl_names.heat_geodesic(V, FLAT.F, 0.01, np.array([3])),

@@ -131,7 +131,7 @@ def _measured(
     solver = choice.on(mesh, region)
     once = time.perf_counter() - start
     start = time.perf_counter()
-    phi = solver.distance(sources, cutoff)
+    phi = solver.distance(sources, cutoff=cutoff)
     seconds = time.perf_counter() - start
     rows = [plan_row(solver.plan)]
     if isinstance(solver, HeatMethodSolver):

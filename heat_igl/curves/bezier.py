@@ -54,7 +54,7 @@ def geodesic_bezier(mesh: MeshLike, points: Waypoints, pieces: int = 32) -> Surf
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.grid(8)
-    >>> curve = heat_igl.geodesic_bezier(mesh, [0, 8, 80], pieces=2)  # three corners of the square
+    >>> curve = heat_igl.curves.geodesic_bezier(mesh, [0, 8, 80], pieces=2)  # three corners of the square
     >>> curve.positions(mesh).round(6)[[0, -1]].tolist()
     [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
     """

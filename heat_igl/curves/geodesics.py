@@ -131,7 +131,7 @@ class GeodesicPathSolver:
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.strip(12, 5)
-    >>> solver = heat_igl.GeodesicPathSolver(mesh)
+    >>> solver = heat_igl.curves.GeodesicPathSolver(mesh)
     >>> paths = [solver.path([0, target]) for target in (12, 77)]
     >>> [round(float(path.lengths(mesh).sum()), 6) for path in paths]
     [12.0, 13.0]

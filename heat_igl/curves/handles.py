@@ -47,7 +47,7 @@ def handle_loops(mesh: MeshLike) -> list[SurfaceCurve]:
     >>> import heat_igl
     >>> import numpy as np
     >>> mesh = heat_igl.shapes.torus(48, 96, tube=0.4)
-    >>> loops = heat_igl.handle_loops(mesh)
+    >>> loops = heat_igl.curves.handle_loops(mesh)
     >>> len(loops), round(float(loops[0].lengths(mesh).sum() / (2 * np.pi)), 2)  # around the tube
     (2, 0.4)
     """

@@ -105,7 +105,7 @@ def offset_curves(mesh: MeshLike, solver: Solver, sources: Sources, radius: floa
     >>> import numpy as np
     >>> mesh = heat_igl.shapes.disk(40)
     >>> solver = heat_igl.GeodesicSolver(mesh)
-    >>> (curve,) = heat_igl.offset_curves(mesh, solver, 0, radius=0.5)
+    >>> (curve,) = heat_igl.curves.offset_curves(mesh, solver, 0, radius=0.5)
     >>> round(float(curve.lengths(mesh).sum() / np.pi), 2)  # a circle of radius 1/2
     1.0
     """
@@ -137,7 +137,7 @@ def sublevel_areas(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> Floa
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.grid(10)
-    >>> heat_igl.sublevel_areas(mesh, mesh.V[:, 0], [0.0, 0.25, 2.0]).round(6).tolist()
+    >>> heat_igl.curves.sublevel_areas(mesh, mesh.V[:, 0], [0.0, 0.25, 2.0]).round(6).tolist()
     [0.0, 0.25, 1.0]
     """
     mesh = as_simplices(mesh)
@@ -163,7 +163,7 @@ def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArra
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.grid(10)
-    >>> heat_igl.enclosed_areas(mesh, mesh.V[:, 0], 0.25).round(6).tolist()
+    >>> heat_igl.curves.enclosed_areas(mesh, mesh.V[:, 0], 0.25).round(6).tolist()
     [0.25]
     """
     mesh = as_simplices(mesh)

@@ -86,7 +86,7 @@ def geodesic_distance(
     beyond = checked_cutoff(cutoff)
     given = as_mesh(mesh)
     if method == "heat":
-        distance = HeatMethodSolver(given, region=region).distance(sources, beyond)
+        distance = HeatMethodSolver(given, region=region).distance(sources, cutoff=beyond)
         return distance if targets is None else distance[named_vertices(targets, len(distance), "targets")]
     if isinstance(given, PolygonMesh):
         given = given.triangles
@@ -97,7 +97,7 @@ def geodesic_distance(
             return _on_part(given, near, sources, tolerance if method != "exact" else 0.0, beyond)
     solver = GeodesicSolver(given, method=method, tolerance=tolerance, region=region)
     if targets is None:
-        return solver.distance(sources, beyond)
+        return solver.distance(sources, cutoff=beyond)
     found = solver._to_targets(sources, targets)
     found[found > (np.inf if beyond is None else beyond)] = np.inf
     return found
@@ -113,7 +113,7 @@ def _on_part(mesh: Mesh, faces: BoolArray, sources: Sources, tolerance: float, c
     if is_there.any():
         solver = GeodesicSolver(Mesh(mesh.V[used], numbers.reshape(-1, 3)), tolerance=tolerance)
         there = OffsetSources(np.searchsorted(used, chosen.vertices[is_there]), chosen.vertex_offset[is_there])
-        distance[used] = solver.distance(there, cutoff)
+        distance[used] = solver.distance(there, cutoff=cutoff)
     return np.asarray(cut_off(distance, cutoff))
 
 

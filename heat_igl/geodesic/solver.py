@@ -202,7 +202,7 @@ class GeodesicSolver(BatchedSolver):
         """Vertices (m, 3) of the triangles that points and curves refer to; None if sources are vertices alone."""
         return None if self._triangles is None else self._triangles.given_faces
 
-    def distance(self, sources: Sources, cutoff: float | None = None) -> FloatArray:
+    def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
         """Distance from the nearest source.
 
         Parameters

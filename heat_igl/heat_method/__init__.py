@@ -6,7 +6,7 @@ from heat_igl.heat_method.options import Backend, Boundary, Laplacian, Magnitude
 from heat_igl.heat_method.signed_heat import Level, SignedHeatSolver
 from heat_igl.heat_method.signed_volumes import VoxelBox, volume_signed_distance
 from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
-from heat_igl.heat_method.solver import HeatMethodSolver, heat_method_distance
+from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.heat_method.vector_heat import VectorHeatSolver, VectorMethod
 
 __all__ = [
@@ -27,6 +27,5 @@ __all__ = [
     "VectorHeatSolver",
     "VectorMethod",
     "VoxelBox",
-    "heat_method_distance",
     "volume_signed_distance",
 ]

@@ -57,10 +57,10 @@ class BatchedSolver(ABC):
     def distances(
         self,
         source_sets: Sequence[Sources],
+        *,
         out: AnyArray | None = None,
         progress: bool = False,
         dtype: npt.DTypeLike | None = None,
-        *,
         cutoff: float | None = None,
     ) -> AnyArray:
         """Distance from each of several sets of sources, solved in blocks, on all processors.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from heat_igl.sources import Sources, SourceSet, SourceTerm, require_resolved, r
 from heat_igl.steps import Boundary
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
-__all__ = ["HeatMethodSolver", "heat_method_distance"]
+__all__ = ["HeatMethodSolver"]
 
 
 class HeatMethodSolver(PreparedSolver):
@@ -114,7 +113,7 @@ class HeatMethodSolver(PreparedSolver):
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
         self._set_up(mesh if isinstance(mesh, Operators) and F is None else as_mesh(mesh, F), options, region)
 
-    def distance(self, sources: Sources, cutoff: float | None = None) -> FloatArray:
+    def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
         """Distance from the nearest source.
 
         Parameters
@@ -287,33 +286,3 @@ class HeatMethodSolver(PreparedSolver):
 def _warn(complaint: str | None) -> None:
     if complaint is not None:
         warn_caller(complaint, AccuracyWarning)
-
-
-def heat_method_distance(V: ArrayLike, F: ArrayLike, sources: Sources, **options: Any) -> FloatArray:
-    """Geodesic distance from `sources` in one call; to ask more than once, keep a `HeatMethodSolver`.
-
-    Parameters
-    ----------
-    V : (n, 3) array_like
-        Vertex positions.
-    F : (m, 3) or (m, 4) array_like
-        Triangles or tetrahedra.
-    sources : sources
-        As for `HeatMethodSolver.distance`.
-    **options
-        As for `HeatMethodSolver`.
-
-    Returns
-    -------
-    (n,) float64
-        See `HeatMethodSolver.distance`, for errors too.
-
-    Examples
-    --------
-    >>> import heat_igl
-    >>> mesh = heat_igl.shapes.disk(30)  # the unit disk, with vertex 0 in the middle
-    >>> phi = heat_igl.heat_method_distance(mesh.V, mesh.F, 0)
-    >>> round(float(phi.max()), 1)
-    1.0
-    """
-    return HeatMethodSolver(V, F, **options).distance(sources)

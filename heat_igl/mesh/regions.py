@@ -46,7 +46,7 @@ def region_boundary(
     >>> mesh = heat_igl.shapes.grid(8)
     >>> centre = mesh.V[mesh.F].mean(axis=1)
     >>> region = (abs(centre[:, :2] - 0.5) < 0.25).all(axis=1)  # a square of side 1/2
-    >>> (curve,) = heat_igl.region_boundary(mesh, faces=region)
+    >>> (curve,) = heat_igl.mesh.region_boundary(mesh, faces=region)
     >>> curve.is_closed, float(curve.lengths(mesh).sum())
     (True, 2.0)
     """

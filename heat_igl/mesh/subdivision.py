@@ -53,7 +53,7 @@ def split_long_edges(mesh: MeshLike, longest: float | None = None) -> Mesh:
     >>> import heat_igl
     >>> import numpy as np
     >>> mesh = heat_igl.shapes.strip(4, 1)
-    >>> finer = heat_igl.split_long_edges(mesh, 0.5)
+    >>> finer = heat_igl.mesh.split_long_edges(mesh, 0.5)
     >>> float(finer.edge_lengths.max())
     0.5
     >>> np.array_equal(finer.V[: mesh.n_vertices], mesh.V)

@@ -57,7 +57,7 @@ def connection_laplacian(mesh: MeshLike, laplacian: Laplacian = "intrinsic-delau
     --------
     >>> import heat_igl
     >>> import numpy as np
-    >>> L = heat_igl.connection_laplacian(heat_igl.shapes.icosphere(2)).toarray()
+    >>> L = heat_igl.operators.connection_laplacian(heat_igl.shapes.icosphere(2)).toarray()
     >>> bool(np.allclose(L, L.conj().T))
     True
     >>> bool(np.linalg.eigvalsh(L).max() < 0)  # no vector field on a sphere is parallel

@@ -38,7 +38,7 @@ def point_cloud_operators(
     --------
     >>> import heat_igl
     >>> import numpy as np
-    >>> domain = heat_igl.point_cloud_operators(heat_igl.PointCloud(heat_igl.shapes.icosphere(4).V))
+    >>> domain = heat_igl.operators.point_cloud_operators(heat_igl.PointCloud(heat_igl.shapes.icosphere(4).V))
     >>> round(float(domain.M.sum() / (4 * np.pi)), 2)  # the area of the unit sphere
     1.0
     >>> bool(np.allclose(domain.L @ np.ones(domain.n), 0))

@@ -55,7 +55,8 @@ def polygon_operators(mesh: MeshLike) -> Operators:
     Examples
     --------
     >>> import numpy as np
-    >>> from heat_igl import HeatMethodSolver, PolygonMesh, polygon_operators
+    >>> from heat_igl import HeatMethodSolver, PolygonMesh
+    >>> from heat_igl.operators import polygon_operators
     >>> hexagon = [[np.cos(a), np.sin(a), 0.0] for a in np.arange(6) * np.pi / 3]
     >>> mesh = PolygonMesh([*hexagon, [1.75, 3**0.5 / 2, 0]], [[0, 1, 2, 3, 4, 5], [0, 6, 1]])
     >>> distance = HeatMethodSolver(polygon_operators(mesh)).distance(3)

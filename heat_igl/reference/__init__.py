@@ -1,7 +1,7 @@
 """Distances to compare with: exact ones, those of other people's solvers, bounds, and the paper's other methods.
 
 Every native solver runs in a child process. `docs/references.md` says how far each one can be trusted. Closed forms are
-in `heat_igl.closed_forms`; the other methods that the paper discusses are in `heat_igl.reference.baselines`.
+in `heat_igl.validation.closed_forms`; the other methods that the paper discusses are in `heat_igl.reference.baselines`.
 
 Examples
 --------
@@ -10,6 +10,7 @@ Examples
 [4.0, 3.0, 5.0]
 """
 
+from heat_igl.reference import baselines
 from heat_igl.reference.bounds import edge_paths, straight_lines
 from heat_igl.reference.exact_distance import exact
 from heat_igl.reference.guarded import MEMORY, TIMEOUT, close
@@ -22,6 +23,7 @@ __all__ = [
     "MEMORY",
     "Measured",
     "TIMEOUT",
+    "baselines",
     "close",
     "edge_paths",
     "exact",

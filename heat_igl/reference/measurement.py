@@ -124,7 +124,7 @@ def measured(
         raise ReferenceSolverError(f"solver {solver!r} is unknown: choose one of {names}")
     if mesh.is_tetrahedral:
         raise ReferenceSolverError(
-            f"{solver} works on triangles, and the mesh holds tetrahedra: use heat_igl.closed_forms.convex_solid"
+            f"{solver} works on triangles, and the mesh holds tetrahedra: use validation.closed_forms.convex_solid"
         )
     if chosen is None:
         return _by_windows(mesh, vertex_sources(sources, mesh.n_vertices))

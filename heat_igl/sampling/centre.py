@@ -60,7 +60,7 @@ def geodesic_centre(
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.grid(8)
-    >>> centre = heat_igl.geodesic_centre(mesh, mesh, [0, 8, 72, 80])  # of the corners of the unit square
+    >>> centre = heat_igl.sampling.geodesic_centre(mesh, mesh, [0, 8, 72, 80])  # of the corners of the unit square
     >>> centre.positions(mesh).round(6).tolist()
     [[0.5, 0.5, 0.0]]
     """

@@ -45,7 +45,7 @@ def dual_triangulation(mesh: MeshLike, cells: VoronoiCells) -> Mesh:
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.torus(48, 32)
-    >>> coarse = heat_igl.dual_triangulation(mesh, heat_igl.farthest_cells(mesh, 60))
+    >>> coarse = heat_igl.sampling.dual_triangulation(mesh, heat_igl.farthest_cells(mesh, 60))
     >>> coarse.n_vertices, coarse.report().euler_characteristic
     (60, 0)
     """

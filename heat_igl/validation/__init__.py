@@ -1,5 +1,6 @@
 """Grade distances: generated domains, closed forms to compare with, error norms, and reports on several methods."""
 
+from heat_igl.validation import closed_forms, metrics
 from heat_igl.validation.comparison import METHODS, Method, Progress, Solver, draw_sources, validate
 from heat_igl.validation.metrics import (
     BoundViolations,
@@ -26,9 +27,11 @@ __all__ = [
     "ValidationRow",
     "asymmetry",
     "bound_violations",
+    "closed_forms",
     "draw_sources",
     "eikonal_residual",
     "error_summary",
+    "metrics",
     "relative_error",
     "triangle_violations",
     "validate",

@@ -9,7 +9,7 @@ Examples
 >>> import heat_igl
 >>> import numpy as np
 >>> mesh = heat_igl.shapes.icosphere(2)
->>> bool(np.isclose(heat_igl.closed_forms.sphere(mesh, 0).max(), np.pi))  # at the antipode
+>>> bool(np.isclose(heat_igl.validation.closed_forms.sphere(mesh, 0).max(), np.pi))  # at the antipode
 True
 """
 

@@ -43,7 +43,7 @@ def validate(
     Parameters
     ----------
     mesh : mesh
-        Triangles; for tetrahedra, give a `reference` of your own, such as `heat_igl.closed_forms.convex_solid`. Of a
+        Triangles; for tetrahedra, give a `reference` of your own, such as `closed_forms.convex_solid`. Of a
         `PointCloud` or `PolygonMesh`, own methods take the points or polygons, and native ones and the reference the
         triangles.
     sources : sources, or sequence of sources
@@ -56,7 +56,7 @@ def validate(
         object with a method ``distance(sources)``.
     reference : str, array, callable or None
         "exact" or another name from `METHODS`; distances (k, n) or (n,); a function of mesh and sources, such as those
-        of `heat_igl.closed_forms`; or None for only the checks that need no reference.
+        of `heat_igl.validation.closed_forms`; or None for only the checks that need no reference.
     name : str
         Name of the mesh in the report.
     timeout, memory : float
@@ -83,8 +83,9 @@ def validate(
     Examples
     --------
     >>> import heat_igl
+    >>> from heat_igl.validation import closed_forms
     >>> mesh = heat_igl.shapes.disk(20)
-    >>> report = heat_igl.validate(mesh, 0, methods=["heat", "windows"], reference=heat_igl.closed_forms.plane)
+    >>> report = heat_igl.validate(mesh, 0, methods=["heat", "windows"], reference=closed_forms.plane)
     >>> [(row.method, round(row.errors.mean, 2)) for row in report.rows]
     [('heat', 0.0), ('windows', 0.0)]
     """

@@ -6,7 +6,7 @@ Relative errors are fractions, not percent. A row of a (k, n) array is the dista
 Examples
 --------
 >>> import heat_igl
->>> heat_igl.metrics.relative_error([0.0, 1.1, 2.0], [0.0, 1.0, 2.0]).round(6).tolist()  # nan at the source
+>>> heat_igl.validation.metrics.relative_error([0.0, 1.1, 2.0], [0.0, 1.0, 2.0]).round(6).tolist()  # nan at the source
 [nan, 0.1, 0.0]
 """
 

@@ -52,7 +52,7 @@ class ValidationRow:
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.disk(20)
-    >>> report = heat_igl.validate(mesh, 0, methods=["windows"], reference=heat_igl.closed_forms.plane)
+    >>> report = heat_igl.validate(mesh, 0, methods=["windows"], reference=heat_igl.validation.closed_forms.plane)
     >>> row = report.rows[0]
     >>> row.failure is None, row.errors.n_compared == mesh.n_vertices - 1, row.errors.maximum < 1e-9
     (True, True, True)
@@ -121,8 +121,9 @@ class ValidationReport:
     Examples
     --------
     >>> import heat_igl
+    >>> from heat_igl.validation import closed_forms
     >>> mesh = heat_igl.shapes.disk(20)
-    >>> report = heat_igl.validate(mesh, 0, methods=["heat", "windows"], reference=heat_igl.closed_forms.plane)
+    >>> report = heat_igl.validate(mesh, 0, methods=["heat", "windows"], reference=closed_forms.plane)
     >>> bool(abs(report.distances["windows"] - report.truths).max() < 1e-9)
     True
     >>> print(report.to_markdown().splitlines()[0])

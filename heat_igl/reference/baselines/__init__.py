@@ -11,7 +11,7 @@ and return distances in an array of the same shape.
 Examples
 --------
 >>> import heat_igl
->>> heat_igl.baselines.graph_distance(heat_igl.shapes.strip(4, 3), 0)[[4, 15, 19]].tolist()
+>>> heat_igl.reference.baselines.graph_distance(heat_igl.shapes.strip(4, 3), 0)[[4, 15, 19]].tolist()
 [4.0, 3.0, 7.0]
 """
 
