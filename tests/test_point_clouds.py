@@ -22,14 +22,16 @@ from heat_igl.drawing.discs import discs
 from heat_igl.geodesic import SolverChoice
 from heat_igl.io import ply
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
-from heat_igl.kernels.cloud.local_planes import principal_axes
-from heat_igl.mesh.cloud_fans import with_fans_joined
-from heat_igl.mesh.cloud_gaps import pinched_vertices, with_one_fan
-from heat_igl.mesh.cloud_loops import with_loops_filled
+from heat_igl.kernels.cloud.local_planes import tangent_planes
 from heat_igl.mesh.cloud_orientation import oriented
-from heat_igl.mesh.cloud_triangles import cloud_triangles
-from heat_igl.mesh.neighbourhoods import neighbourhoods, point_tree, without_noise
-from heat_igl.mesh.sheets import one_sheet
+from heat_igl.mesh.cloud_triangles import (
+    cloud_triangles,
+    pinched_vertices,
+    with_fans_joined,
+    with_loops_filled,
+    with_one_fan,
+)
+from heat_igl.mesh.neighbourhoods import neighbourhoods, one_sheet, point_tree, without_noise
 
 HEAT = {"magnitude": "damped"}
 
@@ -695,17 +697,27 @@ def test_points_come_before_their_nearest() -> None:
     np.testing.assert_allclose(np.take_along_axis(far, index, axis=1), square, rtol=1e-12)
 
 
+def test_exact_distance_on_noisy_points() -> None:
+    """Its bounds are those of the points where they were moved to: the given ones are not on the surface."""
+    P = np.random.default_rng(0).standard_normal((800, 3))
+    P /= np.linalg.norm(P, axis=1, keepdims=True)
+    cloud = PointCloud(P + 0.05 * np.random.default_rng(1).standard_normal(P.shape))
+    assert not np.array_equal(cloud.triangles.V, cloud.P)
+    found = GeodesicSolver(cloud, method="exact").distance(0)
+    np.testing.assert_allclose(found, GeodesicSolver(cloud.triangles, method="exact").distance(0), rtol=1e-9)
+
+
 def test_principal_axes() -> None:
     """They are numpy's eigenvectors."""
     P = np.random.default_rng(0).uniform(-1, 1, (41, 3)) * [1, 0.8, 0.2]
     index = np.argsort(np.linalg.norm(P - P[0], axis=1)).astype(np.int32)[None]
     square = np.square(P[index[0]] - P[0]).sum(axis=1)[None]
-    axes, variances = principal_axes(P, index, square)
+    axes, _, bend = tangent_planes(P, index, square, False)
     weights = np.maximum(1 - square[0] / square[0, -1], 1e-3)
     expected, vectors = np.linalg.eigh(
         np.cov((P[index[0]] - P[0]).T / np.sqrt(square[0, -1]), aweights=weights, ddof=0)
     )
-    np.testing.assert_allclose(variances[0], expected, rtol=1e-9)
+    np.testing.assert_allclose(bend[0], expected[0] / expected[1], rtol=1e-9)
     np.testing.assert_allclose(np.abs(axes[0][::-1] @ vectors), np.eye(3), atol=1e-9)
 
 

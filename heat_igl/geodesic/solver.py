@@ -164,7 +164,9 @@ class GeodesicSolver(BatchedSolver):
             if chosen.engine == "sweep":
                 return chosen, sweep
         # Sweeps and fronts are held to bounds where they are made.
-        V = None if isinstance(self._domain, Operators) else self._domain.V
+        domain = self._domain.distinct_triangles if isinstance(self._domain, PointCloud) else self._domain
+        # Noisy points are measured where they were moved to.
+        V = None if isinstance(domain, Operators) else domain.V
         return chosen, guarded_windows(triangles, V, chosen.tolerance or 0.0, originals)
 
     def __repr__(self) -> str:

@@ -1,8 +1,8 @@
 """What distance is measured on: meshes, images and point clouds, and points and curves on them."""
 
 from heat_igl.mesh.cloud_copies import nearest_copies
-from heat_igl.mesh.cloud_cover import is_oriented_manifold, two_sided_cover
 from heat_igl.mesh.cloud_normals import usable_normals
+from heat_igl.mesh.cloud_orientation import is_oriented_manifold, two_sided_cover
 from heat_igl.mesh.edge_curves import edge_curve
 from heat_igl.mesh.exports import to_open3d, to_pyvista, to_trimesh
 from heat_igl.mesh.heights import Terrain, terrain

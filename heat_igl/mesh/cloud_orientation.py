@@ -1,19 +1,17 @@
-"""Orientation of the triangles of a cloud: neighbours alike, and like the normals; without those that contradict."""
+"""Orientation of the triangles of a cloud, like the normals, and the cover with two sides of those that have none."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from heat_igl.kernels.cloud.agreeing import orient
-from heat_igl.mesh.cloud_fans import with_fans_joined
-from heat_igl.mesh.cloud_gaps import pinched_vertices, with_one_fan
+from heat_igl.kernels.mesh.incidence import components
+from heat_igl.mesh.cloud_triangles import pinched_vertices, with_fans_joined, with_one_fan
 from heat_igl.mesh.connectivity import facets
 from heat_igl.mesh.grouping import group_by_label
+from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["neighbours_across_edges", "oriented"]
+__all__ = ["is_oriented_manifold", "neighbours_across_edges", "oriented", "two_sided_cover"]
 
 # Share of the triangles that may be left out for the others to be oriented alike. Clouds of scans had up to 0.0012; at
 # 0.002 and 0.004, on thin and narrow parts of two coarse meshes, distance became up to four times as wrong.
@@ -26,43 +24,27 @@ _FLAT = -0.9
 _POWER, _LEAST_WEIGHT = 4, 1e-3
 
 
-class _Contradictions(NamedTuple):
-    """What remains if the triangles of a surface that may have no orientation are oriented as well as possible.
-
-    Attributes
-    ----------
-    F : (m, 3) int32
-        The triangles, in the given order; some are turned.
-    pairs : (k, 2) int64
-        Neighbours that are oriented differently.
-    folds : (k,) float64
-        Cosine of the angle between them around their edge: -1 where they are flat, 1 where they fold back.
-    """
-
-    F: IntArray
-    pairs: IntArray
-    folds: FloatArray
-
-
 def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> IntArray:
     """The triangles F (m, 3) int32, neighbours oriented alike and each part like most of the normals (n, 3).
 
-    Where triangles join sheets wrongly, no orientation may suit all neighbours. Then of each pair that contradicts it,
-    see `_contradictions`, one triangle is left out. All stay where that would tear the surface: where these are many,
-    or most of them flat, as on a surface with one side. Then as many neighbours as possible are oriented alike.
+    Where triangles join sheets wrongly, no orientation may suit all neighbours. Then groups of triangles are joined,
+    two at a time, in the relative orientation that more of the edges between them want, weighted by flatness. The
+    strongest joins for the sizes of the groups come first: a narrow bridge between two sheets is among the last, and
+    does not turn a part of a sheet around, as it may in a spanning tree of the flattest edges (Hoppe et al. 1992). Of
+    each pair that still contradicts, one triangle is left out. All stay where that would tear the surface: where these
+    are many, or most of them flat, as on a surface with one side. Then as many neighbours as possible are oriented
+    alike.
     """
-    F = F.copy()
-    part, is_oriented = orient(F, len(P))
-    if not is_oriented:
-        found = _contradictions(P, F)
-        left_out = _in_pairs(found.pairs, len(F))
-        if len(left_out) <= _MOST_LEFT_OUT * len(F) and np.median(found.folds) > _FLAT:
-            kept = np.delete(F, left_out, axis=0)
-            none = np.zeros(len(P), bool)
-            F = with_fans_joined(P, with_one_fan(kept, pinched_vertices(kept, none)), none)
-            part, _ = orient(F, len(P))
-        else:
-            F = found.F
+    is_turned, part, pairs, folds = _turned(P, F)
+    left_out = _in_pairs(pairs, len(F))
+    if 0 < len(left_out) <= _MOST_LEFT_OUT * len(F) and np.median(folds) > _FLAT:
+        is_settled = np.ones(len(P), bool)
+        is_settled[F[left_out]] = False
+        is_settled[F[~is_settled[F].all(axis=1)]] = False
+        F = np.delete(F, left_out, axis=0)
+        F = with_fans_joined(P, with_one_fan(F, pinched_vertices(F, is_settled)), is_settled)
+        is_turned, part, _, _ = _turned(P, F)
+    F = np.where(is_turned[:, None], F[:, [0, 2, 1]], F)
     if normals is not None:
         area = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
         along = np.bincount(part, np.einsum("fx,fx->f", area, normals[F].sum(axis=1)))
@@ -71,24 +53,51 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> IntArray
     return F
 
 
-def _contradictions(P: FloatArray, F: IntArray) -> _Contradictions:
-    """The triangles F (m, 3), oriented so that few neighbours contradict, and these at folds rather than where flat.
+def neighbours_across_edges(F: IntArray, n: int) -> tuple[IntArray, IntArray]:
+    """Half-edges 3 f + c (k,), opposite corner c of triangle f, and those of the neighbours across the edges."""
+    found = facets(F, n)
+    sides = group_by_label(found.of_face.ravel(), len(found.vertices))
+    inner = sides.first[:-1][found.n_faces == 2]
+    return sides.members[inner], sides.members[inner + 1]
 
-    Groups of triangles are joined, two at a time, in the relative orientation that more of the edges between them
-    want, weighted by flatness. The strongest joins for the sizes of the groups come first: a narrow bridge between
-    two sheets is among the last, and does not turn a part of a sheet around, as it may in a spanning tree of the
-    flattest edges (Hoppe et al. 1992).
+
+def _pairs(F: IntArray, n: int) -> tuple[IntArray, BoolArray]:
+    """Neighbours (k, 2) among the triangles F (m, 3), and whether both run along their edge in one direction (k,)."""
+    first, second = neighbours_across_edges(F, n)
+    runs_alike = F.ravel()[_corner(first, 1)] == F.ravel()[_corner(second, 1)]
+    return np.stack([first // 3, second // 3], axis=1), runs_alike
+
+
+def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, FloatArray]:
+    """Which of the triangles F (m, 3) to turn, their parts (m,), and pairs (k, 2) that contradict, with folds."""
+    pairs, runs_alike = _pairs(F, len(P))
+    part, is_turned = _parts(pairs, runs_alike, len(F))
+    contradicts, folds = np.zeros(len(pairs), bool), np.zeros(len(pairs))
+    if (part[0] == part[1]).any():
+        folds = _folds(P, F, pairs, runs_alike)
+        is_turned = _as_most_want(pairs, runs_alike, folds, len(F))
+        contradicts = (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]]) != runs_alike
+    return is_turned, part.min(axis=0), pairs[contradicts], folds[contradicts]
+
+
+def _parts(pairs: IntArray, runs_alike: BoolArray, m: int) -> tuple[IntArray, BoolArray]:
+    """Parts (2, m) of both sides of m triangles, glued where pairs (k, 2) of these are, and which triangles to turn.
+
+    Row 0 has the sides that triangles show, row 1 the others. A part of the surface that can be oriented has two parts
+    of its sides, and the triangles that are on another than the first triangle of the part are turned.
     """
-    first, second = neighbours_across_edges(F, len(P))
-    faces = np.stack([first // 3, second // 3], axis=1)
-    runs_alike = F.ravel()[_next(first)] == F.ravel()[_next(second)]
-    folds = _folds(P, F, first, second)
-    weight = np.maximum((1 - folds) / 2, 0) ** _POWER + _LEAST_WEIGHT
-    is_turned = _turned(faces, np.where(runs_alike, -weight, weight), len(F))
-    contradicts = (is_turned[faces[:, 0]] != is_turned[faces[:, 1]]) != runs_alike
-    F = F.copy()
-    F[is_turned] = F[is_turned, ::-1]
-    return _Contradictions(F, faces[contradicts], folds[contradicts])
+    a, b = pairs.T
+    same, other = b + m * runs_alike, b + m * ~runs_alike
+    glued = np.stack([np.concatenate([a, a + m]), np.concatenate([same, other])], axis=1)
+    part = components(glued, 2 * m).reshape(2, m)
+    return part, part[0] > part[1]
+
+
+def _folds(P: FloatArray, F: IntArray, pairs: IntArray, runs_alike: BoolArray) -> FloatArray:
+    """Cosine (k,) of the angle between neighbours around their edge: -1 where they are flat, 1 where they fold back."""
+    normal = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+    return np.asarray(np.einsum("kx,kx->k", normal[pairs[:, 0]], normal[pairs[:, 1]]) * np.where(runs_alike, 1, -1))
 
 
 def _in_pairs(pairs: IntArray, m: int) -> IntArray:
@@ -98,10 +107,17 @@ def _in_pairs(pairs: IntArray, m: int) -> IntArray:
     return np.unique(np.where(count[a] > count[b], a, b))
 
 
-def _turned(pairs: IntArray, weight: FloatArray, m: int) -> BoolArray:
-    """Which of m triangles to turn, for pairs (k, 2) with weights that are negative if just one of them should be."""
-    is_turned, group, size = np.zeros(m, bool), np.arange(m), np.ones(m, np.int64)
-    a, b = pairs.T
+def _as_most_want(pairs: IntArray, runs_alike: BoolArray, folds: FloatArray, m: int) -> BoolArray:
+    """Which of m triangles to turn, see `oriented`; those that are joined by flat edges begin as one group."""
+    is_flat = folds < _FLAT
+    part, is_turned = _parts(pairs[is_flat], runs_alike[is_flat], m)
+    # A flat part that contradicts itself begins as single triangles.
+    label = np.where(part[0] == part[1], 2 * m + np.arange(m), np.minimum(*part))
+    _, group = np.unique(label, return_inverse=True)
+    size, (a, b) = np.bincount(group), group[pairs].T
+    weight = np.maximum((1 - folds) / 2, 0) ** _POWER + _LEAST_WEIGHT
+    weight[runs_alike != (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]])] *= -1
+    a, b, weight = a[a != b], b[a != b], weight[a != b]
     while len(a):
         n_groups = len(size)
         code = np.minimum(a, b) * n_groups + np.maximum(a, b)
@@ -129,29 +145,77 @@ def _turned(pairs: IntArray, weight: FloatArray, m: int) -> BoolArray:
     return is_turned
 
 
-def neighbours_across_edges(F: IntArray, n: int) -> tuple[IntArray, IntArray]:
-    """Half-edges 3 f + c (k,), opposite corner c of triangle f, and those of the neighbours across the edges."""
-    found = facets(F, n)
-    sides = group_by_label(found.of_face.ravel(), len(found.vertices))
-    inner = sides.first[:-1][found.n_faces == 2]
-    return sides.members[inner], sides.members[inner + 1]
+def is_oriented_manifold(surface: Mesh) -> bool:
+    """Whether neighbours of a surface with at most two faces at an edge run alike, and no point has several fans."""
+    _, runs_alike = _pairs(surface.F, surface.n_vertices)
+    return not (runs_alike.any() or pinched_vertices(surface.F, np.zeros(surface.n_vertices, bool)).any())
 
 
-def _next(half_edges: IntArray) -> IntArray:
-    """The corner at which half-edges begin."""
-    return half_edges - half_edges % 3 + (half_edges + 1) % 3
+def two_sided_cover(surface: Mesh) -> Mesh:
+    """Both sides of a surface, glued where its neighbours are: the orientation cover.
+
+    Parameters
+    ----------
+    surface : Mesh
+        m triangles on n vertices, at most two at an edge. Neighbours need not be oriented alike, and a vertex may have
+        several fans of triangles.
+
+    Returns
+    -------
+    Mesh
+        2 m triangles: face f of the surface, and as m + f the same from the other side. Vertex v is on the largest fan
+        around v, and v + n on the other side of it; smaller fans have vertices of their own, from 2 n on, so that
+        each vertex has one fan. Where the surface can be oriented, the sides are two parts; where it cannot, a path
+        may lead from one to the other.
+    """
+    F, n = surface.F, surface.n_vertices
+    both = np.concatenate([F, F[:, [0, 2, 1]]])
+    first, second = neighbours_across_edges(F, n)
+    runs_alike = F.ravel()[_corner(first, 1)] == F.ravel()[_corner(second, 1)]
+    pairs = []
+    for side in (0, 1):
+        # Across an edge along which both run, the neighbour on the same side is the one that is turned over.
+        other = np.where(runs_alike, 1 - side, side)
+        for end in (1, 2):
+            opposite_end = np.where(runs_alike, end, 3 - end)
+            of_first = _on_side(_corner(first, end), side, F.size)
+            of_second = _on_side(_corner(second, opposite_end), other, F.size)
+            pairs.append(np.stack([of_first, of_second], axis=1))
+    fan = components(np.concatenate(pairs), both.size)
+    return Mesh(*_numbered(surface, both, fan))
 
 
-def _folds(P: FloatArray, F: IntArray, first: IntArray, second: IntArray) -> FloatArray:
-    """Cosine (k,) of the angle between neighbours around their edge: -1 where they are flat, 1 where they fold back."""
-    begin, end = F.ravel()[_next(first)], F.ravel()[_next(_next(first))]
-    along = P[end] - P[begin]
-    along /= np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)[:, None]
+def _numbered(surface: Mesh, both: IntArray, fan: IntArray) -> tuple[IntArray, IntArray]:
+    """Positions and faces of the cover, from the label of the fan (6 m,) of each corner of its faces (2 m, 3)."""
+    n, vertex = surface.n_vertices, both.ravel()
+    n_fans = int(fan.max()) + 1
+    size, of_fan = np.bincount(fan, minlength=n_fans), np.empty(n_fans, np.int64)
+    of_fan[fan] = vertex
+    on_other_side = np.empty(n_fans, np.int64)
+    half = both.size // 2
+    corner = np.arange(half)
+    on_other_side[fan[:half]] = fan[_on_side(corner, np.ones(half, np.int64), half)]
+    on_other_side[fan[_on_side(corner, np.ones(half, np.int64), half)]] = fan[:half]
+    # The largest fan of each vertex, of equal ones that of the first face; then the other side of it.
+    first_corner = np.full(n_fans, both.size)
+    np.minimum.at(first_corner, fan, np.arange(both.size))
+    order = np.lexsort((first_corner, -size, of_fan))
+    largest = order[np.diff(of_fan[order], prepend=-1) != 0]
+    number = np.full(n_fans, -1)
+    number[largest] = of_fan[largest]
+    number[on_other_side[largest]] = of_fan[largest] + n
+    rest = np.flatnonzero(number < 0)
+    number[rest] = 2 * n + np.arange(len(rest))
+    V = np.concatenate([surface.V, surface.V, surface.V[of_fan[rest]]])
+    return V, number[fan].reshape(-1, 3)
 
-    def across(half_edges: IntArray) -> FloatArray:
-        to_corner = P[F.ravel()[half_edges]] - P[begin]
-        to_corner -= along * np.einsum("kx,kx->k", along, to_corner)[:, None]
-        length = np.linalg.norm(to_corner, axis=1)
-        return np.asarray(to_corner / np.maximum(length, np.finfo(float).tiny)[:, None])
 
-    return np.asarray(np.einsum("kx,kx->k", across(first), across(second)))
+def _corner(half_edges: IntArray, turn: int | IntArray) -> IntArray:
+    """The corner 3 f + c at the beginning, for 1, or the end, for 2, of half-edges, which are opposite to corner c."""
+    return half_edges - half_edges % 3 + (half_edges + turn) % 3
+
+
+def _on_side(corners: IntArray, side: IntArray | int, size: int) -> IntArray:
+    """Corners of one side as corners of the cover: on the other side, corners 1 and 2 have changed places."""
+    turned = corners - corners % 3 + (3 - corners % 3) % 3
+    return np.where(np.equal(side, 0), corners, size + turned)

@@ -3,34 +3,59 @@
 In the union of the local triangulations (Sharp and Crane 2020, section 6), nearly all triangles are in the stars of all
 three corners. These never overlap, since each star is planar. If stars differ, on four points near a circle or on
 noisy points, triangles of more stars come first, and of these the smaller ones; others that do not fit are left out.
-Then small gaps are closed, and points in no triangle are inserted into the nearest one.
+Then small gaps are closed in tangent planes, each vertex keeps one fan, loops of outer edges that no plane shows are
+filled in space, and points in no triangle are inserted into the nearest one.
 """
 
 from __future__ import annotations
+
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from heat_igl.kernels.cloud.agreeing import agreement
 from heat_igl.kernels.cloud.fitting_triangles import fitting_triangles
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
-from heat_igl.mesh.cloud_fans import with_fans_joined
-from heat_igl.mesh.cloud_gaps import pinched_vertices, with_gaps_closed, with_one_fan
-from heat_igl.mesh.cloud_loops import with_loops_filled
-from heat_igl.mesh.connectivity import ascending_rows
-from heat_igl.mesh.grouping import group_by_label
+from heat_igl.kernels.cloud.loop_filling import filling_triangles
+from heat_igl.kernels.mesh.incidence import components
+from heat_igl.mesh.connectivity import ascending_rows, connected_components, facets, unique_rows
+from heat_igl.mesh.grouping import group_by_label, next_in_run
 from heat_igl.mesh.neighbourhoods import Neighbourhoods
 from heat_igl.runtime import over_rows
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["cloud_triangles", "with_points"]
+__all__ = [
+    "cloud_triangles",
+    "pinched_vertices",
+    "with_fans_joined",
+    "with_loops_filled",
+    "with_one_fan",
+    "with_points",
+]
 
 # Largest radius of a circumscribed circle, in shares of the radius of the neighbourhood. Below one half, all points
 # inside the circle are known; a little more bridges the gaps of random points.
 _LARGEST_RADIUS = 0.6
+# The same for gaps, in shares of the distance of the farthest neighbour where they are filled in space: larger, since
+# the sides of a gap are known to belong to the surface.
+_LARGEST_GAP = 0.9
+_MOST_ROUNDS = 20
 # Points whose stars are found at a time.
 _BLOCK = 1 << 14
 # Product of two normals below which neighbours belong to different sheets; at right angles they may share an edge.
 _OTHER_SHEET = -0.25
+# Cosine of the angle to the next triangle above which the two lie on each other.
+_MOST_FOLDED = 0.99
+# Triangles of a part for each one that fills its gaps: with fewer, it is the border of the part that was filled.
+_PER_FILLED = 10
+
+
+class _Outer(NamedTuple):
+    """The edges (k, 2) of one triangle alone, ascending and in lexicographic order, and the triangle (k,) of each."""
+
+    ends: IntArray
+    face: IntArray
 
 
 def cloud_triangles(P: FloatArray, near: Neighbourhoods, oriented: bool) -> IntArray:
@@ -55,10 +80,8 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, oriented: bool) -> IntA
     both = np.concatenate([F, candidates])
     F = both[fitting_triangles(P, near.axes, both, len(F))]
     F = with_gaps_closed(P, F, near, is_settled)
-    is_pinched = pinched_vertices(F, is_settled)
-    F = with_one_fan(np.concatenate([agreed[~is_open], F]), is_pinched)
-    if is_pinched.any():
-        F = with_fans_joined(P, F, is_settled)
+    F = np.concatenate([agreed[~is_open], F])
+    F = with_fans_joined(P, with_one_fan(F, pinched_vertices(F, is_settled)), is_settled)
     F = with_loops_filled(P, F, near.reach, is_settled)
     return _with_isolated_points(P, F, near)
 
@@ -143,3 +166,255 @@ def _facing(P: FloatArray, F: IntArray, axes: FloatArray, points: IntArray, vert
     # Of several values written to one place, the last stays.
     found[which[of_best]] = face[of_best]
     return found
+
+
+def with_gaps_closed(P: FloatArray, F: IntArray, near: Neighbourhoods, is_settled: BoolArray) -> IntArray:
+    """The triangles F (m, 3) and others in small gaps between them.
+
+    Around settled vertices (n,) there are no gaps, and F need not have all their triangles. Gaps of more than three
+    sides are closed by triangles on two successive sides that overlap no others; gaps of three sides always, even if
+    the three points lie on a line in the tangent planes.
+    """
+    largest = _LARGEST_GAP * near.radius
+    for _ in range(_MOST_ROUNDS):
+        ears = _ears(P, _outer_edges(F, is_settled), near.axes, largest)
+        # Only triangles with a corner in common may overlap.
+        is_near = np.zeros(len(P), bool)
+        is_near[ears] = True
+        around = F[is_near[F].any(axis=1)]
+        fits = fitting_triangles(P, near.axes, np.concatenate([around, ears]), len(around))[len(around) :]
+        if not fits.any():
+            break
+        F = np.concatenate([F, ears[fits]])
+    return np.concatenate([F, _three_sided(P, _outer_edges(F, is_settled), largest)])
+
+
+def with_one_fan(F: IntArray, is_pinched: BoolArray) -> IntArray:
+    """The triangles without those that touch the others in a vertex alone: around each vertex, the largest fan.
+
+    `is_pinched` (n,) are the vertices at which several fans meet, see `pinched_vertices`. No vertices are cut off:
+    where several fans are the only connection between parts, they stay.
+    """
+    n, given = len(is_pinched), F
+    while is_pinched.any():
+        around = np.flatnonzero(is_pinched[F].any(axis=1))
+        left_out = around[_in_smaller_fans(F[around], is_pinched)]
+        is_settled = np.ones(n, bool)
+        is_settled[F[left_out]] = False
+        F = np.delete(F, left_out, axis=0)
+        is_pinched = pinched_vertices(F, is_settled)
+    return F if F is given else _with_parts_joined(given, F, n)
+
+
+def _with_parts_joined(given: IntArray, kept: IntArray, n: int) -> IntArray:
+    """The triangles `kept`, and of the `given` ones those at parts that would be cut off: all but the largest."""
+    before, after = connected_components(given, n), connected_components(kept, n)
+    size = np.bincount(after)[after]
+    largest = np.zeros(int(before.max()) + 1, np.int64)
+    np.maximum.at(largest, before, size)
+    # Of equal parts, the first is the one that the others are joined to.
+    first = np.full(len(largest), n)
+    np.minimum.at(first, before, np.where(size == largest[before], after, n))
+    is_cut_off = after != first[before]
+    rows = np.concatenate([kept, given[is_cut_off[given].any(axis=1)]])
+    return rows[np.sort(unique_rows(ascending_rows(rows), n)[0])]
+
+
+def pinched_vertices(F: IntArray, is_settled: BoolArray) -> BoolArray:
+    """Which vertices (n,) have several fans; not the settled ones, whose triangles may be missing in F."""
+    F = F[~is_settled[F].all(axis=1)]
+    fan = _fans(F, len(is_settled))
+    of_fan = np.zeros(int(fan.max(initial=-1)) + 1, np.int64)
+    of_fan[fan] = F.ravel()
+    return np.asarray((np.bincount(of_fan, minlength=len(is_settled)) > 1) & ~is_settled)
+
+
+def _outer_edges(F: IntArray, is_settled: BoolArray) -> _Outer:
+    found = facets(F, len(is_settled))
+    face = np.empty(len(found.vertices), np.int64)
+    face[found.of_face] = np.arange(len(F))[:, None]
+    is_outer = (found.n_faces == 1) & ~is_settled[found.vertices].any(axis=1)
+    return _Outer(found.vertices[is_outer], face[is_outer])
+
+
+def _corners(P: FloatArray, outer: _Outer, axes: FloatArray) -> IntArray:
+    """Paths (k, 3) of two outer edges that follow each other around the vertex in the middle."""
+    ends = group_by_label(np.concatenate([outer.ends[:, 0], outer.ends[:, 1]]), len(P))
+    other = np.concatenate([outer.ends[:, 1], outer.ends[:, 0]])[ends.members]
+    degrees = np.diff(ends.first)
+    at = np.repeat(np.arange(len(P)), degrees)
+    # Between two edges there are two gaps, one of which has the triangles; where touching gaps meet, angles tell.
+    local = np.einsum("rax,rx->ra", axes[at, :2], P[other] - P[at])
+    order = np.lexsort((np.arctan2(local[:, 1], local[:, 0]), at))
+    following = next_in_run(order, degrees[degrees > 0])
+    corners = np.stack([other[order], at[order], other[following]], axis=1)
+    is_second = (degrees[at[order]] == 2) & (order > following)
+    return np.asarray(corners[~is_second])
+
+
+def _ears(P: FloatArray, outer: _Outer, axes: FloatArray, largest: FloatArray) -> IntArray:
+    """Triangles (k, 3) on two successive outer edges, smallest first, with circles no larger than allowed."""
+    ears = _corners(P, outer, axes)
+    radius = _circumradius(P[ears])
+    small = radius < largest[ears].min(axis=1)
+    return np.asarray(ears[small][np.argsort(radius[small], kind="stable")], dtype=np.int32)
+
+
+def _three_sided(P: FloatArray, outer: _Outer, largest: FloatArray) -> IntArray:
+    """Triangles (k, 3) all three sides of which are outer edges, of different triangles."""
+    n = len(P)
+    if not len(outer.ends):
+        return np.asarray(outer.ends[:, [0, 0, 0]], dtype=np.int32)
+    code = outer.ends[:, 0] * n + outer.ends[:, 1]
+    ends = group_by_label(outer.ends[:, 0], n)
+    # Each edge, with the edges from the larger of its ends on.
+    above, which = ends.of(outer.ends[:, 1])
+    a, c = outer.ends[which, 0], outer.ends[above, 1]
+    third = np.minimum(np.searchsorted(code, a * n + c), len(code) - 1)
+    sides = np.stack([which, above, third], axis=1)[code[third] == a * n + c]
+    taken: set[int] = set()
+    found = []
+    for row in sides.tolist():
+        corners = np.unique(outer.ends[row])
+        extent = np.linalg.norm(P[corners] - P[np.roll(corners, 1)], axis=1).max()
+        is_gap = len({int(outer.face[side]) for side in row}) > 1
+        if is_gap and taken.isdisjoint(row) and extent < 2 * largest[corners].min():
+            taken.update(row)
+            found.append(corners)
+    triangles: IntArray = np.reshape(found, (-1, 3)).astype(np.int32)
+    return triangles
+
+
+def _circumradius(corners: FloatArray) -> FloatArray:
+    """Radius (k,) of the circle around each triangle (k, 3, 3); ``inf`` for corners on a line."""
+    a, b = corners[:, 0] - corners[:, 1], corners[:, 2] - corners[:, 1]
+    double_area = np.linalg.norm(np.cross(a, b), axis=1)
+    sides = [np.linalg.norm(side, axis=1) for side in (a, b, a - b)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radius = (sides[0] / double_area) * sides[1] * sides[2] / 2
+    return np.asarray(np.where(double_area > 0, radius, np.inf))
+
+
+def _in_smaller_fans(F: IntArray, is_pinched: BoolArray) -> BoolArray:
+    """Which of the triangles F (m, 3) around pinched vertices are not in the largest fan of such a vertex."""
+    fan, vertex = _fans(F, len(is_pinched)), F.ravel()
+    size = np.bincount(fan)[fan]
+    # The largest fan of each vertex comes first, of equal ones that with the lowest number.
+    order = np.lexsort((fan, -size, vertex))
+    is_first = np.diff(vertex[order], prepend=-1) != 0
+    largest = np.empty(len(is_pinched), np.int64)
+    largest[vertex[order][is_first]] = fan[order][is_first]
+    return np.asarray((is_pinched[vertex] & (fan != largest[vertex])).reshape(-1, 3).any(axis=1))
+
+
+def _fans(F: IntArray, n: int) -> IntArray:
+    """The fan (3 m,) of each corner: corners of a vertex are in one fan if edges join their triangles."""
+    found = facets(F, n)
+    sides = group_by_label(found.of_face.ravel(), len(found.vertices))
+    inner = sides.first[:-1][found.n_faces == 2]
+    of_h, of_g = _ends_of_sides(sides.members[inner]), _ends_of_sides(sides.members[inner + 1])
+    is_turned = F.ravel()[of_h[0]] != F.ravel()[of_g[0]]
+    of_g = np.where(is_turned, of_g[1], of_g[0]), np.where(is_turned, of_g[0], of_g[1])
+    pairs = np.stack([np.concatenate(of_h), np.concatenate(of_g)], axis=1)
+    fan: IntArray = components(pairs, F.size)
+    return fan
+
+
+def _ends_of_sides(sides: IntArray) -> tuple[IntArray, IntArray]:
+    """The corners (k,) at the beginning and at the end of sides 3 f + c, opposite corner c."""
+    first = sides - sides % 3
+    return first + (sides + 1) % 3, first + (sides + 2) % 3
+
+
+def with_fans_joined(P: FloatArray, F: IntArray, is_settled: BoolArray) -> IntArray:
+    """The triangles F (m, 3), and others between the fans of vertices that have several with an end.
+
+    Two parts of a surface that meet in one vertex alone are connected for distance, but not for vectors, which need a
+    tangent plane along the way. Between the two fans goes the triangle with the smallest angle at the vertex.
+    Around the settled points (n,) there is one fan.
+    """
+    is_pinched = pinched_vertices(F, is_settled)
+    if not is_pinched.any():
+        return F
+    corners = group_by_label(F.ravel(), len(P))
+    added: list[tuple[int, int, int]] = []
+
+    def around(vertex: int) -> list[list[int]]:
+        """The other two corners of each triangle at a vertex."""
+        found, _ = corners.of(np.array([vertex]))
+        triangles = F[found // 3].tolist() + [row for row in added if vertex in row]
+        return [[corner for corner in row if corner != vertex] for row in triangles]
+
+    for vertex in np.flatnonzero(is_pinched).tolist():
+        while True:
+            joint = _between_fans(P, vertex, around(vertex))
+            free = [(a, b) for a, b in joint if sum(b in sides for sides in around(a)) < 2]
+            if not free:
+                break
+            added.append((vertex, *free[0]))
+    return np.concatenate([F, np.array(added, F.dtype)]) if added else F
+
+
+def _between_fans(P: FloatArray, vertex: int, sides: list[list[int]]) -> list[tuple[int, int]]:
+    """Ends of different fans, those with the smallest angle at the vertex first; `sides` are opposite to it."""
+    fans: list[list[int]] = []
+    for side in sides:
+        touching = [fan for fan in fans if not set(fan).isdisjoint(side)]
+        fans = [fan for fan in fans if fan not in touching] + [sum(touching, list(side))]
+    ends = [[corner for corner in fan if fan.count(corner) == 1] for fan in fans]
+    pairs = [pair for i in range(len(ends)) for j in range(i) for pair in product(ends[i], ends[j])]
+    ways = P[np.array(pairs, np.int64).reshape(-1, 2)] - P[vertex]
+    lengths = np.linalg.norm(ways, axis=2).prod(axis=1)
+    cosine = np.einsum("kx,kx->k", ways[:, 0], ways[:, 1]) / np.maximum(lengths, np.finfo(float).tiny)
+    return [pairs[i] for i in np.argsort(-cosine, kind="stable")]
+
+
+def with_loops_filled(P: FloatArray, F: IntArray, reach: FloatArray, is_settled: BoolArray) -> IntArray:
+    """The triangles F (m, 3) int32, and others in small gaps all around which points have two outer edges.
+
+    Parameters
+    ----------
+    P : (n, 3) float64
+        The points.
+    F : (m, 3) int32
+        Triangles that are a surface.
+    reach : (n,) float64
+        See `Neighbourhoods`.
+    is_settled : (n,) bool
+        Points without gaps around them.
+    """
+    n = len(P)
+    near_gaps = F[~is_settled[F].all(axis=1)]
+    found = facets(near_gaps, n)
+    is_outer = (found.n_faces == 1) & ~is_settled[found.vertices].any(axis=1)
+    if not is_outer.any():
+        return F
+    number = np.cumsum(is_outer) - 1
+    ends = found.vertices[is_outer].astype(np.int32)
+    opposite = np.empty(len(ends), np.int32)
+    is_side = is_outer[found.of_face]
+    opposite[number[found.of_face[is_side]]] = near_gaps[is_side]
+    filled = filling_triangles(
+        P,
+        ends,
+        opposite,
+        _two_edges_at(ends, n),
+        _LARGEST_GAP * reach,
+        found.vertices[:, 0] * n + found.vertices[:, 1],
+        _MOST_FOLDED,
+    )
+    if not len(filled):
+        return F
+    part = connected_components(F, n)
+    sizes, gains = (np.bincount(part[of[:, 0]], minlength=n) for of in (F, filled))
+    return np.concatenate([F, filled[(sizes >= _PER_FILLED * gains)[part[filled[:, 0]]]]])
+
+
+def _two_edges_at(ends: AnyArray, n: int) -> AnyArray:
+    """The edges (n, 2) int32 at points that have two of the edges (k, 2), and -1 at others."""
+    order = np.argsort(ends.ravel(), kind="stable")
+    point = ends.ravel()[order]
+    has_two = np.bincount(point, minlength=n) == 2
+    at = np.full((n, 2), -1, np.int32)
+    at[has_two] = order[has_two[point]].reshape(-1, 2) // 2
+    return at

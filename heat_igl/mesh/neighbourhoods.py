@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heat_igl.kernels.cloud.local_planes import principal_axes, tangent_planes
+from heat_igl.kernels.cloud.empty_balls import on_one_side, roomiest_normals
+from heat_igl.kernels.cloud.local_planes import tangent_planes
 from heat_igl.kernels.cloud.quadrics import onto_quadrics
-from heat_igl.mesh.sheets import axes_along, one_sheet
 from heat_igl.runtime import over_rows
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-__all__ = ["Neighbourhoods", "PointTree", "neighbourhoods", "point_tree", "without_noise"]
+__all__ = ["Neighbourhoods", "PointTree", "neighbourhoods", "one_sheet", "point_tree", "without_noise"]
 
 # Nearest points from which the plane of a point and its triangles are found.
 _K = 30
@@ -28,6 +28,12 @@ _BLOCK = 1 << 12
 _LEAF = 32
 # Ratio of the two smaller variances above which neighbours may be on several sheets.
 _SEVERAL_SHEETS = 0.04
+# Directions in which balls are tried: every 25 degrees.
+_DIRECTIONS = 80
+# Radii of balls on the two sides whose ratio is at most this are those of a thin part or a narrow gap.
+_THIN = 0.7
+# Cosine of the angle between the normal of the roomier side and the fitted plane's, below which the plane is wrong.
+_ASTRAY = 0.95
 
 # Noise in shares of the spacing. Heights that vary by a share e of the spacing lengthen edges by the share e^2, so
 # below this one noise costs less than the heat method.
@@ -137,12 +143,9 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: 
         index, square = tree.nearest(np.arange(rows.start, rows.stop), k + 1)
         found.radius[rows] = found.reach[rows] = np.sqrt(square[:, -1])
         if normals is not None:
-            found.axes[rows] = axes_along(normals[rows])
-        elif shrinks:
-            found.axes[rows], found.radius[rows], bend[rows] = tangent_planes(P, index, square)
+            found.axes[rows] = _axes_along(normals[rows])
         else:
-            found.axes[rows], variances = principal_axes(P, index, square)
-            bend[rows] = variances[:, 0] / np.maximum(variances[:, 1], np.finfo(float).tiny)
+            found.axes[rows], found.radius[rows], bend[rows] = tangent_planes(P, index, square, shrinks)
         found.index[rows] = index
 
     over_rows(fill, len(P), _BLOCK)
@@ -151,6 +154,78 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: 
         index, square = tree.nearest(bent, k + 1)
         found.index[bent], found.radius[bent], found.axes[bent] = one_sheet(P, index, square, shrinks)
     return found
+
+
+def one_sheet(
+    P: FloatArray, index: IntArray, square: FloatArray, shrinks: bool
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Neighbours on the same sheet of the surface as each of b points, and the tangent planes through them.
+
+    The sheets of a thin part, or on the two sides of a narrow gap, nearly touch: the neighbours of a point are on
+    both. The empty balls that touch a point are small between the sheets, and neighbours on the other sheet share no
+    ball with it on the same side of both (Amenta and Bern 1999 estimate normals by such balls).
+
+    Parameters
+    ----------
+    P : (n, 3) float64
+        All points.
+    index, square : (b, k) int32, (b, k) float64
+        Neighbours, by distance and each point first, and the squared distances. Only neighbours that are among the b
+        points themselves are left out.
+    shrinks : bool
+        Whether neighbourhoods are made smaller where that makes them flatter.
+
+    Returns
+    -------
+    index : (b, k) int32
+        The neighbours that stay, by distance; -1 after the last.
+    radius : (b,) float64
+        Distance of the farthest of them.
+    axes : (b, 3, 3) float64
+        Two tangents and the normal, in rows, orthonormal.
+    """
+    directions = np.ascontiguousarray(_directions(_DIRECTIONS).T)
+    number = np.full(len(P), -1, np.int32)
+    number[index[:, 0]] = np.arange(len(index))
+
+    def balls(rows: slice) -> tuple[FloatArray, FloatArray, FloatArray]:
+        normals, radii, room = roomiest_normals(P, index[rows], square[rows], directions)
+        return normals, radii, room
+
+    normals, radii, room = map(np.concatenate, zip(*over_rows(balls, len(index), _BLOCK), strict=True))
+
+    def seen(rows: slice) -> tuple[IntArray, FloatArray, FloatArray]:
+        kept, squares = on_one_side(P, index[rows], square[rows], number, normals, radii)
+        axes, radius, _ = tangent_planes(P, kept, squares, shrinks)
+        return kept, radius, axes
+
+    found, radius, axes = map(np.concatenate, zip(*over_rows(seen, len(index), _BLOCK), strict=True))
+    is_thin = room[:, 1] < _THIN * room[:, 0]
+    axes[is_thin] = _axes_along(_blend(axes[is_thin, 2], normals[is_thin]))
+    return found, radius, axes
+
+
+def _axes_along(normals: FloatArray) -> FloatArray:
+    """Orthonormal axes (n, 3, 3) whose last rows are the unit vectors `normals` (n, 3)."""
+    least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    x = np.cross(normals, least)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(normals, x), normals], axis=1)
+
+
+def _directions(m: int) -> FloatArray:
+    """Unit vectors (m, 3) that are spread evenly: on a spiral, whose turns are the golden angle apart."""
+    height = 1 - (2 * np.arange(m) + 1) / m
+    angle = np.pi * (1 + np.sqrt(5)) * np.arange(m)
+    radius = np.sqrt(1 - height**2)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
+
+
+def _blend(of_planes: FloatArray, of_balls: FloatArray) -> FloatArray:
+    """Normals (k, 3) between those of fitted planes and of balls where both agree, and those of balls elsewhere."""
+    alike = np.einsum("rx,rx->r", of_planes, of_balls)[:, None]
+    mean = of_balls + np.where(np.abs(alike) >= _ASTRAY, np.sign(alike) * of_planes, 0)
+    return np.asarray(mean / np.linalg.norm(mean, axis=1, keepdims=True))
 
 
 def without_noise(tree: PointTree) -> PointTree:

@@ -161,11 +161,12 @@ def _along(
 def on_one_side(
     P: cython.const[cython.double][:, ::1],
     index: cython.const[cython.int][:, ::1],
+    square: cython.const[cython.double][:, ::1],
     number: cython.const[cython.int][::1],
     normals: cython.const[cython.double][:, ::1],
     radii: cython.const[cython.double][:, ::1],
 ):
-    """Which neighbours (c, k) of some points see the same side of the same sheet.
+    """The neighbours of points that see the same side of the same sheet: all of them, if these are fewer than three.
 
     On one sheet, the empty balls of two neighbours meet at more than a right angle on one side of it at least, since
     what separates balls is the surface. On the two sides of a thin part or of a narrow gap only those between the
@@ -175,25 +176,40 @@ def on_one_side(
     ----------
     P : (n, 3) float64
         All points.
-    index : (c, k) int32
-        Neighbours, each point first.
+    index, square : (c, k) int32, (c, k) float64
+        Neighbours, each point first, and the squared distances.
     number : (n,) int32
         Row of each point in `normals` and `radii`, -1 if it has none: such neighbours are on one sheet with all.
     normals, radii : (b, 3) float64, (b, 2) float64
         As `roomiest_normals` has them; normals may have either sign.
+
+    Returns
+    -------
+    index, square : (c, k) int32, (c, k) float64
+        Those that stay, in the same order; -1 after the last.
     """
-    keeps = np.ones((index.shape[0], index.shape[1]), np.bool_)
-    keep: cython.uchar[:, ::1] = keeps.view(np.uint8)
+    indices, squares = np.full((index.shape[0], index.shape[1]), -1, np.int32), np.zeros_like(square)
+    kept: cython.int[:, ::1] = indices
+    squared: cython.double[:, ::1] = squares
     row: cython.Py_ssize_t
     j: cython.Py_ssize_t
     with cython.nogil:
         for row in range(index.shape[0]):
             at: cython.int = index[row, 0]
-            for j in range(1, index.shape[1]):
+            size: cython.Py_ssize_t = 0
+            for j in range(index.shape[1]):
                 other: cython.int = index[row, j]
-                if number[other] >= 0:
-                    keep[row, j] = _sees_the_same(P, at, other, number[at], number[other], normals, radii)
-    return keeps
+                if (
+                    j == 0
+                    or number[other] < 0
+                    or _sees_the_same(P, at, other, number[at], number[other], normals, radii)
+                ):
+                    kept[row, size], squared[row, size] = other, square[row, j]
+                    size += 1
+            if size < 4:
+                kept[row, :] = index[row, :]
+                squared[row, :] = square[row, :]
+    return indices, squares
 
 
 @cython.cfunc

@@ -5,66 +5,37 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.cloud.local_planes import BENT, FLATTER, LEAST_WEIGHT, TINY
 from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["principal_axes", "tangent_planes"]
-
-
-def principal_axes(
-    P: cython.const[cython.double][:, ::1],
-    index: cython.const[cython.int][:, ::1],
-    square: cython.const[cython.double][:, ::1],
-):
-    """Tangents and normals of points, by principal components.
-
-    Parameters
-    ----------
-    P : (n, 3) float64
-        All points.
-    index, square : (b, k) int32, (b, k) float64
-        Neighbours of some points, by distance and each point first, and the squared distances.
-
-    Returns
-    -------
-    axes : (b, 3, 3) float64
-        Directions of most, less and least variance in rows, orthonormal.
-    variances : (b, 3) float64
-        In squares of the radius of the neighbourhood, ascending.
-    """
-    found, spread = np.empty((index.shape[0], 3, 3)), np.empty((index.shape[0], 3))
-    axes: cython.double[:, :, ::1] = found
-    variances: cython.double[:, ::1] = spread
-    work: cython.double[:, ::1] = np.empty((6, 3))
-    row: cython.Py_ssize_t
-    with cython.nogil:
-        for row in range(index.shape[0]):
-            _axes(P, index[row], square[row], axes[row], variances[row], work)
-    return found, spread
+__all__ = ["tangent_planes"]
 
 
 def tangent_planes(
     P: cython.const[cython.double][:, ::1],
     index: cython.int[:, ::1],
     square: cython.const[cython.double][:, ::1],
+    shrinks: cython.bint,
 ):
-    """The principal axes of neighbourhoods, which are made smaller where they are not flat.
-
-    Where the points vary much along the normal, two thirds, a half and a third of the neighbours are tried, and those
-    taken that are flatter.
+    """Tangents and normals of points, by principal components of neighbourhoods, some of which are made smaller.
 
     Parameters
     ----------
-    P, index, square
-        As for `principal_axes`; neighbours that are left out become -1 in `index`.
+    P : (n, 3) float64
+        All points.
+    index, square : (b, k) int32, (b, k) float64
+        Neighbours of some points, by distance and each point first, -1 after the last, and the squared distances.
+        Neighbours that are left out become -1.
+    shrinks : bool
+        Whether two thirds, a half and a third of the neighbours are tried where the points vary much along the normal,
+        and those taken that are flatter.
 
     Returns
     -------
     axes : (b, 3, 3) float64
-        As of `principal_axes`.
+        Directions of most, less and least variance in rows, orthonormal.
     radius : (b,) float64
         Distance of the farthest neighbour that is left.
     bend : (b,) float64
         Ratio of the two smaller variances of all neighbours.
     """
-    k: cython.Py_ssize_t = index.shape[1]
     found, radii, bends = np.empty((index.shape[0], 3, 3)), np.empty(index.shape[0]), np.empty(index.shape[0])
     bent: cython.double[::1] = bends
     axes: cython.double[:, :, ::1] = found
@@ -77,13 +48,16 @@ def tangent_planes(
     j: cython.Py_ssize_t
     with cython.nogil:
         for row in range(index.shape[0]):
+            k: cython.Py_ssize_t = index.shape[1]
+            while index[row, k - 1] < 0:
+                k -= 1
             size: cython.Py_ssize_t = k
-            _axes(P, index[row], square[row], axes[row], variances, work)
+            _axes(P, index[row, :k], square[row, :k], axes[row], variances, work)
             bend: cython.double = variances[0] / max(variances[1], TINY)
             bent[row] = bend
             for sixths in range(4, 1, -1):
                 fewer: cython.Py_ssize_t = 1 + (k - 1) * sixths // 6
-                if bend <= BENT or fewer < 8:
+                if not shrinks or bend <= BENT or fewer < 8:
                     break
                 _axes(P, index[row, :fewer], square[row, :fewer], trial, variances, work)
                 if variances[0] < FLATTER * bend * variances[1]:
