@@ -15,7 +15,6 @@ import numpy as np
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.cli.demo import sample_mesh
 from heat_igl.drawing import Page, Picture, page, plot, plot_field, plot_labels
 
 
@@ -28,8 +27,7 @@ def torus() -> Picture:
 
 def bunny() -> Picture:
     """Isolines of the distance from the nearest of three vertices."""
-    path = sample_mesh()
-    mesh = heat_igl.read_mesh(path) if path else shapes.icosphere(5)
+    mesh = heat_igl.sample_mesh()
     sources = [1234, 4000, 9000]
     phi = heat_igl.HeatMethodSolver(mesh).distance(sources)
     return plot(mesh, phi, sources=sources)
@@ -384,9 +382,16 @@ def _short(title: str) -> str:
 
 
 def _body(entry: Callable[[], object]) -> str:
-    """The lines of a function without signature and docstring."""
+    """The lines of a function without signature and docstring, after the imports that they need."""
     lines = inspect.getsource(entry).splitlines(keepends=True)[2:]
-    return "".join(line[4:].removeprefix("return ") for line in lines)
+    code = "".join(line[4:].removeprefix("return ") for line in lines)
+    used = set(re.findall(r"\b[a-z]\w*", code))
+    drawing = [name for name in ("page", "plot", "plot_field", "plot_labels") if name in used]
+    imports = ["import numpy as np"] * ("np" in used) + ["import heat_igl"]
+    imports += ["from heat_igl import shapes"] * ("shapes" in used) + [
+        f"from heat_igl.drawing import {', '.join(drawing)}"
+    ]
+    return "\n".join(imports) + f"\n\n{code}"
 
 
 if __name__ == "__main__":

@@ -1,23 +1,51 @@
+"""Triangles known by edge lengths: flips, refinement, covers and tangent frames."""
+
 from __future__ import annotations
 
 import igl
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from conftest import perturbed, zoo
 
 import heat_igl
-from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, shapes
+from heat_igl import (
+    GeodesicSolver,
+    HeatMethodSolver,
+    Mesh,
+    MeshError,
+    SurfacePoints,
+    geodesic_distance,
+    shapes,
+    tangent_frames,
+)
 from heat_igl.intrinsic import (
     Adjacency,
+    Flipped,
+    IntrinsicTriangulation,
+    Refined,
     apex,
+    carried_angles,
+    closed_cover,
     corner_angles,
+    delaunay_refinement,
     from_edge_lengths,
+    has_nonmanifold_edges,
     intrinsic_delaunay,
     intrinsic_triangulation,
     lay_out,
     mollify,
+    polar_angles,
+    transport_angles,
+    tufted_cover,
 )
+from heat_igl.mesh import split_long_edges
+from heat_igl.operators import Operators, cotan_operators, intrinsic_operators, operators, tufted_operators
+from heat_igl.reference.steiner import graph_distance, steiner_distance
+from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding import exact_distance
+
+# --- intrinsic
 
 
 def delaunay(mesh: Mesh):
@@ -339,3 +367,769 @@ def test_a_triangle_rolled_up_to_a_cone():
 def test_refused_gluing(twin, lengths, message):
     with pytest.raises(MeshError, match=message):
         HeatMethodSolver.from_edge_lengths([[0, 1, 1]], lengths, twin=twin)
+
+
+# --- Intrinsic Delaunay refinement: angles, the surface that stays the same, and points that are carried along
+
+
+def stretched(scale: float = 12.0) -> Mesh:
+    """A long ellipsoid with thin triangles."""
+    sphere = shapes.icosphere(2)
+    return Mesh(sphere.V * [1, 1, scale], sphere.F)
+
+
+@pytest.fixture(scope="module")
+def coarse() -> IntrinsicTriangulation:
+    return intrinsic_delaunay(intrinsic_triangulation(stretched()))
+
+
+@pytest.fixture(scope="module")
+def fine(coarse: IntrinsicTriangulation) -> IntrinsicTriangulation:
+    return delaunay_refinement(coarse, 5000)
+
+
+def cone_angles(triangulation: IntrinsicTriangulation) -> FloatArray:
+    return np.bincount(triangulation.F.ravel(), corner_angles(triangulation.l).ravel(), triangulation.n)
+
+
+def test_no_angle_is_small(coarse: IntrinsicTriangulation, fine: IntrinsicTriangulation) -> None:
+    assert np.degrees(corner_angles(coarse.l)).min() < 15
+    assert np.degrees(corner_angles(fine.l)).min() >= 25 - 1e-9
+    assert coarse.n < fine.n < 5000
+
+
+def test_the_surface_stays_the_same(coarse: IntrinsicTriangulation, fine: IntrinsicTriangulation) -> None:
+    assert fine.areas.sum() == pytest.approx(coarse.areas.sum(), rel=1e-11)
+    assert np.abs(cone_angles(fine)[: coarse.n] - cone_angles(coarse)).max() < 1e-9
+    assert np.abs(cone_angles(fine)[coarse.n :] - 2 * np.pi).max() < 1e-9
+    assert fine.n - len(fine.edges) + len(fine.F) == 2
+
+
+def test_glued_half_edges_share_ends_and_length(fine: IntrinsicTriangulation) -> None:
+    half_edge = np.arange(fine.F.size)
+    assert (fine.twin[fine.twin] == half_edge).all()
+    assert (fine.tail(half_edge) == fine.head(fine.twin)).all()
+    assert np.abs(fine.l.ravel() - fine.l.ravel()[fine.twin]).max() < 1e-12 * fine.l.max()
+
+
+def test_edges_are_delaunay(fine: IntrinsicTriangulation) -> None:
+    opposite = corner_angles(fine.l).ravel()
+    assert (opposite + opposite[fine.twin]).max() < np.pi + 1e-6
+    assert delaunay_refinement(fine, 10**6) is fine
+
+
+def test_radii_and_units(coarse: IntrinsicTriangulation) -> None:
+    def largest(triangulation: IntrinsicTriangulation) -> float:
+        return float((triangulation.l.prod(axis=1) / (4 * triangulation.areas)).max())
+
+    bound = 0.2 * largest(coarse)
+    small = delaunay_refinement(coarse, 10**5, largest_radius=bound)
+    assert 0.5 * bound < largest(small) <= bound
+    unit = np.full(len(coarse.F), 4.0)
+    again = delaunay_refinement(coarse, 10**5, largest_radius=bound / 4, unit=unit)
+    assert np.array_equal(small.F, again.F)
+
+
+def test_growth_is_bounded(coarse: IntrinsicTriangulation) -> None:
+    assert delaunay_refinement(coarse, coarse.n + 7).n == coarse.n + 7
+    assert delaunay_refinement(coarse, coarse.n) is coarse
+
+
+def test_a_sharp_cone_keeps_its_angle() -> None:
+    tetrahedra = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.9, 0], [0.5, 0.3, 20]])
+    mesh = Mesh(tetrahedra, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    assert delaunay_refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)), 10**4).n < 200
+
+
+def test_a_boundary_is_refused() -> None:
+    with pytest.raises(ValueError, match="take the tufted cover"):
+        delaunay_refinement(intrinsic_triangulation(shapes.grid(3)), 100)
+
+
+def test_closed_cover_is_the_tufted_cover() -> None:
+    for mesh in (shapes.grid(4), shapes.icosphere(1), shapes.cylinder(5, 7)):
+        found, expected = closed_cover(intrinsic_triangulation(mesh)), tufted_cover(mesh)
+        assert np.array_equal(found.F, expected.F)
+        assert np.array_equal(found.twin, expected.twin)
+        assert np.array_equal(found.l, expected.l)
+
+
+# Points.
+
+
+def split(refined: Refined, move: int, faces: IntArray, barycentric: FloatArray) -> None:
+    """Carry points through one split: solve for coordinates in each of the three faces, take the one that is inside."""
+    _, f, g = refined.kind[move]
+    new = refined.numbers[move, :3]
+    for i in np.flatnonzero(faces == f):
+        for c, face in enumerate((f, g, g + 1)):
+            corners = np.eye(3)
+            corners[c] = new
+            found = np.linalg.solve(corners.T, barycentric[i])
+            if found.min() >= -1e-12:
+                faces[i], barycentric[i] = face, found
+                break
+
+
+def test_points_are_carried_move_by_move(coarse: IntrinsicTriangulation) -> None:
+    rng = np.random.default_rng(0)
+    fine = delaunay_refinement(coarse, coarse.n + 60)
+    refined = fine.history[-1]
+    assert isinstance(refined, Refined)
+    faces = rng.integers(len(coarse.F), size=200)
+    barycentric = rng.dirichlet([1, 1, 1], 200)
+    expected_faces, expected = faces.copy(), barycentric.copy()
+    for move in range(len(refined.kind)):
+        if refined.kind[move, 0] == 0:
+            split(refined, move, expected_faces, expected)
+        else:
+            flip = Flipped(refined.kind[move, 1:2], refined.kind[move, 2:3], refined.numbers[move, :, None])
+            expected_faces, expected = flip.carry(expected_faces, expected)
+    found_faces, found = refined.carry(faces, barycentric)
+    assert np.array_equal(found_faces, expected_faces)
+    assert np.abs(found - expected).max() < 1e-9
+    assert (found_faces >= len(coarse.F)).mean() > 0.1
+
+
+def test_points_keep_their_distance_from_a_vertex(coarse: IntrinsicTriangulation, fine: IntrinsicTriangulation) -> None:
+    rng = np.random.default_rng(1)
+    faces = rng.integers(len(coarse.F), size=100)
+    near = 1e-3
+    barycentric = np.array([1.0, 0, 0]) * (1 - near) + near * rng.dirichlet([1, 1, 1], 100)
+    before = np.linalg.norm(np.einsum("kc,kcx->kx", barycentric, lay_out(coarse.l[faces])), axis=1)
+    vertex = coarse.F[faces, 0]
+    history = fine.history[-1:]
+    for change in history:
+        faces, barycentric = change.carry(faces, barycentric)
+    corners = lay_out(fine.l[faces])
+    place = np.einsum("kc,kcx->kx", barycentric, corners)
+    at = fine.F[faces] == vertex[:, None]
+    assert at.any(axis=1).all()
+    after = np.linalg.norm(place - corners[np.arange(100), at.argmax(axis=1)], axis=1)
+    assert np.abs(after - before).max() < 1e-9 * before.max()
+
+
+# The solver on refined triangles: answers are those at the vertices of the mesh.
+
+
+@pytest.fixture(scope="module")
+def refined() -> HeatMethodSolver:
+    return HeatMethodSolver(stretched())
+
+
+def mean_error(distance: FloatArray, truth: FloatArray) -> float:
+    there = truth > 0
+    return float(np.mean(np.abs(distance - truth)[there] / truth[there]))
+
+
+def test_answers_are_at_the_vertices_of_the_mesh(refined: HeatMethodSolver) -> None:
+    mesh = stretched()
+    assert refined.operators.n > mesh.n_vertices == refined.n_vertices
+    truth = geodesic_distance(mesh, 5)
+    distance = refined.distance(5)
+    assert distance.shape == (mesh.n_vertices,)
+    plain = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay")
+    assert plain.operators.n == mesh.n_vertices
+    assert 0.002 < mean_error(distance, truth) < 0.02
+
+
+def test_sources_in_faces(refined: HeatMethodSolver) -> None:
+    mesh = stretched()
+    corner = SurfacePoints([17], [[1.0, 0, 0]])
+    assert np.array_equal(refined.distance(corner), refined.distance(int(mesh.F[17, 0])))
+    inside = SurfacePoints([17], [[0.4, 0.35, 0.25]])
+    truth = GeodesicSolver(mesh, method="exact").distance(inside)
+    assert mean_error(refined.distance(inside), truth) < 0.02
+
+
+@pytest.mark.parametrize("boundary", ["neumann", "dirichlet", "average"])
+def test_a_surface_with_a_boundary(boundary: str) -> None:
+    rng = np.random.default_rng(3)
+    flat = shapes.grid(6)
+    inner = ~flat.boundary
+    V = flat.V.copy()
+    V[inner, :2] += rng.uniform(-0.03, 0.03, (inner.sum(), 2))
+    mesh = Mesh(V * [8, 1, 1], flat.F)
+    refined = HeatMethodSolver(mesh, boundary=boundary, laplacian="intrinsic-delaunay-refined")  # type: ignore[arg-type]
+    domain = refined.operators
+    assert domain.n > mesh.n_vertices
+    assert np.array_equal(domain.boundary[: mesh.n_vertices], mesh.boundary)
+    assert not domain.boundary[mesh.n_vertices :].any()
+    assert domain.M.sum() == pytest.approx(8, rel=1e-12)
+    assert abs(domain.L - domain.D @ domain.G).max() < 1e-12
+    inside = int(np.flatnonzero(inner)[7])
+    for source in (inside, SurfacePoints([20], [[0.2, 0.3, 0.5]])):
+        place = mesh.V[source] if isinstance(source, int) else source.barycentric[0] @ mesh.V[mesh.F[20]]
+        truth = np.linalg.norm(mesh.V - place, axis=1)
+        assert mean_error(refined.distance(source), truth) < 0.06
+
+
+def test_paths_are_those_on_the_triangles_of_the_mesh() -> None:
+    mesh = stretched()
+    refined = operators(mesh, "intrinsic-delaunay-refined")
+    assert refined.n > mesh.n_vertices
+    for method in ("sweep", "exact"):
+        found = GeodesicSolver(refined, method=method).distance(0)
+        np.testing.assert_allclose(found, GeodesicSolver(mesh, method=method).distance(0), rtol=1e-9, atol=1e-12)
+
+
+def test_even_meshes_stay_as_they_are() -> None:
+    for mesh in (shapes.icosphere(3), shapes.torus(16, 40), shapes.grid(20)):
+        default, plain = operators(mesh, "auto"), operators(mesh)
+        assert abs(default.L - plain.L).max() == 0
+        assert abs(default.M - plain.M).max() == 0
+        assert default.surface is not None
+        assert default.surface.uncovered is None
+
+
+def beside(one: Mesh, other: Mesh) -> Mesh:
+    aside = other.V + np.array([0, 40, 0])
+    return Mesh(np.concatenate([one.V, aside]), np.concatenate([one.F, other.F + one.n_vertices]))
+
+
+def test_an_uneven_part_is_refined_beside_an_even_one() -> None:
+    sphere, part = shapes.icosphere(4), Mesh(stretched().V / 10, stretched().F)
+    mesh = beside(sphere, part)
+    refined = HeatMethodSolver(mesh)
+    assert mesh.n_vertices < refined.operators.n
+    alone = HeatMethodSolver(part)
+    assert refined.operators.n - mesh.n_vertices < 1.1 * (alone.operators.n - alone.n_vertices)
+    truth = geodesic_distance(part, 7)
+    error = mean_error(refined.distance(sphere.n_vertices + 7)[sphere.n_vertices :], truth)
+    assert error < 1.5 * mean_error(alone.distance(7), truth)
+    # The sphere is as it was.
+    near = refined.distance(7)[: sphere.n_vertices] - HeatMethodSolver(sphere).distance(7)
+    assert np.abs(near).max() < 1e-9
+
+
+def test_stray_triangles_are_left_alone() -> None:
+    needle = Mesh([[0, 0, 0], [1, 0, 0], [0.5, 1e-3, 0]], [[0, 1, 2]])
+    mesh = beside(shapes.icosphere(3), needle)
+    assert operators(mesh, "auto").n == mesh.n_vertices
+
+
+def test_obtuse_triangles_at_the_boundary_take_the_cover() -> None:
+    flat = shapes.grid(20)
+    mesh = Mesh(flat.V @ [[1, 0, 0], [3, 1, 0], [0, 0, 1]], flat.F)
+    domain = operators(mesh, "auto")
+    assert domain.n == mesh.n_vertices
+    covered = domain.L.copy()
+    covered.setdiag(0)
+    assert covered.min() > -1e-9
+    plain = operators(mesh).L.copy()
+    plain.setdiag(0)
+    assert plain.min() < -1
+    middle = mesh.n_vertices // 2
+    truth = np.linalg.norm(mesh.V - mesh.V[middle], axis=1)
+    found = HeatMethodSolver(mesh).distance(middle)
+    assert 0.002 < mean_error(found, truth) < 0.03
+
+
+def test_edge_lengths_alone_are_refined_too() -> None:
+    import igl
+
+    mesh = stretched()
+    by_lengths = HeatMethodSolver.from_edge_lengths(mesh.F, igl.edge_lengths(mesh.V, mesh.F), t_coef=0.5)
+    assert by_lengths.n_vertices == mesh.n_vertices < by_lengths.operators.n
+    # With a time step that was asked for, heat is not held to bounds, for which positions are needed.
+    assert np.abs(by_lengths.distance(5) - HeatMethodSolver(mesh, t_coef=0.5).distance(5)).max() < 1e-9
+
+
+# --- The tufted cover: its gluing, the identities of its operators, and distances against graphs with Steiner points
+
+
+def fan_of_five(longest: float) -> Mesh:
+    """Five equilateral triangles on one edge, subdivided."""
+    angle = 2 * np.pi * np.arange(5) / 5
+    apex = np.stack([np.cos(angle), np.sin(angle), np.full(5, 1 / np.sqrt(3))], axis=1) * np.sqrt(3) / 2
+    V = np.concatenate([[[0, 0, 0], [0, 0, 1]], apex])
+    return split_long_edges(Mesh(V, [[0, 1, k] for k in range(2, 7)]), longest)
+
+
+def uneven_book(pages: int, n: int, stretch: float) -> Mesh:
+    """A book whose vertices are moved at random within their pages, then pulled along the spine."""
+    book = shapes.book(pages, n)
+    rng = np.random.default_rng(0)
+    r, page = np.hypot(book.V[:, 0], book.V[:, 1]), page_of(book)
+    r_new = np.where((r > 1e-9) & (r < 1 - 1e-9), r + rng.uniform(-0.3, 0.3, len(r)) / n, r)
+    inner = (book.V[:, 2] > 0) & (book.V[:, 2] < 1)
+    z = np.where(inner, book.V[:, 2] + rng.uniform(-0.3, 0.3, len(r)) / n, book.V[:, 2])
+    turned = 2 * np.pi * page / pages
+    return Mesh(np.stack([r_new * np.cos(turned), r_new * np.sin(turned), stretch * z], axis=1), book.F)
+
+
+def page_of(book: Mesh, pages: int | None = None):
+    x, y = book.V[:, 0], book.V[:, 1]
+    if pages is None:
+        pages = int(book.facets.n_faces.max())
+    return np.round(np.arctan2(y, x) / (2 * np.pi / pages)).astype(int) % pages
+
+
+def book_distance(book: Mesh, pages: int, sources):
+    """Distance (k, n) on flat pages of which any two unfold to a convex domain."""
+    r, z, page = np.hypot(book.V[:, 0], book.V[:, 1]), book.V[:, 2], page_of(book, pages)
+    on_spine = r < 1e-12
+    rows = []
+    for source in sources:
+        same = (page == page[source]) | on_spine | on_spine[source]
+        rows.append(np.hypot(np.where(same, r - r[source], r + r[source]), z - z[source]))
+    return np.array(rows)
+
+
+def doubled_sphere() -> Mesh:
+    """Every face twice, the second time the other way round, on triangles that are far from Delaunay."""
+    sphere = perturbed(shapes.icosphere(3), 0.3)
+    return Mesh(sphere.V * [1.0, 0.6, 0.2], np.concatenate([sphere.F, sphere.F[:, [2, 1, 0]]]))
+
+
+def finned_sphere() -> Mesh:
+    """A sphere with a triangle standing on every tenth edge."""
+    sphere = perturbed(shapes.icosphere(3), 0.3)
+    edges = sphere.edges[::10]
+    tips = 1.1 * sphere.V[edges].mean(axis=1)
+    fins = np.column_stack([edges, sphere.n_vertices + np.arange(len(edges))])
+    return Mesh(np.concatenate([sphere.V, tips]) * [1.0, 0.6, 0.3], np.concatenate([sphere.F, fins]))
+
+
+def sample_sources(mesh: Mesh, k: int = 3):
+    return np.random.default_rng(0).choice(np.unique(mesh.F), k, replace=False)
+
+
+def error_in_percent(distance, truth) -> float:
+    away = np.isfinite(truth) & (truth > 0)
+    assert (np.isinf(distance) == np.isinf(truth)).all()
+    return float(np.mean(np.abs(distance[away] / truth[away] - 1)))
+
+
+def heat_error(domain: Mesh | Operators, sources, truth, **options) -> float:
+    solver = HeatMethodSolver(domain, **options)
+    return error_in_percent(solver.distances(list(sources))[:, : truth.shape[1]], truth)
+
+
+NONMANIFOLD = {
+    "fan of five": lambda: fan_of_five(0.1),
+    "stretched book": lambda: uneven_book(3, 8, 6.0),
+    "doubled sphere": doubled_sphere,
+    "sphere with fins": finned_sphere,
+    "unreferenced vertices": lambda: Mesh(
+        np.vstack([[[9, 9, 9]], finned_sphere().V, [[8, 8, 8]]]), finned_sphere().F + 1
+    ),
+}
+
+
+@pytest.fixture(params=NONMANIFOLD, ids=str)
+def mesh(request) -> Mesh:
+    return NONMANIFOLD[request.param]()
+
+
+def assert_closed_and_oriented(cover):
+    half_edge = np.arange(cover.F.size)
+    assert (cover.twin >= 0).all()
+    assert (cover.twin[cover.twin] == half_edge).all()
+    assert (cover.twin != half_edge).all()
+    assert (cover.tail(half_edge) == cover.head(cover.twin)).all()
+    assert (cover.head(half_edge) == cover.tail(cover.twin)).all()
+    assert (cover.l.ravel() == cover.l.ravel()[cover.twin]).all()
+
+
+def test_cover_is_closed_and_oriented(mesh):
+    cover = tufted_cover(mesh)
+    assert_closed_and_oriented(cover)
+    assert cover.areas.sum() == pytest.approx(2 * mesh.measures.sum(), rel=1e-12)
+    flipped = intrinsic_delaunay(cover)
+    assert_closed_and_oriented(flipped)
+    assert flipped.areas.sum() == pytest.approx(2 * mesh.measures.sum(), rel=1e-12)
+
+
+def test_tufted_operators_satisfy_the_identities_of_the_laplacian(mesh):
+    domain = tufted_operators(mesh)
+    scale = abs(domain.L).max()
+    assert abs(domain.D @ domain.G - domain.L).max() <= 1e-12 * scale
+    assert abs(domain.L - domain.L.T).max() <= 1e-12 * scale
+    assert np.abs(domain.L @ np.ones(domain.n)).max() <= 1e-12 * scale
+    assert np.linalg.eigvalsh(domain.L.toarray())[-1] <= 1e-10 * scale
+    assert domain.M.sum() == pytest.approx(mesh.measures.sum(), rel=1e-12)
+    assert domain.weights.sum() == pytest.approx(mesh.measures.sum(), rel=1e-12)
+    assert (domain.M.diagonal()[mesh.referenced] > 0).all()
+    assert (domain.referenced == mesh.referenced).all()
+    assert domain.n == mesh.n_vertices
+
+
+def test_no_weight_is_negative(mesh):
+    """Not at edges of many faces and not on the boundary, where without a cover nothing can be flipped."""
+    L = tufted_operators(mesh).L.tocoo()
+    assert L.data[L.row != L.col].min() >= -1e-7
+
+
+@pytest.mark.parametrize("name", ["stretched book", "doubled sphere", "sphere with fins"])
+def test_without_a_cover_weights_are_negative(name):
+    """So that the test above says something."""
+    L = intrinsic_operators(intrinsic_delaunay(intrinsic_triangulation(NONMANIFOLD[name]()))).L.tocoo()
+    assert L.data[L.row != L.col].min() < -0.01
+
+
+def test_boundary_and_components_are_those_of_the_mesh(mesh):
+    domain = tufted_operators(mesh)
+    assert (domain.boundary == mesh.boundary).all()
+    together = mesh.components[:, None] == mesh.components
+    assert ((domain.components[:, None] == domain.components) == together).all()
+
+
+def test_cover_is_used_where_it_is_needed_and_only_there():
+    spheres = shapes.icosphere(2)
+    shared = int(np.argmin(spheres.V @ spheres.V[0]))
+    second = spheres.F + spheres.n_vertices
+    second[second == spheres.n_vertices + shared] = 0
+    touching = Mesh(np.concatenate([spheres.V, spheres.V + 2 * spheres.V[0]]), np.concatenate([spheres.F, second]))
+    assert len(touching.report().nonmanifold_vertices) == 1
+    for manifold in (touching, shapes.disk(4), perturbed(shapes.disk(6), 0.4)):
+        assert not has_nonmanifold_edges(manifold)
+        domain = operators(manifold)
+        assert len(domain.surface.triangulation.F) == manifold.n_faces
+        assert domain.surface.uncovered is None
+
+    book = shapes.book(3, 4)
+    assert has_nonmanifold_edges(book)
+    assert len(operators(book).surface.triangulation.F) == 2 * book.n_faces
+    assert len(operators(book).surface.unfolding.F) == book.n_faces
+    assert len(operators(book, "cotan").surface.triangulation.F) == book.n_faces
+
+
+def test_closed_manifold_gives_its_own_laplacian():
+    """Two copies that meet in the vertices alone: fronts are glued to fronts, and half of both is the mesh."""
+    sphere = perturbed(shapes.icosphere(3), 0.3)
+    sphere = Mesh(sphere.V * [1.0, 0.6, 0.2], sphere.F)
+    cover = tufted_cover(sphere)
+    side = np.arange(cover.F.size) // (3 * sphere.n_faces)
+    assert (side == side[cover.twin]).all()
+    own, unflipped = cotan_operators(sphere), intrinsic_operators(cover)
+    assert abs(unflipped.L / 2 - own.L).max() <= 1e-12 * abs(own.L).max()
+    assert abs(unflipped.M / 2 - own.M).max() <= 1e-12 * abs(own.M).max()
+
+    plain, tufted = operators(sphere), tufted_operators(sphere)
+    assert tufted.surface.triangulation.n_flips == 2 * plain.surface.triangulation.n_flips > 100
+    # Lengths of flipped edges are rounded in another order on the back.
+    assert abs(tufted.L - plain.L).max() <= 1e-9 * abs(plain.L).max()
+    t = plain.mean_edge_length**2 / 2
+    distance = HeatMethodSolver(sphere, t=t).distance(5)
+    np.testing.assert_allclose(HeatMethodSolver(tufted, t=t).distance(5), distance, atol=1e-8)
+
+
+def test_boundary_is_glued_front_to_back():
+    """The cover of a disk is a sphere, the same as a second disk sewn on, seen from the vertices of the first."""
+    disk = perturbed(shapes.disk(8), 0.4)
+    disk = Mesh(disk.V * [1.0, 0.4, 1.0], disk.F)
+    n = disk.n_vertices
+    lower = np.where(disk.boundary, np.arange(n), n + np.arange(n))
+    pillow = Mesh(np.concatenate([disk.V, disk.V]), np.concatenate([disk.F, lower[disk.F][:, ::-1]]))
+    assert_same_as_skin(disk, pillow, np.tile(np.arange(n), 2))
+
+
+def test_pages_are_glued_to_their_neighbours():
+    """The skin of a book of three pages, made by hand: each page twice, a spine of its own in each gap."""
+    book = uneven_book(3, 6, 4.0)
+    # Without the corners, no inner edge joins two boundary vertices, and vertices tell the copies of an edge apart.
+    book = Mesh(book.V, book.F[~book.boundary[book.F].all(axis=1)])
+    n, page = book.n_vertices, page_of(book)
+    spine = np.hypot(book.V[:, 0], book.V[:, 1]) < 1e-12
+    F_page = np.where(spine[book.F], -1, page[book.F]).max(axis=1)
+    faces = []
+    for gap in range(3):
+        # Seen along the spine, gap k is counterclockwise of page k; inner vertices have a copy per side.
+        own = np.where(book.boundary, np.arange(n), n * (1 + gap) + np.arange(n))
+        own_back = np.where(book.boundary | spine, own, n * (4 + gap) + np.arange(n))
+        this, following = book.F[F_page == gap], book.F[F_page == (gap + 1) % 3]
+        faces += [own[this], own_back[following][:, ::-1]]
+    skin = Mesh(np.tile(book.V, (7, 1)), np.concatenate(faces))
+    assert (skin.facets.n_faces == 2).all()
+    assert_same_as_skin(book, skin, np.tile(np.arange(n), 7))
+
+
+def assert_same_as_skin(mesh: Mesh, skin: Mesh, vertex):
+    """The operators of the cover are half of those of a closed manifold whose vertices lie on those of the mesh."""
+    assert (skin.facets.n_faces == 2).all()
+    domain, doubled = tufted_operators(mesh), operators(skin)
+    assert doubled.surface.triangulation.n_flips > 20
+    onto = sp.csr_array((np.ones(len(vertex)), (np.arange(len(vertex)), vertex)))
+    for ours, theirs in ((domain.L, doubled.L), (domain.M, doubled.M)):
+        assert abs(onto.T @ theirs @ onto / 2 - ours).max() <= 1e-9 * abs(ours).max()
+
+
+def test_order_and_orientation_of_the_faces_do_not_matter():
+    mesh = finned_sphere()
+    rng = np.random.default_rng(1)
+    F = mesh.F[rng.permutation(mesh.n_faces)]
+    F[::2] = F[::2, ::-1]
+    F = np.take_along_axis(F, (rng.integers(3, size=len(F))[:, None] + np.arange(3)) % 3, axis=1)
+    one, other = operators(mesh), operators(Mesh(mesh.V, F))
+    assert abs(one.L - other.L).max() <= 1e-9 * abs(one.L).max()
+    assert abs(one.M - other.M).max() <= 1e-9 * abs(one.M).max()
+
+
+def test_paths_are_to_be_unfolded_on_each_face_once():
+    domain = operators(finned_sphere())
+    assert domain.surface.unfolding.areas.sum() == pytest.approx(domain.weights.sum(), rel=1e-12)
+    assert (domain.surface.unfolding.twin == -2).any()
+
+
+def test_a_face_that_is_there_twice_counts_once():
+    """The second copies make every edge one of four faces; without them it is the sphere, to the last bit."""
+    doubled = doubled_sphere()
+    sphere = Mesh(doubled.V, doubled.F[: doubled.n_faces // 2])
+    assert has_nonmanifold_edges(doubled)
+    one, other = operators(sphere), operators(doubled)
+    assert (one.L != other.L).nnz == 0
+    assert (one.M != other.M).nnz == 0
+    assert other.surface.uncovered is None
+
+    fins = finned_sphere()
+    F = np.concatenate([fins.F, np.roll(fins.F[-5:], 1, axis=1), fins.F[:9, ::-1]])
+    assert (operators(Mesh(fins.V, F)).L != operators(fins).L).nnz == 0
+    # Two copies and nothing else are a closed surface, as good as any.
+    pillow = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 1]])
+    assert operators(pillow).weights.sum() == pytest.approx(1)
+
+
+def test_degenerate_faces_and_edges_of_no_length():
+    fan = fan_of_five(0.3)
+    a, b = fan.edges[fan.facets.n_faces == 2][0]
+    V = np.vstack([fan.V, fan.V[a], fan.V[[a, b]].mean(axis=0)])
+    flat = Mesh(V, np.vstack([fan.F, [a, b, len(V) - 2], [a, b, len(V) - 1]]))
+    domain = operators(flat)
+    assert domain.surface.triangulation.lengthening > 0
+    assert np.isfinite(domain.G.data).all()
+    assert abs(domain.D @ domain.G - domain.L).max() <= 1e-8 * abs(domain.L).max()
+    distance = HeatMethodSolver(flat).distance(0)
+    clean = HeatMethodSolver(fan, t=HeatMethodSolver(flat).t).distance(0)
+    assert distance[-2] == pytest.approx(distance[a], abs=1e-4)
+    assert np.abs(distance[: fan.n_vertices] - clean).max() < 0.02
+
+
+@pytest.mark.parametrize("name", ["fan", "book"])
+def test_steiner_graph_against_known_distances(name):
+    fan = fan_of_five(0.2) if name == "fan" else shapes.book(5, 6)
+    sources = sample_sources(fan)
+    truth = book_distance(fan, 5, sources)
+    distance = steiner_distance(fan, sources)
+    away = truth > 0
+    assert (distance[away] / truth[away]).min() >= 1 - 1e-12
+    assert error_in_percent(distance, truth) < 2e-3
+    assert error_in_percent(graph_distance(fan, sources, 1), truth) > 5e-3
+
+    twice = Mesh(fan.V, np.concatenate([fan.F, fan.F[::3, ::-1]]))
+    np.testing.assert_allclose(graph_distance(twice, sources, 4), graph_distance(fan, sources, 4), rtol=1e-12)
+    with pytest.raises(MemoryError, match="1000 points on each of"):
+        graph_distance(fan, sources, 1000)
+
+
+def test_fan_of_five_triangles():
+    fan = fan_of_five(0.04)
+    sources = sample_sources(fan, 5)
+    assert heat_error(fan, sources, book_distance(fan, 5, sources)) < 0.03
+
+
+def test_undivided_fan():
+    """From each tip the edge leads straight to every other, though the cover glues a triangle to two of the others."""
+    fan = fan_of_five(2.0)
+    assert fan.n_vertices == 7
+    sources = np.arange(2, 7)
+    fan = Mesh(fan.V + [[0, 0, 0.2 * (k - 4) * (k > 1)] for k in range(7)], fan.F)
+    for shared in (fan, Mesh(fan.V, np.where(np.arange(5)[:, None] % 2, fan.F[:, ::-1], fan.F))):
+        distance = HeatMethodSolver(shared).distances(list(sources))
+        np.testing.assert_allclose(distance, book_distance(fan, 5, sources), rtol=1e-12, atol=1e-12)
+
+
+def test_point_on_an_edge_of_five_faces():
+    """It is seen along straight lines from all of them, whichever of them it was given in."""
+    book = shapes.book(5, 4)
+    spine = np.flatnonzero(np.hypot(*book.V[:, :2].T) == 0)
+    for face in np.flatnonzero(np.isin(book.F, spine).sum(axis=1) == 2):
+        barycentric = np.where(np.isin(book.F[face], spine), [0.2, 0.3, 0.4], 0.0)
+        point = SurfacePoints([face], [barycentric / barycentric.sum()])
+        exact = np.linalg.norm(book.V - point.positions(book)[0], axis=1)
+        np.testing.assert_allclose(HeatMethodSolver(book).distance(point), exact, rtol=1e-9)
+
+
+@pytest.mark.parametrize("pages", [3, 5])
+def test_stretched_book(pages):
+    """Faces at the spine are far from Delaunay, and without a cover their edges there could not be flipped."""
+    book = uneven_book(pages, 16, 10.0)
+    sources = sample_sources(book, 5)
+    assert heat_error(book, sources, book_distance(book, pages, sources)) < 0.04
+    assert heat_error(cotan_operators(book), sources, book_distance(book, pages, sources)) > 0.3
+
+
+def test_every_face_twice(cow):
+    """Without a remedy no edge of it could be flipped: 5 % then, and 14 % by the paper's method."""
+    twice = Mesh(cow.V, np.concatenate([cow.F, cow.F[:, ::-1]]))
+    sources = sample_sources(cow)
+    truth = graph_distance(cow, sources, 12)
+    plain = intrinsic_operators(intrinsic_delaunay(intrinsic_triangulation(twice)))
+    once = heat_error(cow, sources, truth)
+    assert once < 0.03
+    assert heat_error(twice, sources, truth) == once
+    # With a time step that is asked for, heat is not compared with windows, which multiply where all edges branch.
+    assert heat_error(plain, sources, truth, t_coef=0.5) > 3 * once
+    assert heat_error(plain, sources, truth, magnitude="unit") > 0.1
+
+
+# --- Tangent frames: axes, polar angles, conversions, and the holonomy of transport
+
+
+def off_multiples(angles: np.ndarray, period: float = 2 * np.pi) -> np.ndarray:
+    """How far angles are from the nearest multiple of the period."""
+    return np.abs(angles - period * np.round(angles / period))
+
+
+@pytest.mark.parametrize("mesh", [shapes.icosphere(2), shapes.torus(12, 20), shapes.grid(4), shapes.cone(7, 3)])
+def test_frames_are_orthonormal_and_right_handed(mesh):
+    frames = tangent_frames(mesh)
+    axes = np.stack([frames.x, frames.y, frames.normal], axis=1)
+    np.testing.assert_allclose(axes @ axes.transpose(0, 2, 1), np.broadcast_to(np.eye(3), axes.shape), atol=1e-14)
+    assert np.linalg.det(axes).min() > 0.99
+
+
+def test_normals_of_a_sphere_point_outwards(sphere):
+    frames = tangent_frames(shapes.icosphere(3))
+    np.testing.assert_allclose(frames.normal, shapes.icosphere(3).V, atol=6e-3)
+    assert (np.einsum("vx,vx->v", tangent_frames(sphere).normal, sphere.V) > 0.9).all()
+
+
+@pytest.mark.parametrize("mesh", [shapes.grid(5), perturbed(shapes.icosphere(2)), shapes.cylinder(9, 4)])
+def test_angles_sum_to_two_pi_and_to_pi_on_the_boundary(mesh):
+    angles = tangent_frames(mesh).angles
+    np.testing.assert_array_equal(angles.on_boundary, mesh.boundary)
+    scaled = np.bincount(mesh.F.ravel(), (angles.scale[mesh.F] * angles.corners).ravel())
+    np.testing.assert_allclose(scaled, np.where(mesh.boundary, np.pi, 2 * np.pi))
+    # Every vertex has a reference edge, and on the boundary it is the first.
+    smallest = np.full(mesh.n_vertices, np.inf)
+    np.minimum.at(smallest, mesh.F[:, [1, 2, 0]].ravel(), angles.leaving)
+    np.testing.assert_array_equal(smallest, 0)
+
+
+def test_flat_frames_are_those_of_the_plane():
+    mesh = shapes.grid(5)
+    frames = tangent_frames(mesh)
+    np.testing.assert_allclose(frames.normal, np.broadcast_to([0, 0, 1], (36, 3)), atol=1e-15)
+    # The polar angle of an edge inside is its angle in the plane, up to that of x.
+    along = mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F]
+    leaving = frames.angles.leaving.reshape(-1, 3)[:, [2, 0, 1]]
+    inside = ~mesh.boundary[mesh.F]
+    expected = np.arctan2(along[..., 1], along[..., 0]) - np.arctan2(frames.x[:, 1], frames.x[:, 0])[mesh.F]
+    assert off_multiples(leaving - expected)[inside].max() < 1e-13
+
+
+def test_conversions_are_inverse_to_each_other(sphere):
+    frames = tangent_frames(sphere)
+    vectors = np.random.default_rng(0).standard_normal((sphere.n_vertices, 2))
+    np.testing.assert_allclose(frames.from_world(frames.to_world(vectors)), vectors, atol=1e-13)
+    faces, corners, in_faces = frames.to_faces(np.arange(sphere.n_vertices), vectors)
+    np.testing.assert_array_equal(sphere.F[faces, corners], np.arange(sphere.n_vertices))
+    np.testing.assert_allclose(np.linalg.norm(in_faces, axis=1), np.linalg.norm(vectors, axis=1))
+    np.testing.assert_allclose(frames.from_faces(faces, corners, in_faces), vectors, atol=1e-12)
+    angles = frames.to_angles(vectors)
+    assert angles.min() >= 0
+    assert angles.max() < 2 * np.pi
+    np.testing.assert_allclose(frames.from_angles(angles, np.hypot(*vectors.T)), vectors, atol=1e-13)
+
+
+def test_a_vector_along_an_edge_has_its_angle_from_both_faces(sphere):
+    frames = tangent_frames(sphere)
+    F, V = sphere.F, sphere.V
+    faces = np.arange(len(F))
+    for c in range(3):
+        next_corner, previous = (c + 1) % 3, (c + 2) % 3
+        towards = frames.to_angles(frames.from_faces(faces, np.full(len(F), c), V[F[:, next_corner]] - V[F[:, c]]))
+        assert off_multiples(towards - frames.angles.leaving.reshape(-1, 3)[:, previous]).max() < 1e-12
+        # The other side of the corner leaves from it in the neighbour.
+        other = frames.to_angles(frames.from_faces(faces, np.full(len(F), c), V[F[:, previous]] - V[F[:, c]]))
+        twin = frames.triangulation.twin.reshape(-1, 3)[:, next_corner]
+        assert off_multiples(other - frames.angles.leaving[twin]).max() < 1e-12
+
+
+def test_flips_keep_the_directions_of_edges():
+    mesh = perturbed(shapes.torus(12, 40), 0.6)
+    faces = intrinsic_triangulation(mesh)
+    flipped = intrinsic_delaunay(faces)
+    assert flipped.n_flips > 10
+    angles = carried_angles(polar_angles(faces), flipped)
+    rho = transport_angles(flipped, angles)
+    assert off_multiples(rho + rho[flipped.twin]).max() < 1e-12
+    # Around a face, the angles of its corners follow one another.
+    half_edge = np.arange(flipped.F.size).reshape(-1, 3)
+    for c in range(3):
+        vertex, out, back = flipped.F[:, c], half_edge[:, (c + 2) % 3], half_edge[:, (c + 1) % 3]
+        wide = angles.leaving[flipped.twin[back]] - angles.leaving[out]
+        assert off_multiples(wide - angles.scale[vertex] * angles.corners[:, c]).max() < 1e-11
+
+
+@pytest.mark.parametrize(("mesh", "characteristic"), [(shapes.icosphere(2), 2), (shapes.torus(12, 30), 0)])
+def test_transport_around_vertices_turns_by_the_curvature_enclosed(mesh, characteristic):
+    triangulation = intrinsic_triangulation(mesh)
+    angles = polar_angles(triangulation)
+    rho = transport_angles(triangulation, angles).reshape(-1, 3)
+    # A face has the curvature that its corners are scaled by; all together have 2 pi times Euler's characteristic.
+    of_face = (angles.scale[mesh.F] * angles.corners).sum(axis=1) - np.pi
+    assert of_face.sum() == pytest.approx(2 * np.pi * characteristic, abs=1e-10)
+    for v in range(mesh.n_vertices):
+        face, corner = np.nonzero(v == mesh.F)
+        # The half-edges opposite v are a loop counterclockwise around it.
+        turned = rho[face, corner].sum()
+        assert off_multiples(np.array([turned - of_face[face].sum()])).max() < 1e-11
+
+
+def test_flat_pieces_with_corners_have_no_holonomy():
+    mesh = shapes.grid(3)
+    triangulation = intrinsic_triangulation(mesh)
+    rho = transport_angles(triangulation, polar_angles(triangulation))
+    assert off_multiples(rho.reshape(-1, 3).sum(axis=1)).max() < 1e-12
+
+
+def test_boundary_angles_for_transport_become_polar_angles():
+    mesh = shapes.grid(2)
+    frames = tangent_frames(mesh)
+    corner, edge = 0, np.array([[1.0, 0, 0], [0, 1.0, 0], [1, 1, 0]])
+    angle = frames.to_angles(frames.from_world(edge, np.full(3, corner)))
+    np.testing.assert_allclose(frames.angles.to_polar(np.full(3, corner), angle), [0, np.pi, np.pi / 2], atol=1e-12)
+
+
+def test_unused_vertices_have_the_axes_of_space():
+    mesh = Mesh(np.vstack([shapes.grid(1).V, [[5, 5, 5]]]), shapes.grid(1).F)
+    frames = tangent_frames(mesh)
+    np.testing.assert_array_equal([frames.x[4], frames.y[4], frames.normal[4]], np.eye(3))
+
+
+def moebius(n: int = 8) -> Mesh:
+    angle = 2 * np.pi * np.arange(n) / n
+    half = np.stack([np.cos(angle / 2) * np.cos(angle), np.cos(angle / 2) * np.sin(angle), np.sin(angle / 2)], axis=1)
+    middle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    V = np.concatenate([middle - 0.3 * half, middle + 0.3 * half])
+    k = np.arange(n - 1)
+    F = np.concatenate([np.stack([k, k + 1, n + k], 1), np.stack([k + 1, n + k + 1, n + k], 1)])
+    last = [[n - 1, n, 2 * n - 1], [n, 0, 2 * n - 1]]
+    return Mesh(V, np.concatenate([F, last]))
+
+
+def test_surfaces_without_tangent_planes_are_named():
+    with pytest.raises(heat_igl.MeshError, match="is one of more than two faces"):
+        tangent_frames(shapes.book(3, 2))
+    with pytest.raises(heat_igl.MeshError, match="has faces that are oriented differently"):
+        tangent_frames(moebius())
+    with pytest.raises(heat_igl.MeshError, match="tetrahedral"):
+        tangent_frames(shapes.box(1))
+    two = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 1], [0, -1, 1]], [[0, 1, 2], [0, 3, 4]])
+    with pytest.raises(heat_igl.MeshError, match="the faces at vertex 0 are not one fan"):
+        tangent_frames(two)
+
+
+def test_bad_vectors_are_named():
+    frames = tangent_frames(shapes.grid(1))
+    assert frames.to_world([1.0, 0], [0]).shape == (1, 3)
+    with pytest.raises(ValueError, match=r"vectors must have shape \(4, 2\), but it has shape \(3, 2\)"):
+        frames.to_world(np.ones((3, 2)))
+    with pytest.raises(ValueError, match=r"vectors\[1\] = \[nan, 0.0\] is not finite"):
+        frames.to_world([[0, 0], [np.nan, 0]], [0, 1])
+    with pytest.raises(ValueError, match="vectors must hold real numbers"):
+        frames.from_world(["a"], [0])
+    with pytest.raises(heat_igl.MeshError, match=r"vertices\[0\] = 9 is out of range"):
+        frames.to_world([[1, 0]], [9])
