@@ -44,10 +44,10 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
         m triangles or tetrahedra.
     metric : (m, 3, 3), (n, 3, 3) or (m, 2, 2) array_like
         Symmetric and positive definite. (m, 3, 3) in space, of which a triangle takes what lies in its plane. (n, 3, 3)
-        at each vertex, of a metric that is linear in between: take this where the metric is smooth, as then distance is
-        of second order. If n = m, (m, 3, 3) is per face. (m, 2, 2) in the plane of each triangle: the first axis along
-        the edge from corner 0 to corner 1, the second towards corner 2. Unit: squared length in the metric per squared
-        length of the mesh.
+        at each vertex, of a metric whose logarithm is linear in between: take this where the metric is smooth, as then
+        distance is of second order. If n = m, (m, 3, 3) is per face. (m, 2, 2) in the plane of each triangle: the first
+        axis along the edge from corner 0 to corner 1, the second towards corner 2. Unit: squared length in the metric
+        per squared length of the mesh.
     laplacian : {"auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"}
         Of triangles, see `operators`.
 
@@ -70,7 +70,8 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
         too far along an edge, distance is that of the scheme for tetrahedra, on triangles.
 
         Tetrahedra: in one metric for all, distance is exact as in space. In any other, it is that of a scheme of first
-        order, sharpened to second where the metric and the distance are smooth, see `FrontSolver`.
+        order, sharpened to second where the metric and the distance are smooth, see `FrontSolver`. Where the tensors of
+        neighbours are those of a smooth field, they are carried to the vertices first.
 
     Raises
     ------

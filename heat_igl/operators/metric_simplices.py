@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from heat_igl.mesh import Mesh
 from heat_igl.operators.metric_derivatives import plane_axes
@@ -37,7 +38,8 @@ class MetricSimplices:
     least : float
         Smallest length in any metric per length in that space: no path is shorter than a straight line times this.
     tensors : (m, q, 3, 3) float64 or None
-        A metric that is not the same everywhere: of each simplex (q = 1), or at each of its corners (q = p + 1).
+        A metric that is not the same everywhere: of each simplex (q = 1), or at each of its corners (q = p + 1), with
+        logarithms of lengths that are linear in between.
     flipped : MetricSimplices or None
         The triangles after flips of edges, where they fit together; for fronts, which go on straight there.
     """
@@ -70,6 +72,8 @@ class MetricSimplices:
         if p == 3 and np.abs(tensors - first).max() <= _ROUNDING * np.abs(first).max():
             # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T; relative to a vertex, as digits are lost far from the origin.
             return cls.in_space(Mesh((mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(first), mesh.F))
+        if p == 3 and tensors.shape[1] == 1:
+            tensors = _at_corners(mesh, tensors[:, 0])
         inside = tensors
         if p == 2:
             axes = plane_axes(mesh)[:, None]
@@ -80,10 +84,9 @@ class MetricSimplices:
         squares = simplices.squared_lengths()
         lengths = np.sqrt(squares[:, 0])
         if tensors.shape[1] > 1:
-            # Along an edge, the tensor is linear from end to end: the integral of its square root.
+            # Along an edge, the logarithm of the squared length is linear: Simpson's rule of an exponential function.
             a, b = np.sqrt(np.einsum("miij->mij", squares)), np.sqrt(np.einsum("mjij->mij", squares))
-            total = a + b + np.eye(p + 1)
-            lengths = 2 / 3 * (a * a + a * b + b * b) / total
+            lengths = (a + 4 * np.sqrt(a * b) + b) / 6
         return replace(simplices, lengths=lengths)
 
     def squared_lengths(self) -> FloatArray:
@@ -120,3 +123,53 @@ class MetricSimplices:
         parts += [(ac, bd, one, other) for one, other in around]
         corners = np.concatenate([np.stack(part, axis=1) for part in parts])
         return MetricSimplices.in_space(Mesh(np.concatenate([self.V, self.V[ends].mean(axis=1)]), corners))
+
+
+def _at_corners(mesh: Mesh, g: FloatArray) -> FloatArray:
+    """The tensors g (m, 3, 3) of tetrahedra as samples of a smooth field: (m, 4, 3, 3) at their corners.
+
+    Around each vertex, a linear function is fitted to the logarithms of the tensors. The tensor at the vertex is taken
+    from it if it explains all of their variance, and is that of each tetrahedron if it leaves a quarter or more, as it
+    leaves of a step: jumps stay where they are. (m, 1, 3, 3) if the field is smooth nowhere.
+    """
+    m, n = mesh.n_faces, mesh.n_vertices
+    i, j = np.triu_indices(3)
+    off = np.where(i == j, 1, np.sqrt(2))
+    sizes, axes = np.linalg.eigh(g)
+    logs = ((axes * np.log(sizes)[:, None]) @ np.swapaxes(axes, 1, 2))[:, i, j] * off
+    level = logs.mean(axis=0)
+    logs -= level
+    X = mesh.V - mesh.V.mean(axis=0)
+    centre = X[mesh.F].mean(axis=1)
+    products = [centre[:, :, None] * values[:, None] for values in (centre, logs)]
+    one = np.ones((m, 1))
+    moments = np.concatenate(
+        [one, centre, logs, *(x.reshape(m, -1) for x in products), (logs**2).sum(1, keepdims=True)], 1
+    )
+    at = sp.csr_array((np.ones(4 * m), (mesh.F.ravel(), np.repeat(np.arange(m), 4))), shape=(n, m))
+    # Around a vertex: the tetrahedra at it and at the other corners of these.
+    sums = at @ (at.T @ (at @ moments))
+    sums /= np.maximum(sums[:, :1], 1)
+    middle, mean = sums[:, 1:4], sums[:, 4:10]
+    spread = sums[:, 10:19].reshape(n, 3, 3) - middle[:, :, None] * middle[:, None]
+    slope = sums[:, 19:37].reshape(n, 3, 6) - middle[:, :, None] * mean[:, None]
+    variance = sums[:, 37] - (mean**2).sum(axis=1)
+    fitted = np.linalg.pinv(spread, hermitian=True) @ slope
+    explained = (fitted * slope).sum(axis=(1, 2))
+    is_constant = variance <= _ROUNDING * (1 + sums[:, 37])
+    share = np.clip(1 - 4 * (1 - explained / np.where(is_constant, 1, variance)), 0, 1) * ~is_constant
+    if not share.any():
+        return g[:, None]
+    found = mean + np.einsum("nk,nkl->nl", X - middle, fitted)
+    count = np.maximum(at.sum(axis=1), 1)[:, None]
+    for _ in range(2):
+        # A mean over neighbours flattens curves: until the means over the corners are the given tensors.
+        rest = (logs - found[mesh.F].mean(axis=1)) * share[mesh.F].min(axis=1)[:, None]
+        found += at @ rest / count
+    found += level
+    log = np.empty((n, 3, 3))
+    log[:, i, j] = log[:, j, i] = found / off
+    sizes, axes = np.linalg.eigh(log)
+    at_vertex = (axes * np.exp(sizes)[:, None]) @ np.swapaxes(axes, 1, 2)
+    part = share[mesh.F][..., None, None]
+    return np.asarray((1 - part) * g[:, None] + part * at_vertex[mesh.F])

@@ -79,15 +79,17 @@ class FrontSolver(Engine):
         is_refined = self._is_small and not is_halved and len(self._reflex_edges[0]) > 0
         self._finer = FrontSolver(simplices.halved(), is_halved=True) if is_refined else None
 
-    def _measured(self, tensors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """What `HopfLax` reads of tensors: squared lengths, inverses, and the positions."""
-        # Read only where each simplex has one.
-        inverse = (
-            np.ascontiguousarray(np.linalg.pinv(tensors[:, 0], hermitian=True))
-            if tensors.shape[1] == 1
-            else np.empty((0, 3, 3))
-        )
-        return self._simplices.squared_lengths(), inverse, np.ascontiguousarray(self._simplices.place)
+    def _measured(self, tensors: FloatArray) -> tuple[FloatArray, ...]:
+        """What `HopfLax` reads of tensors: squared lengths, inverses, gradients of coordinates, and positions."""
+        simplices = self._simplices
+        place = np.ascontiguousarray(simplices.place)
+        X = place[simplices.corners]
+        is_solid = X.shape[1] == 4
+        E = X[:, 1:] - X[:, :1]
+        others = np.swapaxes(np.linalg.inv(E) if is_solid else np.linalg.pinv(E), 1, 2)
+        gradient = np.concatenate([-others.sum(axis=1, keepdims=True), others], axis=1)
+        inverse = np.linalg.inv(tensors) if is_solid else np.linalg.pinv(tensors, hermitian=True)
+        return simplices.squared_lengths(), *map(np.ascontiguousarray, (inverse, gradient)), place
 
     def _advance(self, vertices: AnyArray, distance: FloatArray, begin: FloatArray, label: AnyArray) -> None:
         """Lower distance to fronts."""

@@ -1,3 +1,6 @@
+from heat_igl.kernels.priority_queue cimport PriorityQueue
+from heat_igl.kernels.sweep.facets cimport Facet
+
 cdef extern from *:
     """
     // First order ends once no distance falls by more than GAIN of itself; it begins with the larger FIRST_GAIN. In metrics
@@ -7,16 +10,47 @@ cdef extern from *:
     // Second order ends once no distance changes by more than SETTLED of itself; it begins with the larger one.
     #define FIRST_SETTLED 1e-2
     #define SETTLED 0.9e-4
-    // Share of a facet by which the place moves in the last step of Newton's method; the error is of second order in it.
-    #define PLACED 1e-6
-    // Squared volume of a flat tetrahedron, over that of three edges at right angles. Without this bound, single vertices
-    // next to tetrahedra of 1e-7 are up to 40 % too short; with 1e-4 not more so than with first order.
-    #define FLAT 1e-4
     """
-    double FIRST_GAIN, GAIN, FIRST_SETTLED, SETTLED, PLACED, FLAT
+    double FIRST_GAIN, GAIN, FIRST_SETTLED, SETTLED
 
 cdef enum:
     # Of a vertex, in the second order.
     MOST_VISITS = 20
-    MOST_STEPS = 12
-    MOST_HALVINGS = 8
+
+
+cdef class HopfLax(Facet):
+    cdef const int[:, ::1] corners
+    cdef const int[::1] first
+    cdef const int[::1] incident
+    cdef const double[:, :, :, ::1] squares
+    cdef const double[:, :, ::1] mean
+    cdef const double[:, :, :, ::1] inverse
+    cdef const double[:, :, ::1] gradient
+    cdef const double[:, ::1] V
+    cdef PriorityQueue queue
+    cdef double[::1] pending
+    cdef int[::1] n_visits
+    cdef double unit, low
+    cdef const unsigned char[::1] fixed
+    cdef double[::1] d
+    cdef int[::1] label
+    cdef double[::1] handed
+    cdef const double[::1] offset
+    # The derivative of distance by the position of each vertex, where it is known.
+    cdef double[:, ::1] slope
+    cdef unsigned char[::1] is_sloped
+    # The corners of the facet in the simplex.
+    cdef int side[3]
+
+    cdef void spread(self, double low) noexcept nogil
+    cdef int nearest_corner(self) noexcept nogil
+    cdef void face(self, int c) noexcept nogil
+    cdef double linear(self, int s, int c) noexcept nogil
+    cdef double across(self, int s, int c, double da, double db, double dc) noexcept nogil
+    cdef void sharpen(self, const unsigned char[::1] fixed, double low) noexcept nogil
+    cdef void visit(self, int v) noexcept nogil
+    cdef void lay(self, int s, int c) noexcept nogil
+    cdef double curved(self, int s, int c) noexcept nogil
+    cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil
+    cdef double trust(self, int s, int corner) noexcept nogil
+    cdef void find_slope(self, int s, int c) noexcept nogil

@@ -1,0 +1,264 @@
+"""The least of T(x) + |v - x| over the points x of a facet, with T of second order on it."""
+
+import cython
+from cython.cimports.heat_igl.kernels.sweep.facets import FLAT, MOST_HALVINGS, MOST_STEPS, PLACED
+from cython.cimports.libc.math import INFINITY, exp, fabs, log, sqrt
+
+__all__ = ["Facet"]
+
+
+@cython.cclass
+class Facet:
+    """The facet opposite a corner v of a triangle, p = 2, or of a tetrahedron, p = 3.
+
+    Of its corners, `D` are the distances less `start`, and `sag[i][j]` is by how much the square of T sags below that
+    of the linear function between two of them. `product` has the scalar products of the vectors from v to the corners,
+    in one metric (q = 1), or in that at v and those at the corners (q = p + 1). The best place has the shares `share`.
+    """
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def is_flat(self) -> cython.bint:
+        """Whether v and the facet lie nearly in one plane: then slopes across it may come from the wrong side."""
+        m = cython.address(self.product[0])
+        det: cython.double = (
+            m[0] * (m[4] * m[8] - m[5] * m[5]) - m[1] * (m[1] * m[8] - m[5] * m[2]) + m[2] * (m[1] * m[5] - m[4] * m[2])
+        )
+        return det < FLAT * m[0] * m[4] * m[8]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def along_edges(self) -> cython.double:
+        """The least value along an edge to v; sets `share`."""
+        i: cython.int
+        at: cython.int = 0
+        best: cython.double = INFINITY
+        for i in range(3):
+            self.share[i] = 0.0
+        for i in range(self.p):
+            self.share[i] = 1.0
+            value: cython.double = self.start + self.D[i] + self.length(self.share)
+            self.share[i] = 0.0
+            if value < best:
+                best, at = value, i
+        self.share[at] = 1.0
+        return best
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def length(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
+        """|v - x|, with its derivatives `g` and `H` by the shares x, and `lean` by moving v towards each corner.
+
+        The logarithm of the squared length in one direction is linear between the corners: lengths are those of the
+        inverse metric as well, and the integral along the line is Simpson's rule of an exponential function.
+        """
+        i: cython.int
+        j: cython.int
+        k: cython.int
+        p: cython.int = self.p
+        of: cython.double
+        to: cython.double = 0.0
+        by: cython.double[3][4]
+        slope: cython.double[3]
+        bent: cython.double[3]
+        first: cython.double = 0.0
+        for k in range(self.q):
+            of = 0.0
+            for i in range(p):
+                by[k][i] = 0.0
+                for j in range(p):
+                    by[k][i] += self.product[9 * k + 3 * i + j] * x[j]
+                of += x[i] * by[k][i]
+            if not of > 0.0:
+                return 0.0
+            if k == 0:
+                first = of
+            else:
+                self.level[k - 1] = log(of)
+                to += x[k - 1] * self.level[k - 1]
+            for i in range(p):
+                by[k][i] *= 2.0 / of
+        near: cython.double = sqrt(first)
+        if self.q == 1:
+            for i in range(p):
+                self.g[i] = 0.5 * near * by[0][i]
+                self.lean[i] = -self.g[i]
+                for j in range(i + 1):
+                    self.H[i][j] = self.product[3 * i + j] / near - self.g[i] * self.g[j] / near
+            return near
+        far: cython.double = exp(0.5 * to)
+        middle: cython.double = 4.0 * sqrt(near * far)
+        # Of the logarithms of the squared lengths at v and at x; lengths change by half of that.
+        a: cython.double = (near + 0.5 * middle) / 12.0
+        b: cython.double = (far + 0.5 * middle) / 12.0
+        aa: cython.double = (near + 0.25 * middle) / 24.0
+        bb: cython.double = (far + 0.25 * middle) / 24.0
+        ab: cython.double = 0.25 * middle / 24.0
+        for i in range(p):
+            bent[i] = 0.0
+            for k in range(p):
+                bent[i] += x[k] * by[k + 1][i]
+            slope[i] = self.level[i] + bent[i]
+            self.g[i] = a * by[0][i] + b * slope[i]
+            self.lean[i] = a * (self.level[i] - log(first) - by[0][i]) - b * bent[i]
+        for i in range(p):
+            for j in range(i + 1):
+                of = 2.0 * self.product[3 * i + j] / first - by[0][i] * by[0][j]
+                to = by[i + 1][j] + by[j + 1][i]
+                for k in range(p):
+                    to += x[k] * (
+                        2.0 * self.product[9 * (k + 1) + 3 * i + j] / exp(self.level[k]) - by[k + 1][i] * by[k + 1][j]
+                    )
+                self.H[i][j] = (
+                    a * of
+                    + b * to
+                    + aa * by[0][i] * by[0][j]
+                    + bb * slope[i] * slope[j]
+                    + ab * (by[0][i] * slope[j] + slope[i] * by[0][j])
+                )
+        return (near + middle + far) / 6.0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def value(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
+        """T(x) + |v - x| for shares x of the corners, inf if there is none; sets its derivatives `g` and `H`."""
+        i: cython.int
+        j: cython.int
+        p: cython.int = self.p
+        mean: cython.double = 0.0
+        square: cython.double = 0.0
+        hang: cython.double[3]
+        for i in range(p):
+            mean += x[i] * self.D[i]
+            hang[i] = 0.0
+            for j in range(p):
+                if j != i:
+                    hang[i] += 0.5 * x[j] * self.sag[i][j]
+            square -= x[i] * hang[i]
+        square += mean * mean
+        if not square > 0.0:
+            return INFINITY
+        T: cython.double = sqrt(square)
+        L: cython.double = self.length(x)
+        if not L > 0.0:
+            return INFINITY
+        for i in range(p):
+            hang[i] = (mean * self.D[i] - hang[i]) / T
+            self.g[i] += hang[i]
+            for j in range(i + 1):
+                self.H[i][j] += (
+                    self.D[i] * self.D[j] - (0.5 * self.sag[i][j] if i != j else 0.0) - hang[i] * hang[j]
+                ) / T
+                self.H[j][i] = self.H[i][j]
+        return self.start + T + L
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def newton(self) -> cython.double:
+        """The least value over the facet, by Newton's method from `share`, which is changed."""
+        x: cython.double[3]
+        y: cython.double[3]
+        i: cython.int
+        _step: cython.int
+        _half: cython.int
+        for i in range(3):
+            x[i] = self.share[i] if i < self.p else 0.0
+            self.share[i] = x[i]
+        best: cython.double = self.value(x)
+        if best == INFINITY:
+            # The linear place is on the other side of what T allows: begin in the middle.
+            for i in range(self.p):
+                x[i] = self.share[i] = 1.0 / self.p
+            best = self.value(x)
+        for _step in range(MOST_STEPS):
+            if best == INFINITY:
+                return best
+            db: cython.double = 0.0
+            de: cython.double = 0.0
+            if self.p == 2:
+                bend: cython.double = self.H[0][0] - 2.0 * self.H[0][1] + self.H[1][1]
+                db = _on_interval(self.g[1] - self.g[0], bend, -x[1], x[0])
+            else:
+                db, de = self.on_triangle(x)
+            if fabs(db) + fabs(de) <= PLACED:
+                break
+            for _half in range(MOST_HALVINGS):
+                y[0], y[1], y[2] = max(x[0] - db - de, 0.0), max(x[1] + db, 0.0), max(x[2] + de, 0.0)
+                value: cython.double = self.value(y)
+                if value < best:
+                    break
+                db *= 0.5
+                de *= 0.5
+            if not value < best:
+                break
+            best = value
+            for i in range(3):
+                x[i] = self.share[i] = y[i]
+        return best
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def on_triangle(self, x: cython.pointer[cython.const[cython.double]]) -> tuple[cython.double, cython.double]:
+        """The step, in shares of the last two corners, to the least value of the quadratic model on the triangle."""
+        gb: cython.double = self.g[1] - self.g[0]
+        ge: cython.double = self.g[2] - self.g[0]
+        bb: cython.double = self.H[1][1] - 2.0 * self.H[0][1] + self.H[0][0]
+        ee: cython.double = self.H[2][2] - 2.0 * self.H[0][2] + self.H[0][0]
+        be: cython.double = self.H[1][2] - self.H[0][1] - self.H[0][2] + self.H[0][0]
+        det: cython.double = bb * ee - be * be
+        db: cython.double = 0.0
+        de: cython.double = 0.0
+        if bb > 0.0 and det > 0.0:
+            db = (be * ge - ee * gb) / det
+            de = (be * gb - bb * ge) / det
+            if x[1] + db >= 0.0 and x[2] + de >= 0.0 and db + de <= x[0]:
+                return db, de
+        # On the three edges.
+        one: cython.double = _on_interval(gb - be * x[2], bb, -x[1], 1.0 - x[1])
+        two: cython.double = -x[2]
+        least: cython.double = _model(gb, ge, bb, be, ee, one, two)
+        db, de = one, two
+        one, two = -x[1], _on_interval(ge - be * x[1], ee, -x[2], 1.0 - x[2])
+        value: cython.double = _model(gb, ge, bb, be, ee, one, two)
+        if value < least:
+            least, db, de = value, one, two
+        # With no share of the first corner: db + de = x[0].
+        one = _on_interval(gb - ge + (be - ee) * x[0], bb - 2.0 * be + ee, -x[1], 1.0 - x[1])
+        two = x[0] - one
+        if _model(gb, ge, bb, be, ee, one, two) < least:
+            db, de = one, two
+        return db, de
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _on_interval(slope: cython.double, bend: cython.double, low: cython.double, high: cython.double) -> cython.double:
+    """Where slope x + bend x^2 / 2 is least between two bounds."""
+    if bend > 0.0:
+        return min(max(-slope / bend, low), high)
+    return low if slope * low + 0.5 * bend * low * low < slope * high + 0.5 * bend * high * high else high
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _model(
+    gb: cython.double,
+    ge: cython.double,
+    bb: cython.double,
+    be: cython.double,
+    ee: cython.double,
+    b: cython.double,
+    e: cython.double,
+) -> cython.double:
+    return gb * b + ge * e + 0.5 * (bb * b * b + ee * e * e) + be * b * e
