@@ -197,7 +197,7 @@ FARTHEST_SPREAD = 1e5
 
 # --- The linear solver ---
 
-# Below, SuperLU takes less time for both factors and ten queries (scripts/tune_backends.py).
+# Below, SuperLU takes less time for both factors and ten queries (scripts/benchmark.py with both).
 SMALLEST_MULTIFRONTAL = 1000
 # With more entries of a factor than this many times n log2 n, SuperLU takes less time. Nested dissection by sweeps
 # leaves at most 4.3 times as many on the zoo and scans, but 10.7, 11.2 and 8.0 times on capped cylinders of two rings

@@ -19,6 +19,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+from scaffold import add_json, add_output, environment, option_parser, publish, table
 
 import heat_igl
 from heat_igl.errors import AccuracyWarning
@@ -28,8 +29,6 @@ from heat_igl.steps import PoissonProblem
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import Invariants, WindowEngine
 from heat_igl.validation.zoo import FAMILIES
-
-from scaffold import add_json, add_output, environment, option_parser, publish, table
 
 Break = Callable[[FloatArray, int], None]
 

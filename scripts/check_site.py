@@ -8,16 +8,13 @@ Prints what is wrong, and ends with a status of 1 if anything is.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from scaffold import option_parser
-
 LOADING = {"img": "src", "script": "src", "iframe": "src", "source": "src", "link": "href"}
 LOADED_LINKS = {"stylesheet", "icon", "preload"}  # of the element link; others are links for robots
-OUTSIDE = ("http", "https")
 
 
 class PageLinks(HTMLParser):
@@ -40,35 +37,25 @@ class PageLinks(HTMLParser):
             self.loaded.append(found[LOADING[tag]])
 
 
-def faults(root: Path) -> list[str]:
+def faults(root: Path) -> Iterator[str]:
     """One line for each link that leads nowhere, and each thing that is loaded from outside."""
     pages = {path.resolve(): PageLinks(path.read_text(encoding="utf8")) for path in sorted(root.rglob("*.html"))}
     if not pages:
-        return [f"{root} holds no pages"]
-    found = []
+        yield f"{root} holds no pages"
     for path, page in pages.items():
         name = path.relative_to(root.resolve()).as_posix()
         for target in dict.fromkeys(page.loaded + page.links):
             address = urlsplit(target)
-            if address.scheme in OUTSIDE or target.startswith("//"):
+            if address.scheme in ("http", "https") or target.startswith("//"):
                 if target in page.loaded:
-                    found.append(f"{name} loads {target} from outside")
+                    yield f"{name} loads {target} from outside"
             elif not address.scheme:
                 there = (path.parent / unquote(address.path)).resolve() if address.path else path
                 if not there.exists():
-                    found.append(f"{name}: {target} does not exist")
+                    yield f"{name}: {target} does not exist"
                 elif there in pages and unquote(address.fragment) not in pages[there].places:
-                    found.append(f"{name}: {target} names no place on that page")
-    return found
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    parser = option_parser(__doc__)
-    parser.add_argument("site", type=Path, help="directory of the built pages")
-    found = faults(parser.parse_args(argv).site)
-    print("\n".join(found) or "Every link inside leads somewhere, and nothing is loaded from outside.")
-    return int(bool(found))
+                    yield f"{name}: {target} names no place on that page"
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit("\n".join(faults(Path(sys.argv[1]))) or 0)

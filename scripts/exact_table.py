@@ -1,29 +1,31 @@
-"""Exact distance by windows: agreement with pygeodesic, windows per edge, times, and what local queries cost.
+"""Exact distance by windows: agreement with others, windows per edge, time and memory, and what local queries cost.
 
-    python scripts/exact_table.py bunny.obj cow.obj         # 4 sources on each
-    python scripts/exact_table.py MESH --vtp PROGRAM        # the program prints the seconds of its propagation
-    python scripts/exact_table.py MESH --matrix 10000       # rows of the 5 % nearest vertices, into a store
-    python scripts/exact_table.py MESH --output DIRECTORY   # where exact.json and exact.md go
+    python scripts/exact_table.py bunny.obj cow.obj --docs docs/exact.md    # 4 sources on each
+    python scripts/exact_table.py --shapes                 # generated shapes of 5000 to 130 000 vertices instead
+    python scripts/exact_table.py --shapes --only "plane"  # some of them
+    python scripts/exact_table.py MESH --threads           # and the gain of two threads, on idle machines
+    python scripts/exact_table.py --matrix 10000           # rows of the 5 % nearest vertices, into a store
 
-Truth is pygeodesic's (extra ``validate``); meshes that it refuses have no such column. The program of VTP (Qin et al.
-2016) is called with ``-m FILE -s VERTEX -o DISTANCES``, each time beside exact distance from arrays. Local queries are
-compared with a full query. Times are those of the processor, as VTP prints them, summed over
-threads. The rows of the matrix are those of the first vertices of a torus of 100 000.
+Where the variable HEAT_IGL_VTP names the program of VTP (Qin et al. 2016), it takes turns with exact distance from
+arrays; its seconds are those of the propagation alone, as it prints them, ours those of the processor with validation
+and preparation (one thread with HEAT_IGL_NUM_THREADS=1). Where both differ, pygeodesic is a third opinion. Local
+queries are a share of a full query. The shapes are smooth, where a window is carried far, and rough, where there are
+few windows and preparation counts most. The matrix is that of a torus of 100 000 vertices.
 """
 
 from __future__ import annotations
 
 import contextlib
-import re
+import os
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from scipy.spatial import Delaunay
 
 from heat_igl import (
     GeodesicSolver,
@@ -35,195 +37,211 @@ from heat_igl import (
     reference,
     shapes,
     write_distances_within,
-    write_mesh,
 )
 from heat_igl.errors import ReferenceSolverError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.runtime import PeakMemory
-from heat_igl.unfolding import exact_distance
+from heat_igl.typing import FloatArray
 from heat_igl.unfolding.exact import ExactSurface
 
-from measuring import drawn_sources
-from scaffold import add_output, environment, option_parser, over_meshes, publish, table
+from harness import (
+    METHODS,
+    Row,
+    Table,
+    collected,
+    drawn,
+    hull,
+    named,
+    on_sphere,
+    paired,
+    parsed,
+    publish,
+    ratio,
+    seconds,
+)
+from harness import vtp as run_vtp
 
-# Local queries: how many, the share of the vertices that a radius holds, and mean edges between the ends of a pair.
-_LOCAL, _SHARE, _APART = 1000, 0.01, 2.0
-_NEAREST = 32
-# The share of the vertices in each row of a matrix, and how many vertices there are around and along the torus.
-_IN_ROW, _TORUS = 0.05, (400, 250)
+# Local queries: how many, the share of the vertices that a radius holds, mean edges between the ends of a pair, and how
+# many nearest vertices.
+LOCAL, SHARE, APART, NEAREST = 1000, 0.01, 2.0, 32
+# The share of the vertices in each row of a matrix.
+IN_ROW = 0.05
+# Where VTP differs by more, relative to the distance, pygeodesic is asked too.
+AGREE = 1e-10
 
 
-def measured(mesh: Mesh, n_sources: int, repeats: int, vtp: Path | None) -> dict[str, Any]:
-    sources = drawn_sources(mesh, range(n_sources))
+def points_on_sphere(n: int, semi_axes: Sequence[float] = (1.0, 1.0, 1.0)) -> Mesh:
+    return hull(on_sphere(n, np.random.default_rng(0)) * semi_axes)
+
+
+def ground(n: int, roughness: float, shear: float = 0.0) -> Mesh:
+    """Random heights on the Delaunay triangulation of random points; `roughness` in units of their spacing."""
+    rng = np.random.default_rng(0)
+    P = rng.random((n, 2))
+    heights = rng.normal(size=n) * roughness / np.sqrt(n)
+    return Mesh(np.column_stack([P[:, 0] + shear * P[:, 1], P[:, 1], heights]), Delaunay(P).simplices)
+
+
+SHAPES: dict[str, Callable[[], Mesh]] = {
+    "icosphere 5": lambda: shapes.icosphere(5),
+    "icosphere 6": lambda: shapes.icosphere(6),
+    "bumpy sphere": lambda: shapes.blob(6),
+    "small torus": lambda: shapes.torus(120, 50),
+    "large torus": lambda: shapes.torus(400, 250),
+    "5000 points on a sphere": lambda: points_on_sphere(5000),
+    "100 000 points on a sphere": lambda: points_on_sphere(100_000),
+    "points on a flat ellipsoid": lambda: points_on_sphere(20_000, (1.0, 0.3, 0.1)),
+    "plane": lambda: shapes.grid(316),
+    "gentle ground": lambda: ground(5000, 0.2),
+    "rough ground": lambda: ground(5000, 0.5),
+    "rugged ground": lambda: ground(5000, 1.0),
+    "rough ground, large": lambda: ground(50_000, 0.5),
+    "rough ground, largest": lambda: ground(130_000, 0.5),
+    "sheared ground": lambda: ground(5000, 0.3, 4.0),
+    "sheared ground, large": lambda: ground(50_000, 0.3, 4.0),
+}
+
+
+def from_arrays(mesh: Mesh, source: int) -> FloatArray:
+    return geodesic_distance((mesh.V.copy(), mesh.F.copy()), source, method="exact")
+
+
+def difference(distance: FloatArray, other: FloatArray) -> float:
+    """The largest relative difference, at the vertices that the other has reached."""
+    known = (other > 0) & np.isfinite(other)
+    return float((np.abs(distance - other)[known] / other[known]).max())
+
+
+def measured(name: str, mesh: Mesh, n_sources: int, repeats: int, has_threads: bool) -> Row:
+    """Windows, seconds, memory, and differences to pygeodesic and VTP."""
+    sources = drawn(mesh, n_sources)
     surface = ExactSurface(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-    solutions = [surface.solve(np.array([source])) for source in sources]
-    row: dict[str, Any] = {
-        "n": mesh.n_vertices,
-        "windows per edge": float(np.mean([found.n_windows for found in solutions])) / len(mesh.edges),
-        "from arrays": processor_seconds(lambda: exact_distance(mesh.V.copy(), mesh.F.copy(), sources[0]), repeats),
-        "per query": processor_seconds(lambda: surface.solve(np.array([sources[0]])), repeats),
-    }
+    windows = [surface.solve(np.array([source])).n_windows / len(mesh.edges) for source in sources]
+    row: Row = {"mesh": name, "n": mesh.n_vertices, "windows": np.mean(windows)}
+    calls = {"from arrays": lambda: from_arrays(mesh, sources[0])}
+    calls["query"] = lambda: surface.solve(np.array([sources[0]]))
+    row |= {key: np.median(times) for key, times in paired(calls, repeats).items()}
     with PeakMemory() as peak:
-        exact_distance(mesh.V.copy(), mesh.F.copy(), sources[0])
-    row["peak"] = peak.bytes
-    try:
-        others = [reference.measured("pygeodesic", mesh, source) for source in sources]
-        pairs = zip(solutions, others, strict=True)
-        row["difference"] = max(_difference(found.distance, other.distance) for found, other in pairs)
-        row["their peak"] = others[0].peak_memory
-    except ReferenceSolverError as error:
-        row["refused"] = str(error)
-    if vtp is not None:
+        found = from_arrays(mesh, sources[0])
+    row["MiB"] = peak.bytes and peak.bytes / 2**20
+    others = {}
+    if mesh.n_vertices <= METHODS["pygeodesic"].most:
+        with contextlib.suppress(ReferenceSolverError):  # it refuses some meshes
+            theirs = reference.measured("pygeodesic", mesh, sources[0])
+            others["pygeodesic"], row["their MiB"] = theirs.distance, (theirs.peak_memory or 0) / 2**20
+            row["memory"] = row["MiB"] and row["MiB"] / row["their MiB"]
+    if METHODS["VTP"].is_there:
         # It ends in an error at edges of more than two faces.
         with contextlib.suppress(subprocess.CalledProcessError):
-            row |= beside_vtp(vtp, mesh, sources[0], repeats)
-            theirs = [run_vtp(vtp, mesh, source)[1] for source in sources]
-            if all(len(distance) == mesh.n_vertices for distance in theirs):  # it drops some vertices of some meshes
-                pairs = zip(solutions, theirs, strict=True)
-                row["vtp difference"] = max(_difference(found.distance, other) for found, other in pairs)
-    return row | local(mesh, sources[0], solutions[0].distance, repeats)
+            times = [beside_vtp(mesh, source, repeats) for source in sources]
+            row |= {"vtp": np.median([theirs for theirs, _ in times])}
+            shares = [share for _, share in times]
+            row |= {"share": np.median(shares), "largest share": max(shares)}
+            others["VTP"] = run_vtp(mesh, sources[0])[1]
+            row["lost"] = int(np.isinf(others["VTP"]).sum())
+    row |= {f"to {name}": difference(found, distance) for name, distance in others.items()}
+    if len(others) == 2 and row["to VTP"] > AGREE:
+        row["VTP to pygeodesic"] = difference(others["VTP"], others["pygeodesic"])
+    if has_threads:
+        row["speedup"] = speedup(mesh, sources[0], 5 * repeats)
+    return row
 
 
-def processor_seconds(call: Callable[[], object], repeats: int) -> float:
-    """Processor time of a call on all threads, the median: what else the machine does counts little."""
-    taken = []
+def beside_vtp(mesh: Mesh, source: int, repeats: int) -> tuple[float, float]:
+    """Seconds of VTP, and the median share that distance from arrays takes, in turns; the first call warms up."""
+    theirs, shares = [], []
     for _ in range(repeats):
-        begin = time.process_time()
-        call()
-        taken.append(time.process_time() - begin)
-    return float(np.median(taken))
+        theirs.append(run_vtp(mesh, source)[0])
+        shares.append(np.median([seconds(lambda: from_arrays(mesh, source)) for _ in range(3)]) / theirs[-1])
+    return float(np.median(theirs)), float(np.median(shares))
 
 
-def local(mesh: Mesh, source: int, distance: Any, repeats: int) -> dict[str, Any]:
+def speedup(mesh: Mesh, source: int, repeats: int) -> float:
+    """By how much two threads are faster than one, from arrays, by the clock."""
+
+    def on(threads: str) -> Callable[[], FloatArray]:
+        def call() -> FloatArray:
+            os.environ["HEAT_IGL_NUM_THREADS"] = threads
+            return from_arrays(mesh, source)
+
+        return call
+
+    before = os.environ.get("HEAT_IGL_NUM_THREADS", "")
+    times = paired({"1": on("1"), "2": on("2")}, repeats, time.perf_counter)
+    os.environ["HEAT_IGL_NUM_THREADS"] = before
+    return ratio(times["1"], times["2"])
+
+
+def local(name: str, mesh: Mesh, repeats: int) -> Row:
     """Seconds of each of many local queries, preparation shared, and of one full query."""
-    rng = np.random.default_rng(0)
+    source, solver = drawn(mesh, 1)[0], GeodesicSolver(mesh)
+    distance = solver.distance(source)
     usable = np.flatnonzero(np.isfinite(distance))
-    drawn = rng.choice(usable, min(_LOCAL, len(usable)), replace=False)
-    radius = float(np.sort(distance)[int(_SHARE * mesh.n_vertices) + 1])
-    apart = _APART * float(mesh.edge_lengths.mean())
-    near = distances_within(mesh, 1.5 * apart, drawn)
+    some = np.random.default_rng(0).choice(usable, min(LOCAL, len(usable)), replace=False)
+    radius = float(np.sort(distance)[int(SHARE * mesh.n_vertices) + 1])
+    apart = APART * float(mesh.edge_lengths.mean())
+    near = distances_within(mesh, 1.5 * apart, some)
     pairs = []
-    for vertex, begin, end in zip(drawn, near.indptr[:-1], near.indptr[1:], strict=True):
+    for vertex, begin, end in zip(some, near.indptr[:-1], near.indptr[1:], strict=True):
         best = np.argmin(np.abs(near.data[begin:end] - apart))
         pairs.append((vertex, near.indices[begin + best]))
-    solver = GeodesicSolver(mesh)
-    return {
-        "query": processor_seconds(lambda: solver.distance(source), max(repeats, 5)),
-        "within": processor_seconds(lambda: distances_within(mesh, radius, drawn), repeats) / len(drawn),
-        "held": float(np.diff(distances_within(mesh, radius, drawn).indptr).mean()),
-        "pair": processor_seconds(lambda: pair_distances(mesh, pairs), repeats) / len(pairs),
-        "nearest": processor_seconds(lambda: nearest_vertices(mesh, _NEAREST), 1),
+    calls: dict[str, Callable[[], object]] = {
+        "query": lambda: solver.distance(source),
+        "within": lambda: distances_within(mesh, radius, some),
+        "pair": lambda: pair_distances(mesh, pairs),
+        "nearest": lambda: nearest_vertices(mesh, NEAREST),
     }
+    took = {key: float(np.median(times)) for key, times in paired(calls, repeats).items()}
+    parts = {key: took["query"] / took[key] * len(some) for key in ("within", "pair")}
+    held = np.diff(distances_within(mesh, radius, some).indptr).mean()
+    return {"mesh": name, "held": held, "pair, us": 1e6 * took["pair"] / len(some), "parts": parts} | took
 
 
-def beside_vtp(program: Path, mesh: Mesh, source: int, repeats: int) -> dict[str, float]:
-    """Seconds of VTP, and what distance from arrays takes as a share of them: medians of calls that take turns."""
-    rows = [
-        (
-            run_vtp(program, mesh, source)[0],
-            # Three times: the first call after another program finds nothing in the caches.
-            processor_seconds(lambda: exact_distance(mesh.V.copy(), mesh.F.copy(), source), 3),
-            processor_seconds(lambda: geodesic_distance((mesh.V.copy(), mesh.F.copy()), source), 3),
-        )
-        for _ in range(repeats)
-    ]
-    theirs, exact, within = np.array(rows).T
-    return {
-        "vtp": float(np.median(theirs)),
-        "share": float(np.median(exact / theirs)),
-        "tolerance share": float(np.median(within / theirs)),
-    }
-
-
-def run_vtp(program: Path, mesh: Mesh, source: int) -> tuple[float, Any]:
-    """The seconds of its propagation, as the program prints them, and the distances that it writes."""
-    with tempfile.TemporaryDirectory() as folder:
-        path, distances = Path(folder, "mesh.obj"), Path(folder, "distances.txt")
-        write_mesh(path, mesh)
-        command = [str(program), "-m", str(path), "-s", str(source), "-o", str(distances)]
-        printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        found = np.array(distances.read_text().split(), float)
-    return float(re.findall(r"propagation step took (\S+) seconds", printed)[0]), found
-
-
-def streamed(n_rows: int) -> dict[str, float]:
+def streamed(n_rows: int) -> str:
     """What it takes to write rows of a matrix of nearest vertices to a store."""
-    mesh = shapes.torus(*_TORUS)
-    radius = float(np.quantile(exact_distance(mesh.V, mesh.F, 0), _IN_ROW))
-    with tempfile.TemporaryDirectory() as folder:
-        begin = time.process_time()
-        with PeakMemory() as peak:
-            write_distances_within(Path(folder, "matrix"), mesh, radius, np.arange(n_rows))
-        seconds = time.process_time() - begin
+    mesh = shapes.torus(400, 250)
+    radius = float(np.quantile(geodesic_distance(mesh, 0, method="exact"), IN_ROW))
+    with tempfile.TemporaryDirectory() as folder, PeakMemory() as peak:
+        took = seconds(lambda: write_distances_within(Path(folder, "matrix"), mesh, radius, np.arange(n_rows)))
         size = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file())
-    return {"vertices": mesh.n_vertices, "rows": n_rows, "seconds": seconds, "peak": peak.bytes or 0, "size": size}
+    return (
+        f"{n_rows} rows of {mesh.n_vertices} columns into a store: {took:.0f} s, {(peak.bytes or 0) / 2**20:.0f} MiB "
+        f"of memory, {size / 2**20:.0f} MiB of store."
+    )
 
 
-def _difference(distance: Any, other: Any) -> float:
-    there = np.isfinite(other) & (other > 0)
-    return float((np.abs(distance[there] - other[there]) / other[there]).max())
+EXACT = {
+    "mesh": "mesh", "vertices": "{n}", "windows per edge": "{windows:.2f}", "from arrays, s": "{from arrays:.4f}",
+    "per query, s": "{query:.4f}", "VTP, s": "{vtp:.3g}", "from arrays / VTP": "{share:.2f}",
+    "largest": "{largest share:.2f}", "difference to pygeodesic": "{to pygeodesic:.1e}", "to VTP": "{to VTP:.1e}",
+    "VTP to pygeodesic": "{VTP to pygeodesic:.1e}", "VTP without distance": "{lost}", "two threads": "{speedup:.2f}",
+}  # fmt: skip
+MEMORY = {"mesh": "mesh", "from arrays, MiB": "{MiB:.1f}", "pygeodesic, MiB": "{their MiB:.1f}",
+          "peak / pygeodesic's": "{memory:.2f}"}  # fmt: skip
+OF_LOCAL = {
+    "mesh": "mesh", "query, s": "{query:.4f}", "vertices within": "{held:.0f}", "within": "1/{parts[within]:.0f}",
+    "pair": "1/{parts[pair]:.0f}", "pair, µs": "{pair, us:.1f}", f"{NEAREST} nearest of all, s": "{nearest:.2f}",
+}  # fmt: skip
 
 
-def _mebibytes(size: int | None) -> str:
-    return "-" if size is None else f"{size / 2**20:.1f}"
-
-
-_OPTIONAL = (("vtp", 3), ("share", 2), ("tolerance share", 2), ("difference", 2), ("vtp difference", 2))
-
-
-def markdown(result: dict[str, Any]) -> str:
-    rows, shares, memory = [], [], []
-    for name, row in result["meshes"].items():
-        optional = (f"{row[key]:.{digits}g}" if key in row else "-" for key, digits in _OPTIONAL)
-        timed = ("from arrays", "per query")
-        seconds = (f"{row['windows per edge']:.2f}", *(f"{row[key]:.4f}" for key in timed))
-        rows.append((name, f"{row['n']}", *seconds, *optional))
-        parts = (f"1/{row['query'] / row[key]:.0f}" for key in ("within", "pair"))
-        last = (f"{1e6 * row['pair']:.1f}", f"{row['nearest']:.2f}")
-        shares.append((name, f"{row['query']:.4f}", f"{row['held']:.0f}", *parts, *last))
-        memory.append((name, *(_mebibytes(row.get(key)) for key in ("peak", "their peak"))))
-    times = ("from arrays, s", "per query, s")
-    head = ("mesh", "vertices", "windows per edge", *times, "VTP, s", "from arrays / VTP", "to the tolerance / VTP")
-    nearest = f"{_NEAREST} nearest of all, s"
-    local_head = ("mesh", "query, s", "vertices within", "within", "pair", "pair, µs", nearest)
-    lines = [
-        *table((*head, "difference to pygeodesic", "to VTP"), rows),
-        "",
-        f"Local queries as a share of a full one, of {_LOCAL}, preparation included: a radius "
-        f"that holds {100 * _SHARE:.0f} % of the vertices around one of them, and pairs {_APART:g} mean edges apart.",
-        "",
-        *table(local_head, shares),
-        "",
-        "Peak memory above what the process held before.",
-        "",
-        *table(("mesh", "from arrays, MiB", "pygeodesic, MiB"), memory),
-    ]
-    if "matrix" in result:
-        one = result["matrix"]
-        lines += [
-            "",
-            f"{one['rows']} rows of {one['vertices']} columns into a store: {one['seconds']:.0f} s, "
-            f"{one['peak'] / 2**20:.0f} MiB of memory, {one['size'] / 2**20:.0f} MiB of store.",
-        ]
-    return "\n".join(lines)
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    parser = option_parser(__doc__)
-    parser.add_argument("meshes", type=Path, nargs="*", help="triangle meshes")
-    parser.add_argument("--sources", type=int, default=4, help="sources on each mesh (default 4)")
-    parser.add_argument("--repeats", type=int, default=3, help="timed calls, of which the median counts (default 3)")
-    parser.add_argument("--vtp", type=Path, metavar="PROGRAM", help="the program of VTP")
-    parser.add_argument("--matrix", type=int, default=0, metavar="ROWS", help="rows of a matrix to write (default 0)")
-    add_output(parser, "exact")
-    arguments = parser.parse_args(argv)
-    vtp = None if arguments.vtp is None else arguments.vtp.resolve()
-    found = over_meshes(arguments.meshes, lambda mesh: measured(mesh, arguments.sources, arguments.repeats, vtp))
-    result = {"environment": environment(), "meshes": found}
-    if arguments.matrix:
-        result["matrix"] = streamed(arguments.matrix)
-    publish(result, markdown(result), folder=arguments.output, name="exact")
-    return 0
+def main(argv: Sequence[str] | None = None) -> None:
+    switches = {"shapes": False, "threads": False}
+    options = parsed(__doc__, argv, "*", sources=4, repeats=3, matrix=0, only=[*SHAPES], **switches)
+    tables: dict[str, Table | str] = {}
+    meshes = named(options.meshes)
+    generated = {name: SHAPES[name]() for name in options.only} if options.shapes else {}
+    for part, chosen in (("exact", meshes), ("shapes", generated)):
+        options_of = (options.sources, options.repeats, options.threads)
+        rows = collected(measured(name, mesh, *options_of) for name, mesh in chosen.items())
+        if rows:
+            tables |= {part: Table(rows, EXACT), "memory" * (part == "exact") or "memory, shapes": Table(rows, MEMORY)}
+    if meshes:
+        text = f"Local queries as shares of a full one, of {LOCAL}, preparation included."
+        rows = collected(local(name, mesh, options.repeats) for name, mesh in meshes.items())
+        tables["local"] = Table(rows, OF_LOCAL, text)
+    if options.matrix:
+        tables["matrix"] = streamed(options.matrix)
+    publish(options, tables)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
     python scripts/paper_claims.py                      # two to five minutes
     python scripts/paper_claims.py --quick              # small grids: seconds
-    python scripts/paper_claims.py --output DIRECTORY   # where paper_claims.json and paper_claims.md go
+    python scripts/paper_claims.py --output DIRECTORY   # for paper_claims.json and .md
 
 Most of it happens on the paper's own mesh, the unit square of step eps = 1 / i, with its formulas as `paper_formulas`
 has them. Nothing is drawn at random. Times depend on the machine; the rest does not, up to rounding.
@@ -24,11 +24,10 @@ from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, shapes
 from heat_igl.operators import operators
 from heat_igl.reference import baselines
 
-from paper_formulas import Square, distance, mean_error
-from paper_measurements import accuracy, computation_times, power_law
-from scaffold import add_output, environment, option_parser, publish, table
+from harness import Row, Table, parsed, publish
+from paper_formulas import Square, accuracy, computation_times, distance, mean_error, power_law
 
-Rows = list[dict[str, Any]]
+Rows = list[Row]
 
 
 def edge_length(sizes: Sequence[int]) -> Rows:
@@ -300,12 +299,7 @@ def jump(sizes: Sequence[int]) -> Rows:
     return rows
 
 
-def claim_table(rows: Rows) -> list[str]:
-    names = list(rows[0])
-    return table([_cell(name) for name in names], [[_cell(row[name]) for name in names] for row in rows])
-
-
-def _cell(value: Any) -> str:
+def cell(value: Any) -> str:
     if value is None:
         return "-"
     if isinstance(value, list):
@@ -328,25 +322,18 @@ def claims(quick: bool) -> dict[str, Rows]:
         "Expected accuracy": lambda: expected_accuracy((5, 10, 20) if quick else (10, 30, 56, 100, 200)),
         "The jump at i = 56": lambda: jump(range(52, 60) if quick else range(10, 81)),
     }
-    found = {}
-    for title, rows in todo.items():
-        print(title, file=sys.stderr)
-        found[title] = rows()
-    return found
+    return {title: rows() for title, rows in todo.items()}
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> None:
     # The errors of the paper's method are what is measured here.
     warnings.simplefilter("ignore", AccuracyWarning)
-    parser = option_parser(__doc__)
-    parser.add_argument("--quick", action="store_true", help="small grids")
-    add_output(parser, "paper_claims")
-    arguments = parser.parse_args(argv)
-    found = claims(arguments.quick)
-    lines = [line for title, rows in found.items() for line in (f"## {title}", "", *claim_table(rows), "")]
-    result = {"environment": environment(), "tables": found}
-    publish(result, "\n".join(lines), folder=arguments.output, name="paper_claims")
-    return 0
+    options = parsed(__doc__, argv, quick=False)
+    tables = {}
+    for title, rows in claims(options.quick).items():
+        shown = [{name: cell(value) for name, value in row.items()} for row in rows]
+        tables[title] = Table(shown, {cell(name): name for name in rows[0]}, f"## {title}")
+    publish(options, tables)
 
 
 if __name__ == "__main__":

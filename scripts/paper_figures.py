@@ -1,8 +1,9 @@
-"""The paper's figures 1 to 5, as PNG and PDF, with their data as CSV beside them.
+"""The paper's figures 1 to 5, and their data.
 
     python scripts/paper_figures.py                            # all, into ./paper-figures: about two minutes
-    python scripts/paper_figures.py --out DIRECTORY --figure 5 # one of them
+    python scripts/paper_figures.py --out docs/images --figure 5     # one of them, for docs/paper.md
     python scripts/paper_figures.py --figure 1 --mesh camelhead.off --source 7
+    python scripts/paper_figures.py --data --format pdf        # with the data as CSV beside them
     python scripts/paper_figures.py --quick                    # small grids, coarse curves: seconds
 
 1  heat and distance on an animal that steps on a hot rock: any mesh, by default the cow of the pymeshlab wheel
@@ -11,39 +12,33 @@
 4  distance from a corner of the square of step 1 / 70
 5  mean error from that corner against i, and (5_jump) the same in single precision
 
-docs/paper.md says what they show. Needs the extras ``view`` and ``fast``.
+Needs the extras ``view`` and ``fast``.
 """
 
 from __future__ import annotations
 
-import argparse
 import csv
 import sys
-import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import heat_igl
-from heat_igl import AccuracyWarning, HeatMethodSolver, shapes
+from heat_igl import AccuracyWarning, HeatMethodSolver, read_mesh, shapes
 from heat_igl.drawing.plots import Picture, plot
 
-from paper_formulas import Square, mean_error
-from paper_measurements import accuracy, computation_times, polynomial_errors, power_law
-from scaffold import environment, environment_line, option_parser, sample, write_json
+from harness import Row, parsed, sample
+from paper_formulas import Square, accuracy, computation_times, mean_error, polynomial_errors, power_law
 
-WIDTH = 3.15  # inches, one column
-FONT = 7.0
+WIDTH, FONT = 3.15, 7.0  # inches, one column; points
 # Okabe and Ito's colours, told apart by every eye.
 BLUE, ORANGE, GREEN, BLACK, GREY = "#0072B2", "#D55E00", "#009E73", "#000000", "#777777"
 COW = 2904, 751  # vertices; the one under a hoof that a picture from the side shows
 SIZES, SIZES_QUICK = range(10, 301, 10), range(5, 41, 5)
-
-
-# How it is shown.
+# Name, picture, and the data that it shows.
+Drawn = Iterator[tuple[str, Picture, list[Row]]]
 
 
 def canvas(height: float, panels: int = 1, ratios: Sequence[float] | None = None) -> tuple[Any, list[Any]]:
@@ -65,8 +60,7 @@ def canvas(height: float, panels: int = 1, ratios: Sequence[float] | None = None
 
 
 def label(panel: Any, x: str | None, y: str) -> None:
-    if x is not None:
-        panel.set_xlabel(x, fontsize=FONT)
+    panel.set_xlabel(x or "", fontsize=FONT)
     panel.set_ylabel(y, fontsize=FONT)
     if panel.get_legend_handles_labels()[0]:
         panel.legend(fontsize=FONT - 0.5, frameon=False, handlelength=1.8, borderaxespad=0.2, labelspacing=0.3)
@@ -91,20 +85,8 @@ def round_between(low: float, high: float) -> list[float]:
     return found
 
 
-def save(out: Path, name: str, picture: Picture) -> None:
-    for suffix in (".png", ".pdf"):
-        picture.save(out / f"{name}{suffix}")
-
-
-def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
-    with path.open("w", newline="", encoding="utf8") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-
-
-def figure_1(out: Path, options: argparse.Namespace) -> None:
-    mesh = heat_igl.read_mesh(options.mesh) if options.mesh else sample("cow")
+def figure_1(options: Any) -> Drawn:
+    mesh = read_mesh(options.mesh) if options.mesh else sample("cow")
     source = options.source
     if source is None:
         lowest = int(np.argmin(mesh.V[:, "xyz".index(options.up)]))
@@ -112,90 +94,61 @@ def figure_1(out: Path, options: argparse.Namespace) -> None:
     solution = HeatMethodSolver(mesh).solve(source)
     with np.errstate(divide="ignore"):
         decades = np.log10(solution.heat[source] / solution.heat)
+    view: Row = {"sources": source, "up": options.up, "view": options.view}
     heat = {"label": "heat, decades below the source", "colormap": "inferno_r"}
-    view = {"sources": source, "up": options.up, "view": options.view}
-    save(out, "figure_1_heat", plot(mesh, decades, **view, **heat))
-    save(out, "figure_1_distance", plot(mesh, solution.distance, **view))
-    columns = zip(mesh.V.tolist(), decades.tolist(), solution.distance.tolist(), strict=True)
-    write_csv(
-        out / "figure_1.csv",
-        [{"x": x, "y": y, "z": z, "decades": heat, "distance": phi} for (x, y, z), heat, phi in columns],
-    )
+    columns = np.column_stack([mesh.V, decades, solution.distance]).tolist()
+    rows = [dict(zip(("x", "y", "z", "decades", "distance"), row, strict=True)) for row in columns]
+    yield "1_heat", plot(mesh, decades, **view, **heat), rows
+    yield "1_distance", plot(mesh, solution.distance, **view), rows
 
 
-def figure_2(out: Path, options: argparse.Namespace) -> None:
-    rows = _times(options)
-    write_csv(out / "figure_2.csv", rows)
+def figure_2(options: Any) -> Drawn:
+    rows = options.times
     i = [row["i"] for row in rows]
     figure, (panel,) = canvas(2.2)
     for name, colour, marker in (("precomputation", BLUE, "o"), ("solve", ORANGE, "s")):
         seconds = [1e3 * row[name] for row in rows]
         exponent = power_law(i, seconds)["exponent"]
         panel.loglog(i, seconds, marker, color=colour, markersize=2.5, label=f"{name}, about $i^{{{exponent:.2f}}}$")
-        fit = np.array([max(seconds) * (k / max(i)) ** exponent for k in i])
-        panel.loglog(i, fit, color=colour, linewidth=0.7)
+        panel.loglog(i, max(seconds) * (np.array(i) / max(i)) ** exponent, color=colour, linewidth=0.7)
     plain_ticks(panel.xaxis, [5, 10, 20, 40] if options.quick else [10, 20, 50, 100, 200, 300])
     label(panel, "cells per side $i$ (step $1/i$, $2i^2$ faces)", "processor time in ms")
-    save(out, "figure_2", Picture(figure))
+    yield "2", Picture(figure), rows
 
 
-def _times(options: argparse.Namespace) -> list[dict[str, float]]:
-    """The times of figures 2 and 3, measured once in a run."""
-    if options.times is None:
-        options.times = computation_times(SIZES_QUICK if options.quick else SIZES, 1 if options.quick else 9)
-    return list(options.times)
-
-
-def figure_3(out: Path, options: argparse.Namespace) -> None:
-    times = _times(options)
-    i = [row["i"] for row in times]
+def figure_3(options: Any) -> Drawn:
+    i = [row["i"] for row in options.times]
     figure, panels = canvas(3.2, 2)
-    table: list[dict[str, Any]] = []
+    table: list[Row] = []
     for panel, name in zip(panels, ("precomputation", "solve"), strict=True):
-        seconds = [row[name] for row in times]
+        seconds = [row[name] for row in options.times]
         rows = polynomial_errors(i, seconds, range(1, min(11, len(i) - 1)))
         law = power_law(i, seconds)
-        table += [{"time": name, **row} for row in rows] + [{"time": name, "degree": "power law", **_errors(law)}]
+        table += [{"time": name, **row} for row in [*rows, {"degree": "power law", **law}]]
         degree = [row["degree"] for row in rows]
-        for key, colour, marker, text in (
-            ("left_out", ORANGE, "s", "points left out"),
-            ("in_sample", BLUE, "o", "points fitted"),
-        ):
-            percent = [100 * row[key] for row in rows]
-            panel.semilogy(degree, percent, marker + "-", color=colour, markersize=3, linewidth=0.8, label=text)
-        panel.axhline(
-            100 * law["left_out"],
-            color=BLACK,
-            linewidth=0.8,
-            linestyle="--",
-            label=f"$a\\,i^{{{law['exponent']:.2f}}}$",
-        )
+        for key, form, text in (("left_out", "s-", "points left out"), ("in_sample", "o-", "points fitted")):
+            percent, colour = [100 * row[key] for row in rows], ORANGE if key == "left_out" else BLUE
+            panel.semilogy(degree, percent, form, color=colour, markersize=3, linewidth=0.8, label=text)
+        of_law = f"$a\\,i^{{{law['exponent']:.2f}}}$"
+        panel.axhline(100 * law["left_out"], color=BLACK, linewidth=0.8, linestyle="--", label=of_law)
         panel.set_title(name, fontsize=FONT, loc="left", pad=3)
         plain_ticks(panel.xaxis, degree)
         plain_ticks(panel.yaxis, round_between(*panel.get_ylim()))
         label(panel, None, "RMS error, % of mean")
     panels[1].set_xlabel("degree of the polynomial in $i$", fontsize=FONT)
-    write_csv(out / "figure_3.csv", table)
-    save(out, "figure_3", Picture(figure))
+    yield "3", Picture(figure), [{"exponent": "", **row} for row in table]
 
 
-def _errors(law: dict[str, float]) -> dict[str, float]:
-    return {name: law[name] for name in ("in_sample", "left_out")}
-
-
-def figure_4(out: Path, options: argparse.Namespace) -> None:
-    i = 20 if options.quick else 70
-    square = shapes.grid(i)
+def figure_4(options: Any) -> Drawn:
+    square = shapes.grid(20 if options.quick else 70)
     distance = HeatMethodSolver(square, laplacian="cotan").distance(0)
-    save(out, "figure_4", plot(square, distance, sources=0, label="distance from the corner (side = 1)"))
-    truth = np.linalg.norm(square.V, axis=1)
-    columns = zip(square.V[:, :2].tolist(), distance.tolist(), truth.tolist(), strict=True)
-    write_csv(out / "figure_4.csv", [{"x": x, "y": y, "distance": phi, "truth": d} for (x, y), phi, d in columns])
+    columns = np.column_stack([square.V[:, :2], distance, np.linalg.norm(square.V, axis=1)]).tolist()
+    rows = [dict(zip(("x", "y", "distance", "truth"), row, strict=True)) for row in columns]
+    yield "4", plot(square, distance, sources=0, label="distance from the corner (side = 1)"), rows
 
 
-def figure_5(out: Path, options: argparse.Namespace) -> None:
+def figure_5(options: Any) -> Drawn:
     rows = [accuracy(i) for i in (range(2, 21) if options.quick else range(2, 121))]
-    write_csv(out / "figure_5.csv", rows)
     i = [row["i"] for row in rows]
     figure, (errors, rounding) = canvas(3.4, 2, (3.2, 1))
     for name, colour, style, width, text in (
@@ -210,74 +163,52 @@ def figure_5(out: Path, options: argparse.Namespace) -> None:
     plain_ticks(rounding.xaxis, [2, 5, 10, 20] if options.quick else [2, 5, 10, 20, 56, 120])
     for panel in (errors, rounding):
         label(panel, None, "mean error")
-    errors.legend(fontsize=FONT - 0.5, frameon=False, loc="lower left", labelspacing=0.25, handlelength=1.8)
     errors.set_ylim(1e-3, 1)
     rounding.set_ylim(1e-17, 1e-13)
     rounding.set_xlabel("cells per side $i$ (step $1/i$)", fontsize=FONT)
-    save(out, "figure_5", Picture(figure))
-    _jump(out, options.quick)
+    yield "5", Picture(figure), rows
+    yield jump(range(48, 60, 4) if options.quick else range(40, 71))
 
 
-def _jump(out: Path, quick: bool) -> None:
+def jump(sizes: Sequence[int]) -> tuple[str, Picture, list[Row]]:
     """The paper's unexplained rise at i = 56: errors in double and single precision."""
-    squares = [Square(i) for i in (range(48, 60, 4) if quick else range(40, 71))]
-    rows = [
-        {
-            "i": square.i,
-            "double": mean_error(square),
-            "single": mean_error(square, dtype=np.float32),
-            "single_safe_norm": mean_error(square, dtype=np.float32, safe_norm=True),
-        }
-        for square in squares
-    ]
-    write_csv(out / "figure_5_jump.csv", rows)
+    lines: dict[str, tuple[Row, str, str, float, str]] = {
+        "single": ({"dtype": np.float32}, ORANGE, "-", 1.0, "single precision"),
+        "double": ({}, BLUE, "-", 2.2, "double precision"),
+        "single_safe_norm": (
+            {"dtype": np.float32, "safe_norm": True}, GREEN, "--", 0.9, "single, norm that cannot underflow"
+        ),
+    }  # fmt: skip
+    rows: list[Row] = [{"i": i} | {k: mean_error(Square(i), **line[0]) for k, line in lines.items()} for i in sizes]
     figure, (panel,) = canvas(2.1)
-    for name, colour, style, width, text in (
-        ("single", ORANGE, "-", 1.0, "single precision"),
-        ("double", BLUE, "-", 2.2, "double precision"),
-        ("single_safe_norm", GREEN, "--", 0.9, "single, norm that cannot underflow"),
-    ):
-        errors = [row[name] for row in rows]
-        panel.plot([row["i"] for row in rows], errors, style, color=colour, linewidth=width, label=text)
+    for name, (_, colour, style, width, text) in lines.items():
+        panel.plot(sizes, [row[name] for row in rows], style, color=colour, linewidth=width, label=text)
     panel.axvline(56, color=GREY, linewidth=0.6, linestyle=":")
     panel.text(56.3, 0.001, "$i = 56$", fontsize=FONT - 0.5, color=GREY)
-    panel.set_ylim(0, 0.02)
-    panel.set_xlim(40, 66)
+    panel.set(ylim=(0, 0.02), xlim=(40, 66))
     label(panel, "cells per side $i$ (step $1/i$)", "mean error")
-    save(out, "figure_5_jump", Picture(figure))
+    return "5_jump", Picture(figure), rows
 
 
-FIGURES: dict[int, Callable[[Path, argparse.Namespace], Any]] = {
-    1: figure_1,
-    2: figure_2,
-    3: figure_3,
-    4: figure_4,
-    5: figure_5,
-}
+FIGURES: dict[int, Callable[[Any], Drawn]] = {1: figure_1, 2: figure_2, 3: figure_3, 4: figure_4, 5: figure_5}
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    # The errors of the paper's method are what is measured here.
-    warnings.simplefilter("ignore", AccuracyWarning)
-    parser = option_parser(__doc__)
-    parser.add_argument("--out", type=Path, default=Path("paper-figures"), help="directory (default ./paper-figures)")
-    parser.add_argument("--figure", type=int, choices=sorted(FIGURES), action="append", help="one figure; repeatable")
-    parser.add_argument("--mesh", type=Path, help="of figure 1 (default: the cow of the pymeshlab wheel)")
-    parser.add_argument("--source", type=int, help="vertex on the hot rock (default: the lowest)")
-    parser.add_argument("--up", choices="xyz", default="y", help="coordinate that points upwards in figure 1")
-    parser.add_argument("--view", type=float, nargs=2, metavar=("AZIMUTH", "ELEVATION"), help="of figure 1, in degrees")
-    parser.add_argument("--quick", action="store_true", help="small grids")
-    arguments = parser.parse_args(argv)
-    arguments.times = None
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    for number in sorted(set(arguments.figure or FIGURES)):
-        start = time.perf_counter()
-        FIGURES[number](arguments.out, arguments)
-        print(f"figure {number}: {time.perf_counter() - start:.1f} s")
-    around = environment()
-    print(f"Environment: {environment_line(around)}")
-    write_json(arguments.out / "environment.json", around)
-    return 0
+def main(argv: Sequence[str] | None = None) -> None:
+    warnings.simplefilter("ignore", AccuracyWarning)  # the errors of the paper's method are what is measured here
+    more: Row = {"mesh": Path, "source": int, "up": "y", "view": [30.0, 20.0], "format": "png", "data": False}
+    options = parsed(__doc__, argv, out=Path("paper-figures"), figure=[*FIGURES], quick=False, **more)
+    options.view = None if options.view == more["view"] else options.view
+    if {2, 3} & set(options.figure):
+        options.times = computation_times(SIZES_QUICK if options.quick else SIZES, 1 if options.quick else 9)
+    options.out.mkdir(parents=True, exist_ok=True)
+    for number in options.figure:
+        for name, picture, rows in FIGURES[number](options):
+            picture.save(options.out / f"paper_{name}.{options.format}")
+            if options.data:
+                with (options.out / f"paper_{name}.csv").open("w", newline="", encoding="utf8") as file:
+                    writer = csv.DictWriter(file, list(rows[0]), restval="", lineterminator="\n")
+                    writer.writeheader()
+                    writer.writerows(rows)
 
 
 if __name__ == "__main__":

@@ -3,27 +3,25 @@
     python scripts/peer_tests.py potpourri3d=FILE.py igl=FILE.py --only exact_geodesic heat_geodesics
     python scripts/peer_tests.py gdist=tvb-gdist/tests/test_gdist.py pygeodesic=pygeodesic/tests/test_pygeodesic.py
 
-A test file is run where it lies, unchanged; ``import potpourri3d`` in it finds `heat_igl.compat.potpourri3d`, and
-``import igl`` finds `heat_igl.compat.igl`; gdist and pygeodesic likewise. Tests run in the folder above
-theirs, whose data they may read. With ``--only``, tests that mention none of these words in their source are
-left out. The exit status is 1 if a test fails that is not in the list of known differences below.
+A test file is run where it lies, unchanged; ``import potpourri3d`` in it finds `heat_igl.compat.potpourri3d`, and the
+others likewise. Tests run in the folder above theirs, whose data they may read. With ``--only``, tests that mention
+none of these words in their source are left out. The exit status is 1 if a test fails that is not among those known
+below.
 """
 
 from __future__ import annotations
 
-import inspect
 import json
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import heat_igl
 
-from scaffold import add_json, add_output, environment, option_parser, publish, table
+from harness import Row, Table, parsed, publish
 
 # Test -> why it cannot pass, or does not yet.
 KNOWN = {
@@ -31,11 +29,8 @@ KNOWN = {
     "test_point_cloud_vector_heat": "its points fill a cube: their triangles are no surface that could be oriented",
     "test_octree": "it fails with libigl 2.6.3 itself, whose marching_cubes returns another number of arrays",
 }
-
-_NAMES = ("potpourri3d", "igl", "gdist", "pygeodesic")
-
 # Run by the interpreter of the tests: puts the drop-in in the place of the library, and reports in JSON.
-_RUNNER = """
+RUNNER = """
 import importlib, inspect, json, sys
 import pytest
 
@@ -70,53 +65,36 @@ json.dump(reports.found, open(out, "w"))
 """
 
 
-def outcomes(name: str, path: Path, words: Sequence[str]) -> list[dict[str, str]]:
+def outcomes(name: str, path: Path, words: Sequence[str]) -> Iterator[Row]:
     """Test, outcome and message of every test in a file, with `heat_igl.compat.<name>` in the place of `name`."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "found.json"
-        arguments = [name, str(path), json.dumps(list(words)), str(out)]
-        done = subprocess.run(
-            [sys.executable, "-c", _RUNNER, *arguments], capture_output=True, text=True, cwd=path.parents[1],
-            env={**os.environ, "PYTHONPATH": str(Path(heat_igl.__file__).parents[1])},
-        )  # fmt: skip
+        command = [sys.executable, "-c", RUNNER, name, str(path), json.dumps(list(words)), str(out)]
+        around = {**os.environ, "PYTHONPATH": str(Path(heat_igl.__file__).parents[1])}
+        done = subprocess.run(command, capture_output=True, text=True, cwd=path.parents[1], env=around)
         if not out.exists():
             raise RuntimeError(f"the tests of {path} did not run: {done.stderr.strip() or done.stdout.strip()}")
-        found: list[dict[str, str]] = json.loads(out.read_text(encoding="utf8"))
-        return found
-
-
-def markdown(results: dict[str, list[dict[str, str]]]) -> str:
-    """Counts of each library, and a reason for every test that did not pass."""
-    rows, reasons = [], []
-    for name, found in results.items():
-        counts = [sum(each["outcome"] == outcome for each in found) for outcome in ("passed", "skipped", "failed")]
-        rows.append((name, *map(str, counts)))
-        for each in found:
-            if each["outcome"] != "passed":
-                reasons.append((name, each["test"], KNOWN.get(each["test"]) or f"not known: {each['said']}"))
-    parts = [table(["tests of", "passed", "skipped", "failed"], rows)]
-    if reasons:
-        parts.append(table(["tests of", "test", "reason"], reasons, (0, 1, 2)))
-    return "\n\n".join("\n".join(lines) for lines in parts)
+        for each in json.loads(out.read_text(encoding="utf8")):
+            yield {"tests of": name, "reason": KNOWN.get(each["test"]) or f"not known: {each['said']}"} | each
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = option_parser(inspect.getdoc(sys.modules[__name__]))
-    parser.add_argument("files", nargs="+", metavar="NAME=FILE", help="a drop-in, and a test file of its library")
-    parser.add_argument("--only", nargs="+", default=[], metavar="WORD", help="tests with one of these in their source")
-    add_json(parser)
-    add_output(parser, "peer_tests")
-    options = parser.parse_args(argv)
-    results: dict[str, list[dict[str, str]]] = {}
-    for given in options.files:
-        name, _, path = given.partition("=")
-        if name not in _NAMES or not Path(path).is_file():
-            parser.error(f"{given}: expected NAME=FILE, with one of {', '.join(_NAMES)} and a file that exists")
-        results[name] = results.get(name, []) + outcomes(name, Path(path).resolve(), options.only)
-    result: dict[str, Any] = {"environment": environment(), "tests": results}
-    publish(result, markdown(results), folder=options.output, name="peer_tests", json_file=options.json)
-    failed = [each["test"] for found in results.values() for each in found if each["outcome"] == "failed"]
-    return int(any(test not in KNOWN for test in failed))
+    options = parsed(__doc__, argv, "+", only=[""])
+    rows = []
+    for given in options.meshes:
+        name, _, path = str(given).partition("=")
+        rows += list(outcomes(name, Path(path).resolve(), [word for word in options.only if word]))
+    counts = [
+        {"tests of": name}
+        | {k: sum(r["outcome"] == k and r["tests of"] == name for r in rows) for k in ("passed", "skipped", "failed")}
+        for name in dict.fromkeys(row["tests of"] for row in rows)
+    ]
+    tables = {"counts": Table(counts, {key: key for key in counts[0]})}
+    others = [row for row in rows if row["outcome"] != "passed"]
+    if others:
+        tables["reasons"] = Table(others, {key: key for key in ("tests of", "test", "reason")})
+    publish(options, tables)
+    return int(any(row["outcome"] == "failed" and row["test"] not in KNOWN for row in rows))
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ import sys
 from collections.abc import Sequence
 
 import numpy as np
+from scaffold import add_output, environment, option_parser, publish, table
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -25,8 +26,6 @@ from heat_igl.typing import FloatArray
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN, from_mesh
 from heat_igl.validation.zoo import FAMILIES
-
-from scaffold import add_output, environment, option_parser, publish, table
 
 NAMES = [name for name, make in FAMILIES.items() if make.__module__.endswith("nearly_flat")]
 _MOST_COMPARED = 60

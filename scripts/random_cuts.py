@@ -29,6 +29,7 @@ from typing import Any, NamedTuple
 
 import igl
 import numpy as np
+from scaffold import add_json, environment, option_parser, publish, table
 
 from heat_igl import Mesh, SurfaceCurve, curve_on, cut, edge_curve, isolines, shapes, tangent_frames
 from heat_igl.curves import CutMesh
@@ -37,8 +38,6 @@ from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import exact_distance
 from heat_igl.unfolding.half_edges import MARGIN
-
-from scaffold import add_json, environment, option_parser, publish, table
 
 # Relative differences above this are failures.
 LARGEST = 1e-12

@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from scaffold import add_json, environment, option_parser, publish, table
 from scipy.spatial import ConvexHull, Delaunay
 
 from heat_igl import Mesh, SignedHeatSolver, SurfacePoints, exp_map, geodesic_distance, log_map, shapes
@@ -27,8 +28,6 @@ from heat_igl.mesh import region_boundary
 from heat_igl.operators import operators
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import ExactSurface
-
-from scaffold import add_json, environment, option_parser, publish, table
 
 # Larger figures are failures.
 LARGEST = {"log-maps": 1e-8, "signed": 1e-12}

@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 import scipy.spatial
+from scaffold import add_output, environment, option_parser, publish, table
 
 from heat_igl import Mesh, SourceError, reference, shapes, shortest_paths
 from heat_igl.errors import ReferenceSolverError
@@ -37,8 +38,6 @@ from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding import exact_distance
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN
-
-from scaffold import add_output, environment, option_parser, publish, table
 
 LARGEST = 1e-10
 CAUSES = ("rounding", "no height", "too long", "contradiction", "unexplained")

@@ -1,41 +1,155 @@
-"""Signed distance from broken curves, beside potpourri3d's: errors, failures, and times.
+"""Signed distance on surfaces and in space: errors from broken curves, circles and holed surfaces, signs, and times.
 
-    python scripts/signed_table.py MESH [MESH ...] [--cases 40] [--signs 0] [--steps] [--no-times] [--json FILE]
+    python scripts/signed_table.py circles [--finest 160]        # circles against closed forms; how near 0 curves are
+    python scripts/signed_table.py broken MESH ... [--cases 40]  # curves with gaps, beside potpourri3d
+    python scripts/signed_table.py steps MESH ...                # time steps of the heat
+    python scripts/signed_table.py signs MESH ... [--cases 100]  # signs against the pieces of the cut mesh
+    python scripts/signed_table.py times MESH ... [--repeats 5]  # shares of potpourri3d's times
+    python scripts/signed_table.py volumes [--points 33] [--boxes 14] [--holed 3]   # in space, from surfaces with holes
 
-Each case is a level of a random smooth function on one of the meshes, in turn, and 10, 30 or 50 % of the length of its
-curves removed, in turn, in one to six pieces. The truth is the unfolded distance from the whole curves, with the sign
-of the function. Errors are means over the vertices, as a share of the square root of the area inside, in percent.
-Times are medians of paired runs; those of potpourri3d's first query are part of its precomputation, since it factors
-then. With --signs, the curves around as many random regions of each mesh: across faces, through vertices, along edges
-and through midpoints of edges in turn; signs are compared with the pieces of the cut mesh, at all vertices farther than
-half a mean edge from the curves. With --steps, the errors of the heat for several time steps on each mesh, for whole
-levels and with 30 % of their length removed, in the mean over three of each. The errors of --cases and the times need
-potpourri3d; docs/signed.md shows the tables.
+circles: on a perturbed square, a sphere and a cylinder, each mesh with edges half as long as the one before: the mean
+error in percent of the mean distance, and the order to which it falls. Then the values at the middles of the segments,
+linear in each triangle, in mean edge lengths, in the root of the mean square.
+broken: a level of a random smooth function on one of the meshes, in turn, and 10, 30 or 50 % of the length of its
+curves removed in one to six pieces. Truth is exact distance from the whole curves with the sign of the function; errors
+are means over the vertices, as a share of the square root of the area inside, in percent. Those of steps likewise.
+signs: curves around regions, across faces, through vertices, along edges and through midpoints of edges in turn, at the
+vertices farther than half a mean edge from them.
+times: medians of paired runs by the clock; potpourri3d's precomputation includes its first query, which factors.
+volumes: a sphere, a box and a torus in a unit cube: closed, with 20 % of the faces removed one by one, or 20 % of the
+area in patches. Truth is libigl's distance with the winding number. Mean error in cells within a cell of the surface,
+and in brackets at all points; the largest of several seeds. docs/signed.md shows the tables.
 """
 
 from __future__ import annotations
 
-import statistics
+import argparse
+import math
 import sys
-from collections.abc import Sequence
-from pathlib import Path
+import time
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+import igl
 import numpy as np
 
-import heat_igl
-from heat_igl import Mesh, SignedHeatSolver, SurfaceCurve, cut, geodesic_distance, isolines
+from heat_igl import (
+    Mesh,
+    SignedHeatSolver,
+    SurfaceCurve,
+    VoxelBox,
+    curve_on,
+    cut,
+    geodesic_distance,
+    isolines,
+    shapes,
+    volume_signed_distance,
+)
 from heat_igl.curves import sublevel_areas
 from heat_igl.mesh import region_boundary
 from heat_igl.typing import FloatArray
 
-from measuring import seconds_of
-from scaffold import add_json, add_seed, environment, option_parser, publish, table
+from harness import Row, Table, as_they_are, collected, geometric_mean, named, paired, parsed, publish, ratio
 
-SHARES = (0.1, 0.3, 0.5)
-LEVELS = ("ZeroSet", "None")
+COARSEST = 20
+# A regular grid has edges in three directions, which heat prefers; a random move of the vertices, by this share of the
+# spacing, leaves none that the curve could follow.
+MOVED = 0.2
+GAPS = (0.1, 0.3, 0.5)
 T_COEFS = (0.25, 0.5, 1.0, 2.0)
 KINDS = ("across faces", "through vertices", "along edges", "through midpoints")
+Curves = list[SurfaceCurve]
+Case = tuple[Mesh, Curves, FloatArray]
+
+
+# Circles.
+
+
+def circle() -> FloatArray:
+    angle = np.linspace(0, 2 * np.pi, 5760, endpoint=False)
+    return np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+
+
+def on_plane(n: int, seed: int) -> Case:
+    """A circle of radius 0.3 on a unit square of n x n perturbed squares."""
+    mesh = shapes.grid(n)
+    moved = np.random.default_rng(seed).uniform(-MOVED / n, MOVED / n, (mesh.n_vertices, 2))
+    V = mesh.V + np.pad(np.where(mesh.boundary[:, None], 0, moved), ((0, 0), (0, 1)))
+    mesh, middle = Mesh(V, mesh.F), np.array([0.5, 0.5, 0])
+    truth = np.linalg.norm(V - middle, axis=1) - 0.3
+    return mesh, [curve_on(mesh, 0.3 * circle() + middle, closed=True)], truth
+
+
+def on_sphere(n: int, seed: int) -> Case:
+    """The circle of latitude at height 0.8 on an icosphere with edges of about 2.8 / n."""
+    del seed
+    mesh = shapes.icosphere(3 + round(math.log2(n / COARSEST)))
+    latitude = np.arctan2(np.hypot(*mesh.V[:, :2].T), mesh.V[:, 2])
+    return mesh, [curve_on(mesh, 0.6 * circle() + [0, 0, 0.8], closed=True)], latitude - np.arctan2(3, 4)
+
+
+def on_cylinder(n: int, seed: int) -> Case:
+    """The circle at height 0.77 of a cylinder of 2 n x n squares and height 2."""
+    del seed
+    mesh = shapes.cylinder(2 * n, n, 2.0)
+    height = mesh.V[:, 2] - mesh.V[:, 2].min() - 0.77
+    return mesh, isolines(mesh, height, 0.0)[0], height
+
+
+SURFACES = {"plane": on_plane, "sphere": on_sphere, "cylinder": on_cylinder}
+WAYS: dict[str, dict[str, Any]] = {"default": {}, "heat, t = h^2 / 4": {"t_coef": 0.25}}
+
+
+def circles(options: argparse.Namespace) -> Iterator[Row]:
+    """Mean errors on each mesh, and the orders; an error below 1e-9 is rounding."""
+    before: Row = {}
+    for surface, make in SURFACES.items():
+        for k in range(1 + max(0, int(math.log2(options.finest / COARSEST)))):
+            n = COARSEST * 2**k
+            mesh, curves, truth = make(n, options.seed)
+            row: Row = {"surface": surface, "vertices": mesh.n_vertices}
+            for name, way in (WAYS | {"heat, t with h": {"t_coef": n / 80}}).items():
+                off = np.abs(SignedHeatSolver(mesh, **way).distance(curves) - truth).mean()
+                error = 100 * off / np.abs(truth).mean()
+                order = k and min(error, before[name]) > 1e-9 and math.log2(before[name] / error)
+                row[name] = f"{error * (error > 1e-9):.2g}" + (f" ({order:.1f})" if order else "")
+                before[name] = error
+            yield row
+
+
+def nearness(options: argparse.Namespace) -> Iterator[Row]:
+    """How near 0 the answers are on circles and on levels with bends; the largest of several cases."""
+    rng = np.random.default_rng(options.seed)
+    cases: dict[str, list[Case]] = {
+        "circle, square, n = 12": [on_plane(12, options.seed)],
+        "circle, square, n = 40": [on_plane(40, options.seed)],
+        "circle, sphere, n = 20": [on_sphere(20, options.seed)],
+    }
+    coarse = {"sphere": shapes.icosphere(3), "torus": shapes.torus(40, 20), "blob": shapes.blob(3)}
+    for name, mesh in coarse.items():
+        cases[f"levels, {name} of {mesh.n_vertices} vertices"] = [bent_level(mesh, rng) for _ in range(6)]
+    for name, each in cases.items():
+        row: Row = {"curves": name}
+        for level in ("none", "zero", None):
+            row[level or "default"] = max(
+                on_curves(m, c, SignedHeatSolver(m).distance(c, level=level)) for m, c, _ in each
+            )
+        yield row | ({"true distance": max(on_curves(*case) for case in each)} if name.startswith("circle") else {})
+
+
+def bent_level(mesh: Mesh, rng: np.random.Generator) -> Case:
+    values = np.sin(mesh.V @ rng.normal(size=(3, 5)) * 2 + rng.uniform(0, 6, 5)).sum(axis=1)
+    return mesh, isolines(mesh, values, float(np.quantile(values, 0.4)))[0], values
+
+
+def on_curves(mesh: Mesh, curves: Curves, values: FloatArray) -> float:
+    """Root mean square of values along curves, in mean edge lengths."""
+    middle = np.concatenate([np.einsum("sc,sc->s", (c.start + c.end) / 2, values[mesh.F[c.faces]]) for c in curves])
+    length = np.concatenate([curve.lengths(mesh) for curve in curves])
+    return float(np.sqrt(np.average(middle**2, weights=length)) / mesh.edge_lengths.mean())
+
+
+# Levels of random smooth functions, whole and broken.
 
 
 class Peer:
@@ -45,17 +159,14 @@ class Peer:
         import potpourri3d
 
         self._mesh = mesh
-        self._solver = potpourri3d.MeshSignedHeatSolver(mesh.V, mesh.F)
+        self.solver = potpourri3d.MeshSignedHeatSolver(mesh.V, mesh.F)
         pairs = np.asarray(potpourri3d.edges(mesh.V, mesh.F)).tolist()
         self._edge = {frozenset(pair): (i, pair[0]) for i, pair in enumerate(pairs)}
 
-    def nodes(self, curves: list[SurfaceCurve]) -> list[list[tuple[int, list[float]]]]:
+    def nodes(self, curves: Curves) -> list[list[tuple[int, list[float]]]]:
         """The curves as it takes them, reversed: it is positive on the left."""
-        found = []
-        for curve in curves:
-            places = [(curve.faces[0], curve.start[0]), *zip(curve.faces, curve.end, strict=True)]
-            found.append([self._node(int(face), at) for face, at in places[::-1]])
-        return found
+        places = [[(c.faces[0], c.start[0]), *zip(c.faces, c.end, strict=True)] for c in curves]
+        return [[self._node(int(face), at) for face, at in each[::-1]] for each in places]
 
     def _node(self, face: int, at: FloatArray) -> tuple[int, list[float]]:
         held = np.flatnonzero(at > 1e-12)
@@ -68,11 +179,14 @@ class Peer:
         return edge, [float(at[held[1 if tail == corners[0] else 0]])]
 
     def distance(self, nodes: Any, level: str) -> FloatArray:
-        """The answer; a RuntimeError or a ValueError where it fails."""
-        return np.asarray(self._solver.compute_distance(nodes, level_set_constraint=level))
+        """The answer; NaN where a factorization fails."""
+        try:
+            return np.asarray(self.solver.compute_distance(nodes, level_set_constraint=level))
+        except (RuntimeError, ValueError):
+            return np.full(self._mesh.n_vertices, np.nan)
 
 
-def broken(mesh: Mesh, curve: SurfaceCurve, share: float, gaps: int, rng: np.random.Generator) -> list[SurfaceCurve]:
+def broken(mesh: Mesh, curve: SurfaceCurve, share: float, gaps: int, rng: np.random.Generator) -> Curves:
     """What is left of a curve when a share of its length is removed, in pieces of equal length."""
     lengths = curve.lengths(mesh)
     middle = (np.cumsum(lengths) - lengths / 2) / lengths.sum()
@@ -93,99 +207,83 @@ def smooth_function(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
     return np.asarray(np.sin(mesh.V @ waves + rng.uniform(0, 2 * np.pi, 4)) @ rng.normal(size=4))
 
 
-def our_solvers(mesh: Mesh) -> dict[str, Any]:
-    """By default, with the integrated distance, and refined."""
-    return {
-        "default": SignedHeatSolver(mesh),
-        "heat": SignedHeatSolver(mesh, t_coef=T_COEFS[0]),
-        "windows": SignedHeatSolver(mesh, method="windows"),
-    }
-
-
-def measure_case(mesh: Mesh, solvers: dict[str, Any], share: float, rng: np.random.Generator) -> dict[str, float]:
-    """The errors of all solvers in one case; NaN where one fails."""
+def whole_and_pieces(mesh: Mesh, share: float, gaps: int, rng: np.random.Generator) -> tuple[Curves, Curves, Any]:
+    """A level, what is left of it, and a function to the error in percent of the square root of the area inside."""
     values = smooth_function(mesh, rng)
     level = float(np.quantile(values, rng.uniform(0.3, 0.7)))
     whole = isolines(mesh, values, level)[0]
-    gaps = int(rng.integers(1, 7))
     pieces = [piece for curve in whole for piece in broken(mesh, curve, share, gaps, rng)]
     truth = np.where(values < level, -1, 1) * geodesic_distance(mesh, whole)
     size = float(np.sqrt(sublevel_areas(mesh, values, level)[0]))
-    answers: dict[str, FloatArray | None] = {}
-    for name, solver in solvers.items():
-        if isinstance(solver, Peer):
-            for constraint in LEVELS:
-                try:
-                    answers[f"{name} {constraint}"] = solver.distance(solver.nodes(pieces), constraint)
-                except (RuntimeError, ValueError):  # a factorization that failed
-                    answers[f"{name} {constraint}"] = None
-        else:
-            answers[name] = solver.distance(pieces)
-    return {
-        name: np.nan if found is None else float(100 * np.abs(found - truth).mean() / size)
-        for name, found in answers.items()
-    }
+    return whole, pieces, lambda found: float(100 * np.abs(found - truth).mean() / size)
 
 
-def measure_times(mesh: Mesh, rounds: int) -> dict[str, float]:
-    """Seconds, and their ratios: a curve through the middle of the mesh, whole for the peer and in every ratio."""
-    height = mesh.V @ [0.3, 0.5, 0.81]
-    curves = isolines(mesh, height, float(np.median(height)))[0]
-    rng = np.random.default_rng(0)
-    pieces = [piece for curve in curves for piece in broken(mesh, curve, 0.3, 3, rng)]
+def broken_rows(meshes: dict[str, Mesh], options: argparse.Namespace) -> Iterator[Row]:
+    rng = np.random.default_rng(options.seed)
+    solvers = {name: {way: SignedHeatSolver(m, **kept) for way, kept in WAYS.items()} for name, m in meshes.items()}
+    peers = {name: Peer(mesh) for name, mesh in meshes.items()}
+    for case in range(options.cases):
+        name, share = list(meshes)[case % len(meshes)], GAPS[case // len(meshes) % len(GAPS)]
+        _, pieces, error = whole_and_pieces(meshes[name], share, int(rng.integers(1, 7)), rng)
+        row: Row = {"mesh": name, "removed": share}
+        row |= {way: error(solver.distance(pieces)) for way, solver in solvers[name].items()}
+        nodes = peers[name].nodes(pieces)
+        for level in ("ZeroSet", "None"):
+            row[f"potpourri3d {level}"] = error(peers[name].distance(nodes, level))
+        yield row
+
+
+def summary(rows: Sequence[Row]) -> Iterator[Row]:
+    """Means for each share removed, and comparisons with the better of the peer's answers."""
+    names = [name for name in rows[0] if name not in ("mesh", "removed")]
+    best = [np.nanmin([row[name] for name in names if name.startswith("potpourri3d")]) for row in rows]
+    for share in GAPS:
+        some = [row for row in rows if row["removed"] == share]
+        if some:
+            yield {"removed": f"{share:.0%}", "n": len(some)} | {
+                k: f"{np.nanmean([r[k] for r in some]):.3g}" for k in names
+            }
+    ratios = {name: np.array([row[name] for row in rows]) / best for name in names}
+    yield {"removed": "failed", "n": len(rows)} | {k: str(int(np.isnan(r).sum())) for k, r in ratios.items()}
+    yield {"removed": "no worse", "n": len(rows)} | {k: str(int((r <= 1).sum())) for k, r in ratios.items()}
+    yield {"removed": "of its error, at most", "n": ""} | {k: np.nanmax(r) for k, r in ratios.items()}
+    means = {k: geometric_mean(r[~np.isnan(r)]) for k, r in ratios.items()}
+    yield {"removed": "in the geometric mean", "n": ""} | means
+
+
+def steps(name: str, mesh: Mesh, rng: np.random.Generator) -> Row:
+    """Mean error of the heat for each time step: of whole levels, and with 30 % of their length removed."""
     found: dict[str, list[float]] = {}
-
-    def ours() -> SignedHeatSolver:
-        return SignedHeatSolver(mesh)
-
-    peer = Peer(mesh)
-    nodes = peer.nodes(curves)
-
-    def theirs() -> None:
-        import potpourri3d
-
-        solver = potpourri3d.MeshSignedHeatSolver(mesh.V, mesh.F)
-        solver.compute_distance(nodes, level_set_constraint="None")
-
-    solver, refined = ours(), SignedHeatSolver(mesh, method="windows")
-    queries = {
-        "query": lambda: solver.distance(curves),
-        "broken query": lambda: solver.distance(pieces),
-        "heat query": lambda: solver.distance(curves, level="zero"),
-        "refined query": lambda: refined.distance(curves),
-    }
-    for ask in (*queries.values(), lambda: peer.distance(nodes, "None")):
-        ask()
-    for _ in range(rounds):
-        times = {"precomputation": (seconds_of(ours), seconds_of(theirs))}
-        for name, ask in queries.items():
-            times[name] = seconds_of(ask), seconds_of(lambda: peer.distance(nodes, "None"))
-        for name, (one, other) in times.items():
-            for key, value in ((f"{name}, s", one), (f"{name}, peer, s", other), (f"{name}, ratio", one / other)):
-                found.setdefault(key, []).append(value)
-    return {"vertices": mesh.n_vertices} | {name: statistics.median(each) for name, each in found.items()}
+    solvers = {f"t = {t_coef:g} h^2": SignedHeatSolver(mesh, t_coef=t_coef) for t_coef in T_COEFS}
+    for _ in range(3):
+        whole, pieces, error = whole_and_pieces(mesh, 0.3, 3, rng)
+        for what, curves in (("whole", whole), ("30 % removed", pieces)):
+            for step, solver in solvers.items():
+                found.setdefault(f"{what}, {step}", []).append(error(solver.distance(curves)))
+    return {"mesh": name, "vertices": mesh.n_vertices} | {key: np.mean(each) for key, each in found.items()}
 
 
-def drawn(kind: str, mesh: Mesh, values: FloatArray, level: float) -> list[SurfaceCurve]:
+def around_region(kind: str, mesh: Mesh, values: FloatArray, level: float) -> Curves:
     """Closed curves around a region of low values, with the region on their left."""
-    if kind == "across faces":
-        return isolines(mesh, values, level)[0]
-    if kind == "through vertices":
-        return isolines(mesh, values, float(values[np.argmin(np.abs(values - level))]))[0]
     if kind == "along edges":
         return region_boundary(mesh, faces=values[mesh.F].mean(axis=1) < level)
-    return region_boundary(mesh, vertices=values < level)
+    if kind == "through midpoints":
+        return region_boundary(mesh, vertices=values < level)
+    if kind == "through vertices":
+        level = float(values[np.argmin(np.abs(values - level))])
+    return isolines(mesh, values, level)[0]
 
 
-def wrong_signs(mesh: Mesh, count: int, rng: np.random.Generator) -> dict[str, int]:
-    """Cases with a wrong sign, and vertices compared; the truth is a flood fill of the cut mesh."""
-    solvers = our_solvers(mesh)
-    found = {"cases": 0, "curves": 0, "vertices compared": 0}
-    found |= {f"{name}, cases with a wrong sign": 0 for name in solvers}
-    for case in range(count):
+def signs(name: str, mesh: Mesh, options: argparse.Namespace) -> Row:
+    """Regions with a wrong sign, and vertices compared; the truth is a flood fill of the cut mesh."""
+    solvers = {way: SignedHeatSolver(mesh, **kept) for way, kept in WAYS.items()}
+    rng = np.random.default_rng(options.seed)
+    row: Row = {"mesh": name, "regions": options.cases, "curves": 0, "vertices compared": 0} | dict.fromkeys(solvers, 0)
+    for case in range(options.cases):
         values = smooth_function(mesh, rng)
-        level = float(np.quantile(values, rng.uniform(0.2, 0.8)))
-        curves = drawn(KINDS[case % len(KINDS)], mesh, values, level)
+        curves = around_region(
+            KINDS[case % len(KINDS)], mesh, values, float(np.quantile(values, rng.uniform(0.1, 0.9)))
+        )
         pieces = cut(mesh, curves)
         left, right = (set(side[side >= 0].tolist()) for side in pieces.pieces[pieces.sides].T)
         if left & right:
@@ -193,96 +291,119 @@ def wrong_signs(mesh: Mesh, count: int, rng: np.random.Generator) -> dict[str, i
         is_left = np.zeros(pieces.mesh.n_vertices, bool)
         is_left[pieces.mesh.F[np.isin(pieces.pieces, sorted(left))]] = True
         far = geodesic_distance(mesh, curves) > mesh.edge_lengths.mean() / 2
-        found["cases"] += 1
-        found["curves"] += len(curves)
-        found["vertices compared"] += int(far.sum())
-        for name, solver in solvers.items():
-            is_wrong = (solver.distance(curves) < 0) != is_left[: mesh.n_vertices]
-            found[f"{name}, cases with a wrong sign"] += bool(is_wrong[far].any())
-    return found
+        row["curves"] += len(curves)
+        row["vertices compared"] += int(far.sum())
+        for way, solver in solvers.items():
+            row[way] += bool(((solver.distance(curves) < 0) != is_left[: mesh.n_vertices])[far].any())
+    return row
 
 
-def errors_by_step(mesh: Mesh, rng: np.random.Generator) -> dict[str, Any]:
-    """Mean error for each time step: of whole levels, and with 30 % of their length removed."""
-    solvers = {t_coef: SignedHeatSolver(mesh, t_coef=t_coef) for t_coef in T_COEFS}
-    errors = np.zeros((2, len(T_COEFS)))
-    for _ in range(3):
-        values = smooth_function(mesh, rng)
-        level = float(np.quantile(values, rng.uniform(0.3, 0.7)))
-        whole = isolines(mesh, values, level)[0]
-        truth = np.where(values < level, -1, 1) * geodesic_distance(mesh, whole)
-        size = float(np.sqrt(sublevel_areas(mesh, values, level)[0]))
-        pieces = [piece for curve in whole for piece in broken(mesh, curve, 0.3, 3, rng)]
-        for row, curves in zip(errors, (whole, pieces), strict=True):
-            row += [100 * np.abs(solver.distance(curves) - truth).mean() / size / 3 for solver in solvers.values()]
-    names = [f"{what}, t = {t_coef:g} h^2" for what in ("whole", "30 % removed") for t_coef in T_COEFS]
-    return {"vertices": mesh.n_vertices} | dict(zip(names, errors.ravel().tolist(), strict=True))
+def times(name: str, mesh: Mesh, repeats: int) -> Iterator[Row]:
+    """Medians of paired runs: a curve through the middle of the mesh, whole for the peer and in every ratio."""
+    height = mesh.V @ [0.3, 0.5, 0.81]
+    curves = isolines(mesh, height, float(np.median(height)))[0]
+    rng = np.random.default_rng(0)
+    pieces = [piece for curve in curves for piece in broken(mesh, curve, 0.3, 3, rng)]
+    peer, solver = Peer(mesh), SignedHeatSolver(mesh)
+    nodes = peer.nodes(curves)
+
+    def theirs() -> None:
+        import potpourri3d
+
+        made = potpourri3d.MeshSignedHeatSolver(mesh.V, mesh.F)
+        made.compute_distance(nodes, level_set_constraint="None")
+
+    calls: dict[str, Callable[[], object]] = {
+        "query from a closed curve": lambda: solver.distance(curves),
+        "query from a curve with gaps": lambda: solver.distance(pieces),
+        'query, level="zero"': lambda: solver.distance(curves, level="zero"),
+    }
+    made = paired({"ours": lambda: SignedHeatSolver(mesh), "theirs": theirs}, repeats, time.perf_counter)
+    asked = paired(calls | {"theirs": lambda: peer.distance(nodes, "None")}, repeats, time.perf_counter)
+    for what, one, other in (
+        ("precomputation", made["ours"], made["theirs"]),
+        *((what, asked[what], asked["theirs"]) for what in calls),
+    ):
+        both = {"ours, s": np.median(one), "potpourri3d, s": np.median(other)}
+        yield {"mesh": name, "what": what} | both | {"ratio": ratio(one, other)}
 
 
-def summary(rows: list[dict[str, Any]]) -> str:
-    names = [name for name in rows[0] if name not in ("mesh", "removed")]
-    lines = []
-    for share in SHARES:
-        those = [row for row in rows if row["removed"] == share]
-        cells = []
-        for name in names:
-            errors = np.array([row[name] for row in those])
-            failed = int(np.isnan(errors).sum())
-            cells.append(f"{np.nanmean(errors):.3g}" + (f" ({failed} failed)" if failed else ""))
-        lines.append((f"{100 * share:.0f} %", str(len(those)), *cells))
-    best = np.array([np.nanmin([row[name] for name in names if name.startswith("potpourri3d")]) for row in rows])
-    better = [f"{int((np.array([row[name] for row in rows]) <= best).sum())} of {len(rows)}" for name in names]
-    lines.append(("no worse than the better of potpourri3d's", str(len(rows)), *better))
-    shares = [np.array([row[name] for row in rows]) / best for name in names]
-    lines.append(("of its error, at most", "", *(f"{np.nanmax(share):.3g}" for share in shares)))
-    lines.append(("in the geometric mean", "", *(f"{np.exp(np.nanmean(np.log(share))):.3g}" for share in shares)))
-    return "\n".join(table(["removed", "cases", *names], lines))
+# In space.
 
 
-def measure_errors(meshes: dict[str, Mesh], count: int, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """A row for each case: mesh, share removed, and the errors of all solvers."""
-    solvers = {name: our_solvers(mesh) | {"potpourri3d": Peer(mesh)} for name, mesh in meshes.items()}
-    rows: list[dict[str, Any]] = []
-    for case in range(count):
-        name, share = list(meshes)[case % len(meshes)], SHARES[case // len(meshes) % len(SHARES)]
-        rows.append({"mesh": name, "removed": share} | measure_case(meshes[name], solvers[name], share, rng))
-        print(rows[-1], file=sys.stderr, flush=True)
-    return rows
+def brick() -> Mesh:
+    """A box of 0.6 x 0.5 x 0.4, each side a grid of squares, counter-clockwise seen from outside."""
+    cells = shapes.box(8, (0.6, 0.5, 0.4))
+    F = igl.boundary_facets(cells.F)[0]
+    centre = cells.V.mean(axis=0)
+    inward = np.linalg.det(cells.V[F] - centre) < 0
+    used, compact = np.unique(np.where(inward[:, None], F[:, ::-1], F), return_inverse=True)
+    return Mesh(cells.V[used] - centre + 0.5, compact.reshape(-1, 3))
 
 
-def one_row_each(found: dict[str, dict[str, Any]]) -> str:
-    """A table with a row for each mesh."""
-    head = ["mesh", *next(iter(found.values()))]
-    cells = [
-        (name, *(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()))
-        for name, row in found.items()
-    ]
-    return "\n".join(table(head, cells))
+def scaled(mesh: Mesh, factor: float) -> Mesh:
+    return Mesh(factor * mesh.V + 0.5, mesh.F)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    parser = option_parser(__doc__)
-    parser.add_argument("meshes", nargs="+", type=Path)
-    parser.add_argument("--cases", type=int, default=40, help="number of cases (default 40)")
-    parser.add_argument("--signs", type=int, default=0, help="number of regions on each mesh for the signs (default 0)")
-    parser.add_argument("--steps", action="store_true", help="errors of the heat for several time steps")
-    parser.add_argument("--no-times", action="store_true", help="errors and signs only")
-    add_seed(parser)
-    add_json(parser)
-    arguments = parser.parse_args(argv)
-    rng = np.random.default_rng(arguments.seed)
-    meshes = {path.stem: heat_igl.read_mesh(path) for path in arguments.meshes}
-    parts: list[str] = []
-    rows = measure_errors(meshes, arguments.cases, rng) if arguments.cases else []
-    if rows:
-        parts.append(summary(rows))
-    signs = {name: wrong_signs(mesh, arguments.signs, rng) for name, mesh in meshes.items() if arguments.signs}
-    times = {name: measure_times(mesh, 5) for name, mesh in meshes.items() if not arguments.no_times}
-    steps = {name: errors_by_step(mesh, rng) for name, mesh in meshes.items() if arguments.steps}
-    parts += [one_row_each(found) for found in (signs, times, steps) if found]
-    result = {"environment": environment(), "rows": rows, "signs": signs, "times": times, "steps": steps}
-    publish(result, "\n\n".join(parts), json_file=arguments.json)
-    return 0
+SOLIDS: dict[str, Callable[[], Mesh]] = {
+    "sphere": lambda: scaled(shapes.icosphere(3), 0.3),
+    "box": brick,
+    "torus": lambda: scaled(shapes.torus(48, 24), 0.25),
+}
+HOLES = ("closed", "20 % of the faces away", "20 % of the area away in patches")
+
+
+def holed(mesh: Mesh, holes: str, rng: np.random.Generator, radius: float = 0.07) -> Mesh:
+    """Without a fifth of the faces, or of the area in patches of a radius around random faces."""
+    kept, centre = np.ones(mesh.n_faces, bool), mesh.V[mesh.F].mean(axis=1)
+    if holes == HOLES[1]:
+        kept[rng.choice(mesh.n_faces, mesh.n_faces // 5, replace=False)] = False
+    while holes == HOLES[2] and mesh.measures[kept].sum() > 0.8 * mesh.measures.sum():
+        kept &= np.linalg.norm(centre - centre[rng.integers(mesh.n_faces)], axis=1) > radius
+    return Mesh(mesh.V, mesh.F[kept])
+
+
+def volumes(options: argparse.Namespace) -> Iterator[Row]:
+    """A row for each surface and domain."""
+    n, boxes = options.points, options.boxes
+    grid, tetrahedra = VoxelBox([0, 0, 0], 1 / (n - 1), [n] * 3), shapes.box(boxes)
+    kind = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
+    for domain, where, points, cell in (
+        (f"grid of {n}^3", grid, grid.positions().reshape(-1, 3), 1 / (n - 1)),
+        (f"tetrahedra of {boxes}^3 boxes", tetrahedra, tetrahedra.V, 1 / boxes),
+    ):
+        for name, make in SOLIDS.items():
+            whole, row = make(), {"domain": domain, "surface": name}
+            truth = np.asarray(igl.signed_distance(points, whole.V, whole.F, sign_type=kind)[0])
+            near = np.abs(truth) < cell
+            for holes in HOLES:
+                found = []
+                for seed in range(1 if holes == "closed" else options.holed):
+                    surface = holed(whole, holes, np.random.default_rng(seed))
+                    off = np.abs(volume_signed_distance(where, surface).ravel() - truth) / cell
+                    found.append((off[near].mean(), off.mean()))
+                row[holes] = "{:.2f} ({:.2f})".format(*np.max(found, axis=0))
+            yield row
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    names = ("circles", "broken", "steps", "signs", "times", "volumes")
+    options = parsed(__doc__, argv, "*", names, finest=160, cases=40, repeats=5, points=33, boxes=14, holed=3)
+    meshes, rng = named(options.meshes), np.random.default_rng(options.seed)
+    make: dict[str, Callable[[], Iterator[Row]]] = {
+        "circles": lambda: circles(options),
+        "broken": lambda: summary(collected(broken_rows(meshes, options))),
+        "steps": lambda: (steps(name, mesh, rng) for name, mesh in meshes.items()),
+        "signs": lambda: (signs(name, mesh, options) for name, mesh in meshes.items()),
+        "times": lambda: (row for name, mesh in meshes.items() for row in times(name, mesh, options.repeats)),
+        "volumes": lambda: volumes(options),
+    }
+    rows = collected(make[options.table]())
+    tables = {options.table: as_they_are(rows)}
+    if options.table == "circles":
+        columns = {key: f"{{{key}:.2g}}" for key in ("none", "zero", "default", "true distance")}
+        tables["nearness"] = Table(collected(nearness(options)), {"curves": "{curves}"} | columns)
+    publish(options, tables)
 
 
 if __name__ == "__main__":

@@ -236,7 +236,7 @@ def error(distance: FloatArray, truth: FloatArray) -> float:
 
 @pytest.mark.parametrize("kind", ["helix", "spiral ramp", "handles", "spiky sphere", "random tetrahedra", "clusters"])
 def test_heat_says_when_it_is_wrong(kind: str) -> None:
-    """Kinds on which heat was off by more than 5 % in silence; more members are in scripts/zoo_table.py."""
+    """Kinds on which heat was off by more than 5 % in silence; more members are in scripts/accuracy.py."""
     for seed in range(3):
         mesh = FAMILIES[kind](seed)
         with warnings.catch_warnings(record=True) as caught:

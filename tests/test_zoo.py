@@ -71,7 +71,7 @@ def test_a_seed_is_a_mesh_of_its_own(kind: str) -> None:
 
 @pytest.mark.parametrize("name", MEASURED)
 def test_heat_on_shapes_of_the_zoo(name: str) -> None:
-    table = load_script("zoo_table")
+    table = load_script("accuracy")
     mesh = made(name)
     solver = HeatMethodSolver(mesh)
     with warnings.catch_warnings():

@@ -1,19 +1,21 @@
-"""The drawings of docs/theory.md, from the package's own results.
+"""The drawings in docs/images: those of the theory, from the package's own results, and the pictures of the README.
 
-    python scripts/theory_figures.py                           # all, into docs/images: seconds
-    python scripts/theory_figures.py --out DIRECTORY --figure cone
+    python docs/drawings.py                           # all: about a minute
+    python docs/drawings.py theory_cone.svg bunny.png
 
-steps  the heat, its direction and the distance on a square with walls, as the three steps make them
-sweep  a source that is placed through two triangles
-strip  a shortest path on a torus, and its faces laid out in the plane
-cone   a cone and its sector, and a vertex with more than the full angle
+theory_steps  the heat, its direction and the distance on a square with walls, as the three steps make them
+theory_sweep  a source that is placed through two triangles
+theory_strip  a shortest path on a torus, and its faces laid out in the plane
+theory_cone   a cone and its sector, and a vertex with more than the full angle
 
-Needs the extra ``view``.
+Needs the extra ``view``. `scripts/paper_figures.py` draws those of docs/paper.md.
 """
 
 from __future__ import annotations
 
+import importlib
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,10 +24,10 @@ import numpy as np
 
 import heat_igl
 from heat_igl import shapes
+from heat_igl.cli.demo import sample_mesh
+from heat_igl.drawing.plots import plot
 
-from scaffold import environment, environment_line, option_parser
-
-DOCS = Path(__file__).resolve().parent.parent / "docs" / "images"
+DOCS = Path(__file__).resolve().parent / "images"
 WIDTH = 7.2  # inches, the text of a page
 FONT = 9.0
 # Okabe and Ito's colours, told apart by every eye.
@@ -308,32 +310,64 @@ def _saddle(panel: Any) -> None:
     point(panel, (0, 0), "$p$", (-3, 10))
 
 
-FIGURES: dict[str, Callable[[], Any]] = {"steps": steps, "sweep": sweep, "strip": strip, "cone": cone}
+def bunny() -> Any:
+    """Distance from one vertex of the bunny, which heads the README."""
+    path = sample_mesh()
+    mesh = heat_igl.read_mesh(path) if path else shapes.icosphere(5)
+    return plot(mesh, heat_igl.HeatMethodSolver(mesh).distance(1234), sources=1234).figure
 
 
-def draw(name: str, out: Path) -> Path:
-    """Write one figure: as PNG where it shows a field, as SVG elsewhere."""
+# Functions of docs/gallery.py, and what they show.
+MORE = {
+    "cells": "Voronoi cells",
+    "paths": "shortest paths",
+    "grown": "signed distance",
+    "directions": "log map",
+    "straightest": "straightest geodesics",
+    "cloud": "point clouds",
+}
+
+
+def more() -> Any:
+    """Six pictures of the gallery, for the README."""
+    from matplotlib.image import imread
+
+    gallery = importlib.import_module("gallery")
+    figure, _ = canvas(5, 1)
+    figure.clear()
+    with tempfile.TemporaryDirectory() as folder:
+        for panel, (name, text) in zip(figure.subplots(2, 3).flat, MORE.items(), strict=True):
+            path = Path(folder, f"{name}.png")
+            getattr(gallery, name)().save(path)
+            panel.imshow(imread(path))
+            title(panel, text)
+            panel.set_anchor("N")
+            panel.axis("off")
+    return figure
+
+
+FIGURES: dict[str, Callable[[], Any]] = {
+    "theory_steps.png": steps,
+    "theory_sweep.svg": sweep,
+    "theory_strip.svg": strip,
+    "theory_cone.svg": cone,
+    "bunny.png": bunny,
+    "more.png": more,
+}
+
+
+def main() -> None:
+    """Write the files that are named, or all: as PNG where they show a field, as SVG elsewhere."""
     import matplotlib
 
-    path = out / f"theory_{name}.{'png' if name == 'steps' else 'svg'}"
-    # The same bytes in every run: names of the parts by this word, and no date.
-    with matplotlib.rc_context({"svg.hashsalt": "heat_igl", "mathtext.fontset": "cm"}):
-        options = {"dpi": 200} if path.suffix == ".png" else {"metadata": {"Date": None}}
-        FIGURES[name]().savefig(path, facecolor="white", **options)
-    return path
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    parser = option_parser(__doc__)
-    parser.add_argument("--out", type=Path, default=DOCS, help="directory (default docs/images)")
-    parser.add_argument("--figure", choices=list(FIGURES), action="append", help="one of them; repeatable")
-    arguments = parser.parse_args(argv)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    for name in arguments.figure or FIGURES:
-        print(draw(name, arguments.out))
-    print(f"Environment: {environment_line(environment())}")
-    return 0
+    for name in sys.argv[1:] or FIGURES:
+        path = DOCS / name
+        # The same bytes in every run: names of the parts by this word, and no date.
+        with matplotlib.rc_context({"svg.hashsalt": "heat_igl", "mathtext.fontset": "cm"}):
+            options = {"dpi": 200} if path.suffix == ".png" else {"metadata": {"Date": None}}
+            FIGURES[name]().savefig(path, facecolor="white", **options)
+        print(path)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -1,0 +1,252 @@
+"""Error of every method over the zoo, generated shapes of which a third tuned no default, or on meshes of files.
+
+    python scripts/accuracy.py --methods heat potpourri3d --output results     # the zoo, or parts: --shapes spike maze
+    python scripts/accuracy.py FOLDER MESH --methods heat sweep meshlab        # meshes instead
+    python scripts/accuracy.py MESH --variants                                 # the ways to run the heat method
+    python scripts/accuracy.py MESH --in-faces                                 # points in faces as sources
+
+Columns are the mean of |d - exact| / exact over the vertices, averaged over ``--sources`` seeded vertices, and in
+brackets the largest |d - exact| and the largest exact - d as shares of the largest distance; all in percent. ``w``
+counts answers with an accuracy warning. Shapes that are held out have a star. Then, for both kinds apart, geometric
+means over the shapes, the worst, and ratios to potpourri3d. A mesh that exact distance refuses, and a method that
+fails, are listed with the reason.
+
+With ``--variants``, a row for each way, its geometric mean over the meshes, and that relative to potpourri3d's default,
+in the mean and at worst: the defaults of `HeatMethodSolver` are chosen by this table (docs/engines.md). With
+``--in-faces``, points are drawn in faces by area, compared with exact distance on the mesh with the point as a vertex,
+and beside them a corner of the same face; "corners" is the largest relative error there (docs/sources.md).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from heat_igl import Mesh, SurfacePoints, read_mesh, reference
+from heat_igl.errors import AccuracyWarning, MeshError, MissingExtraError, ReferenceSolverError
+from heat_igl.operators import operators
+from heat_igl.steps import HeatFlow, PoissonProblem, damping, normalize
+from heat_igl.typing import FloatArray, IntArray
+from heat_igl.validation.zoo import SHAPES
+
+from harness import Query, Row, Table, collected, errors, geometric_mean, mean_error, ours, parsed, publish
+
+SUFFIXES = {".off", ".obj", ".ply", ".stl", ".mesh", ".msh"}
+FAILURES = (MeshError, MissingExtraError, ReferenceSolverError, ImportError, RuntimeError, ValueError)
+# Errors below this many percent count as this much in geometric means: rounding is no merit.
+LEAST = 0.01
+
+
+def native(function: Callable[[Mesh, int], FloatArray]) -> Callable[[Mesh], Query]:
+    """A reference, in a process that may crash."""
+    return lambda mesh: lambda source: function(mesh, int(source))
+
+
+METHODS: dict[str, Callable[[Mesh], Query]] = {
+    "heat": ours("heat"),
+    "sweep": ours("sweep"),
+    "windows": ours("windows"),
+    "meshlab": native(reference.meshlab),
+    "meshlab_heat": native(reference.meshlab_heat),
+    "igl": native(reference.igl_heat),
+    "potpourri3d": native(reference.potpourri3d_heat),
+}
+
+
+def field(
+    fitted: bool = True, of_log: bool = True, full_rate: float | None = 0.95, t_coef: float = 0.5
+) -> Callable[[Mesh], Query]:
+    """Put together from the steps: the flow, what X follows, the rate from which it has length 1, and the time step."""
+
+    def prepare(mesh: Mesh) -> Query:
+        domain = operators(mesh)
+        t = t_coef * domain.mean_edge_length**2
+        flow, poisson = HeatFlow(domain, t, fitted=fitted), PoissonProblem(domain)
+
+        def distance(source: int) -> FloatArray:
+            initial = np.zeros(domain.n)
+            initial[source] = 1e280
+            u = flow.solve(initial)
+            X = normalize(domain, u, of_log)
+            if full_rate is not None:
+                X *= np.tile(damping(domain, u, t, full_rate, fitted), domain.dimension)
+            phi = poisson.solve(domain.D @ X)
+            return np.maximum(phi - phi[source], 0)
+
+        return distance
+
+    return prepare
+
+
+VARIANTS: dict[str, Callable[[Mesh], Query]] = {
+    "potpourri3d": METHODS["potpourri3d"],
+    "default": ours("heat"),
+    **{f"default, t_coef {t:g}": ours("heat", t_coef=t) for t in (0.25, 0.35, 0.7, 1.0, 2.0)},
+    "default, average boundary": ours("heat", boundary="average"),
+    "default, dirichlet boundary": ours("heat", boundary="dirichlet"),
+    "unit field": ours("heat", magnitude="unit"),
+    "unit, t_coef 0.5": ours("heat", magnitude="unit", t_coef=0.5),
+    "unit, t_coef 2": ours("heat", magnitude="unit", t_coef=2.0),
+    "unit, average boundary": ours("heat", magnitude="unit", boundary="average"),
+    "cotan, the paper's": ours("heat", laplacian="cotan"),
+    "cotan, damped": ours("heat", laplacian="cotan", magnitude="damped"),
+    "steps of the default": field(),
+    "damped from 0.9": field(full_rate=0.9),
+    "damped from 1": field(full_rate=1.0),
+    "not damped": field(full_rate=None),
+    "along u": field(of_log=False),
+    "not fitted": field(fitted=False, full_rate=0.9),
+    "not fitted, along u": field(fitted=False, of_log=False, full_rate=0.9),
+    "t_coef 1": field(t_coef=1.0),
+    "t_coef 1, along u": field(of_log=False, t_coef=1.0),
+    "t_coef 1, not fitted": field(fitted=False, full_rate=0.9, t_coef=1.0),
+    "t_coef 1, not fitted, along u": field(fitted=False, of_log=False, full_rate=0.9, t_coef=1.0),
+}
+
+
+def seeded_sources(mesh: Mesh, count: int = 3, seed: int = 7) -> IntArray:
+    """So many vertices, or all of fewer; of several components the first two get one each."""
+    usable = np.unique(mesh.F)
+    sources = np.random.default_rng(seed).choice(usable, min(count, len(usable)), replace=False)
+    _, first = np.unique(mesh.components[usable], return_index=True)
+    if len(first) > 1 < len(sources):
+        sources[:2] = usable[first[:2]]
+    return np.asarray(sources, np.int64)
+
+
+def meshes(options: argparse.Namespace) -> Iterator[tuple[str, str, Callable[[], Mesh]]]:
+    """Kind, name and maker of each mesh."""
+    for place in options.meshes:
+        for path in sorted(place.iterdir()) if place.is_dir() else [place]:
+            if path == place or path.suffix.lower() in SUFFIXES:
+                yield "meshes", path.stem, lambda path=path: read_mesh(path)
+    for shape in SHAPES if not options.meshes else ():
+        if any(part in shape.name for part in options.shapes):
+            kind, star = ("held out", " *") if shape.held_out else ("not held out", "")
+            yield kind, shape.name + star, shape.make
+
+
+def measured(query: Query, sources: IntArray, truths: Sequence[FloatArray]) -> Row:
+    """Mean and largest error, the largest excess below exact, and the number of warned answers."""
+    found, n_warned = [], 0
+    for source, truth in zip(sources.tolist(), truths, strict=True):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            distance = np.asarray(query(source), float)
+        n_warned += any(issubclass(warning.category, AccuracyWarning) for warning in caught)
+        found.append(errors(distance, truth))
+    mean, largest, below = ([one[key] for one in found] for key in ("mean", "largest", "below"))
+    row = {"mean": np.mean(mean), "largest": max(largest), "below": max(below)}
+    return row | {"warned": f" {n_warned}w" if n_warned else ""}
+
+
+def over_meshes(
+    options: argparse.Namespace, methods: dict[str, Callable[[Mesh], Query]], reasons: list[str]
+) -> Iterator[Row]:
+    """A row for each mesh that has an exact distance; why others, or methods, have none goes to `reasons`."""
+    for kind, name, make in meshes(options):
+        try:
+            mesh = make()
+            sources = seeded_sources(mesh, options.sources, options.seed)
+            truths = [reference.exact(mesh, int(source)) for source in sources]
+        except (*FAILURES, OSError) as error:
+            reasons.append(f"- {name}: {error}")
+            continue
+        row: Row = {"mesh": name, "kind": kind, "vertices": mesh.n_vertices}
+        for method, prepare in methods.items():
+            try:
+                row[method] = measured(prepare(mesh), sources, truths)
+            except FAILURES as error:
+                reasons.append(f"- {name}, {method}: {error}")
+        yield row
+
+
+def summary(rows: Sequence[Row], methods: Sequence[str]) -> Iterator[str]:
+    """Geometric means, the worst shape, and the ratios to potpourri3d: geometric mean, and the largest."""
+    for kind in dict.fromkeys(row["kind"] for row in rows):
+        yield f"\nGeometric means, {kind}:\n"
+        for method in methods:
+            mean = {r["mesh"]: max(r[method]["mean"], LEAST) for r in rows if r["kind"] == kind and method in r}
+            other = {r["mesh"]: max(r["potpourri3d"]["mean"], LEAST) for r in rows if "potpourri3d" in r}
+            share = {mesh: mean[mesh] / other[mesh] for mesh in mean if mesh in other}
+            if mean:
+                worst = max(mean, key=lambda mesh: mean[mesh])
+                line = f"- {method}: {geometric_mean(mean.values()):.3g} %, at worst {mean[worst]:.3g} % ({worst})"
+                if share and method != "potpourri3d":
+                    most = max(share, key=lambda mesh: share[mesh])
+                    line += f"; {geometric_mean(share.values()):.3g} of potpourri3d, at most {share[most]:.3g} ({most})"
+                yield line
+
+
+def of_variants(rows: Sequence[Row]) -> list[Row]:
+    """A row for each variant, a column for each mesh."""
+    turned = []
+    for variant in VARIANTS:
+        error = {row["mesh"]: row[variant]["mean"] for row in rows if variant in row}
+        share = [row[variant]["mean"] / row["potpourri3d"]["mean"] for row in rows if variant in row]
+        means = {"mean": geometric_mean(error.values()), "share": geometric_mean(share), "worst": max(share)}
+        turned.append({"variant": variant, "errors": error} | means)
+    return turned
+
+
+def in_faces(path: Path, count: int, seed: int) -> Row:
+    """Errors from points inside faces, of no coordinate below 0.01 since exact solvers dislike slivers."""
+    mesh, rng = read_mesh(path), np.random.default_rng(seed)
+    faces = rng.choice(mesh.n_faces, count, p=mesh.measures / mesh.measures.sum())
+    row: Row = {"mesh": path.stem}
+    points = [SurfacePoints([face], [0.97 * rng.dirichlet(np.ones(3)) + 0.01]) for face in faces]
+    truths = [exact_from(mesh, point) for point in points]
+    for method in ("heat", "sweep"):
+        query = METHODS[method](mesh)
+        row[method] = np.mean([errors(query(p), truth)["mean"] for p, truth in zip(points, truths, strict=True)])
+        corners = [int(mesh.F[face, 0]) for face in faces]
+        row[f"{method}, vertex"] = mean_error(query, corners, lambda corner: reference.exact(mesh, corner))
+        off = []
+        for point in points:
+            corners = mesh.F[point.faces[0]]
+            straight = np.linalg.norm(mesh.V[corners] - point.positions(mesh), axis=1)
+            off.append(np.abs(query(point)[corners] / straight - 1).max())
+        row[f"{method}, corners"] = max(off)
+    return row
+
+
+def exact_from(mesh: Mesh, point: SurfacePoints) -> FloatArray:
+    """Exact distance on the mesh with a point inside a face as its last vertex."""
+    face, new = int(point.faces[0]), mesh.n_vertices
+    fan = [np.where(np.arange(3) == corner, new, mesh.F[face]) for corner in range(3)]
+    F = np.concatenate([np.delete(mesh.F, face, 0), fan])
+    return reference.exact(Mesh(np.concatenate([mesh.V, point.positions(mesh)]), F), new)[:-1]
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    switches = {"variants": False, "in_faces": False}
+    options = parsed(__doc__, argv, "*", shapes=[""], methods=list(METHODS), sources=3, **switches)
+    reasons: list[str] = []
+    if options.in_faces:
+        rows = collected(in_faces(path, options.sources, options.seed) for path in options.meshes)
+        columns = {"mesh": "{mesh}"}
+        for method in ("heat", "sweep"):
+            columns |= {f"{method}, face": f"{{{method}:.3g}}", f"{method}, vertex": f"{{{method}, vertex:.3g}}"}
+            columns |= {f"{method}, corners": f"{{{method}, corners:.1e}}"}
+        publish(options, {"in faces": Table(rows, columns)})
+        return
+    methods = VARIANTS if options.variants else {name: METHODS[name] for name in options.methods}
+    rows = collected(over_meshes(options, methods, reasons))
+    if options.variants:
+        columns = {"%": "{variant}"} | {row["mesh"]: f"{{errors[{row['mesh']}]:.2f}}" for row in rows}
+        columns |= {"geometric mean": "{mean:.3f}", "of potpourri3d": "{share:.3f}", "at worst": "{worst:.3f}"}
+        tables: dict[str, Table | str] = {"variants": Table(of_variants(rows), columns)}
+    else:
+        form = "{{{0}[mean]:.3g}} ({{{0}[largest]:.2g}}, {{{0}[below]:.2g}}){{{0}[warned]}}"
+        columns = {"mesh": "{mesh}", "vertices": "{vertices}"} | {name: form.format(name) for name in methods}
+        tables = {"errors": Table(rows, columns), "summary": "\n".join(summary(rows, list(methods)))}
+    publish(options, tables | ({"reasons": "\n".join(reasons)} if reasons else {}))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
