@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import doctest
+import importlib
 import importlib.util
 import inspect
 import re
@@ -13,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import load_script
 
 import heat_igl
 from heat_igl import shapes
@@ -127,8 +127,9 @@ def test_every_public_name_has_an_example(name: str) -> None:
     assert any(part.want for part in PARSER.get_examples(section)), f"{name} has no example that shows a result"
 
 
-def test_the_drawn_strip_is_flat_and_true_to_length() -> None:
-    figures = load_script("theory_figures")
+def test_the_drawn_strip_is_flat_and_true_to_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "docs")
+    figures = importlib.import_module("drawings")
     mesh = shapes.torus(14, 22, tube=0.5)
     path = heat_igl.geodesic_path(mesh, heat_igl.SurfacePoints([476, 546], [[0.2, 0.3, 0.5], [0.3, 0.4, 0.3]]))
     corners, way = figures.laid_out(mesh, path)
