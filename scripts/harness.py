@@ -375,7 +375,7 @@ def errors(found: FloatArray, truth: FloatArray) -> dict[str, float]:
         "mean": float(relative.mean()),
         "p99": float(np.percentile(relative, 99)),
         "largest": float(np.abs(off).max()),
-        "below": max(float((-off).max()), 0.0),
+        "below": max(0.0, float(-off.min())),
     }
 
 

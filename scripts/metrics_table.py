@@ -157,7 +157,7 @@ def in_bodies(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
             over = [excess(d, truth(i)) for i, d in zip(sources, found, strict=True)]
             row[method] |= {"error": np.mean(np.abs(over)), "above": max(np.max(over), 0)}
             lines = [excess(d, straight(mesh.V, i)).min() for i, d in zip(sources, found, strict=True)]
-            row[method]["below"] = max(-min(lines), 0.0)
+            row[method]["below"] = max(0.0, -min(lines))
         yield row
 
 
@@ -269,7 +269,7 @@ def in_walls(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
         error = np.concatenate([excess(d, truth(i)) for i, d in zip(sources, found["default"], strict=True)])
         row |= {"mean": np.abs(error).mean(), "longer": max(error.max(), 0), "shorter": max(-error.min(), 0)}
         lines = [excess(d, straight(mesh.V, i)).min() for i, d in zip(sources, found["default"], strict=True)]
-        yield row | {"below": max(-min(lines), 0.0), "ms": took["default"], "ratio": took["default"] / took["heat"]}
+        yield row | {"below": max(0.0, -min(lines)), "ms": took["default"], "ratio": took["default"] / took["heat"]}
 
 
 # Layers, and a metric for each face.
