@@ -30,8 +30,8 @@ GROUPS = {
     "Operators of a domain": """Operators operators.polygon_operators operators.point_cloud_operators speed_operators
         metric_operators fibre_metric activation_times""",
     "Surface maps": "smooth parcel_distances geodesic_errors",
-    "Validation": """validate ValidationReport validation.ValidationRow validate_domains validation.domains.DomainReport
-        validation.domains.DomainRow reference validation.closed_forms validation.metrics shapes reference.baselines""",
+    "Validation": """validate ValidationReport validation.ValidationRow reference
+        validation.closed_forms validation.metrics shapes reference.baselines""",
     "Pictures": "plots",
     "Many meshes": "cluster",
     "Errors and warnings": """MeshError SourceError AccuracyWarning errors.FactorizationError errors.MissingExtraError

@@ -73,7 +73,6 @@ from heat_igl.unfolding import write_distances_within as write_distances_within
 from heat_igl.validation import ValidationReport as ValidationReport
 from heat_igl.validation import shapes as shapes
 from heat_igl.validation import validate as validate
-from heat_igl.validation.domains import validate_domains as validate_domains
 from heat_igl.validation.samples import sample_mesh as sample_mesh
 
 __all__: list[str]

@@ -16,7 +16,6 @@ PACKAGE = Path(heat_igl.__file__).parent
 ROOT = PACKAGE.parent
 
 EXTRAS = """
-Xlib
 colorspacious
 dask
 distributed

@@ -501,21 +501,16 @@ def test_distances_as_text(two_spheres: Path) -> None:
 def test_the_table_of_errors_fits_the_terminal(
     sphere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    heads = {}
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm")
-    for width in (60, 80, 140):
-        monkeypatch.setenv("COLUMNS", str(width))
-        assert cli.run(["validate", str(sphere), "--methods=heat,sweep"]) == 0
-        lines = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
-        assert "162 vertices" in lines[0]
-        table = lines[[line.startswith("method") for line in lines].index(True) :]
-        assert max(map(len, table[:3])) <= width
-        assert [line.split()[0] for line in table[1:3]] == ["heat", "sweep"]
-        assert not any("…" in line for line in table)
-        heads[width] = table[0].split()
-        assert all(any(line.startswith(head) for line in table[3:]) for head in ("mean", "max", "ms"))
-    assert len(heads[60]) < len(heads[80]) < len(heads[140])
+    monkeypatch.setenv("COLUMNS", "60")
+    assert cli.run(["validate", str(sphere), "--methods=heat,sweep"]) == 0
+    lines = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
+    assert "162 vertices" in lines[0]
+    table = lines[[line.startswith("method") for line in lines].index(True) :]
+    assert max(map(len, table)) <= 60
+    assert [line.split()[0] for line in table] == ["method", "heat", "sweep"]
+    assert not any("…" in line for line in table)
 
 
 def test_a_shell_is_told_how_commands_go_on(tmp_path: Path) -> None:

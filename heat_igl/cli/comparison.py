@@ -10,15 +10,24 @@ import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import Progress
+from rich.table import Table
 
 import heat_igl
-from heat_igl.cli.error_table import print_report
 from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, positive
-from heat_igl.cli.output import check_json, check_outputs, described, plan_row, print_json, print_rows, prints_json, say
+from heat_igl.cli.output import (
+    check_json,
+    check_outputs,
+    described,
+    plan_row,
+    print_json,
+    print_rows,
+    prints_json,
+    say,
+)
 from heat_igl.drawing.output import Picture
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.reference.guarded import TIMEOUT
-from heat_igl.validation import METHODS, ValidationRow, draw_sources
+from heat_igl.validation import METHODS, ValidationReport, ValidationRow, draw_sources
 
 __all__ = ["info", "validate"]
 
@@ -76,12 +85,35 @@ def validate(
     if json_file is not None:
         print_json(report.to_dict(), json_file)
     if not prints_json(json_file):
-        print_report(report)
+        _print(report)
     exceeding = report.exceeding(fail_above) if fail_above is not None else ()
     if exceeding:
         found = ", ".join(f"{row.method} {_verdict(row)}" for row in exceeding)
         say(f"the mean error is not at most {fail_above:g} %: {found}")
         raise typer.Exit(1)
+
+
+def _print(report: ValidationReport) -> None:
+    """Print the columns that a terminal has space for, and all to anything else."""
+    console = Console(highlight=False)
+    heading, *_, remarks = report.to_markdown().split("\n\n")
+    if not console.is_terminal:
+        print(report.to_markdown(), end="")
+        return
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("method")
+    for head in ("mean %", "max %", "once s", "ms", "MB"):
+        table.add_column(head, justify="right")
+    for row in report.rows:
+        errors = (None, None) if row.errors is None else (100 * row.errors.mean, 100 * row.errors.maximum)
+        costs = row.precompute_seconds, row.solve_seconds and 1e3 * row.solve_seconds
+        cells = (*errors, *costs, row.peak_memory and row.peak_memory / 1e6)
+        shown = ["failed"] if row.failure else ["-" if cell is None else f"{cell:.3g}" for cell in cells]
+        table.add_row(row.method, *shown)
+    console.print(heading.replace("**", ""))
+    console.print(table)
+    if remarks.startswith("- "):
+        console.print(remarks.rstrip(), markup=False)
 
 
 def _verdict(row: ValidationRow) -> str:

@@ -7,7 +7,6 @@ __all__ = ["EXAMPLES", "epilog"]
 EXAMPLES = {
     "info": ("info bunny.obj", "info lh.pial --json -"),
     "validate": ("validate bunny.obj", "validate bunny.obj --methods heat,windows --sources 10 --picture errors.png"),
-    "validate-domains": ("validate-domains", "validate-domains --domain tetrahedra --domain polygons --json -"),
     "distance": (
         "distance bunny.obj --source 1234 --output distance.ply --picture distance.png",
         "distance bunny.obj --source 12 --source 40 --cutoff 0.1 --output distance.npy",

@@ -35,7 +35,6 @@ _COMPLETION = "_HEAT_IGL_COMPLETE"
 _MODULES = {
     "info": "comparison",
     "validate": "comparison",
-    "validate-domains": "domain_checks",
     "distance": "distances",
     "isolines": "distances",
     "path": "paths",

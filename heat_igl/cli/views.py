@@ -1,7 +1,10 @@
-"""Commands that show: a window or page, and the demonstration."""
+"""Commands that show: an interactive page, and the demonstration."""
 
 from __future__ import annotations
 
+import os
+import sys
+import webbrowser
 from pathlib import Path
 from typing import Annotated
 
@@ -9,11 +12,11 @@ import numpy as np
 import typer
 from rich.console import Console
 
+from heat_igl import reference
 from heat_igl.cli.demo import demonstrate
 from heat_igl.cli.options import JsonOption, MeshArgument, MethodOption, PointsOption, ToleranceOption, choice, positive
-from heat_igl.cli.output import check_json, check_page, check_writable, described, print_rows, say
+from heat_igl.cli.output import check_json, check_page, check_writable, described, print_rows
 from heat_igl.cli.regions import projected
-from heat_igl.errors import ReferenceSolverError
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat_method import Boundary, SignedHeatSolver
 from heat_igl.io import read_mesh_or_cloud
@@ -40,39 +43,30 @@ def view(
         Path | None, typer.Option(metavar="OBJ", help="Show the signed distance from these polylines, too.")
     ] = None,
     points: PointsOption = False,
-    html: Annotated[Path | None, typer.Option(help="Write an interactive page to this file; no window.")] = None,
+    html: Annotated[Path | None, typer.Option(help="File for the page, which is not opened then.")] = None,
     json_file: JsonOption = None,
 ) -> None:
-    """A window in which a click moves the source and the distance follows, or a page if there is no display."""
-    from heat_igl.drawing.viewer import Exploration, Window, display_problem
+    """An interactive page, opened in the browser: a click moves the source, and the distance follows."""
+    from heat_igl.drawing import page
 
+    target = html or Path(f"{mesh.stem}-view.html")
+    check_page(target)
     check_json(json_file)
     loaded = read_mesh_or_cloud(mesh, points)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
-    solver_choice = SolverChoice.of(method, tolerance, t_coef=t_coef, boundary=boundary)
-    target = html or Path(f"{mesh.stem}-view.html")
-    problem = None if html else display_problem()
-    if html or problem:
-        check_page(target)
     with Console(stderr=True).status("measuring"):
-        shown = Exploration(loaded, sources, solver_choice, fields={} if curves is None else _signed(loaded, curves))
-        if exact:
-            shown.compare()
-            if shown.exact is None:
-                raise ReferenceSolverError(shown.message)
-    if html is None and problem is None:
-        try:
-            window = Window(shown, title=f"heat-igl: {mesh.name}", exact=exact)
-        except RuntimeError as error:
-            problem = str(error)
-            check_page(target)
-        else:
-            window.run()
-            return
-    shown.page(mesh.name, f"Distance by {shown.plan}.").save(target)
-    if problem:
-        say(f"no window: {problem}")
-    written = ("wrote", f"{target} (open it in a browser)", str(target))
+        solver = SolverChoice.of(method, tolerance, t_coef=t_coef, boundary=boundary).on(loaded)
+        fields = {"exact": reference.exact(as_simplices(loaded), sources)} if exact else {}
+        fields |= {} if curves is None else _signed(loaded, curves)
+        shown = page(
+            loaded, solver.distance(sources), sources=sources, title=mesh.name, method=f"Distance by {solver.plan}.",
+            fields=fields, beside=next(iter(fields), None),
+        )  # fmt: skip
+    shown.save(target)
+    # A browser for terminals would take the place of the shell.
+    has_display = not sys.platform.startswith("linux") or {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()
+    is_open = html is None and has_display and webbrowser.open(target.resolve().as_uri())
+    written = ("wrote", str(target) if is_open else f"{target} (open it in a browser)", str(target))
     print_rows([described(mesh, loaded), written], json_file)
 
 
