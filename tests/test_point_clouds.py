@@ -862,8 +862,8 @@ def test_vectors_on_both_sides_are_those_on_one(monkeypatch: pytest.MonkeyPatch)
     for method in ("heat", "windows"):
         with monkeypatch.context() as patch:
             one = heat_igl.VectorHeatSolver(cloud, method=method)
-            patch.setattr("heat_igl.heat_method.vector_heat.is_oriented_manifold", lambda _: False)
-            both = heat_igl.VectorHeatSolver(cloud, method=method)
+            patch.setattr("heat_igl.mesh.point_cloud.is_oriented_manifold", lambda _: False)
+            both = heat_igl.VectorHeatSolver(PointCloud(cloud.P), method=method)
         assert both.operators.n == 2 * one.operators.n
         for name in ("x", "y", "normal"):
             np.testing.assert_allclose(getattr(both.frames, name), getattr(one.frames, name), atol=1e-12)

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, positive
 from heat_igl.heat_method.directions import rigid_angles
-from heat_igl.mesh import MeshLike, as_simplices
+from heat_igl.mesh import MeshLike, one_sided
 from heat_igl.operators import unfolding_surface
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray, IntArray
@@ -99,7 +99,7 @@ def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = Non
     True
     """
     limit = positive("radius", radius, infinite=True)
-    triangles = as_simplices(mesh)
+    triangles = one_sided(mesh, "parallel transport along paths needs")
     if triangles.is_tetrahedral:
         raise MeshError("log maps need triangles, and the mesh holds tetrahedra")
     n = triangles.n_vertices

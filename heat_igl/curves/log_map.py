@@ -9,7 +9,7 @@ import numpy as np
 from heat_igl.errors import SourceError, require_choice
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.heat_method import VectorHeatSolver
-from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices, is_oriented_manifold
+from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices
 from heat_igl.sources import Sources, ordered_vertices
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import vectors_from
@@ -28,7 +28,7 @@ def log_map(
     ----------
     mesh : mesh, GeodesicSolver or VectorHeatSolver
         Whatever `as_mesh` takes, with triangles that are a manifold and oriented alike, which those of a `PointCloud`
-        need not be for paths from a vertex; or a solver on such a mesh. A solver keeps the tables that a mesh needs for
+        need not be; or a solver on such a mesh. A solver keeps the tables that a mesh needs for
         each source.
     source : int or SurfacePoints
         A vertex, or one point in a face.
@@ -79,9 +79,10 @@ def log_map(
     triangles = as_simplices(mesh)
     if method == "vector-heat":
         return VectorHeatSolver(mesh).log_map(_one_vertex(source, triangles.n_vertices))
-    if isinstance(mesh, PointCloud) and not is_oriented_manifold(triangles):
-        return VectorHeatSolver(mesh, method="windows").log_map(_one_vertex(source, triangles.n_vertices))
     _require_one(source, triangles.n_vertices)
+    if isinstance(mesh, PointCloud):
+        found = GeodesicSolver(mesh, method="exact").directions(source)
+        return _vectors(found.distance, found.departure)
     if not triangles.is_tetrahedral and not isinstance(source, SurfacePoints):
         vertex = triangles.originals[ordered_vertices(source, triangles.n_vertices, "source")[0]]
         vectors = vectors_from(triangles, int(vertex))

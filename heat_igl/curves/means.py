@@ -11,7 +11,7 @@ from heat_igl.curves.places import Waypoints, mixed_places
 from heat_igl.curves.straightest import Tracer
 from heat_igl.errors import AccuracyWarning, SourceError, is_number, real_numbers, shown
 from heat_igl.geodesic import GeodesicSolver, geodesic_distance
-from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_mesh, as_simplices
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
@@ -83,12 +83,13 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
     >>> mean.positions(mesh).round(6).tolist()
     [[0.5, 0.5, 0.0]]
     """
+    mesh = as_mesh(mesh)
     triangles = as_simplices(mesh)
     faces, barycentric = mixed_places("points", triangles, points)
     weight = _checked_weights(weights, len(faces))
     power = _checked_power(p)
     used = weight > 0
-    search = _Search(triangles, faces[used], barycentric[used], weight[used], power)
+    search = _Search(triangles, Tracer(mesh), faces[used], barycentric[used], weight[used], power)
     return search.found()
 
 
@@ -110,12 +111,14 @@ class _State(NamedTuple):
 class _Search:
     """The points, with the weights and the power of their distances."""
 
-    def __init__(self, mesh: Mesh, faces: IntArray, barycentric: FloatArray, weight: FloatArray, power: float) -> None:
+    def __init__(
+        self, mesh: Mesh, tracer: Tracer, faces: IntArray, barycentric: FloatArray, weight: FloatArray, power: float
+    ) -> None:
         self._mesh = mesh
         self._faces, self._barycentric = faces, barycentric
         self._weight, self._power = weight / weight.sum(), power
         self._solver = GeodesicPathSolver(mesh)
-        self._tracer = Tracer(mesh)
+        self._tracer = tracer
 
     def found(self) -> SurfacePoints:
         """The point with the least sum."""

@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl.curves.straightest import Tracer
 from heat_igl.errors import SourceError
 from heat_igl.geodesic import GeodesicSolver
-from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.mesh import MeshLike, as_mesh, as_simplices
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import BoolArray, FloatArray, IntArray
@@ -97,6 +97,7 @@ def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> C
     """
     if isinstance(rounds, bool) or not isinstance(rounds, int | np.integer) or rounds < 0:
         raise ValueError(f"rounds must be an integer of at least 0, not {rounds!r}")
+    mesh = as_mesh(mesh)
     triangles = as_simplices(mesh)
     chosen = named_vertices(sites, triangles.n_vertices, "sites")
     if len(np.unique(chosen)) < len(chosen):
@@ -105,16 +106,16 @@ def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> C
     lost = np.flatnonzero(~triangles.referenced[chosen])
     if len(lost):
         raise SourceError(f"sites[{lost[0]}] = {chosen[lost[0]]} is a vertex that no face uses: it has no cell")
-    return _Relaxation(triangles).relaxed(chosen, int(rounds))
+    return _Relaxation(mesh).relaxed(chosen, int(rounds))
 
 
 class _Relaxation:
     """The solvers of a mesh, and the areas of its vertices."""
 
-    def __init__(self, mesh: Mesh) -> None:
-        self._mesh = mesh
-        self._solver = GeodesicSolver(mesh, tolerance=0)
-        self._tracer = Tracer(mesh)
+    def __init__(self, given: MeshLike) -> None:
+        self._mesh = mesh = as_simplices(given)
+        self._solver = GeodesicSolver(given, method="exact")
+        self._tracer = Tracer(given)
         self._areas = np.bincount(mesh.F.ravel(), np.repeat(mesh.measures / 3, 3), mesh.n_vertices)
 
     def relaxed(self, sites: IntArray, rounds: int) -> CentroidalSites:

@@ -10,7 +10,8 @@ import numpy as np
 from heat_igl.errors import SourceError, real_numbers, shown
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.kernels.paths import straightest
-from heat_igl.mesh import ON_SIDE, Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_simplices
+from heat_igl.mesh import ON_SIDE, MeshLike, SurfaceCurve, SurfacePoints, as_mesh, as_simplices, tangent_surface
+from heat_igl.mesh.cloud_orientation import on_one_side
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, ordered_vertices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -78,7 +79,7 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
     >>> bool(np.linalg.norm(end - start) < 0.05)
     True
     """
-    tracer = Tracer(as_simplices(mesh))
+    tracer = Tracer(mesh)
     vector = real_numbers("direction", direction)
     begin = tracer.starts("start", start, vector.shape != (3,))
     if len(begin.faces) != 1:
@@ -129,7 +130,7 @@ def exp_map(mesh: MeshLike, source: Sources, vectors: ArrayLike) -> SurfacePoint
     >>> bool(np.linalg.norm(ends + mesh.V[0], axis=1).max() < 0.05)  # both are at the antipode
     True
     """
-    return Tracer(as_simplices(mesh)).exp(source, vectors)
+    return Tracer(mesh).exp(source, vectors)
 
 
 class _Starts(NamedTuple):
@@ -156,13 +157,17 @@ class _Ends(NamedTuple):
 
 
 class Tracer:
-    """Straightest geodesics of one mesh: its frames, and the tables of the kernel."""
+    """Straightest geodesics of one mesh: its frames, and the tables of the kernel.
 
-    def __init__(self, mesh: Mesh) -> None:
-        self._mesh = mesh
-        self._frames: TangentFrames = tangent_frames(mesh)
+    On a cloud without an orientation they are traced on the cover, from the first side, and seen from one side.
+    """
+
+    def __init__(self, mesh: MeshLike) -> None:
+        given = as_mesh(mesh)
+        self._mesh, self._surface = as_simplices(given), tangent_surface(given)
+        self._frames: TangentFrames = tangent_frames(given)
         triangulation, polar = self._frames.triangulation, self._frames.angles
-        half = np.where(polar.on_boundary, -1.0, polar.sums / 2)[mesh.F]
+        half = np.where(polar.on_boundary, -1.0, polar.sums / 2)[self._surface.F]
         self._tables = kernel.Triangles(
             triangulation.l, triangulation.areas, polar.corners, triangulation.twin, np.ascontiguousarray(half)
         )
@@ -171,7 +176,7 @@ class Tracer:
     def curvature(self) -> float:
         """Mean over the vertices inside of how far the angles around them are from 2 pi, in radians."""
         polar = self._frames.angles
-        inside = self._mesh.referenced & ~polar.on_boundary
+        inside = self._surface.referenced & ~polar.on_boundary
         return float(np.abs(2 * np.pi - polar.sums[inside]).mean()) if inside.any() else 0.0
 
     def exp(self, source: Sources, vectors: ArrayLike) -> SurfacePoints:
@@ -210,7 +215,7 @@ class Tracer:
             points.positions(self._mesh)  # which checks the faces
             weights = np.where(points.barycentric < ON_SIDE, 0.0, points.barycentric)
             weights /= weights.sum(axis=1, keepdims=True)
-            corner = self._mesh.F[points.faces, weights.argmax(axis=1)]
+            corner = self._surface.F[points.faces, weights.argmax(axis=1)]
             vertices = np.where((weights.max(axis=1) == 1) & in_frame, corner, -1)
             return _Starts(points.faces.copy(), np.ascontiguousarray(weights), vertices)
         vertices = ordered_vertices(points, self._mesh.n_vertices, name)
@@ -268,7 +273,8 @@ class Tracer:
         bounds = np.linspace(0, k, threads + 1).astype(int)
         if k:
             side_by_side(work, [slice(*ends) for ends in pairwise(bounds)])
-        return found
+        faces, barycentric = on_one_side(found.faces, found.barycentric, self._mesh.n_faces)
+        return found._replace(faces=faces, barycentric=barycentric)
 
     def curve(self, start: _Starts, turn: FloatArray, length: FloatArray) -> SurfaceCurve:
         """Trace one geodesic, twice: for the number of segments, then to store them."""
@@ -277,6 +283,7 @@ class Tracer:
         faces, points = np.empty(n, np.int64), np.empty((n, 2, 3))
         given: tuple[Any, ...] = (start.faces, start.barycentric, turn, length)
         kernel.trace(self._tables, *given, *found, np.zeros(1, np.int64), faces, points)
+        faces, points = on_one_side(faces, points, self._mesh.n_faces)
         return SurfaceCurve(faces, points[:, 0], points[:, 1], mesh=self._mesh)
 
 

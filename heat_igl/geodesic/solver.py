@@ -13,8 +13,9 @@ from heat_igl.heat_method.derivatives import DistanceDerivative, differentiable_
 from heat_igl.heat_method.directions import Directions, directions
 from heat_igl.heat_method.side_lengths import SideLengths, SidesOfMesh
 from heat_igl.heat_method.solution import LabelledDistance
+from heat_igl.heat_method.two_sides import directions_from_one_side
 from heat_igl.intrinsic import TangentFrames, tangent_frames
-from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh, tangent_surface
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import MetricSimplices, Operators, edge_length_operators
 from heat_igl.plan import DomainKind, Method, Plan, distance_plan, sweep_plan
@@ -274,17 +275,27 @@ class GeodesicSolver(BatchedSolver):
             If the engine is not windows, or the solver was made from operators.
         """
         chosen = self._source_set(sources)
-        found = directions(*self._windows("directions follow").directed(chosen), self._frames)
+        engine, frames = self._directed
+        found = directions(*engine.directed(chosen), frames)
+        if isinstance(self._domain, PointCloud):
+            if self._domain.cover is not None:
+                found = directions_from_one_side(found, frames, self.n_vertices, self._domain.n_faces)
+            return found if self._originals is None else found.of(self._originals)
         if self._part is None:
             return found
         start = unchecked_points(self._part.faces[found.start.faces], found.start.barycentric)
         return replace(found, start=start)
 
     @cached_property
-    def _frames(self) -> TangentFrames:
-        if isinstance(self._domain, Operators):
+    def _directed(self) -> tuple[GuardedEngine, TangentFrames]:
+        """The engine and the frames of directions: those of a cloud are on its copies too, and on both of its sides."""
+        domain, engine = self._domain, self._windows("directions follow")
+        if isinstance(domain, Operators):
             raise ValueError("directions need the positions of a mesh, which this solver does not have")
-        return tangent_frames(self._domain if isinstance(self._domain, Mesh) else self._domain.triangles)
+        surface = tangent_surface(domain)
+        if isinstance(domain, PointCloud) and surface is not domain.distinct_triangles:
+            engine = guarded_windows(MeshTriangles(surface), surface.V, 0.0, None)
+        return engine, tangent_frames(surface)
 
     def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
         """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.

@@ -311,7 +311,9 @@ def differentiable_surface(surface: Surface | None, sources: SourceSet, mesh: Me
         If there is none, if it is that of a point cloud, or if a curve is among the sources.
     """
     if surface is None or isinstance(mesh, PointCloud):
-        raise ValueError("derivatives need a surface of triangles: this domain has none, or is a point cloud")
+        raise ValueError(
+            "derivatives need a surface of triangles: this domain has none, or is a point cloud: take its triangles"
+        )
     if mesh is not None and mesh.has_copies:
         raise ValueError(
             "derivatives need vertices none of which is a copy of another, and seams of this mesh were merged"

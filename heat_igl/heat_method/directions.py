@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from heat_igl.intrinsic import PolarAngles, TangentFrames
 from heat_igl.mesh import SurfacePoints
+from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding import PathAngles, in_circle
 
@@ -62,6 +63,12 @@ class Directions:
     turning: FloatArray
     gradient: FloatArray
     start: SurfacePoints
+
+    def of(self, vertices: IntArray) -> Directions:
+        """The directions at some vertices (k,)."""
+        start = unchecked_points(self.start.faces[vertices], self.start.barycentric[vertices])
+        rest = {field.name: getattr(self, field.name)[vertices] for field in fields(self)[:-1]}
+        return replace(self, start=start, **rest)
 
     def __repr__(self) -> str:
         return f"Directions({len(self.distance)} vertices)"

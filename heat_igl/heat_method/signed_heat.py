@@ -21,7 +21,7 @@ from heat_igl.heat_method.parts import prepare
 from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.intrinsic import IntrinsicTriangulation, oriented
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, one_sided
 from heat_igl.operators import Operators, operators
 from heat_igl.runtime import both, n_threads
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, require_resolved, source_set
@@ -88,7 +88,7 @@ class SignedHeatSolver:
     ) -> None:
         is_default = t_coef is None and t is None
         options = SolverOptions(_T_COEF if is_default else t_coef, t, backend=backend)
-        self._mesh = as_simplices(mesh)
+        self._mesh = one_sided(mesh, "the left and the right of a curve need")
         domain, self._faces, triangulation = _oriented_domain(self._mesh)
         parts = prepare(domain, options, V=self._mesh.V)
         self._domain = parts.operators

@@ -6,12 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from heat_igl.heat_method.directions import Directions
 from heat_igl.heat_method.heat_transport import HeatTransport
 from heat_igl.heat_method.path_transport import PathTransport
 from heat_igl.intrinsic import TangentFrames
+from heat_igl.mesh.cloud_orientation import on_one_side
+from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding import in_circle
 
-__all__ = ["TwoSidedTransport"]
+__all__ = ["TwoSidedTransport", "directions_from_one_side"]
 
 
 class TwoSidedTransport:
@@ -36,9 +40,7 @@ class TwoSidedTransport:
         self._on_cover, self._n = on_cover, n
         #: Of the vertices on the first side.
         self.frames = replace(frames, x=frames.x[:n], y=frames.y[:n], normal=frames.normal[:n])
-        # The x axis of the second side, in the frame of the first.
-        x = frames.x[n : 2 * n]
-        self._turn = np.einsum("nx,nx->n", x, frames.x[:n]) + 1j * np.einsum("nx,nx->n", x, frames.y[:n])
+        self._turn = _axis_of_second_side(frames, n)
 
     def extend(self, vertices: IntArray, values: FloatArray) -> FloatArray:
         """Values (n,) from values (k,) at `vertices` (k,)."""
@@ -64,3 +66,21 @@ class TwoSidedTransport:
     def on_both(self, vertices: IntArray) -> IntArray:
         """The vertices (2 k,) of the cover that are `vertices` (k,)."""
         return np.concatenate([vertices, vertices + self._n])
+
+
+def directions_from_one_side(found: Directions, frames: TangentFrames, n: int, m: int) -> Directions:
+    """The directions of paths from the first side of a cover, see `two_sided_cover`, on the n vertices and m faces.
+
+    Of the two copies of a vertex that which is nearer; arrivals on the second side are seen from the first.
+    """
+    is_other = found.distance[n : 2 * n] < found.distance[:n]
+    seen = found.of(np.arange(n) + n * is_other)
+    mirrored = in_circle(np.angle(_axis_of_second_side(frames, n)) - seen.arrival)
+    start = unchecked_points(*on_one_side(seen.start.faces, seen.start.barycentric, m))
+    return replace(seen, arrival=np.where(is_other, mirrored, seen.arrival), start=start)
+
+
+def _axis_of_second_side(frames: TangentFrames, n: int) -> AnyArray:
+    """The x axis (n,) of the second side, as complex numbers in the frame of the first."""
+    x = frames.x[n : 2 * n]
+    return np.asarray(np.einsum("nx,nx->n", x, frames.x[:n]) + 1j * np.einsum("nx,nx->n", x, frames.y[:n]))

@@ -18,7 +18,7 @@ from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.heat_method.two_sides import TwoSidedTransport
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.linear import Backend
-from heat_igl.mesh import MeshLike, PointCloud, as_mesh, as_simplices, is_oriented_manifold, two_sided_cover
+from heat_igl.mesh import MeshLike, as_mesh, as_simplices, tangent_surface
 from heat_igl.operators import Operators, edge_rotations, operators
 from heat_igl.sources import Sources, ordered_vertices
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
@@ -93,9 +93,8 @@ class VectorHeatSolver:
         #: Vertices that vectors are given at and returned for.
         self.n_vertices = triangles.n_vertices
         self._originals: IntArray | None = triangles.originals if triangles.has_copies else None
-        has_two_sides = isinstance(mesh, PointCloud) and not is_oriented_manifold(triangles)
-        if has_two_sides:
-            triangles = two_sided_cover(triangles)
+        triangles = tangent_surface(mesh)
+        has_two_sides = triangles.n_vertices > self.n_vertices
         self._frames: TangentFrames | None = tangent_frames(triangles)
         # Angles are carried over flips, not to added vertices.
         domain = operators(triangles, "intrinsic-delaunay")

@@ -12,7 +12,7 @@ from heat_igl.intrinsic.gluing import intrinsic_triangulation
 from heat_igl.intrinsic.polar_angles import PolarAngles, polar_angles
 from heat_igl.intrinsic.tangent_frames import TangentFrames
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
-from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, as_mesh, as_simplices, tangent_surface
 from heat_igl.typing import FloatArray
 
 __all__ = ["tangent_frames"]
@@ -63,7 +63,8 @@ def tangent_frames(mesh: MeshLike) -> TangentFrames:
     >>> bool(np.allclose(np.cross(frames.normal[4], x), y))
     True
     """
-    mesh = as_simplices(mesh)
+    given = as_mesh(mesh)
+    mesh, n = tangent_surface(given), as_simplices(given).n_vertices
     if mesh.is_tetrahedral:
         raise MeshError("tangent frames need triangles, but the mesh is tetrahedral")
     # Not mollified: mollification gives a flat triangle some height, and would bend lines across it.
@@ -76,7 +77,8 @@ def tangent_frames(mesh: MeshLike) -> TangentFrames:
     )
     normal = _vertex_normals(mesh, angles, face_normals)
     x, normal = (axes[mesh.originals] for axes in (_first_axes(mesh, triangulation, angles, normal), normal))
-    return TangentFrames(x, np.cross(normal, x), normal, angles, triangulation, sides, face_normals)
+    y = np.cross(normal, x)
+    return TangentFrames(x[:n], y[:n], normal[:n], angles, triangulation, sides, face_normals)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

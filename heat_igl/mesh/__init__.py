@@ -2,13 +2,21 @@
 
 from heat_igl.mesh.cloud_copies import nearest_copies
 from heat_igl.mesh.cloud_normals import usable_normals
-from heat_igl.mesh.cloud_orientation import is_oriented_manifold, two_sided_cover
+from heat_igl.mesh.cloud_orientation import two_sided_cover
 from heat_igl.mesh.edge_curves import edge_curve
 from heat_igl.mesh.exports import to_open3d, to_pyvista, to_trimesh
 from heat_igl.mesh.heights import Terrain, terrain
 from heat_igl.mesh.level_segments import Segments, crossings, joined_segments, level_segments
 from heat_igl.mesh.mesh import Mesh, checked_faces, checked_positions
-from heat_igl.mesh.objects import MeshLike, as_mesh, as_simplices, read_paths_with, warn_of_seams
+from heat_igl.mesh.objects import (
+    MeshLike,
+    as_mesh,
+    as_simplices,
+    one_sided,
+    read_paths_with,
+    tangent_surface,
+    warn_of_seams,
+)
 from heat_igl.mesh.part import MeshPart
 from heat_igl.mesh.pixel_domain import ImageDomain, image_domain
 from heat_igl.mesh.point_cloud import PointCloud
@@ -57,14 +65,15 @@ __all__ = [
     "edge_curve",
     "flat_curves",
     "image_domain",
-    "is_oriented_manifold",
     "joined_segments",
     "level_segments",
+    "one_sided",
     "named_entries",
     "nearest_copies",
     "read_paths_with",
     "region_boundary",
     "split_long_edges",
+    "tangent_surface",
     "terrain",
     "to_open3d",
     "to_pyvista",

@@ -11,7 +11,7 @@ from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["is_oriented_manifold", "neighbours_across_edges", "oriented", "two_sided_cover"]
+__all__ = ["is_oriented_manifold", "neighbours_across_edges", "on_one_side", "oriented", "two_sided_cover"]
 
 # Share of the triangles that may be left out for the others to be oriented alike. Clouds of scans had up to 0.0012; at
 # 0.002 and 0.004, on thin and narrow parts of two coarse meshes, distance became up to four times as wrong.
@@ -183,6 +183,13 @@ def two_sided_cover(surface: Mesh) -> Mesh:
             pairs.append(np.stack([of_first, of_second], axis=1))
     fan = components(np.concatenate(pairs), both.size)
     return Mesh(*_numbered(surface, both, fan))
+
+
+def on_one_side(faces: IntArray, barycentric: FloatArray, m: int) -> tuple[IntArray, FloatArray]:
+    """Points in the 2 m faces of a cover as points (k,), (k, ..., 3) of the m faces that it covers."""
+    is_other, found = faces >= m, barycentric.copy()
+    found[is_other] = found[is_other][..., [0, 2, 1]]
+    return np.where(is_other, faces - m, faces), found
 
 
 def _numbered(surface: Mesh, both: IntArray, fan: IntArray) -> tuple[IntArray, IntArray]:

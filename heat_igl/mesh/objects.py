@@ -20,7 +20,15 @@ from heat_igl.mesh.seams import seam_originals, seam_pairs
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
-__all__ = ["MeshLike", "as_mesh", "as_simplices", "read_paths_with", "warn_of_seams"]
+__all__ = [
+    "MeshLike",
+    "as_mesh",
+    "as_simplices",
+    "one_sided",
+    "read_paths_with",
+    "tangent_surface",
+    "warn_of_seams",
+]
 
 MeshLike = Any
 """`Mesh`, `PolygonMesh`, `PointCloud`, a pair (V, F), a path, or a mesh of another library, see `as_mesh`."""
@@ -183,6 +191,30 @@ def as_simplices(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh:
     """
     found = as_mesh(mesh, F)
     return found if isinstance(found, Mesh) else found.triangles
+
+
+def tangent_surface(mesh: MeshLike) -> Mesh:
+    """The surface that tangent vectors live on: `as_simplices`, or the `cover` of a `PointCloud` that has one."""
+    found = as_mesh(mesh)
+    return as_simplices(found) if not isinstance(found, PointCloud) or found.cover is None else found.cover
+
+
+def one_sided(mesh: MeshLike, what: str) -> Mesh:
+    """`as_simplices`, of a domain whose triangles have a common orientation.
+
+    Raises
+    ------
+    MeshError
+        If it is a `PointCloud` without one; `what` needs it.
+    """
+    found = as_mesh(mesh)
+    surface = as_simplices(found)
+    if isinstance(found, PointCloud) and found.cover is not None:
+        raise MeshError(
+            f"the triangles between the points are no oriented manifold: {what} one, and in places the points do not "
+            "tell on which side of the surface they are; reconstruct a mesh from them, or leave out thin parts"
+        )
+    return surface
 
 
 def _named(mesh: object) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.mesh.cloud_copies import distinct_points, with_copies
 from heat_igl.mesh.cloud_normals import oriented_normals
-from heat_igl.mesh.cloud_orientation import oriented
+from heat_igl.mesh.cloud_orientation import is_oriented_manifold, oriented, two_sided_cover
 from heat_igl.mesh.cloud_triangles import cloud_triangles
 from heat_igl.mesh.connectivity import connected_components
 from heat_igl.mesh.mesh import Mesh, checked_positions
@@ -170,6 +170,14 @@ class PointCloud:
         F, V = number[oriented(tree.P, triangles, normals)], np.empty_like(self.P)
         V[number] = tree.P
         return Mesh(V[distinct[original]], F)
+
+    @cached_property
+    def cover(self) -> Mesh | None:
+        """Both sides of `triangles` where these are no oriented manifold, see `two_sided_cover`; else None.
+
+        Tangent vectors, and what follows them, live on it.
+        """
+        return None if is_oriented_manifold(self.triangles) else two_sided_cover(self.triangles)
 
     @property
     def components(self) -> IntArray:
