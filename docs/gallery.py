@@ -28,7 +28,7 @@ def torus() -> Picture:
 def bunny() -> Picture:
     """Isolines of the distance from the nearest of three vertices."""
     mesh = heat_igl.sample_mesh()
-    sources = [1234, 4000, 9000]
+    sources = [1234, 400, 2000]
     phi = heat_igl.HeatMethodSolver(mesh).distance(sources)
     return plot(mesh, phi, sources=sources)
 
@@ -121,9 +121,9 @@ def offsets() -> Picture:
     """Curves at a given distance from two vertices."""
     mesh = heat_igl.sample_mesh()
     solver = heat_igl.GeodesicSolver(mesh)
-    phi = solver.distance([1234, 9000])
-    found = heat_igl.curves.offset_curves(mesh, solver, [1234, 9000], 0.3 * phi.max())
-    return plot(mesh, phi, sources=[1234, 9000], style="plain", curves=found)
+    phi = solver.distance([1234, 2000])
+    found = heat_igl.curves.offset_curves(mesh, solver, [1234, 2000], 0.3 * phi.max())
+    return plot(mesh, phi, sources=[1234, 2000], style="plain", curves=found)
 
 
 def scribble() -> Picture:

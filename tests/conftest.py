@@ -1,6 +1,6 @@
 """What the tests share: meshes, and the scripts as modules.
 
-Real meshes come from the pymeshlab wheel, and from ../shared/meshes where that exists.
+Real meshes come from the pymeshlab wheel; all others are made by the shapes and the zoo of the package, from seeds.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ import heat_igl
 from heat_igl.validation.zoo import SHAPES
 
 ROOT = Path(__file__).resolve().parents[1]
-SHARED = ROOT.parent / "shared" / "meshes"
 
 
 def wheel_path(name: str) -> Path:
@@ -27,15 +26,6 @@ def wheel_path(name: str) -> Path:
     if spec is None or spec.origin is None:
         pytest.skip("pymeshlab is not installed, and its sample meshes with it")
     return Path(spec.origin).parent / "tests" / "sample_meshes" / name
-
-
-def shared_path(name: str) -> Path:
-    path = SHARED / name
-    if not path.exists():
-        pytest.skip(f"{name} is not at hand")
-    if path.suffix == ".mesh":
-        pytest.importorskip("meshio")
-    return path
 
 
 def zoo(name: str) -> heat_igl.Mesh:

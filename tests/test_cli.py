@@ -253,6 +253,7 @@ def test_a_closed_pipe_is_no_traceback(sphere: Path) -> None:
     assert running.returncode == 1
 
 
+@pytest.mark.slow
 def test_demo_does_the_whole_job(tmp_path: Path) -> None:
     done = command("demo", "--out", "made/results", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -440,6 +440,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", "-l", disk], check=True)
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_with_one_error_and_can_be_resumed(client, tmp_path, small_disk):
     meshes = {f"ball {i}": Mesh(ball.V * (1 + i), ball.F) for i, ball in enumerate([heat_igl.shapes.icosphere(3)] * 4)}
     with pytest.raises(BatchError, match=r"disk.*cannot be written: No space left on device.*free some space"):
@@ -522,6 +523,7 @@ def processes(tmp_path):
     running.close()
 
 
+@pytest.mark.slow
 def test_killed_processes_lose_nothing_and_repeat_nothing(processes, tmp_path):
     """Kill a worker, then the scheduler, then the client; what was finished is not touched again, and the bits are
     those of a solver that nobody disturbed."""

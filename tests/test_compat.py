@@ -508,6 +508,7 @@ def test_files_are_read_back_as_written(tmp_path: Path, torus: Mesh) -> None:
     assert np.array_equal(pp3d.read_point_cloud(str(tmp_path / "b.ply")), torus.V)
 
 
+@pytest.mark.slow
 def test_the_peers_own_tests_are_run_with_the_drop_in(tmp_path: Path) -> None:
     """The script reports a failure that it does not know, and says of each test what happened."""
     (tmp_path / "test_theirs.py").write_text(

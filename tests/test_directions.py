@@ -314,6 +314,7 @@ def test_paths_from_a_curve_start_at_the_nearest_place_on_it():
     assert off[of_curve].max() < 1e-6
 
 
+@pytest.mark.slow
 def test_exact_paths_from_curves_lead_back_to_the_vertices(sphere):
     level, through_vertices = isolines(sphere, sphere.V[:, 2], 0.3)[0], geodesic_path(sphere, [5, 900])
     for sources in (level, through_vertices, [level, SurfacePoints([7], [[0.2, 0.3, 0.5]]), 100]):

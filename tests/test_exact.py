@@ -12,8 +12,8 @@ from conftest import (
     perturbed,
     pygeodesic_distance,
     relative_error,
-    shared_path,
     wheel_path,
+    zoo,
 )
 from surfaces import (
     COORDINATES,
@@ -138,9 +138,9 @@ def test_paths_go_through_a_vertex_where_two_fans_meet():
     np.testing.assert_allclose(exact_distance(tie.V, tie.F, 2), [2**0.5, 1, 0, 1 + 2**0.5, 2 * 2**0.5], rtol=1e-15)
 
 
-@pytest.mark.parametrize("name", ["suzanne.obj", "truck.obj"])
+@pytest.mark.parametrize("name", ["voxel blob", "wandering cells", "crossed sheets", "pinched"])
 def test_nonmanifold_meshes_against_steiner_points(name):
-    mesh = read_mesh(shared_path(name))
+    mesh = zoo(name)
     sources = np.random.default_rng(0).choice(np.unique(mesh.F), 2)
     upper = graph_distance(mesh, sources, 6)
     for source, bound in zip(sources, upper, strict=True):
@@ -153,16 +153,13 @@ def test_nonmanifold_meshes_against_steiner_points(name):
         assert excess.mean() < 1e-2
 
 
-@pytest.mark.parametrize("name", ["cow.obj", "bunny.obj"])
-def test_meshes_of_the_wheel_against_pygeodesic(name):
-    assert_agrees(read_mesh(wheel_path(name)), 2)
+@pytest.mark.parametrize("name", ["pill", "trefoil", "dunes", "elbow", "gear", "spiky sphere", "fractal terrain"])
+def test_surfaces_against_pygeodesic(name):
+    assert_agrees(zoo(name), 3)
 
 
-@pytest.mark.parametrize(
-    "name", "camelhead.off spot.obj fertility.off 3holes.off cheburashka.off lion.off fandisk.off homer.obj".split()
-)
-def test_shared_meshes_against_pygeodesic(name):
-    assert_agrees(read_mesh(shared_path(name)), 4)
+def test_a_model_against_pygeodesic():
+    assert_agrees(read_mesh(wheel_path("cow.obj")), 2)
 
 
 def assert_agrees(mesh: Mesh, n_sources: int) -> None:
