@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
 import threading
+import time
 
 import numpy as np
 import pytest
 
-from heat_igl import GeodesicSolver, distances_within, shapes
+from heat_igl import GeodesicSolver, distances_within, shapes, write_distances_within
 from heat_igl.runtime.threads import pool
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer signals on this system")
@@ -70,3 +73,60 @@ def test_loops_of_an_abandoned_pool_end():
     begun.wait()
     workers.abandon()
     assert isinstance(other.exception(timeout=60), MemoryError)
+
+
+#: Calls that take ten seconds and more, in a process of their own.
+CALLS = {
+    "the factors of heat": "HeatMethodSolver(large)",
+    "a batch by heat": "HeatMethodSolver(mesh).distances(each)",
+    "heat by relaxation": "HeatMethodSolver(mesh, backend='iterative').distances(each)",
+    "an exact batch": "GeodesicSolver(large).distances(each)",
+    "a batch of sweeps": "GeodesicSolver(large, method='sweep').distances(each)",
+    "a local query": "distances_within(mesh, 1.0)",
+    "pairs": "pair_distances(mesh, [[i, 40000 - i] for i in range(20000)])",
+    "farthest points": "farthest_points(large, 3000)",
+    "signed distances": "[SignedHeatSolver(large).distance(isolines(large, large.V[:, 2], [0.1])) for _ in each]",
+    "vectors": "[VectorHeatSolver(mesh).log_map(i) for i in range(4000)]",
+    "tetrahedra": "GeodesicSolver(shapes.box(30)).distances(each)",
+    "refinement": "HeatMethodSolver(shapes.cylinder(30000, 1, 1.0))",
+    "points": "GeodesicSolver(PointCloud(large.V))",
+    "a store": "write_distances_within(folder + '/near.zarr', mesh, 1.0)",
+}
+CHILD = """
+import sys, time, warnings
+from heat_igl import *
+warnings.simplefilter("ignore")
+folder, large, mesh, each = sys.argv[1], shapes.icosphere(7), shapes.icosphere(6), [[i] for i in range(4000)]
+for line in sys.stdin:
+    call = eval("lambda: " + line)
+    print("begun", flush=True)
+    try:
+        call()
+        print("it returned", flush=True)
+    except KeyboardInterrupt:
+        print("interrupted", flush=True)
+"""
+
+
+def test_ctrl_c_ends_long_calls(tmp_path):
+    """Within some seconds, which nothing else here would do: no call is as short, and some take minutes."""
+    late = {}
+    with subprocess.Popen(
+        [sys.executable, "-c", CHILD, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as child:
+        for name, call in CALLS.items():
+            child.stdin.write(call + "\n")
+            child.stdin.flush()
+            assert child.stdout.readline() == "begun\n"
+            time.sleep(0.4)
+            begin = time.monotonic()
+            child.send_signal(signal.SIGINT)
+            assert child.stdout.readline() == "interrupted\n", name
+            if time.monotonic() - begin > 4:
+                late[name] = time.monotonic() - begin
+        child.stdin.close()
+        assert child.wait(timeout=10) == 0  # threads of what was left have ended, too
+    assert not late
+    # Nothing is half-written: what is there under the name is all there, and it can be written now.
+    assert not (tmp_path / "near.zarr").exists()
+    write_distances_within(tmp_path / "near.zarr", shapes.icosphere(1), 1.0)

@@ -7,7 +7,6 @@ pivoting, for the reason that `SuperLUFactorization` gives.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 
 import numpy as np
@@ -15,11 +14,12 @@ import scipy.sparse as sp
 
 from heat_igl.errors import FactorizationError
 from heat_igl.kernels import builds
+from heat_igl.kernels.signals import raise_caught
 from heat_igl.linear.dissection import dissect
 from heat_igl.linear.fronts import fronts
 from heat_igl.linear.protocols import check_finite, check_probe
 from heat_igl.linear.substitution import Substitution
-from heat_igl.runtime import n_threads
+from heat_igl.runtime import n_threads, pool
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["MultifrontalAnalysis", "MultifrontalFactorization"]
@@ -38,7 +38,7 @@ class MultifrontalAnalysis:
     def __init__(self, pattern: sp.csc_matrix) -> None:
         self._ends = pattern.indptr.astype(np.int32, copy=False)
         self._neighbours = pattern.indices.astype(np.int32, copy=False)
-        with ThreadPoolExecutor(n_threads()) as workers:
+        with pool(n_threads()) as workers:
             tree = dissect(self._ends, self._neighbours, workers)
         self.fronts = fronts(self._ends, self._neighbours, tree)
         self.order: IntArray | None = self.fronts.order
@@ -67,6 +67,7 @@ class MultifrontalAnalysis:
         is_free = np.ones(A.shape[0], np.uint8) if free is None else free.astype(np.uint8)
         failed = _kernel.factor(self._ends, self._neighbours, data, is_free, self.fronts, entries, _SINGULAR)
         if failed >= 0:
+            raise_caught()
             raise FactorizationError(f"the matrix ({A.shape[0]} rows) is singular or not positive definite")
 
 

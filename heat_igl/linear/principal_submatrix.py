@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import scipy.sparse as sp
 
+from heat_igl.runtime import pool
 from heat_igl.typing import BoolArray, FloatArray
 
 __all__ = ["PrincipalSubmatrix"]
@@ -43,8 +43,8 @@ class PrincipalSubmatrix:
         if columns.shape[1] == 1 or n_threads == 1:
             solved = [column_solve(np.ascontiguousarray(column)) for column in columns.T]
         else:
-            with ThreadPoolExecutor(min(n_threads, columns.shape[1])) as pool:
-                solved = list(pool.map(column_solve, np.ascontiguousarray(columns.T)))
+            with pool(min(n_threads, columns.shape[1])) as workers:
+                solved = list(workers.map(column_solve, np.ascontiguousarray(columns.T)))
         x = np.zeros(b.shape)
         into = x.reshape(len(x), -1)
         into[slice(None) if self._free is None else self._free] = np.stack(solved, axis=1)

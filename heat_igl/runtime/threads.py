@@ -44,7 +44,10 @@ def n_threads() -> int:
 
 
 class _Pool(ThreadPoolExecutor):
-    """A pool of k threads, among which the processors of the calling thread are divided (see `n_threads`)."""
+    """A pool of k threads, among which the processors of the calling thread are divided (see `n_threads`).
+
+    A ``with`` block waits for them at its end; it abandons them after an exception, such as that of Ctrl-C.
+    """
 
     def __init__(self, k: int) -> None:
         among, stop = k * _among(), threading.Event()
@@ -56,8 +59,14 @@ class _Pool(ThreadPoolExecutor):
         super().__init__(k, initializer=begin)
         self._stop = stop
 
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self.shutdown()
+        else:
+            self.abandon()
+
     def abandon(self) -> None:
-        """End compiled loops, begin nothing new, and do not wait: after an exception, such as that of Ctrl-C."""
+        """End compiled loops, begin nothing new, and do not wait."""
         self._stop.set()
         self.shutdown(wait=False, cancel_futures=True)
 
@@ -79,16 +88,11 @@ def side_by_side(work: Callable[[Item], Any], items: Sequence[Item]) -> None:
     if len(items) == 1:
         work(items[0])
         return
-    workers = pool(len(items))
-    try:
+    with pool(len(items)) as workers:
         others = [workers.submit(work, item) for item in items[1:]]
         work(items[0])
         for other in others:
             other.result()
-    except BaseException:
-        workers.abandon()
-        raise
-    workers.shutdown()
 
 
 def over_rows(work: Callable[[slice], Result], n: int, most: int) -> list[Result]:
@@ -119,12 +123,6 @@ def both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[Firs
     """The results of two calls, the second of them on another thread if there is one."""
     if n_threads() == 1:
         return first(), second()
-    workers = pool(2)
-    try:
+    with pool(2) as workers:
         other = workers.submit(second)
-        result = first(), other.result()
-    except BaseException:
-        workers.abandon()
-        raise
-    workers.shutdown()
-    return result
+        return first(), other.result()

@@ -3,6 +3,7 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.linear.panels import entries, in_panel, numbers
+from cython.cimports.heat_igl.kernels.signals import is_interrupted
 
 __all__ = ["factor"]
 
@@ -19,13 +20,21 @@ def factor(
     """Factor a matrix of the pattern that `fronts` was made for, into L.
 
     Vertices that are not free keep an identity row. Returns -1, or the vertex whose pivot is not positive, or has
-    shrunk to less than the share `singular` of its diagonal.
+    shrunk to less than the share `singular` of its diagonal; or after a signal the one that is next.
     """
     e = Elimination(ends, neighbours, data, free, fronts, L, singular)
     b: cython.Py_ssize_t
     failed: cython.Py_ssize_t = -1
+    work: cython.double = 0.0
     with cython.nogil:
         for b in range(e.parent.shape[0]):
+            rows: cython.double = e.start[b + 1] - e.start[b] + e.first_row[b + 1] - e.first_row[b]
+            work += rows * rows
+            if work > ASK:
+                work = 0.0
+                if is_interrupted():
+                    failed = e.start[b]
+                    break
             failed = _front(e, b)
             if failed >= 0:
                 break
@@ -223,6 +232,9 @@ def _eliminate_columns(panel: numbers, columns: cython.Py_ssize_t, size: cython.
         if not _divide(following, size - j - 1):
             return False
         j += 2
+        # The largest fronts take seconds.
+        if size > 1000 and j % 64 == 0 and is_interrupted():
+            return False
     return True
 
 

@@ -11,7 +11,10 @@ from cython.cimports.heat_igl.kernels.mesh.growing_triangulation import GrowingT
 from cython.cimports.heat_igl.kernels.mesh.refinement import LEAST, MOST_STEPS, SHARPEST, Exit, Location, Ray
 from cython.cimports.heat_igl.kernels.mesh.triangles import area, foot
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
+from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.libc.math import atan2
+
+from heat_igl.kernels.signals import raise_caught
 
 __all__ = ["refine"]
 
@@ -64,6 +67,7 @@ def refine(
     with cython.nogil:
         _find_sharp(triangles, seen, one.is_sharp)
         one.run(limit)
+    raise_caught()
     return *triangles.faces(), int(triangles.n_vertices), *triangles.moves()
 
 
@@ -89,6 +93,8 @@ class _Refinement:
         for f in range(self.triangles.n_faces):
             self.judge(f)
         while self.bad.count > 0 and self.triangles.n_vertices < most_vertices:
+            if self.triangles.n_vertices % ASK == 0 and is_interrupted():
+                break
             f = self.bad.first()
             center: Location = _circumcenter(self.triangles, f)
             if center.face < 0:

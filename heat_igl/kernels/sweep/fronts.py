@@ -6,10 +6,13 @@ refracted. Seen from a vertex, the source lies behind the opposite side of a sim
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.fronts import GAIN, MOST_REGIONS, MOST_VISITS, STRAIGHT
 from cython.cimports.heat_igl.kernels.sweep.refraction import Refracted, refracted
 from cython.cimports.heat_igl.kernels.sweep.spatial_updates import Edges, across_base, foot
 from cython.cimports.libc.math import INFINITY, sqrt
+
+from heat_igl.kernels.signals import raise_caught
 
 __all__ = ["advance"]
 
@@ -66,6 +69,7 @@ def advance(
         _begin_in_own_regions(one, np.asarray(d), np.asarray(begin), np.asarray(label), np.asarray(one.arrived))
     with cython.nogil:
         one.run()
+    raise_caught()
     return one.n_visits
 
 
@@ -91,6 +95,7 @@ def _begin_in_own_regions(one: _Fronts, d, begin, label, arrived):
         np.asarray(one.is_stale)[:] = 1
         with cython.nogil:
             one.run()
+        raise_caught()
         nearer = d < found[0]
         for values, kept in zip((d, begin, label, arrived), found, strict=True):
             kept[nearer] = values[nearer]
@@ -149,6 +154,8 @@ class _Fronts:
             if self.is_stale[v]:
                 self.is_stale[v] = False
                 self.n_visits += 1
+                if self.n_visits % ASK == 0 and is_interrupted():
+                    break
                 behind = min(behind, self.visit(v))
             if behind < i and i == n:
                 i, behind = behind, n

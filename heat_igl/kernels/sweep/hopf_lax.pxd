@@ -30,6 +30,7 @@ cdef class HopfLax(Facet):
     cdef PriorityQueue queue
     cdef double[::1] pending
     cdef int[::1] n_visits
+    cdef long long n_carried
     cdef double unit, low
     cdef const unsigned char[::1] fixed
     cdef double[::1] d

@@ -14,6 +14,7 @@ as far as these agree with the distances, and with the metric of the simplex.
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
+from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet
 from cython.cimports.heat_igl.kernels.sweep.hopf_lax import (
     FIRST_GAIN,
@@ -23,6 +24,8 @@ from cython.cimports.heat_igl.kernels.sweep.hopf_lax import (
     SETTLED,
 )
 from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
+
+from heat_igl.kernels.signals import raise_caught
 
 __all__ = ["HopfLax"]
 
@@ -75,6 +78,7 @@ class HopfLax(Facet):
         self.handed = np.full(n, np.inf)
         with cython.nogil:
             self.spread(self.low)
+        raise_caught()
 
     def second_order(self):
         """After `first_order`: change its distances to those of second order."""
@@ -83,6 +87,7 @@ class HopfLax(Facet):
         self.pending, self.n_visits = np.where(np.isfinite(self.d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
             self.sharpen(self.fixed, self.low)
+        raise_caught()
 
     @cython.cfunc
     @cython.nogil
@@ -99,6 +104,9 @@ class HopfLax(Facet):
                 if self.d[v] + gain * fabs(self.d[v]) < self.handed[v]:
                     self.queue.set_key(v, 1.0 / (1.0 + (self.d[v] - low) / self.unit))
             while self.queue.count > 0:
+                self.n_carried += 1
+                if self.n_carried % ASK == 0 and is_interrupted():
+                    return
                 v = cython.cast(cython.int, self.queue.first())
                 self.queue.set_key(v, 0.0)
                 self.handed[v] = self.d[v]
@@ -247,6 +255,9 @@ class HopfLax(Facet):
                 if self.pending[v] > settled and not fixed[v] and self.n_visits[v] < MOST_VISITS:
                     self.queue.set_key(v, 1.0 / (1.0 + (self.d[v] - low) / self.unit))
             while self.queue.count > 0:
+                self.n_carried += 1
+                if self.n_carried % ASK == 0 and is_interrupted():
+                    return
                 v = cython.cast(cython.int, self.queue.first())
                 self.queue.set_key(v, 0.0)
                 self.pending[v] = 0.0

@@ -8,6 +8,7 @@ planar_updates.pxd has the formulas. Here is which vertex is updated when, and f
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
+from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.front_order import FrontOrder
 from cython.cimports.heat_igl.kernels.sweep.half_edges import HalfEdges
 from cython.cimports.heat_igl.kernels.sweep.planar_updates import (
@@ -29,6 +30,8 @@ from cython.cimports.heat_igl.kernels.sweep.sweeping import (
     SWEEP_ROUNDING,
 )
 from cython.cimports.libc.math import INFINITY, sqrt
+
+from heat_igl.kernels.signals import raise_caught
 
 __all__ = ["sweep"]
 
@@ -68,6 +71,7 @@ def sweep(
     one.label = label if one.has_labels else np.empty(0, np.int32)
     with cython.nogil:
         one.run()
+    raise_caught()
     return one.n_visits / n
 
 
@@ -120,6 +124,8 @@ class _Sweep:
                 continue
             self.is_stale[v] = False
             self.n_visits += 1
+            if self.n_visits % ASK == 0 and is_interrupted():
+                break
             back = self.visit(v)
             if back < i:
                 if self.n_visits < GO_BACK * n:
