@@ -76,7 +76,7 @@ def paths() -> Picture:
     mesh = heat_igl.sample_mesh()
     solver = heat_igl.GeodesicSolver(mesh)
     ends = heat_igl.farthest_points(solver, 40, start=1234)[1:]
-    paths = heat_igl.shortest_paths(mesh, ends, 1234, distance=solver)
+    paths = heat_igl.shortest_paths(mesh, ends, 1234)
     return plot(mesh, solver.distance(1234), sources=1234, curves=paths)
 
 

@@ -68,7 +68,7 @@ CALLS: dict[str, Call] = {
     "polygon_operators": lambda mesh: heat_igl.operators.polygon_operators(mesh).L,
     "region_boundary": lambda mesh: heat_igl.mesh.region_boundary(mesh, vertices=LABELS < 1)[0].positions(MESH),
     "shortest_path": lambda mesh: heat_igl.shortest_path(mesh, 0, 40).points,
-    "shortest_paths": lambda mesh: heat_igl.shortest_paths(mesh, 40, distance=PHI)[0].positions(MESH),
+    "shortest_paths": lambda mesh: heat_igl.shortest_paths(mesh, 40, 0)[0].positions(MESH),
     "signed_distance": lambda mesh: heat_igl.signed_distance(mesh, LOOPS),
     "smooth": lambda mesh: heat_igl.smooth(mesh, PHI, 0.3),
     "speed_operators": lambda mesh: heat_igl.speed_operators(mesh, np.ones(MESH.n_faces)).L,

@@ -209,7 +209,7 @@ def test_offset_of_a_curve_drawn_on_the_plane():
     mesh = shapes.grid(60)
     solver = heat_igl.HeatMethodSolver(mesh)
     first, last = 20 * 61 + 20, 30 * 61 + 40
-    drawn = heat_igl.shortest_paths(mesh, last, first, distance=solver)[0]
+    drawn = heat_igl.shortest_paths(mesh, last, first)[0]
     length = np.linalg.norm(mesh.V[first] - mesh.V[last])
     assert drawn.lengths(mesh).sum() == pytest.approx(length, rel=1e-9)
     (curve,) = heat_igl.curves.offset_curves(mesh, solver, drawn, 0.2)
@@ -228,7 +228,7 @@ def test_offset_of_a_curve_drawn_on_a_part():
     pytest.importorskip("pygeodesic")
     mesh = zoo("pill")
     solver = heat_igl.HeatMethodSolver(mesh)
-    drawn = heat_igl.shortest_paths(mesh, 0, 900, distance=solver)[0]
+    drawn = heat_igl.shortest_paths(mesh, 0, 900)[0]
     radius = 4 * mesh.edge_lengths.mean()
     curves = heat_igl.curves.offset_curves(mesh, solver, drawn, radius)
     assert curves

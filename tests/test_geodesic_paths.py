@@ -23,7 +23,6 @@ from heat_igl import (
     straighten,
 )
 from heat_igl.curves import GeodesicPathSolver, handle_loops
-from heat_igl.curves.words import crossing_letters
 
 
 def length(mesh: Mesh, curve: SurfaceCurve) -> float:
@@ -450,21 +449,6 @@ def test_one_solver_serves_several_threads_and_is_pickled():
     assert float(copy.path(pairs[0]).lengths(mesh).sum()) == want[0]
 
 
-def test_straight_lines_lead_past_hills_of_many_vertices():
-    grid = flat_perturbed(shapes.grid(30))
-    x, y = grid.V[:, 0], grid.V[:, 1]
-    height = 0.1 * np.exp(-(((x - 0.5) / 0.1) ** 2) - ((y - 0.48) / 0.1) ** 2)
-    mesh = Mesh(grid.V + height[:, None] * [0, 0, 1], grid.F)
-    start, above, below = (int(np.argmin(np.hypot(x - a, y - b))) for a, b in ((0, 0.5), (0.5, 0.6), (0.5, 0.36)))
-    for b in np.linspace(0.3, 0.7, 9):
-        end = int(np.argmin(np.hypot(x - 1, y - b)))
-        exact = heat_igl.pair_distances(mesh, [[start, end]])[0]
-        for side in (above, below):
-            path = straighten(mesh, edge_walk(mesh, [start, side, end]))
-            assert_locally_shortest(mesh, path)
-            assert length(mesh, path) == pytest.approx(exact, rel=1e-12)
-
-
 @pytest.mark.parametrize("turns", [0, 1, -1, 2])
 def test_turns_around_a_narrow_cylinder_are_kept(turns):
     around, rows, tall = 12, 20, 40.0
@@ -493,48 +477,3 @@ def test_straightened_paths_stay_in_their_class(holes):
             core = center + np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 0]])
             assert winding(around, center) == pytest.approx(0, abs=1e-6)
             assert linking(around, core) == pytest.approx(0, abs=1e-6)
-
-
-def vertex_words(mesh: Mesh) -> list[list[int]]:
-    """The word around each inner vertex, with neighbours that cancel taken away."""
-    letter = crossing_letters(mesh)
-    assert letter is not None
-    edge = mesh.facets.of_face.ravel()
-    words = []
-    for v in np.flatnonzero(~mesh.boundary):
-        faces = np.flatnonzero((v == mesh.F).any(axis=1))
-        f, word = int(faces[0]), []
-        for _ in faces:
-            h = 3 * f + (mesh.F[f].tolist().index(v) + 1) % 3
-            (other,) = np.setdiff1d(np.flatnonzero(edge == edge[h]), h)
-            assert letter[other] == -letter[h]
-            if letter[h]:
-                word.append(int(letter[h]))
-            if word[-2:] and len(word) > 1 and word[-1] == -word[-2]:
-                word = word[:-2]
-            f = int(other) // 3
-        while len(word) > 1 and word[0] == -word[-1]:
-            word = word[1:-1]
-        words.append(word)
-    return words
-
-
-@pytest.mark.parametrize("holes", [1, 2, 3])
-def test_words_around_vertices_cancel_but_where_chains_meet(holes):
-    words = [word for word in vertex_words(handlebody(holes)) if word]
-    assert 0 < len(words) <= 4 * holes - 2
-    assert all(len(word) > 2 for word in words)
-    letters = {abs(letter) for word in words for letter in word}
-    assert len(letters) <= 6 * holes - 3
-    # Each chain has two ends.
-    assert sum(map(len, words)) == 2 * len(letters)
-
-
-def test_words_with_holes_and_without():
-    assert not any(vertex_words(shapes.cylinder(12, 6)))
-    assert np.abs(crossing_letters(shapes.cylinder(12, 6))).max() == 1
-    for mesh in (shapes.icosphere(2), shapes.grid(4)):
-        assert len(crossing_letters(mesh)) == 0
-    assert crossing_letters(shapes.book(3, 4)) is None
-    grid = shapes.grid(2)
-    assert crossing_letters(Mesh(grid.V, np.concatenate([grid.F[:1, ::-1], grid.F[1:]]))) is None

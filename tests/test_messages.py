@@ -31,16 +31,15 @@ PHI = SOLVER.distance(0)
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
-        (lambda: shortest_paths(MESH, 162, distance=PHI), r"targets\[0\] = 162 is no vertex"),
-        (lambda: shortest_paths(MESH, [3, -1], distance=PHI), r"targets\[1\] = -1 is no vertex"),
-        (lambda: shortest_paths(MESH, [], distance=PHI), "targets is empty"),
-        (lambda: shortest_paths(MESH, np.ones(3, bool), distance=PHI), "the mask targets has 3 entries"),
+        (lambda: shortest_paths(MESH, 162, 0), r"targets\[0\] = 162 is no vertex"),
+        (lambda: shortest_paths(MESH, [3, -1], 0), r"targets\[1\] = -1 is no vertex"),
+        (lambda: shortest_paths(MESH, [], 0), "targets is empty"),
+        (lambda: shortest_paths(MESH, np.ones(3, bool), 0), "the mask targets has 3 entries"),
         (
-            lambda: shortest_paths(MESH, SurfacePoints([999], [1, 0, 0]), distance=PHI),
+            lambda: shortest_paths(MESH, SurfacePoints([999], [1, 0, 0]), 0),
             r"targets: faces\[0\] = 999 is no face",
         ),
-        (lambda: shortest_paths(MESH, 4, [162], distance=PHI), r"sources\[0\] = 162 is no vertex"),
-        (lambda: shortest_paths(MESH, 4), "sources are missing: name them"),
+        (lambda: shortest_paths(MESH, 4, [162]), r"sources\[0\] = 162 is no vertex"),
         (lambda: farthest_points(SOLVER, 3, start=162), r"start\[0\] = 162 is no vertex"),
         (lambda: farthest_points(MESH, 3, start=[0.5]), "start must be a vertex index.* not floats such as 0.5"),
         (lambda: voronoi_cells(SOLVER, [1, 162]), r"sites\[1\] = 162 is no vertex"),
@@ -102,7 +101,7 @@ def test_positions_as_sources_are_told_of_closest_points(positions):
             ask(positions)
     assert geodesic_distance(MESH, heat_igl.closest_points(MESH, positions).points).min() < 0.1
     with pytest.raises(SourceError, match=r"closest_points\(mesh, targets\).points"):
-        shortest_paths(MESH, positions, distance=PHI)
+        shortest_paths(MESH, positions, 0)
 
 
 def test_curves_are_written_from_lists_of_any_depth(tmp_path):

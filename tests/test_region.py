@@ -152,8 +152,6 @@ def test_paths_in_a_region():
         heat_igl.shortest_path(mesh, far, used[3], region=region)
     with pytest.raises(SourceError, match="a must be one place, not 2"):
         heat_igl.shortest_path(mesh, [0, 1], 2)
-    with pytest.raises(ValueError, match="paths in a region are exact: leave distance away"):
-        heat_igl.shortest_paths(mesh, 0, 1, distance=np.zeros(mesh.n_vertices), region=region)
 
 
 def test_the_command_takes_a_region(tmp_path, capsys):

@@ -9,8 +9,7 @@ import igl
 import numpy as np
 
 from heat_igl.compat.triangles import proper
-from heat_igl.curves import geodesic_path, isolines, shortest_paths, straighten, trace_geodesic
-from heat_igl.geodesic import GeodesicSolver
+from heat_igl.curves import geodesic_path, isolines, shortest_path, straighten, trace_geodesic
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints
 from heat_igl.typing import ArrayLike, FloatArray
 
@@ -21,18 +20,14 @@ Curves = list[list[tuple[int, list[float]]]]
 
 
 class EdgeFlipGeodesicSolver:
-    """Paths between vertices, and paths and loops in the class of others: `shortest_paths` and `straighten`.
+    """Paths between vertices, and paths and loops in the class of others: `shortest_path` and `straighten`.
 
-    A path between two vertices follows near-exact distances, so no path of another class is taken for the shortest. The
-    last two arguments of the methods limit the work of potpourri3d, and are not read.
+    A path between two vertices is the exact shortest one, of whatever class. The last two arguments of the methods
+    limit the work of potpourri3d, and are not read.
     """
 
     def __init__(self, V: ArrayLike, F: ArrayLike, t_coef: float = 1.0) -> None:
         self._mesh = Mesh(V, F)
-
-    @cached_property
-    def _solver(self) -> GeodesicSolver:
-        return GeodesicSolver(self._mesh)
 
     def find_geodesic_path(
         self,
@@ -44,7 +39,7 @@ class EdgeFlipGeodesicSolver:
         """Corners (k, 3) of the path from one vertex to another."""
         if v_start == v_end:
             raise ValueError(f"v_start and v_end are the same vertex, {v_start}")
-        return shortest_paths(self._mesh, v_start, v_end, distance=self._solver)[0].positions(self._mesh)
+        return shortest_path(self._mesh, v_start, v_end).positions(self._mesh)
 
     def find_geodesic_path_poly(
         self,

@@ -48,9 +48,7 @@ def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
     at a vertex with an angle below pi on the other side, the strip is led there (Xin and Wang 2007). A loop is
     shortened at the vertex with the smallest angle first (Sharp and Crane 2020), then from one of its points to itself,
     and from another one, until its length stays the same. On a surface with hills one class can have several locally
-    shortest curves. A loop that becomes less than half as long is shortened a second time in another order. Straight
-    lines that leave the curve at small angles are followed; one that meets the curve again after a shorter way, in the
-    same class, replaces the part in between.
+    shortest curves. A loop that becomes less than half as long is shortened a second time in another order.
 
     Examples
     --------
@@ -93,9 +91,8 @@ def geodesic_path(mesh: MeshLike, waypoints: Waypoints, closed: bool = False) ->
 
     Notes
     -----
-    The first course is the shortest way along edges and straight lines from corner to corner across an edge, and it is
-    shortened as by `straighten`. Between far points with hills in between it may pass a hill on the longer side:
-    for the shortest path of all, call `shortest_paths` without a distance.
+    The first course is the shortest way along edges, and it is shortened as by `straighten`. Between far points with
+    hills in between it may pass a hill on the longer side: for the shortest path of all, call `shortest_paths`.
 
     Examples
     --------
@@ -201,10 +198,8 @@ class GeodesicPathSolver:
 
     def geodesics(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
         """The geodesics between checked places (k,), each from one to the next."""
-        # Each of the two ways may lead past a hill on the longer side.
         with self._one_at_a_time:
-            ways = (self._routes.legs(faces, barycentric, crosses=crosses) for crosses in (True, False))
-            return [self._shortener.shorter(*pair) for pair in zip(*ways, strict=True)]
+            return [self._shortener.shortest(leg) for leg in self._routes.legs(faces, barycentric)]
 
     @property
     def _routes(self) -> Router:

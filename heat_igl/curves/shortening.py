@@ -8,12 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from heat_igl.curves.places import snapped
-from heat_igl.curves.tracing import Surface, opposite_sides, surface
-from heat_igl.curves.words import crossing_letters
+from heat_igl.curves.surface import Surface, opposite_sides, surface
 from heat_igl.errors import SourceError
 from heat_igl.kernels.mesh import polar_angles
 from heat_igl.kernels.paths import shortening
-from heat_igl.mesh import Mesh, SurfaceCurve
+from heat_igl.mesh import Mesh, SurfaceCurve, is_oriented_manifold
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -21,7 +20,6 @@ __all__ = ["Course", "Shortened", "Shortener", "as_curve", "course_of"]
 
 # The compiled module, whose signatures are those of Cython.
 kernel: Any = shortening
-_AHEAD = np.dtype([("along", "f8"), ("above", "f8"), ("after", "i4", 2), ("vertex", "i4")], align=True)
 # Segments are joined if their ends are no farther apart than this, in mean edge lengths.
 _GAP = 1e-6
 
@@ -128,15 +126,11 @@ class Shortener:
         sums[mesh.facets.vertices[mesh.facets.n_faces != 2]] = np.inf
         half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
         most_corners = int(np.diff(self.surface.first_corner).max())
-        letters = crossing_letters(mesh)
-        if letters is None:
-            empty = np.empty(0, np.int32)
-            shortcuts, directions = (np.empty(0, _AHEAD), empty), (np.empty(0), np.empty(0), empty)
-        else:
+        directions = np.empty(0), np.empty(0), np.empty(0, np.int32)
+        if mesh.facets.n_faces.max() <= 2 and is_oriented_manifold(mesh):
             opposite = opposite_sides(self.surface)
-            shortcuts = _faces_ahead(self.surface, opposite), letters
             directions = *_directions(self.surface, opposite), opposite
-        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, shortcuts, directions)
+        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, directions)
 
     def shortest(self, course: Course, *, is_closed: bool = False) -> Shortened:
         """The locally shortest curve of the class of a course: between the ends, or as a loop."""
@@ -150,23 +144,6 @@ class Shortener:
             at = (self.surface.triangle["vertex"][faces[[0, -1]]] == vertex).astype(float)
             _, *found = self._kernel.shorten(faces, np.ascontiguousarray(joins), at, False)
         return Shortened(*found)
-
-    def shorter(self, one: Course, other: Course) -> Shortened:
-        """The shorter of the locally shortest paths of two courses with the same first and last place."""
-        found = self._kernel.shorter(one.faces, one.joins, other.faces, other.joins, one.ends)
-        if found is None:
-            return min(self.shortest(one), self.shortest(other), key=lambda path: path.length)
-        return Shortened(*found[1:])
-
-
-def _faces_ahead(surface: Surface, opposite: AnyArray) -> AnyArray:
-    """The face behind each half-edge (3 m,) of an oriented manifold, as the kernel of fans has it in `Ahead`."""
-    triangle = surface.triangle
-    ahead = np.empty((len(triangle), 3), _AHEAD)
-    ahead["along"], ahead["above"], ahead["vertex"] = triangle["along"], triangle["above"], triangle["vertex"]
-    across = opposite.reshape(-1, 3)
-    ahead["after"] = np.stack([np.roll(across, -2, axis=1), np.roll(across, -1, axis=1)], axis=2)
-    return ahead.ravel()
 
 
 def _directions(surface: Surface, opposite: AnyArray) -> tuple[FloatArray, FloatArray]:

@@ -66,7 +66,9 @@ class ExactPaths(NamedTuple):
     distance: FloatArray
 
 
-def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: FloatArray) -> ExactPaths:
+def exact_paths(
+    mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: FloatArray, margin: float = MARGIN
+) -> ExactPaths:
     """Shortest paths on the faces of a mesh, by windows on the triangles as they are given.
 
     Parameters
@@ -77,6 +79,8 @@ def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: Fl
         Vertices, points and segments.
     faces, barycentric : (k,) int64, (k, 3) float64
         Where the paths begin. The search ends when the distance of all these places is known.
+    margin : float
+        By how much triangles are mollified, see `intrinsic_triangulation`.
 
     Returns
     -------
@@ -88,7 +92,7 @@ def exact_paths(mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: Fl
     MemoryError
         If the windows do not fit into memory.
     """
-    edges = from_triangulation(intrinsic_triangulation(mesh, MARGIN))
+    edges = from_triangulation(intrinsic_triangulation(mesh, margin))
     is_corner = barycentric.max(axis=1) == 1
     vertex = np.full(len(faces), -1)
     vertex[is_corner] = mesh.F[faces[is_corner], barycentric[is_corner].argmax(axis=1)]

@@ -7,10 +7,7 @@ cdef extern from *:
     """
     // The base of a loop does not slide by a smaller share of its edge.
     #define SHORTEST_SLIDE 1e-4
-    // A loop that keeps more than this share of its length is near where it was, and no other way is tried.
-    #define MOST_KEPT 0.5
     """
-    double MOST_KEPT
     double SHORTEST_SLIDE
 
 cdef enum:
@@ -24,12 +21,11 @@ cdef class Loop:
     cdef SettledPath path
     cdef Course course
     cdef Polyline polyline
-    # The loop as it was given, the shortest so far, that before the base slides, and that before the base moves.
-    cdef Saved first, best, kept, ring
+    # The loop before the base slides, and before it moves.
+    cdef Saved kept, ring
 
     cdef double shorten(self) except -1 nogil
-    cdef double relax(self) except -1 nogil
-    cdef double straighten(self, double length) except -1 nogil
+    cdef int relax(self) except -1 nogil
     cdef double tighten(self) except -1 nogil
     cdef double slide(self, double length) except -1 nogil
     cdef void place_base(self, int f, int a, int b, int a_end, int b_end, double share) noexcept nogil

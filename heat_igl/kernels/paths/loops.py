@@ -6,10 +6,10 @@ with every such step unless the loop is locally shortest at the base too.
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.paths.loops import BOTH_WAYS, MOST_BASES, MOST_KEPT, SHORTEST_SLIDE
+from cython.cimports.heat_igl.kernels.paths.loops import BOTH_WAYS, MOST_BASES, SHORTEST_SLIDE
 from cython.cimports.heat_igl.kernels.paths.passing import Saved, copy
 from cython.cimports.heat_igl.kernels.paths.polylines import Polyline
-from cython.cimports.heat_igl.kernels.paths.settled_paths import GAIN, SAME_LENGTH, SettledPath
+from cython.cimports.heat_igl.kernels.paths.settled_paths import GAIN, SettledPath
 from cython.cimports.heat_igl.kernels.paths.surfaces import SNAP, Place, at_corner, corner_of, side_of
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
@@ -23,68 +23,34 @@ class Loop:
 
     def __init__(self, path: SettledPath, polyline: Polyline):
         self.path, self.course, self.polyline = path, path.course, polyline
-        self.first, self.best, self.kept, self.ring = Saved(), Saved(), Saved(), Saved()
+        self.kept, self.ring = Saved(), Saved()
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def shorten(self) -> cython.double:
-        """Lead the strip to the shortest loop of its class that is found; returns the length.
-
-        From one loop, different orders of shortening can lead to different closed geodesics. The loop is relaxed as
-        a polyline first. If it comes far, but not to a point, the same loop is shortened from its base too.
-        """
-        end: Place = self.path.end
-        self.first.save(self.course)
-        given: cython.double = self.relax()
-        length: cython.double = self.straighten(self.tighten())
-        if not length < MOST_KEPT * given or self.course.strip.count == 0:
-            return length
-        best_end: Place = self.path.end
-        self.best.save(self.course)
-        self.first.restore(self.course)
-        self.path.end = end
-        other: cython.double = self.tighten()
-        if other < length * (1.0 - SAME_LENGTH) and self.course.strip.count > 0:
-            other = self.straighten(other)
-            if self.course.strip.count > 0:
-                return other
-        self.best.restore(self.course)
-        self.path.end = best_end
-        return self.path.settle()
+        """Lead the strip to the shortest loop of its class that is found; returns the length."""
+        self.relax()
+        return self.tighten()
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def relax(self) -> cython.double:
-        """Shorten the loop as a polyline as far as that goes; returns the length before, 0 if it stays as it is."""
+    def relax(self) -> cython.int:
+        """Shorten the loop as a polyline as far as that goes."""
         if not self.polyline.is_oriented:
-            return 0.0
+            return 0
         self.path.lay_out()
         if self.course.vertex < 0:
             # Joints are vertices.
             if self.course.layout.n_bends == 2 or not self.move_base():
-                return 0.0
+                return 0
             self.path.lay_out()
-        length: cython.double = self.course.layout.length()
-        if not self.polyline.read():
-            return 0.0
-        self.polyline.relax()
-        self.polyline.write()
-        self.path.end = at_corner(corner_of(self.course.s, self.course.last_face(), self.course.vertex))
-        return length
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
-    def straighten(self, length: cython.double) -> cython.double:
-        """Take shortcuts from a tightened loop while there are any; returns the length."""
-        while self.course.strip.count > 0:
-            shorter: cython.double = self.path.shortcut(length)
-            if not shorter < length * (1.0 - GAIN):
-                return shorter
-            length = self.tighten()
-        return length
+        if self.polyline.read():
+            self.polyline.relax()
+            self.polyline.write()
+            self.path.end = at_corner(corner_of(self.course.s, self.course.last_face(), self.course.vertex))
+        return 0
 
     @cython.cfunc
     @cython.nogil
@@ -218,7 +184,7 @@ class Loop:
         if f == self.course.face:
             return 1
         if self.course.vertex >= 0:
-            return self.course.turn(self.course.vertex, f, self.course.face, -1)
+            return self.course.turn(self.course.vertex, f, self.course.face)
         self.course.strip.push(
             3 * f + side_of(cython.address(self.path.end)),
             3 * self.course.face + side_of(cython.address(self.course.start)),

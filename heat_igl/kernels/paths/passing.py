@@ -147,9 +147,7 @@ class Passing:
         before: Sides
         after: Sides
         before.this, before.other, after.this, after.other = INFINITY, 0.0, 0.0, 0.0
-        count: cython.int = self.course.detour.find(
-            self.course.s, choice.vertex, h, before, g // 3, -1, g, after, INFINITY
-        )
+        count: cython.int = self.course.detour.find(self.course.s, choice.vertex, h, before, g // 3, g, after, INFINITY)
         if count < 0:
             return 0
         self.course.face, self.course.start, self.course.strip.count = self.kept.face, self.kept.start, 0

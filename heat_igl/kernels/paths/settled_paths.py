@@ -1,7 +1,6 @@
-"""A path made locally shortest in its class: settled in its strip, led past vertices, and along straight shortcuts."""
+"""A path made locally shortest in its class: settled in its strip, and led past vertices on the other side."""
 
 import cython
-from cython.cimports.heat_igl.kernels.paths.fans import Fan
 from cython.cimports.heat_igl.kernels.paths.passing import Passing
 from cython.cimports.heat_igl.kernels.paths.settled_paths import GAIN
 from cython.cimports.heat_igl.kernels.paths.straightening import Course
@@ -15,10 +14,9 @@ __all__ = ["SettledPath"]
 class SettledPath:
     """The path of a course from its start to `end`, a place in the last face."""
 
-    def __init__(self, course: Course, half_turn, ahead, letter):
+    def __init__(self, course: Course, half_turn):
         self.course = course
         self.passing = Passing(course, half_turn)
-        self.fan = Fan(course, len(half_turn), ahead, letter)
 
     @cython.cfunc
     @cython.nogil
@@ -26,9 +24,7 @@ class SettledPath:
     def settle(self) -> cython.double:
         """Lead the strip until the path to `end` is locally shortest; returns the length."""
         v: cython.int = self.vertex_at(self.course.last_face(), cython.address(self.end))
-        ends: Place[2]
-        ends[0] = ends[1] = self.end
-        return self.course.settle(v, ends, cython.address(self.end))
+        return self.course.settle(v, cython.address(self.end))
 
     @cython.cfunc
     @cython.nogil
@@ -63,26 +59,6 @@ class SettledPath:
                 self.end = end
                 self.settle()
         return length
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
-    def shortcut(self, length: cython.double) -> cython.double:
-        """Take shortcuts along straight lines, and better sides from there, while there are any; returns the length."""
-        i: cython.int = 0
-        while True:
-            end: Place = self.end
-            i = self.fan.shorten(i, cython.address(self.end))
-            if i < 0:
-                return length
-            trial: cython.double = self.settle()
-            if trial < length * (1.0 - GAIN):
-                length = self.pass_better(trial)
-            else:
-                self.fan.kept.restore(self.course)
-                self.end = end
-                self.settle()
-                i += 1
 
     @cython.cfunc
     @cython.nogil

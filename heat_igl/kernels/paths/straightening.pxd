@@ -9,10 +9,6 @@ cdef extern from *:
     """
     double NEARLY_STRAIGHT
 
-cdef enum:
-    # The end on a curve is moved at most this often in one strip; once is enough unless the last bend changes with it.
-    MOST_SLIDES = 8
-
 # A part of a path that lies in one face, by barycentric coordinates.
 cdef struct Segment:
     double start[3]
@@ -32,14 +28,13 @@ cdef class Course:
 
     cdef void begin(self, int face, int vertex, const Place* start) noexcept nogil
     cdef int last_face(self) noexcept nogil
-    cdef int turn(self, int v, int f, int goal, int other) except -1 nogil
-    cdef double straighten(self, int end_vertex, Place* ends_on) except -1 nogil
-    cdef double settle(self, int end_vertex, Place* ends_on, Place* end) except -1 nogil
+    cdef int turn(self, int v, int f, int goal) except -1 nogil
+    cdef double straighten(self, int end_vertex) except -1 nogil
+    cdef double settle(self, int end_vertex, Place* end) except -1 nogil
     cdef int lay_out(self, int end_vertex, Place* end) except -1 nogil
-    cdef int _pull(self, Place* end, const Place* ends_on, bint slides) except -1 nogil
     cdef int _repair(self) except -1 nogil
     cdef int _shorter_way(self, int i) noexcept nogil
-    cdef void _trim(self, int end_vertex, Place* end, Place* ends_on) noexcept nogil
+    cdef void _trim(self, int end_vertex, Place* end) noexcept nogil
     cdef Place _on(self, int j, int f, double share) noexcept nogil
     cdef int emit(self, const Place* end) except -1 nogil
     cdef bint _is_one_way(self, int first, int last, int v) noexcept nogil

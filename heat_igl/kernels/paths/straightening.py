@@ -8,7 +8,7 @@ way is the other side.
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.paths.funnels import Layout, weighted
-from cython.cimports.heat_igl.kernels.paths.straightening import MOST_SLIDES, NEARLY_STRAIGHT
+from cython.cimports.heat_igl.kernels.paths.straightening import NEARLY_STRAIGHT
 from cython.cimports.heat_igl.kernels.paths.strips import Detour, Sides, Strip
 from cython.cimports.heat_igl.kernels.paths.surfaces import Place, at_corner, corner_of, moved
 from cython.cimports.libc.math import INFINITY, M_PI, atan2, fabs
@@ -54,17 +54,17 @@ class Course:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def turn(self, v: cython.int, f: cython.int, goal: cython.int, other: cython.int) -> cython.int:
-        """Extend a strip that ends in face f at vertex v to face `goal`, or to one with `other`, the shorter way round.
+    def turn(self, v: cython.int, f: cython.int, goal: cython.int) -> cython.int:
+        """Extend a strip that ends in face f at vertex v to face `goal`, the shorter way round.
 
         0 if the faces around v do not lead there.
         """
-        if f == goal or (other >= 0 and corner_of(self.s, f, other) >= 0):
+        if f == goal:
             return 1
         nothing: Sides
         nothing.this = nothing.other = 0.0
         h: cython.int = 3 * f + (corner_of(self.s, f, v) + 1) % 3
-        count: cython.int = self.detour.find(self.s, v, h, nothing, goal, other, -1, nothing, INFINITY)
+        count: cython.int = self.detour.find(self.s, v, h, nothing, goal, -1, nothing, INFINITY)
         i: cython.int
         for i in range(count):
             self.strip.push(self.detour.way[i].leave, self.detour.way[i].enter)
@@ -73,35 +73,26 @@ class Course:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def straighten(self, end_vertex: cython.int, ends_on: cython.pointer[Place]) -> cython.double:
-        """Append the segments of a locally shortest path through the strip; returns the length. See `settle`."""
+    def straighten(self, end_vertex: cython.int) -> cython.double:
+        """Append the segments of a locally shortest path through the strip to a vertex; returns the length."""
         end: Place
-        length: cython.double = self.settle(end_vertex, ends_on, cython.address(end))
+        length: cython.double = self.settle(end_vertex, cython.address(end))
         self.emit(cython.address(end))
         return length
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def settle(
-        self, end_vertex: cython.int, ends_on: cython.pointer[Place], end: cython.pointer[Place]
-    ) -> cython.double:
-        """Lead the strip until the shortest path in it is locally shortest, and set `end`; returns the length.
+    def settle(self, end_vertex: cython.int, end: cython.pointer[Place]) -> cython.double:
+        """Lead the strip until the shortest path in it is locally shortest; returns the length.
 
-        It ends at `end_vertex`, or, if that is -1, at the nearest point of the segment between two places `ends_on` in
-        the last face, which move with the end of the strip into the face before.
+        It ends at `end_vertex`, or, if that is -1, at the place `end` of the last face. `end` moves with the end of the
+        strip.
         """
-        c: cython.int
-        slides: cython.bint = False
-        if end_vertex < 0:
-            for c in range(3):
-                end.c[c] = 0.5 * (ends_on[0].c[c] + ends_on[1].c[c])
-                slides = slides or ends_on[0].c[c] != ends_on[1].c[c]
         shortest: cython.double = INFINITY
         failures: cython.int = 0
         while True:
-            self._trim(end_vertex, end, ends_on)
-            self._pull(end, ends_on, slides)
+            self.lay_out(end_vertex, end)
             length: cython.double = self.layout.length()
             # Rounding can make two ways around a vertex look shorter than one another.
             failures = 0 if length < shortest * (1.0 - 1e-13) else failures + 1
@@ -114,39 +105,10 @@ class Course:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def lay_out(self, end_vertex: cython.int, end: cython.pointer[Place]) -> cython.int:
-        """Find the shortest path in the strip as it is, to `end_vertex`, or to the place `end` if that is -1."""
-        ends: Place[2]
-        ends[0] = ends[1] = end[0]
-        self._trim(end_vertex, end, ends)
-        return self._pull(end, ends, False)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
-    def _pull(
-        self, end: cython.pointer[Place], ends_on: cython.pointer[cython.const[Place]], slides: cython.bint
-    ) -> cython.int:
-        """Lay out the strip and find the shortest path to `end`, or, if that slides, to the nearest on a segment."""
+        """Find the shortest path in the strip as it is, with the end of `settle`."""
+        self._trim(end_vertex, end)
         self.layout.lay_out(self.s, self.face, cython.address(self.start), self.strip)
         self.layout.pull_tight(weighted(end, self.layout.last.x), weighted(end, self.layout.last.y))
-        c: cython.int
-        for _ in range(MOST_SLIDES if slides else 0):
-            bend = cython.address(self.layout.bend[self.layout.n_bends - 2])
-            last: cython.int = bend.last
-            ax: cython.double = weighted(cython.address(ends_on[0]), self.layout.last.x)
-            ay: cython.double = weighted(cython.address(ends_on[0]), self.layout.last.y)
-            bx: cython.double = weighted(cython.address(ends_on[1]), self.layout.last.x)
-            by: cython.double = weighted(cython.address(ends_on[1]), self.layout.last.y)
-            squared: cython.double = (bx - ax) * (bx - ax) + (by - ay) * (by - ay)
-            share: cython.double = 0.0
-            if squared > 0.0:
-                share = ((bend.x - ax) * (bx - ax) + (bend.y - ay) * (by - ay)) / squared
-            share = min(max(share, 0.0), 1.0)
-            for c in range(3):
-                end.c[c] = ends_on[0].c[c] + share * (ends_on[1].c[c] - ends_on[0].c[c])
-            self.layout.pull_tight(weighted(end, self.layout.last.x), weighted(end, self.layout.last.y))
-            if self.layout.bend[self.layout.n_bends - 2].last == last:
-                break
         return 0
 
     @cython.cfunc
@@ -211,7 +173,7 @@ class Course:
             )
             if count >= -1:
                 return count
-        return self.detour.find(self.s, v, h, before, e, -1, g, after, M_PI - NEARLY_STRAIGHT)
+        return self.detour.find(self.s, v, h, before, e, g, after, M_PI - NEARLY_STRAIGHT)
 
     @cython.cfunc
     @cython.nogil
@@ -232,7 +194,7 @@ class Course:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def _trim(self, end_vertex: cython.int, end: cython.pointer[Place], ends_on: cython.pointer[Place]) -> cython.void:
+    def _trim(self, end_vertex: cython.int, end: cython.pointer[Place]) -> cython.void:
         """Drop crossings of edges on which the path starts or ends: rounding would put it on either side."""
         h: cython.int
         g: cython.int
@@ -254,11 +216,9 @@ class Course:
             if end_vertex >= 0:
                 if self.s.triangle[g // 3].vertex[g % 3] == end_vertex:
                     break
-            elif ends_on[0].c[g % 3] != 0.0 or ends_on[1].c[g % 3] != 0.0:
+            elif end.c[g % 3] != 0.0:
                 break
             else:
-                ends_on[0] = moved(self.s, g, h, cython.address(ends_on[0]))
-                ends_on[1] = moved(self.s, g, h, cython.address(ends_on[1]))
                 end[0] = moved(self.s, g, h, end)
             self.strip.count -= 1
         if self.vertex >= 0:

@@ -33,7 +33,7 @@ cdef class Detour:
     cdef Crossing[::1] way
 
     cdef int find(
-        self, Surface s, int v, int h, Sides before, int goal, int other, int end, Sides after, double limit
+        self, Surface s, int v, int h, Sides before, int goal, int end, Sides after, double limit
     ) noexcept nogil
     cdef int turn_back(self, Surface s, int v, int h, double before, int end, double after, double limit) noexcept nogil
     cdef bint _is_entered(self, int g, int n_steps) noexcept nogil

@@ -74,12 +74,11 @@ class Detour:
         h: cython.int,
         before: Sides,
         goal: cython.int,
-        other: cython.int,
         end: cython.int,
         after: Sides,
         limit: cython.double,
     ) -> cython.int:
-        """The shortest way around v from the face of half-edge h to face `goal`, or to one with vertex `other`.
+        """The shortest way around v from the face of half-edge h to face `goal`.
 
         The length is the sum of the angles at v: in the first face `before`, of h; in the last face `after`, of
         half-edge `end`; and those of the faces between. Returns how many crossings, in `way`; -1 if there is no way, or
@@ -123,7 +122,7 @@ class Detour:
                 step = cython.address(self.step[n_steps])
                 step.enter, step.before = g, at
                 angle: cython.double
-                if f == goal or (other >= 0 and corner_of(s, f, other) >= 0):
+                if f == goal:
                     step.leave = -1
                     angle = after.this if g == end else after.other
                 else:

@@ -25,7 +25,6 @@ cdef struct Place:
 cdef class Surface:
     cdef const Triangle[::1] triangle
     cdef const int[::1] first_side, side, first_corner, corner
-    cdef const double[::1] d
 
 
 # The corner of face f at vertex v, -1 if it has none.

@@ -1,4 +1,4 @@
-"""Input of the path kernels: triangles, the faces around edges and vertices, a distance, and places in faces."""
+"""Input of the path kernels: triangles, the faces around edges and vertices, and places in faces."""
 
 import cython
 
@@ -8,10 +8,9 @@ __all__ = ["Surface"]
 @cython.final
 @cython.cclass
 class Surface:
-    """Views of the arrays of `heat_igl.curves.tracing.Surface`, and of a distance (n,) on the vertices."""
+    """Views of the arrays of `heat_igl.curves.surface.Surface`."""
 
-    def __init__(self, surface, d):
+    def __init__(self, surface):
         self.triangle = surface.triangle
         self.first_side, self.side = surface.first_side, surface.side
         self.first_corner, self.corner = surface.first_corner, surface.corner
-        self.d = d
