@@ -176,26 +176,6 @@ class GeodesicPathSolver:
                 return self._loop(self._routes.legs(faces[around], barycentric[around]))
         return as_curve(self.geodesics(faces, barycentric), is_closed=False).on(self._mesh)
 
-    def log_vectors(self, face: int, barycentric: FloatArray, faces: IntArray, ends: FloatArray) -> FloatArray:
-        """The log maps (k, 2) at a place inside a face, of places with barycentric coordinates `ends` (k, 3) in faces.
-
-        The first axis runs from corner 0 to corner 1 of the face, the second to the side of corner 2. A vector
-        has the length of the path to the place, and the direction in which this leaves.
-        """
-        corner = self._mesh.V[self._mesh.F[face]]
-        along, side = corner[1] - corner[0], corner[2] - corner[0]
-        along /= np.linalg.norm(along)
-        across = side - (side @ along) * along
-        axes = np.stack([along, across / np.linalg.norm(across)])
-        vectors = np.zeros((len(faces), 2))
-        for i in range(len(faces)):
-            leg = self.geodesics(np.array([face, faces[i]]), np.stack([barycentric, ends[i]]))[0]
-            if leg.length > 0:
-                first = int(np.argmax((leg.points[:, 0] != leg.points[:, 1]).any(axis=1)))
-                direction = axes @ ((leg.points[first, 1] - leg.points[first, 0]) @ corner)
-                vectors[i] = leg.length * direction / np.linalg.norm(direction)
-        return vectors
-
     def geodesics(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
         """The geodesics between checked places (k,), each from one to the next."""
         with self._one_at_a_time:

@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.curves.geodesics import GeodesicPathSolver
+from heat_igl.curves.paths import shortest_paths
 from heat_igl.curves.places import Waypoints, mixed_places
 from heat_igl.curves.straightest import Tracer
 from heat_igl.errors import AccuracyWarning, SourceError, is_number, real_numbers, shown
-from heat_igl.geodesic import GeodesicSolver, geodesic_distance
+from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_mesh, as_simplices
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -22,13 +23,12 @@ _INSIDE = 1e-7
 # The search ends with a step below this share of the largest distance from the mean.
 _CONVERGED = 1e-9
 _MOST_STEPS = 500
-# With more radians of curvature at a vertex in the mean, the sum has local minima within an edge or two of each other.
-# From one vertex, 12 of 120 means of two points were such, from three vertices 4, from five 3.
+# With more radians of curvature at a vertex in the mean, log maps are those of exact paths: locally shortest ones often
+# pass a hill on the longer side. The sum has local minima within an edge or two of each other, so there are three
+# starts: of 60 means of two points on rough squares one was not in the middle from one vertex, and none from three.
 _ROUGH, _STARTS = 0.1, 3
 # Distances in a weight d^(p - 2) are at least this share of the largest one.
 _NEAREST = 1e-12
-# From this number of points on, one factorization pays.
-_MANY = 4
 # With higher powers, distances far from 1 overflow or vanish.
 _LARGEST_POWER = 64
 
@@ -73,7 +73,8 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
     maps v_i of the points, weighted by w_i d_i^(p - 2): the Karcher iteration for p = 2 (Karcher 1977) and Weiszfeld's
     for p = 1. The step is halved until the sum falls, so the sum falls in every step. A median can be one of the
     points: it is if the unit vectors to the others, weighted, sum to no more than the weight of this point (Vardi and
-    Zhang 2000). Log maps are the first directions and the lengths of straightened paths.
+    Zhang 2000). Log maps are the first directions and the lengths of straightened paths, on rough surfaces of exact
+    ones.
 
     Examples
     --------
@@ -116,9 +117,11 @@ class _Search:
     ) -> None:
         self._mesh = mesh
         self._faces, self._barycentric = faces, barycentric
+        self._places = [SurfacePoints(np.array([f]), b[None]) for f, b in zip(faces, barycentric, strict=True)]
         self._weight, self._power = weight / weight.sum(), power
         self._solver = GeodesicPathSolver(mesh)
         self._tracer = tracer
+        self._is_rough = tracer.curvature > _ROUGH
 
     def found(self) -> SurfacePoints:
         """The point with the least sum."""
@@ -133,24 +136,45 @@ class _Search:
         if not np.isfinite(energy).any():
             raise SourceError("points lie on different components of the mesh, so none is at a distance from all")
         corners = self._mesh.F.ravel()
-        best = np.argsort(energy)[: _STARTS if self._tracer.curvature > _ROUGH else 1]
+        best = np.argsort(energy)[: _STARTS if self._is_rough else 1]
         starts = [int(np.argmax(corners == vertex)) for vertex in best if energy[vertex] < np.inf]
         ends = [self._descend(self._state(corner // 3, np.eye(3)[corner % 3])) for corner in starts]
         return min(ends, key=lambda end: end.energy).points
 
     def _fields(self) -> FloatArray:
         """Distances (k, n) of all vertices from each point."""
-        places = [SurfacePoints(np.array([f]), b[None]) for f, b in zip(self._faces, self._barycentric, strict=True)]
-        if len(places) < _MANY:
-            return np.stack([geodesic_distance(self._mesh, place) for place in places])
-        return np.asarray(GeodesicSolver(self._mesh).distances(places))
+        return np.asarray(GeodesicSolver(self._mesh).distances(self._places))
 
     def _state(self, face: int, barycentric: FloatArray) -> _State:
         inside = np.maximum(barycentric, _INSIDE)
         inside /= inside.sum()
-        vectors = self._solver.log_vectors(face, inside, self._faces, self._barycentric)
+        vectors = self._log_maps(face, inside)
         distances = np.hypot(*vectors.T)
         return _State(face, inside, vectors, distances, float(self._weight @ distances**self._power))
+
+    def _log_maps(self, face: int, barycentric: FloatArray) -> FloatArray:
+        """The log maps (k, 2) of all points at a place inside a face.
+
+        The first axis runs from corner 0 to corner 1 of the face, the second to the side of corner 2.
+        """
+        V, F = self._mesh.V, self._mesh.F
+        here = SurfacePoints(np.array([face]), barycentric[None])
+        if self._is_rough:
+            points = SurfacePoints(self._faces, self._barycentric)
+            paths = [path.reversed() for path in shortest_paths(self._mesh, points, here)]
+        else:
+            paths = [self._solver.path([here, place]) for place in self._places]
+        along, side = V[F[face, 1:]] - V[F[face, 0]]
+        along /= np.linalg.norm(along)
+        across = side - (side @ along) * along
+        axes = np.stack([along, across / np.linalg.norm(across)])
+        vectors = np.zeros((len(paths), 2))
+        for i, path in enumerate(paths):
+            if path.length > 0:
+                first = int(np.argmax((path.start != path.end).any(axis=1)))
+                direction = axes @ ((path.end[first] - path.start[first]) @ V[F[path.faces[first]]])
+                vectors[i] = path.length * direction / np.linalg.norm(direction)
+        return vectors
 
     def _direction(self, at: _State) -> FloatArray:
         """The mean (2,) of the log maps."""

@@ -2,7 +2,7 @@
 
 from heat_igl.mesh.cloud_copies import nearest_copies
 from heat_igl.mesh.cloud_normals import usable_normals
-from heat_igl.mesh.cloud_orientation import two_sided_cover
+from heat_igl.mesh.cloud_orientation import is_oriented_manifold, two_sided_cover
 from heat_igl.mesh.edge_curves import edge_curve
 from heat_igl.mesh.exports import to_open3d, to_pyvista, to_trimesh
 from heat_igl.mesh.heights import Terrain, terrain
@@ -65,6 +65,7 @@ __all__ = [
     "edge_curve",
     "flat_curves",
     "image_domain",
+    "is_oriented_manifold",
     "joined_segments",
     "level_segments",
     "one_sided",
