@@ -115,7 +115,9 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
             what = "the mesh holds tetrahedra" if kind == "tetrahedra" else "those of this metric do not fit together"
             raise MeshError(f"method={method!r} needs triangles that fit together, and {what}: take method='auto'")
         return Plan(
-            "fronts", None, f"{kind} are passed by fronts, and where the metric varies by a scheme that converges"
+            "fronts",
+            None,
+            f"{kind} are passed by straight lines, and where the metric varies by a scheme that converges",
         )
     if method == "sweep":
         return Plan("sweep", None, "a sweep was asked for")

@@ -140,10 +140,11 @@ def test_refraction_at_a_straight_border(speeds):
     assert errors[1] < max(0.8 * errors[0], 5e-5)
     assert errors[2] < max(0.8 * errors[1], 5e-5)
     assert errors[2] < (1e-4 if speeds != (1.0, 2.0) else 5e-4)
-    # From the border itself, straight lines in the slow half and the waves that the fast half sends there.
+    # From the border itself, straight lines in the slow half and the waves that the fast half sends there: they part at
+    # the source, and what is wrong on the first ring of vertices stays, a hundredth of an edge.
     source = int(np.argmin(np.linalg.norm(mesh.V - [0.25, 0, 0], axis=1)))
     exact = by_fermat(mesh.V[source, :2], mesh.V[:, :2], *speeds)
-    assert np.nanmean(relative_error(solver(mesh, speed).distance(source), exact)) < 1e-4
+    assert np.nanmean(np.abs(solver(mesh, speed).distance(source) - exact)) * min(speeds) < 0.01 / 64
 
 
 @pytest.mark.parametrize(

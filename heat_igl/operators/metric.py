@@ -7,7 +7,6 @@ from dataclasses import replace
 import igl
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 
 from heat_igl.errors import MeshError, real_numbers
 from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, intrinsic_delaunay, lay_out, mollify
@@ -17,12 +16,12 @@ from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, l
 from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
 from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.simplices import cotan_operators, longest_sides
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = ["fibre_metric", "metric_operators", "operators_in_metric"]
 
 # Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken
-# for its length. Beyond, fronts are refracted at the edge.
+# for its length.
 _ONE_LENGTH = 0.1
 # Share that has to remain of the length by which two sides of a triangle are longer than the third.
 _SLACK = 0.03
@@ -62,8 +61,8 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
         cannot suit both.
 
         Where faces differ by more anywhere, as at a jump of the speed, no unfolding is straight: there is no `surface`,
-        flips end at such edges, sources are vertices, and `GeodesicSolver` takes the shorter of two: the scheme for
-        tetrahedra on triangles, and fronts that are refracted, if most edges have one length.
+        flips end at such edges, sources are vertices, and `GeodesicSolver` takes the scheme for tetrahedra on
+        triangles: those after flips if most edges have one length.
 
         With a metric at the vertices, the length of an edge is the integral along it. Where these are the sides of
         triangles, they are an intrinsic triangulation; if there is a face where they are not, since the metric turns
@@ -209,7 +208,6 @@ def operators_in_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian = "auto"
     if p == 3:
         return _of_tetrahedra(mesh, MetricSimplices.in_metric(mesh, g[:, None]), g)
     factor = np.linalg.cholesky(g)
-    slowness = np.prod(np.diagonal(factor, axis1=1, axis2=2), axis=1) ** (1 / p)
     corners = lay_out(igl.edge_lengths(mesh.V, mesh.F))
     # Relative to the first corner: digits would be lost far from the origin.
     corners = (corners - corners[:, :1]) @ factor
@@ -217,8 +215,13 @@ def operators_in_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian = "auto"
     sides, fit_together = _smoothed(mesh, lengths[:, [1, 2, 0], [2, 0, 1]])
     if fit_together:
         domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
-        return replace(domain, contrast=float(slowness.max() / slowness.min()))
-    return _refracting(mesh, sides, slowness, g, laplacian)
+        return replace(domain, contrast=_contrast(g))
+    return _refracting(mesh, sides, g, laplacian)
+
+
+def _contrast(g: FloatArray) -> float:
+    """Ratio of the lengths in metrics (m, p, p), each the geometric mean over all directions."""
+    return float(np.exp(np.ptp(np.linalg.slogdet(g)[1]) / (2 * g.shape[1])))
 
 
 def _of_smooth_metric(mesh: Mesh, corners: FloatArray, laplacian: Laplacian) -> Operators:
@@ -227,14 +230,15 @@ def _of_smooth_metric(mesh: Mesh, corners: FloatArray, laplacian: Laplacian) -> 
     mean = corners.mean(axis=1)
     if mesh.is_tetrahedral:
         return _of_tetrahedra(mesh, simplices, mean)
-    sides = simplices.lengths[:, [1, 2, 0], [2, 0, 1]]
-    contrast = float(simplices.slowness.max() / simplices.slowness.min())
-    if (sides.sum(axis=1) > 2 * (1 + _ROUNDING) * longest_sides(sides)).all():
-        return replace(edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian), contrast=contrast)
-    # For heat: what each face says alone.
     axes = plane_axes(mesh)
-    domain = operators_in_metric(mesh, axes @ mean @ np.swapaxes(axes, 1, 2), laplacian)
-    return replace(domain, surface=None, simplices=simplices, contrast=contrast)
+    inside = axes @ mean @ np.swapaxes(axes, 1, 2)
+    sides = simplices.lengths[:, [1, 2, 0], [2, 0, 1]]
+    if (sides.sum(axis=1) > 2 * (1 + _ROUNDING) * longest_sides(sides)).all():
+        domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
+        return replace(domain, contrast=_contrast(inside))
+    # For heat: what each face says alone.
+    domain = operators_in_metric(mesh, inside, laplacian)
+    return replace(domain, surface=None, simplices=simplices)
 
 
 def _smoothed(mesh: Mesh, sides: FloatArray) -> tuple[FloatArray, bool]:
@@ -257,37 +261,24 @@ def _smoothed(mesh: Mesh, sides: FloatArray) -> tuple[FloatArray, bool]:
     return smoothed, bool(is_one.all() and not differs.any())
 
 
-def _refracting(mesh: Mesh, sides: FloatArray, slowness: FloatArray, g: FloatArray, laplacian: Laplacian) -> Operators:
+def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, laplacian: Laplacian) -> Operators:
     """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
     glued = _glued_where_equal(mesh, sides + mollify(sides, mesh.F)[:, None])
     triangulation = glued if laplacian == "cotan" else intrinsic_delaunay(glued)
     domain = intrinsic_operators(triangulation)
     pairs = np.concatenate([triangulation.F[:, pair] for pair in ([1, 2], [2, 0], [0, 1])])
     domain = _with_shortest_edges(domain, mesh, pairs, triangulation.l.ravel(order="F"))
-    lengths = np.zeros((mesh.n_faces, 3, 3))
-    lengths[:, [1, 2, 0], [2, 0, 1]] = lengths[:, [2, 0, 1], [1, 2, 0]] = triangulation.l
-    # Where triangles fit together, fronts go straight on. A flip keeps the numbers of its two faces, and their region.
-    regions = _regions(glued)
-    mean = np.exp(np.bincount(regions, np.log(slowness)) / np.bincount(regions))
-    least = float(np.sqrt(np.linalg.eigvalsh(g)[:, 0].min()))
-    simplices = MetricSimplices(triangulation.F, lengths, mean[regions], mesh.n_vertices, None, mesh.V, least)
-    # Fronts are for regions in which triangles fit together, and fall short where most edges have two lengths. Only
-    # fronts pass triangles without area, which know no metric in their plane.
-    if (mesh.measures > 0).all():
+    # Where most triangles fit together, they are those after flips: even ones, however thin the given ones are in the
+    # metric. Triangles without area know no metric in their plane, but have lengths.
+    is_inside = mesh.facets.n_faces[mesh.facets.of_face] == 2
+    fits = 2 * np.count_nonzero(glued.twin.reshape(-1, 3)[is_inside] >= 0) > np.count_nonzero(is_inside)
+    if fits or not (mesh.measures > 0).all():
+        least = float(np.sqrt(np.linalg.eigvalsh(g)[:, 0].min()))
+        simplices = MetricSimplices.of_sides(mesh.V, triangulation.F, triangulation.l, least)
+    else:
         axes = plane_axes(mesh)
-        in_space = np.swapaxes(axes, 1, 2) @ g @ axes
-        is_inside = mesh.facets.n_faces[mesh.facets.of_face] == 2
-        fits = 2 * np.count_nonzero(glued.twin.reshape(-1, 3)[is_inside] >= 0) > np.count_nonzero(is_inside)
-        simplices = replace(MetricSimplices.in_metric(mesh, in_space[:, None]), flipped=simplices if fits else None)
-    return replace(domain, simplices=simplices, contrast=float(slowness.max() / slowness.min()))
-
-
-def _regions(triangulation: IntrinsicTriangulation) -> IntArray:
-    """Label (m,) of each triangle: those that are glued together have one."""
-    m = len(triangulation.F)
-    glued = np.flatnonzero(triangulation.twin >= 0)
-    graph = sp.coo_array((np.ones(len(glued), np.int8), (glued // 3, triangulation.twin[glued] // 3)), shape=(m, m))
-    return np.asarray(csgraph.connected_components(graph, directed=False)[1])
+        simplices = MetricSimplices.in_metric(mesh, (np.swapaxes(axes, 1, 2) @ g @ axes)[:, None])
+    return replace(domain, simplices=simplices, contrast=_contrast(g))
 
 
 def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
@@ -301,7 +292,7 @@ def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
 
 
 def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> Operators:
-    """The operators of tetrahedra with a metric g (m, 3, 3) on each, for heat, and `simplices` for fronts."""
+    """The operators of tetrahedra with a metric g (m, 3, 3) on each, for heat, and `simplices` for distance."""
     m, n = mesh.n_faces, mesh.n_vertices
     # Each in a space of its own: edges times C have the lengths of the metric C C^T.
     corners = mesh.V[mesh.F]
@@ -325,7 +316,7 @@ def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> Ope
         weights=weights,
         face_sizes=longest_sides(lengths.reshape(m, -1)),
         simplices=simplices,
-        contrast=float(simplices.slowness.max() / simplices.slowness.min()),
+        contrast=_contrast(g),
     )
     return _with_shortest_edges(domain, mesh, pairs, lengths)
 

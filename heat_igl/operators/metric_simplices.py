@@ -1,4 +1,4 @@
-"""`MetricSimplices`: triangles or tetrahedra with edge lengths of their own, for fronts that pass through them."""
+"""`MetricSimplices`: triangles or tetrahedra with edge lengths of their own."""
 
 from __future__ import annotations
 
@@ -27,8 +27,6 @@ class MetricSimplices:
         Vertices of each triangle (p = 2) or tetrahedron (p = 3).
     lengths : (m, p + 1, p + 1) float64
         Distances between the corners of each, in its own metric.
-    slowness : (m,) float64
-        Length in the metric per length in space, the geometric mean over all directions.
     n : int
         Number of vertices.
     V : (n, 3) float64 or None
@@ -46,20 +44,18 @@ class MetricSimplices:
 
     corners: IntArray
     lengths: FloatArray
-    slowness: FloatArray
     n: int
     V: FloatArray | None = None
     place: FloatArray | None = None
     least: float = 1.0
     tensors: FloatArray | None = None
-    flipped: MetricSimplices | None = None
 
     @classmethod
     def in_space(cls, mesh: Mesh) -> MetricSimplices:
         """The faces of a mesh, by the positions of its vertices."""
         X = mesh.V[mesh.F]
         lengths = np.linalg.norm(X[:, :, None] - X[:, None], axis=3)
-        return cls(mesh.F, lengths, np.ones(mesh.n_faces), mesh.n_vertices, mesh.V, mesh.V)
+        return cls(mesh.F, lengths, mesh.n_vertices, mesh.V, mesh.V)
 
     @classmethod
     def in_metric(cls, mesh: Mesh, tensors: FloatArray) -> MetricSimplices:
@@ -78,9 +74,8 @@ class MetricSimplices:
         if p == 2:
             axes = plane_axes(mesh)[:, None]
             inside = axes @ tensors @ np.swapaxes(axes, 2, 3)
-        slowness = np.linalg.det(inside.mean(axis=1)) ** (1 / (2 * p))
         least = float(np.sqrt(np.linalg.eigvalsh(inside)[..., 0].min()))
-        simplices = cls(mesh.F, np.empty(0), slowness, mesh.n_vertices, None, mesh.V, least, tensors)
+        simplices = cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, tensors)
         squares = simplices.squared_lengths()
         lengths = np.sqrt(squares[:, 0])
         if tensors.shape[1] > 1:
@@ -89,10 +84,24 @@ class MetricSimplices:
             lengths = (a + 4 * np.sqrt(a * b) + b) / 6
         return replace(simplices, lengths=lengths)
 
+    @classmethod
+    def of_sides(cls, V: FloatArray, F: IntArray, sides: FloatArray, least: float) -> MetricSimplices:
+        """Triangles (m, 3) whose sides (m, 3), opposite each corner, have lengths of their own."""
+        lengths = np.zeros((len(F), 3, 3))
+        lengths[:, [1, 2, 0], [2, 0, 1]] = lengths[:, [2, 0, 1], [1, 2, 0]] = sides
+        # The tensor E^+ P E^+^T for edges E from the first corner with scalar products P.
+        across = np.linalg.pinv(V[F[:, 1:]] - V[F[:, :1]])
+        squares = lengths**2
+        products = (squares[:, 1:, :1] + squares[:, :1, 1:] - squares[:, 1:, 1:]) / 2
+        tensors = across @ products @ np.swapaxes(across, 1, 2)
+        return cls(F, lengths, len(V), None, V, least, tensors[:, None])
+
     def squared_lengths(self) -> FloatArray:
         """Squared distances (m, q, p + 1, p + 1) between the corners, in each of the `tensors`."""
         if self.place is None or self.tensors is None:
             raise ValueError("these simplices have lengths, and no tensors")
+        if self.tensors.shape[1] == 1 and len(self.lengths):
+            return self.lengths[:, None] ** 2
         X = self.place[self.corners]
         e = X[:, :, None] - X[:, None]
         return np.ascontiguousarray(np.einsum("mijx,mqxy,mijy->mqij", e, self.tensors, e, optimize=True))

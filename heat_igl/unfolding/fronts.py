@@ -13,7 +13,6 @@ from heat_igl.kernels.bodies.bends import bend_around
 from heat_igl.kernels.bodies.bodies import Body
 from heat_igl.kernels.bodies.sight import look_around
 from heat_igl.kernels.mesh import bounds
-from heat_igl.kernels.sweep.fronts import advance
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.mesh import connectivity
 from heat_igl.operators import MetricSimplices
@@ -41,20 +40,13 @@ _STRAIGHT, _UNKNOWN = -1, -2
 
 
 class FrontSolver(Engine):
-    """Distance by fronts that pass through simplices, each with edge lengths of its own; no heat is read.
+    """Distance through tetrahedra in space, and through simplices in a metric that changes; no heat is read.
 
     In space, distance follows straight lines from the sources, and lines that bend around edges of the body with more
     than half a turn inside: once its ends know their distances, such an edge is a source itself.
 
     In a metric that changes from simplex to simplex, the Hopf-Lax formula on each is iterated until distances are a
     fixed point, and then with distance of second order on facets (`heat_igl.kernels.sweep.hopf_lax`).
-
-    Triangles that mostly fit together are passed by fronts too, and the shorter distance stands. A vertex gets its
-    distance from the other corners of a triangle: from each alone along an edge, and from two by the point behind the
-    edge between them that lies at their distances, if the straight line from it crosses there.
-
-    Where a front passes into a triangle of another slowness, it is refracted: its values along the facet stay, which is
-    Snell's law, and its radius is divided by the square of the ratio of speeds, as that of a paraxial ray.
 
     Parameters
     ----------
@@ -70,10 +62,7 @@ class FrontSolver(Engine):
         used = simplices.corners.ravel()
         self._incident = np.argsort(used, kind="stable").astype(np.int32)
         self._first = np.concatenate([[0], np.cumsum(np.bincount(used, minlength=simplices.n))]).astype(np.int32)
-        self._lengths = np.ascontiguousarray(simplices.lengths)
-        self._slowness = np.ascontiguousarray(simplices.slowness)
         self._V = np.empty((0, 3)) if simplices.V is None else np.ascontiguousarray(simplices.V)
-        self._flipped = None if simplices.flipped is None else FrontSolver(simplices.flipped)
         self._in_metric = None if simplices.tensors is None else self._measured(simplices.tensors)
         self._is_small = simplices.V is not None and simplices.n <= _FEW
         is_refined = self._is_small and not is_halved and len(self._reflex_edges[0]) > 0
@@ -91,24 +80,12 @@ class FrontSolver(Engine):
         inverse = np.linalg.inv(tensors) if is_solid else np.linalg.pinv(tensors, hermitian=True)
         return simplices.squared_lengths(), *map(np.ascontiguousarray, (inverse, gradient)), place
 
-    def _advance(self, vertices: AnyArray, distance: FloatArray, begin: FloatArray, label: AnyArray) -> None:
-        """Lower distance to fronts."""
-        mesh = self._corners, self._first, self._incident
-        advance(self._order(vertices), *mesh, self._lengths, self._slowness, distance, begin, label)
-
-    def _by_hopf_lax(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
-        """Lower distance to that of second order, and to fronts."""
-        fronts, origin = distance.copy(), label.copy()
+    def _by_hopf_lax(self, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
+        """Lower distance to that of second order."""
         scheme: Any = HopfLax
         scheme = scheme(self._corners, self._first, self._incident, *self._in_metric or ())
         scheme.first_order(distance, label, offset)
         scheme.second_order()
-        if self._flipped is None:
-            return
-        self._flipped._advance(vertices, fronts, fronts.copy(), origin)
-        # Where triangles fit together, fronts go straight on, however long the triangles are in the metric.
-        shorter = fronts < distance
-        distance[shorter], label[shorter] = fronts[shorter], origin[shorter]
 
     @cached_property
     def _edges(self) -> tuple[AnyArray, FloatArray]:
@@ -171,10 +148,8 @@ class FrontSolver(Engine):
         label[vertices] = np.arange(len(vertices))
         if self._simplices.V is not None:
             self._follow_lines(vertices, offset, distance, begin, label)
-        elif self._in_metric is not None:
-            self._by_hopf_lax(vertices, offset, distance, label)
         else:
-            self._advance(vertices, distance, begin, label)
+            self._by_hopf_lax(offset, distance, label)
         self._keep_bounds(vertices, offset, distance, label)
         labels = np.concatenate([sources.vertex_label, [-1]])[label]
         if self._finer is not None:
