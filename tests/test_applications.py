@@ -84,20 +84,6 @@ def test_search_between_components():
         assert (here.length, here.vertices.tolist(), here.n_expanded) == (0.0, [7], 0)
 
 
-def test_wrong_searches_are_refused():
-    mesh = shapes.icosphere(1)
-    with pytest.raises(heat_igl.SourceError, match="target = 42 is no vertex: indices run from 0 to 41"):
-        EdgeSearch(mesh).path(0, 42)
-    with pytest.raises(heat_igl.SourceError, match=r"source = 0.5 is no vertex"):
-        EdgeSearch(mesh).path(0.5, 1)
-    with pytest.raises(ValueError, match=r"landmark_distances must have shape \(k, 42\)"):
-        EdgeSearch(mesh, np.zeros(42))
-    rows = np.zeros((2, 42))
-    rows[1, 7] = np.nan
-    with pytest.raises(ValueError, match=r"landmark_distances\[1, 7\] = nan is no distance"):
-        EdgeSearch(mesh, rows)
-
-
 # Particles.
 
 

@@ -9,7 +9,6 @@ import pytest
 from conftest import perturbed
 
 from heat_igl import HeatMethodSolver, Mesh, MeshError, SourceError, shapes
-from heat_igl.errors import MissingExtraError
 from heat_igl.geodesic import SolverChoice
 from heat_igl.runtime import PeakMemory, blocks, over_rows
 
@@ -129,18 +128,6 @@ def test_a_zarr_array_and_a_memmap_hold_the_same(tmp_path, solver):
         solver.distances(sets, out=np.load(tmp_path / "d.npy", mmap_mode="r"))
 
 
-def test_types_of_the_result(solver):
-    single = solver.distances([4, 5], dtype="float32")
-    assert single.dtype == np.float32
-    np.testing.assert_array_equal(single, solver.distances([4, 5]).astype(np.float32))
-    with pytest.raises(ValueError, match="dtype must be float64 or float32, not int64"):
-        solver.distances([4], dtype=int)
-    with pytest.raises(ValueError, match="dtype is float32, but out holds float64"):
-        solver.distances([4], out=np.empty((1, solver.n_vertices)), dtype=np.float32)
-    with pytest.raises(ValueError, match="dtype must be float64 or float32, not float16"):
-        solver.iter_distances([4], dtype=np.float16)
-
-
 @pytest.mark.parametrize("method", ["heat", "sweep"])
 def test_rows_do_not_depend_on_blocks_or_threads(sphere, method, monkeypatch):
     solver = SolverChoice(method).on(sphere)
@@ -204,12 +191,6 @@ def test_stated_memory_bound(monkeypatch):
     if peak.bytes is None:
         pytest.skip("nobody can tell how much memory is in use here")
     assert peak.bytes < 1.25 * allowed
-
-
-def test_progress_without_rich_names_the_extra(solver, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "rich.console", None)
-    with pytest.raises(MissingExtraError, match="needs rich: pip install rich"):
-        solver.distances([0], progress=True)
 
 
 # A solver after the vertices moved.

@@ -16,7 +16,7 @@ import pytest
 import typer
 
 import heat_igl
-from heat_igl import cli, drawing, io, reference, shapes
+from heat_igl import cli, drawing, io, shapes
 from heat_igl.cli import comparison, demo, distances
 from heat_igl.cli.examples import EXAMPLES
 from heat_igl.cli.program import application
@@ -93,18 +93,6 @@ def test_distance_from_positions_in_space(sphere: Path) -> None:
         assert_one_line(refused.stderr, words)
 
 
-def test_refined_distance_is_that_of_the_library(sphere: Path) -> None:
-    done = command("distance", sphere, "--source", 12, "--method", "windows", "--output", "out.ply", cwd=sphere.parent)
-    assert done.returncode == 0, done.stderr
-    written = io.read_attributes(sphere.parent / "out.ply")["distance"]
-    expected = heat_igl.GeodesicSolver(shapes.icosphere(2), method="exact").distance(12)
-    np.testing.assert_array_equal(written, expected)
-    assert np.abs(expected - heat_igl.HeatMethodSolver(shapes.icosphere(2)).distance(12)).max() > 0.01
-    refused = command("distance", sphere, "--source", 12, "--method", "best", cwd=sphere.parent)
-    assert refused.returncode == 2
-    assert_one_line(refused.stderr, "--method", "'best' is not one of auto, windows")
-
-
 def test_paths_and_traces_are_those_of_the_library(
     sphere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -127,28 +115,6 @@ def test_paths_and_traces_are_those_of_the_library(
         np.testing.assert_allclose(np.array(written, float), curve.positions(mesh), atol=1e-6)
 
 
-def test_a_file_that_is_no_mesh(tmp_path: Path) -> None:
-    (tmp_path / "notes.off").write_text("buy milk\n")
-    done = command("distance", "notes.off", "--source", 0, "--output", "out.ply", cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert_one_line(done.stderr, "notes.off")
-    assert files(tmp_path) == {"notes.off"}
-
-
-def test_a_source_that_is_no_vertex(sphere: Path) -> None:
-    done = command("distance", sphere, "--source", 162, "--output", "out.ply", cwd=sphere.parent)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert_one_line(done.stderr, "162", "indices run from 0 to 161")
-    assert files(sphere.parent) == {"sphere.off"}
-
-
-def test_an_output_directory_that_does_not_exist(sphere: Path) -> None:
-    done = command("distance", sphere, "--source", 0, "--output", "nowhere/out.ply", cwd=sphere.parent)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert_one_line(done.stderr, "nowhere")
-    assert files(sphere.parent) == {"sphere.off"}
-
-
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a directory in which even root cannot write")
 @pytest.mark.parametrize(
     ("arguments", "status", "words"),
@@ -156,37 +122,6 @@ def test_an_output_directory_that_does_not_exist(sphere: Path) -> None:
         (["path", "--from=0", "--to=162", "--output=p.obj"], 1, ("--to 162 is no vertex", "162, counted from 0")),
         (["path", "--from=-1", "--to=0", "--output=p.obj"], 1, ("--from -1 is no vertex",)),
         (["path", "--output=p.obj"], 1, ("name two waypoints or more",)),
-        (["path", "--from=3", "--output=p.obj"], 1, ("--to is missing",)),
-        (["path", "--to=3", "--output=p.obj"], 1, ("--from is missing",)),
-        (["path", "--from=3", "--to=4", "5", "--output=p.obj"], 1, ("not both",)),
-        (
-            ["trace", "--from=162", "--direction=1,0,0", "--length=1", "--output=p.obj"],
-            1,
-            ("start[0] = 162 is no vertex",),
-        ),
-        (
-            ["trace", "--from=0", "--direction=1,0,0", "--length=1e12", "--output=p.obj"],
-            1,
-            ("length is too long: 1e+12", "unit of the mesh"),
-        ),
-        (["distance", "--at=1e300,0,0"], 1, ("positions[0]", "too far away")),
-        (["distance", "--source=0", "--t=1e300"], 1, ("t = 1e+300 is too large", "t is a squared length")),
-        (["path", "3", "--output=p.obj"], 1, ("2 places or more for a path, not 1",)),
-        (["path", "3", "south", "--output=p.obj"], 1, ("'south' is no place",)),
-        (["path", "3", "1,2", "--output=p.obj"], 1, ("position 1,2: three numbers",)),
-        (["path", "3", "4", "5", "--closed", "--output=p.obj"], 1, ("contracts to a point",)),
-        (
-            ["trace", "--from=0", "--direction=0,0,0", "--length=1", "--output=p.obj"],
-            1,
-            ("direction", "needs a length"),
-        ),
-        (
-            ["trace", "--from=0", "--direction=1,0", "--length=1", "--output=p.obj"],
-            1,
-            ("--direction 1,0: three numbers",),
-        ),
-        (["isolines", "--source=0", "--spacing=9", "--output=l.obj"], 1, ("--spacing 9 makes no line",)),
-        (["validate", "--methods=heat", "--fail-above=nan"], 2, ("--fail-above", "nan is not a positive number")),
     ],
 )
 def test_a_request_without_meaning_names_its_option_and_leaves_no_file(
@@ -204,12 +139,6 @@ def test_an_output_that_cannot_be_written(sphere: Path, option: str) -> None:
     done = command("distance", sphere, "--source", 0, option, cwd=sphere.parent)
     assert (done.returncode, done.stdout) == (1, "")
     assert_one_line(done.stderr, "/proc/out", "cannot be written")
-
-
-def test_wrong_usage_is_one_line_with_status_2(sphere: Path) -> None:
-    done = command("distance", sphere, "--source", "north", cwd=sphere.parent)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert_one_line(done.stderr, "--source", "integer")
 
 
 def test_without_typer_one_line_names_the_extra(tmp_path: Path) -> None:
@@ -268,27 +197,6 @@ def test_demo_does_the_whole_job(tmp_path: Path) -> None:
     assert 0.1 < float(error.split()[3]) < 1.5
 
 
-def test_info_prints_the_report(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.run(["info", str(sphere)]) == 0
-    out = capsys.readouterr().out
-    for name, value in shapes.icosphere(2).report().rows():
-        assert [line[len(name) :].strip() for line in out.splitlines() if line.startswith(name + " ")] == [value]
-    assert re.search(r"^plan +windows to 1e-05: ", out, re.MULTILINE)
-
-
-def test_unreachable_vertices_are_counted(two_spheres: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.run(["distance", str(two_spheres), "--source", "0"]) == 0
-    assert "42 vertices" in next(
-        line for line in capsys.readouterr().out.splitlines() if line.startswith("unreachable")
-    )
-
-
-def test_vertices_beyond_the_cutoff_are_said_to_be(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.run(["distance", str(sphere), "--source=0", "--cutoff=1"]) == 0
-    n_beyond = (heat_igl.geodesic_distance(sphere, 0) > 1).sum()
-    assert re.search(rf"unreachable +{n_beyond} vertices, or beyond the cutoff", capsys.readouterr().out)
-
-
 @pytest.mark.parametrize("method", ["windows", "sweep", "heat"])
 def test_the_method_is_that_of_the_front_door(
     sphere: Path, capsys: pytest.CaptureFixture[str], method: heat_igl.geodesic.DistanceMethod
@@ -324,15 +232,6 @@ def test_a_warning_of_the_package_is_one_line(sphere: Path, capsys: pytest.Captu
         (["--t-coef=-1"], 2, ("--t-coef", "-1 is not a positive number")),
         (["--t=nan"], 2, ("--t", "nan is not a positive number")),
         (["--laplacian=graph"], 2, ("graph", "auto, intrinsic-delaunay, intrinsic-delaunay-refined, cotan")),
-        (["--boundary=hot"], 2, ("hot", "neumann, dirichlet, average")),
-        (["--magnitude=long"], 2, ("long", "auto, unit, damped")),
-        (["--method=guess"], 2, ("--method", "'guess' is not one of auto, windows, exact, sweep, heat")),
-        (["--method=windows", "--t-coef=2"], 1, ("--t-coef is an option of the heat method", "--method is windows")),
-        (["--backend=abacus"], 2, ("abacus", "auto, scipy, multifrontal")),
-        (["--output=out.obj"], 1, ("out.obj", ".ply, .vtu, .gii, .npy or .csv")),
-        (["--picture=out.gif"], 1, ("out.gif", ".png, .pdf, .svg")),
-        (["--output=.ply/out.ply"], 1, (".ply",)),
-        (["--picture=folder.png"], 1, ("folder.png is a directory",)),
     ],
 )
 def test_a_bad_option_stops_before_anything_is_solved(
@@ -379,38 +278,6 @@ def test_a_failure_while_drawing_leaves_old_files_alone(
     assert_one_line(capsys.readouterr().err, "out.png: No space left on device")
     assert output.read_text() == "old"
     assert files(sphere.parent) == {"sphere.off", "out.ply"}
-
-
-def test_no_arguments_print_the_help(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.run([]) == 0
-    out = capsys.readouterr().out
-    assert all(name in out for name in ("info", "distance", "demo"))
-
-
-def test_version_prints_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.run(["--version"]) == 0
-    assert capsys.readouterr().out == f"{heat_igl.__version__}\n"
-
-
-def test_demo_goes_on_without_pymeshlab_and_without_references(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def missing(*_: object) -> None:
-        raise heat_igl.errors.ReferenceSolverError("meshlab_front cannot be loaded: libOpenGL.so.0")
-
-    monkeypatch.setattr(demo, "sample_mesh", lambda: None)
-    monkeypatch.setattr(reference, "exact", lambda mesh, _: np.arccos(np.clip(mesh.V @ mesh.V[1234], -1, 1)))
-    monkeypatch.setattr(reference, "meshlab", missing)
-    assert cli.run(["demo", "--out", str(tmp_path)]) == 0
-    out = capsys.readouterr().out
-    assert "no bunny, since pymeshlab is missing" in out
-    assert out.count("libOpenGL") == 1
-    assert "error of heat" in out
-    assert files(tmp_path) == {"sphere.ply", "sphere.png"}
-    monkeypatch.setattr(reference, "exact", missing)
-    monkeypatch.setattr(demo, "_drawn", lambda *_: ("picture", "drawn before"))
-    assert cli.run(["demo", "--out", str(tmp_path)]) == 0
-    assert "error of heat" not in capsys.readouterr().out
 
 
 def test_a_fault_of_the_package_is_not_hidden(sphere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -484,11 +351,6 @@ def test_json_of_the_other_commands(sphere: Path, capsys: pytest.CaptureFixture[
     assert validation["rows"][0]["errors"]["mean"] < 0.05
 
 
-def test_json_that_cannot_be_written_stops_at_once(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.run(["info", str(sphere), "--json=nowhere/a.json"]) == 1
-    assert_one_line(capsys.readouterr().err, "nowhere/a.json cannot be written")
-
-
 def test_distances_as_text(two_spheres: Path) -> None:
     file = two_spheres.with_name("d.csv")
     assert cli.run(["distance", str(two_spheres), "--source=3", f"--output={file}"]) == 0
@@ -497,38 +359,3 @@ def test_distances_as_text(two_spheres: Path) -> None:
     vertex, distance = np.array([line.split(",") for line in lines], float).T
     assert np.array_equal(vertex, np.arange(84))
     assert np.array_equal(distance, heat_igl.geodesic_distance(two_spheres, 3))
-
-
-def test_the_table_of_errors_fits_the_terminal(
-    sphere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setenv("COLUMNS", "60")
-    assert cli.run(["validate", str(sphere), "--methods=heat,sweep"]) == 0
-    lines = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
-    assert "162 vertices" in lines[0]
-    table = lines[[line.startswith("method") for line in lines].index(True) :]
-    assert max(map(len, table)) <= 60
-    assert [line.split()[0] for line in table] == ["method", "heat", "sweep"]
-    assert not any("…" in line for line in table)
-
-
-def test_a_shell_is_told_how_commands_go_on(tmp_path: Path) -> None:
-    def completed(words: str, place: int) -> str:
-        asked = {"_HEAT_IGL_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(place)}
-        return subprocess.run(
-            [sys.executable, "-m", "heat_igl"], cwd=tmp_path, env={**ENVIRONMENT, **asked}, capture_output=True,
-            text=True, check=False,
-        ).stdout.strip()  # fmt: skip
-
-    assert completed("heat-igl dist", 1) == "distance"
-    assert completed("heat-igl distance --cut", 2) == "--cutoff"
-
-
-def test_isolines_of_a_surface_are_drawn_with_hidden_lines_dotted(sphere: Path) -> None:
-    file = sphere.with_name("lines.svg")
-    assert cli.run(["isolines", str(sphere), "--source=0", "--spacing=0.5", f"--output={file}"]) == 0
-    text = file.read_text()
-    assert 'id="visible"' in text
-    assert 'id="hidden" stroke-dasharray=' in text

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import Mesh, SourceError, cluster
+from heat_igl import Mesh, cluster
 from heat_igl.cluster.collection import SourcePlan, items
 from heat_igl.cluster.store import Store, rows_per_block
 from heat_igl.cluster.worker import Task, begin
@@ -81,15 +81,6 @@ def test_source_sets_and_farthest_points(client, tmp_path):
     points = heat_igl.farthest_points(heat_igl.GeodesicSolver(mesh), 5)
     np.testing.assert_array_equal(group["source_vertex"][:], points)
     np.testing.assert_array_equal(group["distance"][:], expected(mesh, points))
-
-
-def test_xarray_reads_a_mesh(client, tmp_path):
-    xarray = pytest.importorskip("xarray")
-    cluster.distances({"a mesh": FAN}, [0, 4], tmp_path / "store", client=client)
-    data = xarray.open_zarr(tmp_path / "store", group="a mesh", consolidated=False)
-    assert dict(data.distance.sizes) == {"source": 2, "vertex": 7}
-    np.testing.assert_array_equal(data.distance.values, expected(FAN, [0, 4]))
-    assert data.attrs["report"]["n_faces"] == 5
 
 
 def bad_files(folder: Path) -> set[str]:
@@ -250,23 +241,6 @@ def test_a_group_that_a_crash_left_half_made_is_made_anew(client, tmp_path):
         np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["distance"][:], expected(FAN, [0, 4]))
 
 
-def test_a_group_that_a_crash_left_half_deleted_is_made_anew(client, tmp_path, monkeypatch):
-    """Although the mesh is again the one that the group was made for."""
-    store, other = tmp_path / "store", heat_igl.shapes.grid(3)
-    whole = cluster.distances({"mesh": FAN}, [0, 4], store, client=client)
-
-    def killed(path, *_, **__):
-        os.remove(Path(path) / "distance" / "c" / "0" / "0")
-        raise OSError("killed")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(shutil, "rmtree", killed)
-        with pytest.raises(BatchError, match="killed"):
-            cluster.distances({"mesh": other}, [0, 4], store, client=client)
-    assert cluster.distances({"mesh": FAN}, [0, 4], store, client=client) == whole
-    np.testing.assert_array_equal(zarr.open_group(store / "mesh", mode="r")["distance"][:], expected(FAN, [0, 4]))
-
-
 @pytest.mark.parametrize("file", ["zarr.json", "distance/zarr.json", "source_vertex/c/0", "source_row/zarr.json"])
 @pytest.mark.parametrize("is_lost", [True, False])
 def test_a_group_that_cannot_be_read_is_made_anew(client, tmp_path, file, is_lost):
@@ -360,52 +334,12 @@ def test_a_store_keeps_its_options(client, tmp_path):
         cluster.distances({"fan": FAN}, [0], tmp_path / "foreign", client=client)
 
 
-@pytest.mark.parametrize(
-    ("sources", "message"),
-    [
-        ("every", "must be 'all', 'farthest:K'"),
-        ("farthest:0", "K at least 1"),
-        ([], "must be 'all'"),
-        ([[0], [-1]], r"sources\[1\]: .* = -1 is no vertex"),
-        ([0.5], r"sources\[0\]: .* convert with int"),
-    ],
-)
-def test_sources_without_a_meaning_are_refused(client, tmp_path, sources, message):
-    with pytest.raises(SourceError, match=message):
-        cluster.distances({"fan": FAN}, sources, tmp_path / "store", client=client)
-    assert not (tmp_path / "store").exists()
-
-
-def test_names_must_differ(client, tmp_path):
-    with pytest.raises(ValueError, match=r"two meshes are called 'a\.off'"):
-        cluster.distances([tmp_path / "a.off", tmp_path / "b" / "a.off"], [0], tmp_path / "store", client=client)
-
-
 @pytest.mark.parametrize("name", ["", ".", "..", "zarr.json"])
 def test_a_name_that_would_overwrite_something_else_is_refused(client, tmp_path, name):
     """The group of a mesh replaces the folder of its name: here the store, its parent, or the metadata of the store."""
     with pytest.raises(ValueError, match=f"a mesh cannot be called '{name}' in a store: choose another name"):
         cluster.distances({"ball": heat_igl.shapes.icosphere(1), name: FAN}, [0], tmp_path / "store", client=client)
     cluster.distances({"ball": heat_igl.shapes.icosphere(1), "...": FAN}, [0], tmp_path / "store", client=client)
-
-
-def test_a_folder_without_meshes_is_refused(tmp_path):
-    with pytest.raises(ValueError, match="holds no mesh"):
-        cluster.folder(tmp_path)
-    with pytest.raises(ValueError, match="is not a folder"):
-        cluster.folder(tmp_path / "nowhere")
-
-
-def test_sources_from_a_file(tmp_path):
-    path = tmp_path / "sources.txt"
-    path.write_text("3, 5 # two at once\n\n8\n")
-    assert cluster.read_source_sets(path) == [[3, 5], [8]]
-    path.write_text("3\nx\n")
-    with pytest.raises(SourceError, match="line 2: 'x' is no vertex index"):
-        cluster.read_source_sets(path)
-    path.write_text("# none\n")
-    with pytest.raises(SourceError, match="holds no sources"):
-        cluster.read_source_sets(path)
 
 
 def test_a_mesh_too_large_for_its_worker_is_a_row(client, tmp_path, monkeypatch):

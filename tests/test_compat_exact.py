@@ -88,18 +88,6 @@ def test_gdist_matrices(mesh: Mesh, radius: float | None) -> None:
     assert abs(within - within.T).max() == 0
 
 
-def test_gdist_names_what_is_wrong() -> None:
-    V, F = arrays(shapes.grid(3))
-    with pytest.raises(SourceError, match=r"source_indices\[1\] = 16 is no vertex"):
-        gdist.compute_gdist(V, F, [0, 16])
-    with pytest.raises(SourceError, match=r"target_indices\[0\] = -1 is no vertex"):
-        gdist.compute_gdist(V, F, [0], [-1])
-    with pytest.raises(ValueError, match="max_distance must be a positive number, not 0"):
-        gdist.local_gdist_matrix(V, F, 0)
-    with pytest.raises(MeshError, match="subtract 1"):
-        gdist.compute_gdist(V, F + 1, [0])
-
-
 # --- pygeodesic -------------------------------------------------------------------------------------------------------
 
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from conftest import flat_perturbed, load_script
+from conftest import flat_perturbed
 
 import heat_igl
-from heat_igl import Mesh, MeshError, SourceError, SurfaceCurve, curve_on, cut, edge_curve, isolines, shapes
+from heat_igl import Mesh, SurfaceCurve, curve_on, cut, edge_curve, isolines, shapes
 from heat_igl.mesh import connectivity
 
 
@@ -108,24 +106,6 @@ def test_many_random_curves():
         assert is_along_edges(found)
 
 
-def test_the_script_of_random_cuts(monkeypatch):
-    """Every kind of its curves, and a cut that is wrong is found."""
-    script = load_script("random_cuts")
-    found = script.campaign(12, 0)
-    assert found["failed"] == []
-    assert all(counts["meshes"] == 2 for counts in found["counts"].values())
-
-    def moved(mesh, curves):
-        right = cut(mesh, curves)
-        V = right.mesh.V.copy()
-        V[0] += 1e-6
-        return replace(right, mesh=Mesh(V, right.mesh.F))
-
-    monkeypatch.setattr(script, "cut", moved)
-    assert all("area" in each["wrong"] for each in script.campaign(12, 0)["failed"])
-    assert len(script.campaign(12, 0)["failed"]) == 12
-
-
 def test_pieces_lie_on_either_side():
     mesh = sphere()
     height = mesh.V @ [0.3, 0.5, 0.8]
@@ -178,22 +158,6 @@ def test_faces_without_a_curve_stay():
     whole = count[found.old_faces] == 1
     np.testing.assert_array_equal(found.mesh.F[whole], mesh.F[found.old_faces[whole]])
     assert whole.sum() > mesh.n_faces - 10
-
-
-def test_what_is_no_curve_on_the_mesh_is_refused():
-    mesh = square()
-    curve = random_loop(mesh, 1)
-    with pytest.raises(SourceError, match="curves is empty"):
-        cut(mesh, [])
-    with pytest.raises(SourceError, match=r"curves\[1\] must be a SurfaceCurve, not int"):
-        cut(mesh, [curve, 3])
-    with pytest.raises(SourceError, match=r"curves\[1\]\[0\] must be a SurfaceCurve, not str"):
-        cut(mesh, [[curve], ["loop"]])
-    with pytest.raises(SourceError, match=r"curves\.faces\[0\] = 128 is no face"):
-        cut(mesh, SurfaceCurve([128], [[1, 0, 0]], [[0, 1, 0]]))
-    tetrahedron = Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 1, 2, 3]])
-    with pytest.raises(MeshError, match="the mesh is tetrahedral"):
-        cut(tetrahedron, SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]]))
 
 
 def test_infinite_values_are_carried_to_the_vertices_that_lie_among_them():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import flat_perturbed, load_script, perturbed
+from conftest import flat_perturbed, perturbed
 from scipy.spatial import ConvexHull
 
 import heat_igl
@@ -197,19 +197,6 @@ def test_departures_are_those_of_shortest_paths(bunny):
     assert np.abs(np.angle(found[reached] / (log[targets] @ [1, 1j])[reached])).max() < 1e-6
 
 
-@pytest.mark.parametrize("mesh", [perturbed(shapes.icosphere(2), 0.1), flat_perturbed(shapes.grid(9))])
-def test_the_script_of_directions_measures_against_paths(mesh):
-    script = load_script("directions_table")
-    truth, is_straight = script.exact_log(mesh, 7)
-    away = script.away_from_jumps(mesh, truth)
-    assert 0.1 < is_straight.mean() <= 1
-    assert 0.5 < away.mean() <= 1
-    found = log_map(mesh, 7)
-    assert script.errors(found, truth, away)["error"] < 1e-7
-    turned = found @ np.array([[np.cos(0.1), np.sin(0.1)], [-np.sin(0.1), np.cos(0.1)]])
-    assert script.errors(turned, truth, away)["median angle"] == pytest.approx(np.degrees(0.1))
-
-
 def test_log_map_converges_on_the_sphere():
     errors = []
     for level in (3, 4):
@@ -351,45 +338,3 @@ def test_unreachable_vertices_have_no_direction():
     assert (found.labels[far] == -1).all()
     for nothing in (found.gradient, found.departure, log_map(mesh, 2)):
         assert not nothing[far].any()
-
-
-def test_log_map_takes_solvers_and_other_meshes(sphere):
-    pair = log_map((sphere.V, sphere.F), 4, method="exact")
-    np.testing.assert_allclose(log_map(GeodesicSolver(sphere, method="exact"), 4), pair, atol=1e-12)
-    vector = heat_igl.VectorHeatSolver(sphere)
-    np.testing.assert_array_equal(log_map(vector, 4), vector.log_map(4))
-    np.testing.assert_allclose(log_map(sphere, 4, method="vector-heat"), vector.log_map(4), atol=1e-9)
-
-
-def test_bad_arguments_are_one_clear_error(sphere):
-    with pytest.raises(ValueError, match="directions follow paths, which a sweep does not find"):
-        GeodesicSolver(sphere, method="sweep").directions(0)
-    with pytest.raises(heat_igl.SourceError, match="source must be one vertex or point, not 2"):
-        log_map(sphere, [1, 2])
-    with pytest.raises(heat_igl.SourceError, match="source must be one vertex or point, not 2"):
-        log_map(GeodesicSolver(sphere), SurfacePoints([0, 1], [[0.2, 0.4, 0.4]] * 2))
-    with pytest.raises(heat_igl.SourceError, match="the vector heat method starts at vertices"):
-        log_map(sphere, SurfacePoints([0], [[0.2, 0.4, 0.4]]), method="vector-heat")
-    with pytest.raises(ValueError, match="method must be one of 'exact', 'vector-heat', not 'heat'"):
-        log_map(sphere, 0, method="heat")
-    with pytest.raises(heat_igl.MeshError, match="directions follow paths on triangles that fit together"):
-        log_map((np.eye(4, 3), [[0, 1, 2, 3]]), 0)
-    solid = GeodesicSolver(shapes.box(2))
-    with pytest.raises(heat_igl.MeshError, match="directions follow paths on triangles that fit together"):
-        solid.directions(0)
-    fan = Mesh(np.random.default_rng(0).random((5, 3)), [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
-    with pytest.raises(heat_igl.MeshError, match="is one of more than two faces"):
-        GeodesicSolver(fan, method="exact").directions(0)
-
-
-def test_pairs_and_polygons_are_meshes_too(sphere):
-    pair = (sphere.V, sphere.F)
-    np.testing.assert_array_equal(tangent_frames(pair).x, tangent_frames(sphere).x)
-    connection = heat_igl.operators.connection_laplacian
-    assert abs(connection(pair) - connection(sphere)).max() == 0
-    ends = (exp_map(mesh, 3, [[0.5, 0.2]]).barycentric for mesh in (pair, sphere))
-    np.testing.assert_array_equal(*ends)
-    lengths = (heat_igl.trace_geodesic(mesh, 3, [1, 0], 0.7).lengths(sphere) for mesh in (pair, sphere))
-    np.testing.assert_array_equal(*lengths)
-    squares = heat_igl.PolygonMesh(np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]]), [[0, 1, 2, 3]])
-    np.testing.assert_allclose(np.hypot(*log_map(squares, 0).T), [0, 1, np.sqrt(2), 1])

@@ -26,19 +26,6 @@ def test_every_method_stays_within_its_bound(case: DomainCase):
         assert case.domain != "tetrahedra" or error.min() > -0.01, method
 
 
-IN_SPACE = [c for c in CASES if c.domain not in ("metric", "point cloud") and "tensor" not in c.name]
-
-
-@pytest.mark.parametrize("case", IN_SPACE, ids=lambda case: case.name)
-def test_exact_distances_obey_the_triangle_inequality_and_edges(case):
-    """From one source, exact distance differs over an edge by no more than the length of the edge in space."""
-    problem = case.problem(np.random.default_rng(1))
-    mesh = heat_igl.mesh.as_simplices(problem.domain)
-    i, j = mesh.edges.T
-    assert (np.abs(problem.exact[i] - problem.exact[j]) <= np.linalg.norm(mesh.V[i] - mesh.V[j], axis=1) + 1e-12).all()
-    assert (problem.exact[np.atleast_1d(np.arange(mesh.n_vertices)[problem.sources])] == 0).all()
-
-
 def test_refracted_time_obeys_snells_law():
     """The ray at an angle of incidence a leaves at b with sin a / sin b the ratio of the speeds."""
     left, right = 1.0, 0.4

@@ -29,7 +29,6 @@ from surfaces import (
 )
 
 from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
-from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.kernels.mesh import flipping, gluing
 from heat_igl.reference.steiner import graph_distance
@@ -364,26 +363,6 @@ def test_the_order_of_vertices_and_faces_does_not_matter():
     assert (from_mesh(shuffled, 7).number != number).any()
     distance = exact_distance(shuffled.V, shuffled.F, int(new[7]))
     np.testing.assert_allclose(distance[new], exact_distance(mesh.V, mesh.F, 7), rtol=1e-14)
-
-
-def test_what_has_no_exact_distance_is_refused():
-    mesh = shapes.grid(3)
-    with pytest.raises(MeshError, match="needs triangles"):
-        exact_distance(shapes.box(1).V, shapes.box(1).F, 0)
-    with pytest.raises(SourceError, match="99"):
-        exact_distance(mesh.V, mesh.F, 99)
-    with pytest.raises(ValueError, match="make it from a triangulation"):
-        ExactSurface(from_mesh(mesh, 0)).solve(points=SurfacePoints([0], [[0.2, 0.3, 0.5]]))
-
-
-def test_targets_where_faces_are_there_twice():
-    square = shapes.grid(20)
-    twice = Mesh(square.V, np.concatenate([square.F, square.F[::2]]))
-    at_vertex = geodesic_distance(twice, 0, targets=[20])
-    assert at_vertex[0] == pytest.approx(np.linalg.norm(square.V[20] - square.V[0]))
-    places = SurfacePoints([100, 850], [[0.2, 0.3, 0.5], [0.1, 0.1, 0.8]])
-    expected = np.linalg.norm(places.positions(twice) - square.V[0], axis=1)
-    np.testing.assert_allclose(geodesic_distance(twice, 0, targets=places), expected, rtol=1e-12)
 
 
 def test_straight_past_a_flat_vertex_next_to_the_source():

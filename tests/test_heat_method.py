@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import perturbed, zoo
 
-from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, MeshError, SourceError, shapes
+from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, SourceError, shapes
 from heat_igl.operators import operators
 from heat_igl.steps import fitted_laplacian, integrate
 
@@ -113,16 +113,6 @@ def test_heat_of_a_region_starts_at_its_rim():
     np.testing.assert_allclose(residual, rim & region, rtol=0, atol=1e-12)
 
 
-def test_batch_into_a_given_array(tmp_path, solver):
-    out = np.lib.format.open_memmap(tmp_path / "out.npy", mode="w+", dtype=np.float32, shape=(2, solver.n_vertices))
-    assert solver.distances([0, [1, 2]], out=out) is out
-    np.testing.assert_allclose(np.load(tmp_path / "out.npy")[1], solver.distance([1, 2]), rtol=1e-6, atol=1e-6)
-    with pytest.raises(ValueError, match=r"out must be an array of float64 or float32 of shape \(3, 2562\)"):
-        solver.distances([0, 1, 2], out=out)
-    with pytest.raises(ValueError, match="out must be an array of float64 or float32"):
-        solver.distances([0], out=np.empty((1, solver.n_vertices), int))
-
-
 def test_bad_source_set_is_named_before_anything_is_solved(solver):
     out = np.full((2, solver.n_vertices), -1.0)
     with pytest.raises(SourceError, match=r"source_sets\[1\]: sources\[0\] = 9999 is no vertex"):
@@ -209,15 +199,6 @@ def test_dirichlet_and_average_boundaries():
     with pytest.warns(AccuracyWarning, match="too short"):
         distance = HeatMethodSolver(mesh, boundary="dirichlet").distance(edge)
     assert 1.5 < distance[np.argmin(mesh.V[:, 0])] < 2.5
-
-
-def test_mesh_and_faces_are_not_mixed(sphere):
-    with pytest.raises(MeshError, match="pass a mesh alone"):
-        HeatMethodSolver(sphere, sphere.F)
-    with pytest.raises(MeshError, match="faces F are missing"):
-        HeatMethodSolver(sphere.V)
-    with pytest.raises(MeshError, match="F is empty"):
-        HeatMethodSolver(sphere.V, [])
 
 
 def test_backends_agree(sphere):

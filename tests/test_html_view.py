@@ -17,7 +17,7 @@ from conftest import zoo
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.drawing.plots import Page, page, write_html
+from heat_igl.drawing.plots import Page, page
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, UNREACHABLE, colours
 
 read_image = pytest.importorskip("matplotlib.image").imread
@@ -48,13 +48,6 @@ def test_the_file_is_complete_and_loads_nothing() -> None:
     assert "default-src 'none'" in text
 
 
-def test_the_same_input_gives_the_same_bytes(tmp_path: Path) -> None:
-    mesh, x = square()
-    for name in ("a.html", "b.htm"):
-        write_html(tmp_path / name, mesh, x, sources=[0])
-    assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.htm").read_bytes()
-
-
 def test_titles_and_labels_cannot_become_markup() -> None:
     mesh, x = square(3)
     text = page(mesh, x, title="</title><i>&", label="</script><!--<script>", method="<b>").html
@@ -71,35 +64,6 @@ def test_a_notebook_gets_the_page_in_a_frame() -> None:
     )
     assert frame
     assert html.unescape(frame[1]) == shown.html
-
-
-def test_what_cannot_be_shown_is_rejected_by_name(tmp_path: Path) -> None:
-    mesh, x = square(4)
-    page(mesh, x)
-    with pytest.raises(ValueError, match=r"distance must have shape \(25,\)"):
-        page(mesh, x[1:])
-    with pytest.raises(ValueError, match="style must be one of 'lines', 'stripes', 'plain', not 'dots'"):
-        page(mesh, x, style="dots")  # type: ignore[arg-type]
-    with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 25"):
-        page(mesh, x, sources=25)
-    with pytest.raises(ValueError, match=r"a\.png must end in \.html or \.htm to be a page"):
-        write_html(tmp_path / "a.png", mesh, x)
-
-
-def test_fields_that_cannot_be_shown_are_rejected_by_name() -> None:
-    mesh, x = square(4)
-    page(mesh, x, fields={"exact": x, "map": mesh.V[:, :2]}, beside="map")
-    for fields, message in (
-        ({"exact": x[1:]}, r"fields\['exact'\] must have shape \(25,\) or \(25, 2\), not \(24,\)"),
-        ({"exact": np.where(x > 0.9, np.nan, x)}, r"fields\['exact'\] is NaN at vertex 4"),
-        ({"distance": x}, "fields cannot have the name 'distance', which the page uses itself"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            page(mesh, x, fields=fields)
-    with pytest.raises(ValueError, match="beside must be one of 'exact', 'log map', not 'exakt'"):
-        page(mesh, x, sources=3, fields={"exact": x}, beside="exakt")
-    with pytest.raises(ValueError, match="beside must be one of the fields, not 'log map'"):
-        page(mesh, x, beside="log map")
 
 
 # ---- the browser

@@ -18,7 +18,6 @@ from hypothesis import strategies as st
 
 import heat_igl
 from heat_igl import AccuracyWarning, Mesh, MeshError, read_attributes, read_mesh, write_mesh
-from heat_igl.errors import MissingExtraError
 from heat_igl.io import files
 
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="needs meshio")
@@ -119,19 +118,6 @@ def test_attributes_come_back_bit_for_bit(tmp_path: Path, extension: str) -> Non
 def test_vtu_attributes_on_tetrahedra(tmp_path: Path) -> None:
     write_mesh(tmp_path / "a.vtu", solid(), distance=[0, 1, 2, np.inf, 4])
     assert read_attributes(tmp_path / "a.vtu")["distance"].tolist() == [0, 1, 2, np.inf, 4]
-
-
-def test_scalars_named_like_parts_of_a_vector_stay_scalars(tmp_path: Path) -> None:
-    write_mesh(tmp_path / "a.ply", grid(2), a_0=[1, 2, 3, 4], a_1=[5, 6, 7, 8])
-    assert {name: values.shape for name, values in read_attributes(tmp_path / "a.ply").items()} == {
-        "a_0": (4,),
-        "a_1": (4,),
-    }
-
-
-def test_path_may_be_a_string_with_capitals(tmp_path: Path) -> None:
-    write_mesh(str(tmp_path / "A.OFF"), grid(2))
-    assert read_mesh(str(tmp_path / "A.OFF")).n_vertices == 4
 
 
 # --- OFF --------------------------------------------------------------------------------------------------------------
@@ -290,113 +276,10 @@ def test_ply_types_orders_and_further_elements(tmp_path: Path, order: str, kind:
     assert attributes["value"].dtype == np.dtype(PLY_TYPES[kind])
 
 
-# --- STL --------------------------------------------------------------------------------------------------------------
-
-
-def facets(corners: np.ndarray) -> str:
-    loop = "outer loop\n" + "  vertex {!r} {!r} {!r}\n" * 3 + " endloop\n"
-    return "".join(f"facet normal 0 0 1\n {loop}endfacet\n".format(*row) for row in corners.reshape(-1, 9).tolist())
-
-
-def binary_stl(corners: np.ndarray, header: bytes = b"") -> bytes:
-    rows = b"".join(struct.pack("<12fH", 0, 0, 1, *row, 7) for row in corners.reshape(-1, 9))
-    return header.ljust(80) + struct.pack("<I", len(corners)) + rows
-
-
-CORNERS = V4[[[0, 1, 2], [0, 1, 3]]]
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        "solid\n" + facets(CORNERS) + "endsolid\n",
-        "solid a b c\n" + facets(CORNERS[:1]) + "endsolid a\nsolid facet\n" + facets(CORNERS[1:]) + "endsolid facet",
-        ("solid a\n" + facets(CORNERS) + "endsolid a\n").upper(),
-        ("solid a\n" + facets(CORNERS) + "endsolid a\n").replace("\n", "\r\n"),
-        binary_stl(CORNERS),
-        binary_stl(CORNERS, b"solid but binary"),
-        # A triangle that collapses when its equal corners are merged, and -0.0, which equals 0.0.
-        binary_stl(np.concatenate([CORNERS[:1], V4[[[3, 3, 1]]], np.where(CORNERS[1:] == 0, -0.0, CORNERS[1:])])),
-    ],
-)
-def test_variants_of_stl_are_read_alike(tmp_path: Path, content: str | bytes) -> None:
-    mesh = read_mesh(save(tmp_path / "a.stl", content))
-    assert np.array_equal(mesh.V, V4)
-    assert np.array_equal(mesh.F, F4)
-
-
-def test_stl_drops_vertices_of_collapsed_triangles(tmp_path: Path) -> None:
-    far = np.array([[[9.0, 9, 9], [9, 9, 9], [8, 8, 8]]])
-    mesh = read_mesh(save(tmp_path / "a.stl", binary_stl(np.concatenate([far, CORNERS]))))
-    assert same(mesh, V4, F4)
-
-
 # --- MESH -------------------------------------------------------------------------------------------------------------
-
-MEDIT = "MeshVersionFormatted 1\nDimension 3\nVertices\n4\n0 0 0 1\n1 0 0 1\n0 1 0 1\n0 0 1 1\n"
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        MEDIT + "Triangles\n2\n1 2 3 0\n1 2 4 0\nEnd\n",
-        MEDIT.replace("Dimension 3", " Dimension\n3").replace("Vertices\n4", "Vertices 4").replace("ted 1", "ted\n2")
-        + "Triangles 2\n1 2 3 0\n1 2 4 0\n End",
-        "# comment\n"
-        + MEDIT
-        + "Corners 1\n1\nRidges\n1\n1\nEdges\n1\n1 2 0\nTriangles\n2\n1 2 3 0 1 2 4 0\nTetrahedra\n0\nEnd",
-    ],
-)
-def test_medit_surfaces(tmp_path: Path, content: str) -> None:
-    assert same(read_mesh(save(tmp_path / "a.mesh", content)), V4, F4)
-
-
-def test_medit_tetrahedra_quadrilaterals_and_the_plane(tmp_path: Path) -> None:
-    tets = MEDIT + "Triangles\n1\n1 2 3 0\nTetrahedra\n1\n1 2 3 4 0\nQuadrilaterals\n1\n1 2 3 4 0\nEnd\n"
-    assert same(read_mesh(save(tmp_path / "a.mesh", tets)), V4, [[0, 1, 2, 3]])
-    quads = MEDIT + "Triangles\n1\n1 2 3 0\nQuadrilaterals\n1\n1 2 4 3 0\nEnd\n"
-    assert same(read_mesh(save(tmp_path / "a.mesh", quads)), V4, [[0, 1, 2], [0, 1, 3], [0, 3, 2]])
-    plane = "MeshVersionFormatted 2\nDimension 2\nVertices\n3\n0 0 1\n1 0 1\n0 1 1\nTriangles\n1\n1 2 3 1\nEnd\n"
-    assert same(read_mesh(save(tmp_path / "a.mesh", plane)), [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-
-
-def test_medit_version_1_is_read_in_double_precision(tmp_path: Path) -> None:
-    content = MEDIT.replace("\n1 0 0 1", "\n0.1234567890123456789 0 0 1") + "Triangles\n1\n1 2 3 0\nEnd\n"
-    assert read_mesh(save(tmp_path / "a.mesh", content)).V[1, 0] == 0.1234567890123456789
-
-
-def test_medit_hexahedra_are_refused_by_name(tmp_path: Path) -> None:
-    content = MEDIT + "Hexahedra\n1\n1 2 3 4 1 2 3 4 0\nTetrahedra\n1\n1 2 3 4 0\nEnd\n"
-    with pytest.raises(MeshError, match=r"a.mesh: 1 cells are of kind hexahedron; .* convert the cells"):
-        read_mesh(save(tmp_path / "a.mesh", content))
 
 
 # --- MSH --------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("mesh", [grid(4), solid()], ids=["surface", "solid"])
-@pytest.mark.parametrize("version", ["gmsh", "gmsh22"])
-@pytest.mark.parametrize("binary", [False, True])
-def test_msh_of_another_writer(tmp_path: Path, mesh: Mesh, version: str, binary: bool) -> None:
-    meshio = pytest.importorskip("meshio")
-    kind = "tetra" if mesh.is_tetrahedral else "triangle"
-    data = {"gmsh:physical": [np.ones(mesh.n_faces, np.int32)], "gmsh:geometrical": [np.ones(mesh.n_faces, np.int32)]}
-    other = meshio.Mesh(mesh.V, [(kind, mesh.F)], {"phi": mesh.V[:, 0].copy()}, data)
-    meshio.write(tmp_path / "a.msh", other, file_format=version, binary=binary)
-    assert same(read_mesh(tmp_path / "a.msh"), mesh.V, mesh.F)
-
-
-def test_msh_node_numbers_with_gaps_and_mixed_elements(tmp_path: Path) -> None:
-    pytest.importorskip("meshio")
-    nodes = "$Nodes\n5\n70 0 0 0\n5 1 0 0\n2000 0 1 0\n6 0 0 1\n1 5 5 5\n$EndNodes\n"
-    head = "$Comments\nx\n$EndComments\n$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
-    head += '$PhysicalNames\n1\n2 1 "a b"\n$EndPhysicalNames\n'
-    faces = "$Elements\n4\n1 15 2 0 1 70\n2 2 2 0 1 70 5 2000\n3 1 2 0 1 5 6\n"
-    faces += "4 3 2 0 1 70 5 6 2000\n$EndElements\n"
-    V = [*V4.tolist(), [5, 5, 5]]
-    assert same(read_mesh(save(tmp_path / "a.msh", head + nodes + faces)), V, [[0, 1, 2], [0, 1, 3], [0, 3, 2]])
-    tets = "$Elements\n2\n1 2 2 0 1 70 5 2000\n2 4 2 0 1 70 5 2000 6\n$EndElements\n"
-    assert same(read_mesh(save(tmp_path / "a.msh", head + nodes + tets)), V, [[0, 1, 2, 3]])
 
 
 def msh(version: str, number: str) -> str:
@@ -411,30 +294,7 @@ def msh(version: str, number: str) -> str:
     return f"{form}$Nodes\n{nodes}$EndNodes\n$Elements\n{elements}$EndElements\n"
 
 
-@needs_meshio
-@pytest.mark.parametrize("version", ["2.2", "4.1"])
-def test_msh_node_numbers_that_meshio_cannot_hold(tmp_path: Path, version: str) -> None:
-    """It takes 0 for the last node, and needs memory in proportion to the largest number."""
-    assert same(read_mesh(save(tmp_path / "a.msh", msh(version, "1"))), V4, F4)
-    for number in ("0", "-1", "2000000000"):
-        with pytest.raises(MeshError, match=r"a.msh, line \d+ .*: node number -?\d+, but they run from 1"):
-            read_mesh(save(tmp_path / "a.msh", msh(version, number)))
-
-
 # --- VTU and meshio ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("purpose", ["reading", "writing"])
-def test_without_meshio_the_error_names_the_extra(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, purpose: str
-) -> None:
-    monkeypatch.setitem(sys.modules, "meshio", None)
-    path = save(tmp_path / "a.vtu", "<VTKFile/>")
-    with pytest.raises(MissingExtraError, match=f"{purpose} .vtu files needs meshio: pip install meshio"):
-        read_mesh(path) if purpose == "reading" else write_mesh(path, grid(2))
-    assert path.read_text() == "<VTKFile/>"
-    write_mesh(tmp_path / "a.ply", grid(2))
-    assert read_mesh(tmp_path / "a.ply").n_vertices == 4
 
 
 @needs_meshio
@@ -622,10 +482,3 @@ def test_real_attributes() -> None:
     airplane = read_attributes(real("colored_airplane.ply"))["quality"]
     assert airplane.dtype == np.float64
     assert airplane.max() == pytest.approx(1.543193660475573, rel=1e-15)
-
-
-@pytest.mark.filterwarnings("ignore:.*no face uses")
-def test_the_same_airplane_from_two_formats() -> None:
-    obj, ply = read_mesh(real("airplane.obj")), read_mesh(real("colored_airplane.ply"))
-    assert np.array_equal(obj.F, ply.F)
-    assert np.abs(obj.V - ply.V).max() < 1e-5

@@ -71,11 +71,6 @@ def test_matrices_that_are_not_positive_definite_are_refused(backend, kind):
         factorize(matrix.tocsc(), backend)
 
 
-def test_unknown_backend(heat_matrix):
-    with pytest.raises(ValueError, match="backend must be one of 'auto', 'scipy'"):
-        factorize(heat_matrix, "mumps")
-
-
 def test_missing_backend_names_the_extra(monkeypatch):
     """Only multigrid needs more than the base install; "auto" does without it."""
     laplacian = -operators(shapes.icosphere(2)).L

@@ -113,13 +113,6 @@ def test_a_pickled_mesh_comes_back_with_the_same_bits(mesh: Mesh) -> None:
     assert not back.V.flags.writeable
 
 
-def test_counts_and_representation() -> None:
-    assert (sheet(2, 3).n_vertices, sheet(2, 3).n_faces, sheet(2, 3).is_tetrahedral) == (12, 12, False)
-    assert repr(sheet(2, 3)) == "Mesh(12 vertices, 12 triangles)"
-    assert (two_tetrahedra().n_faces, two_tetrahedra().is_tetrahedral) == (2, True)
-    assert repr(two_tetrahedra()) == "Mesh(5 vertices, 2 tetrahedra)"
-
-
 def test_measures_do_not_depend_on_orientation() -> None:
     mesh = Mesh(TETRAHEDRON_V, TETRAHEDRON_F)
     assert mesh.measures == pytest.approx([0.5, 0.5, 3**0.5 / 2, 0.5], rel=1e-15)
@@ -233,18 +226,6 @@ def test_report_of_a_scaled_mesh_is_scaled() -> None:
     for name in ("smallest_angle", "largest_angle", "edges_across"):
         assert getattr(large, name) == pytest.approx(getattr(small, name), rel=1e-9)
     assert len(small.degenerate_faces) == len(large.degenerate_faces) == 0
-
-
-def test_report_prints_a_table() -> None:
-    V = np.concatenate([sheet(2, 2).V, np.full((9, 3), 5.0)])
-    lines = str(Mesh(V, sheet(2, 2).F).report()).splitlines()
-    table = {name: value.strip() for name, value in (line.split("  ", 1) for line in lines)}
-    assert table["n vertices"] == "18"
-    assert table["euler characteristic"] == "1"
-    assert table["unreferenced vertices"] == "9: 9, 10, 11, 12, 13, ..."
-    assert table["duplicate faces"] == "0"
-    assert table["is intrinsic delaunay"] in ("yes", "no")
-    assert dict(two_tetrahedra().report().rows())["is intrinsic delaunay"] == "-"
 
 
 # --- connectivity -----------------------------------------------------------------------------------------------------
@@ -673,13 +654,6 @@ def test_refused_edges(vertices, message):
         edge_curve(shapes.grid(4), vertices)
 
 
-def test_tetrahedra_have_no_faces_for_points():
-    with pytest.raises(SourceError, match="need triangles, but the mesh is tetrahedral"):
-        closest_points(shapes.box(2), [0, 0, 0])
-    with pytest.raises(SourceError, match="need triangles, but the mesh is tetrahedral"):
-        edge_curve(shapes.box(2), [0, 1])
-
-
 # --- subdivision
 
 
@@ -710,11 +684,6 @@ def test_the_surface_stays_and_edges_become_short(factor):
     assert fine.n_vertices - len(fine.edges) + fine.n_faces == 2
     volume = [np.einsum("fk,fk->", m.V[m.F[:, 0]], double_area_vector(m, m.F)) for m in (mesh, fine)]
     assert volume[1] == pytest.approx(volume[0], rel=1e-12)
-
-
-def test_what_is_short_enough_is_left_alone():
-    mesh = uneven()
-    assert split_long_edges(mesh, mesh.edge_lengths.max()) is mesh
 
 
 def test_by_default_no_edge_stays_longer_than_the_mean():
@@ -756,18 +725,3 @@ def test_new_vertices_lie_in_the_middle():
     assert fine.V[4:].tolist() == [[0.5, 0.5, 0.0]]
     finer = split_long_edges(shapes.grid(1), 0.8)
     assert sorted(finer.V.tolist()) == sorted(shapes.grid(2).V.tolist())
-
-
-def test_lengths_that_make_no_sense():
-    mesh = shapes.grid(2)
-    for longest in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="longest must be a positive number"):
-            split_long_edges(mesh, longest)
-    with pytest.raises(ValueError, match="longest = 1e-09 would cut the edges into"):
-        split_long_edges(mesh, 1e-9)
-    assert split_long_edges(mesh, 0.5).n_vertices > mesh.n_vertices
-
-
-def test_tetrahedra_are_refused():
-    with pytest.raises(MeshError, match="needs triangles"):
-        split_long_edges(shapes.box(1), 0.5)

@@ -148,8 +148,6 @@ def test_activation_of_a_twisted_block():
         (np.diag([1.0, 1, -1]), 0, r"D\[0\] = .* must be positive definite \(48 of 48"),
         (np.full((3, 3), np.nan), 0, r"D\[0\] = .* must be finite"),
         (np.triu(np.ones((3, 3))), 0, r"D\[0\] = .* must be symmetric"),
-        (np.ones((5, 3, 3)), 0, r"D must have shape \(3, 3\), \(48, 3, 3\) per face or \(27, 3, 3\) per vertex"),
-        (np.eye(3), np.inf, "times must be finite"),
     ],
 )
 def test_wrong_tissue_is_refused(D, times, message):
@@ -167,7 +165,6 @@ def test_wrong_tissue_is_refused(D, times, message):
         ({"sheets": [[0, 1, 0]]}, "sheets and normal go together"),
         ({"sheets": [[2, 0, 0]], "normal": 1}, r"sheets\[0\] = .* has the direction of its fibre"),
         ({"sheets": [[0, 0, 0]], "normal": 1}, r"sheets\[0\] = .* is no direction"),
-        ({"sheets": [[0, 1, 0]], "normal": -1}, r"normal\[0\] = -1.0 must be positive"),
     ],
 )
 def test_wrong_sheets_are_refused(arguments, message):

@@ -223,19 +223,6 @@ def changed(face: int, value: Any) -> FloatArray:
             r"metric\[4\] = .* must be positive definite on its face \(1 of 18 are not\)",
         ),
         (changed(5, np.diag([1, 0, 1])), r"metric\[5\] = .* must be positive definite"),
-        (changed(3, [[1, 1, 0], [0, 1, 0], [0, 0, 1]]), r"metric\[3\] = .* must be symmetric"),
-        (
-            np.eye(3),
-            r"one per face or vertex, not \(3, 3\): np.broadcast_to\(metric, \(18, 3, 3\)\) is the same on all",
-        ),
-        (changed(2, np.nan), r"metric\[2\] = .* must be finite"),
-        (
-            changed(7, 1e200 * np.eye(3)),
-            r"metric\[7\] = .* must have entries and eigenvalues between 1e-120 and 1e\+120",
-        ),
-        (changed(8, 1e-200 * np.eye(3)), r"metric\[8\] = .* take another unit \(1 of 18 are not\)"),
-        ("round", "metric must be real numbers"),
-        (1j * GOOD, "metric must be real numbers, not an array of complex128"),
     ],
 )
 def test_wrong_metrics_are_refused(metric, message):
@@ -251,7 +238,6 @@ def test_wrong_metrics_are_refused(metric, message):
         (([[1, 0, 0], [0, 0, 0]], 1, 2), r"directions\[1\] = \[0.0, 0.0, 0.0\] is no direction"),
         (([1, 0, 0], 1, 2), r"directions must have shape \(k, 3\)"),
         (([[1, 0, 0]], 0, 2), r"along\[0\] = 0.0 must be positive and finite"),
-        (([[1, 0, 0]], 1, [1, 2]), r"across must be a number or have shape \(1,\), not \(2,\)"),
     ],
 )
 def test_wrong_fibres_are_refused(arguments, message):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +9,7 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import Mesh, MeshError, PolygonMesh, as_mesh, shapes, write_mesh
+from heat_igl import Mesh, MeshError, PolygonMesh, as_mesh, shapes
 
 SPHERE = shapes.icosphere(1)
 SQUARES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 0, 0], [2, 1, 0.0]])
@@ -84,15 +82,6 @@ def test_tetrahedra_come_without_the_triangles_around_them(kind: Any) -> None:
     mesh = as_mesh(SimpleNamespace(points=CORNERS, cells_dict=cells))
     assert isinstance(mesh, Mesh)
     np.testing.assert_array_equal(mesh.F, TETRAHEDRA)
-
-
-def test_own_meshes_are_returned_and_paths_are_read(tmp_path: Any) -> None:
-    polygons = PolygonMesh(SQUARES, TWO_QUADS)
-    assert as_mesh(SPHERE) is SPHERE
-    assert as_mesh(polygons) is polygons
-    write_mesh(tmp_path / "sphere.ply", SPHERE)
-    np.testing.assert_array_equal(as_mesh(tmp_path / "sphere.ply").V, V)
-    np.testing.assert_array_equal(as_mesh(str(tmp_path / "sphere.ply")).V, V)
 
 
 @pytest.mark.parametrize("library", ["trimesh", "pyvista", "meshio", "pymeshlab", "vedo", "nibabel"])
@@ -210,11 +199,6 @@ def test_cells_of_other_kinds_are_refused() -> None:
         as_mesh(SimpleNamespace(points=CORNERS, cells_dict={"line": F[:, :2]}))
 
 
-def test_an_image_domain_is_the_mesh_of_the_pixels() -> None:
-    domain = heat_igl.image_domain(np.ones((2, 3), bool))
-    assert as_mesh(domain) is domain.mesh
-
-
 def test_operators_and_solvers_are_refused_by_name() -> None:
     with pytest.raises(MeshError, match=r"Operators: GeodesicSolver and HeatMethodSolver take operators"):
         as_mesh(heat_igl.speed_operators(SPHERE, np.ones(len(F))))
@@ -234,14 +218,6 @@ def test_faces_beside_a_mesh_are_refused() -> None:
     np.testing.assert_array_equal(as_mesh(V, F).F, F)
     with pytest.raises(MeshError, match="F is given beside a Mesh"):
         as_mesh(SPHERE, F)
-
-
-def test_a_path_is_taken_in_a_new_interpreter(tmp_path):
-    """Where nothing has loaded the room that reads files."""
-    path = tmp_path / "ball.off"
-    heat_igl.write_mesh(path, heat_igl.shapes.icosphere(1))
-    code = f"import heat_igl; print(heat_igl.as_mesh({str(path)!r}).n_vertices)"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "42\n"
 
 
 @pytest.mark.parametrize("suffix", ["xyz", "ply", "obj", "npy"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import igl
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from conftest import perturbed
 from scipy.spatial import Delaunay
 
@@ -64,13 +63,6 @@ def test_mass_is_the_area(domain):
     assert domain.M.sum() == pytest.approx(domain.weights.sum(), rel=1e-12)
     assert (domain.M.diagonal()[domain.referenced] > 0).all()
     assert (domain.M.diagonal()[~domain.referenced] == 0).all()
-
-
-def test_matrices_are_csc(domain):
-    for matrix in (domain.L, domain.M, domain.G, domain.D):
-        assert sp.issparse(matrix)
-        assert matrix.format == "csc"
-        assert matrix.dtype == np.float64
 
 
 def test_gradient_of_a_linear_function_in_space_is_exact():
@@ -203,8 +195,3 @@ def test_laplacian_is_handed_out_early(mesh, laplacian):
     assert len(early) == 1
     assert np.array_equal(early[0].indptr, final.indptr)
     assert np.array_equal(early[0].indices, final.indices)
-
-
-def test_unknown_laplacian():
-    with pytest.raises(ValueError, match="laplacian must be"):
-        operators(shapes.grid(2), "cotangent")

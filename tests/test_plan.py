@@ -32,10 +32,6 @@ def test_engines_by_kind_and_method(kind, method, engine, tolerance):
     assert plan.reason in str(plan)
 
 
-def test_a_tolerance_of_zero_is_exact():
-    assert distance_plan("triangles", "auto", 0) == distance_plan("triangles", "exact", 0.5)
-
-
 @pytest.mark.parametrize("kind", ["tetrahedra", "separate simplices"])
 @pytest.mark.parametrize("method", ["windows", "exact"])
 def test_windows_need_triangles_that_fit_together(kind, method):

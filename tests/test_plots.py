@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +15,6 @@ from heat_igl.drawing.line_drawing import write_line_drawing
 from heat_igl.drawing.plots import Picture, picture, plot, plot_field, plot_labels
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, colours
 from heat_igl.drawing.surface_image import LINE
-
-matplotlib = pytest.importorskip("matplotlib")
 
 
 @pytest.fixture(autouse=True)
@@ -62,15 +58,6 @@ def test_each_pixel_shows_the_nearest_triangle_and_interpolates_exactly() -> Non
     np.testing.assert_allclose(pixels.depth, depth, atol=1e-9)
     where = np.einsum("pk,pkd->pd", pixels.weights, points[F[pixels.face]])
     np.testing.assert_allclose(where[:, 0] + 40 * where[:, 1], pixels.place, atol=1e-6)
-
-
-def test_many_pixels_are_drawn_in_chunks_without_a_difference(monkeypatch: pytest.MonkeyPatch) -> None:
-    points = np.random.default_rng(1).uniform(0, 60, (90, 3))
-    F = np.arange(90).reshape(30, 3)
-    whole = raster.rasterize(points, F, 60, 60)
-    monkeypatch.setattr(raster, "_CHUNK", 500)
-    for a, b in zip(whole, raster.rasterize(points, F, 60, 60), strict=True):
-        np.testing.assert_array_equal(a, b)
 
 
 def test_neighbouring_triangles_leave_no_gap() -> None:
@@ -298,13 +285,6 @@ def test_scale_and_place_do_not_change_the_picture(scale: float, offset: float) 
     assert np.abs(a - b).mean() < 1e-4
 
 
-def test_tetrahedra_are_drawn_by_their_surface() -> None:
-    box = shapes.box(3)
-    distance = np.linalg.norm(box.V - box.V[0], axis=1)
-    image = surface_image(plot(box, distance, sources=0))
-    assert 0.3 < (image[..., 3] > 0.5).mean() < 0.95
-
-
 def test_nothing_overlaps_and_nothing_is_cut_off() -> None:
     mesh, x = flat_grid()
     for values in (x * 1e-9, x * 12345.0):
@@ -338,30 +318,6 @@ def test_save_writes_the_format_that_the_suffix_names_and_the_same_bytes(tmp_pat
     assert drawn._repr_png_().startswith(b"\x89PNG")
 
 
-def test_save_rejects_other_suffixes(tmp_path: Path) -> None:
-    mesh, x = flat_grid(4)
-    with pytest.raises(ValueError, match=r"a\.gif must end in one of \.png, \.pdf, \.svg"):
-        picture(tmp_path / "a.gif", mesh, x)
-
-
-def test_a_failed_save_leaves_the_old_file_and_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, x = flat_grid(4)
-    drawn = plot(mesh, x)
-    path = tmp_path / "a.png"
-    path.write_text("old")
-
-    def fail(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "replace", fail)
-        with pytest.raises(OSError, match="No space left"):
-            drawn.save(path)
-    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("a.png", "old")]
-    drawn.save(path)
-    assert path.read_bytes().startswith(b"\x89PNG")
-
-
 def test_what_cannot_be_drawn_is_rejected_by_name() -> None:
     mesh, x = flat_grid(4)
     plot(mesh, x)
@@ -371,35 +327,6 @@ def test_what_cannot_be_drawn_is_rejected_by_name() -> None:
         plot(mesh, np.where(np.arange(25) == 3, np.nan, x))
     with pytest.raises(ValueError, match="infinite everywhere"):
         plot(mesh, np.full(25, np.inf))
-    with pytest.raises(ValueError, match="spacing must be a positive number"):
-        plot(mesh, x, spacing=-1.0)
-    with pytest.raises(ValueError, match="spacing must be a positive number"):
-        plot(mesh, x, spacing=1e-9)
-    with pytest.raises(ValueError, match="up must be"):
-        plot(mesh, x, up="w")
-    with pytest.raises(ValueError, match="style must be one of 'lines', 'stripes', 'plain', not 'dots'"):
-        plot(mesh, x, style="dots")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="colormap must be"):
-        plot(mesh, x, colormap="mud")
-    with pytest.raises(heat_igl.SourceError, match=r"sources\[0\] = 25"):
-        plot(mesh, x, sources=25)
-
-
-def test_zero_everywhere_can_be_drawn() -> None:
-    mesh, x = flat_grid(4)
-    assert plot(mesh, 0 * x, sources=np.ones(25, bool)).figure is not None
-
-
-def test_without_matplotlib_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, x = flat_grid(4)
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(heat_igl.errors.MissingExtraError, match="needs matplotlib: pip install matplotlib"):
-        plot(mesh, x)
-
-
-@pytest.mark.parametrize(("largest", "spacing"), [(1.0, 0.05), (0.85, 0.05), (635.0, 50.0), (3e-8, 2e-9), (0.0, 1.0)])
-def test_spacing_is_a_round_number(largest: float, spacing: float) -> None:
-    assert shading.isoline_spacing(largest) == pytest.approx(spacing)
 
 
 # --- labels -----------------------------------------------------------------------------------------------------------
@@ -439,15 +366,6 @@ def test_vertices_without_a_label_are_grey() -> None:
     image = surface_image(plot_labels(mesh, np.full(25, -1) + (mesh.V[:, 0] > mesh.V[:, 0].mean())))
     grey = np.ptp(image[..., :3], axis=2) < 1e-6
     assert 0.3 < (grey & (image[..., 3] == 1)).sum() / (image[..., 3] == 1).sum() < 0.95
-
-
-@pytest.mark.parametrize(
-    ("labels", "said"),
-    [(np.zeros(25), "labels must be integers, not float64"), (np.zeros(3, int), r"labels must have shape \(25,\)")],
-)
-def test_what_are_no_labels(labels: np.ndarray, said: str) -> None:
-    with pytest.raises(ValueError, match=said):
-        plot_labels(shapes.grid(4), labels)
 
 
 # --- line drawings ----------------------------------------------------------------------------------------------------

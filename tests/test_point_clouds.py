@@ -470,12 +470,6 @@ def test_bad_files(tmp_path, name: str, text: str, message: str) -> None:
         read_point_cloud(tmp_path / name)
 
 
-def test_npy_of_another_shape(tmp_path) -> None:
-    np.save(tmp_path / "a.npy", np.zeros((5, 4)))
-    with pytest.raises(MeshError, match=r"must have shape \(n, 3\), \(n, 6\) with normals, or \(n, 2\)"):
-        read_point_cloud(tmp_path / "a.npy")
-
-
 def test_attributes_of_points_go_to_ply(tmp_path) -> None:
     cloud = PointCloud(sphere(40), sphere(40))
     heat_igl.write_point_cloud(tmp_path / "a.ply", cloud, distance=np.append(np.inf, np.arange(39.0)))

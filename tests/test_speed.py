@@ -153,10 +153,6 @@ def test_refraction_at_a_straight_border(speeds):
         (np.ones(17), r"speed must have shape \(18,\), one per face, not \(17,\)"),
         (1.0, r"speed must have shape \(18,\), one per face, not \(\)"),
         ([1.0] * 17 + [0.0], r"speed\[17\] = 0.0 must be positive and finite \(1 of 18 are not\): remove faces"),
-        ([np.inf] + [1.0] * 17, r"speed\[0\] = inf must be positive and finite"),
-        (["fast"] * 18, "speed must be real numbers"),
-        (np.full(18, 1j), "speed must be real numbers, not an array of complex128"),
-        (np.where(np.arange(18) == 4, 1e-200, 1), r"speed\[4\] = 1e-200 is not between 1e-60 and 1e\+60 \(1 of 18"),
     ],
 )
 def test_wrong_speeds_are_refused(speed, message):

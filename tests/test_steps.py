@@ -134,25 +134,6 @@ def test_integration_inverts_the_gradient():
     assert abs(np.ptp(difference)) > 1e-3
 
 
-def test_columns_are_solved_as_one_by_one(disk):
-    flow, poisson = HeatFlow(disk, 0.01), PoissonProblem(disk)
-    b = np.random.default_rng(0).random((disk.n, 5))
-    np.testing.assert_allclose(flow.solve(b)[:, 3], flow.solve(b[:, 3]), rtol=1e-12)
-    rhs = disk.D @ normalize(disk, b)
-    np.testing.assert_allclose(poisson.solve(rhs)[:, 3], poisson.solve(rhs[:, 3]), rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("t", [0.0, -1.0, np.inf, np.nan])
-def test_time_step_must_be_positive(disk, t):
-    with pytest.raises(ValueError, match="t must be a positive number"):
-        HeatFlow(disk, t)
-
-
-def test_unknown_boundary(disk):
-    with pytest.raises(ValueError, match="boundary must be 'neumann', 'dirichlet' or 'average'"):
-        HeatFlow(disk, 1.0, "robin")
-
-
 @pytest.mark.parametrize("k", [1, 5])
 @pytest.mark.parametrize(("damped", "fitted"), [(False, False), (True, False), (True, True)])
 @pytest.mark.parametrize("scale", [1e-280, 1.0, 1e280])

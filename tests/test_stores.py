@@ -192,15 +192,6 @@ def test_one_of_two_writers_of_a_matrix_is_told(tmp_path: Path, monkeypatch: pyt
     assert [entry.name for entry in tmp_path.iterdir()] == ["near"]
 
 
-def test_a_partial_folder_of_somebody_else_stays(tmp_path: Path) -> None:
-    (tmp_path / "near.partial").mkdir()
-    (tmp_path / "near.partial" / "thesis.tex").write_text("precious")
-    with pytest.raises(FileExistsError, match="wait for the process, or remove the folder, or name another path"):
-        write_distances_within(tmp_path / "near", BALL, 0.3)
-    assert (tmp_path / "near.partial" / "thesis.tex").read_text() == "precious"
-    write_distances_within(tmp_path / "other", BALL, 0.3)
-
-
 def test_a_store_that_appears_meanwhile_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def late(*_: object) -> Iterator[object]:
         yield distances_within(BALL, 0.2)
