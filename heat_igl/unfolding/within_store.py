@@ -187,11 +187,13 @@ def _opened(path: Path) -> tuple[Any, dict[str, Any]]:
 
 
 def _remove(folder: Path) -> None:
-    """Remove a folder into which zarr's threads may still write for a moment after one of them has failed."""
+    """Remove a folder into which zarr's threads may still write, or make it again, for a moment after a failure."""
+    n_gone = 0
     for _ in range(100):
-        shutil.rmtree(folder, ignore_errors=True)
-        if not folder.exists():
+        n_gone = 0 if folder.exists() else n_gone + 1
+        if n_gone == 5:
             return
+        shutil.rmtree(folder, ignore_errors=True)
         time.sleep(0.02)
 
 
