@@ -291,11 +291,8 @@ def test_normals_keep_sheets_apart_that_nearly_touch() -> None:
     assert np.isfinite(distance[:2000]).all()
 
 
-@pytest.mark.parametrize("share", [0.2, 0.5])
-def test_normals_that_were_not_oriented_are_left_out(share: float) -> None:
-    """As estimated ones: distance is that without normals, not that on sheets of points with equal signs."""
-    P = sphere(2000)
-    normals = np.where(np.random.default_rng(1).random(2000) < share, -1, 1)[:, None] * P
+def test_normals_that_are_none_of_the_surface_are_left_out() -> None:
+    P, normals = sphere(2000), sphere(2000, seed=1)
     with pytest.warns(AccuracyWarning, match="normals point to both sides .* pass normals=None") as caught:
         F = PointCloud(P, normals).F
     assert caught[0].filename == __file__
@@ -303,13 +300,18 @@ def test_normals_that_were_not_oriented_are_left_out(share: float) -> None:
     np.testing.assert_array_equal(F, PointCloud(P).F)
 
 
-@pytest.mark.parametrize("share", [0.01, 0.04])
-def test_single_normals_that_point_to_the_other_side_are_turned(share: float) -> None:
-    P = sphere(2000)
-    turned = np.random.default_rng(2).random(2000) < share
-    cloud = PointCloud(P, np.where(turned, -1, 1)[:, None] * P)
-    np.testing.assert_array_equal(cloud.F, PointCloud(P, P).F)
-    np.testing.assert_allclose(cloud.normals[turned], -P[turned], atol=1e-14)
+@pytest.mark.parametrize("turned", ["one in a hundred", "two in five", "a cap", "more than half"])
+def test_normals_that_point_to_the_other_side_are_turned(turned: str) -> None:
+    """Single points, as estimates from neighbours are, and whole patches, which would be sheets of their own."""
+    P, at_random = sphere(2000), np.random.default_rng(2).random(2000)
+    masks = {"one in a hundred": at_random < 0.01, "two in five": at_random < 0.4}
+    is_turned = masks.get(turned, P[:, 2] > (0.9 if turned == "a cap" else -0.2))
+    cloud = PointCloud(P, np.where(is_turned, -1, 1)[:, None] * P)
+    found, expected = (np.unique(np.sort(F, axis=1), axis=0) for F in (cloud.F, PointCloud(P, P).F))
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_allclose(cloud.normals[is_turned], -P[is_turned], atol=1e-14)
+    volume = np.linalg.det(cloud.triangles.V[cloud.F]).sum() / 6  # most points keep their normals
+    assert volume * (1 if is_turned.mean() < 0.5 else -1) == pytest.approx(4 / 3 * np.pi, rel=0.02)
 
 
 @pytest.mark.parametrize("thickness", [1.0, 1e-3])
@@ -320,6 +322,31 @@ def test_normals_of_both_sides_of_a_thin_shell_are_oriented(thickness: float) ->
     radius = np.where(outside, 1, 1 - thickness * np.sqrt(4 * np.pi / 2000))[:, None]
     cloud = PointCloud(radius * P, np.where(outside, 1, -1)[:, None] * P)
     assert not np.isin(cloud.components[outside], cloud.components[~outside]).any()
+
+
+@pytest.mark.parametrize("gap", [0.5, 1.2])
+def test_two_sheets_nearer_than_the_spacing_are_said_to_be_one(gap: float) -> None:
+    P, normals = two_sheets(1500, gap / np.sqrt(1500))
+    with pytest.warns(AccuracyWarning, match=r"two sheets 0.0\d+ apart, .* pass PointCloud\(P, normals\)"):
+        assert PointCloud(P).report().n_components == 1
+    assert PointCloud(P, normals).report().n_components == 2
+    noisy = PointCloud(plane(1500) + 0.5 / np.sqrt(1500) * np.random.default_rng(0).standard_normal((1500, 3)))
+    assert noisy.report().noise == pytest.approx(0.5 / np.sqrt(1500), rel=0.1)
+
+
+def test_a_report_names_border_copies_and_points_where_sheets_may_be_joined() -> None:
+    P = plane(400)
+    found = PointCloud(np.concatenate([P, P[:3], [[0.5, 0.5, 2]]])).report()
+    assert (found.n_copies, found.noise, found.doubtful_points.tolist()) == (3, 0, [])
+    assert found.unreferenced_vertices.tolist() == [403]
+    assert set(found.boundary_points) >= set(P[:, 0].argsort()[[0, -1]])
+    # Two sheets at an angle of 30 degrees, with a common edge.
+    folded = np.where(
+        P[:, :1] < 0.5, [1, 1, 0] * P, np.stack([1 - 0.5 + 0.87 * (0.5 - P[:, 0]), P[:, 1], P[:, 0] / 2 - 0.25], axis=1)
+    )
+    doubtful = PointCloud(folded).report().doubtful_points
+    assert len(doubtful) > 5
+    assert (np.abs(P[doubtful, 0] - 0.5) < 0.12).all()
 
 
 def test_sheets_further_apart_than_the_spacing_need_no_normals() -> None:

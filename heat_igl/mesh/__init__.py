@@ -24,7 +24,7 @@ from heat_igl.mesh.polygon_fans import PolygonFans
 from heat_igl.mesh.polygons import PolygonMesh, which_repeat_a_vertex
 from heat_igl.mesh.projection import ClosestPoints, closest_points
 from heat_igl.mesh.regions import region_boundary
-from heat_igl.mesh.report import DELAUNAY_TOLERANCE, MeshReport
+from heat_igl.mesh.report import DELAUNAY_TOLERANCE, CloudReport, MeshReport
 from heat_igl.mesh.subdivision import split_long_edges
 from heat_igl.mesh.surface_curves import curve_on
 from heat_igl.mesh.surface_points import (
@@ -39,6 +39,7 @@ from heat_igl.mesh.surface_points import (
 
 __all__ = [
     "ClosestPoints",
+    "CloudReport",
     "DELAUNAY_TOLERANCE",
     "ImageDomain",
     "Mesh",

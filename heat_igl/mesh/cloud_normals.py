@@ -1,4 +1,4 @@
-"""Normals of a cloud that are missing or were not oriented: found, reported and left out."""
+"""Normals of a cloud that are missing or point to the wrong side: turned over, or reported and left out."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
+from heat_igl.kernels.mesh.incidence import components
+from heat_igl.mesh.cloud_orientation import turned_groups
 from heat_igl.runtime import over_rows, warn_caller
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray
 
 if TYPE_CHECKING:
     from heat_igl.mesh.neighbourhoods import PointTree
@@ -16,75 +18,61 @@ if TYPE_CHECKING:
 __all__ = ["oriented_normals", "usable_normals"]
 
 _K = 10
-# Points at which neighbours are looked at.
-_SAMPLE = 2000
-# Largest share of contradicting neighbours of oriented normals, after single ones were turned over. On the vertices of
-# scans and models it is below 0.01, where parts cross up to 0.07; with random signs of the normals of a sphere 0.5.
+# Largest share of contradicting neighbours of oriented normals. On the vertices of scans and models it is below 0.01,
+# where parts cross up to 0.07; with normals at random 0.5.
 _MOST_CONTRADICTING = 0.015
-# A single normal is turned over if this share of the neighbours is opposite, on both sides.
+# Two groups of points lie on different sheets if this share of their neighbours is on one side of each other.
 _NEARLY_ALL = 0.8
 # Heights that are taken for 0, in shares of the distance.
 _ROUNDING = 1e-10
-# How often single normals are looked for.
-_PASSES = 3
 # Points at a time: bounds the memory for their neighbours.
 _BLOCK = 1 << 12
 
 
 def oriented_normals(tree: PointTree, normals: FloatArray | None) -> FloatArray | None:
-    """The normals (n, 3) of the points of `tree`, single ones turned over that contradict their neighbours.
+    """The normals (n, 3) of the points of `tree`, those turned over that contradict their neighbours.
 
-    Neighbours of opposite normals lie on two sheets. Then one sheet is in front of the other, so all of these
-    neighbours are in front of a point, or all behind it. If normals were estimated and not oriented, they are on both
-    sides, and None is returned.
+    Neighbours of opposite normals lie on two sheets, or one of the normals points to the wrong side. Of two sheets one
+    is in front of the other, so nearly all such neighbours are in front of each other, or nearly all behind. Points
+    that are joined by neighbours of like normals are a group: a sheet, a patch whose normals were turned over, or a
+    single point. Groups are turned as a whole, where they contradict others, and most points keep their normals.
 
     Warns
     -----
     AccuracyWarning
-        If there are normals, and they are left out.
+        If neighbours contradict each other in any case: then None is returned.
     """
     n = len(tree.P)
     if normals is None or n <= _K:
         return normals
-    opposite, one_side = _opposite(tree, normals, np.unique(np.linspace(0, n - 1, _SAMPLE).astype(np.int64)))
-    if (opposite == one_side).all():
-        return normals
-    found = normals
-    for _ in range(_PASSES):
-        opposite, one_side = _of_all(tree, found)
-        turned = (opposite >= _NEARLY_ALL * _K) & (one_side < opposite)
-        if not turned.any():
-            break
-        found = np.where(turned[:, None], -found, found)
-    contradicting = float((opposite - one_side).mean() / _K)
-    if contradicting <= _MOST_CONTRADICTING:
-        return found
+    blocks = over_rows(lambda rows: tree.nearest(np.arange(rows.start, rows.stop), _K + 1)[0][:, 1:], n, _BLOCK)
+    pairs = np.stack([np.repeat(np.arange(n), _K), np.concatenate(blocks).ravel()], axis=1)
+    is_opposite = np.einsum("kx,kx->k", normals[pairs[:, 0]], normals[pairs[:, 1]]) < 0
+    group, (a, b) = components(pairs[~is_opposite], n), pairs[is_opposite].T
+    # Heights of the neighbour over the plane of the point, and of the point over that of the neighbour: the bend of a
+    # single sheet cancels in the sum.
+    way = tree.P[b] - tree.P[a]
+    height = np.einsum("kx,kx->k", way, normals[a] - normals[b])
+    side = np.sign(height) * (np.abs(height) > _ROUNDING * np.linalg.norm(way, axis=1))
+    ends = np.sort(group[np.stack([a, b], axis=1)], axis=1)
+    _, begin, which = np.unique(ends[:, 0] * n + ends[:, 1], return_index=True, return_inverse=True)
+    count, total = np.bincount(which), np.abs(np.bincount(which, side))
+    contradicts = (total < _NEARLY_ALL * count) & (ends[begin, 0] != ends[begin, 1])
+    joins = ends[begin[contradicts]]
+    is_turned = turned_groups(joins, -count[contradicts].astype(float), np.arange(int(group.max()) + 1))[group]
+    part = components(joins, int(group.max()) + 1)[group]
+    is_turned ^= (np.bincount(part, is_turned) > np.bincount(part) / 2)[part]
+    # Those of a single point are on one side of it, too. In groups of which one was turned they are opposite no more.
+    stays = ~contradicts[which] | (is_turned[a] == is_turned[b])
+    share = (stays.sum() - np.abs(np.bincount(a[stays], side[stays])).sum()) / len(pairs)
+    if share <= _MOST_CONTRADICTING:
+        return np.where(is_turned[:, None], -normals, normals) if is_turned.any() else normals
     warn_caller(
-        f"normals point to both sides of the surface at random ({100 * contradicting:.0f} % of neighbours contradict "
-        "each other), as if they were estimated and not oriented: they are not used; orient them, or pass normals=None",
+        f"normals point to both sides of the surface at random ({100 * share:.0f} % of neighbours contradict each "
+        "other), as if they were no normals of it: they are not used; orient them, or pass normals=None",
         AccuracyWarning,
     )
     return None
-
-
-def _of_all(tree: PointTree, normals: FloatArray) -> tuple[AnyArray, AnyArray]:
-    """`_opposite` of all points."""
-    blocks = over_rows(lambda rows: _opposite(tree, normals, np.arange(rows.start, rows.stop)), len(tree.P), _BLOCK)
-    opposite, one_side = np.concatenate(blocks, axis=1)
-    return opposite, one_side
-
-
-def _opposite(tree: PointTree, normals: FloatArray, points: IntArray) -> tuple[IntArray, FloatArray]:
-    """How many neighbours of some points (b,) have opposite normals, and by how many more they are on one side."""
-    near = tree.nearest(points, _K + 1)[0][:, 1:]
-    is_opposite = np.einsum("sx,skx->sk", normals[points], normals[near]) < 0
-    # Heights of the neighbour over the plane of the point, and of the point over that of the neighbour: the bend of a
-    # single sheet cancels in the sum.
-    to_neighbour = tree.P[near] - tree.P[points][:, None]
-    height = np.einsum("skx,skx->sk", to_neighbour, normals[points][:, None] - normals[near])
-    is_apart = np.abs(height) > _ROUNDING * np.linalg.norm(to_neighbour, axis=2)
-    side = np.sign(height) * (is_opposite & is_apart)
-    return is_opposite.sum(axis=1), np.abs(side.sum(axis=1))
 
 
 def usable_normals(normals: AnyArray, where: str = "") -> AnyArray | None:

@@ -11,13 +11,23 @@ from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["is_oriented_manifold", "neighbours_across_edges", "on_one_side", "oriented", "two_sided_cover"]
+__all__ = [
+    "doubtful_points",
+    "is_oriented_manifold",
+    "neighbours_across_edges",
+    "on_one_side",
+    "oriented",
+    "turned_groups",
+    "two_sided_cover",
+]
 
 # Share of the triangles that may be left out for the others to be oriented alike. Clouds of scans had up to 0.0012; at
 # 0.002 and 0.004, on thin and narrow parts of two coarse meshes, distance became up to four times as wrong.
 _MOST_LEFT_OUT = 1.5e-3
 # Cosine of the angle at an edge, -1 where the two triangles are flat, below which nothing tells a wrong join.
 _FLAT = -0.9
+# The same above which two triangles may join sheets: 60 degrees between them.
+_FOLDED_BACK = 0.5
 # Weights of edges on folds, which join sheets wrongly more often than flat ones: powers of half of 1 - cosine, at least
 # the second number. On the vertices of cow, cheburashka and camelhead, 99.0, 99.9 and 99.3 % of the triangles are
 # oriented as on the mesh; with the first and the second power down to 95.7 and 87 %.
@@ -114,9 +124,17 @@ def _as_most_want(pairs: IntArray, runs_alike: BoolArray, folds: FloatArray, m: 
     # A flat part that contradicts itself begins as single triangles.
     label = np.where(part[0] == part[1], 2 * m + np.arange(m), np.minimum(*part))
     _, group = np.unique(label, return_inverse=True)
-    size, (a, b) = np.bincount(group), group[pairs].T
     weight = np.maximum((1 - folds) / 2, 0) ** _POWER + _LEAST_WEIGHT
     weight[runs_alike != (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]])] *= -1
+    return is_turned ^ turned_groups(pairs, weight, group)
+
+
+def turned_groups(pairs: IntArray, weight: FloatArray, group: IntArray) -> BoolArray:
+    """Which elements (m,) to turn, for pairs (k, 2) with weights that are negative if just one of them should be.
+
+    Elements of one of the groups (m,), counted from 0, are turned alike. Groups are joined as in `oriented`.
+    """
+    is_turned, size, (a, b) = np.zeros(len(group), bool), np.bincount(group), group[pairs].T
     a, b, weight = a[a != b], b[a != b], weight[a != b]
     while len(a):
         n_groups = len(size)
@@ -149,6 +167,14 @@ def is_oriented_manifold(surface: Mesh) -> bool:
     """Whether neighbours of a surface with at most two faces at an edge run alike, and no point has several fans."""
     _, runs_alike = _pairs(surface.F, surface.n_vertices)
     return not (runs_alike.any() or pinched_vertices(surface.F, np.zeros(surface.n_vertices, bool)).any())
+
+
+def doubtful_points(surface: Mesh) -> IntArray:
+    """Points (k,) at edges along which neighbours run alike, or fold back by more than 120 degrees."""
+    pairs, runs_alike = _pairs(surface.F, surface.n_vertices)
+    faces = pairs[runs_alike | (_folds(surface.V, surface.F, pairs, runs_alike) > _FOLDED_BACK)]
+    common = (surface.F[faces[:, 0], :, None] == surface.F[faces[:, 1], None]).any(axis=2)
+    return np.unique(surface.F[faces[:, 0]][common])
 
 
 def two_sided_cover(surface: Mesh) -> Mesh:

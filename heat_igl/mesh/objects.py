@@ -212,7 +212,7 @@ def one_sided(mesh: MeshLike, what: str) -> Mesh:
     if isinstance(found, PointCloud) and found.cover is not None:
         raise MeshError(
             f"the triangles between the points are no oriented manifold: {what} one, and in places the points do not "
-            "tell on which side of the surface they are; reconstruct a mesh from them, or leave out thin parts"
+            "tell on which side of the surface they are: pass PointCloud(P, normals), or a mesh"
         )
     return surface
 

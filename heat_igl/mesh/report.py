@@ -113,6 +113,32 @@ class MeshReport:
         return "\n".join(f"{name:{width}}  {value}" for name, value in rows)
 
 
+@dataclass(frozen=True)
+class CloudReport(MeshReport):
+    """What the points of a `PointCloud` tell of the surface, as `PointCloud.report` returns it.
+
+    The counts, defects and sizes are those of `PointCloud.triangles`; `unreferenced_vertices` are the points left out,
+    outliers that belong to no triangle.
+
+    Attributes
+    ----------
+    boundary_points : (k,) int64
+        Points at a border of the triangles: of the surface, of a hole, or of a part that was not scanned.
+    doubtful_points : (k,) int64
+        Points at which the triangles may join sheets that are apart: at an edge of two triangles that contradict
+        each other's orientation or fold back, with less than 60 degrees between them.
+    n_copies : int
+        Points that are copies of earlier ones.
+    noise : float
+        Root mean square of how far points were moved to smooth them, in the unit of the points; 0 if they were not.
+    """
+
+    boundary_points: IntArray
+    doubtful_points: IntArray
+    n_copies: int
+    noise: float
+
+
 def _shown(value: object) -> str:
     if isinstance(value, np.ndarray):
         head = ", ".join(str(row.tolist()) for row in value[:5])
