@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
+import scipy.sparse
 
 import heat_igl
-from heat_igl import Mesh, MeshError, PointCloud
+from heat_igl import Mesh, MeshError, PointCloud, cli
 from heat_igl.io import write_point_cloud
 
 needs_nibabel = pytest.mark.skipif(importlib.util.find_spec("nibabel") is None, reason="needs nibabel")
@@ -107,11 +109,56 @@ def test_gifti_without_a_surface_lists_its_arrays(tmp_path: Path, mesh: Mesh) ->
 
     shape = nibabel.gifti.GiftiDataArray(np.zeros(3, np.float32), "NIFTI_INTENT_SHAPE")
     nibabel.GiftiImage(darrays=[shape]).to_filename(tmp_path / "a.shape.gii")
-    with pytest.raises(MeshError, match=r"holds no surface, .* its arrays are SHAPE"):
+    with pytest.raises(MeshError, match=r"holds no surface, .* its arrays are shape"):
         heat_igl.read_mesh(tmp_path / "a.shape.gii")
     with pytest.raises(MeshError, match=r"GIFTI holds one number per vertex, and normal has several"):
         heat_igl.write_mesh(tmp_path / "b.gii", mesh, normal=mesh.V)
     assert not (tmp_path / "b.gii").exists()
+
+
+@needs_nibabel
+def test_maps_without_a_surface_are_read_and_matrices_take_them(
+    tmp_path: Path, mesh: Mesh, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import nibabel
+    from nibabel import cifti2
+
+    monkeypatch.chdir(tmp_path)
+    n = mesh.n_vertices
+    inside, parcel = mesh.V[:, 2] > mesh.V[:, 2].min(), (mesh.V[:, 0] > mesh.V[:, 0].mean()).astype(float)
+    models = cifti2.BrainModelAxis.from_mask(inside, "cortex_left") + cifti2.BrainModelAxis.from_mask(
+        np.ones(n, bool), "cortex_right"
+    )
+    names = cifti2.LabelAxis(["halves"], {i: (str(i), (1, 1, 1, 1)) for i in range(2)})
+    values = np.concatenate([parcel[inside], 1 - parcel])[None].astype(np.float32)
+    nibabel.Cifti2Image(values, header=(names, models)).to_filename("halves.dlabel.nii")
+    maps = heat_igl.read_attributes("halves.dlabel.nii")
+    np.testing.assert_array_equal(maps["cortex_left halves"], np.where(inside, parcel, np.nan))
+    np.testing.assert_array_equal(maps["cortex_right halves"], 1 - parcel)
+    shape = nibabel.gifti.GiftiDataArray(inside.astype(np.float32), "NIFTI_INTENT_SHAPE")
+    nibabel.GiftiImage(darrays=[shape]).to_filename("inside.shape.gii")
+    heat_igl.write_mesh("lh.ply", mesh)
+
+    pytest.importorskip("typer")
+    assert cli.run(["matrix", "lh.ply", "--parcels=halves.dlabel.nii", "--output=a.csv"]) == 1
+    assert "name a map, as in halves.dlabel.nii::NAME (it has cortex_left halves" in capsys.readouterr().err
+    options = ["--parcels=halves.dlabel.nii::cortex_left", "--region=inside.shape.gii", "--output=a.csv"]
+    assert cli.run(["matrix", "lh.ply", *options]) == 0
+    labels = np.where(inside, parcel, -1).astype(int)
+    expected = heat_igl.parcel_distances(mesh, labels, region=inside)
+    np.testing.assert_allclose(np.loadtxt("a.csv", delimiter=","), expected, rtol=1e-8)
+    assert cli.run(["matrix", "lh.ply", "--radius=0.7", "--output=a.npz"]) == 0
+    assert abs(scipy.sparse.load_npz("a.npz") - heat_igl.distances_within(mesh, 0.7)).nnz == 0
+    for name, load in (("b.npy", np.load), ("b.mat", lambda path: scipy.io.loadmat(path)["distance"])):
+        assert cli.run(["matrix", "lh.ply", "--normalize", "--dtype=float64", f"--output={name}"]) == 0
+        assert f"{n} by {n} distances: about" in capsys.readouterr().err
+        rows = heat_igl.GeodesicSolver(mesh, tolerance=0).distances(range(n)) / np.sqrt(mesh.measures.sum())
+        np.testing.assert_array_equal(load(name), rows)
+    assert cli.run(["matrix", "lh.ply", "--radius=1", "--parcels=x", "--output=c.npz"]) == 1
+    assert not Path("c.npz").exists()
+    Path("cut.nii").write_bytes(b"cut")
+    with pytest.raises(MeshError, match=r"cut.nii: nibabel finds no maps here"):
+        heat_igl.read_attributes("cut.nii")
 
 
 # --- point clouds -----------------------------------------------------------------------------------------------------

@@ -10,9 +10,10 @@ from heat_igl.applications.activation import activation_times
 from heat_igl.applications.edge_search import EdgePath, EdgeSearch
 from heat_igl.applications.matches import geodesic_errors
 from heat_igl.applications.particles import particle_length, reconstruct, skeleton, zones_of_influence
-from heat_igl.applications.surface_maps import parcel_distances, smooth
+from heat_igl.applications.surface_maps import Statistic, parcel_distances, smooth
 
 __all__ = [
+    "Statistic",
     "EdgePath",
     "EdgeSearch",
     "activation_times",

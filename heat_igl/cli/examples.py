@@ -13,6 +13,11 @@ EXAMPLES = {
         "distance bunny.obj --at 0.3,0.1,0 --method exact --json -",
         "distance scan.xyz --source 1234 --output distance.ply --picture distance.png",
     ),
+    "matrix": (
+        "matrix lh.midthickness --radius 20 --region cortex.npy --output within.npz",
+        "matrix lh.gii --parcels atlas.dlabel.nii::cortex_left --output parcels.csv",
+        "matrix bunny.obj --normalize --dtype float16 --output all.npy",
+    ),
     "isolines": (
         "isolines bunny.obj --source 1234 --spacing 0.05 --output lines.obj",
         "isolines bunny.obj --source 1234 --spacing 0.05 --output lines.svg",

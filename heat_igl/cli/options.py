@@ -11,8 +11,8 @@ import typer
 
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.geodesic import DistanceMethod
-from heat_igl.io import read_attributes
-from heat_igl.typing import BoolArray
+from heat_igl.io import MAP_SUFFIXES, read_attributes
+from heat_igl.typing import AnyArray, BoolArray
 
 __all__ = [
     "JsonOption",
@@ -26,6 +26,7 @@ __all__ = [
     "position",
     "positive",
     "region_mask",
+    "values_of",
 ]
 
 MeshArgument = Annotated[
@@ -40,8 +41,8 @@ PointsOption = Annotated[bool, typer.Option("--points", help="The file holds poi
 RegionOption = Annotated[
     str | None,
     typer.Option(
-        metavar="NPY|NAME",
-        help="What paths may enter, where this is not 0: an NPY file for vertices or faces, or a vertex attribute.",
+        metavar="FILE|NAME",
+        help="What paths may enter, where this is not 0: an NPY, GIFTI or CIFTI file, or a vertex attribute.",
     ),
 ]
 JsonOption = Annotated[
@@ -92,19 +93,31 @@ MethodOption = Annotated[
 ToleranceOption = Annotated[float, typer.Option(help="Largest error over the distance, of windows; 0 is exact.")]
 
 
-def region_mask(mesh: Path, region: str) -> BoolArray:
-    """The mask that `RegionOption` names: of an NPY file, or of a vertex attribute in the file of the mesh."""
-    if Path(region).suffix == ".npy":
+def values_of(mesh: Path, option: str, text: str) -> AnyArray:
+    """Values for vertices that an option names, in an NPY file, a map file or an attribute of the mesh.
+
+    A map of a GIFTI or CIFTI file is named by the beginning of its name, as in ``FILE::cortex_left``.
+    """
+    file, _, name = text.partition("::")
+    suffix = Path(file).suffix.lower()
+    if suffix == ".npy":
         try:
-            values = np.load(region, allow_pickle=False)
+            values = np.load(file, allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:
-            raise MeshError(f"--region {region}: {error or 'no NPY file'}") from None
+            raise MeshError(f"{option} {text}: {error or 'no NPY file'}") from None
     else:
-        attributes = read_attributes(mesh)
-        if region not in attributes:
-            known = ", ".join(attributes) or "none"
-            raise MeshError(f"--region {region}: no NPY file, and no vertex attribute of {mesh} (it has {known})")
-        values = attributes[region]
+        is_file = suffix in MAP_SUFFIXES
+        maps = read_attributes(file if is_file else mesh)
+        found = [each for each in maps if (each.startswith(name) if is_file else each == text)]
+        if len(found) != 1:
+            where = f"name a map, as in {file}::NAME" if is_file else f"no NPY file, and no vertex attribute of {mesh}"
+            raise MeshError(f"{option} {text}: {where} (it has {', '.join(maps) or 'none'})")
+        values = maps[found[0]]
     if values.dtype.kind not in "biuf":
-        raise MeshError(f"--region {region} holds {values.dtype}: numbers or bools are expected")
-    return np.asarray(np.nan_to_num(values) != 0)
+        raise MeshError(f"{option} {text} holds {values.dtype}: numbers or bools are expected")
+    return np.asarray(values)
+
+
+def region_mask(mesh: Path, region: str) -> BoolArray:
+    """The mask that `RegionOption` names: where its values are not 0."""
+    return np.asarray(np.nan_to_num(values_of(mesh, "--region", region)) != 0)

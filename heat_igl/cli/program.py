@@ -36,6 +36,7 @@ _MODULES = {
     "info": "comparison",
     "validate": "comparison",
     "distance": "distances",
+    "matrix": "matrices",
     "isolines": "distances",
     "path": "paths",
     "trace": "paths",

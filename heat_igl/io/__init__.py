@@ -1,6 +1,7 @@
 """Files: reading and writing meshes with vertex attributes and point clouds, and writing curves."""
 
 from heat_igl.io.atomic import complete_file
+from heat_igl.io.by_nibabel import MAP_SUFFIXES
 from heat_igl.io.curves import CURVE_SUFFIXES, is_flat, write_curves, write_svg
 from heat_igl.io.files import MESH_SUFFIXES, read_attributes, read_mesh, read_polygon_mesh, write_mesh
 from heat_igl.io.point_clouds import (
@@ -14,6 +15,7 @@ from heat_igl.io.polylines import Polyline, read_polylines
 
 __all__ = [
     "CURVE_SUFFIXES",
+    "MAP_SUFFIXES",
     "MESH_SUFFIXES",
     "POINT_CLOUD_SUFFIXES",
     "Polyline",

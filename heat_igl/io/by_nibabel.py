@@ -1,6 +1,6 @@
 """Surfaces of neuroimaging, by nibabel (extra ``io``): GIFTI (``lh.pial.surf.gii``) and FreeSurfer's (``lh.white``).
 
-Both hold triangles in single precision.
+Both hold triangles in single precision. Maps on surfaces come from GIFTI (``lh.label.gii``) and CIFTI (``dlabel.nii``).
 """
 
 from __future__ import annotations
@@ -17,10 +17,14 @@ from heat_igl.io.packed import form_suffix
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray
 
-__all__ = ["FREESURFER_SUFFIXES", "read", "write"]
+__all__ = ["FREESURFER_SUFFIXES", "MAP_SUFFIXES", "read", "read_maps", "write"]
 
 # FreeSurfer's files have no extension; these names of surfaces stand in its place.
 FREESURFER_SUFFIXES = (".white", ".pial", ".inflated", ".sphere", ".smoothwm", ".midthickness")
+
+# Files that hold maps.
+MAP_SUFFIXES = (".gii", ".nii")
+_CORTEX = "CIFTI_STRUCTURE_"
 
 
 def _nibabel(purpose: str) -> Any:
@@ -40,7 +44,13 @@ def read(path: Path, data: bytes) -> Contents:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             if form_suffix(path) == ".gii":
-                positions, triangles, attributes = _gifti(path, nibabel, data)
+                attributes = _gifti(nibabel, data)
+                positions, triangles = (attributes.pop(name, None) for name in ("POINTSET", "TRIANGLE"))
+                if positions is None or triangles is None:
+                    raise MeshError(
+                        f"{path}: the file holds no surface, which needs coordinates (POINTSET) and faces (TRIANGLE): "
+                        f"its arrays are {', '.join(attributes) or 'none'}"
+                    )
             else:
                 # Without the centre of the volume, which other programs leave out, too.
                 positions, triangles = nibabel.freesurfer.read_geometry(str(path))
@@ -57,24 +67,41 @@ def read(path: Path, data: bytes) -> Contents:
     return Contents(V, cells, {name: values for name, values in attributes.items() if len(values) == len(V)})
 
 
-def _gifti(path: Path, nibabel: Any, data: bytes) -> tuple[Any, Any, dict[str, AnyArray]]:
-    """The first coordinates, the first triangles, and the other arrays by name."""
-    image = nibabel.GiftiImage.from_bytes(data)
-    parts: dict[str, Any] = {}
-    others: dict[str, AnyArray] = {}
-    for k, each in enumerate(image.darrays):
+def _gifti(nibabel: Any, data: bytes) -> dict[str, AnyArray]:
+    """The arrays by name, or by what they are meant for: the first coordinates are POINTSET, triangles TRIANGLE."""
+    found: dict[str, AnyArray] = {}
+    for k, each in enumerate(nibabel.GiftiImage.from_bytes(data).darrays):
         intent = str(nibabel.nifti1.intent_codes.niistring[each.intent]).removeprefix("NIFTI_INTENT_")
         if intent in ("POINTSET", "TRIANGLE"):
-            parts.setdefault(intent, each.data)
+            found.setdefault(intent, each.data)
         else:
             name = each.meta.get("Name") or intent.lower()
-            others[name if name not in others else f"{name}_{k}"] = np.asarray(each.data)
-    if len(parts) < 2:
-        raise MeshError(
-            f"{path}: the file holds no surface, which needs coordinates (POINTSET) and faces (TRIANGLE): its arrays "
-            f"are {', '.join(map(str.upper, [*parts, *others])) or 'none'}"
-        )
-    return parts["POINTSET"], parts["TRIANGLE"], others
+            found[name if name not in found else f"{name}_{k}"] = np.asarray(each.data)
+    return found
+
+
+def read_maps(path: Path, data: bytes) -> dict[str, AnyArray]:
+    """The maps (n,) of a GIFTI file, with a surface or without, or of a CIFTI file of labels or scalars.
+
+    A CIFTI file has a map for each surface, "cortex_left NAME", with NaN at vertices that it leaves out.
+    """
+    nibabel = _nibabel("reading")
+    try:
+        if form_suffix(path) == ".gii":
+            found = _gifti(nibabel, data)
+            return {name: values for name, values in found.items() if name not in ("POINTSET", "TRIANGLE")}
+        image = nibabel.Cifti2Image.from_bytes(data)
+        names, models = (image.header.get_axis(k) for k in range(2))
+        found, rows = {}, np.asarray(image.get_fdata())
+        for structure, columns, model in models.iter_structures():
+            n = models.nvertices.get(structure)
+            for name, row in zip(names.name, rows, strict=True) if n else ():
+                values = np.full(n, np.nan)
+                values[model.vertex] = row[columns]
+                found[f"{structure.removeprefix(_CORTEX).lower()} {name}"] = values
+        return found
+    except Exception as error:  # as for surfaces
+        raise MeshError(f"{path}: nibabel finds no maps here ({error}): it is damaged, or another file") from error
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:

@@ -160,12 +160,13 @@ def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
 
 
 def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
-    """Read the vertex attributes of a PLY, VTU or GIFTI file.
+    """Read the vertex attributes of a PLY, VTU or GIFTI file, or the maps of a GIFTI or CIFTI file without a surface.
 
     Parameters
     ----------
     path : path-like
-        A file that holds a valid mesh.
+        A file that holds a valid mesh; or labels, scalars or shapes (.gii, .nii). In CIFTI files the maps of each
+        surface are called "cortex_left NAME", and are NaN at vertices that the file leaves out.
 
     Returns
     -------
@@ -185,7 +186,9 @@ def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
     >>> heat_igl.read_attributes("square.ply")["height"].tolist()
     [0.0, 0.0, 0.0, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0]
     """
-    path = _checked(path)
+    path = checked_path(path, (*MESH_SUFFIXES, *by_nibabel.MAP_SUFFIXES), (*_PACKED, *by_nibabel.MAP_SUFFIXES))
+    if form_suffix(path) in by_nibabel.MAP_SUFFIXES:
+        return by_nibabel.read_maps(path, file_bytes(path))
     if not _FORMATS[form_suffix(path)].attributes:
         raise MeshError(f"{path}: this format holds no vertex attributes; {_those_with('attributes')} do")
     path, contents = _load(path)
