@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.paths.surfaces import Surface
+from cython.cimports.heat_igl.kernels.paths.strips import Surface
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.libc.math import INFINITY, sqrt
 

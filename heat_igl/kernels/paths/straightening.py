@@ -1,32 +1,50 @@
-"""The strip of a path, led past vertices the other way until the shortest path in it is locally shortest.
+"""Paths straightened within their class: in the strip, past bends, and past vertices that may be passed on both sides.
 
-If the path bends at a vertex although another way around it has an angle of less than pi, the strip is led that way,
-which makes the path shorter (Xin and Wang 2007); it is repeated until no such bend is left. At most vertices the other
-way is the other side.
+A funnel finds the shortest path in a strip. If the path bends at a vertex although another way around it has an angle
+of less than pi, the strip is led that way, which makes the path shorter (Xin and Wang 2007); this is repeated until no
+such bend is left. At vertices with less than 2 pi both ways can be locally shortest, and the other one is tried.
 """
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.paths.funnels import Layout, weighted
-from cython.cimports.heat_igl.kernels.paths.straightening import NEARLY_STRAIGHT
-from cython.cimports.heat_igl.kernels.paths.strips import Detour, Sides, Strip
-from cython.cimports.heat_igl.kernels.paths.surfaces import Place, at_corner, corner_of, moved
-from cython.cimports.libc.math import INFINITY, M_PI, atan2, fabs
+from cython.cimports.heat_igl.kernels.paths.straightening import (
+    GAIN,
+    MARGIN_OF_TURN,
+    MOST_CHOICES,
+    MOST_TRIED,
+    NEARLY_STRAIGHT,
+    Choice,
+)
+from cython.cimports.heat_igl.kernels.paths.strips import (
+    Detour,
+    Layout,
+    Place,
+    Sides,
+    Strip,
+    Surface,
+    at_corner,
+    corner_of,
+    moved,
+    vertex_at,
+    weighted,
+)
+from cython.cimports.libc.math import INFINITY, M_PI, acos, atan2, cos, fabs, sqrt
 
-__all__ = ["Course"]
+__all__ = ["Course", "Passing", "Saved"]
 
 _SEGMENT = np.dtype([("start", "f8", 3), ("end", "f8", 3), ("face", "i4")], align=True)
+_CHOICE = np.dtype([("saved", "f8"), ("vertex", "i4"), ("first", "i4"), ("last", "i4")], align=True)
 
 
 @cython.final
 @cython.cclass
 class Course:
-    """A path on its way: the strip from the start, and the segments of all paths so far.
+    """A path on its way, and the segments of all paths so far.
 
-    It starts in `face`: at `vertex`, or at `start` if that is -1.
+    It starts at `start` in `face`, at `vertex` if that is not -1, and ends at `end` in the last face of the strip.
     """
 
-    def __init__(self, s, n_corners):
+    def __init__(self, s: Surface, n_corners):
         self.s = s
         self.strip, self.straighter, self.detour, self.layout = Strip(), Strip(), Detour(n_corners), Layout()
         self.segment = np.empty(64, _SEGMENT)
@@ -39,10 +57,10 @@ class Course:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def begin(self, face: cython.int, vertex: cython.int, start: cython.pointer[cython.const[Place]]) -> cython.void:
+    def begin(self, face: cython.int, start: Place) -> cython.void:
         """Begin a strip."""
-        self.face, self.vertex, self.start = face, vertex, start[0]
-        self.strip.count = 0
+        self.face, self.start, self.strip.count = face, start, 0
+        self.vertex = vertex_at(self.s, face, cython.address(start))
 
     @cython.cfunc
     @cython.nogil
@@ -54,46 +72,27 @@ class Course:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def turn(self, v: cython.int, f: cython.int, goal: cython.int) -> cython.int:
-        """Extend a strip that ends in face f at vertex v to face `goal`, the shorter way round.
-
-        0 if the faces around v do not lead there.
-        """
+    def turn(self, v: cython.int, goal: cython.int) -> cython.bint:
+        """Lead the strip, which ends at vertex v, around it to face `goal`, the shorter way; False if there is none."""
+        f: cython.int = self.last_face()
         if f == goal:
-            return 1
+            return True
         nothing: Sides
         nothing.this = nothing.other = 0.0
         h: cython.int = 3 * f + (corner_of(self.s, f, v) + 1) % 3
         count: cython.int = self.detour.find(self.s, v, h, nothing, goal, -1, nothing, INFINITY)
-        i: cython.int
-        for i in range(count):
-            self.strip.push(self.detour.way[i].leave, self.detour.way[i].enter)
+        self.strip.extend(self.detour.way, 0, count)
         return count >= 0
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def straighten(self, end_vertex: cython.int) -> cython.double:
-        """Append the segments of a locally shortest path through the strip to a vertex; returns the length."""
-        end: Place
-        length: cython.double = self.settle(end_vertex, cython.address(end))
-        self.emit(cython.address(end))
-        return length
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
-    def settle(self, end_vertex: cython.int, end: cython.pointer[Place]) -> cython.double:
-        """Lead the strip until the shortest path in it is locally shortest; returns the length.
-
-        It ends at `end_vertex`, or, if that is -1, at the place `end` of the last face. `end` moves with the end of the
-        strip.
-        """
+    def settle(self) -> cython.double:
+        """Lead the strip until the shortest path in it is locally shortest; returns the length."""
         shortest: cython.double = INFINITY
         failures: cython.int = 0
         while True:
-            self.lay_out(end_vertex, end)
-            length: cython.double = self.layout.length()
+            length: cython.double = self.lay_out()
             # Rounding can make two ways around a vertex look shorter than one another.
             failures = 0 if length < shortest * (1.0 - 1e-13) else failures + 1
             shortest = min(shortest, length)
@@ -104,12 +103,13 @@ class Course:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def lay_out(self, end_vertex: cython.int, end: cython.pointer[Place]) -> cython.int:
-        """Find the shortest path in the strip as it is, with the end of `settle`."""
-        self._trim(end_vertex, end)
+    def lay_out(self) -> cython.double:
+        """Find the shortest path in the strip as it is; returns the length."""
+        self._trim()
         self.layout.lay_out(self.s, self.face, cython.address(self.start), self.strip)
+        end = cython.address(self.end)
         self.layout.pull_tight(weighted(end, self.layout.last.x), weighted(end, self.layout.last.y))
-        return 0
+        return self.layout.length()
 
     @cython.cfunc
     @cython.nogil
@@ -120,7 +120,6 @@ class Course:
         copied: cython.int = 0
         has_changed: cython.bint = False
         i: cython.int
-        j: cython.int
         for i in range(1, self.layout.n_bends - 1):
             bend = cython.address(self.layout.bend[i])
             # Two bends repaired at once must not share a face.
@@ -129,18 +128,13 @@ class Course:
             count: cython.int = self._shorter_way(i)
             if count < 0:
                 continue
-            for j in range(copied, bend.first):
-                self.straighter.push(self.strip.crossing[j].leave, self.strip.crossing[j].enter)
-            for j in range(count):
-                self.straighter.push(self.detour.way[j].leave, self.detour.way[j].enter)
+            self.straighter.extend(self.strip.crossing, copied, bend.first)
+            self.straighter.extend(self.detour.way, 0, count)
             copied, has_changed = bend.last + 1, True
         if not has_changed:
             return 0
-        for j in range(copied, self.strip.count):
-            self.straighter.push(self.strip.crossing[j].leave, self.strip.crossing[j].enter)
-        self.strip.count = 0
-        for j in range(self.straighter.count):
-            self.strip.push(self.straighter.crossing[j].leave, self.straighter.crossing[j].enter)
+        self.straighter.extend(self.strip.crossing, copied, self.strip.count)
+        self.strip.copy(self.straighter)
         return 1
 
     @cython.cfunc
@@ -194,11 +188,12 @@ class Course:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def _trim(self, end_vertex: cython.int, end: cython.pointer[Place]) -> cython.void:
+    def _trim(self) -> cython.void:
         """Drop crossings of edges on which the path starts or ends: rounding would put it on either side."""
         h: cython.int
         g: cython.int
         n_dropped: cython.int = 0
+        end_vertex: cython.int = vertex_at(self.s, self.last_face(), cython.address(self.end))
         while n_dropped < self.strip.count:
             h, g = self.strip.crossing[n_dropped].leave, self.strip.crossing[n_dropped].enter
             if self.vertex >= 0:
@@ -216,20 +211,20 @@ class Course:
             if end_vertex >= 0:
                 if self.s.triangle[g // 3].vertex[g % 3] == end_vertex:
                     break
-            elif end.c[g % 3] != 0.0:
+            elif self.end.c[g % 3] != 0.0:
                 break
             else:
-                end[0] = moved(self.s, g, h, end)
+                self.end = moved(self.s, g, h, cython.address(self.end))
             self.strip.count -= 1
         if self.vertex >= 0:
             self.start = at_corner(corner_of(self.s, self.face, self.vertex))
         if end_vertex >= 0:
-            end[0] = at_corner(corner_of(self.s, self.last_face(), end_vertex))
+            self.end = at_corner(corner_of(self.s, self.last_face(), end_vertex))
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(-1, check=False)
-    def emit(self, end: cython.pointer[cython.const[Place]]) -> cython.int:
+    def emit(self) -> cython.int:
         """Append the segments of the path through the strip, without those of no length."""
         k: cython.int = self.strip.count
         if self.n_segments + k + 1 > self.segment.shape[0]:
@@ -245,7 +240,7 @@ class Course:
         n_before: cython.int = self.n_segments
         for j in range(k + 1):
             if j == k:
-                y = end[0]
+                y = self.end
             else:
                 while self.layout.bend[i].last < j:
                     i += 1
@@ -274,6 +269,170 @@ class Course:
         x.c[corner_of(self.s, f, gate.vertex[0])] = share
         x.c[corner_of(self.s, f, gate.vertex[1])] = 1.0 - share
         return x
+
+
+@cython.final
+@cython.cclass
+class Saved:
+    """A copy of a course, to return to."""
+
+    def __init__(self):
+        self.strip = Strip()
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def save(self, course: Course) -> cython.int:
+        """Save a course as it is now."""
+        self.face, self.vertex, self.start, self.end = course.face, course.vertex, course.start, course.end
+        return self.strip.copy(course.strip)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def restore(self, course: Course) -> cython.int:
+        """Make a course equal to the saved one."""
+        course.face, course.vertex, course.start, course.end = self.face, self.vertex, self.start, self.end
+        return course.strip.copy(self.strip)
+
+
+@cython.final
+@cython.cclass
+class Passing:
+    """The vertices that the path of a course may pass on the other side, the most promising first.
+
+    `half_turn` (n,) is the cosine of half the sum of the angles at each vertex, -1 where one side only is shortest.
+    """
+
+    def __init__(self, course: Course, half_turn):
+        self.course, self.half_turn = course, half_turn
+        self.kept, self.choice = Saved(), np.empty(MOST_CHOICES, _CHOICE)
+        self.tried = np.empty(MOST_TRIED, np.int32)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def improve(self, length: cython.double) -> cython.double:
+        """Lead a settled path past vertices on the other side while that makes it shorter; returns the length."""
+        i: cython.int
+        self.n_tried = 0
+        is_better: cython.bint = True
+        while is_better and self.propose() > 0:
+            is_better = False
+            for i in range(self.count):
+                if not self.lead(i):
+                    continue
+                trial: cython.double = self.course.settle()
+                if trial < length * (1.0 - GAIN):
+                    length = trial
+                    is_better = True
+                    break
+            if not is_better:
+                self.kept.restore(self.course)
+                self.course.settle()
+        return length
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def propose(self) -> cython.int:
+        """Keep the strip of a straightened path, and note the vertices not tried before; returns their number.
+
+        Laid flat, a path around one vertex is shorter on the other side if it spans more than half of the angles there.
+        """
+        self.kept.save(self.course)
+        self.count = 0
+        i: cython.int
+        j: cython.int
+        side: cython.int
+        for i in range(1, self.course.layout.n_bends):
+            p = cython.address(self.course.layout.bend[i - 1])
+            q = cython.address(self.course.layout.bend[i])
+            squared: cython.double = (q.x - p.x) * (q.x - p.x) + (q.y - p.y) * (q.y - p.y)
+            for j in range(p.last + 1, q.first):
+                gate = cython.address(self.course.layout.gate[j])
+                for side in range(2):
+                    half: cython.double = self.half_turn[gate.vertex[side]]
+                    if half <= -1.0:
+                        continue
+                    if j > p.last + 1 and self.course.layout.gate[j - 1].vertex[side] == gate.vertex[side]:
+                        continue
+                    px: cython.double = p.x - gate.x[side]
+                    py: cython.double = p.y - gate.y[side]
+                    qx: cython.double = q.x - gate.x[side]
+                    qy: cython.double = q.y - gate.y[side]
+                    product: cython.double = sqrt((px * px + py * py) * (qx * qx + qy * qy))
+                    spanned: cython.double = px * qx + py * qy
+                    if spanned < (half + MARGIN_OF_TURN) * product:
+                        # The law of cosines, for the angles on both sides.
+                        turn: cython.double = 2.0 * acos(half) - acos(max(spanned / product, -1.0))
+                        self.note(j, side, 2.0 * (product * cos(turn) - spanned) / squared)
+        return self.count
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def note(self, j: cython.int, side: cython.int, saved: cython.double) -> cython.int:
+        """Insert the vertex at a side of crossing j into the sorted choices."""
+        v: cython.int = self.course.layout.gate[j].vertex[side]
+        if not saved > -self.largest_loss or self.is_tried(v):
+            return 0
+        if self.count == MOST_CHOICES:
+            if not saved > self.choice[self.count - 1].saved:
+                return 0
+            self.count -= 1
+        i: cython.int = self.count
+        while i > 0 and self.choice[i - 1].saved < saved:
+            self.choice[i] = self.choice[i - 1]
+            i -= 1
+        self.count += 1
+        first: cython.int = j
+        last: cython.int = j
+        while first > 0 and self.course.layout.gate[first - 1].vertex[side] == v:
+            first -= 1
+        while last + 1 < self.course.strip.count and self.course.layout.gate[last + 1].vertex[side] == v:
+            last += 1
+        choice = cython.address(self.choice[i])
+        choice.saved, choice.vertex, choice.first, choice.last = saved, v, first, last
+        return 1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def is_tried(self, v: cython.int) -> cython.bint:
+        """Whether the other side of v has been tried."""
+        i: cython.int
+        for i in range(self.n_tried):
+            if self.tried[i] == v:
+                return True
+        return False
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def lead(self, i: cython.int) -> cython.int:
+        """Lead the strip that was kept around the vertex of choice i the other way; 0 if no faces are there."""
+        if self.n_tried == MOST_TRIED:
+            return 0
+        choice: Choice = self.choice[i]
+        self.tried[self.n_tried] = choice.vertex
+        self.n_tried += 1
+        h: cython.int = self.kept.strip.crossing[choice.first].leave
+        g: cython.int = self.kept.strip.crossing[choice.last].enter
+        if h // 3 == g // 3:
+            return 0
+        before: Sides
+        after: Sides
+        before.this, before.other, after.this, after.other = INFINITY, 0.0, 0.0, 0.0
+        count: cython.int = self.course.detour.find(self.course.s, choice.vertex, h, before, g // 3, g, after, INFINITY)
+        if count < 0:
+            return 0
+        self.course.face, self.course.start, self.course.end = self.kept.face, self.kept.start, self.kept.end
+        self.course.strip.count = 0
+        self.course.strip.extend(self.kept.strip.crossing, 0, choice.first)
+        self.course.strip.extend(self.course.detour.way, 0, count)
+        self.course.strip.extend(self.kept.strip.crossing, choice.last + 1, self.kept.strip.count)
+        return 1
 
 
 @cython.cfunc

@@ -1,20 +1,42 @@
-"""Strips of faces, and the shortest way around a vertex from one face to another.
+"""Strips of faces: where they turn around a vertex, how they lie in the plane, and the shortest path in them.
 
-A strip is a sequence of crossings. If more than two faces meet at an edge, it crosses the edge from any of them into
-any other, and the ways around the ends of the edge branch, so the shortest one is searched for. Faces need not be
-oriented alike.
+A strip is a sequence of crossings, each from a half-edge of one face to a half-edge of the next on the same edge. If
+more than two faces meet at an edge, a strip crosses it from any of them into any other, and the ways around the ends of
+the edge branch, so the shortest one is searched for. Faces need not be oriented alike. Laid out in the plane a strip is
+a polygon, in which a funnel finds the shortest path (Lee and Preparata 1984).
 """
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.paths.strips import Sides
-from cython.cimports.heat_igl.kernels.paths.surfaces import Surface, corner_of, other_side
+from cython.cimports.heat_igl.kernels.paths.strips import (
+    Corners,
+    Crossing,
+    Place,
+    Sides,
+    corner_of,
+    other_side,
+    weighted,
+)
+from cython.cimports.libc.math import hypot, sqrt
 
-__all__ = ["Detour", "Strip"]
+__all__ = ["Detour", "Layout", "Strip", "Surface"]
 
 _CROSSING = np.dtype([("leave", "i4"), ("enter", "i4")])
 _AROUND = np.dtype([("enter", "i4"), ("leave", "i4"), ("before", "i4")])
 _TIP = np.dtype([("length", "f8"), ("step", "i4")], align=True)
+_GATE = np.dtype([("x", "f8", 2), ("y", "f8", 2), ("vertex", "i4", 2)])
+_BEND = np.dtype([("x", "f8"), ("y", "f8"), ("side", "i4"), ("first", "i4"), ("last", "i4")], align=True)
+
+
+@cython.final
+@cython.cclass
+class Surface:
+    """Views of the arrays of `heat_igl.curves.surface.Surface`."""
+
+    def __init__(self, surface):
+        self.triangle = surface.triangle
+        self.first_side, self.side = surface.first_side, surface.side
+        self.first_corner, self.corner = surface.first_corner, surface.corner
 
 
 @cython.final
@@ -42,6 +64,24 @@ class Strip:
         else:
             self.count -= 1
         return 0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def extend(self, crossing: Crossing[::1], begin: cython.int, end: cython.int) -> cython.int:
+        """Add crossings `begin` to `end`, exclusive."""
+        j: cython.int
+        for j in range(begin, end):
+            self.push(crossing[j].leave, crossing[j].enter)
+        return 0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def copy(self, other: Strip) -> cython.int:
+        """Become a copy of another strip."""
+        self.count = 0
+        return self.extend(other.crossing, 0, other.count)
 
     @cython.cfunc
     @cython.nogil
@@ -198,3 +238,164 @@ class Detour:
             at = self.step[at].before
             self.way[i].leave = self.step[at].leave
         return count
+
+
+@cython.final
+@cython.cclass
+class Layout:
+    """The crossings of a strip in the plane, `gate`, and the corners of the shortest path through them, `bend`.
+
+    Side "left" is the side of the second of a half-edge's ends for the first crossing, and carried along from there.
+    (x, y) is the start of the path.
+    """
+
+    def __init__(self):
+        self.gate, self.bend = np.empty(64, _GATE), np.empty(66, _BEND)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(-1, check=False)
+    def lay_out(
+        self, s: Surface, face: cython.int, start: cython.pointer[cython.const[Place]], strip: Strip
+    ) -> cython.int:
+        """Lay out the strip that begins in a face, for paths from `start` there."""
+        if strip.count > self.gate.shape[0]:
+            with cython.gil:
+                self.gate, self.bend = np.empty(2 * strip.count, _GATE), np.empty(2 * strip.count + 2, _BEND)
+        p: Corners
+        f: cython.int = face
+        first = cython.address(s.triangle[f])
+        a: cython.double = first.length[0]
+        b: cython.double = first.length[1]
+        c: cython.double = first.length[2]
+        half: cython.double = 0.5 * (a + b + c)
+        p.x[0], p.y[0], p.x[1], p.y[1] = 0.0, 0.0, c, 0.0
+        p.x[2] = 0.5 * ((b - a) * (b + a) / c + c)
+        p.y[2] = 2.0 * sqrt(max(half * (half - a) * (half - b) * (half - c), 0.0)) / c
+        self.first = p
+        self.x, self.y = weighted(start, p.x), weighted(start, p.y)
+        entered: cython.int = -1
+        left: cython.int = -1
+        right: cython.int = -1
+        j: cython.int
+        for j in range(strip.count):
+            corner: cython.int = strip.crossing[j].leave % 3
+            if entered < 0:
+                left, right = (corner + 2) % 3, (corner + 1) % 3
+            elif corner == left:
+                left = entered
+            else:
+                right = entered
+            gate = cython.address(self.gate[j])
+            gate.x[0], gate.y[0], gate.x[1], gate.y[1] = p.x[left], p.y[left], p.x[right], p.y[right]
+            here = cython.address(s.triangle[f])
+            gate.vertex[0], gate.vertex[1] = here.vertex[left], here.vertex[right]
+            f, entered = strip.crossing[j].enter // 3, strip.crossing[j].enter % 3
+            left, right = corner_of(s, f, gate.vertex[0]), corner_of(s, f, gate.vertex[1])
+            there = cython.address(s.triangle[f])
+            # The far corner over the crossing, from the right end.
+            x: cython.double = there.along[entered]
+            if right != (entered + 2) % 3:
+                x = 1.0 - x
+            y: cython.double = there.above[entered]
+            ux: cython.double = gate.x[0] - gate.x[1]
+            uy: cython.double = gate.y[0] - gate.y[1]
+            p.x[left], p.y[left], p.x[right], p.y[right] = gate.x[0], gate.y[0], gate.x[1], gate.y[1]
+            p.x[entered], p.y[entered] = gate.x[1] + x * ux + y * uy, gate.y[1] + x * uy - y * ux
+        self.n_gates = strip.count
+        self.last = p
+        return 0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def pull_tight(self, x: cython.double, y: cython.double) -> cython.void:
+        """The shortest path to (x, y): `bend` 0 is the start and the last one the end."""
+        k: cython.int = self.n_gates
+        count: cython.int = 1
+        ax: cython.double = self.x
+        ay: cython.double = self.y
+        # For each side the limit of the apex's view, and the crossing that set it; -1 for none yet.
+        limit_x: cython.double[2]
+        limit_y: cython.double[2]
+        by: cython.int[2]
+        by[0] = by[1] = -1
+        self.bend[0].x, self.bend[0].y = ax, ay
+        self.bend[0].side = self.bend[0].first = self.bend[0].last = -1
+        j: cython.int = 0
+        side: cython.int
+        while j <= k:
+            is_turned: cython.bint = False
+            for side in range(1, -1, -1):
+                px: cython.double = (self.gate[j].x[side] if j < k else x) - ax
+                py: cython.double = (self.gate[j].y[side] if j < k else y) - ay
+                sign: cython.double = 1.0 if side == 0 else -1.0
+                if by[side] >= 0 and sign * (limit_x[side] * py - limit_y[side] * px) > 0.0:
+                    continue  # opens the funnel
+                opposite: cython.int = 1 - side
+                if by[opposite] >= 0 and sign * (limit_x[opposite] * py - limit_y[opposite] * px) < 0.0:
+                    self._bend_at(count, opposite, by[opposite])
+                    ax, ay, j = self.bend[count].x, self.bend[count].y, self.bend[count].last + 1
+                    count += 1
+                    by[0] = by[1] = -1
+                    is_turned = True
+                    break
+                limit_x[side], limit_y[side], by[side] = px, py, j
+            if not is_turned:
+                j += 1
+        end = cython.address(self.bend[count])
+        end.x, end.y, end.side, end.first, end.last = x, y, -1, k, k
+        self.n_bends = count + 1
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def _bend_at(self, count: cython.int, side: cython.int, at: cython.int) -> cython.void:
+        """Make an end of the crossing `at` the next bend."""
+        v: cython.int = self.gate[at].vertex[side]
+        first: cython.int = at
+        last: cython.int = at
+        while first > 0 and self.gate[first - 1].vertex[side] == v:
+            first -= 1
+        while last + 1 < self.n_gates and self.gate[last + 1].vertex[side] == v:
+            last += 1
+        bend = cython.address(self.bend[count])
+        bend.x, bend.y, bend.side = self.gate[at].x[side], self.gate[at].y[side], side
+        # Crossings before the last bend come before it, though this vertex may be in sight already.
+        bend.first, bend.last = max(first, self.bend[count - 1].last), last
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def length(self) -> cython.double:
+        """Length of the shortest path."""
+        total: cython.double = 0.0
+        i: cython.int
+        for i in range(1, self.n_bends):
+            total += hypot(self.bend[i].x - self.bend[i - 1].x, self.bend[i].y - self.bend[i - 1].y)
+        return total
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def share(self, j: cython.int, i: cython.int) -> cython.double:
+        """The share from right end (0) to left end (1) at which the path passes crossing j on the way to bend i."""
+        gate = cython.address(self.gate[j])
+        if self.bend[i].side >= 0 and self.bend[i].first <= j:
+            return 1.0 - self.bend[i].side
+        p = cython.address(self.bend[i - 1])
+        q = cython.address(self.bend[i])
+        ux: cython.double = q.x - p.x
+        uy: cython.double = q.y - p.y
+        to_left: cython.double = ux * (gate.y[0] - p.y) - uy * (gate.x[0] - p.x)
+        to_right: cython.double = ux * (gate.y[1] - p.y) - uy * (gate.x[1] - p.x)
+        share: cython.double = to_right / (to_right - to_left) if to_right != to_left else 0.5
+        # Between the feet of p and q, the only choice left if the line runs along the crossing.
+        ex: cython.double = gate.x[0] - gate.x[1]
+        ey: cython.double = gate.y[0] - gate.y[1]
+        squared: cython.double = ex * ex + ey * ey
+        foot_p: cython.double = ((p.x - gate.x[1]) * ex + (p.y - gate.y[1]) * ey) / squared
+        foot_q: cython.double = ((q.x - gate.x[1]) * ex + (q.y - gate.y[1]) * ey) / squared
+        share = min(max(share, min(foot_p, foot_q)), max(foot_p, foot_q))
+        return min(max(share, 0.0), 1.0)
