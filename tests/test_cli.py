@@ -16,10 +16,14 @@ import pytest
 import typer
 
 import heat_igl
-from heat_igl import cli, drawing, io, shapes
+from heat_igl import MeshError, cli, drawing, io, shapes
 from heat_igl.cli import comparison, demo, distances
 from heat_igl.cli.examples import EXAMPLES
 from heat_igl.cli.program import application
+from heat_igl.io import read_attributes, read_mesh, read_polylines, write_curves, write_mesh
+
+# --- The command line: what it prints, what it leaves behind, and how it fails
+
 
 ENVIRONMENT = {
     **os.environ,
@@ -47,7 +51,7 @@ def assert_one_line(stderr: str, *words: str) -> None:
 
 
 @pytest.fixture
-def sphere(tmp_path: Path) -> Path:
+def ball(tmp_path: Path) -> Path:
     io.write_mesh(tmp_path / "sphere.off", shapes.icosphere(2))
     return tmp_path / "sphere.off"
 
@@ -62,41 +66,41 @@ def two_spheres(tmp_path: Path) -> Path:
     return path
 
 
-def test_distance_writes_what_the_library_returns_and_a_picture(sphere: Path) -> None:
+def test_distance_writes_what_the_library_returns_and_a_picture(ball: Path) -> None:
     done = command(
-        "distance", sphere, "--source", 12, "--source", 40, "--output", "out.ply", "--picture", "out.png",
-        cwd=sphere.parent,
+        "distance", ball, "--source", 12, "--source", 40, "--output", "out.ply", "--picture", "out.png",
+        cwd=ball.parent,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    written = io.read_attributes(sphere.parent / "out.ply")["distance"]
+    written = io.read_attributes(ball.parent / "out.ply")["distance"]
     np.testing.assert_array_equal(written, heat_igl.geodesic_distance(shapes.icosphere(2), [12, 40]))
     assert written[[12, 40]].tolist() == [0, 0]
-    assert (sphere.parent / "out.png").read_bytes().startswith(b"\x89PNG")
+    assert (ball.parent / "out.png").read_bytes().startswith(b"\x89PNG")
     assert f"{written.max():.6g} at vertex {written.argmax()}" in done.stdout
-    assert files(sphere.parent) == {"sphere.off", "out.ply", "out.png"}
+    assert files(ball.parent) == {"sphere.off", "out.ply", "out.png"}
 
 
-def test_distance_from_positions_in_space(sphere: Path) -> None:
-    done = command("distance", sphere, "--source", 12, "--at", "0.3,-2,0.1", "--cutoff", 0.5, "--output", "out.ply",
-                   cwd=sphere.parent)  # fmt: skip
+def test_distance_from_positions_in_space(ball: Path) -> None:
+    done = command("distance", ball, "--source", 12, "--at", "0.3,-2,0.1", "--cutoff", 0.5, "--output", "out.ply",
+                   cwd=ball.parent)  # fmt: skip
     assert done.returncode == 0, done.stderr
     mesh = shapes.icosphere(2)
     points, gap = heat_igl.closest_points(mesh, [0.3, -2, 0.1])
     expected = heat_igl.geodesic_distance(mesh, [12, points], cutoff=0.5)
-    np.testing.assert_array_equal(io.read_attributes(sphere.parent / "out.ply")["distance"], expected)
+    np.testing.assert_array_equal(io.read_attributes(ball.parent / "out.ply")["distance"], expected)
     assert np.isinf(expected).any()
     assert f"{gap[0]:.6g}" in done.stdout
     for arguments, words in ((["--at", "1,2"], "--at 1,2: three numbers"), ([], "no source: name vertices")):
-        refused = command("distance", sphere, *arguments, cwd=sphere.parent)
+        refused = command("distance", ball, *arguments, cwd=ball.parent)
         assert refused.returncode == 1
         assert_one_line(refused.stderr, words)
 
 
 def test_paths_and_traces_are_those_of_the_library(
-    sphere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ball: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(sphere.parent)
+    monkeypatch.chdir(ball.parent)
     mesh = shapes.icosphere(2)
     place = heat_igl.closest_points(mesh, [0.3, 2, 0.1]).points
     expected = {
@@ -105,7 +109,7 @@ def test_paths_and_traces_are_those_of_the_library(
         ("trace", "--from=12", "--direction=1,2,3", "--length=0.7"): heat_igl.trace_geodesic(mesh, 12, [1, 2, 3], 0.7),
     }
     for (name, *arguments), curve in expected.items():
-        assert cli.run([name, str(sphere), *arguments, "--output=curve.obj"]) == 0
+        assert cli.run([name, str(ball), *arguments, "--output=curve.obj"]) == 0
         printed = capsys.readouterr().out
         assert f"{curve.lengths(mesh).sum():.6g}" in printed
         # The position is told how far it is from the surface.
@@ -125,18 +129,18 @@ def test_paths_and_traces_are_those_of_the_library(
     ],
 )
 def test_a_request_without_meaning_names_its_option_and_leaves_no_file(
-    sphere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    ball: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
     arguments: list[str], status: int, words: tuple[str, ...],
 ) -> None:  # fmt: skip
-    monkeypatch.chdir(sphere.parent)
-    assert cli.run([arguments[0], str(sphere), *arguments[1:]]) == status
+    monkeypatch.chdir(ball.parent)
+    assert cli.run([arguments[0], str(ball), *arguments[1:]]) == status
     assert_one_line(capsys.readouterr().err, *words)
-    assert files(sphere.parent) == {"sphere.off"}
+    assert files(ball.parent) == {"sphere.off"}
 
 
 @pytest.mark.parametrize("option", ["--output=/proc/out.ply", "--picture=/proc/out.png"])
-def test_an_output_that_cannot_be_written(sphere: Path, option: str) -> None:
-    done = command("distance", sphere, "--source", 0, option, cwd=sphere.parent)
+def test_an_output_that_cannot_be_written(ball: Path, option: str) -> None:
+    done = command("distance", ball, "--source", 0, option, cwd=ball.parent)
     assert (done.returncode, done.stdout) == (1, "")
     assert_one_line(done.stderr, "/proc/out", "cannot be written")
 
@@ -171,9 +175,9 @@ def test_an_interrupt_ends_the_command_without_a_traceback(tmp_path: Path) -> No
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs a shell with pipes")
-def test_a_closed_pipe_is_no_traceback(sphere: Path) -> None:
+def test_a_closed_pipe_is_no_traceback(ball: Path) -> None:
     with subprocess.Popen(
-        [sys.executable, "-m", "heat_igl", "info", str(sphere)], env=ENVIRONMENT, stdout=-1, stderr=-1, text=True
+        [sys.executable, "-m", "heat_igl", "info", str(ball)], env=ENVIRONMENT, stdout=-1, stderr=-1, text=True
     ) as running:
         assert running.stdout is not None
         running.stdout.close()
@@ -199,28 +203,28 @@ def test_demo_does_the_whole_job(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("method", ["windows", "sweep", "heat"])
 def test_the_method_is_that_of_the_front_door(
-    sphere: Path, capsys: pytest.CaptureFixture[str], method: heat_igl.geodesic.DistanceMethod
+    ball: Path, capsys: pytest.CaptureFixture[str], method: heat_igl.geodesic.DistanceMethod
 ) -> None:
-    output = sphere.with_name("out.ply")
-    assert cli.run(["distance", str(sphere), "--source=3", f"--output={output}", f"--method={method}"]) == 0
-    expected = heat_igl.geodesic_distance(sphere, 3, method=method)
+    output = ball.with_name("out.ply")
+    assert cli.run(["distance", str(ball), "--source=3", f"--output={output}", f"--method={method}"]) == 0
+    expected = heat_igl.geodesic_distance(ball, 3, method=method)
     np.testing.assert_array_equal(io.read_attributes(output)["distance"], expected)
-    engine = heat_igl.geodesic.SolverChoice(method).on(heat_igl.read_mesh(sphere)).plan.engine
+    engine = heat_igl.geodesic.SolverChoice(method).on(heat_igl.read_mesh(ball)).plan.engine
     assert re.search(rf"^plan +{engine}\b", capsys.readouterr().out, re.MULTILINE)
 
 
-def test_options_reach_the_solver(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    output = sphere.with_name("out.ply")
+def test_options_reach_the_solver(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = ball.with_name("out.ply")
     options = {"t_coef": 7.0, "laplacian": "cotan", "boundary": "dirichlet", "magnitude": "damped", "backend": "scipy"}
     arguments = [f"--{name.replace('_', '-')}={value}" for name, value in options.items()]
-    assert cli.run(["distance", str(sphere), "--source", "3", "--output", str(output), *arguments]) == 0
+    assert cli.run(["distance", str(ball), "--source", "3", "--output", str(output), *arguments]) == 0
     solver = heat_igl.HeatMethodSolver(shapes.icosphere(2), **options)
     np.testing.assert_array_equal(io.read_attributes(output)["distance"], solver.distance(3))
     assert f"{solver.t:.6g}" in capsys.readouterr().out
 
 
-def test_a_warning_of_the_package_is_one_line(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.run(["distance", str(sphere), "--source", "3", "--t", "1e-300"]) == 0
+def test_a_warning_of_the_package_is_one_line(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["distance", str(ball), "--source", "3", "--t", "1e-300"]) == 0
     first, *others = capsys.readouterr().err.splitlines()
     assert first.startswith("heat-igl: warning: t = 1e-300 is too small")
     assert all(line.startswith("heat-igl: warning: ") for line in others)
@@ -235,19 +239,19 @@ def test_a_warning_of_the_package_is_one_line(sphere: Path, capsys: pytest.Captu
     ],
 )
 def test_a_bad_option_stops_before_anything_is_solved(
-    sphere: Path,
+    ball: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
     arguments: list[str],
     status: int,
     words: tuple[str, ...],
 ) -> None:
-    monkeypatch.chdir(sphere.parent)
+    monkeypatch.chdir(ball.parent)
     Path("folder.png").mkdir()
     monkeypatch.setattr(distances.SolverChoice, "on", lambda *_: pytest.fail("solved before it checked"))
-    assert cli.run(["distance", str(sphere), "--source", "0", *arguments]) == status
+    assert cli.run(["distance", str(ball), "--source", "0", *arguments]) == status
     assert_one_line(capsys.readouterr().err, *words)
-    assert files(sphere.parent) == {"sphere.off", "folder.png"}
+    assert files(ball.parent) == {"sphere.off", "folder.png"}
 
 
 def test_tetrahedra_go_to_vtu_only(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -265,28 +269,28 @@ def test_tetrahedra_go_to_vtu_only(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_a_failure_while_drawing_leaves_old_files_alone(
-    sphere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ball: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device", "out.png")
 
     monkeypatch.setattr(drawing, "plot", full)
-    output = sphere.with_name("out.ply")
+    output = ball.with_name("out.ply")
     output.write_text("old")
-    picture = sphere.with_name("out.png")
-    assert cli.run(["distance", str(sphere), "--source", "0", f"--output={output}", f"--picture={picture}"]) == 1
+    picture = ball.with_name("out.png")
+    assert cli.run(["distance", str(ball), "--source", "0", f"--output={output}", f"--picture={picture}"]) == 1
     assert_one_line(capsys.readouterr().err, "out.png: No space left on device")
     assert output.read_text() == "old"
-    assert files(sphere.parent) == {"sphere.off", "out.ply"}
+    assert files(ball.parent) == {"sphere.off", "out.ply"}
 
 
-def test_a_fault_of_the_package_is_not_hidden(sphere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_of_the_package_is_not_hidden(ball: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise TypeError("a bug")
 
     monkeypatch.setattr(comparison, "read_mesh_or_cloud", broken)
     with pytest.raises(TypeError, match="a bug"):
-        cli.run(["info", str(sphere)])
+        cli.run(["info", str(ball)])
 
 
 # --- JSON, arrays, help and completion --------------------------------------------------------------------------------
@@ -312,41 +316,45 @@ def test_examples_are_understood(example: str) -> None:
     assert all(value is not None for key, value in context.params.items() if key in ("mesh", "folder", "store"))
 
 
-def test_json_holds_what_the_lines_say(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["distance", str(sphere), "--source=12", "--method=heat", f"--output={sphere.with_name('d.npy')}"]
+def test_json_holds_what_the_lines_say(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = [
+        "distance",
+        str(ball),
+        "--source=12",
+        "--method=heat",
+        f"--output={ball.with_name('d.npy')}",
+    ]
     assert cli.run([*arguments, "--json=-"]) == 0
     found = json.loads(capsys.readouterr().out)
-    distance = heat_igl.HeatMethodSolver(sphere).distance(12)
-    assert np.array_equal(np.load(sphere.with_name("d.npy")), distance)
-    assert found["mesh"] == {"path": str(sphere), "n_vertices": 162, "n_triangles": 320}
+    distance = heat_igl.HeatMethodSolver(ball).distance(12)
+    assert np.array_equal(np.load(ball.with_name("d.npy")), distance)
+    assert found["mesh"] == {"path": str(ball), "n_vertices": 162, "n_triangles": 320}
     assert found["farthest"] == {"distance": distance.max(), "vertex": distance.argmax()}
     assert (found["plan"]["engine"], found["mean"]) == ("heat", distance.mean())
-    assert found["wrote"] == [str(sphere.with_name("d.npy"))]
+    assert found["wrote"] == [str(ball.with_name("d.npy"))]
     assert found["seconds"]["per_distance"] > 0
-    file = sphere.with_name("d.json")
+    file = ball.with_name("d.json")
     assert cli.run([*arguments, f"--json={file}"]) == 0
     assert re.search(r"farthest +\S+ at vertex", capsys.readouterr().out)
     assert json.loads(file.read_text())["farthest"] == found["farthest"]
 
 
-def test_json_of_the_other_commands(sphere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_of_the_other_commands(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def printed(*arguments: str) -> dict[str, Any]:
-        assert cli.run([arguments[0], str(sphere), *arguments[1:], "--json=-"]) == 0
+        assert cli.run([arguments[0], str(ball), *arguments[1:], "--json=-"]) == 0
         return json.loads(capsys.readouterr().out)
 
     report = shapes.icosphere(2).report()
     assert printed("info")["mean_edge"] == report.mean_edge
-    lines = printed("isolines", "--source=0", "--spacing=0.5", f"--output={sphere.with_name('l.obj')}")
+    lines = printed("isolines", "--source=0", "--spacing=0.5", f"--output={ball.with_name('l.obj')}")
     assert (lines["lines"], lines["distances"]) == (6, [0.5, 1.0, 1.5, 2.0, 2.5, 3.0])
     assert lines["farthest"] == printed("distance", "--source=0")["farthest"]["distance"]
-    by_heat = printed(
-        "isolines", "--source=0", "--spacing=0.5", "--method=heat", f"--output={sphere.with_name('l.obj')}"
-    )
-    assert by_heat["farthest"] == heat_igl.HeatMethodSolver(sphere).distance(0).max()
-    path = printed("path", "--from=0", "--to=5", f"--output={sphere.with_name('p.obj')}")
-    assert path["length"] == pytest.approx(heat_igl.geodesic_distance(sphere, 0, method="exact")[5], rel=1e-12)
-    page = printed("view", f"--html={sphere.with_name('v.html')}")
-    assert page["wrote"] == [str(sphere.with_name("v.html"))]
+    by_heat = printed("isolines", "--source=0", "--spacing=0.5", "--method=heat", f"--output={ball.with_name('l.obj')}")
+    assert by_heat["farthest"] == heat_igl.HeatMethodSolver(ball).distance(0).max()
+    path = printed("path", "--from=0", "--to=5", f"--output={ball.with_name('p.obj')}")
+    assert path["length"] == pytest.approx(heat_igl.geodesic_distance(ball, 0, method="exact")[5], rel=1e-12)
+    page = printed("view", f"--html={ball.with_name('v.html')}")
+    assert page["wrote"] == [str(ball.with_name("v.html"))]
     validation = printed("validate", "--methods=heat")
     assert validation["rows"][0]["errors"]["mean"] < 0.05
 
@@ -359,3 +367,114 @@ def test_distances_as_text(two_spheres: Path) -> None:
     vertex, distance = np.array([line.split(",") for line in lines], float).T
     assert np.array_equal(vertex, np.arange(84))
     assert np.array_equal(distance, heat_igl.geodesic_distance(two_spheres, 3))
+
+
+# --- The commands `signed` and `cut`, and the polylines that they read
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A sphere, and a circle around its pole."""
+    monkeypatch.chdir(tmp_path)
+    sphere = shapes.icosphere(3)
+    write_mesh("sphere.ply", sphere)
+    write_curves("circle.obj", sphere, heat_igl.isolines(sphere, -sphere.V[:, 2], -0.6)[0])
+    return tmp_path
+
+
+def test_signed_writes_what_the_library_returns(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["signed", "sphere.ply", "--curves=circle.obj", "--output=out.ply"]
+    assert cli.run([*arguments, "--picture=out.png"]) == 0
+    sphere = read_mesh("sphere.ply")
+    circle = read_polylines("circle.obj")[0]
+    curve = heat_igl.curve_on(sphere, circle.positions, closed=True)
+    phi = heat_igl.SignedHeatSolver(sphere).distance(curve)
+    np.testing.assert_array_equal(read_attributes("out.ply")["distance"], phi)
+    assert (folder / "out.png").stat().st_size > 1000
+    # The cap of the north pole is on the left.
+    np.testing.assert_array_equal(phi < 0, sphere.V[:, 2] > 0.6)
+    assert f"{(phi < 0).sum()} vertices, down to" in capsys.readouterr().out
+
+
+def test_cut_writes_the_pieces(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["cut", "sphere.ply", "--curves=circle.obj", "--output=part.ply", "--split"]) == 0
+    parts = [read_mesh(folder / f"part_{i}.ply") for i in (0, 1)]
+    assert not (folder / "part.ply").exists()
+    assert sum(part.measures.sum() for part in parts) == pytest.approx(read_mesh("sphere.ply").measures.sum())
+    assert all(part.boundary.any() for part in parts)
+    assert "pieces" in capsys.readouterr().out
+    assert cli.run(["cut", "sphere.ply", "--curves=circle.obj", "--output=whole.ply"]) == 0
+    assert read_mesh("whole.ply").n_faces == sum(part.n_faces for part in parts)
+
+
+def test_polylines_are_those_that_were_written(folder: Path) -> None:
+    sphere = read_mesh("sphere.ply")
+    curves = heat_igl.isolines(sphere, sphere.V[:, 2], [0.1, 0.5])
+    path = heat_igl.edge_curve(sphere, [0, int(sphere.edges[sphere.edges[:, 0] == 0][0, 1])])
+    write_curves("lines.obj", sphere, [*curves, path])
+    found = read_polylines(folder / "lines.obj")
+    assert [line.is_closed for line in found] == [True, True, False]
+    for line, curve in zip(found, [curves[0][0], curves[1][0], path], strict=True):
+        expected = curve.positions(sphere)
+        np.testing.assert_array_equal(line.positions, expected[:-1] if line.is_closed else expected)
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("v 0 0 0\nv 1 0 0\n", "holds no curve"),
+        ("v 0 0 0\nl 1 2\n", "line 2: vertex 2 is not one of the 1 in the file"),
+        ("v 0 zero 0\nl 1 1\n", "line 1: 'v 0 zero 0' is no vertex or line"),
+        ("v 0 0 0\nl 1\n", "line 2: a curve needs two vertices or more"),
+    ],
+)
+def test_files_without_curves(tmp_path: Path, text: str, match: str) -> None:
+    (tmp_path / "bad.obj").write_text(text)
+    with pytest.raises(MeshError, match=match):
+        read_polylines(tmp_path / "bad.obj")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["signed", "sphere.ply", "--curves=none.obj"], "none.obj"),
+        (["signed", "sphere.ply", "--curves=sphere.ply"], "holds no curve"),
+        (["signed", "sphere.ply", "--curves=far.obj"], "far.obj, polyline 1: the polyline leaves the surface by"),
+        (["cut", "sphere.ply", "--curves=circle.obj", "--output=cut.png"], "--output cut.png: meshes go to"),
+    ],
+)
+def test_failures_are_one_line(
+    folder: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+) -> None:
+    circle = (folder / "circle.obj").read_text()
+    n = circle.count("v ")
+    (folder / "far.obj").write_text(f"{circle}v 9 0 0\nv 9 1 0\nl {n + 1} {n + 2}\n")
+    before = sorted(folder.iterdir())
+    assert cli.run(arguments) == 1
+    message = capsys.readouterr().err
+    assert message.startswith("heat-igl: ")
+    assert words in message
+    assert message.count("\n") == 1
+    assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.usefixtures("folder")
+def test_commands_for_curves_take_point_clouds(capsys: pytest.CaptureFixture[str]) -> None:
+    """Lines of one command are those that another reads; they lie on the triangles between the points."""
+    cloud = heat_igl.PointCloud(shapes.icosphere(3).V)
+    heat_igl.write_point_cloud("cloud.xyz", cloud)
+    assert cli.run(["isolines", "cloud.xyz", "--source=0", "--spacing=1.5", "--output=lines.obj"]) == 0
+    expected = heat_igl.isolines(cloud, heat_igl.geodesic_distance(cloud, 0), [1.5, 3.0])
+    np.testing.assert_array_equal(
+        np.concatenate([line.positions for line in read_polylines("lines.obj")]),
+        np.concatenate([curve.positions(cloud)[:-1] for level in expected for curve in level]),
+    )
+    assert cli.run(["path", "cloud.xyz", "--from=0", "--to=20", "--output=path.obj"]) == 0
+    assert f"{heat_igl.geodesic_distance(cloud, 0)[20]:.6g}" in capsys.readouterr().out
+    assert cli.run(["trace", "cloud.xyz", "--from=0", "--direction=1,0,0", "--length=1.5", "--output=line.obj"]) == 0
+    assert cli.run(["signed", "cloud.xyz", "--curves=lines.obj", "--output=signed.npy"]) == 0
+    assert (np.load("signed.npy") < 0).any()
+    assert cli.run(["cut", "cloud.xyz", "--curves=circle.obj", "--output=cut.ply"]) == 0
+    assert read_mesh("cut.ply").n_faces > cloud.n_faces
+    assert cli.run(["info", "cloud.xyz"]) == 0
+    assert "cloud.xyz: 642 points, 1280 triangles" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""The drop-in modules: the same calls as those of libigl and potpourri3d, and the same meaning of what they return."""
+"""The drop-in modules: the calls of libigl, potpourri3d, gdist and pygeodesic, and what they return."""
 
 from __future__ import annotations
 
@@ -11,17 +11,22 @@ from typing import Any
 import igl
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import heat_igl
-from heat_igl import Mesh, MeshError, shapes
+from heat_igl import Mesh, MeshError, SourceError, shapes
+from heat_igl.compat import gdist, pygeodesic
 from heat_igl.compat import igl as drop_in
 from heat_igl.compat import potpourri3d as pp3d
+
+# --- The drop-in modules: the same calls as those of libigl and potpourri3d, and the same meaning of what they return
+
 
 needs_potpourri3d = pytest.mark.skipif(importlib.util.find_spec("potpourri3d") is None, reason="needs potpourri3d")
 
 
 @pytest.fixture(scope="module")
-def sphere() -> Mesh:
+def ball() -> Mesh:
     return shapes.icosphere(3)
 
 
@@ -68,30 +73,28 @@ def test_exact_geodesic_agrees_with_libigl(
     assert np.array_equal(found, in_order)
 
 
-def test_heat_geodesics_take_data_in_three_ways(sphere: Mesh) -> None:
-    expected = heat_igl.HeatMethodSolver(sphere, t=0.01).distance([4, 9])
+def test_heat_geodesics_take_data_in_three_ways(ball: Mesh) -> None:
+    expected = heat_igl.HeatMethodSolver(ball, t=0.01).distance([4, 9])
     for arguments, named in (((0.01,), {}), ((), {"t": 0.01})):
         data = drop_in.HeatGeodesicsData()
         data.use_intrinsic_delaunay = True
         if named:
-            drop_in.heat_geodesics_precompute(sphere.V, sphere.F, data=data, **named)
+            drop_in.heat_geodesics_precompute(ball.V, ball.F, data=data, **named)
         else:
-            drop_in.heat_geodesics_precompute(sphere.V, sphere.F, *arguments, data)
+            drop_in.heat_geodesics_precompute(ball.V, ball.F, *arguments, data)
         assert np.array_equal(drop_in.heat_geodesics_solve(data, np.array([4, 9])), expected)
-    assert np.array_equal(drop_in.heat_geodesic(sphere.V, sphere.F, 0.01, np.array([4, 9])), expected)
+    assert np.array_equal(drop_in.heat_geodesic(ball.V, ball.F, 0.01, np.array([4, 9])), expected)
     data = drop_in.HeatGeodesicsData()
-    drop_in.heat_geodesics_precompute(sphere.V, sphere.F, data)
-    assert np.array_equal(
-        drop_in.heat_geodesics_solve(data, [4, 9]), heat_igl.HeatMethodSolver(sphere).distance([4, 9])
-    )
+    drop_in.heat_geodesics_precompute(ball.V, ball.F, data)
+    assert np.array_equal(drop_in.heat_geodesics_solve(data, [4, 9]), heat_igl.HeatMethodSolver(ball).distance([4, 9]))
 
 
-def test_heat_geodesics_are_nearer_to_the_exact_ones_than_libigl_s(sphere: Mesh) -> None:
-    exact = heat_igl.geodesic_distance(sphere, 0, method="exact")
+def test_heat_geodesics_are_nearer_to_the_exact_ones_than_libigl_s(ball: Mesh) -> None:
+    exact = heat_igl.geodesic_distance(ball, 0, method="exact")
     errors = []
     for module in (drop_in, igl):
         data = module.HeatGeodesicsData()
-        module.heat_geodesics_precompute(np.array(sphere.V), np.array(sphere.F), data)
+        module.heat_geodesics_precompute(np.array(ball.V), np.array(ball.F), data)
         errors.append(np.abs(module.heat_geodesics_solve(data, np.array([0])) - exact).mean())
     assert errors[0] < errors[1] < 0.1
 
@@ -139,37 +142,37 @@ def test_arguments_and_defaults_are_theirs(peer: Any, name: str) -> None:
 
 
 @needs_potpourri3d
-def test_distances_agree_within_the_error_of_heat(peer: Any, sphere: Mesh) -> None:
+def test_distances_agree_within_the_error_of_heat(peer: Any, ball: Mesh) -> None:
     for sources in ([5], [5, 100, 333]):
-        exact = np.arccos(np.clip(sphere.V @ sphere.V[sources].T, -1, 1)).min(axis=1)
+        exact = np.arccos(np.clip(ball.V @ ball.V[sources].T, -1, 1)).min(axis=1)
         ours, theirs = (
-            np.abs(module.compute_distance_multisource(np.array(sphere.V), np.array(sphere.F), sources) - exact).mean()
+            np.abs(module.compute_distance_multisource(np.array(ball.V), np.array(ball.F), sources) - exact).mean()
             for module in (pp3d, peer)
         )
         assert ours < theirs < 0.05
-    one = pp3d.MeshHeatMethodDistanceSolver(sphere.V, sphere.F)
+    one = pp3d.MeshHeatMethodDistanceSolver(ball.V, ball.F)
     assert np.array_equal(one.compute_distance(5), one.compute_distance_multisource([5]))
-    assert np.array_equal(one.compute_distance(5), pp3d.compute_distance(sphere.V, sphere.F, 5))
+    assert np.array_equal(one.compute_distance(5), pp3d.compute_distance(ball.V, ball.F, 5))
 
 
-def test_a_larger_time_step_is_larger_in_proportion(sphere: Mesh) -> None:
-    standard = heat_igl.HeatMethodSolver(sphere)
-    wide = pp3d.MeshHeatMethodDistanceSolver(sphere.V, sphere.F, t_coef=4.0)
+def test_a_larger_time_step_is_larger_in_proportion(ball: Mesh) -> None:
+    standard = heat_igl.HeatMethodSolver(ball)
+    wide = pp3d.MeshHeatMethodDistanceSolver(ball.V, ball.F, t_coef=4.0)
     assert wide._solver.t == pytest.approx(4 * standard.t)
-    assert pp3d.MeshHeatMethodDistanceSolver(sphere.V, sphere.F)._solver.t == standard.t
+    assert pp3d.MeshHeatMethodDistanceSolver(ball.V, ball.F)._solver.t == standard.t
 
 
-def test_faces_that_repeat_a_vertex_are_left_out(sphere: Mesh) -> None:
-    faces = np.concatenate([sphere.F, [[3, 3, 8]]])
-    assert np.array_equal(pp3d.compute_distance(sphere.V, faces, 5), pp3d.compute_distance(sphere.V, sphere.F, 5))
+def test_faces_that_repeat_a_vertex_are_left_out(ball: Mesh) -> None:
+    faces = np.concatenate([ball.F, [[3, 3, 8]]])
+    assert np.array_equal(pp3d.compute_distance(ball.V, faces, 5), pp3d.compute_distance(ball.V, ball.F, 5))
     with pytest.raises(MeshError, match="repeats a vertex"):
-        pp3d.GeodesicTracer(sphere.V, faces)
+        pp3d.GeodesicTracer(ball.V, faces)
 
 
 @needs_potpourri3d
-def test_transport_agrees_in_space(peer: Any, sphere: Mesh) -> None:
+def test_transport_agrees_in_space(peer: Any, ball: Mesh) -> None:
     """Components differ with the frames, vectors in space do not."""
-    V, F = np.array(sphere.V), np.array(sphere.F)
+    V, F = np.array(ball.V), np.array(ball.F)
     found = []
     for module in (pp3d, peer):
         solver = module.MeshVectorHeatSolver(V, F)
@@ -184,11 +187,11 @@ def test_transport_agrees_in_space(peer: Any, sphere: Mesh) -> None:
 
 @needs_potpourri3d
 @pytest.mark.parametrize("strategy", ["VectorHeat", "AffineLocal", "AffineAdaptive"])
-def test_log_maps_agree_in_space(peer: Any, sphere: Mesh, strategy: str) -> None:
+def test_log_maps_agree_in_space(peer: Any, ball: Mesh, strategy: str) -> None:
     """Ours is nearer to the polyhedral map: with all strategies, and in any frame."""
-    V, F = np.array(sphere.V), np.array(sphere.F)
-    frames = heat_igl.tangent_frames(sphere)
-    exact = heat_igl.log_map(sphere, 7, method="exact") @ [frames.x[7], frames.y[7]]
+    V, F = np.array(ball.V), np.array(ball.F)
+    frames = heat_igl.tangent_frames(ball)
+    exact = heat_igl.log_map(ball, 7, method="exact") @ [frames.x[7], frames.y[7]]
     near = np.linalg.norm(exact, axis=1) < 2.5
     errors = []
     for module in (pp3d, peer):
@@ -199,30 +202,30 @@ def test_log_maps_agree_in_space(peer: Any, sphere: Mesh, strategy: str) -> None
     assert errors[0] < min(errors[1], 0.03)
 
 
-def test_affine_log_maps_follow_shortest_paths(sphere: Mesh) -> None:
-    solver = pp3d.MeshVectorHeatSolver(sphere.V, sphere.F)
-    near_exact = heat_igl.log_map(sphere, 7)
+def test_affine_log_maps_follow_shortest_paths(ball: Mesh) -> None:
+    solver = pp3d.MeshVectorHeatSolver(ball.V, ball.F)
+    near_exact = heat_igl.log_map(ball, 7)
     for strategy in ("AffineLocal", "AffineAdaptive"):
         assert np.allclose(solver.compute_log_map(7, strategy), near_exact, atol=1e-3)
-    assert np.array_equal(solver.compute_log_map(7, "VectorHeat"), heat_igl.log_map(sphere, 7, method="vector-heat"))
+    assert np.array_equal(solver.compute_log_map(7, "VectorHeat"), heat_igl.log_map(ball, 7, method="vector-heat"))
     with pytest.raises(ValueError, match="strategy must be one of 'VectorHeat', 'AffineLocal', 'AffineAdaptive'"):
         solver.compute_log_map(7, "Affine")
 
 
 @pytest.mark.parametrize("intrinsic", [False, True])
 def test_connection_laplacian_is_positive(intrinsic: bool) -> None:
-    sphere = shapes.icosphere(2)
-    L = pp3d.MeshVectorHeatSolver(sphere.V, sphere.F, use_intrinsic_delaunay=intrinsic).get_connection_laplacian()
+    ball = shapes.icosphere(2)
+    L = pp3d.MeshVectorHeatSolver(ball.V, ball.F, use_intrinsic_delaunay=intrinsic).get_connection_laplacian()
     assert L.format == "csc"
     assert abs(L - L.conj().T).max() < 1e-12
     assert np.linalg.eigvalsh(L.toarray()).min() > 0
 
 
-def test_scalars_are_extended(sphere: Mesh) -> None:
-    found = pp3d.MeshVectorHeatSolver(sphere.V, sphere.F).extend_scalar([1, 22], [0.0, 6.0])
+def test_scalars_are_extended(ball: Mesh) -> None:
+    found = pp3d.MeshVectorHeatSolver(ball.V, ball.F).extend_scalar([1, 22], [0.0, 6.0])
     assert (found.min(), found.max()) >= (0.0, 5.9)
     with pytest.raises(ValueError, match="values must be one number for each of the 2 sources"):
-        pp3d.MeshVectorHeatSolver(sphere.V, sphere.F).extend_scalar([1, 22], [0.0])
+        pp3d.MeshVectorHeatSolver(ball.V, ball.F).extend_scalar([1, 22], [0.0])
 
 
 @needs_potpourri3d
@@ -290,48 +293,48 @@ def test_matrices_and_areas_are_theirs(peer: Any, torus: Mesh) -> None:
     assert {tuple(edge) for edge in pp3d.edges(V, F)} == {tuple(sorted(edge)) for edge in peer.edges(V, F)}
 
 
-def equator(sphere: Mesh) -> list[int]:
+def equator(ball: Mesh) -> list[int]:
     """The vertices of the equator, counter-clockwise seen from the north, the first again at the end."""
-    around = np.flatnonzero(np.abs(sphere.V[:, 2]) < 1e-9)
-    around = around[np.argsort(np.arctan2(sphere.V[around, 1], sphere.V[around, 0]))]
+    around = np.flatnonzero(np.abs(ball.V[:, 2]) < 1e-9)
+    around = around[np.argsort(np.arctan2(ball.V[around, 1], ball.V[around, 0]))]
     return [*around.tolist(), int(around[0])]
 
 
-def latitude(sphere: Mesh) -> np.ndarray:
-    return np.arcsin(np.clip(sphere.V[:, 2], -1, 1))
+def latitude(ball: Mesh) -> np.ndarray:
+    return np.arcsin(np.clip(ball.V[:, 2], -1, 1))
 
 
 @needs_potpourri3d
 @pytest.mark.parametrize("constraint", ["ZeroSet", "None", "Multiple"])
-def test_signed_distance_has_their_sign(peer: Any, sphere: Mesh, constraint: str) -> None:
+def test_signed_distance_has_their_sign(peer: Any, ball: Mesh, constraint: str) -> None:
     """The north is on the left of the equator: positive."""
-    curve = [(v, []) for v in equator(sphere)]
+    curve = [(v, []) for v in equator(ball)]
     for module in (pp3d, peer):
-        solver = module.MeshSignedHeatSolver(np.array(sphere.V), np.array(sphere.F))
+        solver = module.MeshSignedHeatSolver(np.array(ball.V), np.array(ball.F))
         found = solver.compute_distance([curve], level_set_constraint=constraint)
-        assert np.abs(found - latitude(sphere)).max() < 0.03
+        assert np.abs(found - latitude(ball)).max() < 0.03
 
 
 @needs_potpourri3d
-def test_fast_marching_has_their_sign_and_less_error(peer: Any, sphere: Mesh) -> None:
+def test_fast_marching_has_their_sign_and_less_error(peer: Any, ball: Mesh) -> None:
     """The north is on the left of the equator: negative."""
-    curve = [(v, []) for v in equator(sphere)]
+    curve = [(v, []) for v in equator(ball)]
     errors = []
     for module in (pp3d, peer):
-        solver = module.MeshFastMarchingDistanceSolver(np.array(sphere.V), np.array(sphere.F))
-        errors.append(np.abs(solver.compute_distance([curve], sign=True) + latitude(sphere)).max())
+        solver = module.MeshFastMarchingDistanceSolver(np.array(ball.V), np.array(ball.F))
+        errors.append(np.abs(solver.compute_distance([curve], sign=True) + latitude(ball)).max())
     assert errors[0] < min(errors[1], 0.01)
 
 
 @needs_potpourri3d
-def test_fast_marching_begins_at_their_values(peer: Any, sphere: Mesh) -> None:
+def test_fast_marching_begins_at_their_values(peer: Any, ball: Mesh) -> None:
     """At points of faces, in the middles of edges, at vertices; also below 0."""
-    edge = pp3d.edges(sphere.V, sphere.F)[40]
-    same = int(np.flatnonzero((np.sort(peer.edges(np.array(sphere.V), np.array(sphere.F)), axis=1) == edge).all(1))[0])
+    edge = pp3d.edges(ball.V, ball.F)[40]
+    same = int(np.flatnonzero((np.sort(peer.edges(np.array(ball.V), np.array(ball.F)), axis=1) == edge).all(1))[0])
     places = [(9, [0.2, 0.3, 0.5]), (30, [0.1, 0.6]), (100, [])]
     found = []
     for module, number in ((pp3d, 40), (peer, same)):
-        solver = module.MeshFastMarchingDistanceSolver(np.array(sphere.V), np.array(sphere.F))
+        solver = module.MeshFastMarchingDistanceSolver(np.array(ball.V), np.array(ball.F))
         found.append(solver.compute_distance([places, [(number, [0.5])]], [[0.1, -0.2], [0.3]]))
     assert np.abs(found[0] - found[1]).max() < 0.1
     assert np.abs(found[0] - found[1]).mean() < 0.04
@@ -339,20 +342,20 @@ def test_fast_marching_begins_at_their_values(peer: Any, sphere: Mesh) -> None:
 
 
 @needs_potpourri3d
-def test_signed_distance_of_polygons_and_points_is_negative_on_the_left(peer: Any, sphere: Mesh) -> None:
-    V, F, curve = np.array(sphere.V), sphere.F.tolist(), [equator(sphere)]
+def test_signed_distance_of_polygons_and_points_is_negative_on_the_left(peer: Any, ball: Mesh) -> None:
+    V, F, curve = np.array(ball.V), ball.F.tolist(), [equator(ball)]
     for module in (pp3d, peer):
         on_polygons = module.PolygonMeshHeatSolver(V, F).compute_signed_distance(curve)
         on_points = module.PointCloudHeatSolver(V).compute_signed_distance(curve, V)
         for found in (on_polygons, on_points):
-            assert np.abs(found + latitude(sphere)).max() < 0.03, module
+            assert np.abs(found + latitude(ball)).max() < 0.03, module
     turned = pp3d.PointCloudHeatSolver(V).compute_signed_distance(curve, -V)
-    assert np.abs(turned - latitude(sphere)).max() < 0.03
+    assert np.abs(turned - latitude(ball)).max() < 0.03
 
 
-def test_curves_through_faces_and_edges_are_one_curve(sphere: Mesh) -> None:
+def test_curves_through_faces_and_edges_are_one_curve(ball: Mesh) -> None:
     """The isoline of `marching_triangles` at height 0.3, and the same with its points on edges."""
-    V, F = sphere.V, sphere.F
+    V, F = ball.V, ball.F
     (isoline,) = pp3d.marching_triangles(V, F, V[:, 2], 0.3)
     number = {tuple(edge): i for i, edge in enumerate(pp3d.edges(V, F).tolist())}
     on_edges = []
@@ -362,26 +365,26 @@ def test_curves_through_faces_and_edges_are_one_curve(sphere: Mesh) -> None:
     solver = pp3d.MeshSignedHeatSolver(V, F)
     found = solver.compute_distance([isoline])
     assert np.allclose(found, solver.compute_distance([on_edges]), atol=1e-9)
-    height = latitude(sphere) - np.arcsin(0.3)
+    height = latitude(ball) - np.arcsin(0.3)
     assert np.abs(np.abs(found) - np.abs(height)).max() < 0.03
     assert len({float(sign) for sign in np.sign(found * height) if sign}) == 1
 
 
-def test_nodes_without_a_common_face_are_joined(sphere: Mesh) -> None:
-    whole = equator(sphere)
-    solver = pp3d.MeshFastMarchingDistanceSolver(sphere.V, sphere.F)
+def test_nodes_without_a_common_face_are_joined(ball: Mesh) -> None:
+    whole = equator(ball)
+    solver = pp3d.MeshFastMarchingDistanceSolver(ball.V, ball.F)
     found = solver.compute_distance([[(v, []) for v in (*whole[:-1:4], whole[0])]], sign=True)
     # Shortest paths of the polyhedron leave the equator a little.
     assert np.allclose(found, solver.compute_distance([[(v, []) for v in whole]], sign=True), atol=0.01)
 
 
-def test_curves_and_points_without_a_sign(sphere: Mesh) -> None:
-    curve, pole = [(v, []) for v in equator(sphere)], int(sphere.V[:, 2].argmin())
-    solver = pp3d.MeshSignedHeatSolver(sphere.V, sphere.F)
-    assert np.abs(solver.compute_distance([curve], [False]) - np.abs(latitude(sphere))).mean() < 0.01
+def test_curves_and_points_without_a_sign(ball: Mesh) -> None:
+    curve, pole = [(v, []) for v in equator(ball)], int(ball.V[:, 2].argmin())
+    solver = pp3d.MeshSignedHeatSolver(ball.V, ball.F)
+    assert np.abs(solver.compute_distance([curve], [False]) - np.abs(latitude(ball))).mean() < 0.01
     found = solver.compute_distance([curve], points=[(pole, [])])
     assert found[pole] == 0
-    north = latitude(sphere) > 0.1
+    north = latitude(ball) > 0.1
     assert np.array_equal(found[north], solver.compute_distance([curve])[north])
 
 
@@ -398,30 +401,30 @@ def test_the_polygon_solver_measures_a_plane_and_carries_vectors_unturned() -> N
     assert np.array_equal(solver.extend_scalar([0, 20], [3.0, 3.0]), np.full(len(V), 3.0))
 
 
-def test_the_cloud_solver_measures_a_sphere(sphere: Mesh) -> None:
-    solver = pp3d.PointCloudHeatSolver(sphere.V)
-    exact = np.arccos(np.clip(sphere.V @ sphere.V[7], -1, 1))
+def test_the_cloud_solver_measures_a_sphere(ball: Mesh) -> None:
+    solver = pp3d.PointCloudHeatSolver(ball.V)
+    exact = np.arccos(np.clip(ball.V @ ball.V[7], -1, 1))
     assert np.abs(solver.compute_distance(7) - exact).mean() < 0.05
     assert np.array_equal(solver.compute_distance(7), solver.compute_distance_multisource([7]))
     x, y, normal = solver.get_tangent_frames()
-    assert np.allclose(np.abs(np.einsum("nx,nx->n", normal, sphere.V)), 1, atol=0.01)
+    assert np.allclose(np.abs(np.einsum("nx,nx->n", normal, ball.V)), 1, atol=0.01)
     plane = solver.compute_log_map(7)
     assert np.abs(np.linalg.norm(plane, axis=1) - exact).mean() < 0.01
-    assert np.abs(plane @ [x[7], y[7]] @ sphere.V[7]).max() < 0.1
+    assert np.abs(plane @ [x[7], y[7]] @ ball.V[7]).max() < 0.1
     carried = solver.transport_tangent_vectors([7], [[2.0, 0.0]])
     assert np.allclose(np.linalg.norm(carried, axis=1).max(), 2)
 
 
-def test_local_triangulations_are_fans(sphere: Mesh) -> None:
+def test_local_triangulations_are_fans(ball: Mesh) -> None:
     """Each row begins with its point, each triangle is in three rows, and none is lost."""
-    table = pp3d.PointCloudLocalTriangulation(sphere.V).get_local_triangulation()
-    assert table.shape == (sphere.n_vertices, 6, 3)
+    table = pp3d.PointCloudLocalTriangulation(ball.V).get_local_triangulation()
+    assert table.shape == (ball.n_vertices, 6, 3)
     used = table[..., 0] >= 0
     assert np.array_equal(table[used][:, 0], np.nonzero(used)[0])
     assert (table[~used] == -1).all()
     found, count = np.unique(np.sort(table[used], axis=1), axis=0, return_counts=True)
     assert (count == 3).all()
-    assert np.array_equal(found, np.unique(np.sort(sphere.F, axis=1), axis=0))
+    assert np.array_equal(found, np.unique(np.sort(ball.F, axis=1), axis=0))
 
 
 @pytest.mark.parametrize(("kind", "rows"), [("per-vertex", 4), ("per-face", 2), ("per-corner", 6)])
@@ -454,3 +457,147 @@ def test_files_are_read_back_as_written(tmp_path: Path, torus: Mesh) -> None:
     assert polygons == torus.F.tolist()
     pp3d.write_point_cloud(torus.V, str(tmp_path / "b.ply"))
     assert np.array_equal(pp3d.read_point_cloud(str(tmp_path / "b.ply")), torus.V)
+
+
+# --- The drop-ins for gdist and pygeodesic: the numbers of these libraries, from their calls
+
+
+def bumpy() -> Mesh:
+    """A sphere with spikes in and out, from a named seed."""
+    mesh = shapes.icosphere(2)
+    return Mesh(mesh.V * np.random.default_rng(7).uniform(0.6, 1.4, (mesh.n_vertices, 1)), mesh.F)
+
+
+def two_parts() -> Mesh:
+    square = shapes.grid(4)
+    return Mesh(np.concatenate([square.V, square.V + 3]), np.concatenate([square.F, square.F + square.n_vertices]))
+
+
+@pytest.fixture(params=[bumpy, two_parts, lambda: shapes.torus(14, 9)], ids=["bumpy", "two parts", "torus"])
+def mesh(request: pytest.FixtureRequest) -> Mesh:
+    made: Mesh = request.param()
+    return made
+
+
+def arrays(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    return np.array(mesh.V), mesh.F.astype(np.int32)
+
+
+def indices(*values: int) -> np.ndarray:
+    return np.array(values, np.int32)
+
+
+# --- gdist ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (),
+        (indices(3),),
+        (indices(3, 20),),
+        (indices(3, 20), indices(7, 1, 3, 7)),
+        (None, indices(9)),
+        (indices(2), None),
+    ],
+)
+def test_gdist_distances(mesh: Mesh, arguments: tuple[Any, ...]) -> None:
+    theirs = pytest.importorskip("gdist").compute_gdist(*arrays(mesh), *arguments)
+    ours = gdist.compute_gdist(*arrays(mesh), *arguments)
+    assert ours.dtype == np.float64
+    np.testing.assert_allclose(ours, theirs, atol=1e-12)
+
+
+def test_gdist_counts_from_one_and_stops_at_the_largest_distance(mesh: Mesh) -> None:
+    V, F = arrays(mesh)
+    whole = gdist.compute_gdist(V, F, [5])
+    np.testing.assert_array_equal(gdist.compute_gdist(V, F + 1, [5], is_one_indexed=True), whole)
+    radius = float(np.median(whole))
+    near = gdist.compute_gdist(V, F, [5], max_distance=radius)
+    np.testing.assert_allclose(near, np.where(whole <= radius, whole, np.inf), rtol=1e-14)
+    assert gdist.compute_gdist(V, F, [5], []).shape == (0,)
+
+
+@pytest.mark.parametrize("radius", [0.7, None])
+def test_gdist_matrices(mesh: Mesh, radius: float | None) -> None:
+    peer = pytest.importorskip("gdist")
+    limit = () if radius is None else (radius,)
+    ours, theirs = (module.local_gdist_matrix(*arrays(mesh), *limit) for module in (gdist, peer))
+    assert isinstance(ours, sp.csc_matrix)
+    if radius is None:  # gdist stores 1e100 between components
+        theirs.data[theirs.data > 1e99] = 0
+        theirs.eliminate_zeros()
+    assert ours.nnz == theirs.nnz
+    np.testing.assert_allclose(ours.toarray(), theirs.toarray(), atol=1e-12)
+    chosen = indices(4, 0, 17, 30)
+    ours, theirs = (module.distance_matrix_of_selected_points(*arrays(mesh), chosen) for module in (gdist, peer))
+    np.testing.assert_allclose(ours.toarray(), theirs.toarray(), atol=1e-12)
+    within = gdist.distance_matrix_of_selected_points(*arrays(mesh), chosen, 1.0)
+    assert within.nnz == (ours.data <= 1.0).sum()
+    assert abs(within - within.T).max() == 0
+
+
+# --- pygeodesic -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("arguments", [(), ([3],), ([20, 3, 20],), ([3, 20], [7, 1, 3, 7]), (None, [9])])
+def test_pygeodesic_distances(mesh: Mesh, arguments: tuple[Any, ...]) -> None:
+    peer = pytest.importorskip("pygeodesic.geodesic")
+    theirs, their_best = peer.PyGeodesicAlgorithmExact(*arrays(mesh)).geodesicDistances(*arguments)
+    ours, best = pygeodesic.PyGeodesicAlgorithmExact(*arrays(mesh)).geodesicDistances(*arguments)
+    np.testing.assert_allclose(ours, theirs, atol=1e-12)
+    assert best.dtype == their_best.dtype
+    assert len(best) == len(their_best)
+    # Of equally near sources, either is right: the distance from the named one alone is the distance.
+    algorithm = pygeodesic.PyGeodesicAlgorithmExact(*arrays(mesh))
+    sources = [0] if not arguments or arguments[0] is None else arguments[0]
+    each = np.stack([algorithm.geodesicDistances([s], *arguments[1:])[0] for s in sources])
+    np.testing.assert_allclose(each[best, np.arange(len(best))], ours, atol=1e-12)
+
+
+def test_pygeodesic_stops_at_the_largest_distance() -> None:
+    algorithm = pygeodesic.PyGeodesicAlgorithmExact(*arrays(shapes.strip(5, 1)))
+    distance, _ = algorithm.geodesicDistances([0], None, 2.5)
+    np.testing.assert_allclose(distance, [0, 1, 2, np.inf, np.inf, np.inf, 1, 2**0.5, 5**0.5, np.inf, np.inf, np.inf])
+    assert algorithm.geodesicDistances([0], [5, 1], 2.5)[0].tolist() == [np.inf, 1.0]
+
+
+def test_pygeodesic_path(mesh: Mesh) -> None:
+    peer = pytest.importorskip("pygeodesic.geodesic").PyGeodesicAlgorithmExact(*arrays(mesh))
+    algorithm = pygeodesic.PyGeodesicAlgorithmExact(*arrays(mesh))
+    for source, target in pairwise([0, 7, 22, 13, 2]):
+        length, path = algorithm.geodesicDistance(source, target)
+        their_length, their_path = peer.geodesicDistance(source, target)
+        assert length == pytest.approx(their_length, rel=1e-12)
+        assert np.linalg.norm(np.diff(path, axis=0), axis=1).sum() == pytest.approx(length, rel=1e-12)
+        np.testing.assert_allclose(path[[0, -1]], their_path[[0, -1]], atol=1e-12)
+    assert algorithm.geodesicDistance(3, 3)[1].tolist() == mesh.V[[3]].tolist()
+
+
+def test_pygeodesic_raises_instead_of_printing() -> None:
+    V, F = arrays(two_parts())
+    algorithm = pygeodesic.PyGeodesicAlgorithmExact(V, F)
+    with pytest.raises(SourceError, match=r"targetIndex\[0\] = 50 is no vertex"):
+        algorithm.geodesicDistance(0, 50)
+    with pytest.raises(SourceError, match="no source can be reached"):
+        algorithm.geodesicDistance(0, 30)
+    with pytest.raises(SourceError, match=r"source_indices\[0\] = -1 is no vertex"):
+        algorithm.geodesicDistances([-1])
+    with pytest.raises(MeshError, match="must have shape"):
+        pygeodesic.PyGeodesicAlgorithmExact(V, F[:, :2])
+
+
+def test_pygeodesic_reads_its_files(tmp_path: Any) -> None:
+    V, F = arrays(shapes.grid(2))
+    path = tmp_path / "mesh.txt"
+    lines = [f"{len(V)} {len(F)}", *(" ".join(map(repr, row)) for row in [*V.tolist(), *F.tolist()])]
+    path.write_text("\n".join(lines))
+    points, faces = pygeodesic.read_mesh_from_file(path)
+    np.testing.assert_array_equal(points, V)
+    np.testing.assert_array_equal(faces, F)
+    path.write_text("\n".join(lines[:-1]))
+    with pytest.raises(MeshError, match="ends before"):
+        pygeodesic.read_mesh_from_file(path)
+    path.write_text("solid")
+    with pytest.raises(MeshError, match="expected a line"):
+        pygeodesic.read_mesh_from_file(path)

@@ -152,7 +152,10 @@ def test_nonmanifold_meshes_against_steiner_points(name):
         assert excess.mean() < 1e-2
 
 
-@pytest.mark.parametrize("name", ["pill", "trefoil", "dunes", "elbow", "gear", "spiky sphere", "fractal terrain"])
+@pytest.mark.parametrize(
+    "name",
+    ["pill", "trefoil", "dunes", "elbow", "gear", "sponge", "plate", "hull of 35", "spiky sphere", "fractal terrain"],
+)
 def test_surfaces_against_pygeodesic(name):
     assert_agrees(zoo(name), 3)
 

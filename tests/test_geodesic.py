@@ -1,29 +1,206 @@
-"""`GeodesicSolver`: one interface for all domains, the same bits alone, in batches, in threads and pickled."""
+"""GeodesicSolver, geodesic_distance and the plan: which engine answers, for every kind of source, cutoff and target."""
 
 from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import igl
 import numpy as np
 import pytest
+from conftest import flat_perturbed, perturbed
 
 import heat_igl
-from heat_igl import GeodesicSolver, OffsetSources, SurfacePoints, edge_curve, shapes
+from heat_igl import (
+    GeodesicSolver,
+    HeatMethodSolver,
+    Mesh,
+    MeshError,
+    OffsetSources,
+    SurfacePoints,
+    edge_curve,
+    geodesic_distance,
+    shapes,
+)
+from heat_igl.plan import SurfaceMeasures, distance_plan, sweep_plan
+from heat_igl.unfolding import engine
+from heat_igl.unfolding.half_edges import from_mesh
 
-TORUS = shapes.torus(60, 40)
+# --- `geodesic_distance`, and `as_mesh` in front of everything that takes a mesh
+
+
+SQUARE = flat_perturbed(shapes.grid(12))
+TORUS = perturbed(shapes.torus(20, 30))
+INSIDE = SurfacePoints([17, 250], [[0.2, 0.5, 0.3], [0.6, 0.3, 0.1]])
+
+
+def lines(mesh: Mesh, *places: tuple[Any, float]) -> np.ndarray:
+    """Distance in a convex part of the plane, from positions and where distance begins at each."""
+    return np.min([offset + np.linalg.norm(mesh.V - place, axis=1) for place, offset in places], axis=0)
+
+
+def in_the_plane() -> dict[str, tuple[Any, np.ndarray]]:
+    V, n = SQUARE.V, SQUARE.n_vertices
+    mask = np.zeros(n, bool)
+    mask[[3, 80]] = True
+    first, second = INSIDE.positions(SQUARE)
+    two = lines(SQUARE, (V[3], 0), (V[80], 0))
+    return {
+        "a vertex": (0, lines(SQUARE, (V[0], 0))),
+        "vertices": ([3, 80], two),
+        "a mask": (mask, two),
+        "points": (INSIDE, lines(SQUARE, (first, 0), (second, 0))),
+        "offsets at vertices": (OffsetSources([3, 80], [0.1, 0.3]), lines(SQUARE, (V[3], 0.1), (V[80], 0.3))),
+        "offsets at points": (OffsetSources(INSIDE, [0.2, 0]), lines(SQUARE, (first, 0.2), (second, 0))),
+        "a list": ([7, INSIDE], lines(SQUARE, (V[7], 0), (first, 0), (second, 0))),
+        "a curve": (edge_curve(SQUARE, np.arange(13)), V[:, 1]),  # the lower side
+    }
+
+
+@pytest.mark.parametrize("name", in_the_plane())
+@pytest.mark.parametrize("method", ["windows", "sweep", "heat", "exact"])
+def test_distance_in_the_plane(name: str, method: Any) -> None:
+    sources, truth = in_the_plane()[name]
+    found = geodesic_distance(SQUARE, sources, method=method)
+    assert found.dtype == np.float64
+    allowed = {"windows": 1e-5, "sweep": 0.02, "heat": 0.1, "exact": 1e-9}[method]
+    assert np.abs(found - truth).max() < allowed * truth.max()
+
+
+@pytest.mark.parametrize("method", ["windows", "sweep", "heat", "exact"])
+def test_sources_that_no_face_uses(method: Any) -> None:
+    n = SQUARE.n_vertices
+    mesh = Mesh(np.concatenate([SQUARE.V, [[9, 9, 9]]]), SQUARE.F)
+    alone = geodesic_distance(mesh, n, method=method)
+    np.testing.assert_array_equal(alone, [*np.full(n, np.inf), 0])
+    expected = geodesic_distance(SQUARE, 3, method=method)
+    np.testing.assert_allclose(geodesic_distance(mesh, [n, 3], method=method), [*expected, 0], atol=1e-9)
+    late = geodesic_distance(mesh, OffsetSources([n, 3], [1, 2]), method=method)
+    np.testing.assert_allclose(late, [*(expected + 2), 1], atol=1e-9)
+
+
+@pytest.mark.parametrize("sources", [5, [5, 300], OffsetSources([5, 300], [0.1, 0.0])], ids=["one", "two", "late"])
+def test_a_cutoff_looks_at_what_is_near_alone(sources: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On the part within the cutoff distances are those on the whole mesh, also beyond its narrow places."""
+    mesh = shapes.torus(60, 40)
+    exact = geodesic_distance(mesh, sources, method="exact")
+    sizes = []
+    monkeypatch.setattr(engine, "from_mesh", lambda part, start: sizes.append(part.n_faces) or from_mesh(part, start))
+    for cutoff in (0.02, 0.2, 0.6):
+        near = np.where(exact <= cutoff, exact, np.inf)
+        found = geodesic_distance(mesh, sources, cutoff=cutoff, method="exact")
+        np.testing.assert_allclose(found, near, rtol=1e-12)
+    assert sizes == sorted(sizes)
+    assert sizes[0] < 0.02 * mesh.n_faces
+
+
+def test_targets_alone() -> None:
+    mesh = shapes.torus(30, 20)
+    places = SurfacePoints([7, 300, 7], [[0.2, 0.5, 0.3], [0, 1, 0], [0.5, 0.5, 0]])
+    curve = edge_curve(mesh, mesh.F[0, :2])
+    for sources in (5, [5, SurfacePoints([40], [[0.2, 0.5, 0.3]])], curve):
+        whole = geodesic_distance(mesh, sources, method="exact")
+        for method, allowed in (("windows", 1e-5), ("exact", 1e-12), ("sweep", 0.05), ("heat", 0.2)):
+            some = geodesic_distance(mesh, sources, method=method, targets=[40, 3, 40])
+            np.testing.assert_allclose(some, whole[[40, 3, 40]], rtol=allowed)
+        near = geodesic_distance(mesh, sources, targets=[40, 3], cutoff=1e-3)
+        assert np.isinf(near).all()
+        at_places = geodesic_distance(mesh, sources, targets=places, method="exact")
+        np.testing.assert_allclose(at_places[1], whole[mesh.F[300, 1]], rtol=1e-12)
+        back = geodesic_distance(mesh, places, method="exact", targets=[5])
+        if sources == 5:
+            np.testing.assert_allclose(back, at_places.min(), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (
+            {"method": "guess"},
+            ValueError,
+            "method must be one of 'auto', 'windows', 'exact', 'sweep', 'heat', not 'guess'",
+        ),
+        ({"targets": INSIDE, "method": "sweep", "mesh": shapes.icosphere(4)}, ValueError, "targets inside faces need"),
+        ({"tolerance": -1}, ValueError, "tolerance must be at least 0 and less than 1, not -1"),
+    ],
+)
+def test_what_cannot_be_asked(arguments: dict[str, Any], error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        geodesic_distance(**{"mesh": TORUS, "sources": 0, **arguments})
+
+
+def test_faces_that_are_there_twice_count_once() -> None:
+    twice = Mesh(TORUS.V, np.concatenate([TORUS.F, TORUS.F[100:400, [1, 2, 0]]]))
+    for method in ("windows", "sweep", "exact"):
+        expected = geodesic_distance(TORUS, 5, method=method)
+        np.testing.assert_allclose(geodesic_distance(twice, 5, method=method), expected, atol=1e-9)
+    solver = GeodesicSolver(twice, method="exact")
+    np.testing.assert_allclose(geodesic_distance(twice, 5), solver.distance(5), atol=1e-3 * expected.max())
+    # Faces of points are counted in the mesh as it is given.
+    there = SurfacePoints([TORUS.n_faces + 3], [[0.2, 0.3, 0.5]])
+    here = SurfacePoints([103], [[0.5, 0.2, 0.3]])
+    np.testing.assert_allclose(there.positions(twice), here.positions(TORUS))
+    np.testing.assert_allclose(geodesic_distance(twice, there), geodesic_distance(TORUS, here), atol=1e-9)
+
+
+OTHERS = SimpleNamespace(vertices=TORUS.V, faces=TORUS.F)
+PHI = TORUS.V[:, 0] + 3
+
+
+def test_files_and_pictures_of_other_meshes(tmp_path: Path) -> None:
+    heat_igl.write_mesh(tmp_path / "a.ply", OTHERS, distance=PHI)
+    heat_igl.write_mesh(tmp_path / "b.ply", TORUS, distance=PHI)
+    assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
+    np.testing.assert_array_equal(geodesic_distance(tmp_path / "a.ply", 3), geodesic_distance(TORUS, 3))
+    curves = heat_igl.isolines(OTHERS, PHI, [3.1, 3.2])
+    heat_igl.write_curves(tmp_path / "a.obj", OTHERS, curves)
+    heat_igl.write_curves(tmp_path / "b.obj", TORUS, [curve for level in curves for curve in level])
+    assert (tmp_path / "a.obj").read_bytes() == (tmp_path / "b.obj").read_bytes()
+    pytest.importorskip("matplotlib")
+    heat_igl.plots.picture(tmp_path / "a.png", OTHERS, PHI)
+    heat_igl.plots.write_html(tmp_path / "a.html", OTHERS, PHI)
+    assert {path.name for path in tmp_path.iterdir()} >= {"a.png", "a.html"}
+
+
+def test_a_mesh_that_everybody_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = heat_igl.sample_mesh()
+    assert mesh.n_vertices > 2500
+    assert not mesh.is_tetrahedral
+    monkeypatch.setattr(heat_igl.validation.samples, "bunny_path", lambda: None)
+    blob = heat_igl.sample_mesh()
+    np.testing.assert_array_equal(blob.V, shapes.blob(4).V)
+    report = blob.report()
+    assert (report.n_components, report.euler_characteristic, report.n_boundary_loops) == (1, 2, 0)
+    assert not len(report.nonmanifold_vertices)
+    assert np.isfinite(geodesic_distance(blob, 1234)).all()
+
+
+@pytest.mark.parametrize("options", [{"t": 1e300}, {"t_coef": 1e20}])
+def test_steps_that_leave_heat_level_are_refused(options: dict[str, float]) -> None:
+    """M - t L is singular in double precision then."""
+    with pytest.raises(ValueError, match=f"{next(iter(options))} = 1e.* is too large: heat spreads over"):
+        HeatMethodSolver(TORUS, **options)
+
+
+# --- `GeodesicSolver`: one interface for all domains, the same bits alone, in batches, in threads and pickled
+
+
+RING = shapes.torus(60, 40)
 DOMAINS = {
-    "windows": lambda: GeodesicSolver(TORUS),
-    "exact": lambda: GeodesicSolver(TORUS, method="exact"),
-    "sweep": lambda: GeodesicSolver(TORUS, method="sweep"),
-    "points": lambda: GeodesicSolver(heat_igl.PointCloud(TORUS.V)),
+    "windows": lambda: GeodesicSolver(RING),
+    "exact": lambda: GeodesicSolver(RING, method="exact"),
+    "sweep": lambda: GeodesicSolver(RING, method="sweep"),
+    "points": lambda: GeodesicSolver(heat_igl.PointCloud(RING.V)),
     "tetrahedra": lambda: GeodesicSolver(shapes.box(4)),
-    "metric": lambda: GeodesicSolver(heat_igl.speed_operators(TORUS, np.linspace(1, 1.05, TORUS.n_faces))),
+    "metric": lambda: GeodesicSolver(heat_igl.speed_operators(RING, np.linspace(1, 1.05, RING.n_faces))),
 }
 
 
 def test_every_kind_of_source_against_the_single_sources():
-    solver = GeodesicSolver(TORUS, tolerance=0)
+    solver = GeodesicSolver(RING, tolerance=0)
     point = SurfacePoints([40], [[0.2, 0.5, 0.3]])
-    curve = edge_curve(TORUS, TORUS.F[300, :2])
+    curve = edge_curve(RING, RING.F[300, :2])
     parts = [solver.distance(each) for each in (7, point, curve)]
     np.testing.assert_allclose(solver.distance([7, point, curve]), np.min(parts, axis=0), rtol=1e-12, atol=1e-12)
     late = solver.distance(OffsetSources([7, 900], [3.0, 2.5]))
@@ -32,7 +209,7 @@ def test_every_kind_of_source_against_the_single_sources():
 
 
 def test_directions_are_those_of_the_distance():
-    solver = GeodesicSolver(TORUS, tolerance=0)
+    solver = GeodesicSolver(RING, tolerance=0)
     found = solver.directions([3, 500])
     np.testing.assert_allclose(found.distance, solver.distance([3, 500]), rtol=1e-12, atol=1e-14)
     np.testing.assert_array_equal(found.labels, solver.voronoi([3, 500]).labels)
@@ -41,8 +218,8 @@ def test_directions_are_those_of_the_distance():
 
 
 def test_edge_lengths_alone_are_the_mesh():
-    by_lengths = GeodesicSolver.from_edge_lengths(TORUS.F, igl.edge_lengths(TORUS.V, TORUS.F), tolerance=0)
-    np.testing.assert_allclose(by_lengths.distance(3), GeodesicSolver(TORUS, tolerance=0).distance(3), rtol=1e-12)
+    by_lengths = GeodesicSolver.from_edge_lengths(RING.F, igl.edge_lengths(RING.V, RING.F), tolerance=0)
+    np.testing.assert_allclose(by_lengths.distance(3), GeodesicSolver(RING, tolerance=0).distance(3), rtol=1e-12)
     with pytest.raises(ValueError, match="directions need the positions of a mesh"):
         by_lengths.directions(3)
 
@@ -52,4 +229,77 @@ def test_what_has_no_paths():
         DOMAINS["sweep"]().directions(0)
     with pytest.raises(heat_igl.MeshError, match="derivatives are those of paths on triangles that fit together"):
         DOMAINS["tetrahedra"]().distance_vjp(0)
-    assert DOMAINS["windows"]().distance_vjp(0)[1](np.ones(TORUS.n_vertices)).shape == (TORUS.n_vertices, 3)
+    assert DOMAINS["windows"]().distance_vjp(0)[1](np.ones(RING.n_vertices)).shape == (
+        RING.n_vertices,
+        3,
+    )
+
+
+# --- The plan names the engine for each kind of domain, its tolerance and the reason; solvers do as it says
+
+
+SMOOTH = SurfaceMeasures(n=5000, curvature=0.02, flatness=0.0, has_holes=False)
+
+
+@pytest.mark.parametrize(
+    ("kind", "method", "engine", "tolerance"),
+    [
+        ("triangles", "auto", "windows", 1e-4),
+        ("triangles", "windows", "windows", 1e-4),
+        ("triangles", "exact", "windows", 0.0),
+        ("triangles", "sweep", "sweep", None),
+        ("points", "auto", "sweep", None),
+        ("points", "windows", "windows", 1e-4),
+        ("tetrahedra", "auto", "fronts", None),
+        ("separate simplices", "sweep", "fronts", None),
+    ],
+)
+def test_engines_by_kind_and_method(kind, method, engine, tolerance):
+    plan = distance_plan(kind, method, 1e-4)
+    assert (plan.engine, plan.tolerance) == (engine, tolerance)
+    assert str(plan).startswith(engine)
+    assert plan.reason in str(plan)
+
+
+@pytest.mark.parametrize("kind", ["tetrahedra", "separate simplices"])
+@pytest.mark.parametrize("method", ["windows", "exact"])
+def test_windows_need_triangles_that_fit_together(kind, method):
+    with pytest.raises(MeshError, match=f"method='{method}' needs triangles that fit together, and .*: take method="):
+        distance_plan(kind, method, 1e-5)
+
+
+@pytest.mark.parametrize("tolerance", [-1e-9, 1, np.nan, "1e-5", True])
+def test_tolerances_without_a_meaning(tolerance):
+    with pytest.raises(ValueError, match="tolerance must be at least 0 and less than 1, not"):
+        GeodesicSolver(shapes.grid(3), tolerance=tolerance)
+    GeodesicSolver(shapes.grid(3), tolerance=0.5)
+
+
+@pytest.mark.parametrize(
+    ("measures", "words"),
+    [
+        (SurfaceMeasures(900, 0.02, 0.0, False), "on 900 vertices"),
+        (SurfaceMeasures(5000, 0.5, 0.0, False), "0.5 radians"),
+        (SurfaceMeasures(5000, 0.02, 0.8, True), "flat with holes"),
+        (SurfaceMeasures(5000, 0.02, 0.0, False, 0.5), "triangles are large"),
+    ],
+)
+def test_where_a_sweep_is_replaced_the_plan_says_why(measures, words):
+    asked = distance_plan("triangles", "sweep", 1e-5)
+    assert sweep_plan(SMOOTH, asked) == asked
+    found = sweep_plan(measures, asked)
+    assert (found.engine, found.tolerance) == ("windows", 0)
+    assert words in found.reason
+
+
+def test_solvers_carry_their_plan():
+    mesh = shapes.icosphere(2)
+    assert GeodesicSolver(mesh, tolerance=1e-3).plan.tolerance == 1e-3
+    heat = HeatMethodSolver(mesh).plan
+    assert (heat.engine, heat.tolerance) == ("heat", None)
+    assert "t = 0.5 h^2" in heat.reason
+    assert HeatMethodSolver(shapes.box(3)).plan.engine == "heat"
+    assert GeodesicSolver(shapes.box(3)).plan.engine == "fronts"
+    cloud = heat_igl.PointCloud(shapes.icosphere(4).V)
+    assert GeodesicSolver(cloud).plan.engine == "sweep"
+    assert HeatMethodSolver(cloud).plan.engine == "heat"

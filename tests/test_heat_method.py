@@ -1,14 +1,20 @@
+"""HeatMethodSolver: the three steps together, options, range, parity with libigl, and rates of convergence."""
+
 from __future__ import annotations
 
 import dataclasses
 
+import igl
 import numpy as np
 import pytest
-from conftest import perturbed, zoo
+from conftest import perturbed, wheel_path, zoo
 
-from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, SourceError, shapes
-from heat_igl.operators import operators
-from heat_igl.steps import fitted_laplacian, integrate
+from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, SourceError, read_mesh, shapes
+from heat_igl.heat_method import SolverOptions
+from heat_igl.operators import Operators, intrinsic_operators, operators
+from heat_igl.steps import HeatFlow, fitted_laplacian, integrate
+
+# --- heat method
 
 
 def angle(mesh: Mesh, source: int) -> np.ndarray:
@@ -239,3 +245,206 @@ def test_cold_boundary_that_cuts_the_mesh_is_reported():
         HeatMethodSolver(mesh, boundary="dirichlet").distance(0)
     distance = HeatMethodSolver(mesh, boundary="average").distance(0)
     assert distance[label[0]] == pytest.approx(2, abs=0.2)
+
+
+# --- Options of the solver: checked once, with the same words and defaults wherever they are given
+
+
+def test_options_put_together_before_are_those_of_the_keywords():
+    mesh = perturbed(shapes.disk(6))
+    chosen = {"t_coef": np.float32(3), "laplacian": "cotan", "boundary": "average", "backend": "scipy"}
+    options = SolverOptions(**chosen)
+    assert type(options.t_coef) is float
+    np.testing.assert_array_equal(
+        HeatMethodSolver.from_options(mesh, options).distance(5), HeatMethodSolver(mesh, **chosen).distance(5)
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "surface", "volume"),
+    [
+        (SolverOptions(), True, False),
+        (SolverOptions(laplacian="cotan"), False, False),
+        (SolverOptions(magnitude="unit"), False, False),
+        (SolverOptions(laplacian="cotan", magnitude="damped"), True, True),
+    ],
+)
+def test_which_fields_are_damped(options, surface, volume):
+    assert options.damps(operators(shapes.grid(2))) is surface
+    assert options.damps(operators(shapes.box(1))) is volume
+
+
+# --- Large and elongated meshes, where heat in double precision runs out of range unless something is done about it
+
+
+@pytest.mark.parametrize("laplacian", ["intrinsic-delaunay", "cotan"])
+def test_strip_4000_long(laplacian):
+    mesh = shapes.strip(4000, 3)
+    solver = HeatMethodSolver(mesh, laplacian=laplacian)
+    distance = solver.distance(0)
+    assert distance[4000] == pytest.approx(4000, rel=0.01)
+    assert (np.diff(distance[:4001]) > 0).all()
+
+
+@pytest.mark.parametrize("backend", ["scipy", "multifrontal"])
+def test_heat_keeps_its_relative_accuracy_over_500_decades(backend):
+    """Four vertices wide, 4000 cells long: the heat per cell falls by the closed form acosh(1 + h^2 / 2 t)."""
+    domain = operators(shapes.strip(4000, 3))
+    t = 10.0
+    b = np.zeros((domain.n, 9))
+    b[::4001, 0] = 1e290  # a row of sources across the end: one-dimensional
+    b[:, 1:] = b[:, :1]
+    u = HeatFlow(domain, t, backend=backend).solve(b)
+    rate = -np.diff(np.log(u[:4001]), axis=0)[100:3900]
+    assert u[3900].max() < 1e-200
+    np.testing.assert_allclose(rate, np.arccosh(1 + 1 / (2 * t)), rtol=1e-9)
+
+
+def test_backends_agree_on_the_strip():
+    mesh = shapes.strip(4000, 3)
+    one, other = (HeatMethodSolver(mesh, backend=name) for name in ("scipy", "multifrontal"))
+    for sources in (0, [17, 9000]):
+        np.testing.assert_allclose(one.distance(sources), other.distance(sources), rtol=0, atol=1e-9 * 4000)
+
+
+def test_grid_450_from_a_corner():
+    unit = shapes.grid(449)
+    mesh = Mesh(unit.V * 449, unit.F)
+    exact = np.linalg.norm(mesh.V, axis=1)
+    distance = HeatMethodSolver(mesh).distance(0)
+    assert (np.abs(distance - exact)[1:] / exact[1:]).mean() < 0.01
+    # Along diagonals heat falls faster than along rows, the more so the smaller t is.
+    assert distance[-1] == pytest.approx(449 * np.sqrt(2), rel=0.015)
+    at_the_papers_time = HeatMethodSolver(mesh, t_coef=1).distance(0)
+    assert (np.abs(at_the_papers_time - exact)[1:] / exact[1:]).mean() < 0.006
+    assert at_the_papers_time[-1] == pytest.approx(449 * np.sqrt(2), rel=0.01)
+
+
+@pytest.mark.slow
+def test_icosphere_of_655362_vertices():
+    mesh = shapes.icosphere(8)
+    assert mesh.n_vertices == 655_362
+    exact = np.arccos(np.clip(mesh.V @ mesh.V[0], -1, 1))
+    distance = HeatMethodSolver(mesh).distance(0)
+    assert (np.abs(distance - exact)[1:] / exact[1:]).mean() < 0.004
+    assert np.abs(distance - exact).max() < 0.01 * np.pi
+
+
+# --- The same numbers as libigl's own heat method, where both do the same
+
+
+def libigl_distance(mesh: Mesh, t: float, source: int) -> np.ndarray:
+    data = igl.HeatGeodesicsData()
+    igl.heat_geodesics_precompute(mesh.V, mesh.F, t, data)
+    return np.asarray(igl.heat_geodesics_solve(data, np.array([source], np.int64)))
+
+
+@pytest.mark.parametrize("name", ["cow.obj", "bunny.obj"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_cotan_agrees_with_libigl(name, seed):
+    """To 1e-6 of the diameter; libigl averages both boundary conditions, and leaves the source at the mean, 0."""
+    mesh = read_mesh(wheel_path(name))
+    inner = np.flatnonzero(mesh.referenced & ~mesh.boundary)
+    source = int(np.random.default_rng(seed).choice(inner))
+    solver = HeatMethodSolver(mesh, laplacian="cotan", boundary="average")
+    expected = libigl_distance(mesh, solver.t, source)
+    expected = np.maximum(expected - expected[source], 0)
+    difference = np.abs(solver.distance(source) - expected)
+    assert difference.max() <= 1e-6 * mesh.longest_distance
+
+
+# --- Distance converges to the known one, at the rate the theory gives and no faster, on every kind of domain
+
+
+def periodic(x, period):
+    return np.minimum(x % period, -x % period)
+
+
+def disk(n: int) -> tuple[Operators, int, np.ndarray]:
+    mesh = shapes.disk(n)
+    source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0, 0], axis=1)))
+    return operators(mesh), source, np.linalg.norm(mesh.V - mesh.V[source], axis=1)
+
+
+def sphere(n: int) -> tuple[Operators, int, np.ndarray]:
+    mesh = shapes.icosphere(int(np.log2(n)))
+    return operators(mesh), 0, np.arccos(np.clip(mesh.V @ mesh.V[0], -1, 1))
+
+
+def cylinder(n: int) -> tuple[Operators, int, np.ndarray]:
+    ring, k = np.divmod(np.arange(n * (n + 1)), n)
+    step = 2 * np.pi / n
+    exact = np.hypot(periodic(k * step, 2 * np.pi), (ring - n // 2) * step)
+    return operators(shapes.cylinder(n, n)), n // 2 * n, exact
+
+
+def cone(n: int) -> tuple[Operators, int, np.ndarray]:
+    half_angle = np.pi / 6
+    around = 3 * n
+    ring, k = np.divmod(np.arange(around * n), around)
+    slant = (ring + 1) / n
+    start = (n // 2 + 1) / n
+    rolled = periodic(2 * np.pi * k / around, 2 * np.pi) * np.sin(half_angle)  # at most pi / 2: never by the apex
+    exact = np.sqrt(slant**2 + start**2 - 2 * slant * start * np.cos(rolled))
+    return operators(shapes.cone(around, n, half_angle)), 1 + n // 2 * around, np.concatenate([[start], exact])
+
+
+def flat_torus(n: int) -> tuple[Operators, int, np.ndarray]:
+    row, column = np.divmod(np.arange(n * n), n)
+    return intrinsic_operators(shapes.flat_torus(n)), 0, np.hypot(periodic(row / n, 1), periodic(column / n, 1))
+
+
+def box(n: int) -> tuple[Operators, int, np.ndarray]:
+    mesh = shapes.box(n)
+    source = int(np.argmin(np.linalg.norm(mesh.V - 0.5, axis=1)))
+    return operators(mesh), source, np.linalg.norm(mesh.V - mesh.V[source], axis=1)
+
+
+def mean_error(domain: Operators, source: int, exact: np.ndarray, t: float, **options) -> float:
+    distance = HeatMethodSolver(domain, t=t, **options).distance(source)
+    return float(np.abs(distance - exact).mean())
+
+
+@pytest.mark.parametrize(("magnitude", "fastest"), [("unit", 1.0), ("auto", 1.6)])
+@pytest.mark.parametrize(
+    ("shape", "sizes"),
+    [
+        (disk, (16, 32, 64)),
+        (sphere, (8, 16, 32)),
+        (cylinder, (32, 64, 128)),
+        (cone, (16, 32, 64)),
+        (flat_torus, (32, 64, 128)),
+        (box, (6, 12, 24)),
+    ],
+)
+def test_order_and_bound(shape, sizes, magnitude, fastest):
+    h, error, bound = [], [], []
+    for n in sizes:
+        domain, source, exact = shape(n)
+        t = 0.3 * domain.mean_edge_length**1.5
+        h.append(domain.mean_edge_length)
+        error.append(mean_error(domain, source, exact, t, magnitude=magnitude))
+        bound.append(np.sqrt(t) / 2)
+    assert (np.array(error) < bound).all()
+    order = np.polyfit(np.log(h), np.log(error), 1)[0]
+    assert 0.5 < order < fastest
+
+
+@pytest.mark.parametrize(("n", "coarser"), [(64, 32)])
+def test_where_the_source_is_the_centre_of_symmetry(n, coarser):
+    """No cut locus and no preferred direction: order 1 from the centre of a disk, 2 from the apex of a cone."""
+    for make, expected in ((shapes.disk, 1), (lambda k: shapes.cone(3 * k, k), 2)):
+        errors = []
+        for size in (coarser, n):
+            mesh = make(size)
+            domain = operators(mesh)
+            exact = np.linalg.norm(mesh.V, axis=1)
+            errors.append(mean_error(domain, 0, exact, domain.mean_edge_length**2, magnitude="unit"))
+        assert np.log2(errors[0] / errors[1]) == pytest.approx(expected, abs=0.1)
+        assert errors[1] < 0.01
+
+
+@pytest.mark.parametrize("shape", [disk, sphere, cylinder, cone, flat_torus])
+def test_default_time_step_is_accurate_to_two_percent(shape):
+    domain, source, exact = shape(32)
+    assert mean_error(domain, source, exact, domain.mean_edge_length**2) < 0.02 * exact.max()

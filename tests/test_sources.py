@@ -1,21 +1,42 @@
+"""Sources of every kind: what they are, straight lines around them, and distance from points, curves and offsets."""
+
 from __future__ import annotations
 
+import itertools
+import pickle
 import re
 
+import igl
 import numpy as np
 import pytest
+from conftest import perturbed
+from scipy.spatial import Delaunay
 
 from heat_igl import (
     GeodesicSolver,
+    HeatMethodSolver,
+    Mesh,
+    MeshError,
     OffsetSources,
     SourceError,
     SurfaceCurve,
     SurfacePoints,
+    closest_points,
+    curve_on,
+    edge_curve,
     geodesic_distance,
     isolines,
+    reference,
     shapes,
 )
-from heat_igl.sources import source_set, vertex_sources
+from heat_igl.geodesic import SolverChoice
+from heat_igl.intrinsic import Adjacency, intrinsic_triangulation
+from heat_igl.reference import edge_paths
+from heat_igl.sources import NearField, Seeds, Sources, near_field, source_set, vertex_sources, windows
+from heat_igl.sources.own_faces import seen_from_points
+from heat_igl.steps import fitted_laplacian
+
+# --- sources
 
 
 @pytest.mark.parametrize(
@@ -161,3 +182,552 @@ def test_offsets_from_which_distances_cannot_be_told_are_refused(method):
                 geodesic_distance(mesh, sources, method=method)
     late = geodesic_distance(mesh, OffsetSources(0, 1e9), method=method)
     np.testing.assert_allclose(late - 1e9, geodesic_distance(mesh, 0, method=method), atol=2.4e-7)
+
+
+# --- Straight lines around sources: all that is near and in sight, exactly, and nothing shorter than the shortest
+
+
+def seeds(mesh: Mesh, sources: Sources, radius: float) -> Seeds:
+    """Those within `radius`."""
+    found = source_set(sources, mesh.n_vertices, mesh.F)
+    return NearField(intrinsic_triangulation(mesh)).seeds(
+        found.points.joined(found.segments.ends()), found.segments, radius
+    )[0]
+
+
+def sheared_grid() -> Mesh:
+    """Flat and convex, but far from Delaunay, and with faces that run either way round."""
+    mesh = perturbed(shapes.grid(16), 0.2)
+    V = mesh.V * [1, 1, 0]
+    V[:, 0] += 1.7 * V[:, 1]
+    turned = np.random.default_rng(0).random(mesh.n_faces) < 0.5
+    return Mesh(V, np.where(turned[:, None], mesh.F[:, ::-1], mesh.F))
+
+
+def to_polyline(V: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    distance = np.full(len(V), np.inf)
+    for a, b in itertools.pairwise(corners):
+        along = b - a
+        share = np.clip((V - a) @ along / (along @ along), 0, 1)
+        distance = np.minimum(distance, np.linalg.norm(V - a - share[:, None] * along, axis=1))
+    return distance
+
+
+@pytest.mark.parametrize("barycentric", [(0.2, 0.5, 0.3), (0.3, 0.0, 0.7), (1e-9, 0.4, 0.6 - 1e-9)])
+def test_all_that_is_near_a_point_in_the_plane(barycentric):
+    mesh = sheared_grid()
+    for face in (3, 201, 340):
+        point = SurfacePoints([face], [barycentric])
+        truth = np.linalg.norm(mesh.V - point.positions(mesh), axis=1)
+        found = seeds(mesh, point, 0.4)
+        assert np.isin(np.flatnonzero(truth < 0.4), found.vertex).all()
+        np.testing.assert_allclose(found.value, truth[found.vertex], rtol=1e-12)
+
+
+def test_all_that_is_near_a_curve_in_the_plane():
+    """A polyline with corners on both sides, and one that begins and ends inside faces."""
+    mesh = sheared_grid()
+    corners = np.array([[0.5, 0.2, 0], [1.1, 0.33, 0], [1.0, 0.52, 0], [1.9, 0.8, 0]])
+    truth = to_polyline(mesh.V, corners)
+    found = seeds(mesh, curve_on(mesh, corners), 0.3)
+    assert np.isin(np.flatnonzero(truth < 0.3), found.vertex).all()
+    np.testing.assert_allclose(found.value, truth[found.vertex], atol=1e-12)
+
+
+def test_a_single_segment():
+    """Beside it distance is that to the line, beyond its ends that to the ends."""
+    mesh = shapes.grid(8)
+    start, end = np.array([[0.1, 0.2, 0.7]]), np.array([[0.6, 0.3, 0.1]])
+    curve = SurfaceCurve([60], start, end)
+    found = seeds(mesh, curve, 0.5)
+    truth = to_polyline(mesh.V, curve.positions(mesh))
+    assert np.isin(np.flatnonzero(truth < 0.5), found.vertex).all()
+    np.testing.assert_allclose(found.value, truth[found.vertex], atol=1e-13)
+
+
+def test_offsets_and_labels_of_several():
+    mesh = sheared_grid()
+    found = source_set(SurfacePoints([100, 140, 300], np.full((3, 3), 1 / 3)), mesh.n_vertices, mesh.F).points
+    offset = np.array([0.0, 0.2, 0.05])
+    points = type(found)(found.faces, found.barycentric, np.array([7, 3, 5]), offset)
+    none = source_set(0, mesh.n_vertices, mesh.F).segments
+    near = NearField(intrinsic_triangulation(mesh)).seeds(points, none, 0.5)[0]
+    centres = mesh.V[mesh.F[points.faces]].mean(axis=1)
+    each = np.linalg.norm(mesh.V[:, None] - centres, axis=2) + offset
+    truth = each.min(axis=1)
+    assert (near.value >= truth[near.vertex] * (1 - 1e-12)).all()
+    # Beyond the radius of the earliest, a source that is nearer may not have been looked for.
+    certain = near.value < 0.5
+    assert np.isin(np.flatnonzero(truth < 0.5), near.vertex[certain]).all()
+    np.testing.assert_allclose(near.value[certain], truth[near.vertex[certain]], rtol=1e-12)
+    assert (near.label == np.array([7, 3, 5])[each.argmin(axis=1)][near.vertex])[certain].all()
+    assert set(near.label) == {3, 5, 7}
+
+
+def test_on_a_curved_surface():
+    """Never below the exact distance, nearly everywhere equal to it, and straight to the corners of the face."""
+    mesh = perturbed(shapes.icosphere(3), 0.4, 1)
+    h = mesh.edge_lengths.mean()
+    exact = sampled = 0
+    for face in (5, 300, 801):
+        point = SurfacePoints([face], [[0.25, 0.35, 0.4]])
+        split = np.array([[a, b, mesh.n_vertices] for a, b in mesh.F[face][[[0, 1], [1, 2], [2, 0]]]])
+        refined = Mesh(
+            np.concatenate([mesh.V, point.positions(mesh)]), np.concatenate([np.delete(mesh.F, face, 0), split])
+        )
+        truth = reference.exact(refined, mesh.n_vertices)
+        found = seeds(mesh, point, 4 * h)
+        assert (found.value > truth[found.vertex] * (1 - 1e-12)).all()
+        exact += (found.value < truth[found.vertex] * (1 + 1e-9)).sum()
+        sampled += len(found.vertex)
+        corner = np.isin(found.vertex, mesh.F[face])
+        straight = np.linalg.norm(mesh.V[found.vertex[corner]] - point.positions(mesh), axis=1)
+        np.testing.assert_allclose(found.value[corner], straight, rtol=1e-13)
+        assert corner.sum() == 3
+    assert sampled > 100
+    assert exact > 0.95 * sampled
+
+
+def test_far_corners_of_the_own_face():
+    """A face longer than the radius: its corners are told apart, since another source may be nearer to them."""
+    mesh = Mesh([[0, 0, 0], [10, 0, 0], [0, 0.5, 0], [10, 1, 0]], [[0, 1, 2], [1, 3, 2]])
+    point = SurfacePoints([0], [[0.9, 0.05, 0.05]])
+    found = source_set(point, 4, mesh.F)
+    near, far = NearField(intrinsic_triangulation(mesh)).seeds(found.points, found.segments, 1.0)
+    truth = np.linalg.norm(mesh.V - point.positions(mesh), axis=1)
+    assert near.vertex.tolist() == [0, 2]
+    assert far.vertex.tolist() == [1]
+    np.testing.assert_allclose(near.value, truth[near.vertex], rtol=1e-14)
+    np.testing.assert_allclose(far.value, truth[far.vertex], rtol=1e-14)
+
+
+def test_a_way_around_is_not_taken_for_straight():
+    """Over the top of a spike it is straight, around its foot it is shorter: such vertices are left out."""
+    disk = shapes.disk(6)
+    radius = np.linalg.norm(disk.V, axis=1)
+    spike = Mesh(disk.V + np.where(radius < 1e-9, 3.0, 0.0)[:, None] * [0, 0, 1], disk.F)
+    face = int(np.argmin(np.abs(np.linalg.norm(disk.V[disk.F].mean(axis=1), axis=1) - 0.12)))
+    point = SurfacePoints([face], [[0.4, 0.3, 0.3]])
+    found = seeds(spike, point, 10.0)
+    graph = reference.exact(spike, int(spike.F[face, 0]))
+    reach = np.linalg.norm(spike.V[spike.F[face, 0]] - point.positions(spike)[0])
+    assert (found.value <= graph[found.vertex] + reach + 1e-12).all()
+
+
+def test_curves_refuse_nothing_at_the_boundary():
+    """A source on the boundary sees inwards only."""
+    mesh = shapes.grid(5)
+    side = int(np.flatnonzero((mesh.V[mesh.F][:, :, 0] == 0).sum(axis=1) == 2)[0])
+    barycentric = np.where(mesh.V[mesh.F[side], 0] == 0, 0.5, 0.0)
+    point = SurfacePoints([side], [barycentric])
+    found = seeds(mesh, point, 3.0)
+    assert len(found.vertex) == mesh.n_vertices
+    np.testing.assert_allclose(found.value, np.linalg.norm(mesh.V - point.positions(mesh), axis=1), rtol=1e-12)
+
+
+def test_dropped_lines_are_no_shortest_ones(monkeypatch):
+    mesh = perturbed(shapes.icosphere(3), 0.4, 1)
+    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    wave = np.stack([np.cos(angle), np.sin(angle), 0.4 * np.sin(3 * angle)], axis=1)
+    curve = curve_on(mesh, wave / np.linalg.norm(wave, axis=1)[:, None], closed=True)
+    found = seeds(mesh, curve, 1.0)
+    monkeypatch.setattr(windows, "_DETOUR", 1e9)
+    every = seeds(mesh, curve, 1.0)
+    exact = GeodesicSolver(mesh, method="exact").distance(curve)
+    shortest = every.at(every.value < exact[every.vertex] * (1 + 1e-9))
+    assert len(shortest.vertex) > 400
+    value = np.full(mesh.n_vertices, np.nan)
+    value[found.vertex] = found.value
+    np.testing.assert_allclose(value[shortest.vertex], shortest.value, rtol=1e-12)
+
+
+def test_joints_of_segments_count_once():
+    mesh = shapes.icosphere(2)
+    curve = isolines(mesh, mesh.V @ [0.2, 0.3, 0.9], 0.1)[0][0]
+    ends = source_set(curve, mesh.n_vertices, mesh.F).segments.ends()
+    assert len(ends.faces) == 2 * len(curve)
+    corners = seen_from_points(ends, Adjacency(intrinsic_triangulation(mesh)))[1][0].vertex
+    # All joints lie on edges: once in each of two faces, though two segments meet there.
+    assert len(corners) == 2 * len(curve)
+
+
+def random_boundary(seed: int, n: int) -> Mesh:
+    """The boundary of a random half of the tetrahedra of a Delaunay triangulation: edges of up to a dozen faces."""
+    rng = np.random.default_rng(seed)
+    P = rng.random((n, 3))
+    T = Delaunay(P).simplices
+    T = T[rng.random(len(T)) < 0.5]
+    sides = np.concatenate([np.delete(T, c, axis=1) for c in range(4)])
+    F, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+    used, F = np.unique(F[count == 1], return_inverse=True)
+    return Mesh(P[used], F.reshape(-1, 3))
+
+
+def test_work_at_edges_of_many_faces_is_bounded_and_what_is_found_is_complete(monkeypatch):
+    mesh = random_boundary(0, 60)
+    point = SurfacePoints([7], [[0.2, 0.3, 0.5]])
+    found = source_set(point, mesh.n_vertices, mesh.F)
+    field = NearField(intrinsic_triangulation(mesh))
+    crossed = []
+    cross = near_field.cross
+    monkeypatch.setattr(near_field, "cross", lambda w, adjacency: crossed.append(len(w)) or cross(w, adjacency))
+    values = []
+    for most in (10**9, 2000):
+        monkeypatch.setattr(near_field, "_MOST_WINDOWS", most)
+        crossed.clear()
+        near = field.seeds(found.points, found.segments, 0.6)[0]
+        values.append(np.full(mesh.n_vertices, np.inf))
+        values[-1][near.vertex] = near.value
+    assert sum(crossed) <= 2000
+    everything, bounded = values
+    limit = bounded[np.isfinite(bounded)].max()
+    assert np.isfinite(bounded).sum() > 3
+    # Up to the farthest of what is found, nothing is missing and nothing is longer.
+    np.testing.assert_array_equal(bounded[everything <= limit], everything[everything <= limit])
+
+
+# --- Distance from points in faces, from curves, from sources that begin later, and the cells of the nearest source
+
+
+@pytest.fixture(params=["heat", "sweep", "exact"])
+def method(request):
+    return request.param
+
+
+def plane(n: int, amount: float = 0.2) -> Mesh:
+    """The unit square, its vertices moved within it."""
+    mesh = perturbed(shapes.grid(n), amount)
+    return Mesh(mesh.V * [1, 1, 0], mesh.F)
+
+
+def nearest_vertex(mesh: Mesh, position) -> int:
+    return int(np.linalg.norm(mesh.V - position, axis=1).argmin())
+
+
+def relative_error(distance, truth) -> float:
+    far = truth > 0
+    return float((np.abs(distance - truth)[far] / truth[far]).mean())
+
+
+@pytest.mark.parametrize("name", ["cow", pytest.param("bunny", marks=pytest.mark.slow)])
+def test_a_point_in_a_face_is_as_good_a_source_as_a_vertex(name, method, request):
+    """As a vertex in the same place, against the exact distance: the corners straight, the rest no worse."""
+    mesh = request.getfixturevalue(name)
+    solver = SolverChoice(method).on(mesh)
+    rng = np.random.default_rng(2)
+    of_points, of_vertices = [], []
+    for face in rng.choice(mesh.n_faces, 12, p=mesh.measures / mesh.measures.sum()):
+        point = SurfacePoints([face], [0.9 * rng.dirichlet(np.ones(3)) + 0.1 / 3])
+        corners, n = mesh.F[face], mesh.n_vertices
+        fan = [np.where(np.arange(3) == c, n, corners) for c in range(3)]
+        inserted = Mesh(
+            np.concatenate([mesh.V, point.positions(mesh)]), np.concatenate([np.delete(mesh.F, face, 0), fan])
+        )
+        distance, truth = solver.distance(point), reference.exact(inserted, n)[:-1]
+        straight = np.linalg.norm(mesh.V[corners] - point.positions(mesh), axis=1)
+        np.testing.assert_allclose(distance[corners], straight, rtol=1e-9)
+        of_points.append(relative_error(distance, truth))
+        of_vertices.append(relative_error(SolverChoice(method).on(inserted).distance(n)[:-1], truth))
+    # As good on average; what is below the tolerance of the unfolding is chance.
+    assert np.mean(of_points) < max(1.05 * np.mean(of_vertices), 4e-5)
+
+
+def test_near_field_joins_the_far_field(bunny):
+    """Across an edge out of the near field distance changes by no more than the length of the edge."""
+    solver = HeatMethodSolver(bunny)
+    point = SurfacePoints([1234], [[0.2, 0.5, 0.3]])
+    distance = solver.distance(point)
+    near = solver._parts.assembler.term(solver._source_set(point)).near.vertex
+    edges = bunny.edges[np.isin(bunny.edges, near).any(axis=1)]
+    assert len(near) > 50
+    change = np.abs(distance[edges[:, 0]] - distance[edges[:, 1]])
+    assert (change <= np.linalg.norm(bunny.V[edges[:, 0]] - bunny.V[edges[:, 1]], axis=1) * (1 + 1e-9)).all()
+
+
+def test_a_ring_of_edges_around_a_vertex_is_straight(cow):
+    solver = HeatMethodSolver(cow)
+    edges = cow.edges[(cow.edges == 50).any(axis=1)]
+    others = edges.sum(axis=1) - 50
+    lengths = np.linalg.norm(cow.V[others] - cow.V[50], axis=1)
+    np.testing.assert_allclose(solver.distance(50)[others], lengths, rtol=1e-12)
+
+
+@pytest.mark.parametrize("amount", [0.0, 0.2])
+def test_a_line_across_the_square(method, amount):
+    """Distance is the coordinate across, on both sides; the error falls with the size of the faces."""
+    errors = []
+    for n in (15, 30, 60):
+        mesh = plane(n, amount)
+        line = curve_on(mesh, [[0.37, 0, 0], [0.37, 1, 0]])
+        distance = SolverChoice(method).on(mesh).distance(line)
+        errors.append(np.abs(distance - np.abs(mesh.V[:, 0] - 0.37)).mean())
+    if method != "heat":
+        assert max(errors) < 1e-4
+    else:
+        # On faces that repeat, the direction of the heat is right; on others it scatters, by as much on small ones.
+        assert errors[0] < 0.003
+        assert amount or np.log2(errors[0] / errors[2]) > 1.5
+
+
+def test_a_circle_around_the_sphere(method):
+    """Distance from a circle of latitude is the difference of latitudes."""
+    errors = []
+    for subdivisions in (2, 3, 4):
+        mesh = shapes.icosphere(subdivisions)
+        angle = np.linspace(0, 2 * np.pi, 300, endpoint=False)
+        circle = np.stack([0.8 * np.cos(angle), 0.8 * np.sin(angle), np.full(300, 0.6)], axis=1)
+        distance = SolverChoice(method).on(mesh).distance(curve_on(mesh, circle, closed=True))
+        truth = np.abs(np.arcsin(np.clip(mesh.V[:, 2], -1, 1)) - np.arcsin(0.6))
+        errors.append(np.abs(distance - truth).mean())
+    assert errors[2] < (4e-3 if method != "heat" else 0.02)
+    assert np.log2(errors[0] / errors[2]) > (0.9 if method != "exact" else 3)
+
+
+def test_a_ring_and_a_generator_of_the_cylinder(method):
+    for along in (True, False):
+        errors = []
+        for around in (24, 48, 96):
+            mesh = shapes.cylinder(around, around)
+            angle = np.arctan2(mesh.V[:, 1], mesh.V[:, 0])
+            low, high = mesh.V[:, 2].min(), mesh.V[:, 2].max()
+            if along:
+                step = 2.5 * 2 * np.pi / around
+                across = mesh.V[np.abs((angle - step + np.pi) % (2 * np.pi) - np.pi) < 0.6 * 2 * np.pi / around]
+                middle = across[:, :2][across[:, 2] == low].mean(axis=0)
+                curve = curve_on(mesh, [[*middle, low], [*middle, high]])
+                truth = np.abs((angle - step + np.pi) % (2 * np.pi) - np.pi)
+            else:
+                height = 0.43 * low + 0.57 * high
+                ring = mesh.V[mesh.V[:, 2] == low] * [1, 1, 0] + [0, 0, height]
+                curve = curve_on(mesh, ring[np.argsort(np.arctan2(ring[:, 1], ring[:, 0]))], closed=True)
+                truth = np.abs(mesh.V[:, 2] - height)
+            distance = SolverChoice(method).on(mesh).distance(curve)
+            errors.append(np.abs(distance - truth).mean())
+        assert errors[2] < (0.003 if method != "heat" else 0.03)
+        assert max(errors) < 1e-12 or np.log2(errors[0] / errors[2]) > 0.9
+
+
+@pytest.mark.parametrize("n_edges", [4, 16, 24])
+def test_refined_distance_from_a_curve_of_any_length(n_edges):
+    """In the plane: straight fronts beside the curve, round ones beyond its ends, and neither grows into the other."""
+    mesh = plane(32, 0.2)
+    line = [[0.5 - n_edges / 64, 0.5, 0], [0.5 + n_edges / 64, 0.5, 0]]
+    beside = np.clip(mesh.V[:, 0], line[0][0], line[1][0])
+    truth = np.hypot(mesh.V[:, 0] - beside, mesh.V[:, 1] - 0.5)
+    for method, bound in (("sweep", 4e-3), ("exact", 1e-4)):
+        distance = SolverChoice(method).on(mesh).distance(curve_on(mesh, line))
+        assert relative_error(distance, truth) < bound
+
+
+def test_edges_as_sources_are_nearer_than_their_ends():
+    mesh = plane(16)
+    path = [nearest_vertex(mesh, [x, 0.5, 0]) for x in np.linspace(0, 1, 17)]
+    curve = edge_curve(mesh, path)
+    solver = HeatMethodSolver(mesh)
+    distance = solver.distance(curve)
+    assert (distance[path] == 0).all()
+    a, b = mesh.V[path[:-1]], mesh.V[path[1:]]
+    share = np.clip(np.einsum("nsx,sx->ns", mesh.V[:, None] - a, b - a) / ((b - a) ** 2).sum(axis=1), 0, 1)
+    truth = np.linalg.norm(mesh.V[:, None] - a - share[:, :, None] * (b - a), axis=2).min(axis=1)
+    ring = (truth > 0) & (truth < 3 / 16)
+    np.testing.assert_allclose(distance[ring], truth[ring], rtol=1e-9)
+    to_ends = np.linalg.norm(mesh.V[:, None] - mesh.V[path], axis=2).min(axis=1)
+    assert (distance < to_ends)[ring].mean() > 0.5
+
+
+def test_offsets_move_the_border_of_two_cells(method):
+    """The exact additively weighted Voronoi edge of the plane, a hyperbola, within one edge length."""
+    for mesh in (shapes.grid(40), plane(40)):
+        solver = SolverChoice(method).on(mesh)
+        sources = [nearest_vertex(mesh, [0.25, 0.4, 0]), nearest_vertex(mesh, [0.75, 0.6, 0])]
+        each = np.linalg.norm(mesh.V[:, None] - mesh.V[sources], axis=2) + np.array([0, 0.2])
+        found = solver.voronoi(OffsetSources(sources, [0, 0.2]))
+        # The border is where both are equal; a step towards it changes the difference by at most twice the step.
+        wrong = found.labels != each.argmin(axis=1)
+        assert (np.abs(each[:, 0] - each[:, 1])[wrong] < 2 * mesh.edge_lengths.mean()).all()
+        assert (found.distance[sources] == [0, 0.2]).all()
+        assert relative_error(found.distance, each.min(axis=1)) < (0.03 if method == "heat" else 2e-3)
+
+
+def test_a_source_that_is_overtaken_is_none(method):
+    mesh = plane(30)
+    first, late = nearest_vertex(mesh, [0.2, 0.5, 0]), nearest_vertex(mesh, [0.6, 0.5, 0])
+    solver = SolverChoice(method).on(mesh)
+    found = solver.voronoi(OffsetSources([first, late], [0, 1]))
+    np.testing.assert_allclose(found.distance, solver.distance(first), rtol=0, atol=1e-9)
+    assert (found.labels == 0).all()
+
+
+def test_a_vertex_beside_a_point(method):
+    """Straight lines from the point end where the vertex is nearer."""
+    mesh = plane(20)
+    vertex = nearest_vertex(mesh, [0.6, 0.5, 0])
+    at = mesh.V[vertex] - [0.17, 0.03, 0]
+    distance = SolverChoice(method).on(mesh).distance([closest_points(mesh, at).points, vertex])
+    truth = np.minimum(np.linalg.norm(mesh.V - at, axis=1), np.linalg.norm(mesh.V - mesh.V[vertex], axis=1))
+    near = truth < 0.25
+    # A sweep mixes the distances from both in triangles on the border.
+    np.testing.assert_allclose(distance[near], truth[near], rtol=0.06 if method == "sweep" else 1e-9)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.5])
+def test_every_vertex_of_a_side_with_an_offset(method, slope):
+    """Sources next to one another, each a little later than the one before, do not overtake one another."""
+    mesh = shapes.grid(30)
+    side = np.flatnonzero(mesh.V[:, 0] == 0)
+    offsets = slope * mesh.V[side, 1] + 0.05 * (mesh.V[side, 1] == 1)
+    distance = SolverChoice(method).on(mesh).distance(OffsetSources(side, offsets))
+    truth = (np.linalg.norm(mesh.V[:, None] - mesh.V[side], axis=2) + offsets).min(axis=1)
+    assert (distance[side] == offsets).mean() > 0.9
+    # Each triangle of a sweep knows one source, and here every vertex of the front has another.
+    assert relative_error(distance, truth) < (0.1 if method == "sweep" else 0.03)
+
+
+@pytest.mark.parametrize("offset", [0.3, 1e6])
+def test_an_offset_for_all_is_added(method, offset):
+    mesh = plane(12)
+    solver = SolverChoice(method).on(mesh)
+    for sources in ([3, 90], closest_points(mesh, [[0.3, 0.4, 0], [0.8, 0.9, 0]]).points):
+        expected = solver.distance(sources) + offset
+        np.testing.assert_allclose(solver.distance(OffsetSources(sources, offset)), expected, rtol=1e-9)
+
+
+def test_labels_of_several_kinds(method):
+    mesh = plane(30)
+    line = curve_on(mesh, [[0.9, 0, 0], [0.9, 1, 0]])
+    points = closest_points(mesh, [[0.1, 0.2, 0], [0.4, 0.8, 0]]).points
+    mask = np.zeros(mesh.n_vertices, bool)
+    mask[nearest_vertex(mesh, [0.5, 0.2, 0])] = True
+    found = SolverChoice(method).on(mesh).voronoi([line, points, mask], cutoff=0.25)
+    distances = [np.abs(mesh.V[:, 0] - 0.9)]
+    distances += [np.linalg.norm(mesh.V - [*at, 0], axis=1) for at in ((0.1, 0.2), (0.4, 0.8))]
+    distances += [np.linalg.norm(mesh.V - mesh.V[mask], axis=1)]
+    each = np.stack(distances, axis=1)
+    clear = np.sort(each, axis=1)[:, 1] - each.min(axis=1) > 0.1
+    assert (
+        found.labels[clear & (each.min(axis=1) < 0.22)] == each.argmin(axis=1)[clear & (each.min(axis=1) < 0.22)]
+    ).all()
+    assert (found.labels[each.min(axis=1) > 0.28] == -1).all()
+    assert (np.isinf(found.distance) == (found.labels == -1)).all()
+
+
+def test_batches_of_all_kinds(method):
+    mesh = plane(16)
+    solver = SolverChoice(method).on(mesh)
+    line = curve_on(mesh, [[0.3, 0.1, 0], [0.8, 0.7, 0]])
+    point = SurfacePoints([77], [[0.2, 0.3, 0.5]])
+    sets = [5, point, [line, 3], OffsetSources([point, line], [0.1, 0.0]), [1, 2]]
+    for row, sources in zip(solver.distances(sets), sets, strict=True):
+        np.testing.assert_allclose(row, solver.distance(sources), rtol=0, atol=1e-12)
+    copy = pickle.loads(pickle.dumps(solver))
+    assert (copy.distance(sets[3]) == solver.distance(sets[3])).all()
+    with pytest.raises(SourceError, match=r"source_sets\[1\]: faces\[0\] = 999 is no face"):
+        solver.distances([5, SurfacePoints([999], [[0.2, 0.3, 0.5]])])
+
+
+def test_solution_of_a_point_holds_the_three_steps():
+    mesh = plane(16)
+    solver = HeatMethodSolver(mesh)
+    point = SurfacePoints([77], [[0.2, 0.3, 0.5]])
+    solution = solver.solve(point)
+    domain = solver.operators
+    initial = domain.M @ solution.heat - solution.t * (fitted_laplacian(domain, solution.t) @ solution.heat)
+    # A Dirac: heat of one, with its centre at the point.
+    assert initial.sum() == pytest.approx(1)
+    np.testing.assert_allclose(initial @ mesh.V, point.positions(mesh)[0], atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(solution.direction, axis=1), 1, rtol=1e-12)
+
+
+def test_the_dirac_of_a_curve_is_its_length():
+    """The integral of hat functions along it: as much heat as length, with the curve's centre of mass."""
+    sheared = plane(16).V @ np.array([[1, 0, 0], [1.7, 1, 0], [0, 0, 1]])
+    mesh = Mesh(sheared, shapes.grid(16).F)
+    curve = curve_on(mesh, [[0.6, 0.2, 0], [1.0, 0.25, 0], [1.9, 0.8, 0]])
+    solver = HeatMethodSolver(mesh)
+    assert solver.diagnostics.n_flips > 100
+    heat = solver.solve(curve).heat
+    initial = solver.operators.M @ heat - solver.t * (fitted_laplacian(solver.operators, solver.t) @ heat)
+    lengths, corners = curve.lengths(mesh), curve.positions(mesh)
+    centre = lengths @ (corners[1:] + corners[:-1]) / 2 / lengths.sum()
+    assert initial.sum() == pytest.approx(lengths.sum() / (4 * solver.diagnostics.mean_edge_length), rel=1e-9)
+    np.testing.assert_allclose(initial @ mesh.V / initial.sum(), centre, atol=1e-9)
+
+
+def test_points_on_faces_that_are_there_twice(method):
+    mesh = plane(10)
+    twice = Mesh(mesh.V, np.concatenate([mesh.F, mesh.F[[50, 60]][:, [1, 0, 2]]]))
+    solver = SolverChoice(method).on(twice)
+    copy = SurfacePoints([len(mesh.F) + 1], [[0.2, 0.5, 0.3]])
+    original = SurfacePoints([60], [[0.5, 0.2, 0.3]])
+    expected = SolverChoice(method).on(mesh).distance(original)
+    np.testing.assert_allclose(solver.distance(copy)[mesh.F[60]], expected[mesh.F[60]], rtol=1e-12)
+    np.testing.assert_allclose(solver.distance(copy), expected, rtol=1e-9)
+
+
+def test_points_on_pages_of_a_book(method):
+    """Five faces at an edge: the corners of the point's face are straight, other pages are reached over the spine."""
+    mesh = shapes.book(5, 8)
+    solver = SolverChoice(method).on(mesh)
+    face = 20
+    point = SurfacePoints([face], [[0.2, 0.5, 0.3]])
+    distance = solver.distance(point)
+    straight = np.linalg.norm(mesh.V[mesh.F[face]] - point.positions(mesh), axis=1)
+    np.testing.assert_allclose(distance[mesh.F[face]], straight, rtol=1e-9)
+    near = edge_paths(mesh, mesh.F[face]) + straight.max()
+    assert (distance < 1.02 * near).all()
+
+
+def from_edge_lengths(F, lengths, method):
+    if method == "heat":
+        return HeatMethodSolver.from_edge_lengths(F, lengths, t_coef=0.5)
+    return GeodesicSolver.from_edge_lengths(F, lengths, method=method)
+
+
+@pytest.mark.parametrize("name", ["cow", pytest.param("bunny", marks=pytest.mark.slow)])
+def test_edge_lengths_alone(name, method, request):
+    mesh = request.getfixturevalue(name)
+    # With a time step that is asked for, heat is not held to straight lines, for which positions are needed.
+    solver = HeatMethodSolver(mesh, t_coef=0.5) if method == "heat" else SolverChoice(method).on(mesh)
+    by_lengths = from_edge_lengths(mesh.F, igl.edge_lengths(mesh.V, mesh.F), method)
+    if method == "heat":
+        assert by_lengths.t == pytest.approx(solver.t, rel=1e-12)
+    for sources in (5, [5, 90], SurfacePoints([300], [[0.2, 0.3, 0.5]]), edge_curve(mesh, mesh.edges[700])):
+        np.testing.assert_allclose(by_lengths.distance(sources), solver.distance(sources), rtol=1e-9, atol=1e-9)
+
+
+def test_edge_lengths_of_no_embedding(method):
+    """The flat torus fits into no space of three dimensions."""
+    torus = shapes.flat_torus(24)
+    solver = from_edge_lengths(torus.F, torus.l, method)
+    row, column = np.divmod(np.arange(24 * 24), 24)
+    truth = np.hypot(*(np.minimum(k, 24 - k) / 24 for k in (row, column)))
+    assert relative_error(solver.distance(0), truth) < (0.03 if method == "heat" else 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("F", "lengths", "options", "message"),
+    [
+        ([[0, 1, 2]], [[1, 1, -1]], {}, r"l\[0, 2\] = -1.0 is not a length"),
+        ([[0, 1, 2]], [[1, 1, np.nan]], {}, r"l\[0, 2\] = nan is not a length"),
+        ([[0, 1, 2]], [[1, 1]], {}, "one length per side of F"),
+    ],
+)
+def test_refused_edge_lengths(F, lengths, options, message):
+    with pytest.raises(MeshError, match=message):
+        HeatMethodSolver.from_edge_lengths(F, lengths, **options)
+    with pytest.raises(ValueError, match="laplacian must be"):
+        HeatMethodSolver.from_edge_lengths([[0, 1, 2]], [[1, 1, 1]], laplacian="graph")
+
+
+def test_depth_in_a_ball():
+    """The surface of a ball as source: distance is the depth below it."""
+    errors = []
+    for n in (5, 10, 20):
+        cube = shapes.box(n)
+        V = 2 * cube.V - 1
+        largest, norm = np.abs(V).max(axis=1), np.linalg.norm(V, axis=1)
+        ball = Mesh(V * (largest / np.maximum(norm, 1e-300))[:, None], cube.F)
+        distance = HeatMethodSolver(ball).distance(ball.boundary)
+        errors.append(np.abs(distance - (1 - np.linalg.norm(ball.V, axis=1))).mean())
+    assert errors[2] < 0.02
+    assert np.log2(errors[0] / errors[2]) > 1
