@@ -115,7 +115,6 @@ class ExactSurface:
         goals: IntArray | None = None,
         directed: bool = False,
         threads: int = 1,
-        tolerance: float = 0.0,
     ) -> ExactSolution:
         """Distances from vertices and points.
 
@@ -144,27 +143,19 @@ class ExactSurface:
         threads : int
             With more than one, two threads share the search for distances of all vertices, on large surfaces. The
             distances are the same; of paths that are equally long, another may be found.
-        tolerance : float
-            The intended largest error of a distance, as a fraction of it; 0 for exact distances. With a tolerance,
-            windows side by side become one where that changes distances by less. One thread searches. Where the result
-            contradicts paths along edges, and always with `goals`, the search is exact. Origins name the source; the
-            rest of them is that of an exact path only at 0.
 
         Returns
         -------
         ExactSolution
-            Distances are exact on the polyhedral surface, to rounding and the tolerance.
+            Distances are exact on the polyhedral surface, to rounding.
 
         Raises
         ------
         MemoryError
             If the windows do not fit into memory.
         ValueError
-            If there are segments or points, and the surface does not know the faces that they refer to, or directions
-            are asked for with a tolerance.
+            If there are segments or points, and the surface does not know the faces that they refer to.
         """
-        if tolerance > 0 and directed:
-            raise ValueError("directions are those of exact paths: leave out the tolerance")
         starts = starts_at(self._half_edges, sources, offsets, points, point_offsets, segments)
         done = search(
             self._half_edges,
@@ -174,7 +165,6 @@ class ExactSurface:
             goals=goals,
             directed=directed,
             threads=threads,
-            tolerance=tolerance,
         )
         which = done.nearest_copy(0 if targets is None else len(targets))
         return ExactSolution(
@@ -191,12 +181,11 @@ class ExactSurface:
         offsets: FloatArray | None = None,
         cutoff: float = np.inf,
         threads: int = 1,
-        tolerance: float = 0.0,
     ) -> FloatArray:
         """Distance (n,) from vertices alone, as `solve` finds it, without the origins of the paths."""
         edges = self._half_edges
         starts = starts_at(edges, sources, offsets, None, None, None)
-        done = search(edges, starts, cutoff=cutoff, threads=threads, tolerance=tolerance)
+        done = search(edges, starts, cutoff=cutoff, threads=threads)
         distance = edges.unscaled(done.found.distance[edges.number])
         if cutoff < np.inf:
             distance[distance > cutoff] = np.inf

@@ -119,7 +119,7 @@ def guarded_windows(
         invariants = Invariants(triangles.faces.F, components, lengths=triangles.faces.l)
     else:
         invariants = Invariants(triangles.given_faces, components, V)
-    windows = WindowEngine(triangles, tolerance, originals)
+    windows = WindowEngine(triangles, originals)
     return GuardedEngine(windows, invariants, tolerance, (partial(SweepEngine, triangles, originals),))
 
 

@@ -21,22 +21,18 @@ __all__ = ["WindowEngine"]
 
 
 class WindowEngine(Engine):
-    """Distance by windows, within a tolerance; directions and paths are exact.
+    """Distance by windows, directions and paths: all exact, which holds every tolerance.
 
     Parameters
     ----------
     triangles : Triangles
         The surface.
-    tolerance : float
-        Largest error over the distance; 0 is exact. Searches are exact now, which satisfies every tolerance.
     originals : (n,) int64, optional
         The vertex whose values each takes: itself, or that of which it is a copy, see `PointCloud.originals`.
     """
 
-    def __init__(self, triangles: Triangles, tolerance: float = 0.0, originals: IntArray | None = None) -> None:
-        # `ExactSurface` can merge windows within the tolerance. No search is asked to yet: on bunny, fandisk, camelhead
-        # and armadillo, at 1e-5, the result contradicted edges and was found again, in 1.5 to 2.4 of the exact time.
-        self._triangles, self._tolerance, self._originals = triangles, tolerance, originals
+    def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
+        self._triangles, self._originals = triangles, originals
         # Made at once, since nearly every query needs it; what points, curves and paths need is made on request.
         self._from_vertices = ExactSurface(triangles.half_edges())
 

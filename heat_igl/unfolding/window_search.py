@@ -151,7 +151,6 @@ def search(
     goals: IntArray | None = None,
     directed: bool = False,
     threads: int = 1,
-    tolerance: float = 0.0,
 ) -> Searched:
     """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`."""
     n, wanted = edges.n, _targets_at(edges, targets)
@@ -165,19 +164,14 @@ def search(
     statistics = None
     # Vertices are found flat by the first search.
     asks_for_all = not len(wanted.place.faces) and goals is None and not directed
-    if goals is not None:
-        tolerance = 0.0
-    shares = threads > 1 and tolerance == 0 and n >= _FEWEST_SHARED and asks_for_all
+    shares = threads > 1 and n >= _FEWEST_SHARED and asks_for_all
     if shares and not (edges.tables.kind == FLAT_VERTEX).any():
         statistics = _beside(edges, starts, found, run)
         if statistics is None:
             found = Found.of(n, n_labels)
     if statistics is None:
         statistics = np.zeros(3, np.int64)
-        front = _front(edges, found, leaving, tolerance)
-        _require(run(front, starts, statistics))
-        if tolerance > 0 and windows.contradicts(front):
-            return search(edges, starts, cutoff=cutoff, targets=targets, threads=threads)
+        _require(run(windows.Front(edges.tables, found, TOLERANCE, leaving), starts, statistics))
     return Searched(starts, found, wanted, int(statistics[1]), int(statistics[2]), leaving)
 
 
@@ -187,15 +181,10 @@ def _require(is_done: bool) -> None:
         raise MemoryError("the windows of the exact distance do not fit into memory")
 
 
-def _front(edges: HalfEdges, found: Found, leaving: Leaving | None = None, tolerance: float = 0.0) -> windows.Front:
-    """The arrays that the kernel writes in one search."""
-    return windows.Front(edges.tables, found, TOLERANCE, leaving, None, tolerance)
-
-
 def _beside(edges: HalfEdges, starts: Starts, found: Found, run: _Run) -> IntArray | None:
     """Search on two threads; returns the statistics of both, or None if one thread must repeat the search."""
     also, statistics, done = Found.of(edges.n, len(found.label)), np.zeros((2, 3), np.int64), []
-    first, second = _front(edges, found), _front(edges, also)
+    first, second = (windows.Front(edges.tables, each, TOLERANCE) for each in (found, also))
     bounds = np.full((2, edges.n), np.inf)
     window_pairs.pair(first, second, bounds[0], bounds[1], _ROUND * float(edges.tables.length.mean()), _PLENTY)
     calls: list[Callable[[], bool]] = [

@@ -14,16 +14,14 @@ which shortest paths can bend (`window_bends`).
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.windows.window_memory import allocate, empty_front, free_front
 from cython.cimports.heat_igl.kernels.windows.window_queue import push
 from cython.cimports.heat_igl.kernels.windows.window_search import run
 from cython.cimports.heat_igl.kernels.windows.window_sharing import run_beside
 from cython.cimports.heat_igl.kernels.windows.window_sources import start_at
-from cython.cimports.heat_igl.kernels.windows.window_structures import MARGIN, Search
-from cython.cimports.libc.math import INFINITY
+from cython.cimports.heat_igl.kernels.windows.window_structures import Search
 
-__all__ = ["Front", "contradicts", "search"]
+__all__ = ["Front", "search"]
 
 
 class Front:
@@ -39,8 +37,6 @@ class Front:
         found yet at n vertices, with labels for as many source points and segments as there will be.
     tolerance : float
         A window is cut where another path is shorter by more than this fraction of the distance.
-    merging : float
-        The largest error of a distance, as a fraction of it: within this, windows side by side become one.
     leaving : Leaving, optional
         Takes in which direction the straight last parts of the paths leave their roots, see `window_distances.relax`:
         on surfaces whose faces are oriented alike.
@@ -56,7 +52,6 @@ class Front:
         tolerance: cython.double,
         leaving=None,
         position: cython.const[cython.double][::1] = None,
-        merging: cython.double = 0.0,
     ) -> None:
         s: cython.pointer(Search) = cython.address(self.state)
         n = len(tables.corner_of_vertex)
@@ -77,7 +72,6 @@ class Front:
             s.position = cython.cast(cython.p_double, cython.address(position[0]))
         s.aim = -1
         s.tolerance = tolerance
-        s.merging = merging
         s.n_points = s.n_segments = s.n_targets = s.n_goals = 0
         s.first_target = cython.NULL
 
@@ -165,24 +159,6 @@ def search(
     statistics[1] = s.n_windows
     statistics[2] = s.n_lists_done
     return not s.failed
-
-
-def contradicts(front: Front) -> bool:
-    """Whether distances after a `search` for all vertices grow faster than along edges, by more than their error."""
-    s: cython.pointer(Search) = cython.address(front.state)
-    h: cython.int
-    a: cython.double
-    b: cython.double
-    along: cython.double
-    with cython.nogil:
-        for h in range(s.n_half_edges):
-            a = s.distance[s.vertex[next_half_edge(h)]]
-            b = s.distance[s.vertex[previous_half_edge(h)]]
-            along = min(a, b) + s.length[h]
-            if along <= s.cutoff and along < INFINITY and max(a, b) > along * (1.0 + 3.0 * s.merging + MARGIN):
-                with cython.gil:
-                    return True
-    return False
 
 
 @cython.cfunc

@@ -54,8 +54,6 @@ def _emit(
     one.root = root
     one.corner = k
     one.turn_x, one.turn_y = 0.5 * twice_product(length, right, left) / (length * right), -one.depth / right
-    if s.merging > 0.0:
-        one.turn_x = s.merging * offset
     one.side = one.is_plane = 0
     if one.depth > 0.0:
         add(s, k, cython.address(one), 1, False)

@@ -17,8 +17,7 @@ cdef extern from *:
     ctypedef struct Window:
         double x, depth      # the root laid out in the plane lies at (x, -depth); of a plane, the direction of the lines
         # The half-edge as a unit vector in the frame of `corner`; of a plane, how far along the segment the line
-        # through the tail starts, and 1 if lines leave the segment to the left, -1 to the right. In a search with a
-        # tolerance, the first is the error that a window has taken on instead, unless it is a plane.
+        # through the tail starts, and 1 if lines leave the segment to the left, -1 to the right.
         double turn_x, turn_y
         double start, stop   # from where to where along the half-edge
         double offset        # distance of the root; of a plane, the distance that it gives the tail
@@ -123,7 +122,6 @@ cdef struct Search:
     bint failed
     long long n_windows, n_lists_done
     double tolerance
-    double merging       # the largest error, as a fraction of the distance
     # Where the search ends: at a distance, or, if so many vertices are asked for, once the nearest are known.
     double cutoff
     double last_key      # what has a larger key can change nothing that is asked for
@@ -189,8 +187,8 @@ cdef extern from *:
     #define FLATNESS 1e-12
     // Looks at the lock of another thread before it is waited for.
     #define TRIES 2000
-    // How far behind merged windows their root lies at most, in lengths of the part of the half-edge.
-    #define FARTHEST 256.0
+    // Overlaps of less than this fraction of a half-edge are left too: rays from bends are widened by so much.
+    #define SLIVER 1e-5
     // What a list costs beside its windows, in windows.
     #define PER_LIST 4
     """
@@ -200,7 +198,7 @@ cdef extern from *:
     double NEAR
     double SAME
     double OVERLAP
-    double FARTHEST
+    double SLIVER
     double MARGIN
     double FLATNESS
     int TRIES

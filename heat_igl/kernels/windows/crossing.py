@@ -127,13 +127,8 @@ def _reach_apex(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _to_left(
-    w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window), turns: cython.bint
-) -> cython.bint:
-    """Make the window over the side between the tail and the apex; true if there is one.
-
-    Without `turns` windows are not asked where their lines leave the root.
-    """
+def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
+    """Make the window over the side between the tail and the apex; true if there is one."""
     scale: cython.double
     out[0] = w[0]
     if w.is_plane:
@@ -142,9 +137,8 @@ def _to_left(
     else:
         out.x = w.x * apex.cos_left - w.depth * apex.sin_left
         out.depth = w.x * apex.sin_left + w.depth * apex.cos_left
-        if turns:
-            out.turn_x = w.turn_x * apex.cos_left - w.turn_y * apex.sin_left
-            out.turn_y = w.turn_x * apex.sin_left + w.turn_y * apex.cos_left
+        out.turn_x = w.turn_x * apex.cos_left - w.turn_y * apex.sin_left
+        out.turn_y = w.turn_x * apex.sin_left + w.turn_y * apex.cos_left
     if out.depth <= 0.0:
         return False
     scale = w.depth * apex.cos_left
@@ -163,9 +157,7 @@ def _to_left(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _to_right(
-    w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window), turns: cython.bint
-) -> cython.bint:
+def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
     """Make the window over the side between the apex and the head; true if there is one."""
     scale: cython.double
     x: cython.double = apex.length - w.x
@@ -178,9 +170,8 @@ def _to_right(
     else:
         out.x = apex.right_length - (x * apex.cos_right - w.depth * apex.sin_right)
         out.depth = x * apex.sin_right + w.depth * apex.cos_right
-        if turns:
-            out.turn_x = w.turn_x * apex.cos_right + w.turn_y * apex.sin_right
-            out.turn_y = w.turn_y * apex.cos_right - w.turn_x * apex.sin_right
+        out.turn_x = w.turn_x * apex.cos_right + w.turn_y * apex.sin_right
+        out.turn_y = w.turn_y * apex.cos_right - w.turn_x * apex.sin_right
     if out.depth <= 0.0:
         return False
     scale = w.depth * apex.cos_right
@@ -214,7 +205,7 @@ def _place(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _goes_on(
+def _continues(
     w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window), to_left: cython.bint
 ) -> cython.bint:
     """Whether `out` lies on its side, and begins and ends at the first and the last line of w, or at the apex.
@@ -256,9 +247,9 @@ def _is_behind(
     place: cython.double
     i: cython.int
     if to_left:
-        if not _to_left(w, apex, cython.address(out), False):
+        if not _to_left(w, apex, cython.address(out)):
             return True
-    elif not _to_right(w, apex, cython.address(out), False):
+    elif not _to_right(w, apex, cython.address(out)):
         return True
     for i in range(2):
         place = out.stop if i else out.start
@@ -294,7 +285,6 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     apex: Apex
     w: cython.pointer(Window)
     is_best: cython.bint
-    turns: cython.bint = s.merging == 0.0
     _fetch(s, s.twin[previous_half_edge(h)])
     _fetch(s, s.twin[next_half_edge(h)])
     s.slot[h] = -1
@@ -321,8 +311,8 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
             or w.start < apex.best_at
             or (w.side != AROUND_APEX and not apex.nearest <= bent(w, w.stop, apex.x, apex.y))
         ):
-            if _to_left(w, cython.address(apex), s.to_left + n_left, turns):
-                assert _goes_on(w, cython.address(apex), s.to_left + n_left, True)
+            if _to_left(w, cython.address(apex), s.to_left + n_left):
+                assert _continues(w, cython.address(apex), s.to_left + n_left, True)
                 n_left += 1
         else:
             assert w.side == RIGHT_OF_APEX or _is_behind(w, cython.address(apex), windows + apex.best, True)
@@ -331,8 +321,8 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
             or w.stop > apex.best_at
             or (w.side != AROUND_APEX and not apex.nearest <= bent(w, w.start, apex.x, apex.y))
         ):
-            if _to_right(w, cython.address(apex), s.to_right + n_right, turns):
-                assert _goes_on(w, cython.address(apex), s.to_right + n_right, False)
+            if _to_right(w, cython.address(apex), s.to_right + n_right):
+                assert _continues(w, cython.address(apex), s.to_right + n_right, False)
                 n_right += 1
         else:
             assert w.side == LEFT_OF_APEX or _is_behind(w, cython.address(apex), windows + apex.best, False)
