@@ -125,7 +125,7 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
         return Plan("sweep", None, "between points the triangles are an estimate themselves")
     if method == "exact" or tolerance == 0:
         return Plan("windows", 0.0, "exact distance was asked for")
-    return Plan("windows", float(tolerance), "windows have a bound on their error, and need no factor")
+    return Plan("windows", float(tolerance), "windows are exact, which holds every tolerance, and need no factor")
 
 
 def sweep_plan(measures: SurfaceMeasures, plan: Plan) -> Plan:

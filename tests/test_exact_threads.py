@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from conftest import perturbed
@@ -77,14 +75,14 @@ def test_two_threads_find_what_one_finds_from_curves():
 
 def test_the_second_thread_has_a_share(monkeypatch):
     """Without this, equal distances could be those of one thread that did all."""
-    shares = []
+    shares, alone = [], windows.search
 
     def search(*arguments):
-        done = windows.search(*arguments)
+        done = alone(*arguments)
         shares.append(int(arguments[-1][1]))
         return done
 
-    monkeypatch.setattr(window_search, "windows", SimpleNamespace(Front=windows.Front, search=search))
+    monkeypatch.setattr(windows, "search", search)
     surface = ExactSurface(intrinsic_triangulation(ZOO["rough sphere"]()))
     found = surface.solve(np.array([0]), threads=2)
     assert len(shares) == 2

@@ -14,7 +14,7 @@ import heat_igl
 from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, Mesh, SurfacePoints, shapes
 from heat_igl.heat_method.checking import Comparisons
 from heat_igl.kernels.sweep import sweeping
-from heat_igl.kernels.windows import local_windows
+from heat_igl.kernels.windows import windows
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.steps import PoissonProblem
 from heat_igl.typing import FloatArray
@@ -167,14 +167,14 @@ WRONG: dict[str, Callable[[FloatArray], object]] = {
 @pytest.mark.parametrize("query", LOCAL)
 def test_local_answers_that_are_wrong_are_found_again(monkeypatch: pytest.MonkeyPatch, query: str, wrong: str) -> None:
     mesh, _ = two_squares()
-    right, search = LOCAL[query](mesh), local_windows.search_each
+    right, search = LOCAL[query](mesh), windows.search_each
 
     def step(*arguments: Any) -> int:
         done = search(*arguments)
         WRONG[wrong](arguments[8][: arguments[9][0]])
         return done
 
-    monkeypatch.setattr(local_windows, "search_each", step)
+    monkeypatch.setattr(windows, "search_each", step)
     with pytest.warns(AccuracyWarning, match="contradicted themselves .* found again"):
         found = LOCAL[query](mesh)
     np.testing.assert_allclose(found, right, rtol=1e-6)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.intrinsic import intrinsic_triangulation
-from heat_igl.kernels.windows import window_paths
+from heat_igl.kernels.windows import paths
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -142,7 +142,7 @@ def _traced(edges: HalfEdges, done: Searched, starts: PathStarts) -> tuple[AnyAr
     room = _ROOM
     while True:
         face, place, ends = np.empty(room, np.int32), np.empty((room, 2, 3)), np.zeros(len(starts.vertex), np.int64)
-        n_done = window_paths.trace_back(edges.tables, done.found, done.starts, starts, face, place, ends)
+        n_done = paths.trace_back(edges.tables, done.found, done.starts, starts, face, place, ends)
         if n_done == len(starts.vertex):
             n = ends[-1] if n_done else 0
             return face[:n], place[:n], ends

@@ -9,7 +9,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import corner_angles, intrinsic_triangulation, polar_angles
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
-from heat_igl.kernels.windows.window_surface import SEVERAL_FANS
+from heat_igl.kernels.windows.surface import SEVERAL_FANS
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges, from_mesh

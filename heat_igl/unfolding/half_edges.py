@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, lay_out
 from heat_igl.kernels.mesh import numbering
-from heat_igl.kernels.windows import window_surface
+from heat_igl.kernels.windows.surface import shapes
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
@@ -42,7 +42,7 @@ _LARGEST_EXPONENT = 1000
 
 
 class Tables(NamedTuple):
-    """What the kernel reads, in its order; see `heat_igl.kernels.windows.window_surface.shapes`."""
+    """What the kernel reads, in its order; see `heat_igl.kernels.windows.surface.shapes`."""
 
     vertex: AnyArray
     length: FloatArray
@@ -141,7 +141,7 @@ class HalfEdges:
             "n_corners": np.zeros(n, np.int32),
             "kind": np.zeros(n, np.uint8),
         }
-        is_delaunay = window_surface.shapes(vertex, length, twin, **derived)
+        is_delaunay = shapes(vertex, length, twin, **derived)
         self.tables = Tables(vertex, length, twin, aligned, ring, **derived, is_delaunay=is_delaunay)
 
     @cached_property

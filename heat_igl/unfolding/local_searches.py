@@ -10,7 +10,7 @@ import numpy as np
 
 from heat_igl.kernels.mesh import checking
 from heat_igl.kernels.signals import raise_caught
-from heat_igl.kernels.windows import local_windows, windows
+from heat_igl.kernels.windows import windows
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.half_edges import HalfEdges
@@ -48,7 +48,7 @@ class Chunk(NamedTuple):
 class Near(NamedTuple):
     """The number of vertices found from each source, and the vertices and their distances, source after source.
 
-    From a directed search, `way` and `line` (r, 3) say how the path to each runs, see `local_windows.search_each`.
+    From a directed search, `way` and `line` (r, 3) say how the path to each runs, see `windows.search_each`.
     What was found from a source `is_wrong` if it contradicts straight lines or the lengths of edges.
     """
 
@@ -95,7 +95,7 @@ class Workspace:
     ) -> IntArray:
         """Search from each of `sources`; returns the end of the results of each source whose results fitted."""
         ends = np.zeros(len(sources), np.int64)
-        n_done = local_windows.search_each(
+        n_done = windows.search_each(
             self._front,
             sources,
             goals,

@@ -1,6 +1,6 @@
 """Derivatives of the lengths of the paths that a query found, by the lengths of the edges.
 
-`heat_igl.kernels.windows.path_derivatives` derives them. A path is known by how it begins at each vertex, its *way*:
+`heat_igl.kernels.windows.derivatives` derives them. A path is known by how it begins at each vertex, its *way*:
 along an edge, or straight across the opposite side of a face, as far as the next vertex on the path;
 from there on it is that vertex's own path.
 """
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation
-from heat_igl.kernels.windows import path_derivatives as kernels
+from heat_igl.kernels.windows import derivatives as kernels
 from heat_igl.mesh import SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.kernels.signals import raise_caught
-from heat_igl.kernels.windows import window_pairs, windows
-from heat_igl.kernels.windows.window_surface import FLAT_VERTEX
+from heat_igl.kernels.windows import windows
+from heat_igl.kernels.windows.surface import FLAT_VERTEX
 from heat_igl.mesh import SurfacePoints
 from heat_igl.runtime import side_by_side
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -95,7 +95,7 @@ class Leaving(NamedTuple):
 
     Notes
     -----
-    For paths from segments a search notes a length along the segment and a side, see `window_distances.relax`;
+    For paths from segments a search notes a length along the segment and a side, see `front.relax`;
     `leaving.with_places` turns both into a direction and a place.
     """
 
@@ -186,7 +186,7 @@ def _beside(edges: HalfEdges, starts: Starts, found: Found, run: _Run) -> IntArr
     also, statistics, done = Found.of(edges.n, len(found.label)), np.zeros((2, 3), np.int64), []
     first, second = (windows.Front(edges.tables, each, TOLERANCE) for each in (found, also))
     bounds = np.full((2, edges.n), np.inf)
-    window_pairs.pair(first, second, bounds[0], bounds[1], _ROUND * float(edges.tables.length.mean()), _PLENTY)
+    windows.pair(first, second, bounds[0], bounds[1], _ROUND * float(edges.tables.length.mean()), _PLENTY)
     calls: list[Callable[[], bool]] = [
         lambda: run(first, starts, statistics[0]),
         lambda: run(second, NO_STARTS, statistics[1]),
@@ -194,7 +194,7 @@ def _beside(edges: HalfEdges, starts: Starts, found: Found, run: _Run) -> IntArr
     try:
         side_by_side(lambda call: done.append(call()), calls)
     finally:
-        is_same = window_pairs.part(first, second)
+        is_same = windows.part(first, second)
     _require(all(done))
     found.take_nearer(also)
     return np.asarray(statistics.sum(axis=0)) if is_same else None

@@ -1,4 +1,6 @@
-from heat_igl.kernels.windows.window_structures cimport Search
+from heat_igl.kernels.windows.structures cimport Search, Window
 
+cdef int trim(Search* s, Window* windows, int n, int h) noexcept nogil
+cdef bint is_covered(Search* s, const Window* before, int n_before, const Window* windows, int n, int h) noexcept nogil
 cdef void cross(Search* s, int h) noexcept nogil
 cdef void over_corners(Search* s, int j) noexcept nogil

@@ -1,17 +1,28 @@
-"""Windows cross a face: they give distances to the opposite vertex and the targets inside, and windows on two sides."""
+"""Windows cross a face: trimmed before it, they give distances to the opposite vertex and go on over two sides.
+
+They lose the parts of their half-edge that another path reaches sooner: over an end of the half-edge (Xin and Wang
+2009), or through another window of the list.
+"""
 
 import cython
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
-from cython.cimports.heat_igl.kernels.windows.window_distances import relax, take
-from cython.cimports.heat_igl.kernels.windows.window_lists import add
-from cython.cimports.heat_igl.kernels.windows.window_memory import more_room
-from cython.cimports.heat_igl.kernels.windows.window_structures import (
+from cython.cimports.heat_igl.kernels.windows.front import add, more_room, relax, take
+from cython.cimports.heat_igl.kernels.windows.structures import (
     AROUND_APEX,
     LEFT_OF_APEX,
     NARROW,
     NEAR,
+    OVERLAP,
     RIGHT_OF_APEX,
+    ROUNDING,
+    SAME,
+    SLIVER,
+    U_NEARER,
+    U_THEN_W,
+    UNDECIDED,
+    W_NEARER,
+    W_THEN_U,
     Apex,
     List,
     Search,
@@ -25,9 +36,413 @@ from cython.cimports.heat_igl.kernels.windows.window_structures import (
     reach,
     twice_product,
 )
-from cython.cimports.heat_igl.kernels.windows.window_trimming import is_covered, trim
-from cython.cimports.libc.math import INFINITY, sqrt
-from cython.cimports.libc.string import memcpy
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
+from cython.cimports.libc.string import memcpy, memmove
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
+    """Derivative, along the half-edge, of the length `reached` that a window adds to its offset."""
+    return w.x if w.is_plane else (at - w.x) / reached
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _excess(
+    u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, slope: cython.p_double
+) -> cython.double:
+    """Distance by u less that by w; `slope` takes a number with the sign of the derivative of this difference."""
+    a: cython.double = reach(u, at)
+    b: cython.double = reach(w, at)
+    if u.is_plane or w.is_plane:
+        slope[0] = _slope(u, at, a) - _slope(w, at, b)
+    else:
+        slope[0] = (at - u.x) * b - (at - w.x) * a
+    return (u.offset - w.offset) + a - b
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _meeting(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    at_low: cython.double,
+    at_high: cython.double,
+    shift: cython.double,
+    slope: cython.p_double,
+) -> cython.double:
+    """The point at which distance by u less that by w, plus `shift`, is 0: Newton's method inside a bracket.
+
+    The bracket is [low, high], with the values `at_low` and `at_high` of opposite signs. `slope` takes the derivative.
+    """
+    x: cython.double = low + (high - low) * at_low / (at_low - at_high)
+    y: cython.double
+    a: cython.double
+    b: cython.double
+    _: cython.int
+    shift += u.offset - w.offset
+    for _ in range(8):
+        a = reach(u, x)
+        b = reach(w, x)
+        y = shift + a - b
+        if (y < 0.0) == (at_low < 0.0):
+            low = x
+        else:
+            high = x
+        slope[0] = _slope(u, x, a) - _slope(w, x, b)
+        if fabs(y) <= 1e-15 * (fabs(a) + fabs(u.offset)):
+            break
+        if slope[0] != 0.0:
+            x -= y / slope[0]
+        if not (low < x < high):
+            x = 0.5 * (low + high)
+    return x
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _compare_squares(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    until: cython.p_double,
+) -> cython.int:
+    """`_compare` for roots with the same offset: the difference of the squares of both distances is linear."""
+    # |x - u|^2 - |x - w|^2 = b - a x
+    a: cython.double = 2.0 * (u.x - w.x)
+    b: cython.double = (u.x - w.x) * (u.x + w.x) + (u.depth - w.depth) * (u.depth + w.depth)
+    at_low: cython.double = b - a * low
+    at_high: cython.double = b - a * high
+    reached: cython.double = fabs(low - u.x) + u.depth
+    margin: cython.double = 2.0 * ROUNDING * (u.offset + reached) * reached
+    if at_low < -margin and at_high < -margin:
+        return U_NEARER
+    if at_low > margin and at_high > margin:
+        return W_NEARER
+    if a == 0.0:
+        return UNDECIDED
+    a = 1.0 / a
+    if a < 0.0:
+        until[0] = high if at_high <= margin else (b - margin) * a
+        until[1] = low if at_low >= -margin else (b + margin) * a
+        return U_THEN_W
+    until[0] = low if at_low <= margin else (b - margin) * a
+    until[1] = high if at_high >= -margin else (b + margin) * a
+    return W_THEN_U
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _ordered(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    at_low: cython.double,
+    at_high: cython.double,
+    slope_low: cython.double,
+    slope_high: cython.double,
+    margin: cython.double,
+    until: cython.p_double,
+) -> cython.int:
+    """`_compare`, if u is nearer at one end and w is at most at the other; by the excess and its slope at both."""
+    a: cython.double
+    b: cython.double
+    if at_high < -margin:
+        # The difference has at most one extremum: for two roots, where the line through both meets the half-edge.
+        if slope_low <= 0.0 or slope_high >= 0.0:
+            return U_NEARER
+        a = u.x - w.x
+        b = u.depth - w.depth
+        is_farther: cython.bint = u.offset <= w.offset and a * a + b * b <= (u.offset - w.offset) ** 2
+        return U_NEARER if is_farther and not (u.is_plane or w.is_plane) else UNDECIDED
+    if at_low < -margin and at_high > margin:
+        a = _meeting(u, w, low, high, at_low, at_high, 0.0, cython.address(slope_low))
+        # The difference grows to the margin within this, as it grows further before its extremum.
+        b = 2.0 * margin / fabs(slope_low) if slope_low != 0.0 else high - low
+        until[0], until[1] = min(a + b, high), max(a - b, low)
+        return U_THEN_W
+    # Equally near at one end, or at both.
+    until[0], until[1] = high, low
+    if at_low < -margin:
+        if slope_high >= 0.0:
+            until[1] = _meeting(u, w, low, high, at_low + margin, at_high + margin, margin, cython.address(slope_low))
+        return U_THEN_W
+    if at_high > margin:
+        if slope_low >= 0.0:
+            until[0] = _meeting(u, w, low, high, at_low - margin, at_high - margin, -margin, cython.address(slope_low))
+        return U_THEN_W
+    return UNDECIDED
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _compare(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    until: cython.p_double,
+) -> cython.int:
+    """Which of two windows is nearer between two points, by more than rounding.
+
+    If one is nearer at one end and the other at the other, `until` takes the points up to which u and w are needed.
+    """
+    at_low: cython.double
+    at_high: cython.double
+    slope_low: cython.double
+    slope_high: cython.double
+    margin: cython.double
+    order: cython.int
+    if u.offset == w.offset and not (u.is_plane or w.is_plane):
+        return _compare_squares(u, w, low, high, until)
+    at_low = _excess(u, w, low, cython.address(slope_low))
+    at_high = _excess(u, w, high, cython.address(slope_high))
+    margin = ROUNDING * (fabs(u.offset) + reach(u, low))
+    # Where w comes first, u and w change places.
+    if at_low > margin or (at_low >= -margin and at_high < -margin):
+        order = _ordered(w, u, low, high, -at_low, -at_high, -slope_low, -slope_high, margin, until)
+        until[0], until[1] = until[1], until[0]
+        return W_NEARER if order == U_NEARER else W_THEN_U if order == U_THEN_W else UNDECIDED
+    return _ordered(u, w, low, high, at_low, at_high, slope_low, slope_high, margin, until)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _gives_way(
+    u: cython.pointer(Window), w: cython.pointer(Window), low: cython.double, high: cython.double
+) -> cython.int:
+    """Cut w between two points where u is nearer. 2: w is gone, 4: what is left comes before u, 0: or behind."""
+    if low <= w.start:
+        if high >= w.stop:
+            return 2
+        w.start = high
+        return 0
+    if high >= w.stop:
+        w.stop = low
+        return 4
+    return 4 if w.start < u.start and w.stop < u.stop else 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _settle(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double) -> cython.int:
+    """Cut two windows of one half-edge where the other is nearer. 1: u is gone, 2: w is gone, 4: w comes before u.
+
+    What overlaps by little, of both or of the half-edge, is left: it seldom pays to compare.
+    """
+    low: cython.double = u.start if u.start > w.start else w.start
+    high: cython.double = u.stop if u.stop < w.stop else w.stop
+    until: cython.double[2]
+    order: cython.int
+    first: cython.int = 4 if w.start < u.start and w.stop < u.stop else 0
+    if low >= high:
+        return first
+    if high - low < sliver or (high - low < OVERLAP * (u.stop - u.start) and high - low < OVERLAP * (w.stop - w.start)):
+        return first
+    order = _compare(u, w, low, high, until)
+    if order == U_NEARER:
+        return _gives_way(u, w, low, high)
+    if order == W_NEARER:
+        order = _gives_way(w, u, low, high)
+        if order == 2:
+            return 1
+        # What is left of u comes before w, unless w comes first.
+        return 4 if order == 0 and w.start < u.start else 0
+    if order == U_THEN_W:
+        if high >= u.stop:
+            u.stop = until[0]
+        if low <= w.start:
+            w.start = until[1]
+    elif order == W_THEN_U:
+        if high >= w.stop:
+            w.stop = until[1]
+        if low <= u.start:
+            u.start = until[0]
+        return 4
+    return first
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) -> cython.bint:
+    """Cut what is nearer over the ends of the half-edge; whether anything is left.
+
+    The way over the tail is longer than the offset of the window by `a` plus the place on the half-edge, the one over
+    the head by `b` minus the place.
+    """
+    p: cython.double
+    q: cython.double
+    r: cython.double
+    square: cython.double
+    if w.is_plane:
+        if w.x * w.stop > a + w.stop or w.x * w.start > b - w.start:
+            return False
+        if w.x * w.start > a + w.start:
+            w.start = a / (w.x - 1.0)
+        if w.x * w.stop > b - w.stop:
+            w.stop = b / (w.x + 1.0)
+        return True
+    square = w.depth * w.depth
+    p = (w.start - w.x) * (w.start - w.x) + square
+    q = (w.stop - w.x) * (w.stop - w.x) + square
+    r = a + w.stop
+    if r < 0.0 or q > r * r:
+        return False
+    r = b - w.start
+    if r < 0.0 or p > r * r:
+        return False
+    r = a + w.start
+    if r < 0.0 or p > r * r:
+        r = 2.0 * (a + w.x)
+        if r > 0.0:
+            r = (w.x * w.x + square - a * a) / r
+            if r > w.start:
+                w.start = r
+    r = b - w.stop
+    if r < 0.0 or q > r * r:
+        r = 2.0 * (b - w.x)
+        if r > 0.0:
+            r = (b * b - w.x * w.x - square) / r
+            if r < w.stop:
+                w.stop = r
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cython.double) -> cython.bint:
+    """Whether w continues u: two halves that passed a flat vertex."""
+    return (
+        fabs(u.x - w.x) <= SAME * (fabs(w.x) + w.depth)
+        and u.root == w.root
+        and fabs(u.offset - w.offset) <= (SAME * (fabs(w.offset) + length) if w.is_plane else 0.0)
+        and fabs(u.depth - w.depth) <= SAME * (fabs(w.x) + w.depth)
+        and u.start <= w.start <= u.stop + NARROW * length
+    )
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _insert(
+    windows: cython.pointer(Window),
+    k: cython.int,
+    w: cython.pointer(Window),
+    length: cython.double,
+) -> cython.int:
+    """Add a window to k that lie side by side, after cutting all where another is nearer; how many there are then.
+
+    The window may stand in the same array, behind the k.
+    """
+    j: cython.int = k
+    outcome: cython.int
+    moved: Window
+    narrow: cython.double = NARROW * length
+    while j > 0:
+        outcome = _settle(cython.address(windows[j - 1]), w, SLIVER * length)
+        if outcome == 1 or windows[j - 1].stop - windows[j - 1].start <= narrow:
+            # remove j - 1
+            if j < k:
+                memmove(windows + (j - 1), windows + j, (k - j) * cython.sizeof(Window))
+            k -= 1
+            j -= 1
+            if outcome == 2:
+                return k
+            continue
+        if outcome == 2 or w.stop - w.start <= narrow:
+            return k
+        if outcome == 4:
+            j -= 1
+            continue
+        break
+    if j < k:
+        moved = w[0]
+        memmove(windows + (j + 1), windows + j, (k - j) * cython.sizeof(Window))
+        windows[j] = moved
+        return k + 1
+    if j > 0 and _goes_on(cython.address(windows[j - 1]), w, length):
+        if w.stop > windows[j - 1].stop:
+            windows[j - 1].stop = w.stop
+        return k
+    if w != windows + j:
+        windows[j] = w[0]
+    return k + 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int) -> cython.int:
+    """Cut from windows what a path over an end of the half-edge or another window makes useless; how many are left."""
+    i: cython.int
+    k: cython.int = 0
+    w: cython.pointer(Window)
+    length: cython.double = s.length[h]
+    from_tail: cython.double = s.upper[s.vertex[next_half_edge(h)]]
+    from_head: cython.double = s.upper[s.vertex[previous_half_edge(h)]]
+    # Of the length too: straight past a vertex near the root, both ways round to the same number.
+    from_tail += s.tolerance * (from_tail + length)
+    from_head += s.tolerance * (from_head + length)
+    from_head += length
+    for i in range(n):
+        w = windows + i
+        if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset):
+            continue
+        if w.stop - w.start > NARROW * length:
+            k = _insert(windows, k, w, length)
+    return k
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def is_covered(
+    s: cython.pointer(Search),
+    before: cython.pointer(cython.const[Window]),
+    n_before: cython.int,
+    windows: cython.pointer(cython.const[Window]),
+    n: cython.int,
+    h: cython.int,
+) -> cython.bint:
+    """Whether n trimmed windows, and the ends of the half-edge, lead to all points of the windows before as shortly."""
+    length: cython.double = s.length[h]
+    at: cython.double
+    reached: cython.double
+    nearest: cython.double
+    i: cython.int
+    j: cython.int
+    k: cython.int
+    w: cython.pointer(cython.const[Window])
+    for i in range(n_before):
+        for j in range(5):
+            at = before[i].start + 0.25 * j * (before[i].stop - before[i].start)
+            reached = before[i].offset + reach(before + i, at)
+            nearest = s.upper[s.vertex[next_half_edge(h)]] + at
+            nearest = min(nearest, s.upper[s.vertex[previous_half_edge(h)]] + (length - at))
+            for k in range(n):
+                w = windows + k
+                if w.start - 2.0 * NARROW * length <= at <= w.stop + 2.0 * NARROW * length:
+                    nearest = min(nearest, w.offset + reach(w, at))
+            if not is_within(nearest, reached, length):
+                return False
+    return True
 
 
 @cython.cfunc

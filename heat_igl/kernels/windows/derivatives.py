@@ -13,7 +13,7 @@ the order of distance.
 
 import cython
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.windows.path_lines import AT_SOURCE, Gate, Lines, Place
+from cython.cimports.heat_igl.kernels.windows.lines import AT_SOURCE, Gate, Lines, Place
 from cython.cimports.libc.math import sqrt
 
 __all__ = ["pull_back", "push_forward"]

@@ -1,20 +1,305 @@
-"""Windows that wait: lists at half-edges, each with a key.
+"""The front of a search: windows that wait in lists at half-edges, the queue of what comes next, and distances found.
 
 The square of the key of a list is the power of the root with respect to the circle around the face that is entered
 next. On a Delaunay triangulation that power grows along every straight line from the root, it is no larger than the
 square of the distance of any vertex ahead, and it sorts faces from front to back. So a list is nearly always complete
 when its turn comes, a face is crossed once from each side, and no vertex can come nearer than the key. On other
 triangulations the key is the distance of the nearest point of the windows.
+
+In a search for the distance of one goal, windows that cannot lead to it on a shortest path are left out.
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge
-from cython.cimports.heat_igl.kernels.windows.window_goal import towards_goal
-from cython.cimports.heat_igl.kernels.windows.window_queue import push
-from cython.cimports.heat_igl.kernels.windows.window_structures import List, Search, Window
+from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.windows.structures import (
+    FLAT,
+    PASSED,
+    UNKNOWN,
+    Entry,
+    List,
+    Search,
+    Window,
+    reach,
+    straight,
+)
+from cython.cimports.heat_igl.kernels.windows.surface import classify, third
 from cython.cimports.libc.math import INFINITY, sqrt
-from cython.cimports.libc.stdlib import realloc
+from cython.cimports.libc.stdlib import free, malloc, realloc
 from cython.cimports.libc.string import memcpy, memmove
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def allocate(s: cython.pointer(Search)) -> cython.void:
+    """Room for a front."""
+    s.n_lists = s.n_made_lists = s.n_heap = s.n_touched = s.n_found = 0
+    s.n_all_lists, s.n_all_heap, s.n_out = 256, 1024, 256
+    s.free_list = -1
+    s.failed = s.meets_flat = s.is_shared = False
+    s.n_windows = s.n_lists_done = s.n_waiting = 0
+    s.n_nearest = s.n_all_ranked = 0
+    s.ranked = cython.NULL
+    s.lists = cython.cast(cython.pointer(List), malloc(s.n_all_lists * cython.sizeof(List)))
+    s.heap = cython.cast(cython.pointer(Entry), malloc(s.n_all_heap * cython.sizeof(Entry)))
+    s.to_left = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
+    s.to_right = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
+    if s.lists == cython.NULL or s.heap == cython.NULL or s.to_left == cython.NULL or s.to_right == cython.NULL:
+        s.failed = True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def more_room(s: cython.pointer(Search), n: cython.int) -> cython.void:
+    """Room for n windows on each side of an apex."""
+    s.n_out = 2 * n
+    free(s.to_left)
+    free(s.to_right)
+    s.to_left = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
+    s.to_right = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
+    if s.to_left == cython.NULL or s.to_right == cython.NULL:
+        s.failed = True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def empty_front(s: cython.pointer(Search)) -> cython.void:
+    """Drop all that waits; lists and queue keep their room."""
+    i: cython.int
+    for i in range(s.n_lists):
+        if s.lists[i].half_edge >= 0:
+            s.slot[s.lists[i].half_edge] = -1
+    s.n_lists = s.n_heap = 0
+    s.n_waiting = 0
+    s.free_list = -1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def free_front(s: cython.pointer(Search)) -> cython.void:
+    """Return the memory of a front."""
+    i: cython.int
+    for i in range(s.n_made_lists):
+        free(s.lists[i].windows)
+    free(s.lists)
+    free(s.heap)
+    free(s.to_left)
+    free(s.to_right)
+    free(s.ranked)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cython.void:
+    """Add to the queue, a binary heap."""
+    i: cython.int
+    above: cython.int
+    if s.n_heap == s.n_all_heap:
+        more: cython.pointer(Entry) = cython.cast(
+            cython.pointer(Entry), realloc(s.heap, 2 * s.n_all_heap * cython.sizeof(Entry))
+        )
+        if more == cython.NULL:
+            s.failed = True
+            return
+        s.heap = more
+        s.n_all_heap *= 2
+    i = s.n_heap
+    s.n_heap += 1
+    while i > 0:
+        above = (i - 1) // 2
+        if s.heap[above].key <= key:
+            break
+        s.heap[i] = s.heap[above]
+        i = above
+    s.heap[i].key = key
+    s.heap[i].what = what
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def pop(s: cython.pointer(Search)) -> Entry:
+    """Take the entry with the smallest key."""
+    heap: cython.pointer(Entry) = s.heap
+    top: Entry = heap[0]
+    last: Entry
+    i: cython.int = 0
+    above: cython.int
+    below: cython.int = 1
+    s.n_heap -= 1
+    last = heap[s.n_heap]
+    # From below: the gap goes down to a leaf, without a branch that depends on keys, and the last entry seldom rises.
+    while below + 1 < s.n_heap:
+        below += heap[below + 1].key < heap[below].key
+        heap[i] = heap[below]
+        i = below
+        below = 2 * i + 1
+    if below < s.n_heap:
+        heap[i] = heap[below]
+        i = below
+    while i > 0:
+        above = (i - 1) // 2
+        if heap[above].key <= last.key:
+            break
+        heap[i] = heap[above]
+        i = above
+    heap[i] = last
+    return top
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython.void:
+    """Let the search from v be one for the distance of `goal` alone, and bound that by a path along edges.
+
+    From each vertex, the path takes the edge that makes the way to the goal shortest, were it straight from there on.
+    Where that comes no nearer to the goal, there is no bound.
+    """
+    k: cython.int
+    h: cython.int
+    i: cython.int
+    best: cython.int
+    length: cython.double = 0.0
+    along: cython.double
+    left: cython.double
+    shortest: cython.double
+    s.aim = goal
+    s.within = INFINITY
+    left = straight(s, v)
+    while v != goal:
+        shortest = INFINITY
+        best = -1
+        k = s.corner_of_vertex[v]
+        while k >= 0:
+            for i in range(2):
+                h = next_half_edge(k) if i == 0 else previous_half_edge(k)
+                along = s.length[third(k, h)]
+                if along + straight(s, s.vertex[h]) < shortest:
+                    shortest = along + straight(s, s.vertex[h])
+                    best = s.vertex[h]
+            k = s.next_corner[k]
+        if best < 0 or straight(s, best) >= left:
+            return
+        v = best
+        left = straight(s, v)
+        length += shortest - left
+    s.within = with_rounding(length)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def towards_goal(s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int) -> cython.int:
+    """Keep the windows over e through which a path to the goal may be as short as the one known; how many they are.
+
+    No path from a point of e to the goal is shorter than the straight line from an end of e, less the way to that end.
+    With the distance of the point added, this falls from one end to the other, so it is least at an end of the window.
+    """
+    i: cython.int
+    k: cython.int = 0
+    w: cython.pointer(Window)
+    # As seen by the windows, whose frame begins at the head of e.
+    from_tail: cython.double = straight(s, s.vertex[previous_half_edge(e)])
+    from_head: cython.double = straight(s, s.vertex[next_half_edge(e)]) - s.length[e]
+    for i in range(n):
+        w = run + i
+        if w.offset + reach(w, w.stop) + (from_tail - w.stop) > s.within:
+            continue
+        if w.offset + reach(w, w.start) + (from_head + w.start) > s.within:
+            continue
+        if k < i:
+            run[k] = run[i]
+        k += 1
+    return k
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def relax(
+    s: cython.pointer(Search),
+    v: cython.int,
+    distance: cython.double,
+    root: cython.int,
+    entered: cython.int,
+    crossing: cython.double,
+    corner: cython.int,
+    x: cython.double,
+    y: cython.double,
+) -> cython.void:
+    """Lower the distance of v to `distance` if that is shorter, and note the path: root, half-edge, and crossing.
+
+    The straight last part of the path leaves the root out of a corner, in the direction (x, y). The frame of a corner
+    begins with the side to the next corner of the face. In the face f of a source point it is that of corner 3 f. Of a
+    segment in face f, x is the length along the segment at which the path starts, and y is 1 if the path leaves to the
+    left and -1 if to the right; both are 0 for corners of the same face.
+    """
+    if distance >= s.upper[v]:
+        return
+    if s.distance[v] == INFINITY:
+        s.touched[s.n_touched] = v
+        s.n_touched += 1
+    s.distance[v] = s.upper[v] = distance
+    s.root[v] = root
+    s.label[v] = s.label[root]
+    s.entered[v] = entered
+    s.crossing[v] = crossing
+    if s.corner != cython.NULL:
+        s.corner[v] = corner
+        s.leaving[2 * v] = x
+        s.leaving[2 * v + 1] = y
+    if s.other != cython.NULL:
+        tell(s, v, distance)
+    if distance > s.last_key:
+        return
+    if s.aim >= 0:
+        if v == s.aim:
+            s.within = min(s.within, with_rounding(distance))
+        elif distance + straight(s, v) > s.within:
+            return
+    if s.kind[v] == UNKNOWN:
+        s.kind[v] = classify(s, v)
+    if s.kind[v] == FLAT:
+        s.meets_flat = True
+    elif s.kind[v] != PASSED:
+        push(s, distance, s.n_half_edges + v)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take(s: cython.pointer(Search), j: cython.int, distance: cython.double, root: cython.int) -> cython.void:
+    """Lower the distance of target j to one along a straight line inside the face, if that is shorter."""
+    if distance < s.target_distance[j]:
+        s.target_distance[j] = distance
+        s.target_root[j] = root
+        s.target_entered[j] = -1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> cython.void:
+    """Note a distance of vertex v for the other of two searches."""
+    n: cython.int = s.n_news[s.parity]
+    room: cython.int = s.n_all_news[s.parity]
+    more: cython.pointer(Entry)
+    if n == room:
+        room = 2 * room + 64
+        more = cython.cast(cython.pointer(Entry), realloc(s.news[s.parity], room * cython.sizeof(Entry)))
+        if more == cython.NULL:
+            s.failed = True
+            return
+        s.news[s.parity] = more
+        s.n_all_news[s.parity] = room
+    s.news[s.parity][n].key = distance
+    s.news[s.parity][n].what = v
+    s.n_news[s.parity] = n + 1
 
 
 @cython.cfunc

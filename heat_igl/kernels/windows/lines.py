@@ -6,7 +6,7 @@ The triangles are laid out in the plane, one behind the other. Unfolding and win
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.windows.path_lines import (
+from cython.cimports.heat_igl.kernels.windows.lines import (
     ALONG_EDGE,
     IN_FACE,
     MEETS,

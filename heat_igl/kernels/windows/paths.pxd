@@ -1,3 +1,20 @@
+cdef class InnerSources:
+    cdef int n, n_points
+    cdef const int[::1] point_face
+    cdef const double[:, ::1] point
+    cdef const double[::1] point_offset
+    cdef const int[::1] segment_face
+    cdef const double[:, :, ::1] segment
+    cdef const double[::1] segment_offset
+
+    cdef int face(self, int root) noexcept nogil
+    cdef double nearest(self, const double* side, int root, double* here, double* found) noexcept nogil
+cdef class PathSegments:
+    cdef int[::1] face
+    cdef double[:, :, ::1] place
+    cdef long long n
+
+    cdef bint append(self, int f, double* start, double* end) noexcept nogil
 cdef struct Bend:
     # Where the straight part of a path ends: barycentric coordinates in a face, and what the search found there.
     int face

@@ -1,20 +1,85 @@
-"""Shortest paths back from where windows arrived: straight through the faces from bend to bend.
-
-Of the straight last part of a path, the search knows the root and the point at which it enters the last face. The line
-from the end of the path through this point, continued over faces laid out in the plane, leads back to the root. A
-vertex on the line counts as a bend if the distance there accounts for the rest of the path, so no side has to be
-chosen. At an edge of more than two faces the path may come from any of them: they are tried one after the other, and a
-line is given up once the distances of the vertices beside it show that it leads away from the source.
-"""
+"""Sources inside faces, points and segments, by their roots: n + i for source i of a surface with n vertices."""
 
 import cython
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.windows.inner_sources import InnerSources
-from cython.cimports.heat_igl.kernels.windows.path_segments import PathSegments
-from cython.cimports.heat_igl.kernels.windows.window_structures import apart, at_corner
+from cython.cimports.heat_igl.kernels.windows.structures import apart, at_corner, nearest_on
 from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["trace_back"]
+__all__ = ["InnerSources", "PathSegments", "trace_back"]
+
+
+@cython.final
+@cython.cclass
+class InnerSources:
+    """Source points and, after them, source segments of a search by windows.
+
+    `n` is the number of vertices, and `starts` are the sources, see `heat_igl.unfolding.window_starts.Starts`.
+    """
+
+    def __init__(self, n, starts):
+        points, segments = starts.points, starts.segments
+        self.n, self.n_points = n, len(points.faces)
+        self.point_face, self.point, self.point_offset = points.faces, points.barycentric, starts.point_offset
+        self.segment_face, self.segment = segments.faces, segments.barycentric
+        self.segment_offset = starts.segment_offset
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def face(self, root: cython.int) -> cython.int:
+        """The face that holds a source; -1 if the root is a vertex."""
+        i: cython.int = root - self.n
+        if i < 0:
+            return -1
+        return self.point_face[i] if i < self.n_points else self.segment_face[i - self.n_points]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def nearest(
+        self,
+        side: cython.pointer[cython.const[cython.double]],
+        root: cython.int,
+        here: cython.p_double,
+        found: cython.p_double,
+    ) -> cython.double:
+        """Find the point of a source that is nearest to a point of its face with these sides; the source's offset."""
+        k: cython.int
+        i: cython.int = root - self.n
+        if i < self.n_points:
+            for k in range(3):
+                found[k] = self.point[i, k]
+            return self.point_offset[i]
+        i -= self.n_points
+        nearest_on(side, cython.address(self.segment[i, 0, 0]), here, found)
+        return self.segment_offset[i]
+
+
+@cython.final
+@cython.cclass
+class PathSegments:
+    """Segments, path after path: `face` (r,) int32, and barycentric coordinates `place` (r, 2, 3) of both ends.
+
+    `n` is how many there are so far.
+    """
+
+    def __init__(self, face, place):
+        self.face, self.place = face, place
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def append(self, f: cython.int, start: cython.p_double, end: cython.p_double) -> cython.bint:
+        """Add a segment in face f; whether there was room."""
+        k: cython.int
+        if self.n == self.face.shape[0]:
+            return False
+        self.face[self.n] = f
+        for k in range(3):
+            self.place[self.n, 0, k] = start[k]
+            self.place[self.n, 1, k] = end[k]
+        self.n += 1
+        return True
 
 
 def trace_back(

@@ -1,37 +1,187 @@
-"""Windows from vertices at which shortest paths can bend: the pseudo-sources of continuous Dijkstra.
+"""Where windows begin: at source vertices, points and segments inside faces, and at vertices where shortest paths bend.
+
+Segments emit parallel lines at a right angle on both sides (Bommes and Kobbelt 2007). Around their ends lines leave in
+all directions: the ends are source points as well.
 
 Paths bend at a vertex with angles that sum to more than 2 pi, into directions at least pi from the arriving path on
-both sides; at the boundary; and, into all faces, at a vertex with several fans.
-
-Two paths to the vertex whose lengths agree to rounding can differ in direction by the square root of that: excess grows
-with the square of the angle. What passes the vertex on its two sides may have come on the other path. So that nothing
-between is left out, the rays that bound the directions of windows from the vertex are moved apart by this angle. Such
-windows are paths too, and are cut where another is shorter.
+both sides; at the boundary; and, into all faces, at a vertex with several fans. Two paths to the vertex whose lengths
+agree to rounding can differ in direction by the square root of that: excess grows with the square of the angle. What
+passes the vertex on its two sides may have come on the other path. So that nothing between is left out, the rays that
+bound the directions of windows from the vertex are moved apart by this angle. Such windows are paths too, and are cut
+where another is shorter.
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.windows.window_distances import relax
-from cython.cimports.heat_igl.kernels.windows.window_lists import add
-from cython.cimports.heat_igl.kernels.windows.window_structures import (
+from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.windows.front import add, push, relax, take, tell
+from cython.cimports.heat_igl.kernels.windows.structures import (
     BENDS,
     FLATNESS,
     JOINS,
+    NARROW,
     ROUNDING,
     WIDEST,
     Ray,
     Search,
     Window,
+    apart,
+    at_corner,
+    nearest_on,
     twice_product,
 )
-from cython.cimports.heat_igl.kernels.windows.window_surface import beyond, third, turn
-from cython.cimports.libc.math import sqrt
+from cython.cimports.heat_igl.kernels.windows.surface import beyond, third, turn
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _emit(
+def start_at(s: cython.pointer(Search), v: cython.int, offset: cython.double, label: cython.int) -> cython.void:
+    """Let distance start at vertex v."""
+    if s.failed or offset >= s.distance[v]:
+        return
+    if s.distance[v] == INFINITY:
+        s.touched[s.n_touched] = v
+        s.n_touched += 1
+    s.distance[v] = s.upper[v] = offset
+    s.root[v] = v
+    s.label[v] = label
+    s.entered[v] = -1
+    if s.other != cython.NULL:
+        tell(s, v, offset)
+    push(s, offset, s.n_half_edges + v)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
+    """Windows from a source inside a face over its three sides."""
+    f: cython.int = s.point_face[p]
+    root: cython.int = s.n + p
+    offset: cython.double = s.point_offset[p]
+    at: cython.p_double = s.point + 3 * p
+    one: Window
+    c: cython.int
+    h: cython.int
+    j: cython.int
+    corner: cython.double[3]
+    length: cython.double
+    left_length: cython.double
+    right_length: cython.double
+    distance: cython.double
+    place_x: cython.double[3]
+    place_y: cython.double[3]
+    place_x[0] = place_y[0] = place_y[1] = 0.0
+    place_x[1] = s.length[3 * f + 2]
+    place_x[2] = foot(place_x[1], s.length[3 * f + 1], s.length[3 * f])
+    place_y[2] = s.double_area[f] / place_x[1]
+    x: cython.double = at[1] * place_x[1] + at[2] * place_x[2]
+    y: cython.double = at[2] * place_y[2]
+    for c in range(3):
+        h = 3 * f + c
+        at_corner(c, corner)
+        distance = offset + apart(s.length + 3 * f, corner, at)
+        relax(s, s.vertex[h], distance, root, -1, 0.0, 3 * f, place_x[c] - x, place_y[c] - y)
+        if at[c] <= 0.0:
+            continue  # on the side itself, the source belongs to the face beyond it too
+        length = s.length[h]
+        left_length = s.length[previous_half_edge(h)]
+        right_length = s.length[next_half_edge(h)]
+        one.x = at[c] * 0.5 * twice_product(length, left_length, right_length) / length
+        one.x = length - (one.x + at[previous_half_edge(h) % 3] * length)
+        one.depth = at[c] * s.double_area[f] / length
+        one.start = 0.0
+        one.stop = length
+        one.offset = offset
+        one.root = root
+        one.corner = 3 * f
+        one.turn_x = (place_x[(c + 1) % 3] - place_x[(c + 2) % 3]) / length
+        one.turn_y = (place_y[(c + 1) % 3] - place_y[(c + 2) % 3]) / length
+        one.side = one.is_plane = 0
+        if one.depth > 0.0:
+            add(s, h, cython.address(one), 1, False)
+    j = s.first_target[f] if s.first_target != cython.NULL else -1
+    while j >= 0:
+        take(s, j, offset + apart(s.length + 3 * f, s.target + 3 * j, at), root)
+        j = s.next_target[j]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
+    """Distances from source segment i inside its face, and windows over the sides of the face."""
+    f: cython.int = s.segment_face[i]
+    root: cython.int = s.n + s.n_points + i
+    ends: cython.p_double = s.segment + 6 * i
+    corner: cython.double[3]
+    c: cython.int
+    j: cython.int
+    for c in range(3):
+        at_corner(c, corner)
+        relax(s, s.vertex[3 * f + c], _segment_distance(s, i, corner), root, -1, 0.0, 3 * f, 0.0, 0.0)
+        # On the side itself, the segment belongs to the face beyond it too.
+        if ends[c] > 0.0 or ends[3 + c] > 0.0:
+            _emit_parallel(s, 3 * f + c, ends, root, s.segment_offset[i])
+    j = s.first_target[f] if s.first_target != cython.NULL else -1
+    while j >= 0:
+        take(s, j, _segment_distance(s, i, s.target + 3 * j), root)
+        j = s.next_target[j]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _segment_distance(s: cython.pointer(Search), i: cython.int, point: cython.p_double) -> cython.double:
+    """Distance of a point in the face of segment i from the segment."""
+    found: cython.double[3]
+    nearest_on(s.length + 3 * s.segment_face[i], s.segment + 6 * i, point, found)
+    return s.segment_offset[i] + apart(s.length + 3 * s.segment_face[i], point, found)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _emit_parallel(
+    s: cython.pointer(Search), h: cython.int, ends: cython.p_double, root: cython.int, offset: cython.double
+) -> cython.void:
+    """The window over half-edge h, out of the face; its frame runs from the head of h to the tail."""
+    c: cython.int = h % 3
+    head: cython.int = previous_half_edge(h) % 3
+    length: cython.double = s.length[h]
+    height: cython.double = s.double_area[h // 3] / length
+    apex_x: cython.double = foot(length, s.length[previous_half_edge(h)], s.length[next_half_edge(h)])
+    x: cython.double = length - (ends[c] * apex_x + ends[head] * length)
+    depth: cython.double = ends[c] * height
+    along: cython.double = length - (ends[3 + c] * apex_x + ends[3 + head] * length) - x
+    rise: cython.double = depth - ends[3 + c] * height
+    norm: cython.double = sqrt(along * along + rise * rise)
+    one: Window
+    if fabs(along) <= NARROW * norm or norm <= 0.0:
+        return  # at a right angle to the half-edge: nothing leaves over it
+    one.depth = fabs(along) / norm
+    one.x = (-rise if along > 0.0 else rise) / norm
+    one.start = x + depth * one.x / one.depth
+    one.stop = x + along + (depth - rise) * one.x / one.depth
+    if along < 0.0:
+        one.start, one.stop = one.stop, one.start
+    one.start = max(one.start, 0.0)
+    one.stop = min(one.stop, length)
+    one.offset = offset - one.x * x + one.depth * depth
+    one.root = root
+    one.corner = h - c
+    one.turn_x, one.turn_y = (depth * rise - x * along) / norm, 1.0 if along > 0.0 else -1.0
+    one.side = 0
+    one.is_plane = True
+    if one.stop - one.start > NARROW * length:
+        add(s, h, cython.address(one), 1, False)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _emit_from_bend(
     s: cython.pointer(Search),
     k: cython.int,
     start: cython.double,
@@ -62,19 +212,15 @@ def _emit(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _reach_end(
-    s: cython.pointer(Search), k: cython.int, is_tail: cython.bint, v: cython.int, offset: cython.double
-) -> cython.void:
-    """Distance along a side of corner k from its vertex v: to the tail of half-edge k, or to its head."""
+def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset: cython.double) -> cython.void:
+    """Distances along the two sides of corner k from its vertex v."""
     head: cython.int = next_half_edge(k)
     tail: cython.int = previous_half_edge(k)
     a: cython.double = s.length[tail]
     b: cython.double = s.length[head]
-    if is_tail:
-        relax(s, s.vertex[head], offset + a, v, head, b, k, 1.0, 0.0)
-    else:
-        x: cython.double = 0.5 * twice_product(a, b, s.length[k]) / a
-        relax(s, s.vertex[tail], offset + b, v, tail, 0.0, k, x, s.double_area[k // 3] / a)
+    relax(s, s.vertex[head], offset + a, v, head, b, k, 1.0, 0.0)
+    x: cython.double = 0.5 * twice_product(a, b, s.length[k]) / a
+    relax(s, s.vertex[tail], offset + b, v, tail, 0.0, k, x, s.double_area[k // 3] / a)
 
 
 @cython.cfunc
@@ -146,17 +292,12 @@ def _fill(
         far = length
         if last != cython.NULL and k == last.corner:
             far = length - _reach(s, last)
-        # An end that the windows leave out is reached by others. Its path over v would be longer, but with a tolerance
-        # that is not known, and windows from that end would not fit between those that pass it.
-        if near <= 0.0:
-            _reach_end(s, k, side == previous_half_edge(k), v, offset)
-        if far >= length:
-            _reach_end(s, k, side != previous_half_edge(k), v, offset)
+        _reach_ends(s, k, v, offset)
         if near < far:
             if side == previous_half_edge(k):
-                _emit(s, k, near, far, v, offset)
+                _emit_from_bend(s, k, near, far, v, offset)
             else:
-                _emit(s, k, length - far, length - near, v, offset)
+                _emit_from_bend(s, k, length - far, length - near, v, offset)
         if last != cython.NULL and k == last.corner:
             return
         near = 0.0
@@ -188,9 +329,8 @@ def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
     if h < 0 or s.kind[v] == JOINS:
         k = s.corner_of_vertex[v]
         while k >= 0:
-            _reach_end(s, k, True, v, s.distance[v])
-            _reach_end(s, k, False, v, s.distance[v])
-            _emit(s, k, 0.0, s.length[k], v, s.distance[v])
+            _reach_ends(s, k, v, s.distance[v])
+            _emit_from_bend(s, k, 0.0, s.length[k], v, s.distance[v])
             k = s.next_corner[k]
         return
     # From the apex of h: the angles between the way back, to where the path crosses h, and the two sides.

@@ -1,4 +1,4 @@
-from heat_igl.kernels.windows.window_structures cimport Ray, Search
+from heat_igl.kernels.windows.structures cimport Ray, Search
 
 cdef int third(int k, int side) noexcept nogil
 cdef int beyond(Search* s, int k, int side) noexcept nogil

@@ -5,7 +5,7 @@ Half-edge ``3 f + c`` is the side of face f opposite its corner c; the corner ca
 
 import cython
 from cython.cimports.heat_igl.kernels.mesh.triangles import area, next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.windows.window_structures import (
+from cython.cimports.heat_igl.kernels.windows.structures import (
     BENDS,
     ENDS,
     FLAT,

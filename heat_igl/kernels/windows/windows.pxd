@@ -1,4 +1,4 @@
-from heat_igl.kernels.windows.window_structures cimport Search
+from heat_igl.kernels.windows.structures cimport Search
 
 cdef class Front:
     cdef Search state

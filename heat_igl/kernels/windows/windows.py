@@ -1,27 +1,20 @@
-"""Exact distance by windows: continuous Dijkstra over the faces of an intrinsic triangulation.
-
-A *window* is the part of a half-edge that straight lines from one root cross, all through the same faces; the root laid
-out in the plane before the half-edge gives the distance of every point of the window (Mitchell, Mount, Papadimitriou
-1987). Windows that enter a face over the same side wait there in one list and cross the face together, as in Qin et al.
-2016; the order of the lists is different here, see `window_lists`. Before a list crosses its face, windows are cut to
-the points that no other path reaches sooner (`window_trimming`), and to the lines that cross no shorter path to the
-corner ahead (`window_crossing`). Windows begin at sources (`window_sources`, `window_segments`), and at vertices at
-which shortest paths can bend (`window_bends`).
-
-`search` finds the distances of all vertices for one set of sources. With `window_pairs` two threads share it.
-`local_windows` has many local searches.
-"""
+"""What Python calls: `search` from one set of sources, shared by two threads after `pair`, and `search_each`."""
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.windows.window_memory import allocate, empty_front, free_front
-from cython.cimports.heat_igl.kernels.windows.window_queue import push
-from cython.cimports.heat_igl.kernels.windows.window_search import run
-from cython.cimports.heat_igl.kernels.windows.window_sharing import run_beside
-from cython.cimports.heat_igl.kernels.windows.window_sources import start_at
-from cython.cimports.heat_igl.kernels.windows.window_structures import Search
+from cython.cimports.cpython.pythread import (
+    WAIT_LOCK,
+    PyThread_acquire_lock,
+    PyThread_allocate_lock,
+    PyThread_free_lock,
+)
+from cython.cimports.heat_igl.kernels.windows.front import aim_at, allocate, empty_front, free_front, push
+from cython.cimports.heat_igl.kernels.windows.search import forget, narrow, run, run_beside
+from cython.cimports.heat_igl.kernels.windows.sources import start_at
+from cython.cimports.heat_igl.kernels.windows.structures import Search
+from cython.cimports.libc.stdlib import free
 
-__all__ = ["Front", "search"]
+__all__ = ["Front", "search", "search_each", "pair", "part"]
 
 
 class Front:
@@ -38,7 +31,7 @@ class Front:
     tolerance : float
         A window is cut where another path is shorter by more than this fraction of the distance.
     leaving : Leaving, optional
-        Takes in which direction the straight last parts of the paths leave their roots, see `window_distances.relax`:
+        Takes in which direction the straight last parts of the paths leave their roots, see `front.relax`:
         on surfaces whose faces are oriented alike.
     position : (3 n,), optional
         Positions of the vertices, in the unit of the lengths. With one goal for a source, `search_each` uses them to
@@ -117,7 +110,7 @@ def search(
     ----------
     front : Front
         Used for one search only; its labels have room for the source points and segments. Of a pair (see
-        `window_pairs`), one gets all sources and the other none.
+        `pair`), one gets all sources and the other none.
     starts : Starts
         The sources, see `heat_igl.unfolding.window_search.Starts`. A source on a side is listed once for every face
         there, and the ends of segments must be among the points.
@@ -184,3 +177,232 @@ def _take_targets(s: cython.pointer(Search), targets) -> cython.void:
     s.target_distance, s.target_root = _doubles(found.distance), _ints(found.root)
     s.target_entered, s.target_crossing = _ints(found.entered), _doubles(found.crossing)
     s.slack = targets.largest_circle
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _write_within(
+    s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
+) -> cython.int:
+    """Store the vertices within the cutoff and their distances; returns their number."""
+    i: cython.int
+    v: cython.int
+    n: cython.int = 0
+    for i in range(s.n_touched):
+        v = s.touched[i]
+        if s.distance[v] <= s.cutoff:
+            to[n] = name[v]
+            value[n] = s.distance[v]
+            n += 1
+    return n
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _write_ways(s: cython.pointer(Search), way: cython.p_int, line: cython.p_double) -> cython.void:
+    """Store how the paths to the vertices within the cutoff come there, in the order of `_write_within`.
+
+    Of each path the root, the corner out of which it leaves that and the half-edge by which it enters its last face;
+    and the direction out of the corner and the crossing of the half-edge.
+    """
+    i: cython.int
+    v: cython.int
+    n: cython.int = 0
+    for i in range(s.n_touched):
+        v = s.touched[i]
+        if s.distance[v] <= s.cutoff:
+            way[3 * n] = s.root[v]
+            way[3 * n + 1] = s.corner[v]
+            way[3 * n + 2] = s.entered[v]
+            line[3 * n] = s.leaving[2 * v]
+            line[3 * n + 1] = s.leaving[2 * v + 1]
+            line[3 * n + 2] = s.crossing[v]
+            n += 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _write_nearest(
+    s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
+) -> cython.int:
+    """Store the nearest vertices in order, equally near ones by ascending name; returns their number."""
+    i: cython.int
+    j: cython.int
+    v: cython.int
+    n: cython.int = 0
+    d: cython.double
+    for i in range(s.n_touched):
+        v = s.touched[i]
+        d = s.distance[v]
+        if d > s.cutoff:
+            continue
+        if n < s.n_nearest:
+            n += 1
+        elif d > value[n - 1] or (d == value[n - 1] and name[v] > to[n - 1]):
+            continue
+        j = n - 1
+        while j > 0 and (d < value[j - 1] or (d == value[j - 1] and name[v] < to[j - 1])):
+            value[j] = value[j - 1]
+            to[j] = to[j - 1]
+            j -= 1
+        value[j] = d
+        to[j] = name[v]
+    return n
+
+
+def search_each(
+    front: Front,
+    source: cython.int[::1],
+    goal: cython.int[::1],
+    first_goal: cython.longlong[::1],
+    cutoff: cython.double,
+    n_nearest: cython.int,
+    name: cython.longlong[::1],
+    found: cython.int[::1],
+    value: cython.double[::1],
+    end: cython.longlong[::1],
+    way: cython.int[:, ::1],
+    line: cython.double[:, ::1],
+) -> int:
+    """Search from one vertex after the other; returns the number of sources done, -1 if memory ran out.
+
+    Searches end early, and clear the entries that they changed, so the cost does not depend on the size of the mesh.
+
+    Parameters
+    ----------
+    front : Front
+        In its initial state, to which it returns.
+    source : (k,)
+        Vertices that distance starts from, each alone.
+    goal, first_goal : (g,), (k + 1,)
+        If not empty: the distances of ``goal[first_goal[i]:first_goal[i + 1]]`` are asked for from source i.
+    cutoff : float
+        Without goals: all vertices up to this distance are asked for.
+    n_nearest : int
+        At most this many of them, the nearest; 0 for all.
+    name : (n,)
+        The number by which `found` refers to each vertex.
+    found, value : (r,)
+        Take vertices and their distances, source after source. The search stops at the first source whose results do
+        not fit.
+    end : (k,)
+        Takes the end of the results of each source. With goals each result is one value, and `found` is not used.
+    way, line : (r, 3)
+        If not empty, on a front that finds in which direction paths leave: take how the path to each vertex within the
+        cutoff runs, see `_write_ways`, by the numbers of the tables.
+    """
+    s: cython.pointer(Search) = cython.address(front.state)
+    i: cython.int
+    j: cython.longlong
+    n_done: cython.int = 0
+    at: cython.longlong = 0
+    room: cython.longlong = value.shape[0]
+    names: cython.p_longlong = cython.address(name[0])
+    s.stops_early = goal.shape[0] > 0
+    s.slack = 0.0
+    with cython.nogil:
+        allocate(s)
+        for i in range(source.shape[0]):
+            s.cutoff = cutoff
+            s.n_nearest = s.n_next = n_nearest
+            if s.stops_early:
+                s.n_goals = cython.cast(cython.int, first_goal[i + 1] - first_goal[i])
+                s.goal = cython.address(goal[0]) + first_goal[i]
+            s.aim = -1
+            if s.stops_early and s.n_goals == 1 and s.position != cython.NULL:
+                aim_at(s, source[i], s.goal[0])
+                s.cutoff = s.within
+            start_at(s, source[i], 0.0, 0)
+            if not s.failed:
+                run(s)
+            if s.failed:
+                break
+            if s.stops_early:
+                for j in range(first_goal[i], first_goal[i + 1]):
+                    value[j] = s.distance[goal[j]]
+                at = first_goal[i + 1]
+            else:
+                if at + (n_nearest if n_nearest > 0 else s.n_touched) > room:
+                    break
+                if n_nearest > 0:
+                    if s.n_touched >= n_nearest:
+                        narrow(s)
+                    at += _write_nearest(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
+                else:
+                    if way.shape[0] > 0:
+                        _write_ways(s, cython.address(way[at, 0]), cython.address(line[at, 0]))
+                    at += _write_within(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
+            end[i] = at
+            n_done += 1
+            forget(s)
+        forget(s)
+        free_front(s)
+    return -1 if s.failed else n_done
+
+
+def pair(
+    first: Front,
+    second: Front,
+    upper: cython.double[::1],
+    other_upper: cython.double[::1],
+    round_length: cython.double,
+    plenty: cython.longlong,
+) -> None:
+    """Prepare two fronts to share a search: `search` is called on both, on one with all sources, on the other with
+    none.
+
+    Parameters
+    ----------
+    first, second : Front
+        The two fronts. Each has result arrays of its own; they share `kind` only. The distance of a vertex is the
+        smaller of the two that they find.
+    upper, other_upper : (n,)
+        Upper bounds on distances; infinity at first.
+    round_length : float
+        How far the search goes before the threads exchange distances.
+    plenty : int
+        With about this many windows on the front there is work for two threads. With less than a third, one goes on
+        alone.
+    """
+    _join(first, upper, second)
+    _join(second, other_upper, first)
+    first.state.round_length = second.state.round_length = round_length
+    first.state.plenty = second.state.plenty = plenty
+    first.state.few = second.state.few = plenty // 3
+    first.state.is_first, second.state.is_first = True, False
+
+
+@cython.cfunc
+def _join(one: Front, upper: cython.double[::1], other: Front) -> None:
+    s: cython.pointer(Search) = cython.address(one.state)
+    i: cython.int
+    one.arrays += (upper.base,)
+    s.other = cython.address(other.state)
+    s.upper = cython.address(upper[0])
+    s.parity = 0
+    for i in range(2):
+        s.news[i] = cython.NULL
+        s.n_news[i] = s.n_all_news[i] = 0
+    for i in range(4):
+        s.arrived[i] = PyThread_allocate_lock()
+        if s.arrived[i] == cython.NULL:
+            raise MemoryError("there is no room for a lock")
+        PyThread_acquire_lock(s.arrived[i], WAIT_LOCK)
+
+
+def part(first: Front, second: Front) -> bool:
+    """Free what `pair` allocated; false if one thread must search again to get the bits of a search on one thread."""
+    one: Front
+    s: cython.pointer(Search)
+    i: cython.int
+    for one in (first, second):
+        s = cython.address(one.state)
+        s.other = cython.NULL
+        for i in range(2):
+            free(s.news[i])
+        for i in range(4):
+            PyThread_free_lock(s.arrived[i])
+    return not (first.state.is_shared and (first.state.meets_flat or second.state.meets_flat))
