@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -273,13 +274,36 @@ def test_dxf_comes_back_with_layers(tmp_path):
     np.testing.assert_allclose(points, groups["near"][0].positions(mesh)[:-1], rtol=1e-14, atol=1e-15)
 
 
+@pytest.mark.parametrize("suffix", [".ply", ".vtp", ".csv"])
+def test_lines_for_other_programs_are_as_long_as_the_curves(tmp_path, suffix) -> None:
+    mesh = shapes.icosphere(2)
+    loops, path = heat_igl.isolines(mesh, mesh.V[:, 2], [0.1, 0.3]), heat_igl.shortest_path(mesh, 0, 50)
+    write_curves(tmp_path / f"a{suffix}", mesh, {"levels": loops, "path": path})
+    text = (tmp_path / f"a{suffix}").read_text()
+    if suffix == ".csv":
+        rows = np.genfromtxt(text.splitlines()[1:], delimiter=",", usecols=(1, 2, 3, 4))
+        lines = [rows[rows[:, 0] == i, 1:] for i in range(3)]
+    elif suffix == ".vtp":
+        arrays = {
+            each.get("Name"): np.array(each.text.split(), float) for each in ElementTree.XML(text).iter("DataArray")
+        }
+        numbers = np.split(arrays["connectivity"].astype(int), arrays["offsets"].astype(int)[:-1])
+        lines = [arrays["points"].reshape(-1, 3)[each] for each in numbers]
+    else:
+        rows = [line.split() for line in text.partition("end_header\n")[2].splitlines()]
+        points = np.array([row for row in rows if len(row) == 3], float)
+        lines = list(points[np.array([row for row in rows if len(row) == 2], int)])
+    found = sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines)
+    assert found == pytest.approx(sum(curve.length for curve in [*loops[0], *loops[1], path]), rel=1e-12)
+
+
 def test_a_failed_write_leaves_the_old_file(tmp_path):
     mesh, groups = circle_and_arc()
     target = tmp_path / "lines.obj"
     target.write_text("old")
     with pytest.raises(heat_igl.SourceError, match="is no face"):
         write_curves(target, SQUARE, groups)
-    with pytest.raises(ValueError, match=r"curves go to .obj, .svg, .dxf files"):
+    with pytest.raises(ValueError, match=r"curves go to .obj, .ply, .vtp, .csv, .svg, .dxf files"):
         write_curves(tmp_path / "lines.png", mesh, groups)
     with pytest.raises(ValueError, match=r"projection is for .svg"):
         write_curves(target, mesh, groups, projection=np.eye(2, 3))

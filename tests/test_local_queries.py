@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from itertools import pairwise
 
@@ -229,6 +230,18 @@ def test_distances_that_will_not_fit_into_memory_are_refused_early(monkeypatch):
         distances_within(mesh, 1e12)
     # Rows that are written some at a time need less.
     assert sum(block.nnz for block in blocks_within(mesh, np.inf, most_entries=1)) == mesh.n_vertices**2
+
+
+def test_a_terminal_is_told_how_long_a_search_takes(monkeypatch, capsys):
+    monkeypatch.setattr(local, "_PATIENCE", -1.0)
+    mesh = shapes.icosphere(2)
+    distances_within(mesh, 0.3)
+    assert not capsys.readouterr().err  # no terminal
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    distances_within(mesh, 0.3)
+    lines = capsys.readouterr().err.splitlines()
+    assert re.fullmatch(r"distances from \d+ of 162 vertices, about .* in all: \d+ s left, .*", lines[0])
+    assert lines[-1].startswith("distances from 162 of 162")
 
 
 def test_radii_counts_and_pairs_that_make_no_sense_are_refused():

@@ -157,7 +157,7 @@ def isolines(
         list[int], typer.Option(metavar="VERTEX", help="Source vertex, counted from 0; repeat for several.")
     ],
     spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=positive)],
-    output: Annotated[Path, typer.Option(help="OBJ, SVG or DXF file for the lines; dotted behind, in SVG.")],
+    output: Annotated[Path, typer.Option(help="OBJ, PLY, VTP, CSV, SVG or DXF file; in SVG dotted behind.")],
     method: MethodOption = None,
     tolerance: ToleranceOption = 1e-5,
     points: PointsOption = False,

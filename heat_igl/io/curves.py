@@ -1,9 +1,9 @@
-"""Writing curves on a surface to files: OBJ lines, SVG and DXF."""
+"""Writing curves on a surface to files: lines of OBJ, PLY and VTP, CSV, SVG and DXF."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from heat_igl.errors import MissingExtraError, real_numbers, shown
 from heat_igl.io.atomic import replacing
 from heat_igl.io.text import format_rows
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, as_simplices, flat_curves
-from heat_igl.typing import ArrayLike, FloatArray
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = ["CURVE_SUFFIXES", "is_flat", "write_curves", "write_svg"]
 
@@ -33,13 +33,14 @@ def write_curves(
     Parameters
     ----------
     path : path-like
-        The extension selects the format: .obj (a polyline ``l`` for each curve), .svg (a drawing in the plane) or .dxf
-        (three-dimensional polylines). An existing file is replaced only when the new one is complete.
+        The extension selects the format: .obj (a polyline ``l`` for each curve), .ply (edges), .vtp (lines), .csv (a
+        row for each point, a closed curve ends with its first), .svg (a drawing in the plane) or .dxf (polylines in
+        space). An existing file is replaced only when the new one is complete.
     mesh : mesh
         Triangles on which the curves lie.
     curves : SurfaceCurve, sequence of such of any depth, or mapping of str to such
         For instance paths, or isolines as `isolines` returns them, a list for each level. The keys of a mapping become
-        groups (OBJ, SVG) or layers (DXF).
+        groups (OBJ, SVG), a column (CSV) or layers (DXF).
     projection : (2, 3) array_like, optional
         For .svg: the matrix that maps a position to x and y, with y upwards. By default the mesh must be flat and is
         drawn in the plane of the mesh with true lengths; if z is constant, x and y are used unchanged.
@@ -119,19 +120,65 @@ def _plane(mesh: Mesh, path: Path) -> FloatArray:
     return np.asarray(axes[:2])
 
 
-def _write_obj(path: Path, lines: _Lines) -> None:
-    text = ["# curves, a polyline each\n"]
-    n = 1
+def _numbered(lines: _Lines) -> Iterator[tuple[str, FloatArray, IntArray]]:
+    """Of each curve the group, the points (k, 3), and their numbers among all; closed curves end as they begin."""
+    n = 0
     for name, group in lines.items():
-        if name:
-            text.append(f"g {name.replace(' ', '_')}\n")
         for P, is_closed in group:
-            points = P[:-1] if is_closed else P
-            number = np.append(np.arange(n, n + len(points)), n) if is_closed else np.arange(n, n + len(points))
-            text.append(format_rows("v %r %r %r\n", points))
-            text.append(f"l {' '.join(map(str, number.tolist()))}\n")
-            n += len(points)
+            k = len(P) - is_closed
+            yield name, P[:k], n + np.arange(len(P)) % k
+            n += k
+
+
+def _write_obj(path: Path, lines: _Lines) -> None:
+    text, last = ["# curves, a polyline each\n"], ""
+    for name, P, numbers in _numbered(lines):
+        if name != last:
+            text.append(f"g {name.replace(' ', '_')}\n")
+            last = name
+        text.append(format_rows("v %r %r %r\n", P) + f"l {' '.join(map(str, (numbers + 1).tolist()))}\n")
     path.write_text("".join(text), encoding="utf8")
+
+
+def _write_csv(path: Path, lines: _Lines) -> None:
+    text = ["group,curve,x,y,z\n"]
+    for i, (name, P, numbers) in enumerate(_numbered(lines)):
+        group = '"' + name.replace('"', '""') + '"' if name else ""
+        closed = P[numbers - numbers[0]]  # with the first point again
+        text += [f"{group},{i},{x!r},{y!r},{z!r}\n" for x, y, z in closed.tolist()]
+    path.write_text("".join(text), encoding="utf8")
+
+
+def _write_ply(path: Path, lines: _Lines) -> None:
+    curves = list(_numbered(lines))
+    P = np.concatenate([P for _, P, _ in curves] or [np.empty((0, 3))])
+    edges = np.concatenate([np.stack([n[:-1], n[1:]], axis=1) for _, _, n in curves] or [np.empty((0, 2), np.int64)])
+    columns = "".join(f"property double {axis}\n" for axis in "xyz")
+    path.write_text(
+        f"ply\nformat ascii 1.0\nelement vertex {len(P)}\n{columns}element edge {len(edges)}\nproperty int vertex1\n"
+        "property int vertex2\nend_header\n" + format_rows("%r %r %r\n", P) + format_rows("%d %d\n", edges),
+        encoding="ascii",
+    )
+
+
+def _write_vtp(path: Path, lines: _Lines) -> None:
+    curves = list(_numbered(lines))
+    n = sum(len(P) for _, P, _ in curves)
+    arrays = {
+        "points": ("Float64", 3, "".join(format_rows("%r %r %r\n", P) for _, P, _ in curves)),
+        "connectivity": ("Int64", 1, " ".join(str(i) for _, _, numbers in curves for i in numbers.tolist())),
+        "offsets": ("Int64", 1, " ".join(map(str, np.cumsum([len(numbers) for _, _, numbers in curves]).tolist()))),
+    }
+    points, *cells = (
+        f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{width}" format="ascii">\n{data}\n</DataArray>\n'
+        for name, (kind, width, data) in arrays.items()
+    )
+    path.write_text(
+        '<?xml version="1.0"?>\n<VTKFile type="PolyData" version="0.1"><PolyData>\n'
+        f'<Piece NumberOfPoints="{n}" NumberOfLines="{len(curves)}">\n<Points>\n{points}</Points>\n'
+        f"<Lines>\n{''.join(cells)}</Lines>\n</Piece>\n</PolyData></VTKFile>\n",
+        encoding="ascii",
+    )
 
 
 def is_flat(mesh: Mesh) -> bool:
@@ -181,5 +228,12 @@ def _write_dxf(path: Path, lines: _Lines) -> None:
     document.saveas(path)
 
 
-_FORMATS: dict[str, Callable[[Path, _Lines], None]] = {".obj": _write_obj, ".svg": write_svg, ".dxf": _write_dxf}
+_FORMATS: dict[str, Callable[[Path, _Lines], None]] = {
+    ".obj": _write_obj,
+    ".ply": _write_ply,
+    ".vtp": _write_vtp,
+    ".csv": _write_csv,
+    ".svg": write_svg,
+    ".dxf": _write_dxf,
+}
 CURVE_SUFFIXES = tuple(_FORMATS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,6 +20,8 @@ from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
 
 __all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distances"]
 
+# Seconds after which a terminal is told how long a search will take, and again.
+_PATIENCE = 5.0
 # Bytes that each distance of a sparse array takes while the array is put together.
 _BYTES = 48
 # Where more are asked for than the mesh has vertices, the most entries of the result.
@@ -282,11 +286,12 @@ def _wrong(parts: list[local_searches.Near]) -> IntArray:
 
 
 class _Count:
-    """Counts the distances from some of k sources, and ends the search if those from all will be too many."""
+    """Counts the distances from some of k sources: says how long the rest takes, or that they will be too many."""
 
     def __init__(self, k: int, most: float) -> None:
         self._k, self._most = k, most
         self._sources = self._found = 0
+        self._start = self._said = time.monotonic()
 
     def __call__(self, near: local_searches.Near) -> local_searches.Near:
         # Threads may miss what others add: an estimate suffices.
@@ -299,6 +304,12 @@ class _Count:
                 "do not fit into memory: take a smaller radius (in the unit of the mesh) or fewer sources, or write "
                 "rows to a file with write_distances_within"
             )
+        now = time.monotonic()
+        if now - self._said > _PATIENCE and sys.stderr.isatty():
+            self._said = now
+            left = (now - self._start) * (self._k / self._sources - 1)
+            done = f"distances from {self._sources} of {self._k} vertices, about {expected:.2g} in all"
+            print(f"{done}: {left:.0f} s left, less with a smaller radius", file=sys.stderr)
         return near
 
 
