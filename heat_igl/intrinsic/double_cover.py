@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 
 from heat_igl.intrinsic.history import BACK_CORNERS
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
@@ -56,6 +55,8 @@ def double_cover(triangulation: IntrinsicTriangulation) -> tuple[IntArray, Float
         ),
         shape=(2 * size, 2 * size),
     )
+    from scipy.sparse import csgraph
+
     fan = csgraph.connected_components(links, directed=False)[1]
     # The copy of a fan with the smaller label keeps the vertex's number.
     first, second = fan[sheet_of_first[:size]], fan[sheet_of_first[size:]]

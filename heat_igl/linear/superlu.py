@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.linalg as spl
 
 from heat_igl.errors import FactorizationError
 from heat_igl.linear.protocols import check_finite, check_probe
@@ -49,6 +48,8 @@ class SuperLUFactorization:
         self._free = None if free is None or free.all() else np.flatnonzero(free)
         restricted = A.tocsc() if self._free is None else A[self._free][:, self._free].tocsc()
         check_finite(restricted)
+        from scipy.sparse import linalg as spl
+
         try:
             self._factor = spl.splu(
                 restricted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}

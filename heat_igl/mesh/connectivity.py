@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 
 from heat_igl.kernels.mesh import incidence
 from heat_igl.mesh.grouping import group_by_label
@@ -148,6 +147,8 @@ def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
     """
     edge = found.of_face.T.astype(np.int32)  # opposite each corner
     joined = []
+    from scipy.sparse import csgraph  # brings scipy.linalg, which takes as long to import as numpy
+
     for c in range(3):
         right, left = (c + 1) % 3, (c + 2) % 3
         # In the order of found.vertices: the smaller end of each edge, and the larger.
@@ -187,6 +188,8 @@ def longest_paths(graph: sp.csr_array, components: IntArray) -> FloatArray:
     (c,) float64
         0 for a vertex without edges.
     """
+    from scipy.sparse import csgraph
+
     start = np.unique(components, return_index=True)[1]
     for _ in range(2):
         distance = csgraph.dijkstra(graph, directed=False, indices=start, min_only=True)
@@ -219,5 +222,7 @@ def edge_distance(graph: sp.csr_array, sources: IntArray, *, count_edges: bool =
     count_edges : bool
         Count edges instead of adding up their lengths.
     """
+    from scipy.sparse import csgraph
+
     found = csgraph.dijkstra(graph, directed=False, indices=sources, unweighted=count_edges, min_only=True)
     return np.asarray(found, np.float64)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.spatial import cKDTree
 
 from heat_igl.kernels.bodies.bends import bend_around
 from heat_igl.kernels.bodies.bodies import Body
@@ -97,6 +96,8 @@ class FrontSolver(Engine):
         place, least = self._simplices.place, self._simplices.least
         if place is not None:
             if np.ptp(offset) == 0 or len(offset) > _MANY:
+                from scipy.spatial import cKDTree
+
                 line = least * cKDTree(place[vertices]).query(place)[0] + offset.min()
             else:
                 line = np.full(len(place), np.inf)
@@ -200,6 +201,8 @@ class FrontSolver(Engine):
         """The source (n,) that each vertex looks for first: the nearest in space, or -1 for those of its neighbours."""
         if len(vertices) == 1:
             return np.full(self._simplices.n, 0 if self._is_small else -1, np.int32)
+        from scipy.spatial import cKDTree
+
         return np.asarray(cKDTree(self._V[vertices]).query(self._V)[1], np.int32)
 
     def _continue_along_edges(self, distance: FloatArray, begin: FloatArray, label: AnyArray) -> bool:
