@@ -1,8 +1,7 @@
 """Cut meshes along many random curves, and check that the surface stays.
 
-    python scripts/random_cuts.py 10000                   # curves of the seeds 0 to 9999
-    python scripts/random_cuts.py 100 --first 5000        # of the seeds 5000 to 5099
-    python scripts/random_cuts.py 10000 --json FILE
+    python scripts/random_cuts.py --count 10000                   # curves of the seeds 0 to 9999
+    python scripts/random_cuts.py --count 100 --first 5000        # of the seeds 5000 to 5099
 
 A case is determined by its seed: a small mesh and curves of one kind (unconnected segments in corners, along and across
 sides and over each other; loops that cross themselves; lines from boundary to boundary; levels of a function, through
@@ -29,7 +28,6 @@ from typing import Any, NamedTuple
 
 import igl
 import numpy as np
-from scaffold import add_json, environment, option_parser, publish, table
 
 from heat_igl import Mesh, SurfaceCurve, curve_on, cut, edge_curve, isolines, shapes, tangent_frames
 from heat_igl.curves import CutMesh
@@ -38,6 +36,8 @@ from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import exact_distance
 from heat_igl.unfolding.half_edges import MARGIN
+
+from harness import Table, parsed, publish
 
 # Relative differences above this are failures.
 LARGEST = 1e-12
@@ -205,16 +205,12 @@ def campaign(count: int, first: int) -> dict[str, Any]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = option_parser(__doc__)
-    parser.add_argument("count", type=int, help="number of cases")
-    parser.add_argument("--first", type=int, default=0, help="first seed (default 0)")
-    add_json(parser)
-    arguments = parser.parse_args(argv)
-    found = campaign(arguments.count, arguments.first)
-    head = ["meshes", "curves", "distances same", "distances rounding", "distances thin", "failed"]
-    rows = [(name, *(str(counts[column]) for column in head)) for name, counts in found["counts"].items()]
-    lines = table(["kind", *head], rows) + [f"- {each}" for each in found["failed"]]
-    publish({"environment": environment()} | found, "\n".join(lines), json_file=arguments.json)
+    options = parsed(__doc__, argv, count=1000, first=0)
+    found = campaign(options.count, options.first)
+    heads = ["meshes", "curves", "distances same", "distances rounding", "distances thin", "failed"]
+    rows = [{"kind": name} | {head: counts[head] for head in heads} for name, counts in found["counts"].items()]
+    failed = "\n".join(f"- {each}" for each in found["failed"])
+    publish(options, {"cuts": Table(rows, {head: head for head in ["kind", *heads]}), "failed": failed})
     return 1 if found["failed"] else 0
 
 

@@ -1,6 +1,7 @@
 """Random members of families that once had wrong directions, wrong signs or endless queries.
 
-    python scripts/random_edges.py [log-maps] [signed] [--members 1000] [--first 0] [--json FILE]
+    python scripts/random_edges.py log-maps [--members 1000] [--first 0]
+    python scripts/random_edges.py signed [--members 1000] [--first 0]
 
 A member is determined by its seed. `log-maps`: hulls stretched by up to 100, spiky spheres, tori, cylinders and rough
 squares, from vertices, edges and faces, also from 1e-6 to 1e-3 of an edge beside vertices: the largest distance
@@ -17,11 +18,9 @@ from __future__ import annotations
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
-from scaffold import add_json, environment, option_parser, publish, table
-from scipy.spatial import ConvexHull, Delaunay
+from scipy.spatial import Delaunay
 
 from heat_igl import Mesh, SignedHeatSolver, SurfacePoints, exp_map, geodesic_distance, log_map, shapes
 from heat_igl.mesh import region_boundary
@@ -29,16 +28,10 @@ from heat_igl.operators import operators
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import ExactSurface
 
+from harness import Row, Table, hull, on_sphere, parsed, publish
+
 # Larger figures are failures.
 LARGEST = {"log-maps": 1e-8, "signed": 1e-12}
-
-
-def hull(rng: np.random.Generator) -> Mesh:
-    """The convex hull of points on a sphere."""
-    P = rng.normal(size=(int(rng.integers(50, 500)), 3))
-    P /= np.linalg.norm(P, axis=1, keepdims=True)
-    F = ConvexHull(P).simplices
-    return Mesh(P, np.where((np.linalg.det(P[F]) < 0)[:, None], F[:, ::-1], F))
 
 
 def spikes(rng: np.random.Generator) -> Mesh:
@@ -53,7 +46,7 @@ def rough(shape: Mesh) -> Callable[[np.random.Generator], Mesh]:
 
 
 BODIES = {
-    "hull": hull,
+    "hull": lambda rng: hull(on_sphere(int(rng.integers(50, 500)), rng)),
     "spiky sphere": spikes,
     "torus": rough(shapes.torus(12, 24)),
     "cylinder": rough(shapes.cylinder(12, 12)),
@@ -129,42 +122,23 @@ def signed(seed: int) -> tuple[str, float]:
     return f"{spread}, {100 * exchanged:.0f} % exchanged", off
 
 
-FAMILIES: dict[str, Callable[[int], tuple[str, float]]] = {
-    "log-maps": log_maps,
-    "signed": signed,
-}
+FAMILIES: dict[str, Callable[[int], tuple[str, float]]] = {"log-maps": log_maps, "signed": signed}
 
 
-def main(argv: Sequence[str] | None = None) -> dict[str, Any]:
-    parser = option_parser(__doc__)
-    parser.add_argument("families", nargs="*", metavar="FAMILY", help=f"of {', '.join(FAMILIES)} (default all)")
-    parser.add_argument("--members", type=int, default=1000, help="of each family (default 1000)")
-    parser.add_argument("--first", type=int, default=0, metavar="SEED", help="of the first member (default 0)")
-    add_json(parser)
-    options = parser.parse_args(argv)
-    for name in options.families:
-        if name not in FAMILIES:
-            parser.error(f"there is no family {name!r}: choose from {', '.join(FAMILIES)}")
-    cases = []
-    for family in options.families or FAMILIES:
-        figures: dict[str, list[tuple[float, int]]] = defaultdict(list)
-        for seed in range(options.first, options.first + options.members):
-            kind, figure = FAMILIES[family](seed)
-            figures[kind].append((figure, seed))
-        for kind, found in sorted(figures.items()):
-            failed = [seed for figure, seed in found if not figure <= LARGEST[family]]
-            cases.append(
-                {"family": family, "kind": kind, "members": len(found), "largest": max(found)[0], "failed": failed}
-            )
-    rows = [
-        [case["family"], case["kind"], str(case["members"]), f"{case['largest']:.1e}", f"{len(case['failed'])}"]
-        for case in cases
-    ]
-    head = ["family", "kind", "members", "largest figure", "failures"]
-    result = {"environment": environment(), "cases": cases}
-    publish(result, "\n".join(table(head, rows, left=(0, 1))), json_file=options.json)
-    return result
+def main(argv: Sequence[str] | None = None) -> bool:
+    options = parsed(__doc__, argv, tables=FAMILIES, members=1000, first=0)
+    figures: dict[str, list[tuple[float, int]]] = defaultdict(list)
+    for seed in range(options.first, options.first + options.members):
+        kind, figure = FAMILIES[options.table](seed)
+        figures[kind].append((figure, seed))
+    rows: list[Row] = []
+    for kind, found in sorted(figures.items()):
+        failed = [seed for figure, seed in found if not figure <= LARGEST[options.table]]
+        rows.append({"kind": kind, "members": len(found), "largest": max(found)[0], "failed": failed})
+    columns = {"kind": "kind", "members": "members", "largest figure": "{largest:.1e}", "seeds of failures": "failed"}
+    publish(options, {options.table: Table(rows, columns)})
+    return any(row["failed"] for row in rows)
 
 
 if __name__ == "__main__":
-    sys.exit(any(case["failed"] for case in main()["cases"]))
+    sys.exit(main())
