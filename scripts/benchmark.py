@@ -33,8 +33,9 @@ from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, read_mesh, shapes
 from heat_igl.cli.demo import sample_mesh
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
+from heat_igl.validation.zoo.registry import hull
 
-from harness import METHODS, Method, Row, Table, collected, drawn, errors, hull, ours, parsed, publish, seconds
+from harness import METHODS, Method, Row, Table, collected, drawn, errors, ours, parsed, publish, seconds
 from harness import subdivided as finer
 
 SIZES = [10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000]

@@ -14,12 +14,11 @@ from __future__ import annotations
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from scaffold import add_json, add_output, environment, option_parser, publish, table
 
 import heat_igl
 from heat_igl.errors import AccuracyWarning
@@ -29,6 +28,8 @@ from heat_igl.steps import PoissonProblem
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding import Invariants, WindowEngine
 from heat_igl.validation.zoo import FAMILIES
+
+from harness import Table, parsed, publish
 
 Break = Callable[[FloatArray, int], None]
 
@@ -101,12 +102,8 @@ def fate(engine: str, mesh: heat_igl.Mesh, source: int, wrong: Break) -> tuple[s
     return "repaired" if off < 0.02 else "let through", contradicts
 
 
-def main(argv: list[str] | None = None) -> int:
-    parser = option_parser(__doc__)
-    parser.add_argument("--members", type=int, default=3, help="seeds of every kind")
-    add_json(parser)
-    add_output(parser, "broken_engines")
-    options = parser.parse_args(argv)
+def main(argv: Sequence[str] | None = None) -> None:
+    options = parsed(__doc__, argv, members=3)
     found: dict[tuple[str, str], Counter[str]] = {}
     for make in FAMILIES.values():
         for seed in range(options.members):
@@ -115,18 +112,12 @@ def main(argv: list[str] | None = None) -> int:
                 for name, wrong in BREAKS.items():
                     became, contradicts = fate(engine, mesh, 7, wrong)
                     found.setdefault((engine, name), Counter()).update([became, *["contradictions"] * contradicts])
-    columns = ("warned", "repaired", "let through", "contradictions")
-    rows = [(engine, name, *(str(counts[column]) for column in columns)) for (engine, name), counts in found.items()]
-    text = "\n".join(table(["engine", "break", *columns], rows, left=(0, 1)))
-    result = {
-        "environment": environment(),
-        "rows": [
-            {"engine": engine, "break": name, **{column: counts[column] for column in columns}}
-            for (engine, name), counts in found.items()
-        ],
-    }
-    publish(result, text, folder=options.output, name="broken_engines", json_file=options.json)
-    return 0
+    heads = ("engine", "break", "warned", "repaired", "let through", "contradictions")
+    rows = [
+        {"engine": engine, "break": name} | {h: counts[h] for h in heads[2:]}
+        for (engine, name), counts in found.items()
+    ]
+    publish(options, {"broken": Table(rows, {head: head for head in heads})})
 
 
 if __name__ == "__main__":

@@ -43,6 +43,7 @@ from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
 from heat_igl.unfolding.exact import ExactSurface
+from heat_igl.validation.zoo.registry import hull
 
 from harness import (
     METHODS,
@@ -50,7 +51,6 @@ from harness import (
     Table,
     collected,
     drawn,
-    hull,
     named,
     on_sphere,
     paired,

@@ -27,7 +27,6 @@ from typing import Any
 
 import igl
 import numpy as np
-from scipy.spatial import ConvexHull
 
 import heat_igl
 from heat_igl import Mesh, read_mesh, shapes, write_mesh
@@ -216,15 +215,6 @@ def named(paths: Iterable[Path], default: str = "") -> dict[str, Mesh]:
     """Meshes of files, by the names of the files; a sample of the pymeshlab wheel where there are none."""
     found = {path.stem: read_mesh(path) for path in paths}
     return found or ({default: sample(default)} if default else {})
-
-
-def hull(P: FloatArray) -> Mesh:
-    """The convex hull of points, oriented outward, without the points inside."""
-    used, F = np.unique(ConvexHull(P).simplices, return_inverse=True)
-    V, F = P[used], F.reshape(-1, 3)
-    inward = np.linalg.det(V[F] - P.mean(axis=0)) < 0
-    F[inward] = F[inward][:, ::-1]
-    return Mesh(V, F)
 
 
 def on_sphere(n: int, rng: np.random.Generator) -> FloatArray:

@@ -1,7 +1,7 @@
 """Exact distance by windows on random nearly flat surfaces, against straight lines that are followed one by one.
 
-    python scripts/random_coverage.py 2000                # members of the families of validation/zoo/nearly_flat.py
-    python scripts/random_coverage.py 100 --first 500     # those of the seeds 500 to 599
+    python scripts/random_coverage.py --count 2000        # members of the families of validation/zoo/nearly_flat.py
+    python scripts/random_coverage.py --count 100 --first 500     # those of the seeds 500 to 599
 
 Each member is asked from three vertices, on the intrinsic Delaunay triangulation and on the triangles as given. Every
 distance must be finite and no larger than its neighbour's plus the edge between. On members of at most 60 vertices it
@@ -15,7 +15,6 @@ import sys
 from collections.abc import Sequence
 
 import numpy as np
-from scaffold import add_output, environment, option_parser, publish, table
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -26,6 +25,8 @@ from heat_igl.typing import FloatArray
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN, from_mesh
 from heat_igl.validation.zoo import FAMILIES
+
+from harness import Table, parsed, publish
 
 NAMES = [name for name, make in FAMILIES.items() if make.__module__.endswith("nearly_flat")]
 _MOST_COMPARED = 60
@@ -128,24 +129,19 @@ def compared(seed: int) -> tuple[str, int, float, float, float]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = option_parser(__doc__)
-    parser.add_argument("members", type=int, help="how many surfaces")
-    parser.add_argument("--first", type=int, default=0, help="the seed of the first (default 0)")
-    add_output(parser, "random_coverage")
-    arguments = parser.parse_args(argv)
-    found = [compared(seed) for seed in range(arguments.first, arguments.first + arguments.members)]
-    head = ["family", "members", "refused", "compared", "unreached or longer", "triangulations", "straight lines"]
+    options = parsed(__doc__, argv, count=200, first=0)
+    found = [compared(seed) for seed in range(options.first, options.first + options.count)]
+    heads = ("unreached or longer", "triangulations", "straight lines")
     rows = []
-    for name in NAMES:
+    for name in dict.fromkeys(one[0] for one in found):
         mine = [one for one in found if one[0] == name]
-        n_compared = sum(0 < one[1] <= _MOST_COMPARED for one in mine)
-        columns = np.array([one[2:] for one in mine]).max(axis=0)
-        numbers = [len(mine), sum(one[1] == 0 for one in mine), n_compared]
-        rows.append([name, *map(str, numbers), *(f"{worst:.1e}" for worst in columns)])
-    result = {"environment": environment(), "members": found}
-    publish(result, "\n".join(table(head, rows)), folder=arguments.output, name="random_coverage")
-    bad = [seed for seed, one in enumerate(found, arguments.first) if max(one[2:]) > 1e-9]
-    print("seeds above 1e-9:", bad)
+        row = {"family": name, "members": len(mine), "refused": sum(one[1] == 0 for one in mine)}
+        row["compared"] = sum(0 < one[1] <= _MOST_COMPARED for one in mine)
+        rows.append(row | dict(zip(heads, np.array([one[2:] for one in mine]).max(axis=0).tolist(), strict=True)))
+    bad = [seed for seed, one in enumerate(found, options.first) if max(one[2:]) > 1e-9]
+    columns = {key: key for key in ("family", "members", "refused", "compared")}
+    table = Table(rows, columns | {head: f"{{{head}:.1e}}" for head in heads})
+    publish(options, {"coverage": table, "seeds": f"Seeds above 1e-9: {bad}"})
     return 1 if bad else 0
 
 

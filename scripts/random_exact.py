@@ -1,8 +1,7 @@
 """Exact distance on many random coarse meshes against pygeodesic, with an explanation of every difference.
 
-    python scripts/random_exact.py 10000                        # meshes of 10 to 300 faces, one source on each
-    python scripts/random_exact.py 100 --first 5000             # the meshes of the seeds 5000 to 5099
-    python scripts/random_exact.py 10000 --output DIRECTORY     # where random_exact.json and random_exact.md go
+    python scripts/random_exact.py --count 10000                 # meshes of 10 to 300 faces, one source on each
+    python scripts/random_exact.py --count 100 --first 5000      # the meshes of the seeds 5000 to 5099
 
 A mesh is determined by its seed. Distances are computed by windows twice, on the intrinsic Delaunay triangulation and
 on the triangles as given. pygeodesic (extra ``validate``) runs in a child process, which may crash. A relative
@@ -22,13 +21,11 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.spatial
-from scaffold import add_output, environment, option_parser, publish, table
 
 from heat_igl import Mesh, SourceError, reference, shapes, shortest_paths
 from heat_igl.errors import ReferenceSolverError
@@ -38,6 +35,9 @@ from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding import exact_distance
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN
+from heat_igl.validation.zoo.registry import compact, hull, joined
+
+from harness import Row, Table, on_sphere, parsed, publish
 
 LARGEST = 1e-10
 CAUSES = ("rounding", "no height", "too long", "contradiction", "unexplained")
@@ -49,14 +49,13 @@ _FEWEST_FACES, _MOST_FACES = 10, 300
 
 def star(rng: np.random.Generator) -> Mesh:
     """A closed surface that is seen whole from inside, with a random radius in every direction."""
-    P = _directions(rng, rng.integers(8, 150))
-    return Mesh(P * np.exp(rng.normal(size=(len(P), 1)) * rng.uniform(0, 0.6)), _hull(P))
+    mesh = hull(on_sphere(int(rng.integers(8, 150)), rng))
+    return Mesh(mesh.V * np.exp(rng.normal(size=(mesh.n_vertices, 1)) * rng.uniform(0, 0.6)), mesh.F)
 
 
 def polyhedron(rng: np.random.Generator) -> Mesh:
     """The convex hull of random points."""
-    P = rng.normal(size=(rng.integers(8, 150), 3))
-    return _of_used(P, _hull(P))
+    return hull(rng.normal(size=(rng.integers(8, 150), 3)))
 
 
 def height_field(rng: np.random.Generator) -> Mesh:
@@ -103,7 +102,7 @@ def with_holes(rng: np.random.Generator) -> Mesh:
         if not is_at_hole[mesh.F[around]].any():
             is_at_hole[mesh.F[around]] = True
             kept &= ~around
-    return _of_used(mesh.V, mesh.F[kept])
+    return compact(mesh.V, mesh.F[kept])
 
 
 def needles(rng: np.random.Generator) -> Mesh:
@@ -117,8 +116,7 @@ def needles(rng: np.random.Generator) -> Mesh:
 def components(rng: np.random.Generator) -> Mesh:
     """Two meshes, of which the second may be much smaller."""
     one, two = (_SIMPLE[rng.integers(len(_SIMPLE))](rng) for _ in range(2))
-    V = np.concatenate([one.V, 10 ** rng.uniform(-4, 0) * two.V])
-    return Mesh(V, np.concatenate([one.F, two.F + one.n_vertices]))
+    return joined(one, Mesh(10 ** rng.uniform(-4, 0) * two.V, two.F))
 
 
 _SIMPLE: list[Callable[[np.random.Generator], Mesh]] = [
@@ -141,20 +139,6 @@ def random_mesh(seed: int) -> tuple[str, Mesh, int]:
     while not _FEWEST_FACES <= mesh.n_faces <= _MOST_FACES:
         mesh = make(rng)
     return make.__name__.replace("_", " "), mesh, int(rng.choice(np.unique(mesh.F)))
-
-
-def _directions(rng: np.random.Generator, n: int) -> FloatArray:
-    P = rng.normal(size=(n, 3))
-    return np.asarray(P / np.linalg.norm(P, axis=1)[:, None])
-
-
-def _hull(P: FloatArray) -> IntArray:
-    return np.asarray(scipy.spatial.ConvexHull(P).simplices, np.int64)
-
-
-def _of_used(V: FloatArray, F: IntArray) -> Mesh:
-    used, numbers = np.unique(F, return_inverse=True)
-    return Mesh(V[used], numbers.reshape(-1, 3))
 
 
 # The comparison.
@@ -261,47 +245,26 @@ def _lengths(mesh: Mesh) -> FloatArray:
     return np.stack([np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1), np.linalg.norm(b - a, axis=1)], 1)
 
 
-# The table.
-
-
-def markdown(found: Sequence[Compared], unexplained: Sequence[int]) -> str:
-    rows = []
+def rows(found: Sequence[Compared]) -> Iterator[Row]:
+    """A row for each kind of meshes."""
     for kind in dict.fromkeys(one.kind for one in found):
         here = [one for one in found if one.kind == kind]
+        counts = {"refused": sum(bool(one.refused) for one in here), "distances": sum(one.n_values for one in here)}
         causes = sum((one.causes for one in here), Counter())
-        rows.append(
-            (
-                kind,
-                f"{len(here)}",
-                f"{sum(bool(one.refused) for one in here)}",
-                f"{sum(one.n_values for one in here)}",
-                f"{max(one.difference for one in here):.1e}",
-                *(f"{causes[cause]}" for cause in CAUSES),
-            )
-        )
-    head = ("meshes", "number", "refused", "distances", "largest relative difference", *CAUSES)
-    reasons = Counter(one.refused.split(":")[0][:90] for one in found if one.refused)
-    lines = [*table(head, rows), ""]
-    lines += [f"Refused by pygeodesic, {count} times: {reason}" for reason, count in reasons.most_common(10)]
-    if unexplained:
-        lines += [f"Unexplained: the seeds {', '.join(str(seed) for seed in unexplained)}"]
-    return "\n".join(lines)
+        row = {"meshes": kind, "number": len(here)} | counts | {cause: causes[cause] for cause in CAUSES}
+        yield row | {"largest relative difference": f"{max(one.difference for one in here):.1e}"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    parser = option_parser(__doc__)
-    parser.add_argument("meshes", type=int, help="how many meshes")
-    parser.add_argument("--first", type=int, default=0, help="the seed of the first (default 0)")
-    add_output(parser, "random_exact")
-    arguments = parser.parse_args(argv)
-    seeds = range(arguments.first, arguments.first + arguments.meshes)
+    options = parsed(__doc__, argv, count=1000, first=0)
+    seeds = range(options.first, options.first + options.count)
     found = [compared(seed) for seed in seeds]
     unexplained = [seed for seed, one in zip(seeds, found, strict=True) if one.causes["unexplained"]]
-    result: dict[str, Any] = {
-        "environment": environment(),
-        "meshes": [vars(one) | {"seed": seed} for seed, one in zip(seeds, found, strict=True)],
-    }
-    publish(result, markdown(found, unexplained), folder=arguments.output, name="random_exact")
+    reasons = Counter(one.refused.split(":")[0][:90] for one in found if one.refused)
+    said = [f"Refused by pygeodesic, {count} times: {reason}" for reason, count in reasons.most_common(10)]
+    heads = ("meshes", "number", "refused", "distances", "largest relative difference", *CAUSES)
+    text = "\n".join([*said, f"Unexplained: the seeds {unexplained}"])
+    publish(options, {"random": Table(list(rows(found)), {head: head for head in heads}), "reasons": text})
     return 1 if unexplained else 0
 
 

@@ -9,6 +9,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from conftest import load_script
 
 import heat_igl
 
@@ -94,3 +95,11 @@ def test_names_loaded_on_first_use_are_those_of_their_modules():
 def test_public_names_exist_and_are_documented():
     for name in heat_igl.__all__:
         assert getattr(heat_igl, name).__doc__, name
+
+
+def test_the_walks_of_the_page_are_the_files_that_calls_enter() -> None:
+    """``python scripts/walks.py --docs ARCHITECTURE.md`` writes them."""
+    page = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf8")
+    for call, files in load_script("walks").walks().items():
+        part = page.split(f"<!-- {call} -->")[1].split(f"<!-- /{call} -->")[0]
+        assert sorted(re.findall(r"`([\w/]+\.py)`", part)) == sorted(files), call

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import tomllib
 from pathlib import Path
@@ -55,3 +56,37 @@ def test_workflows_may_do_no_more_than_they_need(path: Path) -> None:
     assert granted == ([{"id-token": "write"}] if path.name == "publish.yml" else [])
     for name in re.findall(r"(?:scripts|tests)/\w+\.py", path.read_text(encoding="utf8")):
         assert (ROOT / name).is_file(), name
+
+
+PAGES = ["README.md", "CONTRIBUTING.md", "ARCHITECTURE.md", "CHANGELOG.md", "SECURITY.md"]
+LINK = r"\]\((?!https?:|mailto:)([^)#]*)#?([^)]*)\)"
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_relative_links_lead_to_files_and_headings(name: str) -> None:
+    for path, heading in re.findall(LINK, (ROOT / name).read_text(encoding="utf8")):
+        target = ROOT / (path or name)
+        assert target.exists(), path
+        text = target.read_text(encoding="utf8") if heading else ""
+        headings = {re.sub(r"[^\w -]", "", line.lstrip("# ")).lower().replace(" ", "-") for line in text.splitlines()}
+        assert not heading or heading in headings, f"{path}#{heading}"
+
+
+def test_an_index_of_packages_shows_no_relative_link() -> None:
+    spec = importlib.util.spec_from_file_location("setup_script", ROOT / "setup.py")
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    text = script.index_page()
+    assert re.search(LINK, (ROOT / "README.md").read_text(encoding="utf8"))
+    assert not re.search(LINK, text)
+    assert f"({PROJECT['urls']['Repository']}/blob/main/docs/exact.md)" in text
+
+
+def test_contributing_names_what_exists() -> None:
+    """Files between backticks, in the repository or in the package; commands begin with something that is there."""
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf8")
+    for name in re.findall(r"`([\w./]+(?:\.(?:py|toml|md|yml|yaml|cff)|/))`", text):
+        places = [ROOT / name, *(ROOT / "heat_igl").rglob(name)]
+        assert name == "utils.py" or any(place.exists() for place in places), name
+    for script in re.findall(r"python ((?:scripts|docs)/\S+\.py)", text):
+        assert (ROOT / script).is_file(), script
