@@ -40,6 +40,10 @@ cdef class HopfLax(Facet):
     # The derivative of distance by the position of each vertex, where it is known.
     cdef double[:, ::1] slope
     cdef unsigned char[::1] is_sloped
+    # The corner whose facet gave each vertex its distance, and what bounds the values through each simplex.
+    cdef int[::1] facet
+    cdef double[::1] widest
+    cdef double[::1] slack
     # The corners of the facet in the simplex.
     cdef int side[3]
 
@@ -51,7 +55,9 @@ cdef class HopfLax(Facet):
     cdef void sharpen(self, const unsigned char[::1] fixed, double low) noexcept nogil
     cdef void visit(self, int v) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
-    cdef double curved(self, int s, int c) noexcept nogil
+    cdef bint rests_on(self, int v, int u) noexcept nogil
+    cdef double through(self, int s, int c, double best) noexcept nogil
+    cdef double curved(self, int s, int c, double best) noexcept nogil
     cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil
     cdef double trust(self, int s, int corner) noexcept nogil
     cdef void find_slope(self, int s, int c) noexcept nogil

@@ -57,6 +57,10 @@ class HopfLax(Facet):
         self.inverse, self.gradient, self.V = inverse, gradient, V
         self.p, self.q = corners.shape[1] - 1, squares.shape[1]
         self.unit = np.sqrt(squares.mean())
+        # The longest edge, and by which factor lengths may be shorter than in the mean metric.
+        self.widest = squares.max(axis=(1, 2, 3))
+        apart = squares[:, :, ~np.eye(self.p + 1, dtype=bool)]
+        self.slack = np.sqrt(apart / apart.mean(axis=1, keepdims=True)).min(axis=(1, 2))
         self.mean = squares[:, 0] if self.q == 1 else np.ascontiguousarray(squares.mean(axis=1))
 
     def first_order(self, d, label, offset):
@@ -84,6 +88,7 @@ class HopfLax(Facet):
         """After `first_order`: change its distances to those of second order."""
         n = self.d.shape[0]
         self.slope, self.is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
+        self.facet = np.full(n, -1, np.int32)
         self.pending, self.n_visits = np.where(np.isfinite(self.d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
             self.sharpen(self.fixed, self.low)
@@ -272,6 +277,11 @@ class HopfLax(Facet):
                         u: cython.int = self.corners[s, c]
                         if u == v or fixed[u] or not change > self.pending[u]:
                             continue
+                        # Farther away, v matters to u if it now has a slope, and u gains by that.
+                        if not (self.d[v] < self.d[u] or self.rests_on(u, v)) and not (
+                            change == INFINITY and self.through(s, c, self.d[u]) < self.d[u]
+                        ):
+                            continue
                         self.pending[u] = change
                         if change > settled and self.n_visits[u] < MOST_VISITS:
                             self.queue.set_key(u, 1.0 / (1.0 + (self.d[u] - low) / self.unit))
@@ -290,18 +300,16 @@ class HopfLax(Facet):
         best: cython.double = INFINITY
         best_at: cython.int = -1
         kept: cython.double[3]
-        for k in range(self.first[v], self.first[v + 1]):
-            s: cython.int = self.incident[k] // size
-            c: cython.int = self.incident[k] % size
-            nearest: cython.double = INFINITY
-            for i in range(size):
-                if i != c:
-                    nearest = min(nearest, self.d[self.corners[s, i]])
-            if not nearest < min(best, self.d[v]):
+        # The facet of the last visit first: it rules out most of the others.
+        for k in range(self.first[v] - 1, self.first[v + 1]):
+            at: cython.int = self.facet[v] if k < self.first[v] else self.incident[k]
+            if at < 0 or (at == self.facet[v] and k >= self.first[v]):
                 continue
-            value: cython.double = self.curved(s, c)
+            s: cython.int = at // size
+            c: cython.int = at % size
+            value: cython.double = self.through(s, c, best)
             if value < best:
-                best, best_at = value, self.incident[k]
+                best, best_at = value, at
                 for i in range(self.p):
                     kept[i] = self.share[i]
         if best_at < 0:
@@ -310,10 +318,45 @@ class HopfLax(Facet):
         self.face(c)
         for i in range(self.p):
             self.share[i] = kept[i]
-        self.d[v] = best
+        self.d[v], self.facet[v] = best, best_at
         self.label[v] = self.label[self.corners[s, self.nearest_corner()]]
         self.lay(s, c)
         self.find_slope(s, c)
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def rests_on(self, v: cython.int, u: cython.int) -> cython.bint:
+        """Whether u is in the simplex through which v got its distance."""
+        c: cython.int
+        if self.facet[v] >= 0:
+            for c in range(self.p + 1):
+                if self.corners[self.facet[v] // (self.p + 1), c] == u:
+                    return True
+        return False
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def through(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
+        """The value at corner c of second order through simplex s, inf if it cannot be below `best`; sets `share`.
+
+        It is at least what first order and the nearest corner say, with some margin.
+        """
+        i: cython.int
+        nearest: cython.double = INFINITY
+        for i in range(self.p + 1):
+            if i != c:
+                nearest = min(nearest, self.d[self.corners[s, i]])
+        if not nearest < min(best, self.d[self.corners[s, c]]):
+            return INFINITY
+        linear: cython.double = self.linear(s, c)
+        near: cython.double = nearest - self.low
+        sag: cython.double = near - sqrt(max(near * near - self.widest[s], 0.0))
+        if not nearest + self.slack[s] * (linear - nearest) - sag < best:
+            return INFINITY
+        return self.curved(s, c, linear)
 
     @cython.cfunc
     @cython.nogil
@@ -340,9 +383,8 @@ class HopfLax(Facet):
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def curved(self, s: cython.int, c: cython.int) -> cython.double:
-        """The least value at corner c of simplex s with T of second order; sets `side` and `share`."""
-        best: cython.double = self.linear(s, c)
+    def curved(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
+        """The least value at corner c of simplex s with T of second order, after that of first order; sets `share`."""
         i: cython.int
         j: cython.int
         start: cython.double = INFINITY
